@@ -1,0 +1,1 @@
+//! Hash-consed expression graphs, their derivatives, and tapes evaluated over many algebras.

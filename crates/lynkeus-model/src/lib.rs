@@ -1,0 +1,1 @@
+//! A Modelica subset read into plants; every diagnostic points at the source line.

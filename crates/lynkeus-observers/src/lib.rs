@@ -1,0 +1,1 @@
+//! Observer families, one file each.

@@ -1,0 +1,1 @@
+//! Simulation and log replay of systems and their observers.

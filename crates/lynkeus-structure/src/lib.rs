@@ -1,0 +1,1 @@
+//! What can be observed: chains, and conditions decided on the declared box.
