@@ -1,1 +1,77 @@
-fn main() {}
+//! The project's own chores, run as `cargo xtask <task>`.
+
+mod gallery;
+mod process;
+mod python;
+
+use std::process::ExitCode;
+
+use process::{cargo, run};
+
+const USAGE: &str = "\
+usage: cargo xtask <task>
+
+  test      every test of the workspace, with the Python cross-checks
+  ci        format check, lints, documentation, then `test`
+  gallery   draw the pictures of docs/pictures again from the shipped studies";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let task = match arguments.as_slice() {
+        [task] => task.as_str(),
+        _ => "",
+    };
+    let outcome = match task {
+        "test" => test(),
+        "ci" => ci(),
+        "gallery" => gallery::draw(),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("xtask: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs every test. `cargo test` comes last, so its summary closes the output.
+fn test() -> Result<(), String> {
+    let mut tests = cargo(&["test", "--workspace"]);
+    match python::interpreter() {
+        Ok(path) => {
+            tests.env(python::VARIABLE, path);
+        }
+        Err(reason) if is_ci() => {
+            return Err(format!("the Python cross-checks cannot run: {reason}"));
+        }
+        Err(reason) => {
+            tests.env_remove(python::VARIABLE);
+            eprintln!("skipped: the Python cross-checks: {reason}");
+        }
+    }
+    run(&mut tests)
+}
+
+fn ci() -> Result<(), String> {
+    run(&mut cargo(&["fmt", "--all", "--check"]))?;
+    run(&mut cargo(&[
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ]))?;
+    run(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
+    test()
+}
+
+/// True on machines that promise to have everything: there, a skip is a failure.
+fn is_ci() -> bool {
+    std::env::var("CI").is_ok_and(|value| value == "true" || value == "1")
+}
