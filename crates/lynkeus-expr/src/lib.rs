@@ -1,1 +1,48 @@
 //! Hash-consed expression graphs, their derivatives, and tapes evaluated over many algebras.
+//!
+//! A [`Graph`] holds expressions, each distinct one once. A [`Tape`] is a graph
+//! compiled to straight-line code; it is evaluated over any [`Algebra`]: numbers,
+//! lanes of numbers, intervals, Taylor series, and the nodes of a graph itself.
+//!
+//! ```
+//! use lynkeus_expr::{Graph, Tape, jacobian};
+//!
+//! let g = Graph::new();
+//! let (x, u) = (g.symbol("x"), g.symbol("u"));
+//! let f = u - 0.5 * x.sqrt();
+//!
+//! let tape = Tape::new(&g, &[x.node(), u.node()], &[f.node()])?;
+//! let mut out = [0.0];
+//! tape.evaluator().eval(&[4.0, 3.0], &mut out);
+//! assert_eq!(out, [2.0]);
+//!
+//! let df = jacobian::forward(&g, &[f.node()], &[x.node()]);
+//! let slope = Tape::new(&g, &[x.node()], &[df.get(0, 0).unwrap()])?;
+//! slope.evaluator().eval(&[4.0], &mut out);
+//! assert_eq!(out, [-0.125]);
+//! # Ok::<(), lynkeus_expr::MissingInput>(())
+//! ```
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod algebra;
+mod expr;
+pub mod flow;
+mod graph;
+pub mod jacobian;
+mod jet;
+mod lanes;
+mod linear;
+mod op;
+mod partials;
+pub mod real;
+mod render;
+mod substitute;
+mod tape;
+
+pub use algebra::{Algebra, Nodes, Reals};
+pub use expr::Expr;
+pub use graph::{Graph, Node, Solution};
+pub use jet::{Jet, Jets};
+pub use lanes::Lanes;
+pub use op::{Binary, Op, Unary};
+pub use tape::{Evaluator, MissingInput, Tape};

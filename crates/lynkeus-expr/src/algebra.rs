@@ -1,0 +1,94 @@
+//! What a tape needs of the things it computes with.
+
+use crate::{Binary, Graph, Node, Unary, linear, real};
+
+/// A set of values closed under every operation of a graph. A tape evaluated
+/// over an algebra gives bounds, Taylor coefficients, lanes or new nodes with
+/// the one interpreter that also gives numbers.
+pub trait Algebra {
+    /// The values.
+    type Value: Clone;
+    /// A number as a value.
+    fn constant(&self, value: f64) -> Self::Value;
+    /// A function of one value.
+    fn unary(&self, op: Unary, x: &Self::Value) -> Self::Value;
+    /// An integer power.
+    fn powi(&self, x: &Self::Value, n: i32) -> Self::Value;
+    /// A function of two values.
+    fn binary(&self, op: Binary, x: &Self::Value, y: &Self::Value) -> Self::Value;
+    /// `if condition then x else y`.
+    fn select(&self, condition: &Self::Value, x: &Self::Value, y: &Self::Value) -> Self::Value;
+    /// (x with A x = b, reciprocal condition estimate of A); `a` is n×n row by row.
+    fn solve(&self, a: &[Self::Value], b: &[Self::Value]) -> (Vec<Self::Value>, Self::Value);
+}
+
+/// The numbers: `f64`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reals;
+
+impl Algebra for Reals {
+    type Value = f64;
+
+    fn constant(&self, value: f64) -> f64 {
+        value
+    }
+
+    #[inline(always)]
+    fn unary(&self, op: Unary, x: &f64) -> f64 {
+        real::unary(op, *x)
+    }
+
+    #[inline(always)]
+    fn powi(&self, x: &f64, n: i32) -> f64 {
+        x.powi(n)
+    }
+
+    #[inline(always)]
+    fn binary(&self, op: Binary, x: &f64, y: &f64) -> f64 {
+        real::binary(op, *x, *y)
+    }
+
+    #[inline(always)]
+    fn select(&self, condition: &f64, x: &f64, y: &f64) -> f64 {
+        real::select(*condition, *x, *y)
+    }
+
+    fn solve(&self, a: &[f64], b: &[f64]) -> (Vec<f64>, f64) {
+        let mut x = b.to_vec();
+        let rcond = linear::solve(&mut a.to_vec(), &mut x);
+        (x, rcond)
+    }
+}
+
+/// The nodes of a graph: evaluation builds expressions.
+#[derive(Clone, Copy, Debug)]
+pub struct Nodes<'g>(pub &'g Graph);
+
+impl Algebra for Nodes<'_> {
+    type Value = Node;
+
+    fn constant(&self, value: f64) -> Node {
+        self.0.constant(value).node()
+    }
+
+    fn unary(&self, op: Unary, x: &Node) -> Node {
+        self.0.unary(op, *x)
+    }
+
+    fn powi(&self, x: &Node, n: i32) -> Node {
+        self.0.powi(*x, n)
+    }
+
+    fn binary(&self, op: Binary, x: &Node, y: &Node) -> Node {
+        self.0.binary(op, *x, *y)
+    }
+
+    fn select(&self, condition: &Node, x: &Node, y: &Node) -> Node {
+        self.0.select(*condition, *x, *y)
+    }
+
+    fn solve(&self, a: &[Node], b: &[Node]) -> (Vec<Node>, Node) {
+        let solution = self.0.solve(a, b);
+        (solution.x, solution.rcond)
+    }
+}

@@ -1,0 +1,374 @@
+//! The hash-consed arena: an expression built twice is one node.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+use crate::{Binary, Expr, Op, Unary, real};
+
+/// A node of a [`Graph`]: cheap to copy, meaningful only with its graph.
+/// Arguments of a node are always smaller than the node itself.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub struct Node(pub(crate) u32);
+
+impl Node {
+    /// Position of the node in the order of construction.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// A linear system A x = b of a [`Op::Solve`] node.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct LinearSystem {
+    /// A row by row (n²), then b (n)
+    pub arguments: Vec<Node>,
+    pub n: usize,
+}
+
+/// The result of [`Graph::solve`].
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// the n components of x with A x = b
+    pub x: Vec<Node>,
+    /// estimate of 1/cond(A) in [0, 1]; near 0 where A is close to singular and
+    /// `x` is the bounded answer of a truncated factorisation. Its derivative
+    /// is taken as zero: it is a diagnostic, not part of the solution.
+    pub rcond: Node,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+enum Key {
+    Constant(u64),
+    Symbol(u32),
+    Unary(Unary, Node),
+    Powi(Node, i32),
+    Binary(Binary, Node, Node),
+    Select(Node, Node, Node),
+    Entry(Node, u32),
+}
+
+#[derive(Default)]
+struct Inner {
+    ops: Vec<Op>,
+    known: HashMap<Key, Node>,
+    names: Vec<String>,
+    by_name: HashMap<String, Node>,
+    systems: Vec<LinearSystem>,
+    known_systems: HashMap<LinearSystem, Node>,
+}
+
+impl Inner {
+    fn push(&mut self, op: Op) -> Node {
+        let node = Node(self.ops.len() as u32);
+        self.ops.push(op);
+        node
+    }
+
+    fn intern(&mut self, key: Key, op: Op) -> Node {
+        if let Some(&node) = self.known.get(&key) {
+            return node;
+        }
+        let node = self.push(op);
+        self.known.insert(key, node);
+        node
+    }
+}
+
+/// A growing set of expressions in which equal expressions are one node.
+///
+/// ```
+/// let g = lynkeus_expr::Graph::new();
+/// let x = g.symbol("x");
+/// assert_eq!(((x + 1.0) * x).node(), (x * (1.0 + x)).node());
+/// ```
+#[derive(Default)]
+pub struct Graph {
+    inner: RefCell<Inner>,
+}
+
+impl std::fmt::Debug for Graph {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Graph({} nodes)", self.len())
+    }
+}
+
+impl Graph {
+    /// An empty graph.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Number of distinct nodes.
+    pub fn len(&self) -> usize {
+        self.inner.borrow().ops.len()
+    }
+
+    /// True before the first node.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The free variable of this name; the same name is the same node.
+    pub fn symbol(&self, name: &str) -> Expr<'_> {
+        let mut inner = self.inner.borrow_mut();
+        if let Some(&node) = inner.by_name.get(name) {
+            return Expr::new(self, node);
+        }
+        let index = inner.names.len() as u32;
+        inner.names.push(name.to_owned());
+        let node = inner.intern(Key::Symbol(index), Op::Symbol(index));
+        inner.by_name.insert(name.to_owned(), node);
+        Expr::new(self, node)
+    }
+
+    /// A number.
+    pub fn constant(&self, value: f64) -> Expr<'_> {
+        let key = Key::Constant(value.to_bits());
+        let node = self.inner.borrow_mut().intern(key, Op::Constant(value));
+        Expr::new(self, node)
+    }
+
+    /// The handle with operators for a node of this graph.
+    pub fn expr(&self, node: Node) -> Expr<'_> {
+        Expr::new(self, node)
+    }
+
+    /// What a node is.
+    ///
+    /// # Panics
+    /// If `node` belongs to a larger graph.
+    pub fn op(&self, node: Node) -> Op {
+        self.inner.borrow().ops[node.index()]
+    }
+
+    /// The number, where the node is one.
+    pub fn constant_value(&self, node: Node) -> Option<f64> {
+        match self.op(node) {
+            Op::Constant(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// The name, where the node is a symbol.
+    pub fn symbol_name(&self, node: Node) -> Option<String> {
+        match self.op(node) {
+            Op::Symbol(index) => Some(self.inner.borrow().names[index as usize].clone()),
+            _ => None,
+        }
+    }
+
+    /// Arguments of a node, in order.
+    pub fn arguments(&self, node: Node) -> Vec<Node> {
+        match self.op(node) {
+            Op::Constant(_) | Op::Symbol(_) => vec![],
+            Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => vec![a],
+            Op::Binary(_, a, b) => vec![a, b],
+            Op::Select(c, a, b) => vec![c, a, b],
+            Op::Solve(system) => self.inner.borrow().systems[system as usize]
+                .arguments
+                .clone(),
+        }
+    }
+
+    /// The linear system of a `Solve` node: (A row by row then b, n).
+    pub(crate) fn system(&self, index: u32) -> LinearSystem {
+        self.inner.borrow().systems[index as usize].clone()
+    }
+
+    /// A function of one node.
+    pub fn unary(&self, op: Unary, a: Node) -> Node {
+        if let Some(x) = self.constant_value(a)
+            && let Some(folded) = self.fold(real::unary(op, x))
+        {
+            return folded;
+        }
+        if let (Unary::Neg, Op::Unary(Unary::Neg, inner)) = (op, self.op(a)) {
+            return inner;
+        }
+        self.inner
+            .borrow_mut()
+            .intern(Key::Unary(op, a), Op::Unary(op, a))
+    }
+
+    /// An integer power.
+    pub fn powi(&self, a: Node, n: i32) -> Node {
+        if n == 1 {
+            return a;
+        }
+        if let Some(x) = self.constant_value(a)
+            && let Some(folded) = self.fold(x.powi(n))
+        {
+            return folded;
+        }
+        self.inner
+            .borrow_mut()
+            .intern(Key::Powi(a, n), Op::Powi(a, n))
+    }
+
+    /// A function of two nodes.
+    pub fn binary(&self, op: Binary, a: Node, b: Node) -> Node {
+        let (x, y) = (self.constant_value(a), self.constant_value(b));
+        if let (Some(x), Some(y)) = (x, y)
+            && let Some(folded) = self.fold(real::binary(op, x, y))
+        {
+            return folded;
+        }
+        if let Some(same) = self.identity(op, a, b, x, y) {
+            return same;
+        }
+        let (a, b) = if op.commutes() && b < a {
+            (b, a)
+        } else {
+            (a, b)
+        };
+        self.inner
+            .borrow_mut()
+            .intern(Key::Binary(op, a, b), Op::Binary(op, a, b))
+    }
+
+    /// Identities that hold for every `f64`, NaN, infinities and −0 included:
+    /// x·1, x/1, x·(−1), x/(−1), x − 0 and x + (−0). Notably x + 0 is not one
+    /// (−0 + 0 = +0) and neither are 0·x, x − x and x/x.
+    fn identity(
+        &self,
+        op: Binary,
+        a: Node,
+        b: Node,
+        x: Option<f64>,
+        y: Option<f64>,
+    ) -> Option<Node> {
+        let is =
+            |value: Option<f64>, number: f64| value.map(f64::to_bits) == Some(number.to_bits());
+        match op {
+            Binary::Mul | Binary::Div if is(y, 1.0) => Some(a),
+            Binary::Mul | Binary::Div if is(y, -1.0) => Some(self.unary(Unary::Neg, a)),
+            Binary::Mul if is(x, 1.0) => Some(b),
+            Binary::Mul if is(x, -1.0) => Some(self.unary(Unary::Neg, b)),
+            Binary::Sub if is(y, 0.0) => Some(a),
+            Binary::Add if is(y, -0.0) => Some(a),
+            Binary::Add if is(x, -0.0) => Some(b),
+            _ => None,
+        }
+    }
+
+    /// A folded value as a constant. Values that are not finite stay unfolded,
+    /// so that the operation that makes them can be named when it is evaluated.
+    fn fold(&self, value: f64) -> Option<Node> {
+        value.is_finite().then(|| self.constant(value).node())
+    }
+
+    /// `if condition then a else b`.
+    pub fn select(&self, condition: Node, a: Node, b: Node) -> Node {
+        match self.constant_value(condition) {
+            Some(c) if !c.is_nan() => return if c != 0.0 { a } else { b },
+            _ => {}
+        }
+        self.inner
+            .borrow_mut()
+            .intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
+    }
+
+    /// The solution of A x = b; `a` is n×n row by row, `b` has n entries.
+    ///
+    /// # Panics
+    /// If `a.len() != b.len()²`.
+    pub fn solve(&self, a: &[Node], b: &[Node]) -> Solution {
+        let n = b.len();
+        assert_eq!(a.len(), n * n, "A must be n×n for the n entries of b");
+        let system = LinearSystem {
+            arguments: a.iter().chain(b).copied().collect(),
+            n,
+        };
+        let mut inner = self.inner.borrow_mut();
+        let node = match inner.known_systems.get(&system) {
+            Some(&node) => node,
+            None => {
+                let index = inner.systems.len() as u32;
+                inner.systems.push(system.clone());
+                let node = inner.push(Op::Solve(index));
+                inner.known_systems.insert(system, node);
+                node
+            }
+        };
+        let mut entry = |i: usize| {
+            let i = i as u32;
+            inner.intern(Key::Entry(node, i), Op::Entry(node, i))
+        };
+        Solution {
+            x: (0..n).map(&mut entry).collect(),
+            rcond: entry(n),
+        }
+    }
+
+    /// One result of a `Solve` node built before.
+    pub(crate) fn entry(&self, solve: Node, i: u32) -> Node {
+        self.inner
+            .borrow_mut()
+            .intern(Key::Entry(solve, i), Op::Entry(solve, i))
+    }
+
+    /// Every node that the roots need, arguments before their users.
+    pub fn reachable(&self, roots: &[Node]) -> Vec<Node> {
+        let Some(last) = roots.iter().max() else {
+            return vec![];
+        };
+        let mut needed = vec![false; last.index() + 1];
+        for root in roots {
+            needed[root.index()] = true;
+        }
+        for index in (0..needed.len()).rev() {
+            if needed[index] {
+                for argument in self.arguments(Node(index as u32)) {
+                    needed[argument.index()] = true;
+                }
+            }
+        }
+        (0..needed.len() as u32)
+            .map(Node)
+            .filter(|node| needed[node.index()])
+            .collect()
+    }
+
+    /// The symbols that the roots depend on, in order of creation.
+    pub fn symbols_of(&self, roots: &[Node]) -> Vec<Node> {
+        let mut symbols = self.reachable(roots);
+        symbols.retain(|&node| matches!(self.op(node), Op::Symbol(_)));
+        symbols
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_expression_built_twice_is_one_node() {
+        let g = Graph::new();
+        let build = || ((g.symbol("x") + g.symbol("y")).sin() * 2.0).node();
+        let (first, size) = (build(), g.len());
+        assert_eq!((build(), g.len()), (first, size));
+        assert_eq!((2.0 * (g.symbol("y") + g.symbol("x")).sin()).node(), first);
+    }
+
+    #[test]
+    fn unsafe_identities_do_not_fold() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        for kept in [x * 0.0, x - x, x / x, x + 0.0, g.constant(0.0) * x] {
+            assert!(matches!(g.op(kept.node()), Op::Binary(..)), "{kept:?}");
+        }
+        let infinite = g.constant(1.0) / g.constant(0.0);
+        assert!(matches!(g.op(infinite.node()), Op::Binary(..)));
+        for same in [x * 1.0, 1.0 * x, x / 1.0, x - 0.0, -(-x), x + (-0.0)] {
+            assert_eq!(same.node(), x.node());
+        }
+        assert_eq!((x * -1.0).node(), (-x).node());
+    }
+
+    #[test]
+    fn equal_systems_share_their_solution() {
+        let g = Graph::new();
+        let [a, b] = ["a", "b"].map(|name| g.symbol(name).node());
+        assert_eq!(g.solve(&[a], &[b]).x, g.solve(&[a], &[b]).x);
+    }
+}

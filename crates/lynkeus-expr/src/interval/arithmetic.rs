@@ -1,0 +1,226 @@
+//! The four operations, and the others whose bounds are exact or correctly rounded.
+
+use super::Interval;
+use super::rounding::{
+    add_down, add_up, div_down, div_up, mul_down, mul_up, sqrt_down, sqrt_up,
+};
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+impl Neg for Interval {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        if self.is_empty() {
+            return Self::EMPTY;
+        }
+        Self::raw(-self.hi, -self.lo, self.defined)
+    }
+}
+
+impl Add for Interval {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.combine(other, |a, b| (add_down(a.lo, b.lo), add_up(a.hi, b.hi)))
+    }
+}
+
+impl Sub for Interval {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Interval {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        self.combine(other, |a, b| {
+            let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
+            let lo = corners.map(|(x, y)| mul_down(x, y));
+            let hi = corners.map(|(x, y)| mul_up(x, y));
+            (smallest(lo), largest(hi))
+        })
+    }
+}
+
+impl Div for Interval {
+    type Output = Self;
+
+    /// The quotients by the members other than zero; not defined when zero is a member of the divisor.
+    fn div(self, other: Self) -> Self {
+        if other.hi <= 0.0 && !other.is_empty() {
+            return -self / -other;
+        }
+        if other.lo < 0.0 && !self.is_empty() {
+            let whole = if self == Self::ZERO { Self::ZERO } else { Self::ENTIRE };
+            return whole.and_defined(false);
+        }
+        self.div_by_non_negative(other)
+    }
+}
+
+impl Interval {
+    /// The bounds `f` gives for two intervals that are not empty.
+    pub(super) fn combine(self, other: Self, f: impl FnOnce(Self, Self) -> (f64, f64)) -> Self {
+        if self.is_empty() || other.is_empty() {
+            return Self::EMPTY;
+        }
+        let (lo, hi) = f(self, other);
+        Self::raw(lo, hi, self.defined && other.defined)
+    }
+
+    fn div_by_non_negative(self, divisor: Self) -> Self {
+        if divisor.hi == 0.0 {
+            return Self::EMPTY;
+        }
+        let quotient = self.combine(divisor, |a, b| {
+            let lo = match a.lo {
+                lo if lo >= 0.0 => div_down(lo, b.hi),
+                _ if b.lo == 0.0 => f64::NEG_INFINITY,
+                lo => div_down(lo, b.lo),
+            };
+            let hi = match a.hi {
+                hi if hi <= 0.0 => div_up(hi, b.hi),
+                _ if b.lo == 0.0 => f64::INFINITY,
+                hi => div_up(hi, b.lo),
+            };
+            (lo, hi)
+        });
+        quotient.and_defined(divisor.lo > 0.0)
+    }
+
+    /// The absolute values.
+    #[must_use]
+    pub fn abs(self) -> Self {
+        if self.is_empty() {
+            return Self::EMPTY;
+        }
+        Self::raw(self.mignitude(), self.magnitude(), self.defined)
+    }
+
+    /// The signs: −1, 0 or 1.
+    #[must_use]
+    pub fn sign(self) -> Self {
+        self.increasing(|x| if x == 0.0 { 0.0 } else { x.signum() })
+    }
+
+    /// The largest integers not above the members.
+    #[must_use]
+    pub fn floor(self) -> Self {
+        self.increasing(f64::floor)
+    }
+
+    /// The square roots of the members that are not negative.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
+        if self.is_empty() || self.hi < 0.0 {
+            return Self::EMPTY;
+        }
+        let lo = sqrt_down(self.lo.max(0.0)).max(0.0);
+        Self::raw(lo, sqrt_up(self.hi), self.defined && self.lo >= 0.0)
+    }
+
+    /// The smaller ones of two members.
+    #[must_use]
+    pub fn min(self, other: Self) -> Self {
+        self.combine(other, |a, b| (a.lo.min(b.lo), a.hi.min(b.hi)))
+    }
+
+    /// The larger ones of two members.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        self.combine(other, |a, b| (a.lo.max(b.lo), a.hi.max(b.hi)))
+    }
+
+    /// The image under an increasing function that is exact in floating point.
+    fn increasing(self, f: impl Fn(f64) -> f64) -> Self {
+        if self.is_empty() {
+            return Self::EMPTY;
+        }
+        Self::raw(f(self.lo), f(self.hi), self.defined)
+    }
+}
+
+/// The smallest of some bounds, none of which is NaN.
+pub(super) fn smallest<const N: usize>(bounds: [f64; N]) -> f64 {
+    bounds.into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// The largest of some bounds, none of which is NaN.
+pub(super) fn largest<const N: usize>(bounds: [f64; N]) -> f64 {
+    bounds.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INF: f64 = f64::INFINITY;
+
+    fn interval(lo: f64, hi: f64) -> Interval {
+        Interval::new(lo, hi).unwrap()
+    }
+
+    fn undefined(lo: f64, hi: f64) -> Interval {
+        interval(lo, hi).and_defined(false)
+    }
+
+    #[test]
+    fn products_of_every_sign() {
+        let (n, m, p) = (interval(-3.0, -2.0), interval(-1.0, 5.0), interval(4.0, 7.0));
+        assert_eq!(n * n, interval(4.0, 9.0));
+        assert_eq!(n * m, interval(-15.0, 3.0));
+        assert_eq!(n * p, interval(-21.0, -8.0));
+        assert_eq!(m * m, interval(-5.0, 25.0));
+        assert_eq!(m * p, interval(-7.0, 35.0));
+        assert_eq!(Interval::ZERO * Interval::ENTIRE, Interval::ZERO);
+        assert_eq!(interval(2.0, INF) * interval(-INF, -3.0), interval(-INF, -6.0));
+    }
+
+    #[test]
+    fn division_by_zero_is_extended() {
+        let one = Interval::ONE;
+        assert_eq!(one / interval(2.0, 4.0), interval(0.25, 0.5));
+        assert_eq!(one / interval(0.0, 4.0), undefined(0.25, INF));
+        assert_eq!(one / interval(-4.0, 0.0), undefined(-INF, -0.25));
+        assert_eq!(one / interval(-4.0, 1.0), undefined(-INF, INF));
+        assert_eq!(one / Interval::ZERO, Interval::EMPTY);
+        assert_eq!(interval(-1.0, 2.0) / interval(0.0, 1.0), undefined(-INF, INF));
+        assert_eq!(Interval::ZERO / interval(-1.0, 1.0), undefined(0.0, 0.0));
+        assert_eq!(Interval::ZERO / interval(0.0, 1.0), undefined(0.0, 0.0));
+        assert_eq!(interval(-2.0, 0.0) / interval(0.0, 1.0), undefined(-INF, 0.0));
+        assert_eq!(interval(1.0, INF) / interval(1.0, INF), interval(0.0, INF));
+        assert_eq!(interval(-1.0, 1.0) / Interval::ENTIRE, undefined(-INF, INF));
+    }
+
+    #[test]
+    fn roots_keep_to_their_domain() {
+        assert_eq!(interval(0.0, 4.0).sqrt(), interval(0.0, 2.0));
+        assert_eq!(interval(-1.0, 4.0).sqrt(), undefined(0.0, 2.0));
+        assert_eq!(interval(1.0, INF).sqrt(), interval(1.0, INF));
+        assert!(interval(-2.0, -1.0).sqrt().is_empty());
+    }
+
+    #[test]
+    fn steps_and_selections() {
+        assert_eq!(interval(-2.5, 3.5).floor(), interval(-3.0, 3.0));
+        assert_eq!(Interval::ENTIRE.floor(), Interval::ENTIRE);
+        assert_eq!(interval(-2.5, 0.0).sign(), interval(-1.0, 0.0));
+        assert_eq!(interval(-2.5, 1.0).abs(), interval(0.0, 2.5));
+        let (x, y) = (interval(0.0, 3.0), interval(1.0, 2.0));
+        assert_eq!(x.min(y), interval(0.0, 2.0));
+        assert_eq!(x.max(y), interval(1.0, 3.0));
+        assert!(x.max(Interval::EMPTY).is_empty());
+    }
+
+    #[test]
+    fn the_mark_follows_the_operations() {
+        let x = interval(-1.0, 1.0).sqrt();
+        assert!(!x.is_defined());
+        assert!(!(x + Interval::ONE).is_defined() && !(Interval::ONE * x).is_defined());
+        assert!(!(-x).is_defined() && !x.abs().is_defined());
+    }
+}

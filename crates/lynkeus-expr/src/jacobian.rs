@@ -1,0 +1,300 @@
+//! Sparse symbolic Jacobians.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::partials::{Variation, variation};
+use crate::{Binary, Graph, Node, Op, Unary};
+
+/// A sparse matrix of expressions ∂(outputs)/∂(inputs).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Jacobian {
+    /// number of outputs
+    pub rows: usize,
+    /// number of inputs
+    pub columns: usize,
+    /// (row, column, expression), sorted; entries left out are zero everywhere
+    pub entries: Vec<(usize, usize, Node)>,
+}
+
+impl Jacobian {
+    /// The entry, where it is not zero everywhere.
+    pub fn get(&self, row: usize, column: usize) -> Option<Node> {
+        let place = self
+            .entries
+            .binary_search_by_key(&(row, column), |&(i, j, _)| (i, j));
+        place.ok().map(|k| self.entries[k].2)
+    }
+
+    /// The entries of one row: (column, expression).
+    pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, Node)> + '_ {
+        let start = self.entries.partition_point(|&(i, ..)| i < row);
+        self.entries[start..]
+            .iter()
+            .take_while(move |&&(i, ..)| i == row)
+            .map(|&(_, j, node)| (j, node))
+    }
+}
+
+/// Derivative of one node with respect to each input it depends on.
+type Tangent = BTreeMap<usize, Node>;
+
+struct Builder<'g> {
+    graph: &'g Graph,
+}
+
+impl Builder<'_> {
+    fn times(&self, a: Node, b: Node) -> Node {
+        self.graph.binary(Binary::Mul, a, b)
+    }
+
+    fn plus(&self, a: Option<Node>, b: Node) -> Node {
+        match a {
+            Some(a) => self.graph.binary(Binary::Add, a, b),
+            None => b,
+        }
+    }
+
+    fn minus(&self, a: Option<Node>, b: Node) -> Node {
+        match a {
+            Some(a) => self.graph.binary(Binary::Sub, a, b),
+            None => self.graph.unary(Unary::Neg, b),
+        }
+    }
+
+    fn add_to<K: Ord>(&self, sums: &mut BTreeMap<K, Node>, key: K, term: Node) {
+        let sum = self.plus(sums.get(&key).copied(), term);
+        sums.insert(key, sum);
+    }
+
+    fn zero(&self) -> Node {
+        self.graph.constant(0.0).node()
+    }
+}
+
+/// The Jacobian by forward accumulation: cheap where each node depends on few
+/// inputs, as in a column of trays.
+pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
+    let build = Builder { graph };
+    let mut tangents: HashMap<Node, Tangent> = HashMap::new();
+    let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
+    for (column, &input) in inputs.iter().enumerate() {
+        tangents.insert(input, Tangent::from([(column, graph.constant(1.0).node())]));
+    }
+    for node in graph.reachable(outputs) {
+        if let Op::Solve(_) = graph.op(node) {
+            solved.insert(node, solve_tangents(&build, node, &tangents));
+            continue;
+        }
+        let tangent = match variation(graph, node) {
+            Variation::Sum(terms) => sum_tangent(&build, &terms, &tangents),
+            Variation::Choice(c, a, b) => choice_tangent(&build, c, a, b, &tangents),
+            Variation::Entry { solve, entry } => solved[&solve]
+                .iter()
+                .filter_map(|(&column, dx)| Some((column, *dx.get(entry as usize)?)))
+                .collect(),
+        };
+        if !tangent.is_empty() {
+            tangents.entry(node).or_insert(tangent);
+        }
+    }
+    let entries = outputs.iter().enumerate().flat_map(|(row, output)| {
+        let tangent = tangents.get(output).cloned().unwrap_or_default();
+        tangent
+            .into_iter()
+            .map(move |(column, node)| (row, column, node))
+    });
+    Jacobian {
+        rows: outputs.len(),
+        columns: inputs.len(),
+        entries: entries.collect(),
+    }
+}
+
+fn sum_tangent(
+    build: &Builder<'_>,
+    terms: &[(Node, Node)],
+    tangents: &HashMap<Node, Tangent>,
+) -> Tangent {
+    let mut sum = Tangent::new();
+    for &(argument, slope) in terms {
+        for (&column, &d) in tangents.get(&argument).into_iter().flatten() {
+            build.add_to(&mut sum, column, build.times(slope, d));
+        }
+    }
+    sum
+}
+
+fn choice_tangent(
+    build: &Builder<'_>,
+    condition: Node,
+    a: Node,
+    b: Node,
+    tangents: &HashMap<Node, Tangent>,
+) -> Tangent {
+    let empty = Tangent::new();
+    let (da, db) = (
+        tangents.get(&a).unwrap_or(&empty),
+        tangents.get(&b).unwrap_or(&empty),
+    );
+    let columns = da.keys().chain(db.keys());
+    columns
+        .map(|column| {
+            let side = |d: &Tangent| d.get(column).copied().unwrap_or_else(|| build.zero());
+            (*column, build.graph.select(condition, side(da), side(db)))
+        })
+        .collect()
+}
+
+/// A dx = db − dA x, for each input that A or b depend on.
+fn solve_tangents(
+    build: &Builder<'_>,
+    node: Node,
+    tangents: &HashMap<Node, Tangent>,
+) -> BTreeMap<usize, Vec<Node>> {
+    let Op::Solve(index) = build.graph.op(node) else {
+        return BTreeMap::new();
+    };
+    let system = build.graph.system(index);
+    let n = system.n;
+    let (a, b) = system.arguments.split_at(n * n);
+    let mut right: BTreeMap<usize, BTreeMap<usize, Node>> = BTreeMap::new();
+    for (i, b) in b.iter().enumerate() {
+        for (&column, &db) in tangents.get(b).into_iter().flatten() {
+            right.entry(column).or_default().insert(i, db);
+        }
+    }
+    for (place, entry) in a.iter().enumerate() {
+        let x = build.graph.entry(node, (place % n) as u32);
+        for (&column, &da) in tangents.get(entry).into_iter().flatten() {
+            let row = right.entry(column).or_default();
+            let sum = build.minus(row.get(&(place / n)).copied(), build.times(da, x));
+            row.insert(place / n, sum);
+        }
+    }
+    let solve = |row: BTreeMap<usize, Node>| {
+        let b: Vec<Node> = (0..n)
+            .map(|i| row.get(&i).copied().unwrap_or_else(|| build.zero()))
+            .collect();
+        build.graph.solve(a, &b).x
+    };
+    right
+        .into_iter()
+        .map(|(column, row)| (column, solve(row)))
+        .collect()
+}
+
+/// The Jacobian by reverse accumulation: cheap where outputs are few.
+pub fn reverse(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
+    let mut jacobian = Jacobian {
+        rows: outputs.len(),
+        columns: inputs.len(),
+        entries: vec![],
+    };
+    for (row, &output) in outputs.iter().enumerate() {
+        let adjoints = adjoints(graph, output);
+        for (column, input) in inputs.iter().enumerate() {
+            if let Some(&adjoint) = adjoints.get(input) {
+                jacobian.entries.push((row, column, adjoint));
+            }
+        }
+    }
+    jacobian
+}
+
+/// ∂(output)/∂(node) for every node that the output depends on.
+fn adjoints(graph: &Graph, output: Node) -> BTreeMap<Node, Node> {
+    let build = Builder { graph };
+    let mut adjoints = BTreeMap::from([(output, graph.constant(1.0).node())]);
+    let mut results: HashMap<Node, BTreeMap<u32, Node>> = HashMap::new();
+    for node in graph.reachable(&[output]).into_iter().rev() {
+        if let Op::Solve(_) = graph.op(node) {
+            if let Some(entries) = results.get(&node) {
+                solve_adjoints(&build, node, entries, &mut adjoints);
+            }
+            continue;
+        }
+        let Some(&bar) = adjoints.get(&node) else {
+            continue;
+        };
+        match variation(graph, node) {
+            Variation::Sum(terms) => {
+                for (argument, slope) in terms {
+                    build.add_to(&mut adjoints, argument, build.times(bar, slope));
+                }
+            }
+            Variation::Choice(c, a, b) => {
+                let zero = build.zero();
+                build.add_to(&mut adjoints, a, graph.select(c, bar, zero));
+                build.add_to(&mut adjoints, b, graph.select(c, zero, bar));
+            }
+            Variation::Entry { solve, entry } => {
+                results.entry(solve).or_default().insert(entry, bar);
+            }
+        }
+    }
+    adjoints
+}
+
+/// With Aᵀλ = x̄: b̄ += λ and Ā −= λ xᵀ.
+fn solve_adjoints(
+    build: &Builder<'_>,
+    node: Node,
+    results: &BTreeMap<u32, Node>,
+    adjoints: &mut BTreeMap<Node, Node>,
+) {
+    let Op::Solve(index) = build.graph.op(node) else {
+        return;
+    };
+    let system = build.graph.system(index);
+    let n = system.n;
+    let bar: Vec<Node> = (0..n as u32)
+        .map(|i| results.get(&i).copied().unwrap_or_else(|| build.zero()))
+        .collect();
+    let transposed: Vec<Node> = (0..n * n)
+        .map(|k| system.arguments[k % n * n + k / n])
+        .collect();
+    let λ = build.graph.solve(&transposed, &bar).x;
+    for (i, &λi) in λ.iter().enumerate() {
+        build.add_to(adjoints, system.arguments[n * n + i], λi);
+        for j in 0..n {
+            let entry = system.arguments[i * n + j];
+            let term = build.times(λi, build.graph.entry(node, j as u32));
+            let sum = build.minus(adjoints.get(&entry).copied(), term);
+            adjoints.insert(entry, sum);
+        }
+    }
+}
+
+/// Which inputs each output depends on, as a graph, without derivatives: row by
+/// row the sorted indices into `inputs`.
+pub fn pattern(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Vec<Vec<usize>> {
+    let column: HashMap<Node, usize> = inputs.iter().copied().zip(0..).collect();
+    let row = |output: &Node| {
+        let mut row: Vec<usize> = local_symbols(graph, *output)
+            .into_iter()
+            .filter_map(|symbol| column.get(&symbol).copied())
+            .collect();
+        row.sort_unstable();
+        row
+    };
+    outputs.iter().map(row).collect()
+}
+
+/// Symbols below a node by a walk that visits only its own sub-graph.
+fn local_symbols(graph: &Graph, root: Node) -> Vec<Node> {
+    let mut seen = std::collections::HashSet::from([root]);
+    let mut stack = vec![root];
+    let mut symbols = vec![];
+    while let Some(node) = stack.pop() {
+        if let Op::Symbol(_) = graph.op(node) {
+            symbols.push(node);
+        }
+        stack.extend(
+            graph
+                .arguments(node)
+                .into_iter()
+                .filter(|&a| seen.insert(a)),
+        );
+    }
+    symbols
+}

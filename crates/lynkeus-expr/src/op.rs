@@ -1,0 +1,103 @@
+//! The operations a graph is made of.
+
+use crate::Node;
+
+/// Operations of one argument.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub enum Unary {
+    /// −x
+    Neg,
+    /// |x|
+    Abs,
+    /// −1, 0 or 1; NaN stays NaN
+    Sign,
+    /// the largest integer not above x
+    Floor,
+    /// √x
+    Sqrt,
+    /// eˣ
+    Exp,
+    /// natural logarithm
+    Ln,
+    /// sine
+    Sin,
+    /// cosine
+    Cos,
+    /// tangent
+    Tan,
+    /// inverse sine
+    Asin,
+    /// inverse cosine
+    Acos,
+    /// inverse tangent
+    Atan,
+    /// hyperbolic sine
+    Sinh,
+    /// hyperbolic cosine
+    Cosh,
+    /// hyperbolic tangent
+    Tanh,
+    /// logical not of a truth value (1 − x)
+    Not,
+}
+
+/// Operations of two arguments. Truth values are 1 and 0.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub enum Binary {
+    /// x + y
+    Add,
+    /// x − y
+    Sub,
+    /// x·y
+    Mul,
+    /// x/y
+    Div,
+    /// xʸ for a real exponent (base ≥ 0, as `f64::powf`)
+    Pow,
+    /// the angle of the point (x, y) = (second, first) argument
+    Atan2,
+    /// the smaller one; NaN if either is
+    Min,
+    /// the larger one; NaN if either is
+    Max,
+    /// x < y
+    Less,
+    /// x ≤ y
+    LessEq,
+    /// x = y
+    Equal,
+    /// both truth values
+    And,
+    /// either truth value
+    Or,
+}
+
+impl Binary {
+    /// True where exchanging the arguments gives the same value.
+    pub(crate) fn commutes(self) -> bool {
+        use Binary::*;
+        matches!(self, Add | Mul | Min | Max | Equal | And | Or)
+    }
+}
+
+/// What a node of a [`Graph`](crate::Graph) is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Op {
+    /// a number
+    Constant(f64),
+    /// a free variable: its index among the graph's names
+    Symbol(u32),
+    /// a function of one node
+    Unary(Unary, Node),
+    /// an integer power; any base
+    Powi(Node, i32),
+    /// a function of two nodes
+    Binary(Binary, Node, Node),
+    /// `if` the first is true (non-zero) the second, else the third
+    Select(Node, Node, Node),
+    /// a linear system; its index among the graph's systems. Has no value of its own
+    Solve(u32),
+    /// one result of a [`Op::Solve`] node: 0..n are the solution, n is the
+    /// reciprocal condition estimate
+    Entry(Node, u32),
+}

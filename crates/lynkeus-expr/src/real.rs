@@ -1,0 +1,86 @@
+//! The operations over `f64`: the meaning every other algebra has to agree with.
+
+use crate::{Binary, Unary};
+
+/// −1, 0 or 1 by the sign of `x`; NaN stays NaN, and ±0 gives ±0.
+pub fn sign(x: f64) -> f64 {
+    if x > 0.0 {
+        1.0
+    } else if x < 0.0 {
+        -1.0
+    } else {
+        x
+    }
+}
+
+fn truth(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}
+
+fn min(x: f64, y: f64) -> f64 {
+    if x.is_nan() || y.is_nan() {
+        f64::NAN
+    } else {
+        x.min(y)
+    }
+}
+
+fn max(x: f64, y: f64) -> f64 {
+    -min(-x, -y)
+}
+
+/// Value of a function of one argument.
+#[inline(always)]
+pub fn unary(op: Unary, x: f64) -> f64 {
+    match op {
+        Unary::Neg => -x,
+        Unary::Abs => x.abs(),
+        Unary::Sign => sign(x),
+        Unary::Floor => x.floor(),
+        Unary::Sqrt => x.sqrt(),
+        Unary::Exp => x.exp(),
+        Unary::Ln => x.ln(),
+        Unary::Sin => x.sin(),
+        Unary::Cos => x.cos(),
+        Unary::Tan => x.tan(),
+        Unary::Asin => x.asin(),
+        Unary::Acos => x.acos(),
+        Unary::Atan => x.atan(),
+        Unary::Sinh => x.sinh(),
+        Unary::Cosh => x.cosh(),
+        Unary::Tanh => x.tanh(),
+        Unary::Not => truth(x == 0.0),
+    }
+}
+
+/// Value of a function of two arguments.
+#[inline(always)]
+pub fn binary(op: Binary, x: f64, y: f64) -> f64 {
+    match op {
+        Binary::Add => x + y,
+        Binary::Sub => x - y,
+        Binary::Mul => x * y,
+        Binary::Div => x / y,
+        Binary::Pow => x.powf(y),
+        Binary::Atan2 => x.atan2(y),
+        Binary::Min => min(x, y),
+        Binary::Max => max(x, y),
+        Binary::Less => truth(x < y),
+        Binary::LessEq => truth(x <= y),
+        Binary::Equal => truth(x == y),
+        Binary::And => truth(x != 0.0 && y != 0.0),
+        Binary::Or => truth(x != 0.0 || y != 0.0),
+    }
+}
+
+/// `if` with a truth value as condition; an unknown (NaN) condition gives NaN.
+#[inline(always)]
+pub fn select(condition: f64, x: f64, y: f64) -> f64 {
+    if condition.is_nan() {
+        f64::NAN
+    } else if condition != 0.0 {
+        x
+    } else {
+        y
+    }
+}
