@@ -1,0 +1,85 @@
+//! The one error type of this crate: what was expected, what was found, where, and what to do.
+
+use std::fmt;
+
+/// What kind of answer an [`Error`] is; the command's exit code follows from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The input is at fault: a file, a key, a column, an option.
+    Input,
+    /// The input is fine and the answer is no: a condition is refuted, an estimate diverges.
+    Refused,
+}
+
+/// Why there is no result.
+///
+/// Its text is one line (several when it quotes a Modelica source line under its message):
+/// the place, what is wrong, what was expected, and what to do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Error {
+    kind: ErrorKind,
+    place: Option<String>,
+    message: String,
+    hint: Option<String>,
+}
+
+impl Error {
+    /// An error in what the user gave.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Input, message.into())
+    }
+
+    /// A well-posed question whose answer is no.
+    pub fn refused(message: impl Into<String>) -> Self {
+        Self::new(ErrorKind::Refused, message.into())
+    }
+
+    fn new(kind: ErrorKind, message: String) -> Self {
+        Self {
+            kind,
+            place: None,
+            message,
+            hint: None,
+        }
+    }
+
+    /// Adds where it happened: a file, or `file:line:column`.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        self.place = Some(place.to_string());
+        self
+    }
+
+    /// Adds what the user can do about it.
+    #[must_use]
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Whether the input is at fault or the answer is no.
+    pub fn kind(&self) -> ErrorKind {
+        self.kind
+    }
+
+    /// The place, when one is known.
+    pub fn place(&self) -> Option<&str> {
+        self.place.as_deref()
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(place) = &self.place {
+            write!(f, "{place}: ")?;
+        }
+        f.write_str(&self.message)?;
+        match &self.hint {
+            Some(hint) => write!(f, "; {hint}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,51 @@
+//! Reading whole text files, with errors that name the file.
+
+use std::io;
+use std::path::Path;
+
+use crate::Error;
+
+/// The text of a file; `what` says in messages what the file is for.
+pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Error> {
+    let bytes = std::fs::read(path).map_err(|e| unreadable(path, what, &e))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let good = e.utf8_error().valid_up_to();
+        let line = e
+            .as_bytes()
+            .iter()
+            .take(good)
+            .filter(|b| **b == b'\n')
+            .count()
+            + 1;
+        Error::input(format!(
+            "the {what} file must be UTF-8 text, found other bytes"
+        ))
+        .at(format!("{}:{line}", path.display()))
+        .hint("save it as UTF-8")
+    })?;
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    })
+}
+
+/// Refuses a path that names no file; `named_in` is the file that names it.
+pub(crate) fn must_exist(path: &Path, what: &str, named_in: &str) -> Result<(), Error> {
+    match std::fs::metadata(path) {
+        Ok(data) if data.is_file() => Ok(()),
+        Ok(_) => {
+            Err(Error::input(format!("the {what} {} is not a file", path.display())).at(named_in))
+        }
+        Err(e) => Err(unreadable(path, what, &e).at(named_in)),
+    }
+}
+
+fn unreadable(path: &Path, what: &str, error: &io::Error) -> Error {
+    let path = path.display();
+    match error.kind() {
+        io::ErrorKind::NotFound => {
+            Error::input(format!("no {what} file at {path}")).hint("check the path")
+        }
+        _ => Error::input(format!("cannot read the {what} file {path}: {error}")),
+    }
+}

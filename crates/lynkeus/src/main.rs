@@ -1,0 +1,2 @@
+//! The `lynkeus` command.
+fn main() {}

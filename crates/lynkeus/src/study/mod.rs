@@ -1,0 +1,155 @@
+//! The study file: what is measured, what is unknown, which observer, how to run it.
+//!
+//! ```toml
+//! plant = "two-tanks.mo"            # relative to this file; `model = "…"` if it holds several
+//! [parameters]                      # values that replace those of the plant
+//! k1 = 0.04
+//! [sensors]
+//! measured = ["level"]              # default: every output of the plant
+//! unknown = ["pump"]                # inputs nobody measures
+//! noise = { level = "5%" }          # or a standard deviation; used by simulate
+//! [observer]
+//! theta = 0.03
+//! initial = { default = 0.5, "x[1]" = 0.9 }
+//! [simulate]
+//! until = 4000
+//! output_step = 4
+//! inputs = { pump = "if time < 1000 then 2 else 3" }
+//! [estimate]
+//! between_samples = "linear"
+//! ```
+
+mod estimate;
+mod observer;
+//mod plant;
+mod section;
+mod sensors;
+mod simulate;
+mod source;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use toml::de::DeTable;
+
+pub use estimate::{BetweenSamples, EstimateSettings};
+pub use observer::{Family, Gain, InitialEstimate, ObserverSettings, Tridiagonal};
+pub use sensors::{Noise, Sensors};
+pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
+pub use source::{Name, Place};
+
+use crate::Error;
+use section::Section;
+use source::Source;
+
+const KEYS: &[&str] = &[
+    "plant",
+    "model",
+    "parameters",
+    "sensors",
+    "observer",
+    "simulate",
+    "estimate",
+    "plot",
+];
+
+/// A study: everything beside the plant's equations.
+#[derive(Clone, Debug, Default)]
+pub struct Study {
+    /// The study file as the user named it, for messages; empty for studies made in Rust.
+    pub file: String,
+    /// The Modelica file, resolved against the study's folder.
+    pub plant: Option<PathBuf>,
+    /// The model to take where the Modelica file holds several.
+    pub model: Option<String>,
+    /// Parameter values that replace those of the plant.
+    pub parameters: BTreeMap<String, f64>,
+    /// What is measured and what is not.
+    pub sensors: Sensors,
+    /// The observer family and its tuning.
+    pub observer: ObserverSettings,
+    /// How to simulate; `None` where the study has no `[simulate]`.
+    pub simulate: Option<SimulateSettings>,
+    /// How to replay a log.
+    pub estimate: EstimateSettings,
+    /// The quantities to draw, one panel each; `None` lets the tool choose.
+    pub show: Option<Vec<Name>>,
+}
+
+impl Study {
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// The file is missing, is not UTF-8 or not TOML, has an unknown key, a value of the wrong
+    /// type or out of range, or a number that is not finite; the message names the place.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let file = path.display().to_string();
+        let text = crate::files::read_text(path, "study")?;
+        let mut study = Self::parse(&text, &file)?;
+        if let (Some(plant), Some(folder)) = (study.plant.as_mut(), path.parent()) {
+            *plant = folder.join(&*plant);
+        }
+        Ok(study)
+    }
+
+    /// Reads a study from text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
+        let source = Source {
+            file: Arc::from(file),
+            text,
+        };
+        let table = DeTable::parse(text).map_err(|e| not_toml(&source, &e))?;
+        let mut top = Section::new(&source, "the study", table.into_inner(), KEYS)?;
+        let simulate = top.optional("simulate", simulate::read)?;
+        Ok(Self {
+            file: file.to_owned(),
+            plant: top
+                .optional("plant", section::Entry::name)?
+                .map(|name| PathBuf::from(name.text)),
+            model: top
+                .optional("model", section::Entry::name)?
+                .map(|name| name.text),
+            parameters: top.optional("parameters", parameters)?.unwrap_or_default(),
+            sensors: top.optional("sensors", sensors::read)?.unwrap_or_default(),
+            observer: top
+                .optional("observer", observer::read)?
+                .unwrap_or_default(),
+            simulate,
+            estimate: top
+                .optional("estimate", estimate::read)?
+                .unwrap_or_default(),
+            show: top.optional("plot", plot)?.flatten(),
+        })
+    }
+}
+
+fn not_toml(source: &Source<'_>, error: &toml::de::Error) -> Error {
+    let message = error.message().replace('\n', "; ");
+    let refusal = Error::input(format!("not a TOML file: {message}"));
+    match error.span() {
+        Some(span) => refusal.at(source.place(&span)),
+        None => refusal.at(&source.file),
+    }
+}
+
+fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error> {
+    entry
+        .pairs()?
+        .into_iter()
+        .map(|(name, value)| Ok((name.text, value.number()?)))
+        .collect()
+}
+
+fn plot(entry: section::Entry<'_>) -> Result<Option<Vec<Name>>, Error> {
+    entry
+        .section("[plot]", &["show"])?
+        .optional("show", |e| e.list_of(section::Entry::name))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,74 @@
+//! `[sensors]`: what is measured, what is unknown, how noisy.
+
+use super::Name;
+use super::section::Entry;
+use crate::Error;
+
+const KEYS: &[&str] = &["measured", "unknown", "disturbances", "noise"];
+
+/// What the sensors see of the plant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensors {
+    /// The measured outputs, in the order of their chains; `None` means every output.
+    pub measured: Option<Vec<Name>>,
+    /// Inputs nobody measures, estimated along with the state.
+    pub unknown: Vec<Name>,
+    /// Inputs that act on the plant and that the observer takes as zero.
+    pub disturbances: Vec<Name>,
+    /// Measurement noise added by `simulate`, per measured output.
+    pub noise: Vec<(Name, Noise)>,
+}
+
+/// The standard deviation of white measurement noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Noise {
+    /// In the unit of the output.
+    Absolute(f64),
+    /// As a fraction of the present value: `"5%"` is 0.05.
+    Relative(f64),
+}
+
+pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
+    let mut section = entry.section("[sensors]", KEYS)?;
+    Ok(Sensors {
+        measured: section.optional("measured", |e| {
+            let refusal = e.wrong("a list with at least one output");
+            let names = e.list_of(Entry::name)?;
+            if names.is_empty() {
+                Err(refusal)
+            } else {
+                Ok(names)
+            }
+        })?,
+        unknown: names(section.take("unknown"))?,
+        disturbances: names(section.take("disturbances"))?,
+        noise: match section.take("noise") {
+            None => Vec::new(),
+            Some(table) => table
+                .pairs()?
+                .into_iter()
+                .map(|(name, value)| Ok((name, noise(value)?)))
+                .collect::<Result<_, Error>>()?,
+        },
+    })
+}
+
+fn names(entry: Option<Entry<'_>>) -> Result<Vec<Name>, Error> {
+    entry.map_or(Ok(Vec::new()), |e| e.list_of(Entry::name))
+}
+
+fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
+    let refusal = entry.wrong("a standard deviation >= 0, or a share such as \"5%\"");
+    let (value, kind): (Option<f64>, fn(f64) -> Noise) = match entry.as_text() {
+        Some(text) => {
+            let share = text.trim().strip_suffix('%');
+            let percent = share.and_then(|p| p.trim().parse::<f64>().ok());
+            (percent.map(|p| p / 100.0), Noise::Relative)
+        }
+        None => (entry.number().ok(), Noise::Absolute),
+    };
+    value
+        .filter(|x| x.is_finite() && *x >= 0.0)
+        .map(kind)
+        .ok_or(refusal)
+}

@@ -1,0 +1,83 @@
+//! Where in the study file something stands.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A place in a study file: `file:line:column`, both counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file as the user named it.
+    pub file: Arc<str>,
+    /// The line, from 1.
+    pub line: usize,
+    /// The column in characters, from 1.
+    pub column: usize,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file, self.line, self.column)
+    }
+}
+
+/// A name written in a study, with its place for messages about it.
+///
+/// Two names are equal when their texts are.
+#[derive(Clone, Debug)]
+pub struct Name {
+    /// The name itself: `level`, `x[3]`.
+    pub text: String,
+    /// Where it was written; `None` for names made in Rust.
+    pub place: Option<Place>,
+}
+
+impl Name {
+    /// Puts this name's place on an error about it.
+    pub(crate) fn blame(&self, error: crate::Error) -> crate::Error {
+        match &self.place {
+            Some(place) => error.at(place),
+            None => error,
+        }
+    }
+}
+
+impl From<&str> for Name {
+    fn from(text: &str) -> Self {
+        Self {
+            text: text.to_owned(),
+            place: None,
+        }
+    }
+}
+
+impl PartialEq for Name {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// The text of a study file.
+pub(crate) struct Source<'a> {
+    pub file: Arc<str>,
+    pub text: &'a str,
+}
+
+impl Source<'_> {
+    /// The place of the first character of `span`.
+    pub fn place(&self, span: &Range<usize>) -> Place {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        Place {
+            file: Arc::clone(&self.file),
+            line: before.matches('\n').count() + 1,
+            column: before.get(line_start..).unwrap_or("").chars().count() + 1,
+        }
+    }
+}
