@@ -1,9 +1,7 @@
 //! The four operations, and the others whose bounds are exact or correctly rounded.
 
 use super::Interval;
-use super::rounding::{
-    add_down, add_up, div_down, div_up, mul_down, mul_up, sqrt_down, sqrt_up,
-};
+use super::rounding::{add_down, add_up, div_down, div_up, mul_down, mul_up, sqrt_down, sqrt_up};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 impl Neg for Interval {
@@ -51,14 +49,15 @@ impl Div for Interval {
 
     /// The quotients by the members other than zero; not defined when zero is a member of the divisor.
     fn div(self, other: Self) -> Self {
-        if other.hi <= 0.0 && !other.is_empty() {
-            return -self / -other;
+        if other.lo >= 0.0 {
+            self.div_by_non_negative(other)
+        } else if other.hi <= 0.0 {
+            -self / -other
+        } else if self.is_zero() || self.is_empty() {
+            self.and_defined(false)
+        } else {
+            Self::ENTIRE.and_defined(false)
         }
-        if other.lo < 0.0 && !self.is_empty() {
-            let whole = if self == Self::ZERO { Self::ZERO } else { Self::ENTIRE };
-            return whole.and_defined(false);
-        }
-        self.div_by_non_negative(other)
     }
 }
 
@@ -170,14 +169,21 @@ mod tests {
 
     #[test]
     fn products_of_every_sign() {
-        let (n, m, p) = (interval(-3.0, -2.0), interval(-1.0, 5.0), interval(4.0, 7.0));
+        let (n, m, p) = (
+            interval(-3.0, -2.0),
+            interval(-1.0, 5.0),
+            interval(4.0, 7.0),
+        );
         assert_eq!(n * n, interval(4.0, 9.0));
         assert_eq!(n * m, interval(-15.0, 3.0));
         assert_eq!(n * p, interval(-21.0, -8.0));
         assert_eq!(m * m, interval(-5.0, 25.0));
         assert_eq!(m * p, interval(-7.0, 35.0));
         assert_eq!(Interval::ZERO * Interval::ENTIRE, Interval::ZERO);
-        assert_eq!(interval(2.0, INF) * interval(-INF, -3.0), interval(-INF, -6.0));
+        assert_eq!(
+            interval(2.0, INF) * interval(-INF, -3.0),
+            interval(-INF, -6.0)
+        );
     }
 
     #[test]
@@ -188,10 +194,16 @@ mod tests {
         assert_eq!(one / interval(-4.0, 0.0), undefined(-INF, -0.25));
         assert_eq!(one / interval(-4.0, 1.0), undefined(-INF, INF));
         assert_eq!(one / Interval::ZERO, Interval::EMPTY);
-        assert_eq!(interval(-1.0, 2.0) / interval(0.0, 1.0), undefined(-INF, INF));
+        assert_eq!(
+            interval(-1.0, 2.0) / interval(0.0, 1.0),
+            undefined(-INF, INF)
+        );
         assert_eq!(Interval::ZERO / interval(-1.0, 1.0), undefined(0.0, 0.0));
         assert_eq!(Interval::ZERO / interval(0.0, 1.0), undefined(0.0, 0.0));
-        assert_eq!(interval(-2.0, 0.0) / interval(0.0, 1.0), undefined(-INF, 0.0));
+        assert_eq!(
+            interval(-2.0, 0.0) / interval(0.0, 1.0),
+            undefined(-INF, 0.0)
+        );
         assert_eq!(interval(1.0, INF) / interval(1.0, INF), interval(0.0, INF));
         assert_eq!(interval(-1.0, 1.0) / Interval::ENTIRE, undefined(-INF, INF));
     }

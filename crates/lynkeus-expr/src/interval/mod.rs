@@ -150,6 +150,11 @@ impl Interval {
     pub const fn is_point(self) -> bool {
         self.lo == self.hi
     }
+
+    /// Whether zero is the only member.
+    const fn is_zero(self) -> bool {
+        self.lo == 0.0 && self.hi == 0.0
+    }
 }
 
 impl From<f64> for Interval {

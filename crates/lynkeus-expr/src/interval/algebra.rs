@@ -1,0 +1,82 @@
+//! Evaluation of tapes over intervals.
+
+use super::{Interval, solve};
+use crate::{Algebra, Binary, Unary};
+
+/// The algebra of [`Interval`]s: a tape evaluated over a box gives enclosures of the outputs on that box.
+///
+/// ```
+/// use lynkeus_expr::{Graph, Tape, interval::{Interval, Intervals}};
+///
+/// let graph = Graph::new();
+/// let x = graph.symbol("x");
+/// let tape = Tape::new(&graph, &[x.node()], &[(x * x + 1.0).ln().node()])?;
+/// let range = tape.eval_in(&Intervals, &[Interval::new(0.0, 1.0).expect("in order")])[0];
+/// assert!(range.is_defined() && range.contains(0.0) && range.hi() < 0.7);
+/// # Ok::<(), lynkeus_expr::MissingInput>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Intervals;
+
+impl Algebra for Intervals {
+    type Value = Interval;
+
+    fn constant(&self, value: f64) -> Interval {
+        Interval::point(value)
+    }
+
+    fn unary(&self, op: Unary, x: &Interval) -> Interval {
+        match op {
+            Unary::Neg => -*x,
+            Unary::Abs => x.abs(),
+            Unary::Sign => x.sign(),
+            Unary::Floor => x.floor(),
+            Unary::Sqrt => x.sqrt(),
+            Unary::Exp => x.exp(),
+            Unary::Ln => x.ln(),
+            Unary::Sin => x.sin(),
+            Unary::Cos => x.cos(),
+            Unary::Tan => x.tan(),
+            Unary::Asin => x.asin(),
+            Unary::Acos => x.acos(),
+            Unary::Atan => x.atan(),
+            Unary::Sinh => x.sinh(),
+            Unary::Cosh => x.cosh(),
+            Unary::Tanh => x.tanh(),
+            Unary::Not => x.not(),
+        }
+    }
+
+    fn powi(&self, x: &Interval, n: i32) -> Interval {
+        x.powi(n)
+    }
+
+    fn binary(&self, op: Binary, x: &Interval, y: &Interval) -> Interval {
+        match op {
+            Binary::Add => *x + *y,
+            Binary::Sub => *x - *y,
+            Binary::Mul => *x * *y,
+            Binary::Div => *x / *y,
+            Binary::Pow => x.pow(*y),
+            Binary::Atan2 => x.atan2(*y),
+            Binary::Min => x.min(*y),
+            Binary::Max => x.max(*y),
+            Binary::Less => x.less(*y),
+            Binary::LessEq => x.less_eq(*y),
+            Binary::Equal => x.equal(*y),
+            Binary::And => x.and(*y),
+            Binary::Or => x.or(*y),
+        }
+    }
+
+    fn select(&self, condition: &Interval, x: &Interval, y: &Interval) -> Interval {
+        condition.select(*x, *y)
+    }
+
+    /// The condition estimate is only known to lie in [0, 1].
+    fn solve(&self, a: &[Interval], b: &[Interval]) -> (Vec<Interval>, Interval) {
+        let (x, regular) = solve(a, b);
+        let rcond = Interval::ZERO.hull(Interval::ONE).and_defined(regular);
+        (x, rcond)
+    }
+}
