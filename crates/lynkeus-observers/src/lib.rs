@@ -1,1 +1,21 @@
 //! Observer families, one file each.
+//!
+//! A [`Family`] takes the plant as an observer sees it
+//! ([`Extended`](lynkeus_structure::Extended)) and a [`Tuning`], and returns a
+//! [`Design`] whose [`Observer`] is another system of expressions: its inputs are
+//! time, the known inputs and the measured outputs, its states are the estimate
+//! and whatever the gain needs. Simulation, log replay and export are written
+//! once, for such systems.
+//!
+//! A new family is one file beside [`triangular`] and one line in [`FAMILIES`].
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod estimate;
+mod family;
+mod observer;
+pub mod triangular;
+mod tuning;
+
+pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
+pub use observer::{Estimate, Observer, Signal};
+pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -1,1 +1,23 @@
-//! What can be observed: chains, and conditions decided on the declared box.
+//! What can be observed: chains found in the equations, and conditions decided
+//! on the declared box.
+//!
+//! [`Extended`] is the plant as an observer sees it: unknown inputs are states,
+//! disturbances are zero. [`chains`] finds the triangular form of its equations,
+//! [`sign`] decides whether a partial derivative keeps its sign on the box
+//! — [`Condition`]: proved, refuted with a witness, or undecided with the box
+//! that is left — and [`visibility`] says which states leave a trace in the outputs.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod chains;
+mod condition;
+mod extended;
+mod range;
+mod region;
+pub mod sign;
+pub mod visibility;
+
+pub use chains::{Assignment, Chain, ChainRequest};
+pub use condition::{Check, Condition, Point, Witness};
+pub use extended::{Extended, Measurement, Sensors, SensorsError};
+pub use range::{Range, range};
+pub use region::{Dimension, Region};

@@ -1,0 +1,101 @@
+//! What every family does alike: the copy of the plant that runs on the estimate.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Graph, Node};
+use lynkeus_model::Variable;
+use lynkeus_structure::Extended;
+
+use crate::{Estimate, Observer, Signal, Tuning, TuningError};
+
+/// The plant's expressions over the estimate.
+pub(crate) struct Copy<'e, 'p> {
+    pub extended: &'e Extended<'p>,
+    /// x̂, one per extended state
+    pub hats: Vec<Signal>,
+    /// x ↦ x̂, limited to [min, max] if the tuning says so
+    seen: HashMap<Node, Node>,
+}
+
+impl<'e, 'p> Copy<'e, 'p> {
+    pub fn new(extended: &'e Extended<'p>, tuning: &Tuning) -> Self {
+        let graph = extended.graph();
+        let hats: Vec<Signal> = extended
+            .states
+            .iter()
+            .map(|state| Observer::hat(graph, &state.name))
+            .collect();
+        let seen = extended.states.iter().zip(&hats).map(|(state, hat)| {
+            let image = match tuning.clamp {
+                true => limited(graph, hat.symbol, state),
+                false => hat.symbol,
+            };
+            (state.node, image)
+        });
+        let seen = seen.collect();
+        Self {
+            extended,
+            hats,
+            seen,
+        }
+    }
+
+    /// Expressions of the plant at the estimate: f(x̂, u) from f(x, u).
+    pub fn at_estimate(&self, expressions: &[Node]) -> Vec<Node> {
+        self.extended.graph().substitute(expressions, &self.seen)
+    }
+
+    /// x̂ with its starts: the named value, else the default, else the plant's
+    /// `start`, else the middle of its range, else 0.
+    pub fn states(&self, tuning: &Tuning) -> Result<Vec<(Signal, f64)>, TuningError> {
+        let initial = &tuning.initial;
+        if let Some(name) = initial
+            .values
+            .keys()
+            .find(|n| self.extended.state_index(n).is_none())
+        {
+            let names: Vec<&str> = self.hats.iter().map(|h| h.name.as_str()).collect();
+            let expected = format!("names of estimated quantities ({})", names.join(", "));
+            return Err(TuningError::new("initial", expected, format!("\"{name}\"")));
+        }
+        let start = |variable: &Variable| {
+            let named = initial.values.get(&variable.name).copied();
+            named
+                .or(initial.default)
+                .or(variable.start)
+                .unwrap_or_else(|| middle(variable))
+        };
+        let states = self.hats.iter().zip(&self.extended.states);
+        Ok(states
+            .map(|(hat, variable)| (hat.clone(), start(variable)))
+            .collect())
+    }
+
+    /// The estimates where the observer's first states are x̂ itself.
+    pub fn estimates(&self) -> Vec<Estimate> {
+        let pairs = self.hats.iter().zip(&self.extended.states).enumerate();
+        let estimate = |(i, (hat, variable)): (usize, (&Signal, &Variable))| Estimate {
+            variable: variable.clone(),
+            node: hat.symbol,
+            unknown_input: i >= self.extended.plant_states(),
+        };
+        pairs.map(estimate).collect()
+    }
+}
+
+/// max(min, min(max, x̂)) with the ends that are declared.
+fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
+    let mut image = graph.expr(hat);
+    if variable.max.is_finite() {
+        image = image.min(graph.constant(variable.max));
+    }
+    if variable.min.is_finite() {
+        image = image.max(graph.constant(variable.min));
+    }
+    image.node()
+}
+
+fn middle(variable: &Variable) -> f64 {
+    let middle = variable.min + (variable.max - variable.min) / 2.0;
+    if middle.is_finite() { middle } else { 0.0 }
+}

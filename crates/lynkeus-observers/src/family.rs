@@ -1,0 +1,134 @@
+//! What a family is, and the list of them.
+
+use lynkeus_expr::MissingInput;
+use lynkeus_structure::{Check, Condition, Extended};
+
+use crate::{Observer, Tuning, TuningError, triangular::Triangular};
+
+/// Every family, in the order in which `auto` tries them.
+pub const FAMILIES: &[&dyn Family] = &[&Triangular];
+
+/// The family of that name.
+pub fn find(name: &str) -> Option<&'static dyn Family> {
+    FAMILIES
+        .iter()
+        .copied()
+        .find(|family| family.name() == name)
+}
+
+/// A published observer design.
+pub trait Family: Sync {
+    /// name in studies
+    fn name(&self) -> &'static str;
+    /// where it was published
+    fn paper(&self) -> &'static str;
+    /// the study keys it reads beside those of every family
+    fn keys(&self) -> &'static [&'static str];
+    /// Does the plant have the form, and do the conditions hold on the box?
+    ///
+    /// # Errors
+    /// Tuning keys that cannot be used; parameters without value.
+    fn examine(&self, extended: &Extended<'_>, tuning: &Tuning)
+    -> Result<Examination, DesignError>;
+    /// The observer.
+    ///
+    /// # Errors
+    /// [`DesignError::Refused`] where the family does not fit; tuning keys that
+    /// cannot be used.
+    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError>;
+}
+
+/// Whether a family fits a plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fit {
+    /// every condition is proved
+    Fits,
+    /// a condition is undecided, none is refuted
+    Undecided,
+    /// the form is another, or a condition is refuted
+    DoesNotFit,
+}
+
+impl Fit {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Fit::Fits => "fits",
+            Fit::Undecided => "undecided",
+            Fit::DoesNotFit => "does not fit",
+        }
+    }
+}
+
+/// What a family finds in a plant.
+#[derive(Clone, Debug)]
+pub struct Examination {
+    /// name of the family
+    pub family: &'static str,
+    /// verdict on the whole
+    pub fit: Fit,
+    /// what was found, in one or two sentences: the chains, or what breaks the form
+    pub summary: String,
+    /// names of the states of each chain, where the form was found
+    pub chains: Vec<Vec<String>>,
+    /// every condition with its verdict
+    pub checks: Vec<Check>,
+}
+
+impl Examination {
+    /// The first condition that is refuted.
+    pub fn refuted(&self) -> Option<&Check> {
+        self.checks
+            .iter()
+            .find(|check| matches!(check.verdict, Condition::Refuted(_)))
+    }
+}
+
+/// The constant part of the gain of one chain.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainGain {
+    /// name of the measured output that drives the chain
+    pub output: String,
+    /// (state, gain before the division by partials)
+    pub entries: Vec<(String, f64)>,
+}
+
+/// An observer with everything that led to it.
+#[derive(Clone, Debug)]
+pub struct Design {
+    /// the observer
+    pub observer: Observer,
+    /// what was found in the plant
+    pub examination: Examination,
+    /// gains, one per chain
+    pub gains: Vec<ChainGain>,
+    /// numbers that the tool chose or was given, for the reader: (name, value)
+    pub parameters: Vec<(String, String)>,
+    /// what the user should know
+    pub notes: Vec<String>,
+}
+
+/// Why there is no observer.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum DesignError {
+    /// the family does not fit
+    #[error("{}", refusal(.0))]
+    Refused(Box<Examination>),
+    /// a key of the study
+    #[error(transparent)]
+    Tuning(#[from] TuningError),
+    /// the plant has parameters without value
+    #[error(transparent)]
+    MissingInput(#[from] MissingInput),
+}
+
+fn refusal(examination: &Examination) -> String {
+    let mut text = format!(
+        "the family '{}' does not fit: {}",
+        examination.family, examination.summary
+    );
+    if let Some(check) = examination.refuted() {
+        text += &format!("\n  {}: {} ({})", check.name, check.verdict, check.detail);
+    }
+    text
+}

@@ -1,0 +1,230 @@
+//! Tuning keys, read by the family they belong to.
+
+use std::collections::BTreeMap;
+
+/// A value of a study key.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// a number
+    Number(f64),
+    /// true or false
+    Flag(bool),
+    /// a word
+    Text(String),
+    /// a list
+    List(Vec<Value>),
+    /// named values
+    Table(BTreeMap<String, Value>),
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Value::Number(x) => write!(f, "{x}"),
+            Value::Flag(b) => write!(f, "{b}"),
+            Value::Text(text) => write!(f, "\"{text}\""),
+            Value::List(values) => {
+                let values: Vec<String> = values.iter().map(Value::to_string).collect();
+                write!(f, "[{}]", values.join(", "))
+            }
+            Value::Table(values) => {
+                let values: Vec<String> =
+                    values.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+                write!(f, "{{ {} }}", values.join(", "))
+            }
+        }
+    }
+}
+
+/// A key of the study whose value cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key}: expected {expected}, found {found}")]
+pub struct TuningError {
+    /// the key
+    pub key: String,
+    /// what would be right
+    pub expected: String,
+    /// what stands there
+    pub found: String,
+}
+
+impl TuningError {
+    /// The error for `key`.
+    pub fn new(key: &str, expected: impl Into<String>, found: impl ToString) -> Self {
+        Self {
+            key: key.to_owned(),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+}
+
+/// Where the estimate starts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Initial {
+    /// for every state and unknown input not named
+    pub default: Option<f64>,
+    /// by name
+    pub values: BTreeMap<String, f64>,
+}
+
+/// The tuning of an observer: keys that belong to every family, and those of one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tuning {
+    /// start of the estimate
+    pub initial: Initial,
+    /// the model's functions see the estimate limited to [min, max]
+    pub clamp: bool,
+    /// the family's own keys
+    pub values: BTreeMap<String, Value>,
+}
+
+impl Tuning {
+    /// A tuning with numbers for some keys; a shorthand for plants written in Rust.
+    ///
+    /// ```
+    /// use lynkeus_observers::{Tuning, Value};
+    ///
+    /// let tuning = Tuning::from([("theta", 0.5)]);
+    /// assert_eq!(tuning.values["theta"], Value::Number(0.5));
+    /// ```
+    pub fn from<const N: usize>(numbers: [(&str, f64); N]) -> Self {
+        let values = numbers
+            .into_iter()
+            .map(|(key, x)| (key.to_owned(), Value::Number(x)));
+        Self {
+            values: values.collect(),
+            ..Self::default()
+        }
+    }
+
+    /// A number, or a list of them.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn numbers(&self, key: &str) -> Result<Option<Vec<f64>>, TuningError> {
+        self.values
+            .get(key)
+            .map(|value| numbers(key, value))
+            .transpose()
+    }
+
+    /// A positive number for all of `count` chains, or a list of one per chain.
+    ///
+    /// # Errors
+    /// Numbers that are not positive and finite, lists of another length.
+    pub fn positive_per_chain(
+        &self,
+        key: &str,
+        count: usize,
+    ) -> Result<Option<Vec<f64>>, TuningError> {
+        let Some(found) = self.numbers(key)? else {
+            return Ok(None);
+        };
+        if let Some(wrong) = found.iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+            return Err(TuningError::new(key, "positive numbers", wrong));
+        }
+        match found[..] {
+            [one] => Ok(Some(vec![one; count])),
+            _ if found.len() == count => Ok(Some(found)),
+            _ => Err(TuningError::new(
+                key,
+                format!("one number, or one per measured output ({count})"),
+                format!("{} numbers", found.len()),
+            )),
+        }
+    }
+
+    /// true or false; false if the key is absent.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn flag(&self, key: &str) -> Result<bool, TuningError> {
+        match self.values.get(key) {
+            None => Ok(false),
+            Some(Value::Flag(flag)) => Ok(*flag),
+            Some(other) => Err(TuningError::new(key, "true or false", other)),
+        }
+    }
+
+    /// One of some words.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn choice(&self, key: &str, words: &[&str]) -> Result<Option<String>, TuningError> {
+        match self.values.get(key) {
+            None => Ok(None),
+            Some(Value::Text(text)) if words.contains(&text.as_str()) => Ok(Some(text.clone())),
+            Some(other) => {
+                let words: Vec<String> = words.iter().map(|w| format!("\"{w}\"")).collect();
+                Err(TuningError::new(key, words.join(" or "), other))
+            }
+        }
+    }
+
+    /// Lists of names.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn name_lists(&self, key: &str) -> Result<Option<Vec<Vec<String>>>, TuningError> {
+        let Some(value) = self.values.get(key) else {
+            return Ok(None);
+        };
+        let wrong = || TuningError::new(key, "a list of lists of state names", value);
+        let names = |list: &Value| match list {
+            Value::List(names) => names
+                .iter()
+                .map(|name| match name {
+                    Value::Text(name) => Ok(name.clone()),
+                    _ => Err(wrong()),
+                })
+                .collect(),
+            _ => Err(wrong()),
+        };
+        match value {
+            Value::List(lists) => lists.iter().map(names).collect::<Result<_, _>>().map(Some),
+            _ => Err(wrong()),
+        }
+    }
+
+    /// A list of tables, each with lists of numbers under exactly the given keys.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn number_tables(
+        &self,
+        key: &str,
+        fields: &[&str],
+    ) -> Result<Option<Vec<Vec<Vec<f64>>>>, TuningError> {
+        let Some(value) = self.values.get(key) else {
+            return Ok(None);
+        };
+        let shape = format!("a list of tables with the keys {}", fields.join(" and "));
+        let wrong = || TuningError::new(key, shape.clone(), value);
+        let Value::List(tables) = value else {
+            return Err(wrong());
+        };
+        let table = |table: &Value| {
+            let Value::Table(entries) = table else {
+                return Err(wrong());
+            };
+            if entries.len() != fields.len() {
+                return Err(wrong());
+            }
+            let field = |name: &&str| numbers(key, entries.get(*name).ok_or_else(wrong)?);
+            fields.iter().map(field).collect()
+        };
+        tables.iter().map(table).collect::<Result<_, _>>().map(Some)
+    }
+}
+
+fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
+    let number = |value: &Value| match value {
+        Value::Number(x) => Ok(*x),
+        other => Err(TuningError::new(key, "a number", other)),
+    };
+    match value {
+        Value::List(values) => values.iter().map(number).collect(),
+        one => Ok(vec![number(one)?]),
+    }
+}

@@ -1,0 +1,362 @@
+//! The triangular form, found in the equations.
+//!
+//! A chain starts at a measured state. In every *strict* row j the derivative of
+//! x_j depends on x_1 … x_{j+1} of the same chain only, and on x_{j+1}; so the
+//! next state of a chain is the one new state in the last state's equation, and
+//! nothing has to be searched but where two chains are cut.
+//!
+//! * One output, form (4): rows 1 … n−1 are strict, the last is free.
+//! * Two outputs, form (8): a *leading* chain with rows 1 … n₁−1 strict and a
+//!   *following* one with rows 1 … n₂−2 strict; row n₂−1 may also depend on the
+//!   whole leading chain, and the last rows are free.
+
+use std::collections::BTreeSet;
+
+use crate::Extended;
+
+/// States of one chain, as indices into the extended states; the first is measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// x_1, x_2, …
+    pub states: Vec<usize>,
+}
+
+/// An assignment of every extended state to a chain.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Assignment {
+    /// one chain per measured output, in their order
+    pub chains: Vec<Chain>,
+    /// which chain plays the part of the paper's first one (n₁ rows, n₁−1 strict)
+    pub leading: usize,
+}
+
+impl Assignment {
+    /// Lengths of the chains, in the order of the measured outputs.
+    pub fn lengths(&self) -> Vec<usize> {
+        self.chains.iter().map(|c| c.states.len()).collect()
+    }
+
+    /// Difference between the longest and the shortest chain.
+    fn imbalance(&self) -> usize {
+        let lengths = self.lengths();
+        let longest = lengths.iter().max().copied().unwrap_or(0);
+        longest - lengths.iter().min().copied().unwrap_or(0)
+    }
+}
+
+/// What the user asks of the assignment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChainRequest {
+    /// lengths of the chains, in the order of the measured outputs
+    pub lengths: Option<Vec<usize>>,
+    /// names of the states of each chain
+    pub names: Option<Vec<Vec<String>>>,
+}
+
+/// Every assignment that gives the triangular form, the most balanced first
+/// (of equally balanced ones, the one whose leading chain comes first).
+///
+/// # Errors
+/// Where there is none: one line that says which equation breaks the form.
+pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Assignment>, String> {
+    let heads = heads(extended)?;
+    let mut found = match heads[..] {
+        [head] => vec![single(extended, head)?],
+        [first, second] => pairs(extended, [first, second])?,
+        _ => {
+            return Err(format!(
+                "{} outputs are measured; the triangular family is for one or two: leave some out of 'measured'",
+                heads.len()
+            ));
+        }
+    };
+    let all = found.clone();
+    found.retain(|assignment| fits(extended, assignment, request));
+    if found.is_empty() {
+        let options: Vec<String> = all.iter().map(|a| describe(extended, a)).collect();
+        return Err(format!(
+            "no assignment has the chains asked for; the equations allow {}",
+            options.join(" or ")
+        ));
+    }
+    found.sort_by_key(|a| (a.imbalance(), a.leading));
+    Ok(found)
+}
+
+/// The chains in words: `(level → upper → pump)`.
+pub fn describe(extended: &Extended<'_>, assignment: &Assignment) -> String {
+    let chain = |c: &Chain| {
+        let names: Vec<&str> = c
+            .states
+            .iter()
+            .map(|&i| extended.states[i].name.as_str())
+            .collect();
+        format!("({})", names.join(" → "))
+    };
+    let chains: Vec<String> = assignment.chains.iter().map(chain).collect();
+    chains.join(" and ")
+}
+
+fn fits(extended: &Extended<'_>, assignment: &Assignment, request: &ChainRequest) -> bool {
+    let names = |c: &Chain| {
+        c.states
+            .iter()
+            .map(|&i| extended.states[i].name.clone())
+            .collect()
+    };
+    let lengths = request
+        .lengths
+        .as_ref()
+        .is_none_or(|l| *l == assignment.lengths());
+    let chains = || {
+        assignment
+            .chains
+            .iter()
+            .map(names)
+            .collect::<Vec<Vec<String>>>()
+    };
+    lengths && request.names.as_ref().is_none_or(|n| *n == chains())
+}
+
+/// The measured states, in order.
+fn heads(extended: &Extended<'_>) -> Result<Vec<usize>, String> {
+    let mut heads: Vec<usize> = vec![];
+    for output in &extended.outputs {
+        let Some((state, ..)) = output.state else {
+            return Err(format!(
+                "the output {} = {} is not a state times a factor; a chain has to start at a measured state",
+                output.variable.name,
+                extended.graph().render(output.variable.node, 60)
+            ));
+        };
+        if heads.contains(&state) {
+            return Err(format!(
+                "two outputs measure the same state {}; leave one out of 'measured'",
+                extended.states[state].name
+            ));
+        }
+        heads.push(state);
+    }
+    Ok(heads)
+}
+
+/// The longest chain from `head` whose rows are all strict but the last, and the
+/// new states in the last row: none or several.
+fn strict_path(extended: &Extended<'_>, head: usize) -> (Vec<usize>, Vec<usize>) {
+    let mut path = vec![head];
+    let mut inside = BTreeSet::from([head]);
+    loop {
+        let last = path[path.len() - 1];
+        let new: Vec<usize> = extended.pattern[last]
+            .iter()
+            .copied()
+            .filter(|state| !inside.contains(state))
+            .collect();
+        match new[..] {
+            [next] => {
+                path.push(next);
+                inside.insert(next);
+            }
+            _ => return (path, new),
+        }
+    }
+}
+
+fn names(extended: &Extended<'_>, states: impl IntoIterator<Item = usize>) -> String {
+    let names: Vec<&str> = states
+        .into_iter()
+        .map(|i| extended.states[i].name.as_str())
+        .collect();
+    names.join(", ")
+}
+
+fn single(extended: &Extended<'_>, head: usize) -> Result<Assignment, String> {
+    let (path, new) = strict_path(extended, head);
+    if path.len() == extended.states.len() {
+        return Ok(Assignment {
+            chains: vec![Chain { states: path }],
+            leading: 0,
+        });
+    }
+    Err(stuck(extended, &path, &new))
+}
+
+/// Why a path does not reach every state.
+fn stuck(extended: &Extended<'_>, path: &[usize], new: &[usize]) -> String {
+    let last = &extended.states[path[path.len() - 1]].name;
+    let chain = describe(
+        extended,
+        &Assignment {
+            chains: vec![Chain {
+                states: path.to_vec(),
+            }],
+            leading: 0,
+        },
+    );
+    if new.is_empty() {
+        let left = (0..extended.states.len()).filter(|i| !path.contains(i));
+        return format!(
+            "the chain {chain} ends at {last}: no equation in it depends on {}; measure another output",
+            names(extended, left)
+        );
+    }
+    format!(
+        "the chain {chain} breaks at the equation of {last}: it depends on {} at once, where a triangular form has one new state per equation",
+        names(extended, new.iter().copied())
+    )
+}
+
+fn pairs(extended: &Extended<'_>, heads: [usize; 2]) -> Result<Vec<Assignment>, String> {
+    let paths = heads.map(|head| strict_path(extended, head));
+    let n = extended.states.len();
+    let mut found: Vec<Assignment> = vec![];
+    for leading in [0, 1] {
+        let (lead, follow) = (&paths[leading].0, &paths[1 - leading].0);
+        for n1 in 1..=lead.len().min(n - 1) {
+            if let Some(following) = follower(extended, &lead[..n1], follow) {
+                let leader = Chain {
+                    states: lead[..n1].to_vec(),
+                };
+                let mut chains = vec![leader, Chain { states: following }];
+                chains.rotate_left(leading);
+                let known = found.iter().any(|a| a.chains == chains);
+                if !known {
+                    found.push(Assignment { chains, leading });
+                }
+            }
+        }
+    }
+    if found.is_empty() {
+        let reasons: Vec<String> = paths
+            .iter()
+            .map(|(path, new)| stuck(extended, path, new))
+            .collect();
+        return Err(format!(
+            "no cut into two chains covers every state: {}",
+            reasons.join("; ")
+        ));
+    }
+    Ok(found)
+}
+
+/// The states left over by the leading chain as a following chain, if they form one.
+fn follower(extended: &Extended<'_>, lead: &[usize], path: &[usize]) -> Option<Vec<usize>> {
+    let n = extended.states.len();
+    let n2 = n - lead.len();
+    let mut taken = vec![false; n];
+    lead.iter().for_each(|&i| taken[i] = true);
+    // rows 1 … n₂−2 are strict: the first n₂−1 states are those of the strict path
+    let strict = path.get(..n2 - 1)?;
+    if strict
+        .iter()
+        .any(|&i| std::mem::replace(&mut taken[i], true))
+    {
+        return None;
+    }
+    let last = taken.iter().position(|taken| !taken)?;
+    if n2 == 1 {
+        return (path[0] == last).then(|| vec![last]);
+    }
+    let row = strict[n2 - 2];
+    extended.pattern[row]
+        .contains(&last)
+        .then(|| strict.iter().copied().chain([last]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sensors;
+    use lynkeus_model::{LoadOptions, Plant};
+
+    fn with<T>(text: &str, unknown: &[&str], then: impl FnOnce(&Extended<'_>) -> T) -> T {
+        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
+        let unknown = unknown.iter().map(|s| s.to_string()).collect();
+        let sensors = Sensors {
+            unknown,
+            ..Sensors::default()
+        };
+        then(&Extended::new(&plant, &sensors).unwrap())
+    }
+
+    fn described(extended: &Extended<'_>) -> Vec<String> {
+        let found = find(extended, &ChainRequest::default()).unwrap();
+        found.iter().map(|a| describe(extended, a)).collect()
+    }
+
+    /// States in any order: the chain comes from the equations.
+    #[test]
+    fn one_chain_with_an_unknown_input() {
+        let text = "model T input Real pump; Real upper; Real lower; output Real level = lower;
+          equation der(upper) = -sqrt(upper) + pump; der(lower) = sqrt(upper) - sqrt(lower); end T;";
+        let chains = with(text, &["pump"], described);
+        assert_eq!(chains, ["(lower → upper → pump)"]);
+    }
+
+    fn trays(n: usize, feed: usize) -> String {
+        format!(
+            "model C constant Integer n = {n}; constant Integer f = {feed}; input Real Zf; Real x[n];
+             output Real top = x[1]; output Real bottom = x[n];
+             equation
+             der(x[1]) = x[2] - x[1];
+             for i in 2:f-1 loop der(x[i]) = x[i-1] - 2*x[i] + x[i+1]; end for;
+             der(x[f]) = x[f-1] - 3*x[f] + x[f+1] + Zf;
+             for i in f+1:n-1 loop der(x[i]) = x[i-1] - 2*x[i] + x[i+1]; end for;
+             der(x[n]) = x[n-1] - x[n]; end C;"
+        )
+    }
+
+    /// The paper's column: x1 … x7 and x12 … x8, Zf; it can also be cut with the
+    /// feed in the upper chain, which is less balanced.
+    #[test]
+    fn a_column_is_cut_at_its_most_balanced_place() {
+        let chains = with(&trays(12, 8), &["Zf"], described);
+        assert_eq!(
+            chains[0],
+            "(x[1] → x[2] → x[3] → x[4] → x[5] → x[6] → x[7]) and (x[12] → x[11] → x[10] → x[9] → x[8] → Zf)"
+        );
+        assert_eq!(chains.len(), 2, "{chains:?}");
+        assert!(chains[1].ends_with("x[8] → Zf) and (x[12] → x[11] → x[10] → x[9])"));
+    }
+
+    #[test]
+    fn lengths_and_names_decide_between_cuts() {
+        with(&trays(12, 8), &["Zf"], |extended| {
+            let lengths = ChainRequest {
+                lengths: Some(vec![9, 4]),
+                names: None,
+            };
+            assert_eq!(find(extended, &lengths).unwrap()[0].lengths(), [9, 4]);
+            let wrong = ChainRequest {
+                lengths: Some(vec![5, 8]),
+                names: None,
+            };
+            let text = find(extended, &wrong).unwrap_err();
+            assert!(text.contains("the equations allow"), "{text}");
+        });
+    }
+
+    #[test]
+    fn what_breaks_the_form_is_said() {
+        let unreached = "model U Real a; Real b; output Real y = a;
+          equation der(a) = -a; der(b) = a; end U;";
+        let text = with(unreached, &[], |e| {
+            find(e, &ChainRequest::default()).unwrap_err()
+        });
+        assert!(text.contains("no equation in it depends on b"), "{text}");
+        let two = "model U Real a; Real b; Real c; output Real y = a;
+          equation der(a) = b + c; der(b) = a; der(c) = b; end U;";
+        let text = with(two, &[], |e| find(e, &ChainRequest::default()).unwrap_err());
+        assert!(
+            text.contains("equation of a: it depends on b, c at once"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn two_measured_states_need_no_chain_between_them() {
+        let text = "model M Real a; Real b; output Real y = a; output Real z = b;
+          equation der(a) = b; der(b) = -a*b; end M;";
+        assert_eq!(with(text, &[], described), ["(a) and (b)"]);
+    }
+}

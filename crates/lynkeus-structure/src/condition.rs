@@ -1,0 +1,135 @@
+//! Verdicts.
+
+use std::fmt;
+
+/// A point of the box and the value of the expression in question there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// (name, value) of every variable the expression depends on
+    pub coordinates: Vec<(String, f64)>,
+    /// value of the expression at the point
+    pub value: f64,
+}
+
+/// Points that refute a condition.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Witness {
+    /// one point (where the expression vanishes) or two (where its signs differ)
+    pub points: Vec<Point>,
+}
+
+/// The verdict on a condition over the whole box.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Condition {
+    /// holds everywhere on the box, by interval arithmetic
+    Proved,
+    /// fails at the witness
+    Refuted(Witness),
+    /// neither, within the budget; the part of the box that is left
+    Undecided(Vec<(String, f64, f64)>),
+}
+
+impl Condition {
+    /// One word: `proved`, `refuted` or `undecided`.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Condition::Proved => "proved",
+            Condition::Refuted(_) => "refuted",
+            Condition::Undecided(_) => "undecided",
+        }
+    }
+}
+
+/// A named condition with its verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Check {
+    /// what has to hold, e.g. `∂f(lower)/∂upper keeps its sign`
+    pub name: String,
+    /// the verdict
+    pub verdict: Condition,
+    /// what was found, in words
+    pub detail: String,
+}
+
+/// Six significant digits, as a person reads them.
+pub(crate) fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 5 - value.abs().log10().floor() as i32;
+    let rounded = if (0..=15).contains(&digits) {
+        format!("{value:.*}", digits as usize)
+    } else {
+        return format!("{value:.5e}");
+    };
+    match rounded.contains('.') {
+        true => rounded
+            .trim_end_matches('0')
+            .trim_end_matches('.')
+            .to_owned(),
+        false => rounded,
+    }
+}
+
+impl fmt::Display for Point {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", short(self.value))?;
+        for (i, (name, value)) in self.coordinates.iter().enumerate() {
+            let word = if i == 0 { " at" } else { "," };
+            write!(f, "{word} {name} = {}", short(*value))?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Witness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let points: Vec<String> = self.points.iter().map(Point::to_string).collect();
+        write!(f, "it is {}", points.join(" and "))
+    }
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Condition::Proved => write!(f, "proved"),
+            Condition::Refuted(witness) => write!(f, "refuted: {witness}"),
+            Condition::Undecided(remaining) => {
+                let sides: Vec<String> = remaining
+                    .iter()
+                    .map(|(name, low, high)| {
+                        format!("{name} in [{}, {}]", short(*low), short(*high))
+                    })
+                    .collect();
+                match sides.is_empty() {
+                    true => write!(f, "undecided"),
+                    false => write!(f, "undecided on {}", sides.join(", ")),
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.5, "0.5"),
+            (-1.0, "-1"),
+            (1234567.8, "1.23457e6"),
+            (1e-9, "1e-9"),
+            (0.1 + 0.2, "0.3"),
+            (100.0, "100"),
+        ] {
+            let found = short(value);
+            let same = found.parse::<f64>().unwrap() == text.parse::<f64>().unwrap();
+            assert!(same, "{value} became {found}");
+        }
+        assert_eq!(short(0.1 + 0.2), "0.3");
+        assert_eq!(short(100.0), "100");
+    }
+}

@@ -1,0 +1,339 @@
+//! The plant as an observer sees it.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_model::{Plant, Variable};
+
+use crate::{Dimension, Region};
+
+/// Who measures what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensors {
+    /// names of the measured outputs; empty for every output of the plant
+    pub measured: Vec<String>,
+    /// inputs that nobody measures: estimated along with the state
+    pub unknown: Vec<String>,
+    /// inputs that act on the plant and that the observer takes as zero
+    pub disturbances: Vec<String>,
+}
+
+/// A name that does not fit the plant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SensorsError {
+    /// no such output or input
+    #[error(
+        "{key}: the plant '{plant}' has no {kind} named '{name}'; it has {}",
+        list(found)
+    )]
+    NoSuchName {
+        /// the study key the name stands under
+        key: &'static str,
+        /// name of the plant
+        plant: String,
+        /// `output` or `input`
+        kind: &'static str,
+        /// the name in question
+        name: String,
+        /// the names there are
+        found: Vec<String>,
+    },
+    /// the same name twice
+    #[error("'{name}' is listed twice among the sensors ({first} and {second}): keep one")]
+    Twice {
+        /// the name in question
+        name: String,
+        /// key of the first mention
+        first: &'static str,
+        /// key of the second
+        second: &'static str,
+    },
+    /// nothing is measured
+    #[error(
+        "nothing is measured: the plant '{plant}' has no output; declare one, e.g. 'output Real y = x;'"
+    )]
+    NothingMeasured {
+        /// name of the plant
+        plant: String,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    match names.is_empty() {
+        true => "none".to_owned(),
+        false => names.join(", "),
+    }
+}
+
+/// A measured output.
+#[derive(Clone, Debug)]
+pub struct Measurement {
+    /// the output's declaration; its node is h(t, x, u)
+    pub variable: Variable,
+    /// index of the extended state it is an affine function of, if it is one:
+    /// y = slope·x + offset
+    pub state: Option<(usize, Node, Node)>,
+}
+
+/// The plant with its unknown inputs as further states, x' = f(t, x, v, u) and
+/// v' = 0 (the true v' is an unknown bounded disturbance of that equation, as for
+/// the feed composition in Hammouri, Targui and Armanet, section 3), and with
+/// its disturbances set to zero.
+#[derive(Debug)]
+pub struct Extended<'p> {
+    /// the plant
+    pub plant: &'p Plant,
+    /// states, then unknown inputs
+    pub states: Vec<Variable>,
+    /// right-hand side, one expression per entry of `states`
+    pub derivatives: Vec<Node>,
+    /// inputs the observer knows
+    pub inputs: Vec<Variable>,
+    /// measured outputs, in the order of the study
+    pub outputs: Vec<Measurement>,
+    /// row by row which extended states the derivative depends on
+    pub pattern: Vec<Vec<usize>>,
+}
+
+impl<'p> Extended<'p> {
+    /// Applies the sensors to the plant.
+    ///
+    /// # Errors
+    /// Names that the plant does not have or that are listed twice; no output.
+    pub fn new(plant: &'p Plant, sensors: &Sensors) -> Result<Self, SensorsError> {
+        let graph = &plant.graph;
+        refuse_doubles(sensors)?;
+        let measured = measured(plant, sensors)?;
+        let unknown = inputs(plant, "unknown", &sensors.unknown)?;
+        let disturbances = inputs(plant, "disturbances", &sensors.disturbances)?;
+        let zero = graph.constant(0.0).node();
+        let silenced: HashMap<Node, Node> = disturbances.iter().map(|d| (d.node, zero)).collect();
+        let mut derivatives = graph.substitute(&plant.derivatives, &silenced);
+        derivatives.extend(unknown.iter().map(|_| zero));
+        let known =
+            |v: &&Variable| !sensors.unknown.contains(&v.name) && !silenced.contains_key(&v.node);
+        let inputs = plant.inputs.iter().filter(known).cloned().collect();
+        let states: Vec<Variable> = plant.states.iter().cloned().chain(unknown).collect();
+        let symbols: Vec<Node> = states.iter().map(|s| s.node).collect();
+        let pattern = jacobian::pattern(graph, &derivatives, &symbols);
+        let outputs = measured
+            .into_iter()
+            .map(|mut variable| {
+                variable.node = graph.substitute(&[variable.node], &silenced)[0];
+                let state = affine_state(graph, variable.node, &symbols);
+                Measurement { variable, state }
+            })
+            .collect();
+        Ok(Self {
+            plant,
+            states,
+            derivatives,
+            inputs,
+            outputs,
+            pattern,
+        })
+    }
+
+    /// The graph of the plant.
+    pub fn graph(&self) -> &'p Graph {
+        &self.plant.graph
+    }
+
+    /// Number of states that are not unknown inputs.
+    pub fn plant_states(&self) -> usize {
+        self.plant.states.len()
+    }
+
+    /// Symbols of the extended states.
+    pub fn symbols(&self) -> Vec<Node> {
+        self.states.iter().map(|s| s.node).collect()
+    }
+
+    /// Index of the extended state of that name.
+    pub fn state_index(&self, name: &str) -> Option<usize> {
+        self.states.iter().position(|s| s.name == name)
+    }
+
+    /// ∂f_row/∂x_column as an expression; none where it is zero everywhere.
+    pub fn partial(&self, row: usize, column: usize) -> Option<Node> {
+        let jacobian = jacobian::forward(
+            self.graph(),
+            &[self.derivatives[row]],
+            &[self.states[column].node],
+        );
+        jacobian.get(0, 0)
+    }
+
+    /// The box: declared ranges of the states, unknown and known inputs; time is free.
+    pub fn region(&self) -> Region {
+        let side = |v: &Variable| Dimension {
+            name: v.name.clone(),
+            symbol: v.node,
+            min: v.min,
+            max: v.max,
+            integer: v.integer,
+        };
+        let mut dimensions: Vec<Dimension> =
+            self.states.iter().chain(&self.inputs).map(side).collect();
+        dimensions.push(Dimension {
+            name: "time".into(),
+            symbol: self.plant.time,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            integer: false,
+        });
+        Region { dimensions }
+    }
+}
+
+fn refuse_doubles(sensors: &Sensors) -> Result<(), SensorsError> {
+    let mut seen: HashMap<&str, &'static str> = HashMap::new();
+    let groups = [
+        ("unknown", &sensors.unknown),
+        ("disturbances", &sensors.disturbances),
+    ];
+    let inputs = groups
+        .into_iter()
+        .flat_map(|(key, names)| names.iter().map(move |n| (key, n)));
+    for (second, name) in inputs {
+        if let Some(first) = seen.insert(name, second) {
+            return Err(SensorsError::Twice {
+                name: name.clone(),
+                first,
+                second,
+            });
+        }
+    }
+    let mut outputs = std::collections::HashSet::new();
+    match sensors.measured.iter().find(|name| !outputs.insert(*name)) {
+        Some(name) => Err(SensorsError::Twice {
+            name: name.clone(),
+            first: "measured",
+            second: "measured",
+        }),
+        None => Ok(()),
+    }
+}
+
+fn measured(plant: &Plant, sensors: &Sensors) -> Result<Vec<Variable>, SensorsError> {
+    if plant.outputs.is_empty() {
+        return Err(SensorsError::NothingMeasured {
+            plant: plant.name.clone(),
+        });
+    }
+    if sensors.measured.is_empty() {
+        return Ok(plant.outputs.clone());
+    }
+    let names = sensors.measured.iter();
+    names
+        .map(|name| find(plant, "measured", "output", &plant.outputs, name))
+        .collect()
+}
+
+fn inputs(
+    plant: &Plant,
+    key: &'static str,
+    names: &[String],
+) -> Result<Vec<Variable>, SensorsError> {
+    names
+        .iter()
+        .map(|name| find(plant, key, "input", &plant.inputs, name))
+        .collect()
+}
+
+fn find(
+    plant: &Plant,
+    key: &'static str,
+    kind: &'static str,
+    variables: &[Variable],
+    name: &str,
+) -> Result<Variable, SensorsError> {
+    let found = variables.iter().find(|v| v.name == name).cloned();
+    found.ok_or_else(|| SensorsError::NoSuchName {
+        key,
+        plant: plant.name.clone(),
+        kind,
+        name: name.to_owned(),
+        found: variables.iter().map(|v| v.name.clone()).collect(),
+    })
+}
+
+/// y = slope·x + offset with one state x, slope and offset free of states.
+fn affine_state(graph: &Graph, output: Node, states: &[Node]) -> Option<(usize, Node, Node)> {
+    let jacobian = jacobian::forward(graph, &[output], states);
+    let [(_, state, slope)] = jacobian.entries[..] else {
+        return None;
+    };
+    let depends = |node: Node| !jacobian::pattern(graph, &[node], states)[0].is_empty();
+    if depends(slope) || jacobian::pattern(graph, &[output], states)[0] != [state] {
+        return None;
+    }
+    let zero = graph.constant(0.0).node();
+    let offset = graph.substitute(&[output], &HashMap::from([(states[state], zero)]))[0];
+    Some((state, slope, offset))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lynkeus_model::LoadOptions;
+
+    const PLANT: &str = "model P
+      input Real u; input Real v; input Real e;
+      Real a; Real b;
+      output Real y = 2*a + u; output Real z = a*b;
+    equation
+      der(a) = b + v; der(b) = -a + u + e;
+    end P;";
+
+    fn plant() -> Plant {
+        Plant::from_modelica(PLANT, "p.mo", &LoadOptions::default()).unwrap()
+    }
+
+    #[test]
+    fn unknown_inputs_become_states_and_disturbances_vanish() {
+        let plant = plant();
+        let sensors = Sensors {
+            measured: vec!["y".into()],
+            unknown: vec!["v".into()],
+            disturbances: vec!["e".into()],
+        };
+        let extended = Extended::new(&plant, &sensors).unwrap();
+        let names: Vec<_> = extended.states.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["a", "b", "v"]);
+        assert_eq!(extended.pattern, [vec![1, 2], vec![0], vec![]]);
+        assert_eq!(extended.inputs.len(), 1);
+        let (state, slope, _) = extended.outputs[0].state.unwrap();
+        assert_eq!((state, plant.graph.constant_value(slope)), (0, Some(2.0)));
+    }
+
+    #[test]
+    fn a_product_of_states_is_no_affine_output() {
+        let plant = plant();
+        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+        assert!(extended.outputs[1].state.is_none());
+    }
+
+    #[test]
+    fn wrong_names_are_told_with_the_right_ones() {
+        let plant = plant();
+        let sensors = Sensors {
+            measured: vec!["level".into()],
+            ..Sensors::default()
+        };
+        let text = Extended::new(&plant, &sensors).unwrap_err().to_string();
+        assert!(
+            text.contains("no output named 'level'") && text.contains("y, z"),
+            "{text}"
+        );
+        let twice = Sensors {
+            unknown: vec!["u".into()],
+            disturbances: vec!["u".into()],
+            ..Sensors::default()
+        };
+        assert!(matches!(
+            Extended::new(&plant, &twice),
+            Err(SensorsError::Twice { .. })
+        ));
+    }
+}

@@ -1,0 +1,166 @@
+//! The range of an expression over a box, by interval branch and bound.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
+
+use crate::region::{Cell, Region};
+use crate::{Dimension, Point};
+
+/// Cells examined per end of the range.
+const BUDGET: usize = 4000;
+/// Refinement stops when the outer bound is this close to a value attained.
+const TOLERANCE: f64 = 1e-3;
+
+/// What is known of the values of an expression on a box.
+#[derive(Clone, Debug)]
+pub struct Range {
+    /// rigorous: every value lies inside
+    pub enclosure: Interval,
+    /// the expression is defined everywhere on the box (no √ of a negative, no 1/0)
+    pub defined: bool,
+    /// the smallest value found at a point
+    pub lowest: Option<Point>,
+    /// the largest value found at a point
+    pub highest: Option<Point>,
+    /// the cell that keeps the enclosure from being tighter at its lower end
+    pub weakest: Vec<(String, f64, f64)>,
+}
+
+/// Encloses the values of `node` for variables in `region`.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn range(graph: &Graph, node: Node, region: &Region) -> Result<Range, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let mut search = Search {
+        evaluator: tape.evaluator(),
+        tape,
+        region: &region,
+    };
+    let lower = search.minimum(1.0);
+    let upper = search.minimum(-1.0);
+    let (low, high) = (lower.bound, -upper.bound);
+    Ok(Range {
+        enclosure: Interval::new(low, high).unwrap_or(Interval::ENTIRE),
+        defined: lower.defined && upper.defined,
+        lowest: lower.best,
+        highest: upper.best.map(|p| Point {
+            value: -p.value,
+            ..p
+        }),
+        weakest: lower.weakest,
+    })
+}
+
+/// Cells ordered so that the one with the lowest bound comes first.
+struct Open {
+    bound: f64,
+    cell: Cell,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Open {}
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.bound.total_cmp(&self.bound)
+    }
+}
+
+struct Minimum {
+    bound: f64,
+    best: Option<Point>,
+    defined: bool,
+    weakest: Vec<(String, f64, f64)>,
+}
+
+struct Search<'a> {
+    tape: Tape,
+    evaluator: Evaluator,
+    region: &'a Region,
+}
+
+impl Search<'_> {
+    /// The minimum of sign·f over the region.
+    fn minimum(&mut self, sign: f64) -> Minimum {
+        let whole = self.region.cell();
+        let (bound, defined) = self.bound(&whole, sign);
+        let mut best = self.sample(&whole, sign, None);
+        let mut open = BinaryHeap::from([Open { bound, cell: whole }]);
+        for _ in 0..BUDGET {
+            let Some(weakest) = open.peek() else { break };
+            if close(weakest.bound, best.as_ref()) {
+                break;
+            }
+            let Some((first, second)) = self.region.split(&weakest.cell) else {
+                break;
+            };
+            open.pop();
+            for cell in [first, second] {
+                best = self.sample(&cell, sign, best);
+                let bound = self.bound(&cell, sign).0;
+                open.push(Open { bound, cell });
+            }
+        }
+        let (bound, weakest) = match open.peek() {
+            Some(top) => (top.bound, self.region.named(&top.cell)),
+            None => (bound, vec![]),
+        };
+        Minimum {
+            bound,
+            best,
+            defined,
+            weakest,
+        }
+    }
+
+    /// (lower bound of sign·f on the cell, f is defined on all of it)
+    fn bound(&self, cell: &Cell, sign: f64) -> (f64, bool) {
+        let value = &self.tape.eval_in(&Intervals, cell)[0];
+        if value.is_empty() {
+            return (f64::INFINITY, false);
+        }
+        let bound = if sign > 0.0 { value.lo() } else { -value.hi() };
+        (bound, value.is_defined())
+    }
+
+    fn sample(&mut self, cell: &Cell, sign: f64, mut best: Option<Point>) -> Option<Point> {
+        for point in self.region.samples(cell) {
+            let mut out = [0.0];
+            self.evaluator.eval(&point, &mut out);
+            let value = sign * out[0];
+            if !value.is_nan() && best.as_ref().is_none_or(|b| value < b.value) {
+                best = Some(Point {
+                    coordinates: named(&self.region.dimensions, &point),
+                    value,
+                });
+            }
+        }
+        best
+    }
+}
+
+fn named(dimensions: &[Dimension], point: &[f64]) -> Vec<(String, f64)> {
+    let pairs = dimensions.iter().zip(point);
+    pairs.map(|(d, &x)| (d.name.clone(), x)).collect()
+}
+
+fn close(bound: f64, best: Option<&Point>) -> bool {
+    best.is_some_and(|best| {
+        let gap = best.value - bound;
+        // equal infinities are as close as can be
+        best.value == bound || gap <= TOLERANCE * best.value.abs()
+    })
+}

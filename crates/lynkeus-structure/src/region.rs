@@ -1,0 +1,140 @@
+//! Boxes of variables.
+
+use lynkeus_expr::{Interval, Node};
+
+/// One side of the box.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dimension {
+    /// name shown in witnesses
+    pub name: String,
+    /// the symbol
+    pub symbol: Node,
+    /// smallest value, −∞ if not declared
+    pub min: f64,
+    /// largest value, +∞ if not declared
+    pub max: f64,
+    /// only whole numbers count
+    pub integer: bool,
+}
+
+/// The box on which conditions are decided: the product of its dimensions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Region {
+    /// the sides
+    pub dimensions: Vec<Dimension>,
+}
+
+/// One box of a subdivision: an interval per dimension.
+pub(crate) type Cell = Vec<Interval>;
+
+impl Region {
+    /// The dimensions whose symbols are among `symbols`.
+    pub fn restricted(&self, symbols: &[Node]) -> Region {
+        let kept = self
+            .dimensions
+            .iter()
+            .filter(|d| symbols.contains(&d.symbol));
+        Region {
+            dimensions: kept.cloned().collect(),
+        }
+    }
+
+    /// The symbols, in order.
+    pub fn symbols(&self) -> Vec<Node> {
+        self.dimensions.iter().map(|d| d.symbol).collect()
+    }
+
+    /// The whole region as one cell.
+    pub(crate) fn cell(&self) -> Cell {
+        let side = |d: &Dimension| Interval::new(d.min, d.max).unwrap_or(Interval::ENTIRE);
+        self.dimensions.iter().map(side).collect()
+    }
+
+    /// Names and ends of a cell.
+    pub(crate) fn named(&self, cell: &Cell) -> Vec<(String, f64, f64)> {
+        let sides = self.dimensions.iter().zip(cell);
+        sides
+            .map(|(d, side)| (d.name.clone(), side.lo(), side.hi()))
+            .collect()
+    }
+
+    /// Halves the relatively widest side; none if every side is a point.
+    pub(crate) fn split(&self, cell: &Cell) -> Option<(Cell, Cell)> {
+        let width = |i: usize| self.relative_width(i, &cell[i]);
+        let widest = (0..cell.len()).max_by(|&i, &j| width(i).total_cmp(&width(j)))?;
+        let (low, high) = (cell[widest].lo(), cell[widest].hi());
+        let (left, right) = if self.dimensions[widest].integer {
+            let middle = self.middle(widest, &cell[widest]);
+            (middle, (middle + 1.0).min(high))
+        } else {
+            let middle = between(low, high);
+            (middle, middle)
+        };
+        if !(low < high) || (left == low && right == high && low.next_up() >= high) {
+            return None;
+        }
+        let (mut first, mut second) = (cell.clone(), cell.clone());
+        first[widest] = Interval::new(low, left).ok()?;
+        second[widest] = Interval::new(right, high).ok()?;
+        Some((first, second))
+    }
+
+    fn relative_width(&self, i: usize, side: &Interval) -> f64 {
+        let width = side.hi() - side.lo();
+        let whole = self.dimensions[i].max - self.dimensions[i].min;
+        match whole.is_finite() && whole > 0.0 {
+            true => width / whole,
+            false if width > 0.0 => width.min(1e300),
+            false => 0.0,
+        }
+    }
+
+    /// A value inside a side: whole where the dimension is.
+    fn middle(&self, i: usize, side: &Interval) -> f64 {
+        let middle = between(side.lo(), side.hi());
+        if self.dimensions[i].integer {
+            middle.floor().max(side.lo())
+        } else {
+            middle
+        }
+    }
+
+    /// The middle of a cell.
+    pub(crate) fn middle_point(&self, cell: &Cell) -> Vec<f64> {
+        (0..cell.len()).map(|i| self.middle(i, &cell[i])).collect()
+    }
+
+    /// A few points of a cell: the middle, its ends one side at a time and the
+    /// two extreme corners; only finite ones.
+    pub(crate) fn samples(&self, cell: &Cell) -> Vec<Vec<f64>> {
+        let middle = self.middle_point(cell);
+        let mut points = vec![middle.clone()];
+        for (i, side) in cell.iter().enumerate() {
+            for end in [side.lo(), side.hi()] {
+                let mut point = middle.clone();
+                point[i] = end;
+                points.push(point);
+            }
+        }
+        points.push(cell.iter().map(|side| side.lo()).collect());
+        points.push(cell.iter().map(|side| side.hi()).collect());
+        points.retain(|p| p.iter().all(|x| x.is_finite()));
+        points
+    }
+
+    /// Whether one can move straight between two points inside the region.
+    pub(crate) fn connected(&self, p: &[f64], q: &[f64]) -> bool {
+        let sides = self.dimensions.iter().zip(p.iter().zip(q));
+        sides.into_iter().all(|(d, (p, q))| !d.integer || p == q)
+    }
+}
+
+/// A number inside [low, high], also where an end is infinite.
+fn between(low: f64, high: f64) -> f64 {
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) => low + (high - low) / 2.0,
+        (false, false) => 0.0,
+        (true, false) => (2.0 * low).max(1.0),
+        (false, true) => (2.0 * high).min(-1.0),
+    }
+}

@@ -1,0 +1,243 @@
+//! Does an expression keep its sign on the box?
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Graph, MissingInput, Node, Tape};
+
+use crate::condition::short;
+use crate::{Check, Condition, Point, Range, Region, Witness, range};
+
+/// The verdict on a sign, with the bounds that go with it.
+#[derive(Clone, Debug)]
+pub struct Sign {
+    /// the condition "never zero, one sign"
+    pub check: Check,
+    /// +1 or −1: the sign where it is proved, else that of the first sample
+    pub sign: f64,
+    /// rigorous bounds of the absolute value: (α₁, α₂); α₂ may be infinite
+    pub bounds: (f64, f64),
+}
+
+/// Decides whether `node` has one sign, zero excluded, on the region.
+///
+/// Refuted with two points of opposite sign and, where one can move from one to
+/// the other inside the region, the zero between them.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn keeps_sign(
+    graph: &Graph,
+    name: String,
+    node: Node,
+    region: &Region,
+) -> Result<Sign, MissingInput> {
+    let found = range(graph, node, region)?;
+    let (low, high) = (found.enclosure.lo(), found.enclosure.hi());
+    let expression = graph.render(node, 80);
+    let (verdict, detail) = if low > 0.0 || high < 0.0 {
+        let detail = format!("{expression} lies in [{}, {}]", short(low), short(high));
+        (Condition::Proved, detail)
+    } else if let Some(witness) = witness(graph, node, region, &found)? {
+        (
+            Condition::Refuted(witness),
+            format!("{expression} can vanish or change its sign"),
+        )
+    } else {
+        let detail = format!(
+            "{expression} lies in [{}, {}] as far as can be proved{}",
+            short(low),
+            short(high),
+            undeclared(&found)
+        );
+        (Condition::Undecided(found.weakest.clone()), detail)
+    };
+    let sample = found.highest.as_ref().map_or(1.0, |p| p.value);
+    let sign = if high < 0.0 || (low <= 0.0 && sample < 0.0) {
+        -1.0
+    } else {
+        1.0
+    };
+    let bounds = if low > 0.0 {
+        (low, high)
+    } else if high < 0.0 {
+        (-high, -low)
+    } else {
+        (0.0, high.max(-low))
+    };
+    Ok(Sign {
+        check: Check {
+            name,
+            verdict,
+            detail,
+        },
+        sign,
+        bounds,
+    })
+}
+
+/// Whether one interval evaluation over the whole region bounds the expression.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let value = tape.eval_in(&Intervals, &region.cell())[0];
+    Ok(value.lo().is_finite() && value.hi().is_finite())
+}
+
+/// A hint where the box has no declared end.
+fn undeclared(found: &Range) -> String {
+    let open = |&&(_, low, high): &&(String, f64, f64)| low.is_infinite() || high.is_infinite();
+    let names: Vec<&str> = found
+        .weakest
+        .iter()
+        .filter(open)
+        .map(|(name, ..)| name.as_str())
+        .collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!("; declare min and max of {}", names.join(", ")),
+    }
+}
+
+fn witness(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    found: &Range,
+) -> Result<Option<Witness>, MissingInput> {
+    let (Some(lowest), Some(highest)) = (&found.lowest, &found.highest) else {
+        return Ok(None);
+    };
+    if lowest.value == 0.0 || highest.value == 0.0 {
+        let zero = if lowest.value == 0.0 { lowest } else { highest };
+        return Ok(Some(Witness {
+            points: vec![zero.clone()],
+        }));
+    }
+    if !(lowest.value < 0.0 && highest.value > 0.0) {
+        return Ok(None);
+    }
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let mut points = vec![lowest.clone(), highest.clone()];
+    if let Some(zero) = zero_between(tape, &region, lowest, highest) {
+        points.insert(0, zero);
+    }
+    Ok(Some(Witness { points }))
+}
+
+/// Bisection along the straight line between two points of opposite sign.
+fn zero_between(tape: Tape, region: &Region, negative: &Point, positive: &Point) -> Option<Point> {
+    let values = |p: &Point| p.coordinates.iter().map(|c| c.1).collect::<Vec<f64>>();
+    let (mut p, mut q) = (values(negative), values(positive));
+    if !region.connected(&p, &q) {
+        return None;
+    }
+    let mut evaluator = tape.evaluator();
+    let mut value = [0.0];
+    for _ in 0..200 {
+        let middle: Vec<f64> = p.iter().zip(&q).map(|(p, q)| p + (q - p) / 2.0).collect();
+        evaluator.eval(&middle, &mut value);
+        if value[0] == 0.0 || middle == p || middle == q {
+            break;
+        }
+        *(if value[0] < 0.0 { &mut p } else { &mut q }) = middle;
+    }
+    let middle: Vec<f64> = p.iter().zip(&q).map(|(p, q)| p + (q - p) / 2.0).collect();
+    evaluator.eval(&middle, &mut value);
+    let names = negative.coordinates.iter().map(|c| c.0.clone());
+    let small = value[0].abs() <= 1e-9 * (positive.value - negative.value);
+    small.then(|| Point {
+        coordinates: names.zip(middle).collect(),
+        value: value[0],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Dimension;
+    use lynkeus_expr::Expr;
+
+    fn side(x: Expr<'_>, min: f64, max: f64, integer: bool) -> Dimension {
+        let name = x.graph().symbol_name(x.node()).unwrap();
+        Dimension {
+            name,
+            symbol: x.node(),
+            min,
+            max,
+            integer,
+        }
+    }
+
+    fn decide(f: Expr<'_>, sides: Vec<Dimension>) -> Sign {
+        keeps_sign(
+            f.graph(),
+            "f".into(),
+            f.node(),
+            &Region { dimensions: sides },
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_root_of_a_tank_keeps_its_sign() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let sign = decide(-0.07 / (2.0 * x.sqrt()), vec![side(x, 0.05, 10.0, false)]);
+        assert_eq!(sign.check.verdict, Condition::Proved);
+        assert_eq!(sign.sign, -1.0);
+        let (low, high) = (0.035 / 10f64.sqrt(), 0.035 / 0.05f64.sqrt());
+        assert!(sign.bounds.0 <= low && sign.bounds.0 > low * 0.998);
+        assert!(sign.bounds.1 >= high && sign.bounds.1 < high * 1.002);
+    }
+
+    #[test]
+    fn a_zero_inside_is_the_witness() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        for (min, max) in [(-1.0, 1.0), (-1.0, 2.0), (-0.3, 7.0)] {
+            let sign = decide(2.0 * x, vec![side(x, min, max, false)]);
+            let Condition::Refuted(witness) = sign.check.verdict else {
+                panic!()
+            };
+            assert!(witness.points[0].coordinates[0].1.abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_zero_on_the_edge_counts() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let sign = decide(x, vec![side(x, 0.0, 1.0, false)]);
+        assert!(matches!(sign.check.verdict, Condition::Refuted(_)));
+    }
+
+    /// u = 2s − 1 with a whole s in {0, 1}: never zero, yet of both signs.
+    #[test]
+    fn a_set_of_two_values_has_no_zero_between() {
+        let g = Graph::new();
+        let s = g.symbol("s");
+        let sign = decide(2.0 * s - 1.0, vec![side(s, 0.0, 1.0, true)]);
+        let Condition::Refuted(witness) = sign.check.verdict else {
+            panic!()
+        };
+        let values: Vec<f64> = witness.points.iter().map(|p| p.value).collect();
+        assert_eq!(values, [-1.0, 1.0]);
+    }
+
+    #[test]
+    fn an_undeclared_box_is_undecided_and_says_what_to_declare() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let all = (f64::NEG_INFINITY, f64::INFINITY);
+        let sign = decide(x.exp(), vec![side(x, all.0, all.1, false)]);
+        assert!(matches!(sign.check.verdict, Condition::Undecided(_)));
+        assert!(
+            sign.check.detail.contains("declare min and max of x"),
+            "{}",
+            sign.check.detail
+        );
+    }
+}
