@@ -1,0 +1,94 @@
+//! What an integrator sees of a system.
+
+use crate::Error;
+use crate::error::state_text;
+
+/// A right-hand side x' = f(t, x), with the instants at which f jumps because
+/// of time alone.
+///
+/// A derivative that is NaN or infinite is a statement ("f is not defined
+/// here"), never a value: integrators shorten the step or stop.
+pub trait Dynamics {
+    /// Number of states.
+    fn dimension(&self) -> usize;
+
+    /// Writes f(t, x) to `dx`; both slices have [`Dynamics::dimension`] entries.
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]);
+
+    /// Appends every instant strictly inside (`from`, `to`) at which f jumps or
+    /// has a kink because of time, in any order.
+    ///
+    /// # Errors
+    /// [`Error::TooManySwitches`] where there is no bounded number of them.
+    fn switches(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Freezes what depends on time by jumps (relations, `floor`, `sign`) at its
+    /// value at `t`, so that f is smooth on a whole segment, ends included.
+    fn enter(&mut self, _t: f64) {}
+
+    /// The names of the states, for messages.
+    fn names(&self) -> Vec<String> {
+        (1..=self.dimension()).map(|i| format!("x[{i}]")).collect()
+    }
+
+    /// The error for a derivative that is not finite at (t, x).
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        Error::NotFinite {
+            time: t,
+            operation: "the derivative is not finite".to_owned(),
+            state: state_text(&self.names(), x),
+        }
+    }
+}
+
+impl<D: Dynamics + ?Sized> Dynamics for &mut D {
+    fn dimension(&self) -> usize {
+        (**self).dimension()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        (**self).derivatives(t, x, dx);
+    }
+
+    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        (**self).switches(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        (**self).enter(t);
+    }
+
+    fn names(&self) -> Vec<String> {
+        (**self).names()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        (**self).not_finite(t, x)
+    }
+}
+
+/// A closure (t, x, dx) as dynamics, for plain functions.
+#[derive(Clone, Debug)]
+pub struct Function<F> {
+    dimension: usize,
+    f: F,
+}
+
+impl<F: FnMut(f64, &[f64], &mut [f64])> Function<F> {
+    /// `f` writes the derivative of `dimension` states to its last argument.
+    pub fn new(dimension: usize, f: F) -> Self {
+        Self { dimension, f }
+    }
+}
+
+impl<F: FnMut(f64, &[f64], &mut [f64])> Dynamics for Function<F> {
+    fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        (self.f)(t, x, dx);
+    }
+}

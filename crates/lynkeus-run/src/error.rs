@@ -1,0 +1,203 @@
+//! What can go wrong, with where and what to do.
+
+use lynkeus_expr::MissingInput;
+
+use crate::Trajectory;
+
+/// Why a system could not be built, simulated or replayed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// An expression reads a symbol that is not time, a state or a signal.
+    #[error(transparent)]
+    MissingInput(#[from] MissingInput),
+
+    /// A setting has an impossible value.
+    #[error("{what}: expected {expected}, found {found}")]
+    Setting {
+        /// the setting
+        what: String,
+        /// what it must be
+        expected: String,
+        /// what it is
+        found: String,
+    },
+
+    /// A signal that a system reads comes from nowhere.
+    #[error("the {reader} reads '{name}', which nothing provides; there is: {available}")]
+    Unconnected {
+        /// the system that reads it
+        reader: &'static str,
+        /// name of the signal
+        name: String,
+        /// what is provided, comma-separated
+        available: String,
+    },
+
+    /// The right-hand side or an output is NaN or infinite.
+    #[error("at t = {time}: {operation}; the state there is {state}")]
+    NotFinite {
+        /// when
+        time: f64,
+        /// the first operation that made it, with its value
+        operation: String,
+        /// names and values of the state
+        state: String,
+    },
+
+    /// The error control asks for steps below the resolution of time.
+    #[error(
+        "the step at t = {time} fell to {step:e}: the solution ends or jumps there (finite escape, or a singular right-hand side); the state is {state}"
+    )]
+    StepUnderflow {
+        /// when
+        time: f64,
+        /// the last step tried
+        step: f64,
+        /// names and values of the state
+        state: String,
+    },
+
+    /// The integrator used up its steps.
+    #[error(
+        "{steps} steps took the integration only to t = {time} of {until}; loosen the tolerances, raise the budget, or try the stiff method; the state is {state}"
+    )]
+    StepBudget {
+        /// time reached
+        time: f64,
+        /// time asked for
+        until: f64,
+        /// steps spent
+        steps: usize,
+        /// names and values of the state
+        state: String,
+    },
+
+    /// A fixed step small enough for the fastest mode would need too many steps.
+    #[error(
+        "the fastest mode at t = {time} needs a step of {needed:e}, that is {substeps:.3e} steps from one sample to the next (limit {limit}); lower the gain or use the adaptive method"
+    )]
+    TooStiff {
+        /// when
+        time: f64,
+        /// the step that is small enough
+        needed: f64,
+        /// how many of them one interval takes
+        substeps: f64,
+        /// how many are allowed
+        limit: usize,
+    },
+
+    /// An estimate left every bound.
+    #[error("the estimate diverged: '{name}' is {value:e} at t = {time}{hint}")]
+    Diverged {
+        /// when
+        time: f64,
+        /// the state
+        name: String,
+        /// its value
+        value: f64,
+        /// what to try, starting with "; ", or empty
+        hint: String,
+    },
+
+    /// Too many instants at which an input jumps.
+    #[error(
+        "an expression of time jumps more than {limit} times between t = {from} and t = {to}; make it smoother or the output step smaller"
+    )]
+    TooManySwitches {
+        /// start of the interval
+        from: f64,
+        /// its end
+        to: f64,
+        /// how many are allowed
+        limit: usize,
+    },
+
+    /// Times of a log do not increase.
+    #[error(
+        "data row {row}: the time {time} does not come after {previous} of the row before; sort the log and drop repeated times"
+    )]
+    TimeOrder {
+        /// data row, from 1
+        row: usize,
+        /// time of the row before
+        previous: f64,
+        /// time of this row
+        time: f64,
+    },
+
+    /// A cell that is no finite number.
+    #[error("data row {row}, column '{column}': expected a finite number, found {value}")]
+    NotANumber {
+        /// data row, from 1
+        row: usize,
+        /// name of the column
+        column: String,
+        /// what stands there
+        value: f64,
+    },
+
+    /// The caller asked to stop.
+    #[error("stopped at t = {time}")]
+    Cancelled {
+        /// time reached
+        time: f64,
+    },
+}
+
+impl Error {
+    pub(crate) fn setting(
+        what: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl ToString,
+    ) -> Self {
+        Self::Setting {
+            what: what.into(),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+}
+
+/// A run that ended early: why, and the rows made before.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{error}")]
+pub struct Interrupted {
+    /// why
+    #[source]
+    pub error: Error,
+    /// the rows before the end
+    pub partial: Trajectory,
+}
+
+impl From<Error> for Box<Interrupted> {
+    fn from(error: Error) -> Self {
+        Box::new(Interrupted {
+            error,
+            partial: Trajectory::default(),
+        })
+    }
+}
+
+/// How many states a message lists.
+const LISTED: usize = 6;
+
+/// "h1 = 0.2, h2 = 1.5, … (12 states)", non-finite entries first.
+pub(crate) fn state_text(names: &[String], values: &[f64]) -> String {
+    let mut order: Vec<usize> = (0..names.len().min(values.len())).collect();
+    order.sort_by_key(|&i| values[i].is_finite());
+    let listed: Vec<String> = order
+        .iter()
+        .take(LISTED)
+        .map(|&i| format!("{} = {}", names[i], values[i]))
+        .collect();
+    let mut text = listed.join(", ");
+    if order.len() > LISTED {
+        text.push_str(&format!(", … ({} states)", order.len()));
+    }
+    if text.is_empty() {
+        text.push_str("(no states)");
+    }
+    text
+}

@@ -1,0 +1,102 @@
+//! The choice of an integrator.
+
+use crate::Error;
+
+/// How a system is integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// error-controlled; explicit while that pays, implicit while the system is stiff
+    Adaptive(Tolerances),
+    /// error-controlled, always the explicit Dormand–Prince method of order 8
+    Explicit(Tolerances),
+    /// error-controlled, always the implicit Radau IIA method of order 5
+    Stiff(Tolerances),
+    /// the classical Runge–Kutta method of order 4
+    Rk4(Step),
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self::Adaptive(Tolerances::default())
+    }
+}
+
+impl Method {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] names the number that is impossible.
+    pub fn check(&self) -> Result<(), Error> {
+        match self {
+            Self::Adaptive(t) | Self::Explicit(t) | Self::Stiff(t) => t.check(),
+            Self::Rk4(step) => step.check(),
+        }
+    }
+}
+
+/// Error control: a step may be wrong by `absolute + relative·|x|` per state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// in (0, 0.1]
+    pub relative: f64,
+    /// above 0, in the unit of the states
+    pub absolute: f64,
+    /// most steps (rejected ones included) between two stops: output points,
+    /// samples and switching instants
+    pub budget: usize,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self {
+            relative: 1e-8,
+            absolute: 1e-10,
+            budget: 100_000,
+        }
+    }
+}
+
+impl Tolerances {
+    fn check(&self) -> Result<(), Error> {
+        // below, rounding errors of a step exceed what it may be wrong by
+        if !(1e-13..=0.1).contains(&self.relative) {
+            let expected = "a number in [1e-13, 0.1]";
+            return Err(Error::setting("rtol", expected, self.relative));
+        }
+        if !(self.absolute > 0.0 && self.absolute.is_finite()) {
+            let expected = "a finite number above 0";
+            return Err(Error::setting("atol", expected, self.absolute));
+        }
+        if self.budget == 0 {
+            return Err(Error::setting("step budget", "at least 1", 0));
+        }
+        Ok(())
+    }
+}
+
+/// The step of [`Method::Rk4`].
+///
+/// An interval between two stops (output points, samples, switching instants) is
+/// divided into equal steps, so every stop is hit exactly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Step {
+    /// small enough for the fastest mode: |λ|·h ≤ ½, estimated along the way
+    #[default]
+    Auto,
+    /// steps of at most this length
+    AtMost(f64),
+    /// so many steps from one sample or output point to the next
+    Substeps(usize),
+}
+
+impl Step {
+    fn check(&self) -> Result<(), Error> {
+        match *self {
+            Self::AtMost(h) if !(h > 0.0 && h.is_finite()) => {
+                Err(Error::setting("step", "a finite number above 0", h))
+            }
+            Self::Substeps(0) => Err(Error::setting("substeps", "at least 1", 0)),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! Systems compiled for evaluation.
+
+use std::sync::{Arc, Mutex};
+
+use lynkeus_expr::{Evaluator, Graph, Node, Tape};
+
+use crate::error::state_text;
+use crate::switches::Switches;
+use crate::transplant::transplant;
+use crate::{Dynamics, Error};
+
+/// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
+/// (without states) inputs as functions of time.
+///
+/// The signals w are everything the right-hand side reads beside time and
+/// states. A system owns its code: it is cheap to clone, `Send` and `Sync`, and
+/// independent of the graph it was made from. An [`Evaluation`] evaluates it.
+#[derive(Clone, Debug)]
+pub struct System {
+    code: Arc<Code>,
+    start: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Code {
+    states: Vec<String>,
+    signals: Vec<String>,
+    outputs: Vec<String>,
+    derivative_tape: Tape,
+    output_tape: Tape,
+    switches: Switches,
+    modes: usize,
+    /// only to name an operation in an error
+    graph: Mutex<Graph>,
+}
+
+impl System {
+    /// Compiles expressions of a graph.
+    ///
+    /// `time` and the nodes of `states` (name, symbol, start value) and `signals`
+    /// (name, symbol) are symbols; `derivatives` are in the order of `states`;
+    /// `outputs` are (name, expression).
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`] if an expression reads another symbol;
+    /// [`Error::Setting`] if the numbers of states and derivatives differ or a
+    /// start value is not finite.
+    pub fn new(
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        derivatives: &[Node],
+        outputs: &[(String, Node)],
+    ) -> Result<Self, Error> {
+        if states.len() != derivatives.len() {
+            let expected = format!("{}, one per state", states.len());
+            return Err(Error::setting(
+                "number of derivatives",
+                expected,
+                derivatives.len(),
+            ));
+        }
+        let own = Graph::new();
+        let mut symbols = vec![time];
+        symbols.extend(states.iter().map(|(_, node, _)| *node));
+        symbols.extend(signals.iter().map(|(_, node)| *node));
+        let roots: Vec<Node> = derivatives
+            .iter()
+            .copied()
+            .chain(outputs.iter().map(|(_, node)| *node))
+            .collect();
+        let all: Vec<Node> = symbols.iter().chain(&roots).copied().collect();
+        let image = transplant(graph, &all, &own);
+        let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
+        let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
+        let extracted = Switches::extract(&own, image[&time], &roots)?;
+        inputs.extend(&extracted.modes);
+        let (dx, y) = extracted.roots.split_at(derivatives.len());
+        let code = Code {
+            states: states.iter().map(|(name, ..)| name.clone()).collect(),
+            signals: signals.iter().map(|(name, _)| name.clone()).collect(),
+            outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
+            derivative_tape: Tape::new(&own, &inputs, dx)?,
+            output_tape: Tape::new(&own, &inputs, y)?,
+            modes: extracted.modes.len(),
+            switches: extracted.switches,
+            graph: Mutex::new(own),
+        };
+        let start = states.iter().map(|(.., value)| *value).collect();
+        let code = Arc::new(code);
+        Self {
+            code,
+            start: vec![],
+        }
+        .with_start(start)
+    }
+
+    /// The same system with other start values, in the order of the states.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a wrong number of values or one that is not finite.
+    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
+        if start.len() != self.states().len() {
+            let expected = format!("{}, one per state", self.states().len());
+            return Err(Error::setting(
+                "number of start values",
+                expected,
+                start.len(),
+            ));
+        }
+        if let Some(i) = start.iter().position(|value| !value.is_finite()) {
+            let what = format!("start value of '{}'", self.states()[i]);
+            return Err(Error::setting(what, "a finite number", start[i]));
+        }
+        self.start = start;
+        Ok(self)
+    }
+
+    /// Names of the states.
+    pub fn states(&self) -> &[String] {
+        &self.code.states
+    }
+
+    /// Start values, in the order of the states.
+    pub fn start(&self) -> &[f64] {
+        &self.start
+    }
+
+    /// Names of the signals w.
+    pub fn signals(&self) -> &[String] {
+        &self.code.signals
+    }
+
+    /// Names of the outputs.
+    pub fn outputs(&self) -> &[String] {
+        &self.code.outputs
+    }
+
+    /// An evaluator with its own working memory, signals at zero.
+    pub fn evaluation(&self) -> Evaluation {
+        let code = &self.code;
+        let fixed = 1 + code.states.len() + code.signals.len();
+        Evaluation {
+            derivatives: code.derivative_tape.evaluator(),
+            outputs: code.output_tape.evaluator(),
+            switches: code.switches.clone(),
+            inputs: vec![0.0; fixed + code.modes],
+            system: self.clone(),
+        }
+    }
+}
+
+/// Evaluates one [`System`] without allocating (the arguments of linear systems
+/// in its code apart); holds the values of its signals.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    system: System,
+    derivatives: Evaluator,
+    outputs: Evaluator,
+    switches: Switches,
+    /// t, x, w, modes
+    inputs: Vec<f64>,
+}
+
+impl Evaluation {
+    /// The system.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// The signals' values, in the order of [`System::signals`], to write to.
+    pub fn signals_mut(&mut self) -> &mut [f64] {
+        let from = 1 + self.system.states().len();
+        let to = from + self.system.signals().len();
+        &mut self.inputs[from..to]
+    }
+
+    /// The signals' values.
+    pub fn signals(&self) -> &[f64] {
+        let from = 1 + self.system.states().len();
+        &self.inputs[from..from + self.system.signals().len()]
+    }
+
+    /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
+    ///
+    /// Modes are those of the last [`Dynamics::enter`].
+    pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
+        self.place(t, x);
+        self.outputs.eval(&self.inputs, y);
+    }
+
+    fn place(&mut self, t: f64, x: &[f64]) {
+        self.inputs[0] = t;
+        self.inputs[1..=x.len()].copy_from_slice(x);
+    }
+}
+
+impl Dynamics for Evaluation {
+    fn dimension(&self) -> usize {
+        self.system.states().len()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.place(t, x);
+        self.derivatives.eval(&self.inputs, dx);
+    }
+
+    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.switches.between(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        let first = self.inputs.len() - self.system.code.modes;
+        self.switches.modes_at(t, &mut self.inputs[first..]);
+    }
+    fn names(&self) -> Vec<String> {
+        self.system.states().to_vec()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.place(t, x);
+        let code = &self.system.code;
+        let graph = code.graph.lock().unwrap_or_else(|e| e.into_inner());
+        let named = code
+            .derivative_tape
+            .first_nonfinite(&graph, &self.inputs)
+            .or_else(|| code.output_tape.first_nonfinite(&graph, &self.inputs));
+        Error::NotFinite {
+            time: t,
+            operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
+            state: state_text(self.system.states(), x),
+        }
+    }
+}
