@@ -19,7 +19,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
-use crate::Tridiagonal;
+use crate::{Tridiagonal, TridiagonalError};
 
 /// α₁ ≤ a(t) ≤ α₂, both positive: what is known of one partial derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +28,15 @@ pub struct Bounds {
     pub lower: f64,
     /// α₂
     pub upper: f64,
+}
+
+impl Bounds {
+    fn times(self, factor: f64) -> Self {
+        Self {
+            lower: self.lower * factor,
+            upper: self.upper * factor,
+        }
+    }
 }
 
 /// What [`construct`] found.
@@ -103,61 +112,94 @@ pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     if size > MAX_SIZE {
         return Err(Error::TooLong { size });
     }
+    let w = scale(bounds);
+    let scaled: Vec<Bounds> = bounds.iter().map(|b| b.times(w)).collect();
     let (mut diagonal, mut off) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
-    for k in 1..size {
-        let worst = worst_cross_term(&diagonal, &off, &bounds[..k - 1])
-            .ok_or(Error::Lost { row: k + 1 })?;
-        let s: f64 = -MARGIN_OFF_DIAGONAL * 0.5 * bounds[k - 1].upper * worst;
+    for (k, bound) in scaled.iter().enumerate() {
+        let worst =
+            worst_cross_term(&diagonal, &off, &scaled[..k]).ok_or(Error::Lost { row: k + 2 })?;
+        let s: f64 = -MARGIN_OFF_DIAGONAL * 0.5 * bound.upper * worst;
         off.push(s);
         diagonal.push(MARGIN_DIAGONAL * s * s / pivot);
         pivot = (MARGIN_DIAGONAL - 1.0) * s * s / pivot;
     }
-    let S = Tridiagonal::new(diagonal, off).map_err(|_| Error::Lost { row: size })?;
+    let lost = Error::Lost { row: size };
+    let S = unscaled(diagonal, off, w).map_err(|_| lost.clone())?;
     let η = decay(&S, RHO, bounds);
     match η > 0.0 {
         true => Ok(Lemma1 { S, ρ: RHO, η }),
-        false => Err(Error::Lost { row: size }),
+        false => Err(lost),
     }
 }
 
-/// max over the vertices of cᵀ(−P)⁻¹c with c the last column of S.
+/// 1/geometric mean of the bounds: w·a is then around one. In the coordinates
+/// x_j·w^{1−j} the chain has the partials w·a, and (17) keeps its form and its ρ.
+fn scale(bounds: &[Bounds]) -> f64 {
+    let logarithms = bounds.iter().map(|b| (b.lower.ln() + b.upper.ln()) / 2.0);
+    match bounds.len() {
+        0 => 1.0,
+        n => (-logarithms.sum::<f64>() / n as f64).exp(),
+    }
+}
+
+/// S = D S' D with D = diag(1, 1/w, 1/w², …), from the scaled coordinates back.
+fn unscaled(diagonal: Vec<f64>, off: Vec<f64>, w: f64) -> Result<Tridiagonal, TridiagonalError> {
+    let d = |j: usize| w.powi(-(j as i32));
+    let diagonal = diagonal.iter().enumerate().map(|(j, s)| s * d(j) * d(j));
+    let off = off.iter().enumerate().map(|(j, s)| s * d(j) * d(j + 1));
+    Tridiagonal::new(diagonal.collect(), off.collect())
+}
+
+/// max over the vertices of cᵀ(−P)⁻¹c with c the last column of S, computed in
+/// coordinates in which S has a unit diagonal.
 fn worst_cross_term(diagonal: &[f64], off: &[f64], bounds: &[Bounds]) -> Option<f64> {
     let n = diagonal.len();
-    let entry = |i: usize, j: usize| match i.abs_diff(j) {
+    let S = |i: usize, j: usize| match i.abs_diff(j) {
         0 => diagonal[i],
         1 => off[i.min(j)],
         _ => 0.0,
     };
-    let c = DVector::from_fn(n, |i, _| entry(i, n - 1));
+    let c = DVector::from_fn(n, |i, _| S(i, n - 1) / diagonal[i].sqrt());
     let mut worst: f64 = 0.0;
     for a in vertices(bounds) {
-        let factor = Cholesky::new(-inequality(n, entry, RHO, &a))?;
+        let factor = Cholesky::new(-inequality(n, S, RHO, &a))?;
         worst = worst.max(c.dot(&factor.solve(&c)));
     }
     worst.is_finite().then_some(worst)
 }
 
-/// The largest η with P(a) ≤ −η I on all of the bounds; negative where (17)
-/// fails. λ_max is convex in a, so the vertices decide.
+/// An η > 0 with P(a) ≤ −η I on all of the bounds, or a number ≤ 0 where (17)
+/// fails. λ_max is convex in a, so the vertices decide. With D² = diag S the
+/// largest eigenvalue −μ of D⁻¹PD⁻¹ gives xᵀPx ≤ −μ|Dx|² ≤ −μ·min(S_ii)·|x|²,
+/// and is well conditioned where P itself is not.
 pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
-    vertices(bounds)
+    let entry = |i: usize, j: usize| S.get(i, j);
+    let μ = vertices(bounds)
         .map(|a| {
-            let p = inequality(S.size(), |i, j| S.get(i, j), ρ, &a);
-            -SymmetricEigen::new(p).eigenvalues.max()
+            -SymmetricEigen::new(inequality(S.size(), entry, ρ, &a))
+                .eigenvalues
+                .max()
         })
-        .fold(f64::INFINITY, f64::min)
+        .fold(f64::INFINITY, f64::min);
+    let ends = |f: fn(f64, f64) -> f64, start| S.diagonal().iter().copied().fold(start, f);
+    // a negative μ is scaled the other way: P has an eigenvalue above zero anyhow
+    match μ > 0.0 {
+        true => μ * ends(f64::min, f64::INFINITY),
+        false => μ * ends(f64::max, 0.0),
+    }
 }
 
-/// P(a) = AᵀS + SA − ρCᵀC, with (SA)_ij = S_{i,j−1} a_{j−1}.
-fn inequality(n: usize, s: impl Fn(usize, usize) -> f64, ρ: f64, a: &[f64]) -> DMatrix<f64> {
-    let sa = DMatrix::from_fn(
-        n,
-        n,
-        |i, j| if j == 0 { 0.0 } else { s(i, j - 1) * a[j - 1] },
-    );
+/// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S and (SA)_ij = S_{i,j−1} a_{j−1}.
+fn inequality(n: usize, S: impl Fn(usize, usize) -> f64, ρ: f64, a: &[f64]) -> DMatrix<f64> {
+    let sa = DMatrix::from_fn(n, n, |i, j| {
+        if j == 0 {
+            return 0.0;
+        }
+        S(i, j - 1) * a[j - 1] / (S(i, i).sqrt() * S(j, j).sqrt())
+    });
     let mut p = &sa + sa.transpose();
-    p[(0, 0)] -= ρ;
+    p[(0, 0)] -= ρ / S(0, 0);
     p
 }
 
@@ -193,6 +235,7 @@ mod tests {
             upper: 3.0,
         }])
         .unwrap();
+        // coordinates are scaled by w = 1/√3 first, and back by 1/w after
         let s = -1.3 * 3.0 / 4.0;
         assert!((found.S.off_diagonal()[0] - s).abs() < 1e-15);
         assert!((found.S.diagonal()[1] - 3.0 * s * s).abs() < 1e-14);
@@ -211,9 +254,32 @@ mod tests {
             lower: 1.0,
             upper: 1.0,
         }; 6];
-        let limit = decay(&s, 1e9, &one);
-        assert!((limit + 8.7).abs() < 0.05, "{limit}");
-        assert!(decay(&s, 2.0, &one) < limit);
+        let unscaled = |ρ: f64| {
+            let d = |i: usize| s.get(i, i).sqrt();
+            let p = inequality(7, |i, j| s.get(i, j), ρ, &[1.0; 6]);
+            let p = DMatrix::from_fn(7, 7, |i, j| d(i) * p[(i, j)] * d(j));
+            SymmetricEigen::new(p).eigenvalues.max()
+        };
+        assert!((unscaled(1e9) - 8.7).abs() < 0.05, "{}", unscaled(1e9));
+        for ρ in [0.1, 2.0, 1e3, 1e9] {
+            assert!(unscaled(ρ) > 8.0 && decay(&s, ρ, &one) < 0.0);
+        }
+    }
+
+    /// Six partials that vary by a factor of 5.5, as in a column on its whole box:
+    /// the numbers spread over 14 decades and the inequality still holds.
+    #[test]
+    fn a_long_chain_with_wide_bounds_keeps_definite() {
+        let mut bounds = [Bounds {
+            lower: 4.4,
+            upper: 24.0,
+        }; 6];
+        bounds[0] = Bounds {
+            lower: 0.44,
+            upper: 2.4,
+        };
+        let found = construct(&bounds).unwrap();
+        assert!(found.η > 0.0 && found.S.is_positive_definite());
     }
 
     #[test]
@@ -239,9 +305,9 @@ mod tests {
                 .collect();
             let a: Vec<f64> = chain.iter().map(|&(low, factor, t)| low * (1.0 + t * (factor - 1.0))).collect();
             let found = construct(&bounds).unwrap();
-            let p = inequality(a.len() + 1, |i, j| found.S.get(i, j), found.ρ, &a);
-            let largest = SymmetricEigen::new(p).eigenvalues.max();
-            prop_assert!(largest <= -found.η * (1.0 - 1e-6), "{largest} against {}", -found.η);
+            let inner: Vec<_> = a.iter().map(|&a| Bounds { lower: a, upper: a }).collect();
+            let η = decay(&found.S, found.ρ, &inner);
+            prop_assert!(η >= found.η * (1.0 - 1e-6), "{η} against {}", found.η);
         }
     }
 }
