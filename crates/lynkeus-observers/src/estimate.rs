@@ -83,6 +83,58 @@ impl<'e, 'p> Copy<'e, 'p> {
     }
 }
 
+impl Copy<'_, '_> {
+    /// The signals y, one per measured output.
+    pub fn measured(&self) -> Vec<Signal> {
+        let outputs = self.extended.outputs.iter();
+        outputs
+            .map(|o| Observer::measurement(self.extended.graph(), &o.variable.name))
+            .collect()
+    }
+
+    /// The measured value of the state that output `i` shows: y = slope·x + offset
+    /// solved for x. None where the output is no affine function of one state.
+    pub fn measured_state(&self, i: usize) -> Option<(usize, Node)> {
+        let graph = self.extended.graph();
+        let output = &self.extended.outputs[i];
+        let (state, slope, offset) = output.state?;
+        let y = Observer::measurement(graph, &output.variable.name);
+        let x = (graph.expr(y.symbol) - graph.expr(offset)) / graph.expr(slope);
+        Some((state, x.node()))
+    }
+
+    /// x̂ − x as measured, for the state that output `i` shows.
+    pub fn innovation(&self, i: usize) -> Option<Node> {
+        let graph = self.extended.graph();
+        let (state, measured) = self.measured_state(i)?;
+        let innovation = graph.expr(self.hats[state].symbol) - graph.expr(measured);
+        Some(innovation.node())
+    }
+
+    /// An observer whose states are x̂ alone.
+    pub fn observer(
+        &self,
+        family: &'static str,
+        tuning: &Tuning,
+        derivatives: Vec<Node>,
+    ) -> Result<Observer, TuningError> {
+        let signal = |v: &Variable| Signal {
+            name: v.name.clone(),
+            symbol: v.node,
+        };
+        Ok(Observer {
+            family,
+            time: self.extended.plant.time,
+            states: self.states(tuning)?,
+            derivatives,
+            inputs: self.extended.inputs.iter().map(signal).collect(),
+            measured: self.measured(),
+            estimates: self.estimates(),
+            monitors: vec![],
+        })
+    }
+}
+
 /// max(min, min(max, x̂)) with the ends that are declared.
 fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
     let mut image = graph.expr(hat);

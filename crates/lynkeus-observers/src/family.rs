@@ -3,10 +3,12 @@
 use lynkeus_expr::MissingInput;
 use lynkeus_structure::{Check, Condition, Extended};
 
-use crate::{Observer, Tuning, TuningError, triangular::Triangular};
+use crate::{
+    Observer, Tuning, TuningError, block_triangular::BlockTriangular, triangular::Triangular,
+};
 
 /// Every family, in the order in which `auto` tries them.
-pub const FAMILIES: &[&dyn Family] = &[&Triangular];
+pub const FAMILIES: &[&dyn Family] = &[&Triangular, &BlockTriangular];
 
 /// The family of that name.
 pub fn find(name: &str) -> Option<&'static dyn Family> {

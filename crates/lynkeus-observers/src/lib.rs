@@ -10,6 +10,8 @@
 //! A new family is one file beside [`triangular`] and one line in [`FAMILIES`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod block_triangular;
+mod conditions;
 mod estimate;
 mod family;
 mod observer;
@@ -17,5 +19,5 @@ pub mod triangular;
 mod tuning;
 
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
-pub use observer::{Estimate, Observer, Signal};
+pub use observer::{Estimate, Monitor, Observer, Signal};
 pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -23,6 +23,20 @@ pub struct Estimate {
     pub unknown_input: bool,
 }
 
+/// A quantity that tells how far the estimate can be trusted, reported as a
+/// column beside the estimates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Monitor {
+    /// name of the column
+    pub name: String,
+    /// the quantity as an expression of time, the observer's states and signals
+    pub node: Node,
+    /// the flag is raised where the quantity is below this
+    pub alarm_below: f64,
+    /// what the flag means, for people
+    pub meaning: String,
+}
+
 /// z' = F(t, z, u, y), x̂ = z or a function of it, over the graph of the plant.
 #[derive(Clone, Debug)]
 pub struct Observer {
@@ -40,6 +54,8 @@ pub struct Observer {
     pub measured: Vec<Signal>,
     /// what is estimated, plant states first
     pub estimates: Vec<Estimate>,
+    /// how far it can be trusted; empty for most families
+    pub monitors: Vec<Monitor>,
 }
 
 impl Observer {

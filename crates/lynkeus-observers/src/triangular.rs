@@ -11,14 +11,11 @@
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
-use lynkeus_structure::{
-    Assignment, Check, Condition, Dimension, Extended, Region, chains, chains::ChainRequest, sign,
-};
+use lynkeus_structure::{Assignment, Extended, chains};
 
+use crate::conditions::{chain_request, fit, lipschitz, names, output_slope, partial};
 use crate::estimate::Copy;
-use crate::{
-    ChainGain, Design, DesignError, Examination, Family, Fit, Observer, Signal, Tuning, TuningError,
-};
+use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
 
 const NAME: &str = "triangular";
 
@@ -84,7 +81,9 @@ fn form(
     extended: &Extended<'_>,
     tuning: &Tuning,
 ) -> Result<Result<Form, Examination>, DesignError> {
-    let request = request(extended, tuning)?;
+    let given = explicit(tuning)?;
+    let sizes = given.map(|given| given.iter().map(Tridiagonal::size).collect());
+    let request = chain_request(extended, tuning, "S", sizes)?;
     let assignments = match chains::find(extended, &request) {
         Ok(assignments) => assignments,
         Err(summary) => {
@@ -111,34 +110,6 @@ fn form(
     first
         .map(Ok)
         .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
-}
-
-/// What the study says about the chains: their names, or the lengths of its lists.
-fn request(extended: &Extended<'_>, tuning: &Tuning) -> Result<ChainRequest, TuningError> {
-    let names = tuning.name_lists("chains")?;
-    let unknown = names
-        .iter()
-        .flatten()
-        .flatten()
-        .find(|n| extended.state_index(n).is_none());
-    if let Some(name) = unknown {
-        let states: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
-        let expected = format!("names of states and unknown inputs ({})", states.join(", "));
-        return Err(TuningError::new("chains", expected, format!("\"{name}\"")));
-    }
-    let given = explicit(tuning)?;
-    let count = extended.outputs.len();
-    if let Some(given) = &given
-        && given.len() != count
-    {
-        return Err(TuningError::new(
-            "S",
-            format!("one matrix per measured output ({count})"),
-            format!("{} matrices", given.len()),
-        ));
-    }
-    let lengths = given.map(|given| given.iter().map(Tridiagonal::size).collect());
-    Ok(ChainRequest { lengths, names })
 }
 
 fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
@@ -173,30 +144,12 @@ fn examined(
     choices: usize,
 ) -> Result<Form, DesignError> {
     let region = extended.region();
-    let graph = extended.graph();
     let (mut checks, mut partials) = (vec![], vec![]);
-    for (chain, output) in assignment.chains.iter().zip(&extended.outputs) {
-        if let Some((state, slope, _)) = output.state
-            && graph.constant_value(slope).is_none_or(|c| c == 0.0)
-        {
-            let name = format!(
-                "∂{}/∂{} keeps its sign",
-                output.variable.name, extended.states[state].name
-            );
-            checks.push(sign::keeps_sign(graph, name, slope, &region)?.check);
-        }
+    for (i, chain) in assignment.chains.iter().enumerate() {
+        checks.extend(output_slope(extended, i, &region)?);
         let mut row = vec![];
         for pair in chain.states.windows(2) {
-            let (j, next) = (pair[0], pair[1]);
-            // the pattern has the dependency, so that a missing derivative is a step function
-            let node = extended
-                .partial(j, next)
-                .unwrap_or_else(|| graph.constant(0.0).node());
-            let name = format!(
-                "∂f({})/∂{} keeps its sign",
-                extended.states[j].name, extended.states[next].name
-            );
-            let found = sign::keeps_sign(graph, name, node, &region)?;
+            let (node, found) = partial(extended, pair[0], pair[1], &region)?;
             checks.push(found.check);
             row.push(Partial {
                 node,
@@ -230,57 +183,6 @@ fn examined(
         assignment,
         partials,
         examination,
-    })
-}
-
-fn names(extended: &Extended<'_>, states: &[usize]) -> Vec<String> {
-    states
-        .iter()
-        .map(|&i| extended.states[i].name.clone())
-        .collect()
-}
-
-fn fit(checks: &[Check]) -> Fit {
-    let any = |test: fn(&Condition) -> bool| checks.iter().any(|check| test(&check.verdict));
-    if any(|v| matches!(v, Condition::Refuted(_))) {
-        Fit::DoesNotFit
-    } else if any(|v| matches!(v, Condition::Undecided(_))) {
-        Fit::Undecided
-    } else {
-        Fit::Fits
-    }
-}
-
-/// H3 i): the right-hand side is Lipschitz on the box. Never a refusal: outside
-/// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
-fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
-    let graph = extended.graph();
-    let jacobian =
-        lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &extended.symbols());
-    let name = "∂f/∂x is bounded on the box".to_owned();
-    for &(row, column, node) in &jacobian.entries {
-        if sign::bounded(graph, node, region)? {
-            continue;
-        }
-        let detail = format!(
-            "∂f({})/∂{} = {} is not known to be bounded; declare min and max, and mind divisions and roots at the edges of the box",
-            extended.states[row].name,
-            extended.states[column].name,
-            graph.render(node, 60)
-        );
-        let used = region.restricted(&graph.symbols_of(&[node]));
-        let side = |d: &Dimension| (d.name.clone(), d.min, d.max);
-        let left = used.dimensions.iter().map(side).collect();
-        return Ok(Check {
-            name,
-            verdict: Condition::Undecided(left),
-            detail,
-        });
-    }
-    Ok(Check {
-        name,
-        verdict: Condition::Proved,
-        detail: format!("{} entries enclosed", jacobian.entries.len()),
     })
 }
 
@@ -413,58 +315,32 @@ fn assemble(
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
     let mut derivatives = copy.at_estimate(&extended.derivatives);
-    let (mut measured, mut table) = (vec![], vec![]);
+    let mut table = vec![];
     for (i, chain) in form.assignment.chains.iter().enumerate() {
-        let output = &extended.outputs[i];
-        let y = Observer::measurement(graph, &output.variable.name);
-        let error = innovation(&copy, i, &y);
+        let Some(innovation) = copy.innovation(i) else {
+            continue;
+        };
         let constants = gains.chain(i);
         let scaled = scaled(graph, &copy, &form.partials[i], &constants, gains.divided);
         for (&state, gain) in chain.states.iter().zip(scaled) {
-            let correction = graph.expr(gain) * graph.expr(error);
+            let correction = graph.expr(gain) * graph.expr(innovation);
             derivatives[state] = (graph.expr(derivatives[state]) - correction).node();
         }
-        let entries = names(extended, &chain.states)
-            .into_iter()
-            .zip(constants)
-            .collect();
         table.push(ChainGain {
-            output: output.variable.name.clone(),
-            entries,
+            output: extended.outputs[i].variable.name.clone(),
+            entries: names(extended, &chain.states)
+                .into_iter()
+                .zip(constants)
+                .collect(),
         });
-        measured.push(y);
     }
-    let signal = |v: &lynkeus_model::Variable| Signal {
-        name: v.name.clone(),
-        symbol: v.node,
-    };
-    let observer = Observer {
-        family: NAME,
-        time: extended.plant.time,
-        states: copy.states(tuning)?,
-        derivatives,
-        inputs: extended.inputs.iter().map(signal).collect(),
-        measured,
-        estimates: copy.estimates(),
-    };
     Ok(Design {
-        observer,
+        observer: copy.observer(NAME, tuning, derivatives)?,
         parameters: parameters(gains),
         notes: gains.notes.clone(),
         gains: table,
         examination: form.examination,
     })
-}
-
-/// x̂_1 − x_1 as measured: y = slope·x_1 + offset.
-fn innovation(copy: &Copy<'_, '_>, i: usize, y: &Signal) -> Node {
-    let extended = copy.extended;
-    let graph = extended.graph();
-    let Some((state, slope, offset)) = extended.outputs[i].state else {
-        return y.symbol;
-    };
-    let measured = (graph.expr(y.symbol) - graph.expr(offset)) / graph.expr(slope);
-    (graph.expr(copy.hats[state].symbol) - measured).node()
 }
 
 /// The gains in the coordinates of the plant: with the signs of Remark 2, or

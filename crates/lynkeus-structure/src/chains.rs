@@ -83,8 +83,12 @@ pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Assig
     Ok(found)
 }
 
-/// The chains in words: `(level → upper → pump)`.
+/// The chains in words: `(lower → upper → pump)`.
 pub fn describe(extended: &Extended<'_>, assignment: &Assignment) -> String {
+    describe_chains(extended, &assignment.chains, " and ")
+}
+
+pub(crate) fn describe_chains(extended: &Extended<'_>, chains: &[Chain], between: &str) -> String {
     let chain = |c: &Chain| {
         let names: Vec<&str> = c
             .states
@@ -93,8 +97,8 @@ pub fn describe(extended: &Extended<'_>, assignment: &Assignment) -> String {
             .collect();
         format!("({})", names.join(" → "))
     };
-    let chains: Vec<String> = assignment.chains.iter().map(chain).collect();
-    chains.join(" and ")
+    let chains: Vec<String> = chains.iter().map(chain).collect();
+    chains.join(between)
 }
 
 fn fits(extended: &Extended<'_>, assignment: &Assignment, request: &ChainRequest) -> bool {
@@ -119,7 +123,7 @@ fn fits(extended: &Extended<'_>, assignment: &Assignment, request: &ChainRequest
 }
 
 /// The measured states, in order.
-fn heads(extended: &Extended<'_>) -> Result<Vec<usize>, String> {
+pub(crate) fn heads(extended: &Extended<'_>) -> Result<Vec<usize>, String> {
     let mut heads: Vec<usize> = vec![];
     for output in &extended.outputs {
         let Some((state, ..)) = output.state else {
@@ -162,7 +166,7 @@ fn strict_path(extended: &Extended<'_>, head: usize) -> (Vec<usize>, Vec<usize>)
     }
 }
 
-fn names(extended: &Extended<'_>, states: impl IntoIterator<Item = usize>) -> String {
+pub(crate) fn names(extended: &Extended<'_>, states: impl IntoIterator<Item = usize>) -> String {
     let names: Vec<&str> = states
         .into_iter()
         .map(|i| extended.states[i].name.as_str())

@@ -8,6 +8,7 @@
 //! that is left — and [`visibility`] says which states leave a trace in the outputs.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod blocks;
 pub mod chains;
 mod condition;
 mod extended;
@@ -16,6 +17,7 @@ mod region;
 pub mod sign;
 pub mod visibility;
 
+pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
 pub use condition::{Check, Condition, Point, Witness};
 pub use extended::{Extended, Measurement, Sensors, SensorsError};

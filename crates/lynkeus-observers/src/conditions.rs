@@ -1,0 +1,124 @@
+//! Conditions that several families share.
+
+use lynkeus_expr::Node;
+use lynkeus_structure::sign::{self, Sign};
+use lynkeus_structure::{ChainRequest, Check, Condition, Dimension, Extended, Region};
+
+use crate::{DesignError, Fit, Tuning, TuningError};
+
+/// ∂f_row/∂x_column with the verdict on its sign.
+pub(crate) fn partial(
+    extended: &Extended<'_>,
+    row: usize,
+    column: usize,
+    region: &Region,
+) -> Result<(Node, Sign), DesignError> {
+    let graph = extended.graph();
+    // where the pattern has the dependency, a missing derivative is a step function's
+    let node = extended
+        .partial(row, column)
+        .unwrap_or_else(|| graph.constant(0.0).node());
+    let (f, x) = (&extended.states[row].name, &extended.states[column].name);
+    let name = format!("∂f({f})/∂{x} keeps its sign");
+    Ok((node, sign::keeps_sign(graph, name, node, region)?))
+}
+
+/// The slope of an output in its state must not vanish; nothing to check where
+/// it is a number.
+pub(crate) fn output_slope(
+    extended: &Extended<'_>,
+    i: usize,
+    region: &Region,
+) -> Result<Option<Check>, DesignError> {
+    let graph = extended.graph();
+    let output = &extended.outputs[i];
+    let Some((state, slope, _)) = output.state else {
+        return Ok(None);
+    };
+    if graph.constant_value(slope).is_some_and(|c| c != 0.0) {
+        return Ok(None);
+    }
+    let (y, x) = (&output.variable.name, &extended.states[state].name);
+    let name = format!("∂{y}/∂{x} keeps its sign");
+    Ok(Some(sign::keeps_sign(graph, name, slope, region)?.check))
+}
+
+pub(crate) fn names(extended: &Extended<'_>, states: &[usize]) -> Vec<String> {
+    states
+        .iter()
+        .map(|&i| extended.states[i].name.clone())
+        .collect()
+}
+
+pub(crate) fn fit(checks: &[Check]) -> Fit {
+    let any = |test: fn(&Condition) -> bool| checks.iter().any(|check| test(&check.verdict));
+    if any(|v| matches!(v, Condition::Refuted(_))) {
+        Fit::DoesNotFit
+    } else if any(|v| matches!(v, Condition::Undecided(_))) {
+        Fit::Undecided
+    } else {
+        Fit::Fits
+    }
+}
+
+/// H3 i): the right-hand side is Lipschitz on the box. Never a refusal: outside
+/// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
+pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
+    let graph = extended.graph();
+    let jacobian =
+        lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &extended.symbols());
+    let name = "∂f/∂x is bounded on the box".to_owned();
+    for &(row, column, node) in &jacobian.entries {
+        if sign::bounded(graph, node, region)? {
+            continue;
+        }
+        let detail = format!(
+            "∂f({})/∂{} = {} is not known to be bounded; declare min and max, and mind divisions and roots at the edges of the box",
+            extended.states[row].name,
+            extended.states[column].name,
+            graph.render(node, 60)
+        );
+        let used = region.restricted(&graph.symbols_of(&[node]));
+        let side = |d: &Dimension| (d.name.clone(), d.min, d.max);
+        let left = used.dimensions.iter().map(side).collect();
+        return Ok(Check {
+            name,
+            verdict: Condition::Undecided(left),
+            detail,
+        });
+    }
+    Ok(Check {
+        name,
+        verdict: Condition::Proved,
+        detail: format!("{} entries enclosed", jacobian.entries.len()),
+    })
+}
+
+/// What the study says about the chains: their names, or the lengths of the
+/// lists under `key`.
+pub(crate) fn chain_request(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    key: &str,
+    lengths: Option<Vec<usize>>,
+) -> Result<ChainRequest, TuningError> {
+    let names = tuning.name_lists("chains")?;
+    let mut mentioned = names.iter().flatten().flatten();
+    if let Some(name) = mentioned.find(|n| extended.state_index(n).is_none()) {
+        let states: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
+        let expected = format!("names of states and unknown inputs ({})", states.join(", "));
+        return Err(TuningError::new("chains", expected, format!("\"{name}\"")));
+    }
+    let count = extended.outputs.len();
+    if let Some(lengths) = &lengths
+        && lengths.len() != count
+    {
+        let expected = format!("one entry per measured output ({count})");
+        return Err(TuningError::new(
+            key,
+            expected,
+            format!("{} entries", lengths.len()),
+        ));
+    }
+    Ok(ChainRequest { lengths, names })
+}

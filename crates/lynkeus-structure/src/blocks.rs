@@ -1,0 +1,184 @@
+//! The block-triangular form, found in the equations.
+//!
+//! In the form of Lee, Yee and Park, eq. (2) and Remark 3, there is one chain per
+//! measured output and an order among the chains such that row j of chain i
+//! depends on earlier chains, on x_i1 … x_i,j+1 of its own, and on the *measured*
+//! first states of later chains. So once the earlier chains are known a chain
+//! grows by the one new state of its last equation, as in [`chains`](crate::chains);
+//! what is searched is the order.
+
+use crate::chains::{ChainRequest, describe_chains, heads, names};
+use crate::{Chain, Extended};
+
+/// Chains in the order in which the observer uses them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Blocks {
+    /// (index of the measured output, its chain), first block first
+    pub order: Vec<(usize, Chain)>,
+}
+
+impl Blocks {
+    /// Lengths of the chains, in the order of the measured outputs.
+    pub fn lengths(&self) -> Vec<usize> {
+        let mut lengths = vec![0; self.order.len()];
+        for (output, chain) in &self.order {
+            lengths[*output] = chain.states.len();
+        }
+        lengths
+    }
+
+    /// Names of the states of each chain, in the order of the measured outputs.
+    pub fn names(&self, extended: &Extended<'_>) -> Vec<Vec<String>> {
+        let mut all = vec![vec![]; self.order.len()];
+        for (output, chain) in &self.order {
+            let state = |&i: &usize| extended.states[i].name.clone();
+            all[*output] = chain.states.iter().map(state).collect();
+        }
+        all
+    }
+
+    /// In words: `(x1 → x2), then (x3 → x4)`.
+    pub fn describe(&self, extended: &Extended<'_>) -> String {
+        let chains: Vec<Chain> = self.order.iter().map(|(_, c)| c.clone()).collect();
+        describe_chains(extended, &chains, ", then ")
+    }
+}
+
+/// More outputs than this are refused rather than permuted.
+const MAX_OUTPUTS: usize = 7;
+
+/// Every arrangement into blocks, the most balanced first; of equally balanced
+/// ones that which follows the order of the measured outputs.
+///
+/// # Errors
+/// Where there is none: which equation breaks the form.
+pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Blocks>, String> {
+    let heads = heads(extended)?;
+    if heads.len() > MAX_OUTPUTS {
+        return Err(format!(
+            "{} outputs are measured; at most {MAX_OUTPUTS} are arranged into blocks",
+            heads.len()
+        ));
+    }
+    let mut search = Search {
+        extended,
+        heads: &heads,
+        found: vec![],
+        furthest: None,
+    };
+    search.extend(&mut vec![], &mut vec![false; extended.states.len()]);
+    let Search {
+        mut found,
+        furthest,
+        ..
+    } = search;
+    if found.is_empty() {
+        return Err(furthest.map_or_else(
+            || "no chain starts at a measured state".into(),
+            |(_, why)| why,
+        ));
+    }
+    let all: Vec<String> = found.iter().map(|b| b.describe(extended)).collect();
+    found.retain(|blocks| {
+        request
+            .lengths
+            .as_ref()
+            .is_none_or(|l| *l == blocks.lengths())
+            && request
+                .names
+                .as_ref()
+                .is_none_or(|n| *n == blocks.names(extended))
+    });
+    if found.is_empty() {
+        return Err(format!(
+            "no arrangement has the chains asked for; the equations allow {}",
+            all.join(" or ")
+        ));
+    }
+    found.sort_by_key(|blocks| {
+        let lengths = blocks.lengths();
+        lengths.iter().max().copied().unwrap_or(0) - lengths.iter().min().copied().unwrap_or(0)
+    });
+    Ok(found)
+}
+
+struct Search<'e, 'p> {
+    extended: &'e Extended<'p>,
+    heads: &'e [usize],
+    found: Vec<Blocks>,
+    /// states covered by the best attempt, and why it stopped
+    furthest: Option<(usize, String)>,
+}
+
+impl Search<'_, '_> {
+    fn extend(&mut self, order: &mut Vec<(usize, Chain)>, taken: &mut Vec<bool>) {
+        if order.len() == self.heads.len() {
+            return self.complete(order, taken);
+        }
+        for output in 0..self.heads.len() {
+            if order.iter().any(|(used, _)| *used == output) {
+                continue;
+            }
+            match self.grow(self.heads[output], taken) {
+                Ok(chain) => {
+                    chain.states.iter().for_each(|&i| taken[i] = true);
+                    order.push((output, chain));
+                    self.extend(order, taken);
+                    if let Some((_, chain)) = order.pop() {
+                        chain.states.iter().for_each(|&i| taken[i] = false);
+                    }
+                }
+                Err(why) => self.stopped(taken, why),
+            }
+        }
+    }
+
+    fn complete(&mut self, order: &[(usize, Chain)], taken: &[bool]) {
+        if taken.iter().all(|&t| t) {
+            return self.found.push(Blocks {
+                order: order.to_vec(),
+            });
+        }
+        let left = (0..taken.len()).filter(|&i| !taken[i]);
+        let why = format!(
+            "no chain reaches {}; measure another output",
+            names(self.extended, left)
+        );
+        self.stopped(taken, why);
+    }
+
+    fn stopped(&mut self, taken: &[bool], why: String) {
+        let covered = taken.iter().filter(|&&t| t).count();
+        if self
+            .furthest
+            .as_ref()
+            .is_none_or(|(best, _)| covered > *best)
+        {
+            self.furthest = Some((covered, why));
+        }
+    }
+
+    /// The chain from `head` given that the states `taken` belong to earlier chains.
+    fn grow(&self, head: usize, taken: &[bool]) -> Result<Chain, String> {
+        let mut states = vec![head];
+        loop {
+            let last = states[states.len() - 1];
+            let new: Vec<usize> = self.extended.pattern[last]
+                .iter()
+                .copied()
+                .filter(|i| !taken[*i] && !states.contains(i) && !self.heads.contains(i))
+                .collect();
+            match new[..] {
+                [] => return Ok(Chain { states }),
+                [next] => states.push(next),
+                _ => {
+                    return Err(format!(
+                        "the equation of {} depends on {} at once, beside measured states and earlier chains; a block has one new state per equation",
+                        self.extended.states[last].name,
+                        names(self.extended, new)
+                    ));
+                }
+            }
+        }
+    }
+}
