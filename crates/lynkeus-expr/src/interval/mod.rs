@@ -50,7 +50,7 @@ pub struct Interval {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "an interval needs a lower bound that is not above its upper bound, neither of them NaN, and at least one real \
-     number between them; found [{lo}, {hi}]: exchange or correct the bounds"
+     number between them; found [{lo:?}, {hi:?}]: exchange or correct the bounds"
 )]
 pub struct InvalidInterval {
     /// The lower bound that was given.
@@ -169,7 +169,7 @@ impl fmt::Display for Interval {
         if self.is_empty() {
             return f.write_str("∅");
         }
-        write!(f, "[{}, {}]", self.lo, self.hi)
+        write!(f, "[{:?}, {:?}]", self.lo, self.hi)
     }
 }
 
@@ -187,7 +187,7 @@ mod tests {
             (f64::NEG_INFINITY, f64::NEG_INFINITY),
         ] {
             let message = Interval::new(lo, hi).unwrap_err().to_string();
-            assert!(message.contains(&format!("[{lo}, {hi}]")), "{message}");
+            assert!(message.contains(&format!("[{lo:?}, {hi:?}]")), "{message}");
         }
         assert!(Interval::new(0.0, 0.0).unwrap().is_point());
         assert_eq!(
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn intervals_are_shown_by_their_bounds() {
-        assert_eq!(Interval::new(-0.5, 2.0).unwrap().to_string(), "[-0.5, 2]");
+        assert_eq!(Interval::new(-0.5, 2.0).unwrap().to_string(), "[-0.5, 2.0]");
         assert_eq!(Interval::EMPTY.to_string(), "∅");
     }
 }

@@ -29,7 +29,11 @@ impl Interval {
     }
 
     fn positive_power(self, n: u32) -> Self {
-        let base = if n.is_multiple_of(2) { self.abs() } else { self };
+        let base = if n.is_multiple_of(2) {
+            self.abs()
+        } else {
+            self
+        };
         // Odd powers keep the sign, so both bounds follow from powers of absolute values.
         let lo = if base.lo >= 0.0 {
             repeated(base.lo, n, mul_down)

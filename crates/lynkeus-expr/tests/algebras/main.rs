@@ -1,0 +1,7 @@
+//! Every operation in every algebra against an independent value: evaluation with hundreds of bits.
+
+mod exact;
+mod interval_operations;
+mod interval_systems;
+mod interval_tightness;
+mod sample;
