@@ -1,1 +1,73 @@
 //! A Modelica subset read into plants; every diagnostic points at the source line.
+//!
+//! A [`Plant`] is a system x′ = f(t, x, u), y = h(t, x, u) over one expression graph. It is
+//! written in Modelica, or in Rust as functions over expressions; both give the same plant:
+//!
+//! ```
+//! use lynkeus_expr::Tape;
+//! use lynkeus_model::{Attributes, LoadOptions, Model, Plant};
+//!
+//! let text = r#"
+//! model Tank "A tank that a pump fills"
+//!   parameter Real k = 0.04;
+//!   input Real pump(unit = "V", min = 0, max = 10);
+//!   Real h(start = 4, min = 0.05, max = 10) "Level";
+//!   output Real y = h;
+//! equation
+//!   der(h) = pump - k*sqrt(h);
+//! end Tank;
+//! "#;
+//! let from_text = Plant::from_modelica(text, "tank.mo", &LoadOptions::default())?;
+//!
+//! let model = Model::new("Tank");
+//! let range = Attributes { min: 0.0, max: 10.0, ..Attributes::default() };
+//! let pump = model.input("pump", Attributes { unit: Some("V".into()), ..range.clone() });
+//! let h = model.state("h", Attributes { start: Some(4.0), min: 0.05, ..range });
+//! model.der(h, pump - 0.04 * h.sqrt());
+//! model.output("y", h, Attributes::default());
+//! let from_rust = model.finish()?;
+//!
+//! for plant in [from_text, from_rust] {
+//!     let tape = Tape::new(
+//!         &plant.graph,
+//!         &[plant.states[0].node, plant.inputs[0].node],
+//!         &plant.derivatives,
+//!     )?;
+//!     let mut slope = [0.0];
+//!     tape.evaluator().eval(&[4.0, 1.0], &mut slope);
+//!     assert_eq!(slope, [1.0 - 0.04 * 2.0]);
+//!     assert_eq!((plant.states[0].min, plant.inputs[0].max), (0.05, 10.0));
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # The subset
+//!
+//! One or more `model`s in a file, with `Real` and `Integer` declarations (`parameter`,
+//! `constant`, `input`, `output`, arrays of any rank, the attributes `start`, `min`, `max`,
+//! `nominal` and `unit`), declaration equations, and an `equation` section of scalar and array
+//! equations, `for` loops, and `if` equations with the same number of equations in every
+//! branch. Expressions have the operators of Modelica, `if` expressions, array constructors,
+//! comprehensions, slices, `time`, and the functions of [`parse_expression`].
+//!
+//! Derivatives may carry a factor (`H[i]*der(x[i]) = …`) or be coupled linearly (a mass
+//! matrix). Algebraic variables are sorted; every other variable than states and inputs becomes
+//! an expression over these. What is refused is refused by a [`Diagnostic`] with the line, a
+//! caret and a hint; hostile text ends in one as well, within bounded time and memory.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod balance;
+mod builder;
+mod diagnostic;
+mod elaborate;
+mod limits;
+mod names;
+mod plant;
+mod study;
+mod syntax;
+
+pub use builder::{Attributes, Model, ModelError};
+pub use diagnostic::{Diagnostic, LoadError};
+pub use plant::{LoadOptions, Parameter, Plant, Variable};
+pub use study::parse_expression;
+pub use syntax::Span;

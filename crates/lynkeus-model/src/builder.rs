@@ -1,0 +1,341 @@
+//! Plants written in Rust: functions over expressions with overloaded operators.
+
+use std::cell::{Ref, RefCell};
+use std::collections::{HashMap, HashSet};
+
+use lynkeus_expr::{Expr, Graph, Node};
+
+use crate::{Parameter, Plant, Variable};
+
+/// What a declaration says of a variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Attributes {
+    /// value at the start
+    pub start: Option<f64>,
+    /// smallest value of the range
+    pub min: f64,
+    /// largest value of the range
+    pub max: f64,
+    /// typical size
+    pub nominal: Option<f64>,
+    /// physical unit
+    pub unit: Option<String>,
+    /// one line about it
+    pub description: Option<String>,
+}
+
+impl Default for Attributes {
+    fn default() -> Self {
+        Self {
+            start: None,
+            min: f64::NEG_INFINITY,
+            max: f64::INFINITY,
+            nominal: None,
+            unit: None,
+            description: None,
+        }
+    }
+}
+
+/// Why a model written in Rust is not a plant.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Two variables have one name.
+    #[error("`{0}` is declared twice")]
+    Duplicate(String),
+    /// The name is taken by the language.
+    #[error("`{0}` cannot be the name of a variable")]
+    Reserved(String),
+    /// A state has no derivative.
+    #[error("state `{0}` has no derivative; give it one with `der`")]
+    MissingDerivative(String),
+    /// A state has two derivatives.
+    #[error("state `{0}` has two derivatives")]
+    TwoDerivatives(String),
+    /// `der` was called with something that is no state of this model.
+    #[error("`der` was called with {0}, which is no state of the model")]
+    NotAState(String),
+    /// An expression reads something that was not declared.
+    #[error("{place} reads `{name}`, which is not declared in the model")]
+    Undeclared {
+        /// whose expression it is
+        place: String,
+        /// the name
+        name: String,
+    },
+    /// The range of a variable is empty or not a number.
+    #[error("`{0}` has an empty range: min must not exceed max")]
+    EmptyRange(String),
+}
+
+/// A plant under construction. Expressions borrow the model; [`Model::finish`] takes it.
+#[derive(Debug)]
+pub struct Model {
+    name: String,
+    graph: Graph,
+    parts: RefCell<Parts>,
+}
+
+#[derive(Debug, Default)]
+struct Parts {
+    states: Vec<Variable>,
+    inputs: Vec<Variable>,
+    outputs: Vec<Variable>,
+    parameters: Vec<Parameter>,
+    derivatives: Vec<(Node, Node)>,
+}
+
+impl Model {
+    /// A model without variables.
+    pub fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            graph: Graph::new(),
+            parts: RefCell::default(),
+        }
+    }
+
+    /// The graph the expressions live in, for constants and functions of two arguments.
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// The symbol of time.
+    pub fn time(&self) -> Expr<'_> {
+        self.graph.symbol("time")
+    }
+
+    /// Declares a state.
+    pub fn state(&self, name: &str, attributes: Attributes) -> Expr<'_> {
+        let symbol = self.graph.symbol(name);
+        let state = variable(name, symbol.node(), attributes);
+        self.parts.borrow_mut().states.push(state);
+        symbol
+    }
+
+    /// Declares an input.
+    pub fn input(&self, name: &str, attributes: Attributes) -> Expr<'_> {
+        let symbol = self.graph.symbol(name);
+        let input = variable(name, symbol.node(), attributes);
+        self.parts.borrow_mut().inputs.push(input);
+        symbol
+    }
+
+    /// Declares a parameter that stays a symbol; `None` where its value is unknown.
+    pub fn parameter(&self, name: &str, value: Option<f64>, attributes: Attributes) -> Expr<'_> {
+        let symbol = self.graph.symbol(name);
+        let variable = variable(name, symbol.node(), attributes);
+        let parameter = Parameter { variable, value };
+        self.parts.borrow_mut().parameters.push(parameter);
+        symbol
+    }
+
+    /// States the derivative of a state.
+    pub fn der(&self, state: Expr<'_>, derivative: Expr<'_>) {
+        let pair = (state.node(), derivative.node());
+        self.parts.borrow_mut().derivatives.push(pair);
+    }
+
+    /// Declares an output with its value.
+    pub fn output(&self, name: &str, value: Expr<'_>, attributes: Attributes) {
+        let output = variable(name, value.node(), attributes);
+        self.parts.borrow_mut().outputs.push(output);
+    }
+
+    /// The plant.
+    ///
+    /// # Errors
+    /// A name is used twice or is reserved, a range is empty, a state has no derivative or two,
+    /// or an expression reads a symbol that is not declared.
+    pub fn finish(self) -> Result<Plant, ModelError> {
+        let derivatives = {
+            let parts = self.parts.borrow();
+            check_names(&parts)?;
+            check_ranges(&parts)?;
+            let derivatives = self.match_derivatives(&parts)?;
+            self.check_symbols(&parts, &derivatives)?;
+            derivatives
+        };
+        let time = self.time().node();
+        let parts = self.parts.into_inner();
+        Ok(Plant {
+            name: self.name,
+            graph: self.graph,
+            time,
+            states: parts.states,
+            derivatives,
+            inputs: parts.inputs,
+            outputs: parts.outputs,
+            algebraics: vec![],
+            parameters: parts.parameters,
+        })
+    }
+
+    fn match_derivatives(&self, parts: &Ref<'_, Parts>) -> Result<Vec<Node>, ModelError> {
+        let states: HashSet<Node> = parts.states.iter().map(|state| state.node).collect();
+        let mut found = HashMap::new();
+        for &(state, derivative) in &parts.derivatives {
+            let name = || self.graph.symbol_name(state);
+            if !states.contains(&state) {
+                let what = name().map_or("an expression".to_owned(), |name| format!("`{name}`"));
+                return Err(ModelError::NotAState(what));
+            }
+            if found.insert(state, derivative).is_some() {
+                return Err(ModelError::TwoDerivatives(name().unwrap_or_default()));
+            }
+        }
+        let derivative = |state: &Variable| {
+            let missing = || ModelError::MissingDerivative(state.name.clone());
+            found.get(&state.node).copied().ok_or_else(missing)
+        };
+        parts.states.iter().map(derivative).collect()
+    }
+
+    fn check_symbols(&self, parts: &Ref<'_, Parts>, slopes: &[Node]) -> Result<(), ModelError> {
+        let mut known: HashSet<Node> = [self.time().node()].into();
+        known.extend(parts.states.iter().map(|state| state.node));
+        known.extend(parts.inputs.iter().map(|input| input.node));
+        known.extend(
+            parts
+                .parameters
+                .iter()
+                .map(|parameter| parameter.variable.node),
+        );
+        let states = parts.states.iter().zip(slopes);
+        let slopes = states.map(|(state, &slope)| (format!("der({})", state.name), slope));
+        let outputs = parts
+            .outputs
+            .iter()
+            .map(|output| (output.name.clone(), output.node));
+        let expressions: Vec<(String, Node)> = slopes.chain(outputs).collect();
+        let roots: Vec<Node> = expressions.iter().map(|(_, node)| *node).collect();
+        let read = self.graph.symbols_of(&roots);
+        let Some(stranger) = read.into_iter().find(|symbol| !known.contains(symbol)) else {
+            return Ok(());
+        };
+        let reads =
+            |(_, node): &(String, Node)| self.graph.symbols_of(&[*node]).contains(&stranger);
+        let place = expressions.into_iter().find(reads).map(|(place, _)| place);
+        let name = self.graph.symbol_name(stranger).unwrap_or_default();
+        Err(ModelError::Undeclared {
+            place: place.unwrap_or_default(),
+            name,
+        })
+    }
+}
+
+fn variable(name: &str, node: Node, attributes: Attributes) -> Variable {
+    Variable {
+        name: name.to_owned(),
+        node,
+        unit: attributes.unit,
+        description: attributes.description,
+        start: attributes.start,
+        min: attributes.min,
+        max: attributes.max,
+        nominal: attributes.nominal,
+        integer: false,
+    }
+}
+
+fn all(parts: &Parts) -> impl Iterator<Item = &Variable> {
+    let parameters = parts.parameters.iter().map(|parameter| &parameter.variable);
+    let variables = parts
+        .states
+        .iter()
+        .chain(&parts.inputs)
+        .chain(&parts.outputs);
+    variables.chain(parameters)
+}
+
+fn check_names(parts: &Parts) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
+    for variable in all(parts) {
+        if variable.name == "time" || variable.name.is_empty() {
+            return Err(ModelError::Reserved(variable.name.clone()));
+        }
+        if !names.insert(variable.name.as_str()) {
+            return Err(ModelError::Duplicate(variable.name.clone()));
+        }
+    }
+    Ok(())
+}
+
+fn check_ranges(parts: &Parts) -> Result<(), ModelError> {
+    match all(parts).find(|variable| !(variable.min <= variable.max)) {
+        Some(variable) => Err(ModelError::EmptyRange(variable.name.clone())),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_state() -> Model {
+        let model = Model::new("M");
+        let x = model.state("x", Attributes::default());
+        model.der(x, -x);
+        model
+    }
+
+    #[test]
+    fn duplicate_names() {
+        let model = with_state();
+        model.input("x", Attributes::default());
+        assert_eq!(
+            model.finish().unwrap_err(),
+            ModelError::Duplicate("x".into())
+        );
+    }
+
+    #[test]
+    fn derivatives_are_counted() {
+        let model = with_state();
+        model.state("z", Attributes::default());
+        let missing = ModelError::MissingDerivative("z".into());
+        assert_eq!(model.finish().unwrap_err(), missing);
+        let model = with_state();
+        let x = model.graph().symbol("x");
+        model.der(x, x);
+        assert_eq!(
+            model.finish().unwrap_err(),
+            ModelError::TwoDerivatives("x".into())
+        );
+        let model = with_state();
+        let u = model.input("u", Attributes::default());
+        model.der(u, u);
+        assert_eq!(
+            model.finish().unwrap_err(),
+            ModelError::NotAState("`u`".into())
+        );
+    }
+
+    #[test]
+    fn undeclared_symbols() {
+        let model = with_state();
+        let q = model.graph().symbol("q");
+        model.output("y", q, Attributes::default());
+        let error = model.finish().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "y reads `q`, which is not declared in the model"
+        );
+    }
+
+    #[test]
+    fn ranges() {
+        let model = with_state();
+        let range = Attributes {
+            min: 1.0,
+            max: 0.0,
+            ..Attributes::default()
+        };
+        model.input("u", range);
+        assert_eq!(
+            model.finish().unwrap_err(),
+            ModelError::EmptyRange("u".into())
+        );
+    }
+}

@@ -1,0 +1,185 @@
+//! Refusals that point at the source line.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+use crate::syntax::{Problem, Span};
+
+/// Longest stretch of a line that is shown on each side of the caret, in bytes.
+const WINDOW: usize = 90;
+
+/// Why a text was refused, and where.
+///
+/// `Display` renders it as a compiler does, with the source line and a caret;
+/// [`Diagnostic::one_line`] is the short form.
+///
+/// ```
+/// use lynkeus_model::{LoadOptions, Plant};
+///
+/// let text = "model M\n  Real level;\nequation\n  der(level) = -levle;\nend M;\n";
+/// let refused = Plant::from_modelica(text, "m.mo", &LoadOptions::default()).unwrap_err();
+/// assert_eq!((refused.line, refused.column), (4, 17));
+/// assert_eq!(refused.one_line(), "m.mo:4:17: unknown name `levle` (did you mean `level`?)");
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnostic {
+    /// the file, as given by the caller
+    pub file: String,
+    /// line, from 1
+    pub line: u32,
+    /// column in characters, from 1
+    pub column: u32,
+    /// bytes of the source text
+    pub span: Span,
+    /// what was expected and what was found
+    pub message: String,
+    /// text beside the caret
+    pub label: Option<String>,
+    /// what to do
+    pub hint: Option<String>,
+    excerpt: Box<Excerpt>,
+}
+
+/// The part of the source line that is shown.
+#[derive(Clone, Debug, PartialEq)]
+struct Excerpt {
+    text: String,
+    /// bytes of `text` under the caret
+    marked: std::ops::Range<usize>,
+    /// true where the line is longer than `text`
+    cut: bool,
+}
+
+impl Diagnostic {
+    pub(crate) fn new(problem: Problem, file: &str, source: &str) -> Self {
+        let start = floor_boundary(source, problem.span.start as usize);
+        let end = floor_boundary(source, problem.span.end as usize).max(start);
+        let line_start = source[..start].rfind('\n').map_or(0, |i| i + 1);
+        let line_end = source[start..]
+            .find('\n')
+            .map_or(source.len(), |i| start + i);
+        let before = &source.as_bytes()[..line_start];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        let column = 1 + source[line_start..start].chars().count();
+        Self {
+            file: file.to_owned(),
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            column: u32::try_from(column).unwrap_or(u32::MAX),
+            span: problem.span,
+            message: problem.message,
+            label: problem.label,
+            hint: problem.hint,
+            excerpt: Box::new(Excerpt::new(source, line_start..line_end, start..end)),
+        }
+    }
+
+    /// `file:line:column: message (hint)` on one line.
+    pub fn one_line(&self) -> String {
+        let hint = self.hint.as_deref().map(|hint| format!(" ({hint})"));
+        format!(
+            "{}:{}:{}: {}{}",
+            self.file,
+            self.line,
+            self.column,
+            self.message,
+            hint.unwrap_or_default()
+        )
+        .replace('\n', " ")
+    }
+
+    /// The rendered form with terminal colours.
+    pub fn colored(&self) -> String {
+        self.render(&Renderer::styled())
+    }
+
+    fn render(&self, renderer: &Renderer) -> String {
+        let marked = AnnotationKind::Primary
+            .span(self.excerpt.marked.clone())
+            .label(self.label.as_deref());
+        let snippet = Snippet::source(self.excerpt.text.as_str())
+            .line_start(self.line as usize)
+            .annotation(marked);
+        let title = Level::ERROR.primary_title(self.message.as_str());
+        let group = if self.excerpt.cut {
+            let origin = Origin::path(self.file.as_str())
+                .line(self.line as usize)
+                .char_column(self.column as usize);
+            title.element(origin).element(snippet)
+        } else {
+            title.element(snippet.path(self.file.as_str()))
+        };
+        let hint = self
+            .hint
+            .as_deref()
+            .map(|hint| Group::with_title(Level::HELP.secondary_title(hint)));
+        let report: Vec<Group<'_>> = std::iter::once(group).chain(hint).collect();
+        renderer.render(&report)
+    }
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.render(&Renderer::plain()))
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+impl Excerpt {
+    /// The line, or a window of it around the marked bytes where it is long.
+    fn new(source: &str, line: std::ops::Range<usize>, marked: std::ops::Range<usize>) -> Self {
+        let marked_end = marked.end.min(line.end).min(marked.start + WINDOW);
+        let from = floor_boundary(source, marked.start.saturating_sub(WINDOW).max(line.start));
+        let to = floor_boundary(source, (marked_end + WINDOW).min(line.end));
+        let marked_end = floor_boundary(source, marked_end).max(marked.start);
+        Self {
+            text: source[from..to].trim_end_matches('\r').to_owned(),
+            marked: marked.start - from..marked_end - from,
+            cut: from > line.start || to < line.end,
+        }
+    }
+}
+
+/// The last character boundary at or before `index`.
+fn floor_boundary(source: &str, index: usize) -> usize {
+    source.floor_char_boundary(index.min(source.len()))
+}
+
+/// Why a model file could not be loaded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// the file
+        path: PathBuf,
+        /// the system's reason
+        source: std::io::Error,
+    },
+    /// The file is too large to be a model.
+    #[error("{} has {bytes} bytes; a model file may have at most {limit}", path.display())]
+    TooLarge {
+        /// the file
+        path: PathBuf,
+        /// its size
+        bytes: u64,
+        /// the largest size taken
+        limit: u64,
+    },
+    /// The file is not UTF-8 text.
+    #[error("{}:{line}: byte {offset} is not UTF-8 text; save the file as UTF-8", path.display())]
+    NotUtf8 {
+        /// the file
+        path: PathBuf,
+        /// line of the first wrong byte, from 1
+        line: usize,
+        /// its position in the file, from 0
+        offset: usize,
+    },
+    /// The text is not a model this tool can take.
+    #[error(transparent)]
+    Refused(#[from] Diagnostic),
+}

@@ -1,0 +1,305 @@
+//! Operators on scalars, arrays and matrices.
+
+use lynkeus_expr::{Binary, Node, Unary};
+
+use super::evaluate::Evaluator;
+use super::value::{Array, Scalar, Value, describe_dims};
+use crate::syntax::ast::{BinaryOperator, Relation};
+use crate::syntax::{Problem, Result, Span};
+
+impl Evaluator<'_> {
+    /// A number as a Real expression.
+    pub(super) fn real(&self, scalar: Scalar, span: Span) -> Result<Node> {
+        scalar.real(self.graph).ok_or_else(|| {
+            Problem::new(span, "expected a number, found a Boolean")
+                .hint("write `if a then 1 else 0`")
+        })
+    }
+
+    /// A truth value.
+    pub(super) fn boolean(&self, value: &Value, span: Span) -> Result<Node> {
+        match value {
+            Value::Scalar(Scalar::Boolean(node)) => Ok(*node),
+            _ => Err(Problem::new(span, "expected a condition, found a number")
+                .hint("compare it, as in `u > 0`")),
+        }
+    }
+
+    /// Applies an operation to every element.
+    pub(super) fn map(
+        &self,
+        value: Value,
+        span: Span,
+        operation: impl Fn(&Self, Scalar, Span) -> Result<Scalar>,
+    ) -> Result<Value> {
+        let Array { dims, mut elements } = value.into_array();
+        self.budget.charge(elements.len() as u64, span)?;
+        for element in &mut elements {
+            *element = operation(self, *element, span)?;
+        }
+        Ok(Value::new(dims, elements))
+    }
+
+    /// Applies an operation to the elements of two arrays of one size, or of an array and a
+    /// scalar.
+    pub(super) fn elementwise(
+        &self,
+        left: Value,
+        right: Value,
+        span: Span,
+        operation: impl Fn(&Self, Scalar, Scalar, Span) -> Result<Scalar>,
+    ) -> Result<Value> {
+        let (left, right) = (left.into_array(), right.into_array());
+        if !left.dims.is_empty() && !right.dims.is_empty() && left.dims != right.dims {
+            return Err(unequal_sizes(&left.dims, &right.dims, span));
+        }
+        let count = left.elements.len().max(right.elements.len());
+        let count = if left.elements.is_empty() || right.elements.is_empty() {
+            0
+        } else {
+            count
+        };
+        self.budget.charge(count as u64, span)?;
+        let at = |array: &Array, i: usize| match array.dims.is_empty() {
+            true => array.elements.first().copied(),
+            false => array.elements.get(i).copied(),
+        };
+        let pairs = (0..count).filter_map(|i| Some((at(&left, i)?, at(&right, i)?)));
+        let elements: Result<Vec<Scalar>> =
+            pairs.map(|(a, b)| operation(self, a, b, span)).collect();
+        let dims = if left.dims.is_empty() {
+            right.dims
+        } else {
+            left.dims
+        };
+        Ok(Value::new(dims, elements?))
+    }
+
+    pub(super) fn binary(
+        &self,
+        operator: BinaryOperator,
+        left: Value,
+        right: Value,
+        span: Span,
+    ) -> Result<Value> {
+        use BinaryOperator as B;
+        let scalars = left.dims().is_empty() && right.dims().is_empty();
+        match operator {
+            B::And | B::Or => {
+                let (left, right) = (self.boolean(&left, span)?, self.boolean(&right, span)?);
+                let operation = if operator == B::And {
+                    Binary::And
+                } else {
+                    Binary::Or
+                };
+                let node = self.graph.binary(operation, left, right);
+                return Ok(Value::Scalar(Scalar::Boolean(node)));
+            }
+            B::Add | B::Subtract if left.dims() != right.dims() => {
+                let problem = unequal_sizes(left.dims(), right.dims(), span);
+                return Err(match left.dims().is_empty() || right.dims().is_empty() {
+                    true => problem.hint("`.+` and `.-` take a scalar with every element"),
+                    false => problem,
+                });
+            }
+            B::Multiply if !left.dims().is_empty() && !right.dims().is_empty() => {
+                return self.product(left.into_array(), right.into_array(), span);
+            }
+            B::Divide if !right.dims().is_empty() => {
+                return Err(Problem::new(span, "division by an array")
+                    .hint("`./` divides by every element"));
+            }
+            _ => {}
+        }
+        let operation =
+            |evaluator: &Self, a, b, span| evaluator.scalar_binary(operator, a, b, span);
+        if let (true, Value::Scalar(a), Value::Scalar(b)) = (scalars, &left, &right) {
+            return Ok(Value::Scalar(operation(self, *a, *b, span)?));
+        }
+        self.elementwise(left, right, span, operation)
+    }
+
+    pub(super) fn scalar_binary(
+        &self,
+        operator: BinaryOperator,
+        left: Scalar,
+        right: Scalar,
+        span: Span,
+    ) -> Result<Scalar> {
+        use BinaryOperator as B;
+        let operation = match operator {
+            B::Add | B::ElementAdd => Binary::Add,
+            B::Subtract | B::ElementSubtract => Binary::Sub,
+            B::Multiply | B::ElementMultiply => Binary::Mul,
+            _ => Binary::Div,
+        };
+        if let (Scalar::Integer(a), Scalar::Integer(b)) = (left, right) {
+            let exact = match operation {
+                Binary::Add => Some(a.checked_add(b)),
+                Binary::Sub => Some(a.checked_sub(b)),
+                Binary::Mul => Some(a.checked_mul(b)),
+                _ => None,
+            };
+            if let Some(exact) = exact {
+                return exact.map(Scalar::Integer).ok_or_else(|| overflow(span));
+            }
+        }
+        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
+        if operation == Binary::Div && self.graph.constant_value(right) == Some(0.0) {
+            return Err(Problem::new(span, "division by zero"));
+        }
+        Ok(Scalar::Real(self.graph.binary(operation, left, right)))
+    }
+
+    pub(super) fn negated(&self, scalar: Scalar, span: Span) -> Result<Scalar> {
+        if let Scalar::Integer(value) = scalar {
+            let negated = value.checked_neg();
+            return negated.map(Scalar::Integer).ok_or_else(|| overflow(span));
+        }
+        let node = self.real(scalar, span)?;
+        Ok(Scalar::Real(self.graph.unary(Unary::Neg, node)))
+    }
+
+    pub(super) fn power(
+        &self,
+        base: Value,
+        exponent: Value,
+        elementwise: bool,
+        span: Span,
+    ) -> Result<Value> {
+        if !elementwise && !(base.dims().is_empty() && exponent.dims().is_empty()) {
+            return Err(Problem::new(span, "powers of arrays are not supported")
+                .hint("`.^` takes the power of every element"));
+        }
+        self.elementwise(base, exponent, span, Self::scalar_power)
+    }
+
+    /// A known whole exponent gives an integer power, which takes any base.
+    fn scalar_power(&self, base: Scalar, exponent: Scalar, span: Span) -> Result<Scalar> {
+        let node = self.real(base, span)?;
+        let whole = exponent
+            .number(self.graph)
+            .filter(|value| value.fract() == 0.0 && value.abs() <= f64::from(i32::MAX));
+        let power = match whole {
+            Some(exponent) => self.graph.powi(node, exponent as i32),
+            None => self
+                .graph
+                .binary(Binary::Pow, node, self.real(exponent, span)?),
+        };
+        Ok(Scalar::Real(power))
+    }
+
+    pub(super) fn compare(
+        &self,
+        relation: Relation,
+        left: Scalar,
+        right: Scalar,
+        span: Span,
+    ) -> Result<Scalar> {
+        let (left, right) = match (left, right) {
+            (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
+            _ => (self.real(left, span)?, self.real(right, span)?),
+        };
+        let node = match relation {
+            Relation::Less => self.graph.binary(Binary::Less, left, right),
+            Relation::LessEqual => self.graph.binary(Binary::LessEq, left, right),
+            Relation::Greater => self.graph.binary(Binary::Less, right, left),
+            Relation::GreaterEqual => self.graph.binary(Binary::LessEq, right, left),
+            Relation::Equal => self.graph.binary(Binary::Equal, left, right),
+            Relation::NotEqual => {
+                let equal = self.graph.binary(Binary::Equal, left, right);
+                self.graph.unary(Unary::Not, equal)
+            }
+        };
+        Ok(Scalar::Boolean(node))
+    }
+
+    pub(super) fn select(
+        &self,
+        condition: Node,
+        left: Scalar,
+        right: Scalar,
+        span: Span,
+    ) -> Result<Scalar> {
+        if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (left, right) {
+            return Ok(Scalar::Boolean(self.graph.select(condition, a, b)));
+        }
+        let (left, right) = (self.real(left, span)?, self.real(right, span)?);
+        Ok(Scalar::Real(self.graph.select(condition, left, right)))
+    }
+
+    /// Scalar product, or product of matrices and vectors.
+    fn product(&self, left: Array, right: Array, span: Span) -> Result<Value> {
+        let (rows, inner) = match left.dims[..] {
+            [inner] => (1, inner),
+            [rows, inner] => (rows, inner),
+            _ => return Err(no_product(&left.dims, &right.dims, span)),
+        };
+        let (across, columns) = match right.dims[..] {
+            [across] => (across, 1),
+            [across, columns] => (across, columns),
+            _ => return Err(no_product(&left.dims, &right.dims, span)),
+        };
+        if inner != across {
+            return Err(no_product(&left.dims, &right.dims, span));
+        }
+        let work = (rows as u64)
+            .saturating_mul(inner as u64)
+            .saturating_mul(columns as u64);
+        self.budget
+            .charge(work.max(rows as u64 * columns as u64), span)?;
+        let mut elements = Vec::with_capacity(rows * columns);
+        for row in 0..rows {
+            for column in 0..columns {
+                let terms = (0..inner).filter_map(|k| {
+                    let a = left.elements.get(row * inner + k)?;
+                    Some((*a, *right.elements.get(k * columns + column)?))
+                });
+                elements.push(self.sum_of_products(terms, span)?);
+            }
+        }
+        let mut dims = vec![];
+        dims.extend((left.dims.len() == 2).then_some(rows));
+        dims.extend((right.dims.len() == 2).then_some(columns));
+        Ok(Value::new(dims, elements))
+    }
+
+    fn sum_of_products(
+        &self,
+        terms: impl Iterator<Item = (Scalar, Scalar)>,
+        span: Span,
+    ) -> Result<Scalar> {
+        let mut sum = None;
+        for (a, b) in terms {
+            // A zero entry of a matrix says that there is no such term. Keeping `0*x` would
+            // make every state depend on every other.
+            if a.number(self.graph) == Some(0.0) || b.number(self.graph) == Some(0.0) {
+                continue;
+            }
+            let term = self.scalar_binary(BinaryOperator::Multiply, a, b, span)?;
+            sum = Some(match sum {
+                Some(sum) => self.scalar_binary(BinaryOperator::Add, sum, term, span)?,
+                None => term,
+            });
+        }
+        Ok(sum.unwrap_or(Scalar::Integer(0)))
+    }
+}
+
+pub(super) fn overflow(span: Span) -> Problem {
+    Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
+}
+
+pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
+    let (left, right) = (describe_dims(left), describe_dims(right));
+    Problem::new(
+        span,
+        format!("the sizes differ: left is {left}, right is {right}"),
+    )
+}
+
+fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {
+    let (left, right) = (describe_dims(left), describe_dims(right));
+    Problem::new(span, format!("no product of sizes {left} and {right}"))
+        .hint("the inner sizes of a matrix product must agree; `.*` multiplies element by element")
+}

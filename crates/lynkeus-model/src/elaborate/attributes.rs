@@ -1,0 +1,174 @@
+//! `start`, `min`, `max`, `nominal` and `unit` of declarations.
+
+use super::scope::Mode;
+use super::symbols::{Component, Context, Symbols};
+use super::value::{Scalar, Value, describe_dims, element_name};
+use crate::Variable;
+use crate::syntax::ast::{Attribute, Declaration, ExprId, Kind};
+use crate::syntax::{Problem, Result, unquoted};
+
+/// What a declaration says of all its elements.
+pub(super) struct Attributes {
+    start: Option<Numbers>,
+    min: Option<Numbers>,
+    max: Option<Numbers>,
+    nominal: Option<Numbers>,
+    unit: Option<String>,
+}
+
+/// One number for all elements, or one for each.
+enum Numbers {
+    Same(f64),
+    Each(Vec<f64>),
+}
+
+impl Numbers {
+    fn at(&self, offset: usize) -> Option<f64> {
+        match self {
+            Numbers::Same(value) => Some(*value),
+            Numbers::Each(values) => values.get(offset).copied(),
+        }
+    }
+}
+
+impl Attributes {
+    pub(super) fn new<'a>(
+        context: &Context<'a>,
+        symbols: &Symbols<'a>,
+        declaration: &Declaration,
+        component: &Component,
+    ) -> Result<Self> {
+        let reader = Reader {
+            context,
+            symbols,
+            component,
+        };
+        let mut attributes = Self {
+            start: None,
+            min: None,
+            max: None,
+            nominal: None,
+            unit: None,
+        };
+        for attribute in &declaration.attributes {
+            let slot = match attribute.name.text(context.source) {
+                "start" => &mut attributes.start,
+                "min" => &mut attributes.min,
+                "max" => &mut attributes.max,
+                "nominal" => &mut attributes.nominal,
+                "unit" => {
+                    attributes.unit = Some(reader.text(attribute)?);
+                    continue;
+                }
+                _ => continue,
+            };
+            if slot.is_some() {
+                return Err(Problem::new(
+                    attribute.name,
+                    "this attribute is given twice",
+                ));
+            }
+            *slot = reader.numbers(attribute.value)?;
+        }
+        attributes.check_range(context, declaration, component)?;
+        Ok(attributes)
+    }
+
+    fn check_range(
+        &self,
+        context: &Context<'_>,
+        declaration: &Declaration,
+        component: &Component,
+    ) -> Result<()> {
+        for offset in 0..component.elements.len() {
+            let bound = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
+            if let (Some(min), Some(max)) = (bound(&self.min), bound(&self.max))
+                && min > max
+            {
+                let name = declaration.name.text(context.source);
+                let name = element_name(name, &component.dims, offset);
+                let message = format!("the range of `{name}` is empty: min {min} > max {max}");
+                return Err(Problem::new(declaration.name, message));
+            }
+        }
+        Ok(())
+    }
+
+    /// One element as a variable of the plant.
+    pub(super) fn variable(
+        &self,
+        context: &Context<'_>,
+        declaration: &Declaration,
+        dims: &[usize],
+        offset: usize,
+        node: lynkeus_expr::Node,
+    ) -> Variable {
+        let at = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
+        Variable {
+            name: element_name(declaration.name.text(context.source), dims, offset),
+            node,
+            unit: self.unit.clone(),
+            description: declaration.description.clone(),
+            start: at(&self.start),
+            min: at(&self.min).unwrap_or(f64::NEG_INFINITY),
+            max: at(&self.max).unwrap_or(f64::INFINITY),
+            nominal: at(&self.nominal),
+            integer: declaration.prefix.integer,
+        }
+    }
+}
+
+struct Reader<'r, 'a> {
+    context: &'r Context<'a>,
+    symbols: &'r Symbols<'a>,
+    component: &'r Component,
+}
+
+impl Reader<'_, '_> {
+    fn text(&self, attribute: &Attribute) -> Result<String> {
+        let expression = self.context.ast.expression(attribute.value);
+        match expression.kind {
+            Kind::Text => Ok(unquoted(expression.span.text(self.context.source))),
+            _ => Err(Problem::new(expression.span, "expected a string")
+                .hint("write units as in `unit = \"m/s\"`")),
+        }
+    }
+
+    /// `None` where the value needs a parameter that has none.
+    fn numbers(&self, id: ExprId) -> Result<Option<Numbers>> {
+        let mut evaluator = self.symbols.evaluator(self.context, Mode::Structural);
+        let span = self.context.ast.expression(id).span;
+        let value = match evaluator.value(id) {
+            Ok(value) => value,
+            Err(_) if evaluator.valueless && self.context.options.symbolic_parameters => {
+                return Ok(None);
+            }
+            Err(problem) => return Err(problem),
+        };
+        let number = |scalar: Scalar| {
+            let message = "expected a finite number";
+            scalar
+                .number(self.context.graph)
+                .ok_or_else(|| Problem::new(span, message))
+        };
+        match value {
+            Value::Scalar(scalar) => Ok(Some(Numbers::Same(number(scalar)?))),
+            Value::Array(array) if array.dims == self.component.dims => {
+                let numbers = array
+                    .elements
+                    .into_iter()
+                    .map(number)
+                    .collect::<Result<_>>()?;
+                Ok(Some(Numbers::Each(numbers)))
+            }
+            Value::Array(array) => {
+                let (has, found) = (
+                    describe_dims(&self.component.dims),
+                    describe_dims(&array.dims),
+                );
+                let message = format!("the attribute has the size {found}, its variable has {has}");
+                Err(Problem::new(span, message))
+            }
+        }
+    }
+}

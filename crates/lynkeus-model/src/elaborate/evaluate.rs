@@ -1,0 +1,288 @@
+//! Expressions of the syntax tree to values over the graph.
+
+use lynkeus_expr::{Graph, Unary};
+
+use super::scope::{Mode, Named, Scope};
+use super::value::{Scalar, Value};
+use crate::limits::Budget;
+use crate::names::did_you_mean;
+use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
+use crate::syntax::{Problem, Result, Span};
+
+/// Evaluates expressions of one text. Recursion is bounded by the nesting of the text.
+pub(crate) struct Evaluator<'a> {
+    pub(super) source: &'a str,
+    pub(super) ast: &'a Ast,
+    pub(super) graph: &'a Graph,
+    pub(super) budget: &'a Budget,
+    pub(super) scope: &'a dyn Scope,
+    pub(super) mode: Mode,
+    /// iterators of the loops around, innermost last
+    pub(super) loops: Vec<(&'a str, Scalar)>,
+    /// what `end` means in the subscripts around, innermost last
+    pub(super) ends: Vec<usize>,
+    /// set when an evaluation failed because a parameter has no value
+    pub(super) valueless: bool,
+}
+
+impl<'a> Evaluator<'a> {
+    pub(crate) fn new(
+        source: &'a str,
+        ast: &'a Ast,
+        graph: &'a Graph,
+        budget: &'a Budget,
+        scope: &'a dyn Scope,
+        mode: Mode,
+    ) -> Self {
+        let (loops, ends, valueless) = (vec![], vec![], false);
+        Self {
+            source,
+            ast,
+            graph,
+            budget,
+            scope,
+            mode,
+            loops,
+            ends,
+            valueless,
+        }
+    }
+
+    pub(super) fn span(&self, id: ExprId) -> Span {
+        self.ast.expression(id).span
+    }
+
+    pub(super) fn text(&self, span: Span) -> &'a str {
+        span.text(self.source)
+    }
+
+    /// The value of an expression.
+    pub(crate) fn value(&mut self, id: ExprId) -> Result<Value> {
+        let expression = self.ast.expression(id);
+        let span = expression.span;
+        self.budget.charge(1, span)?;
+        let scalar = match &expression.kind {
+            Kind::Integer(value) => Scalar::Integer(*value),
+            Kind::Real(value) => Scalar::Real(self.graph.constant(*value).node()),
+            Kind::Boolean(value) => self.truth(*value),
+            Kind::Text => return Err(Problem::new(span, "expected a number, found a string")),
+            Kind::All => return Err(Problem::new(span, "`:` stands only in subscripts")),
+            Kind::End => self.end(span)?,
+            Kind::Name => return self.name(span),
+            Kind::Index(base, subscripts) => return self.index(*base, subscripts, span),
+            Kind::Call(call) => return self.call(call, span),
+            Kind::Array(elements) => return self.array(elements, span),
+            Kind::Matrix(rows) => return self.matrix(rows, span),
+            Kind::Comprehension(body, iterators) => {
+                return self.comprehension(*body, iterators, span);
+            }
+            Kind::Unary(operator, operand) => return self.unary(*operator, *operand),
+            Kind::Chain(head, rest) => return self.chain(*head, rest),
+            Kind::Power(base, exponent, elementwise) => {
+                let (base, exponent) = (self.value(*base)?, self.value(*exponent)?);
+                return self.power(base, exponent, *elementwise, span);
+            }
+            Kind::Relation(relation, left, right) => self.relation(*relation, *left, *right)?,
+            Kind::If(branches, otherwise) => return self.conditional(branches, *otherwise),
+            Kind::Range(start, step, stop) => return self.range(*start, *step, *stop, span),
+        };
+        Ok(Value::Scalar(scalar))
+    }
+
+    /// The value of an expression that must be scalar.
+    pub(crate) fn scalar(&mut self, id: ExprId) -> Result<Scalar> {
+        match self.value(id)? {
+            Value::Scalar(scalar) => Ok(scalar),
+            Value::Array(array) => {
+                let found = super::value::describe_dims(&array.dims);
+                let message = format!("expected a scalar, found an array {found}");
+                Err(Problem::new(self.span(id), message))
+            }
+        }
+    }
+
+    /// The value of an expression in which everything must be known.
+    pub(crate) fn structural(&mut self, id: ExprId) -> Result<Value> {
+        let mode = std::mem::replace(&mut self.mode, Mode::Structural);
+        let value = self.value(id);
+        self.mode = mode;
+        value
+    }
+
+    /// An Integer that must be known; `what` names it in the refusal.
+    pub(super) fn known_integer(&mut self, id: ExprId, what: &str) -> Result<i64> {
+        match self.structural(id)? {
+            Value::Scalar(Scalar::Integer(value)) => Ok(value),
+            Value::Array(array) => {
+                let found = super::value::describe_dims(&array.dims);
+                let message = format!("{what} must be an Integer, found an array {found}");
+                Err(Problem::new(self.span(id), message))
+            }
+            Value::Scalar(found) => {
+                let kind = match found {
+                    Scalar::Boolean(_) => "Boolean",
+                    _ => "Real",
+                };
+                let message = format!("{what} must be an Integer, found a {kind}");
+                Err(Problem::new(self.span(id), message)
+                    .hint("`/` and `^` always give a Real: use `div(a, b)` or `integer(a)`"))
+            }
+        }
+    }
+
+    pub(super) fn truth(&self, value: bool) -> Scalar {
+        Scalar::Boolean(self.graph.constant(f64::from(u8::from(value))).node())
+    }
+
+    fn end(&self, span: Span) -> Result<Scalar> {
+        let size = self.ends.last().and_then(|&size| i64::try_from(size).ok());
+        let outside = || Problem::new(span, "`end` stands only in subscripts");
+        size.map(Scalar::Integer).ok_or_else(outside)
+    }
+
+    fn name(&mut self, span: Span) -> Result<Value> {
+        let name = self.text(span);
+        if let Some((_, value)) = self
+            .loops
+            .iter()
+            .rev()
+            .find(|(iterator, _)| *iterator == name)
+        {
+            return Ok(Value::Scalar(*value));
+        }
+        match self.scope.named(name, self.mode) {
+            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
+            Named::Array(dims, elements) => {
+                self.budget.charge(elements.len() as u64, span)?;
+                Ok(Value::new(dims.to_vec(), elements.to_vec()))
+            }
+            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            Named::Unknown => match self.builtin(name) {
+                Some(scalar) => Ok(Value::Scalar(scalar)),
+                None => Err(self.unknown_name(span)),
+            },
+            Named::Varying => Err(self.varying(span)),
+            Named::Valueless => Err(self.without_value(span)),
+        }
+    }
+
+    fn builtin(&self, name: &str) -> Option<Scalar> {
+        let value = match name {
+            "time" => return self.scope.time(self.mode).map(Scalar::Real),
+            "Modelica.Constants.pi" => std::f64::consts::PI,
+            "Modelica.Constants.e" => std::f64::consts::E,
+            "Modelica.Constants.g_n" => 9.80665,
+            "Modelica.Constants.D2R" => std::f64::consts::PI / 180.0,
+            _ => return None,
+        };
+        Some(Scalar::Real(self.graph.constant(value).node()))
+    }
+
+    pub(super) fn varying(&self, span: Span) -> Problem {
+        let name = self.text(span);
+        Problem::new(
+            span,
+            format!("`{name}` is a variable, but a known value is needed here"),
+        )
+        .hint("sizes, loop bounds, subscripts, attributes and parameters use parameters only")
+    }
+
+    pub(super) fn without_value(&mut self, span: Span) -> Problem {
+        self.valueless = true;
+        let name = self.text(span);
+        Problem::new(
+            span,
+            format!("parameter `{name}` has no value, but one is needed here"),
+        )
+        .hint(format!(
+            "write `{name} = …` in its declaration, or give the value on loading"
+        ))
+    }
+
+    pub(super) fn unknown_name(&self, span: Span) -> Problem {
+        let name = self.text(span);
+        if name == "time" {
+            return self.varying(span);
+        }
+        let message = format!("unknown name `{}`", crate::syntax::shortened(name));
+        if name.contains('.') {
+            let hint = "components of other models are not supported; \
+                        of `Modelica.Constants` there are pi, e, g_n and D2R";
+            return Problem::new(span, message).hint(hint);
+        }
+        let iterators = self.loops.iter().map(|(iterator, _)| *iterator);
+        let declared = self.scope.names();
+        let known = declared.into_iter().chain(iterators).chain(["time"]);
+        let suggestion = did_you_mean(name, known);
+        let for_pi = (name == "pi").then(|| "write `Modelica.Constants.pi`".to_owned());
+        Problem::new(span, message).maybe_hint(for_pi.or(suggestion))
+    }
+
+    fn unary(&mut self, operator: UnaryOperator, operand: ExprId) -> Result<Value> {
+        let value = self.value(operand)?;
+        let span = self.span(operand);
+        match operator {
+            UnaryOperator::Not => {
+                let node = self.boolean(&value, span)?;
+                let node = self.graph.unary(Unary::Not, node);
+                Ok(Value::Scalar(Scalar::Boolean(node)))
+            }
+            UnaryOperator::Plus => self.map(value, span, |_, scalar, _| Ok(scalar)),
+            UnaryOperator::Minus => self.map(value, span, Self::negated),
+        }
+    }
+
+    fn chain(&mut self, head: ExprId, rest: &'a [(BinaryOperator, ExprId)]) -> Result<Value> {
+        let mut value = self.value(head)?;
+        let start = self.span(head);
+        for &(operator, operand) in rest {
+            let right = self.value(operand)?;
+            let span = start.to(self.span(operand));
+            value = self.binary(operator, value, right, span)?;
+        }
+        Ok(value)
+    }
+
+    fn relation(&mut self, relation: Relation, left: ExprId, right: ExprId) -> Result<Scalar> {
+        let span = self.span(left).to(self.span(right));
+        let (left, right) = (self.scalar(left)?, self.scalar(right)?);
+        self.compare(relation, left, right, span)
+    }
+
+    /// The truth value of a condition.
+    pub(crate) fn condition(&mut self, id: ExprId) -> Result<lynkeus_expr::Node> {
+        let value = self.value(id)?;
+        self.boolean(&value, self.span(id))
+    }
+
+    /// A known condition takes one branch and leaves the others unread, so that a loop may
+    /// hold `if i == 1 then … else x[i - 1]`.
+    fn conditional(
+        &mut self,
+        branches: &'a [(ExprId, ExprId)],
+        otherwise: ExprId,
+    ) -> Result<Value> {
+        let mut open = vec![];
+        let mut last = otherwise;
+        for &(condition, value) in branches {
+            let node = self.condition(condition)?;
+            match self.graph.constant_value(node) {
+                Some(0.0) => {}
+                Some(_) => {
+                    last = value;
+                    break;
+                }
+                None => open.push((node, value)),
+            }
+        }
+        let mut result = self.value(last)?;
+        for (condition, value) in open.into_iter().rev() {
+            let span = self.span(value);
+            let value = self.value(value)?;
+            result = self.elementwise(value, result, span, |evaluator, a, b, span| {
+                evaluator.select(condition, a, b, span)
+            })?;
+        }
+        Ok(result)
+    }
+}

@@ -1,0 +1,306 @@
+//! The functions of scalars; arrays are taken element by element.
+
+use lynkeus_expr::{Binary, Unary};
+
+use super::arithmetic::overflow;
+use super::evaluate::Evaluator;
+use super::value::{Scalar, Value};
+use crate::names::did_you_mean;
+use crate::syntax::ast::{Call, ExprId, Kind};
+use crate::syntax::{Problem, Result, Span, shortened};
+
+const UNARY: [(&str, Unary); 14] = [
+    ("sqrt", Unary::Sqrt),
+    ("exp", Unary::Exp),
+    ("log", Unary::Ln),
+    ("sin", Unary::Sin),
+    ("cos", Unary::Cos),
+    ("tan", Unary::Tan),
+    ("asin", Unary::Asin),
+    ("acos", Unary::Acos),
+    ("atan", Unary::Atan),
+    ("sinh", Unary::Sinh),
+    ("cosh", Unary::Cosh),
+    ("tanh", Unary::Tanh),
+    ("abs", Unary::Abs),
+    ("sign", Unary::Sign),
+];
+
+/// The other functions, for suggestions.
+const OTHERS: [&str; 29] = [
+    "der",
+    "log10",
+    "floor",
+    "ceil",
+    "integer",
+    "atan2",
+    "mod",
+    "rem",
+    "div",
+    "min",
+    "max",
+    "sum",
+    "product",
+    "noEvent",
+    "smooth",
+    "size",
+    "ndims",
+    "zeros",
+    "ones",
+    "fill",
+    "linspace",
+    "identity",
+    "diagonal",
+    "transpose",
+    "cat",
+    "scalar",
+    "vector",
+    "matrix",
+    "array",
+];
+
+/// Functions that an observer's model cannot have, and what to do instead.
+const REFUSED: [(&str, &str); 12] = [
+    (
+        "pre",
+        "models with events are not supported: use `if` expressions",
+    ),
+    (
+        "edge",
+        "models with events are not supported: use `if` expressions",
+    ),
+    (
+        "change",
+        "models with events are not supported: use `if` expressions",
+    ),
+    ("sample", "sampling is set in the study, not in the model"),
+    ("initial", "give the starting values with `start = …`"),
+    ("terminal", "models with events are not supported"),
+    ("reinit", "models with events are not supported"),
+    (
+        "delay",
+        "a delay has infinitely many states: use a chain of lags",
+    ),
+    ("homotopy", "write the actual expression"),
+    ("semiLinear", "write `if x >= 0 then a*x else b*x`"),
+    ("spatialDistribution", "use a chain of lags"),
+    ("assert", "give bounds with `min` and `max`"),
+];
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn call(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let name = self.text(call.function);
+        let name = name.strip_prefix("Modelica.Math.").unwrap_or(name);
+        if let Some(&(_, operation)) = UNARY.iter().find(|(known, _)| *known == name) {
+            let value = self.only_argument(call)?;
+            return self.map(value, span, |evaluator, scalar, span| {
+                evaluator.unary_function(operation, scalar, span)
+            });
+        }
+        match name {
+            "der" => self.der(call),
+            "log10" => {
+                let value = self.only_argument(call)?;
+                self.map(value, span, |evaluator, scalar, span| {
+                    let node = evaluator.real(scalar, span)?;
+                    let logarithm = evaluator.graph.expr(node).log10();
+                    Ok(Scalar::Real(logarithm.node()))
+                })
+            }
+            "floor" | "ceil" | "integer" => {
+                let value = self.only_argument(call)?;
+                self.map(value, span, |evaluator, scalar, span| {
+                    evaluator.rounded(name, scalar, span)
+                })
+            }
+            "atan2" | "mod" | "rem" | "div" => {
+                let (left, right) = self.two_arguments(call)?;
+                self.elementwise(left, right, span, |evaluator, a, b, span| {
+                    evaluator.binary_function(name, a, b, span)
+                })
+            }
+            "min" | "max" => self.extreme(name, call, span),
+            "noEvent" => self.only_argument(call),
+            "smooth" => Ok(self.two_arguments(call)?.1),
+            _ => match self.array_function(name, call, span)? {
+                Some(value) => Ok(value),
+                None => Err(self.unknown_function(call.function, name)),
+            },
+        }
+    }
+
+    fn unknown_function(&self, span: Span, name: &str) -> Problem {
+        if let Some((_, hint)) = REFUSED.iter().find(|(refused, _)| *refused == name) {
+            return Problem::new(span, format!("`{name}` is not supported")).hint(*hint);
+        }
+        let known = UNARY.iter().map(|(name, _)| *name).chain(OTHERS);
+        let hint = did_you_mean(name, known).unwrap_or_else(|| match name {
+            "ln" => "the natural logarithm is `log`".to_owned(),
+            "pow" => "write `a^b`".to_owned(),
+            _ if self.scope.dims(name).is_some() => "subscripts stand in `[…]`".to_owned(),
+            _ => "functions of your own are not supported: write the formula out".to_owned(),
+        });
+        Problem::new(span, format!("unknown function `{}`", shortened(name))).hint(hint)
+    }
+
+    /// Checks the number of arguments.
+    pub(super) fn arguments<const N: usize>(&self, call: &Call) -> Result<[ExprId; N]> {
+        let given = call.arguments.len();
+        if !call.iterators.is_empty() {
+            let message = "iterators stand only in `sum`, `product`, `min`, `max` and `array`";
+            return Err(Problem::new(call.function, message));
+        }
+        <[ExprId; N]>::try_from(call.arguments.as_slice()).map_err(|_| {
+            let name = self.text(call.function);
+            let plural = if N == 1 { "" } else { "s" };
+            let message = format!("`{name}` takes {N} argument{plural}, found {given}");
+            Problem::new(call.function, message)
+        })
+    }
+
+    pub(super) fn only_argument(&mut self, call: &Call) -> Result<Value> {
+        let [argument] = self.arguments(call)?;
+        self.value(argument)
+    }
+
+    pub(super) fn two_arguments(&mut self, call: &Call) -> Result<(Value, Value)> {
+        let [left, right] = self.arguments(call)?;
+        Ok((self.value(left)?, self.value(right)?))
+    }
+
+    fn unary_function(&self, operation: Unary, scalar: Scalar, span: Span) -> Result<Scalar> {
+        if let Scalar::Integer(value) = scalar {
+            match operation {
+                Unary::Abs => {
+                    let magnitude = value.checked_abs();
+                    return magnitude.map(Scalar::Integer).ok_or_else(|| overflow(span));
+                }
+                Unary::Sign => return Ok(Scalar::Integer(value.signum())),
+                _ => {}
+            }
+        }
+        let node = self.real(scalar, span)?;
+        Ok(Scalar::Real(self.graph.unary(operation, node)))
+    }
+
+    fn rounded(&self, name: &str, scalar: Scalar, span: Span) -> Result<Scalar> {
+        let node = self.real(scalar, span)?;
+        let rounded = match name {
+            "ceil" => {
+                let negative = self.graph.unary(Unary::Neg, node);
+                let floor = self.graph.unary(Unary::Floor, negative);
+                self.graph.unary(Unary::Neg, floor)
+            }
+            _ => self.graph.unary(Unary::Floor, node),
+        };
+        match self.graph.constant_value(rounded) {
+            Some(value) if name == "integer" => {
+                if value.abs() > 2f64.powi(53) {
+                    return Err(overflow(span));
+                }
+                Ok(Scalar::Integer(value as i64))
+            }
+            _ => Ok(Scalar::Real(rounded)),
+        }
+    }
+
+    fn binary_function(&self, name: &str, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
+        if b.number(self.graph) == Some(0.0) && name != "atan2" {
+            return Err(Problem::new(span, "division by zero"));
+        }
+        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+            let exact = match name {
+                "div" => Some(a.checked_div(b)),
+                "rem" => Some(a.checked_rem(b)),
+                "mod" => Some(a.checked_rem(b).map(|rest| match (rest < 0) == (b < 0) {
+                    true => rest,
+                    false if rest == 0 => 0,
+                    false => rest + b,
+                })),
+                _ => None,
+            };
+            if let Some(exact) = exact {
+                return exact.map(Scalar::Integer).ok_or_else(|| overflow(span));
+            }
+        }
+        let graph = self.graph;
+        let (a, b) = (
+            graph.expr(self.real(a, span)?),
+            graph.expr(self.real(b, span)?),
+        );
+        let truncated = || {
+            let quotient = a / b;
+            quotient.sign() * quotient.abs().floor()
+        };
+        let result = match name {
+            "atan2" => graph.expr(graph.binary(Binary::Atan2, a.node(), b.node())),
+            "div" => truncated(),
+            "rem" => a - truncated() * b,
+            _ => a - (a / b).floor() * b,
+        };
+        Ok(Scalar::Real(result.node()))
+    }
+
+    fn extreme(&mut self, name: &str, call: &'a Call, span: Span) -> Result<Value> {
+        let operation = if name == "min" {
+            Binary::Min
+        } else {
+            Binary::Max
+        };
+        if call.arguments.len() == 2 {
+            let (left, right) = self.two_arguments(call)?;
+            return self.elementwise(left, right, span, |evaluator, a, b, span| {
+                evaluator.larger_or_smaller(operation, a, b, span)
+            });
+        }
+        let elements = self.reduced(call, span)?;
+        self.budget.charge(elements.len() as u64, span)?;
+        let Some((&first, rest)) = elements.split_first() else {
+            return Err(Problem::new(span, format!("`{name}` of no elements")));
+        };
+        let result = rest.iter().try_fold(first, |best, &next| {
+            self.larger_or_smaller(operation, best, next, span)
+        });
+        Ok(Value::Scalar(result?))
+    }
+
+    fn larger_or_smaller(&self, op: Binary, a: Scalar, b: Scalar, span: Span) -> Result<Scalar> {
+        if let (Scalar::Integer(a), Scalar::Integer(b)) = (a, b) {
+            return Ok(Scalar::Integer(if op == Binary::Min {
+                a.min(b)
+            } else {
+                a.max(b)
+            }));
+        }
+        let (a, b) = (self.real(a, span)?, self.real(b, span)?);
+        Ok(Scalar::Real(self.graph.binary(op, a, b)))
+    }
+
+    /// `der(x)` of a variable, an element or a slice.
+    fn der(&mut self, call: &Call) -> Result<Value> {
+        let [argument] = self.arguments(call)?;
+        let span = self.span(argument);
+        if !matches!(
+            self.ast.expression(argument).kind,
+            Kind::Name | Kind::Index(..)
+        ) {
+            return Err(
+                Problem::new(span, "`der` takes a variable, not an expression")
+                    .hint("give the expression a variable of its own, or write its derivative out"),
+            );
+        }
+        let value = self.value(argument)?;
+        self.map(value, span, |evaluator, scalar, span| {
+            let derivative = match scalar {
+                Scalar::Real(node) => evaluator.scope.derivative(node),
+                _ => None,
+            };
+            derivative.map(Scalar::Real).ok_or_else(|| {
+                let name = evaluator.text(span);
+                let message = format!("`der({name})`: `{name}` is not a Real variable");
+                Problem::new(span, message)
+                    .hint("inputs and parameters have no derivative in the equations")
+            })
+        })
+    }
+}

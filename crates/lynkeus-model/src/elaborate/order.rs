@@ -1,0 +1,129 @@
+//! The order in which declarations can be given their sizes and values.
+
+use std::collections::HashMap;
+
+use crate::syntax::ast::{Ast, Declaration, ExprId, Kind, Variability};
+use crate::syntax::{Problem, Result};
+
+/// What the declarations need of each other.
+pub(super) struct Order {
+    /// every declaration once, each behind those it needs
+    pub sequence: Vec<usize>,
+    /// true where the value of a parameter is made from other parameters of type Real
+    pub dependent: Vec<bool>,
+}
+
+pub(super) fn order(
+    source: &str,
+    ast: &Ast,
+    declarations: &[Declaration],
+    by_name: &HashMap<&str, usize>,
+) -> Result<Order> {
+    let needs: Vec<Vec<usize>> = declarations
+        .iter()
+        .map(|declaration| needs(source, ast, declaration, by_name))
+        .collect();
+    let sequence = sort(source, declarations, &needs)?;
+    let mut dependent = vec![false; declarations.len()];
+    for &place in &sequence {
+        let depends = |&need: &usize| {
+            let prefix = &declarations[need].prefix;
+            let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
+            dependent[need] || (settable && !prefix.integer)
+        };
+        dependent[place] = needs[place].iter().any(depends);
+    }
+    Ok(Order {
+        sequence,
+        dependent,
+    })
+}
+
+/// Declarations whose size or value this one reads.
+fn needs(
+    source: &str,
+    ast: &Ast,
+    declaration: &Declaration,
+    by_name: &HashMap<&str, usize>,
+) -> Vec<usize> {
+    let is_known = declaration.prefix.variability != Variability::Continuous;
+    let binding = declaration.binding.filter(|_| is_known);
+    let mut found = vec![];
+    for root in declaration.dimensions.iter().copied().chain(binding) {
+        let first = ast.expression(root).first;
+        // The parts of an expression lie side by side in the arena.
+        for id in (first.0..=root.0).map(ExprId) {
+            let expression = ast.expression(id);
+            if matches!(expression.kind, Kind::Name) {
+                found.extend(by_name.get(expression.span.text(source)));
+            }
+        }
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Mark {
+    New,
+    Open,
+    Done,
+}
+
+/// Depth-first, without recursion: a chain of parameters may be as long as the file.
+fn sort(source: &str, declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>> {
+    let mut marks = vec![Mark::New; needs.len()];
+    let mut sequence = Vec::with_capacity(needs.len());
+    let mut path: Vec<(usize, usize)> = vec![];
+    for root in 0..needs.len() {
+        if marks[root] != Mark::New {
+            continue;
+        }
+        marks[root] = Mark::Open;
+        path.push((root, 0));
+        while let Some((place, next)) = path.last_mut() {
+            let Some(&need) = needs[*place].get(*next) else {
+                marks[*place] = Mark::Done;
+                sequence.push(*place);
+                path.pop();
+                continue;
+            };
+            *next += 1;
+            match marks[need] {
+                Mark::Done => {}
+                Mark::Open => return Err(cycle(source, declarations, &path, need)),
+                Mark::New => {
+                    marks[need] = Mark::Open;
+                    path.push((need, 0));
+                }
+            }
+        }
+    }
+    Ok(sequence)
+}
+
+fn cycle(
+    source: &str,
+    declarations: &[Declaration],
+    path: &[(usize, usize)],
+    closing: usize,
+) -> Problem {
+    let name = |place: usize| declarations[place].name.text(source);
+    let start = path
+        .iter()
+        .position(|(place, _)| *place == closing)
+        .unwrap_or(0);
+    let cycle = &path[start..];
+    let mut names: Vec<String> = cycle
+        .iter()
+        .take(8)
+        .map(|(place, _)| format!("`{}`", name(*place)))
+        .collect();
+    if cycle.len() > 8 {
+        names.push(format!("… {} more …", cycle.len() - 8));
+    }
+    names.push(format!("`{}`", name(closing)));
+    let message = format!("these declarations need each other: {}", names.join(" → "));
+    Problem::new(declarations[closing].name, message).hint("give one of them a number")
+}

@@ -1,0 +1,226 @@
+//! The declared names of a model, with sizes, symbols and values.
+
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
+
+use lynkeus_expr::{Graph, Node};
+
+use super::evaluate::Evaluator;
+use super::order::{Order, order};
+use super::overrides::Overrides;
+use super::scope::{Mode, Named, Scope};
+use super::value::{Scalar, element_count, element_name};
+use crate::LoadOptions;
+use crate::limits::{Budget, MAX_SCALARS};
+use crate::syntax::ast::{Ast, Causality, Declaration, Kind, ModelSyntax, Variability};
+use crate::syntax::{Problem, Result};
+
+/// A declared name.
+#[derive(Debug)]
+pub(crate) struct Component {
+    pub dims: Vec<usize>,
+    /// as equations see it: symbols of variables; values or symbols of parameters
+    pub elements: Vec<Scalar>,
+    /// as sizes and attributes see it; `None` for variables and parameters without value
+    pub values: Option<Vec<Scalar>>,
+    pub is_known: bool,
+}
+
+/// What all parts of the elaboration share.
+pub(crate) struct Context<'a> {
+    pub source: &'a str,
+    pub ast: &'a Ast,
+    pub graph: &'a Graph,
+    pub budget: &'a Budget,
+    pub options: &'a LoadOptions,
+}
+
+/// All declared names of a model.
+pub(crate) struct Symbols<'a> {
+    pub declarations: &'a [Declaration],
+    by_name: HashMap<&'a str, usize>,
+    components: Vec<Option<Component>>,
+    /// symbols that may stand in `der`, with the symbols of their derivatives once they do
+    derivatives: RefCell<HashMap<Node, Option<Node>>>,
+    pub time: Node,
+    graph: &'a Graph,
+    pub dependent: Vec<bool>,
+}
+
+impl<'a> Symbols<'a> {
+    pub(crate) fn new(context: &Context<'a>, model: &'a ModelSyntax) -> Result<Self> {
+        let by_name = index_names(context.source, &model.declarations)?;
+        let Order {
+            sequence,
+            dependent,
+        } = order(context.source, context.ast, &model.declarations, &by_name)?;
+        let overrides = Overrides::new(context, model, &by_name)?;
+        let mut symbols = Self {
+            declarations: &model.declarations,
+            by_name,
+            components: model.declarations.iter().map(|_| None).collect(),
+            derivatives: RefCell::default(),
+            time: context.graph.symbol("time").node(),
+            graph: context.graph,
+            dependent,
+        };
+        let scalars = Budget::new(MAX_SCALARS, "scalar variables and parameters");
+        for place in sequence {
+            let component = symbols.component(context, &overrides, &scalars, place)?;
+            if let Some(slot) = symbols.components.get_mut(place) {
+                *slot = Some(component);
+            }
+        }
+        Ok(symbols)
+    }
+
+    /// Declarations with their components, in order of the text.
+    pub(crate) fn all(&self) -> impl Iterator<Item = (&'a Declaration, &Component)> {
+        let pairs = self.declarations.iter().zip(&self.components);
+        pairs.filter_map(|(declaration, component)| Some((declaration, component.as_ref()?)))
+    }
+
+    pub(crate) fn evaluator<'e>(&'e self, context: &'e Context<'a>, mode: Mode) -> Evaluator<'e> {
+        let Context {
+            source,
+            ast,
+            graph,
+            budget,
+            ..
+        } = context;
+        Evaluator::new(source, ast, graph, budget, self, mode)
+    }
+
+    /// The symbol of the derivative of a state; `None` if it is no state.
+    pub(crate) fn derivative_of(&self, variable: Node) -> Option<Node> {
+        self.derivatives.borrow().get(&variable).copied().flatten()
+    }
+
+    fn component(
+        &self,
+        context: &Context<'a>,
+        overrides: &Overrides,
+        scalars: &Budget,
+        place: usize,
+    ) -> Result<Component> {
+        let declaration = &self.declarations[place];
+        let name = declaration.name.text(context.source);
+        if declaration.prefix.variability != Variability::Continuous {
+            return self.parameter(context, overrides, scalars, place);
+        }
+        let dims = self.dims(context, declaration)?.into_iter();
+        let dims: Option<Vec<usize>> = dims.collect();
+        let dims = dims.ok_or_else(|| {
+            Problem::new(
+                declaration.name,
+                format!("the size of variable `{name}` must be given"),
+            )
+            .hint("write a number or a parameter instead of `:`")
+        })?;
+        self.check_count(scalars, &dims, declaration)?;
+        let count: usize = dims.iter().product();
+        let may_have_derivative =
+            declaration.prefix.causality != Causality::Input && !declaration.prefix.integer;
+        let mut derivatives = self.derivatives.borrow_mut();
+        let symbol = |offset: usize| {
+            let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
+            if may_have_derivative {
+                derivatives.insert(symbol, None);
+            }
+            Scalar::Real(symbol)
+        };
+        let elements = (0..count).map(symbol).collect();
+        Ok(Component {
+            dims,
+            elements,
+            values: None,
+            is_known: false,
+        })
+    }
+
+    /// Sizes as declared; `None` for `:`.
+    pub(super) fn dims(
+        &self,
+        context: &Context<'a>,
+        declaration: &Declaration,
+    ) -> Result<Vec<Option<usize>>> {
+        let mut evaluator = self.evaluator(context, Mode::Structural);
+        let length = |&id| match context.ast.expression(id).kind {
+            Kind::All => Ok(None),
+            _ => evaluator.length(id).map(Some),
+        };
+        declaration.dimensions.iter().map(length).collect()
+    }
+
+    pub(super) fn check_count(
+        &self,
+        scalars: &Budget,
+        dims: &[usize],
+        declaration: &Declaration,
+    ) -> Result<()> {
+        // A size beside a size of zero counts as well: slices walk along it.
+        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
+        let count = element_count(&walked).unwrap_or(u64::MAX);
+        scalars.charge(count, declaration.name)
+    }
+}
+
+impl Scope for Symbols<'_> {
+    fn named(&self, name: &str, mode: Mode) -> Named<'_> {
+        let place = self.by_name.get(name).copied();
+        let Some(component) = place.and_then(|place| self.components.get(place)?.as_ref()) else {
+            return Named::Unknown;
+        };
+        match (mode, &component.values) {
+            (Mode::Structural | Mode::Parametric, _) if !component.is_known => Named::Varying,
+            (Mode::Structural, Some(values)) => Named::Array(&component.dims, values),
+            (Mode::Structural, None) => Named::Valueless,
+            _ => Named::Array(&component.dims, &component.elements),
+        }
+    }
+
+    fn dims(&self, name: &str) -> Option<&[usize]> {
+        let place = *self.by_name.get(name)?;
+        Some(&self.components.get(place)?.as_ref()?.dims)
+    }
+
+    fn derivative(&self, variable: Node) -> Option<Node> {
+        let mut derivatives = self.derivatives.borrow_mut();
+        let slot = derivatives.get_mut(&variable)?;
+        if slot.is_none() {
+            let name = self.graph.symbol_name(variable)?;
+            *slot = Some(self.graph.symbol(&format!("der({name})")).node());
+        }
+        *slot
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.by_name.keys().copied().collect()
+    }
+
+    fn time(&self, mode: Mode) -> Option<Node> {
+        (mode == Mode::Continuous).then_some(self.time)
+    }
+}
+
+fn index_names<'a>(
+    source: &'a str,
+    declarations: &'a [Declaration],
+) -> Result<HashMap<&'a str, usize>> {
+    let reserved: HashSet<&str> = ["time"].into();
+    let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
+    for (place, declaration) in declarations.iter().enumerate() {
+        let name = declaration.name.text(source);
+        if reserved.contains(name) {
+            let message = format!("`{name}` is a word of the language");
+            return Err(Problem::new(declaration.name, message).hint("choose another name"));
+        }
+        if let Some(earlier) = by_name.insert(name, place) {
+            let line = super::line_of(source, declarations[earlier].name);
+            let message = format!("`{name}` is declared twice");
+            return Err(Problem::new(declaration.name, message)
+                .hint(format!("it is first declared on line {line}")));
+        }
+    }
+    Ok(by_name)
+}

@@ -1,0 +1,80 @@
+//! What a model may cost. Each limit is named in the message of the refusal it causes,
+//! so that hostile text ends in a diagnostic within a second and bounded memory.
+
+use std::cell::Cell;
+
+use crate::syntax::{Problem, Result, Span};
+
+/// Largest source file in bytes.
+pub(crate) const MAX_SOURCE_BYTES: usize = 64 << 20;
+/// Deepest nesting of expressions and equations.
+pub(crate) const MAX_NESTING: usize = 200;
+/// Most expressions, equations and declarations in one file.
+pub(crate) const MAX_SYNTAX_NODES: usize = 2_000_000;
+/// Most scalar operations while `for` loops and arrays are written out.
+pub(crate) const MAX_ELABORATED: u64 = 2_000_000;
+/// Most scalar variables and parameters of one model.
+pub(crate) const MAX_SCALARS: u64 = 200_000;
+/// Most steps while equations are solved for their unknowns.
+pub(crate) const MAX_SOLVE_STEPS: u64 = 20_000_000;
+
+/// Counts scalar operations against a limit.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    left: Cell<u64>,
+    limit: u64,
+    what: &'static str,
+}
+
+impl Budget {
+    /// A budget of `limit` things called `what`.
+    pub(crate) fn new(limit: u64, what: &'static str) -> Self {
+        Self {
+            left: Cell::new(limit),
+            limit,
+            what,
+        }
+    }
+
+    /// Takes `amount` from the budget.
+    pub(crate) fn charge(&self, amount: u64, span: Span) -> Result<()> {
+        let Some(left) = self.left.get().checked_sub(amount) else {
+            return Err(Problem::new(
+                span,
+                format!(
+                    "the model needs more than {} {}",
+                    grouped(self.limit),
+                    self.what
+                ),
+            )
+            .label("the limit is passed here")
+            .hint("use fewer loop turns or smaller arrays"));
+        };
+        self.left.set(left);
+        Ok(())
+    }
+}
+
+/// Digits in groups of three: `2,000,000`.
+pub(crate) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_digits() {
+        assert_eq!(grouped(7), "7");
+        assert_eq!(grouped(2_000_000), "2,000,000");
+    }
+}

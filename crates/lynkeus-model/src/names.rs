@@ -1,0 +1,66 @@
+//! "Did you mean …?"
+
+/// The names closest to `wanted`, best first, at most three.
+pub(crate) fn near<'a>(wanted: &str, known: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    if wanted.len() > 64 {
+        return vec![];
+    }
+    let allowed = 1 + wanted.chars().count() / 4;
+    let mut found: Vec<(usize, &str)> = known
+        .filter(|name| name.len() <= 64)
+        .map(|name| (distance(wanted, name), name))
+        .filter(|(distance, _)| *distance <= allowed)
+        .collect();
+    found.sort_unstable();
+    found.dedup();
+    found.truncate(3);
+    found.into_iter().map(|(_, name)| name).collect()
+}
+
+/// ``did you mean `a` or `b`?``
+pub(crate) fn did_you_mean<'a>(
+    wanted: &str,
+    known: impl Iterator<Item = &'a str>,
+) -> Option<String> {
+    let names = near(wanted, known);
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    (!quoted.is_empty()).then(|| format!("did you mean {}?", quoted.join(" or ")))
+}
+
+/// Number of edits (with swaps of neighbours) between two words; case counts half as much
+/// as it would, by being ignored where all else agrees.
+fn distance(a: &str, b: &str) -> usize {
+    if a.eq_ignore_ascii_case(b) {
+        return usize::from(a != b);
+    }
+    let a: Vec<char> = a.chars().collect();
+    let b: Vec<char> = b.chars().collect();
+    let mut before: Vec<usize> = vec![];
+    let mut above: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let change = above[j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut best = change.min(above[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                best = best.min(before[j - 2] + 1);
+            }
+            row.push(best);
+        }
+        before = std::mem::replace(&mut above, row);
+    }
+    above[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_neighbours() {
+        let known = ["level", "lower", "pump", "Level"];
+        assert_eq!(near("levle", known.into_iter()), ["level"]);
+        assert_eq!(near("LEVEL", known.into_iter()), ["Level", "level"]);
+        assert!(near("temperature", known.into_iter()).is_empty());
+    }
+}

@@ -1,0 +1,149 @@
+//! What a model means: states, derivatives, inputs and outputs over one expression graph.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lynkeus_expr::{Graph, Node};
+
+use crate::limits::MAX_SOURCE_BYTES;
+use crate::{Diagnostic, LoadError, elaborate};
+
+/// A plant x′ = f(t, x, u), y = h(t, x, u).
+///
+/// `derivatives`, `outputs` and `algebraics` are expressions over the symbols `time`,
+/// the states and the inputs, and over the parameters where these stay symbolic.
+#[derive(Debug)]
+pub struct Plant {
+    /// name of the model
+    pub name: String,
+    /// holds every expression of the plant
+    pub graph: Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// the states, in order of declaration; arrays element by element
+    pub states: Vec<Variable>,
+    /// x′, in the order of `states`
+    pub derivatives: Vec<Node>,
+    /// the inputs, in order of declaration
+    pub inputs: Vec<Variable>,
+    /// the outputs, in order of declaration
+    pub outputs: Vec<Variable>,
+    /// variables that are neither state, input nor output
+    pub algebraics: Vec<Variable>,
+    /// parameters that a caller may set; constants and dependent parameters are not listed
+    pub parameters: Vec<Parameter>,
+}
+
+/// A scalar variable with what its declaration says of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// `x`, `x[3]` or `A[1,2]`
+    pub name: String,
+    /// the symbol of a state, input or parameter; the defining expression of an output or
+    /// an algebraic variable
+    pub node: Node,
+    /// physical unit, as written
+    pub unit: Option<String>,
+    /// description string
+    pub description: Option<String>,
+    /// value at the start
+    pub start: Option<f64>,
+    /// smallest value of its range; −∞ if not given
+    pub min: f64,
+    /// largest value of its range; +∞ if not given
+    pub max: f64,
+    /// typical size
+    pub nominal: Option<f64>,
+    /// declared as `Integer`
+    pub integer: bool,
+}
+
+/// A parameter and its value; `None` where the model gives none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// the parameter; its node is a symbol
+    pub variable: Variable,
+    /// the value in force, overrides included
+    pub value: Option<f64>,
+}
+
+/// How a model text becomes a plant.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LoadOptions {
+    /// the model to take; needed where the file holds several
+    pub model: Option<String>,
+    /// values instead of those in the file, by name: `"k"`, `"H[3]"`, `"A[1,2]"`
+    pub parameters: BTreeMap<String, f64>,
+    /// keep parameters of type Real as symbols, and allow them to have no value. Sizes,
+    /// loop bounds and attributes still use the values.
+    pub symbolic_parameters: bool,
+}
+
+impl Plant {
+    /// Reads a Modelica text. `file_name` is what diagnostics call it.
+    ///
+    /// # Errors
+    /// The first thing in the text that is wrong or not supported.
+    ///
+    /// ```
+    /// use lynkeus_model::{LoadOptions, Plant};
+    ///
+    /// let text = "model Tank
+    ///   input Real inflow;
+    ///   Real level(start = 4, min = 0);
+    /// equation
+    ///   2*der(level) = inflow - sqrt(level);
+    /// end Tank;";
+    /// let plant = Plant::from_modelica(text, "tank.mo", &LoadOptions::default())?;
+    /// assert_eq!(plant.states[0].name, "level");
+    /// assert_eq!(plant.states[0].start, Some(4.0));
+    /// # Ok::<(), lynkeus_model::Diagnostic>(())
+    /// ```
+    pub fn from_modelica(
+        source: &str,
+        file_name: &str,
+        options: &LoadOptions,
+    ) -> Result<Self, Diagnostic> {
+        elaborate::plant(source, options)
+            .map_err(|problem| Diagnostic::new(problem, file_name, source))
+    }
+
+    /// Reads a Modelica file.
+    ///
+    /// # Errors
+    /// The file cannot be read, is not UTF-8, is larger than 64 MiB, or its text is refused.
+    pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
+        let read_error = |source| LoadError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let bytes = std::fs::metadata(path).map_err(read_error)?.len();
+        let limit = MAX_SOURCE_BYTES as u64;
+        if bytes > limit {
+            return Err(LoadError::TooLarge {
+                path: path.to_owned(),
+                bytes,
+                limit,
+            });
+        }
+        let bytes = std::fs::read(path).map_err(read_error)?;
+        let source = std::str::from_utf8(&bytes).map_err(|error| {
+            let offset = error.valid_up_to();
+            let line = 1 + bytes
+                .iter()
+                .take(offset)
+                .filter(|&&byte| byte == b'\n')
+                .count();
+            LoadError::NotUtf8 {
+                path: path.to_owned(),
+                line,
+                offset,
+            }
+        })?;
+        Ok(Self::from_modelica(
+            source,
+            &path.display().to_string(),
+            options,
+        )?)
+    }
+}

@@ -1,0 +1,15 @@
+//! Text to syntax tree: lexer, tree and recursive-descent parser.
+
+pub(crate) mod ast;
+mod declarations;
+mod equations;
+mod expressions;
+mod lexer;
+mod parser;
+mod span;
+mod token;
+
+pub(crate) use parser::{parse_file, parse_single_expression, unquoted};
+pub use span::Span;
+pub(crate) use span::{Problem, Result};
+pub(crate) use token::shortened;

@@ -1,0 +1,348 @@
+//! The parser's hands: the current token, what may come next, and the limits.
+
+use super::ast::{Ast, ExprId, Expression, Kind, ModelSyntax};
+use super::lexer::Lexer;
+use super::token::{Keyword, Symbol, Token};
+use super::{Problem, Result, Span};
+use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
+
+/// Recursive-descent parser with one token of lookahead.
+pub(super) struct Parser<'s> {
+    pub(super) source: &'s str,
+    lexer: Lexer<'s>,
+    pub(super) token: Token,
+    pub(super) span: Span,
+    /// the token before the current one
+    pub(super) last: Span,
+    depth: usize,
+    nodes: usize,
+    pub(super) ast: Ast,
+}
+
+/// Parses a whole file.
+pub(crate) fn parse_file(source: &str) -> Result<Ast> {
+    let mut parser = Parser::new(source)?;
+    parser.within_clause()?;
+    while parser.token != Token::End {
+        let model = parser.model()?;
+        parser.ast.models.push(model);
+    }
+    Ok(parser.ast)
+}
+
+/// Parses a text that is one expression.
+pub(crate) fn parse_single_expression(source: &str) -> Result<(Ast, ExprId)> {
+    let mut parser = Parser::new(source)?;
+    let root = parser.expression()?;
+    if parser.token != Token::End {
+        return Err(parser.unexpected("an operator or the end of the expression"));
+    }
+    Ok((parser.ast, root))
+}
+
+impl<'s> Parser<'s> {
+    fn new(source: &'s str) -> Result<Self> {
+        if source.len() > MAX_SOURCE_BYTES {
+            let limit = grouped(MAX_SOURCE_BYTES as u64);
+            let message = format!("the text is longer than {limit} bytes");
+            return Err(Problem::new(Span::new(0, 0), message));
+        }
+        let mut parser = Self {
+            source,
+            lexer: Lexer::new(source),
+            token: Token::End,
+            span: Span::default(),
+            last: Span::default(),
+            depth: 0,
+            nodes: 0,
+            ast: Ast::default(),
+        };
+        parser.advance()?;
+        Ok(parser)
+    }
+
+    /// Moves to the next token; returns the span of the one left behind.
+    pub(super) fn advance(&mut self) -> Result<Span> {
+        self.last = self.span;
+        (self.token, self.span) = self.lexer.next()?;
+        Ok(self.last)
+    }
+
+    pub(super) fn at(&self, symbol: Symbol) -> bool {
+        self.token == Token::Symbol(symbol)
+    }
+
+    pub(super) fn at_word(&self, keyword: Keyword) -> bool {
+        self.token == Token::Keyword(keyword)
+    }
+
+    pub(super) fn accept(&mut self, symbol: Symbol) -> Result<bool> {
+        self.accept_token(Token::Symbol(symbol))
+    }
+
+    pub(super) fn accept_word(&mut self, keyword: Keyword) -> Result<bool> {
+        self.accept_token(Token::Keyword(keyword))
+    }
+
+    fn accept_token(&mut self, token: Token) -> Result<bool> {
+        let found = self.token == token;
+        if found {
+            self.advance()?;
+        }
+        Ok(found)
+    }
+
+    pub(super) fn expect(&mut self, symbol: Symbol) -> Result<Span> {
+        if self.at(symbol) {
+            return self.advance();
+        }
+        let expected = format!("`{}`", symbol.text());
+        Err(match symbol {
+            Symbol::Semicolon => self.missing_semicolon(),
+            _ => self.unexpected(&expected),
+        })
+    }
+
+    pub(super) fn expect_word(&mut self, keyword: Keyword) -> Result<Span> {
+        if self.at_word(keyword) {
+            return self.advance();
+        }
+        Err(self.unexpected(&format!("`{}`", keyword.text())))
+    }
+
+    pub(super) fn identifier(&mut self, what: &str) -> Result<Span> {
+        if self.token == Token::Identifier {
+            return self.advance();
+        }
+        Err(self.unexpected(what))
+    }
+
+    /// Points behind the last token when `;` is missing at the end of its line.
+    fn missing_semicolon(&self) -> Problem {
+        let between = Span::new(self.last.end as usize, self.span.start as usize);
+        if !between.text(self.source).contains('\n') && self.token != Token::End {
+            return self.unexpected("`;`");
+        }
+        let end = self.last.end as usize;
+        Problem::new(
+            Span::new(end.saturating_sub(1), end),
+            "expected `;` after this",
+        )
+        .hint("every declaration and every equation ends with `;`")
+    }
+
+    /// "expected …, found …" at the current token.
+    pub(super) fn unexpected(&self, expected: &str) -> Problem {
+        let found = self.token.describe(self.span.text(self.source));
+        Problem::new(self.span, format!("expected {expected}, found {found}"))
+    }
+
+    /// Runs a part of the grammar one level deeper.
+    pub(super) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.depth >= MAX_NESTING {
+            let message = format!("nested more than {MAX_NESTING} levels deep");
+            return Err(Problem::new(self.span, message)
+                .hint("name the inner parts with variables of their own"));
+        }
+        self.depth += 1;
+        let result = parse(self);
+        self.depth -= 1;
+        result
+    }
+
+    /// Counts one more part of the syntax tree.
+    pub(super) fn count(&mut self) -> Result<()> {
+        self.nodes += 1;
+        if self.nodes > MAX_SYNTAX_NODES {
+            let limit = grouped(MAX_SYNTAX_NODES as u64);
+            let message = format!("the text has more than {limit} operands and operators");
+            return Err(Problem::new(self.span, message).hint("write repetition as `for` loops"));
+        }
+        Ok(())
+    }
+
+    /// Adds an expression that spans from `start` to the last token.
+    pub(super) fn push(&mut self, kind: Kind, start: Span, first: ExprId) -> Result<ExprId> {
+        self.count()?;
+        let id = self.next_id();
+        let span = start.to(self.last);
+        self.ast.expressions.push(Expression { kind, span, first });
+        Ok(id)
+    }
+
+    /// The id the next expression will get.
+    pub(super) fn next_id(&self) -> ExprId {
+        ExprId(self.ast.expressions.len() as u32)
+    }
+
+    fn within_clause(&mut self) -> Result<()> {
+        if self.accept_word(Keyword::Within)? {
+            while self.token == Token::Identifier || self.at(Symbol::Dot) {
+                self.advance()?;
+            }
+            self.expect(Symbol::Semicolon)?;
+        }
+        Ok(())
+    }
+
+    fn model(&mut self) -> Result<ModelSyntax> {
+        self.expect_model_keyword()?;
+        let name = self.identifier("the name of the model")?;
+        if self.at_word(Keyword::Extends) || self.at(Symbol::Equal) {
+            return Err(self.refuse(
+                "a model made from another one",
+                "write the model out in full",
+            ));
+        }
+        self.description()?;
+        let mut model = ModelSyntax {
+            name,
+            declarations: vec![],
+            equations: vec![],
+        };
+        self.model_body(&mut model)?;
+        self.expect_word(Keyword::End)?;
+        let end = self.identifier("the name of the model after `end`")?;
+        let (opened, closed) = (name.text(self.source), end.text(self.source));
+        if opened != closed {
+            return Err(
+                Problem::new(end, format!("`end {closed}` closes model `{opened}`"))
+                    .hint(format!("write `end {opened};`")),
+            );
+        }
+        self.expect(Symbol::Semicolon)?;
+        Ok(model)
+    }
+
+    fn expect_model_keyword(&mut self) -> Result<()> {
+        if self.accept_word(Keyword::Model)? {
+            return Ok(());
+        }
+        use Keyword::*;
+        match self.token {
+            Token::Keyword(
+                word @ (Block | Class | Connector | Function | Package | Record | Type | Partial
+                | Encapsulated | Operator | Expandable | Pure | Impure),
+            ) => Err(self.refuse(
+                &format!("`{}`", word.text()),
+                "only `model` is supported here",
+            )),
+            _ => Err(self
+                .unexpected("`model`")
+                .hint("a file holds one or more `model`s")),
+        }
+    }
+
+    fn model_body(&mut self, model: &mut ModelSyntax) -> Result<()> {
+        let mut in_equations = false;
+        loop {
+            match self.token {
+                Token::Keyword(Keyword::End) => return Ok(()),
+                Token::Keyword(
+                    word @ (Keyword::Equation | Keyword::Public | Keyword::Protected),
+                ) => {
+                    in_equations = word == Keyword::Equation;
+                    self.advance()?;
+                }
+                Token::End => {
+                    let name = model.name.text(self.source);
+                    return Err(self.unexpected(&format!("`end {name};`")));
+                }
+                Token::Keyword(Keyword::Annotation) => {
+                    self.annotation()?;
+                    self.expect(Symbol::Semicolon)?;
+                }
+                Token::Keyword(Keyword::Initial) => {
+                    return Err(self.refuse(
+                        "an `initial` section",
+                        "give the starting values with `start = …` in the declarations",
+                    ));
+                }
+                Token::Keyword(Keyword::Algorithm) => {
+                    return Err(self.refuse("an `algorithm` section", "write equations instead"));
+                }
+                _ if in_equations => {
+                    let equation = self.equation()?;
+                    model.equations.push(equation);
+                }
+                _ => self.declarations(&mut model.declarations)?,
+            }
+        }
+    }
+
+    /// "… is not supported" at the current token.
+    pub(super) fn refuse(&self, what: &str, hint: &str) -> Problem {
+        Problem::new(self.span, format!("{what} is not supported")).hint(hint)
+    }
+
+    /// An optional description string.
+    pub(super) fn description(&mut self) -> Result<Option<String>> {
+        if self.token != Token::Text {
+            return Ok(None);
+        }
+        let mut text = unquoted(self.span.text(self.source));
+        self.advance()?;
+        while self.at(Symbol::Plus) {
+            self.advance()?;
+            if self.token != Token::Text {
+                return Err(self.unexpected("a string"));
+            }
+            text.push_str(&unquoted(self.span.text(self.source)));
+            self.advance()?;
+        }
+        Ok(Some(text))
+    }
+
+    /// A description and an annotation, as after every declaration and equation.
+    pub(super) fn comment(&mut self) -> Result<Option<String>> {
+        let description = self.description()?;
+        if self.at_word(Keyword::Annotation) {
+            self.annotation()?;
+        }
+        Ok(description)
+    }
+
+    /// `annotation(…)`: skipped by counting brackets.
+    fn annotation(&mut self) -> Result<()> {
+        let start = self.advance()?;
+        if !self.at(Symbol::OpenParen) {
+            return Err(self.unexpected("`(` after `annotation`"));
+        }
+        let mut open = 0usize;
+        loop {
+            match self.token {
+                Token::Symbol(Symbol::OpenParen) => open += 1,
+                Token::Symbol(Symbol::CloseParen) => open -= 1,
+                Token::End => {
+                    return Err(
+                        Problem::new(start, "this annotation has no end").hint("close it with `)`")
+                    );
+                }
+                _ => {}
+            }
+            self.advance()?;
+            if open == 0 {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// The text of a string token without quotes and escapes.
+pub(crate) fn unquoted(token: &str) -> String {
+    let inner = token.strip_prefix('"').unwrap_or(token);
+    let inner = inner.strip_suffix('"').unwrap_or(inner);
+    let mut text = String::with_capacity(inner.len());
+    let mut characters = inner.chars();
+    while let Some(character) = characters.next() {
+        match character {
+            '\\' => text.extend(characters.next().map(|escaped| match escaped {
+                'n' => '\n',
+                't' => '\t',
+                other => other,
+            })),
+            other => text.push(other),
+        }
+    }
+    text
+}
