@@ -310,7 +310,11 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
             Binary::Div => self.quotient(x, y),
             Binary::Pow if x.len() == 1 && y.len() == 1 => vec![self.two(op, &x[0], &y[0])],
             Binary::Pow if y.len() == 1 => self.constant_power(x, &y[0]),
-            Binary::Pow => self.exp(&self.product(y, &self.unary(Unary::Ln, x))),
+            Binary::Pow => {
+                let mut power = self.exp(&self.product(y, &self.unary(Unary::Ln, x)));
+                power[0] = self.two(op, &x[0], &y[0]);
+                power
+            }
             Binary::Atan2 if x.len() == 1 && y.len() == 1 => vec![self.two(op, &x[0], &y[0])],
             Binary::Atan2 => self.atan2(x, y),
             Binary::Min | Binary::Max => {

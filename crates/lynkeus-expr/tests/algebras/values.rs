@@ -1,0 +1,95 @@
+//! Every operation of the table, as a tape over numbers, lanes, intervals and with hundreds of bits.
+
+use crate::exact::{Exact, error, holds};
+use crate::operations::{Case, cases};
+use crate::sample::member;
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Algebra, Interval, Lanes};
+use proptest::prelude::*;
+
+const SPACE: Exact = Exact(192);
+
+fn places() -> impl Strategy<Value = Vec<f64>> {
+    prop::collection::vec(0.0..=1.0, 12)
+}
+
+fn point(case: &Case, places: &[f64]) -> Vec<f64> {
+    let inside = |(&(lo, hi), &p): (&(f64, f64), &f64)| lo + p * (hi - lo);
+    case.domain.iter().zip(places).map(inside).collect()
+}
+
+/// How far `f64` may be off: library functions by some units, systems by their condition.
+fn tolerance(case: &Case) -> f64 {
+    if case.name.starts_with("solve") {
+        1e-13
+    } else {
+        1e-15
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    #[test]
+    fn numbers_agree_with_the_reference(places in places()) {
+        for case in cases() {
+            let x = point(&case, &places);
+            let mut found = vec![0.0];
+            case.tape().evaluator().eval(&x, &mut found);
+            let big: Vec<_> = x.iter().map(|&x| SPACE.constant(x)).collect();
+            let exact = case.tape().eval_in(&SPACE, &big);
+            let off = error(found[0], &exact[0], 1e-3);
+            prop_assert!(off <= tolerance(&case), "{} at {x:?}: {off:e}", case.name);
+        }
+    }
+
+    #[test]
+    fn intervals_hold_the_reference(places in places(), width in 0.0_f64..1.0) {
+        for case in cases() {
+            let x = point(&case, &places);
+            let boxed: Vec<Interval> = x.iter().zip(&case.domain).map(|(&x, &(lo, hi))| {
+                let (lo, hi) = (x + (lo - x) * width, x + (hi - x) * width);
+                Interval::new(lo.min(x), hi.max(x)).expect("in order")
+            }).collect();
+            let found = case.tape().eval_in(&Intervals, &boxed)[0];
+            for place in [0.0, 0.3, 0.5, 0.8, 1.0] {
+                let inside: Vec<_> = boxed.iter().map(|&x| SPACE.constant(member(x, place))).collect();
+                let exact = &case.tape().eval_in(&SPACE, &inside)[0];
+                let held = holds(found, exact);
+                prop_assert!(held, "{} on {boxed:?}: {found} lacks {exact}", case.name);
+            }
+            let regular = !case.name.starts_with("solve");
+            prop_assert!(found.is_defined() || !regular, "{} on {boxed:?}", case.name);
+        }
+    }
+
+    #[test]
+    fn lanes_equal_numbers_bit_for_bit(lanes in prop::array::uniform4(places())) {
+        for case in cases() {
+            let tape = case.tape();
+            let x = lanes.each_ref().map(|places| point(&case, places));
+            let packed: Vec<[f64; 4]> = (0..case.domain.len())
+                .map(|i| x.each_ref().map(|x| x[i]))
+                .collect();
+            let found = tape.eval_in(&Lanes::<4>, &packed)[0];
+            for (x, found) in x.iter().zip(found) {
+                let mut expected = [0.0];
+                tape.evaluator().eval(x, &mut expected);
+                prop_assert_eq!(expected[0].to_bits(), found.to_bits(), "{}", case.name);
+            }
+        }
+    }
+}
+
+/// The condition estimate has no exact value: it must tell a singular matrix from a good one.
+#[test]
+fn the_condition_estimate_separates_singular_from_regular() {
+    use lynkeus_expr::Reals;
+    let (_, good) = Reals.solve(&[2.0, 0.0, 0.0, 1.0], &[1.0, 1.0]);
+    let (_, poor) = Reals.solve(&[1.0, 1.0, 1.0, 1.0 + 1e-10], &[1.0, 1.0]);
+    let (x, none) = Reals.solve(&[1.0, 2.0, 2.0, 4.0], &[1.0, 2.0]);
+    assert!(good > 0.4 && good <= 1.0, "{good}");
+    assert!(poor > 1e-12 && poor < 1e-9, "{poor}");
+    assert!(none < 1e-15, "{none}");
+    assert!(x.iter().all(|x| x.is_finite() && x.abs() < 10.0), "{x:?}");
+}
