@@ -137,6 +137,16 @@ impl System {
         &self.code.outputs
     }
 
+    /// Names of what an observer reports: its outputs, or its states where it has
+    /// no outputs.
+    pub fn estimates(&self) -> &[String] {
+        if self.code.outputs.is_empty() {
+            &self.code.states
+        } else {
+            &self.code.outputs
+        }
+    }
+
     /// An evaluator with its own working memory, signals at zero.
     pub fn evaluation(&self) -> Evaluation {
         let code = &self.code;
@@ -188,6 +198,16 @@ impl Evaluation {
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
         self.place(t, x);
         self.outputs.eval(&self.inputs, y);
+    }
+
+    /// Writes what an observer reports at (t, x), in the order of
+    /// [`System::estimates`].
+    pub fn estimates(&mut self, t: f64, x: &[f64], estimates: &mut [f64]) {
+        if self.system.outputs().is_empty() {
+            estimates.copy_from_slice(x);
+        } else {
+            self.outputs(t, x, estimates);
+        }
     }
 
     fn place(&mut self, t: f64, x: &[f64]) {

@@ -1,0 +1,114 @@
+//! The explicit Dormand–Prince method of order 8 of the `differential-equations`
+//! crate, driven step by step.
+
+use std::cell::RefCell;
+
+use differential_equations::error::Error as StepError;
+use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinary};
+use differential_equations::ode::{ODE, OrdinaryNumericalMethod};
+use differential_equations::status::Status;
+
+use super::{Adaptive, Leg, Ran};
+use crate::{Dynamics, Error, Tolerances};
+
+type Dop853 = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Vec<f64>, 8, 12, 16>;
+
+/// Dynamics as the crate wants them: shared, without errors. The last point
+/// whose derivative is not finite is kept.
+struct Watched<'a, D>(RefCell<(&'a mut D, Option<(f64, Vec<f64>)>)>);
+
+impl<D: Dynamics> ODE<f64, Vec<f64>> for Watched<'_, D> {
+    fn diff(&self, t: f64, x: &Vec<f64>, dx: &mut Vec<f64>) {
+        let (f, bad) = &mut *self.0.borrow_mut();
+        f.derivatives(t, x, dx);
+        if dx.iter().any(|v| !v.is_finite()) {
+            *bad = Some((t, x.clone()));
+        }
+    }
+}
+
+impl Adaptive {
+    pub(super) fn run_explicit(
+        &mut self,
+        f: &mut impl Dynamics,
+        leg: &mut Leg<'_>,
+    ) -> Result<Ran, Error> {
+        if leg.at_the_end() || leg.x.is_empty() {
+            return Ok(Ran::ToTheEnd);
+        }
+        let watched = Watched(RefCell::new((f, None)));
+        let mut method = self.started(&watched, leg)?;
+        loop {
+            let proposed = method.h();
+            let step = leg.step(proposed);
+            {
+                let (f, bad) = &mut *watched.0.borrow_mut();
+                leg.check_step(*f, step, bad.as_ref())?;
+                leg.spend(*f, self.tolerances.budget)?;
+            }
+            method.set_h(step);
+            let failed = match method.step(&watched) {
+                // its own alarm for stiffness; ours decides
+                Err(StepError::Stiffness { .. }) | Ok(_) => false,
+                Err(_) => true,
+            };
+            let accepted = !failed && !matches!(method.status(), Status::RejectedStep);
+            if failed || (accepted && method.y().iter().any(|v| !v.is_finite())) {
+                self.pace.next = 0.25 * step;
+                method = self.started(&watched, leg)?;
+                continue;
+            }
+            if !accepted {
+                continue;
+            }
+            leg.x.copy_from_slice(method.y());
+            leg.t = if step == leg.to - leg.t {
+                leg.to
+            } else {
+                method.t()
+            };
+            // a step cut short by a stop says nothing about the next one
+            let next = if step < proposed {
+                proposed.max(method.h())
+            } else {
+                method.h()
+            };
+            method.set_h(next);
+            self.pace.next = next;
+            let (f, bad) = &mut *watched.0.borrow_mut();
+            *bad = None;
+            if leg.at_the_end() {
+                return Ok(Ran::ToTheEnd);
+            }
+            if self.should_change(*f, leg.t, leg.x, step) {
+                return Ok(Ran::ToTheChange);
+            }
+        }
+    }
+
+    /// The method at the start of what is left of the leg.
+    fn started<D: Dynamics>(
+        &self,
+        watched: &Watched<'_, D>,
+        leg: &Leg<'_>,
+    ) -> Result<Dop853, Error> {
+        let Tolerances {
+            relative, absolute, ..
+        } = self.tolerances;
+        let first = self.pace.next.min(leg.to - leg.t);
+        let mut method = ExplicitRungeKutta::dop853()
+            .rtol(relative)
+            .atol(absolute)
+            .h0(first)
+            .max_steps(usize::MAX);
+        let x = leg.x.to_vec();
+        match method.init(watched, leg.t, leg.to, &x) {
+            Ok(_) => Ok(method),
+            Err(_) => {
+                let (f, bad) = &mut *watched.0.borrow_mut();
+                leg.check_step(*f, 0.0, bad.as_ref())?;
+                Ok(method)
+            }
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Error-controlled integration that chooses between an explicit and an
+//! implicit method.
+
+mod explicit;
+mod implicit;
+mod radau;
+
+use crate::error::state_text;
+use crate::{Dynamics, Error, Tolerances, spectral_radius};
+
+use radau::Radau;
+
+/// Which methods may be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Choice {
+    Auto,
+    Explicit,
+    Stiff,
+}
+
+/// Accepted steps between two looks at the spectral radius.
+const LOOK_EVERY: usize = 40;
+
+/// Looks in a row that must agree before the method changes.
+const LOOKS: usize = 2;
+
+/// Products of step and spectral radius: above the first the explicit method
+/// (stable to about 6) is held back by stability; below the second the implicit
+/// one is not worth its linear algebra.
+const STIFF_ABOVE: f64 = 3.0;
+const STIFF_BELOW: f64 = 1.0;
+
+/// Error-controlled integrator; remembers its step and method between calls.
+#[derive(Clone, Debug)]
+pub(crate) struct Adaptive {
+    choice: Choice,
+    tolerances: Tolerances,
+    implicit: bool,
+    radau: Option<Radau>,
+    pace: Pace,
+}
+
+/// What is known about the steps that the solution wants.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// step proposed for the next step; 0 before the first
+    next: f64,
+    /// accepted steps since the last look
+    since_look: usize,
+    /// looks in a row that spoke for a change
+    agreeing: usize,
+}
+
+/// Why a method returned without an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ran {
+    ToTheEnd,
+    /// the other method fits better from here
+    ToTheChange,
+}
+
+/// Progress of one call: where it is and what it may still spend.
+#[derive(Debug)]
+struct Leg<'a> {
+    t: f64,
+    to: f64,
+    x: &'a mut [f64],
+    steps_left: usize,
+}
+
+impl Adaptive {
+    pub(crate) fn new(choice: Choice, tolerances: Tolerances) -> Self {
+        Self {
+            choice,
+            tolerances,
+            implicit: choice == Choice::Stiff,
+            radau: None,
+            pace: Pace::default(),
+        }
+    }
+
+    /// Takes `x` from `from` to `to`, over which `f` is smooth. Where an error
+    /// ends it early, `x` is the last state reached.
+    pub(crate) fn advance(
+        &mut self,
+        f: &mut impl Dynamics,
+        from: f64,
+        to: f64,
+        x: &mut [f64],
+    ) -> Result<(), Error> {
+        let mut leg = Leg {
+            t: from,
+            to,
+            x,
+            steps_left: self.tolerances.budget,
+        };
+        loop {
+            leg.check_start(f)?;
+            let ran = if self.implicit {
+                self.run_implicit(f, &mut leg)?
+            } else {
+                self.run_explicit(f, &mut leg)?
+            };
+            if ran == Ran::ToTheEnd {
+                return Ok(());
+            }
+            self.implicit = !self.implicit;
+        }
+    }
+
+    /// True every so often, where the other method is the better one.
+    fn should_change(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], step: f64) -> bool {
+        self.pace.since_look += 1;
+        if self.choice != Choice::Auto || self.pace.since_look < LOOK_EVERY {
+            return false;
+        }
+        self.pace.since_look = 0;
+        let product = spectral_radius(f, t, x) * step;
+        let speaks_for_change = if self.implicit {
+            product < STIFF_BELOW
+        } else {
+            product > STIFF_ABOVE
+        };
+        self.pace.agreeing = if speaks_for_change {
+            self.pace.agreeing + 1
+        } else {
+            0
+        };
+        let change = self.pace.agreeing >= LOOKS;
+        if change {
+            self.pace.agreeing = 0;
+        }
+        change
+    }
+}
+
+impl Leg<'_> {
+    /// Steps end here: what is left is below the resolution of time.
+    fn at_the_end(&self) -> bool {
+        self.to - self.t <= resolution(self.to)
+    }
+
+    /// The step to take: the proposed one, or what ends the leg without a
+    /// tiny step at its end.
+    fn step(&self, proposed: f64) -> f64 {
+        let left = self.to - self.t;
+        if proposed >= left {
+            left
+        } else if proposed > 0.5 * left {
+            0.5 * left
+        } else {
+            proposed
+        }
+    }
+
+    fn check_start(&self, f: &mut impl Dynamics) -> Result<(), Error> {
+        let mut dx = vec![0.0; self.x.len()];
+        f.derivatives(self.t, self.x, &mut dx);
+        if dx.iter().all(|v| v.is_finite()) {
+            return Ok(());
+        }
+        Err(f.not_finite(self.t, self.x))
+    }
+
+    /// Pays for one step.
+    fn spend(&mut self, f: &mut impl Dynamics, budget: usize) -> Result<(), Error> {
+        if self.steps_left == 0 {
+            return Err(Error::StepBudget {
+                time: self.t,
+                until: self.to,
+                steps: budget,
+                state: state_text(&f.names(), self.x),
+            });
+        }
+        self.steps_left -= 1;
+        Ok(())
+    }
+
+    fn check_step(
+        &self,
+        f: &mut impl Dynamics,
+        step: f64,
+        bad: Option<&(f64, Vec<f64>)>,
+    ) -> Result<(), Error> {
+        if step > resolution(self.t) {
+            return Ok(());
+        }
+        Err(match bad {
+            Some((t, x)) => f.not_finite(*t, x),
+            None => Error::StepUnderflow {
+                time: self.t,
+                step,
+                state: state_text(&f.names(), self.x),
+            },
+        })
+    }
+}
+
+/// Steps shorter than this do not move time reliably.
+fn resolution(t: f64) -> f64 {
+    (16.0 * f64::EPSILON * t.abs()).max(f64::MIN_POSITIVE)
+}

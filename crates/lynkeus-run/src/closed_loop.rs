@@ -1,0 +1,237 @@
+//! Inputs, plant, sensors and observer as one system.
+
+use crate::noise::Sensors;
+use crate::{Dynamics, Error, Evaluation, Simulation};
+
+/// Where a signal of the observer comes from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    /// output of the plant, as measured
+    Sensor(usize),
+    /// an input
+    Input(usize),
+}
+
+/// The joint system; its state is the plant's, then the observer's.
+pub(crate) struct Loop {
+    inputs: Evaluation,
+    plant: Evaluation,
+    observer: Option<Evaluation>,
+    sensors: Sensors,
+    /// which input each signal of the plant is
+    plant_wires: Vec<usize>,
+    observer_wires: Vec<Source>,
+    record_outputs: bool,
+    u: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl Loop {
+    pub(crate) fn new(simulation: &Simulation, sensors: Sensors) -> Result<Self, Error> {
+        let Simulation {
+            plant,
+            inputs,
+            observer,
+            ..
+        } = simulation;
+        if let Some(name) = inputs.signals().first() {
+            return Err(Error::Unconnected {
+                reader: "inputs",
+                name: name.clone(),
+                available: "time alone".to_owned(),
+            });
+        }
+        let place = |names: &[String], name: &String| names.iter().position(|n| n == name);
+        let unconnected = |reader, name: &String| Error::Unconnected {
+            reader,
+            name: name.clone(),
+            available: [plant.outputs(), inputs.outputs()].concat().join(", "),
+        };
+        let plant_wires = plant
+            .signals()
+            .iter()
+            .map(|name| place(inputs.outputs(), name).ok_or_else(|| unconnected("plant", name)));
+        let read = observer.as_ref().map_or(&[][..], |o| o.signals());
+        let observer_wires = read.iter().map(|name| {
+            let sensor = place(plant.outputs(), name).map(Source::Sensor);
+            let input = || place(inputs.outputs(), name).map(Source::Input);
+            sensor
+                .or_else(input)
+                .ok_or_else(|| unconnected("observer", name))
+        });
+        Ok(Self {
+            plant_wires: plant_wires.collect::<Result<_, _>>()?,
+            observer_wires: observer_wires.collect::<Result<_, _>>()?,
+            u: vec![0.0; inputs.outputs().len()],
+            y: vec![0.0; plant.outputs().len()],
+            inputs: inputs.evaluation(),
+            plant: plant.evaluation(),
+            observer: observer.as_ref().map(|o| o.evaluation()),
+            sensors,
+            record_outputs: simulation.record_outputs,
+        })
+    }
+
+    /// Start values of the joint state.
+    pub(crate) fn start(&self) -> Vec<f64> {
+        let mut x = self.plant.system().start().to_vec();
+        if let Some(observer) = &self.observer {
+            x.extend(observer.system().start());
+        }
+        x
+    }
+
+    /// Names of the recorded columns.
+    pub(crate) fn columns(&self) -> Vec<String> {
+        let plant = self.plant.system();
+        let mut names = [plant.states(), plant.signals()].concat();
+        if self.record_outputs {
+            names.extend(plant.outputs().iter().cloned());
+            names.extend(
+                plant
+                    .outputs()
+                    .iter()
+                    .map(|name| format!("{name}_measured")),
+            );
+        }
+        if let Some(observer) = &self.observer {
+            names.extend(observer.system().estimates().iter().cloned());
+        }
+        names
+    }
+
+    /// Columns that are not estimates.
+    pub(crate) fn known_columns(&self) -> usize {
+        let plant = self.plant.system();
+        let outputs = if self.record_outputs {
+            2 * self.y.len()
+        } else {
+            0
+        };
+        plant.states().len() + plant.signals().len() + outputs
+    }
+
+    /// Names and values of the observer's states.
+    pub(crate) fn estimate<'a>(&'a self, x: &'a [f64]) -> (&'a [String], &'a [f64]) {
+        let names = self
+            .observer
+            .as_ref()
+            .map_or(&[][..], |o| o.system().states());
+        (names, &x[self.plant.dimension()..])
+    }
+
+    /// Draws the next noise sample.
+    pub(crate) fn draw(&mut self) {
+        self.sensors.draw();
+    }
+
+    /// True without noise.
+    pub(crate) fn is_exact(&self) -> bool {
+        self.sensors.are_exact()
+    }
+
+    /// Appends the recorded values at (t, x).
+    pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        self.connect(t, plant_x, true);
+        row.extend_from_slice(plant_x);
+        row.extend_from_slice(self.plant.signals());
+        if self.record_outputs {
+            row.extend_from_slice(&self.y);
+            let measured = |(i, &y): (usize, &f64)| self.sensors.measured(i, y);
+            row.extend(self.y.iter().enumerate().map(measured));
+        }
+        if let Some(observer) = &mut self.observer {
+            let from = row.len();
+            row.resize(from + observer.system().estimates().len(), 0.0);
+            observer.estimates(t, observer_x, &mut row[from..]);
+        }
+        if row.iter().all(|v| v.is_finite()) {
+            return Ok(());
+        }
+        Err(self.not_finite(t, x))
+    }
+
+    /// Carries inputs to the plant and, if wanted, measurements to the observer.
+    fn connect(&mut self, t: f64, plant_x: &[f64], measure: bool) {
+        self.inputs.outputs(t, &[], &mut self.u);
+        for (signal, &wire) in self.plant.signals_mut().iter_mut().zip(&self.plant_wires) {
+            *signal = self.u[wire];
+        }
+        if !measure {
+            return;
+        }
+        self.plant.outputs(t, plant_x, &mut self.y);
+        let Some(observer) = &mut self.observer else {
+            return;
+        };
+        for (signal, wire) in observer.signals_mut().iter_mut().zip(&self.observer_wires) {
+            *signal = match *wire {
+                Source::Sensor(i) => self.sensors.measured(i, self.y[i]),
+                Source::Input(i) => self.u[i],
+            };
+        }
+    }
+}
+
+impl Dynamics for Loop {
+    fn dimension(&self) -> usize {
+        self.plant.dimension() + self.observer.as_ref().map_or(0, Dynamics::dimension)
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (plant_dx, observer_dx) = dx.split_at_mut(self.plant.dimension());
+        self.connect(t, plant_x, self.observer.is_some());
+        self.plant.derivatives(t, plant_x, plant_dx);
+        if let Some(observer) = &mut self.observer {
+            observer.derivatives(t, observer_x, observer_dx);
+        }
+    }
+
+    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.inputs.switches(from, to, times)?;
+        self.plant.switches(from, to, times)?;
+        match &mut self.observer {
+            Some(observer) => observer.switches(from, to, times),
+            None => Ok(()),
+        }
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.inputs.enter(t);
+        self.plant.enter(t);
+        if let Some(observer) = &mut self.observer {
+            observer.enter(t);
+        }
+    }
+
+    fn names(&self) -> Vec<String> {
+        let mut names = self.plant.names();
+        if let Some(observer) = &self.observer {
+            names.extend(
+                observer
+                    .names()
+                    .iter()
+                    .map(|name| format!("observer's {name}")),
+            );
+        }
+        names
+    }
+
+    /// Blames the first part whose values are not finite.
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        self.connect(t, plant_x, true);
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        if !finite(&self.u) {
+            return self.inputs.not_finite(t, &[]);
+        }
+        let mut dx = vec![0.0; plant_x.len()];
+        self.plant.derivatives(t, plant_x, &mut dx);
+        match &mut self.observer {
+            Some(observer) if finite(&dx) && finite(&self.y) => observer.not_finite(t, observer_x),
+            _ => self.plant.not_finite(t, plant_x),
+        }
+    }
+}

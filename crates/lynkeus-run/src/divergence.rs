@@ -1,0 +1,42 @@
+//! When an estimate counts as diverged.
+
+use crate::Error;
+
+/// An estimate this many times larger than anything seen is no estimate.
+const FACTOR: f64 = 1e12;
+
+/// Bound on an estimate, from its start and the signals seen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bound {
+    scale: f64,
+}
+
+impl Bound {
+    pub(crate) fn new(start: &[f64]) -> Self {
+        let mut bound = Self { scale: 1.0 };
+        bound.see(start);
+        bound
+    }
+
+    /// Widens the bound for these values.
+    pub(crate) fn see(&mut self, values: &[f64]) {
+        for value in values {
+            self.scale = self.scale.max(value.abs());
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Diverged`] for a value beyond the bound, or not finite.
+    pub(crate) fn check(&self, time: f64, names: &[String], values: &[f64]) -> Result<(), Error> {
+        let inside = |v: &f64| v.abs() <= FACTOR * self.scale;
+        match values.iter().position(|v| !inside(v)) {
+            None => Ok(()),
+            Some(i) => Err(Error::Diverged {
+                time,
+                name: names.get(i).cloned().unwrap_or_default(),
+                value: values[i],
+                hint: String::new(),
+            }),
+        }
+    }
+}

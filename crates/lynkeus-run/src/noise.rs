@@ -1,0 +1,175 @@
+//! Measurement noise that can be repeated.
+
+use std::collections::BTreeMap;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::Error;
+
+/// Gaussian noise on measured outputs, drawn anew every `sample_step` and held
+/// in between.
+///
+/// Every output has a random stream of its own: the ChaCha8 generator seeded
+/// with `seed` (as `SeedableRng::seed_from_u64` does), on the stream whose number
+/// is the 64-bit FNV-1a hash of the output's name, turned into normal deviates by
+/// the ziggurat method of `rand_distr` 0.6. The same seed gives the same noise on
+/// every machine, and a sensor added to a study leaves the noise of the others
+/// as it was.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Noise {
+    /// seed of all streams
+    pub seed: u64,
+    /// time between two draws; the output step where it is left out
+    pub sample_step: Option<f64>,
+    /// how strong, by the output's name; outputs left out are exact
+    pub levels: BTreeMap<String, Level>,
+}
+
+/// Standard deviation of the noise of one output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Level {
+    /// in the unit of the output
+    Absolute(f64),
+    /// as a fraction of the present value: 0.05 is 5 %
+    Relative(f64),
+}
+
+/// The noise of all outputs of a plant, in their order.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensors {
+    channels: Vec<Option<Channel>>,
+}
+
+#[derive(Clone, Debug)]
+struct Channel {
+    level: Level,
+    stream: ChaCha8Rng,
+    deviate: f64,
+}
+
+impl Sensors {
+    pub(crate) fn new(noise: &Noise, outputs: &[String]) -> Result<Self, Error> {
+        for (name, level) in &noise.levels {
+            if !outputs.contains(name) {
+                let expected = format!("one of the outputs: {}", outputs.join(", "));
+                return Err(Error::setting("noise of", expected, format!("'{name}'")));
+            }
+            let (Level::Absolute(value) | Level::Relative(value)) = *level;
+            if !(value >= 0.0 && value.is_finite()) {
+                let what = format!("noise of '{name}'");
+                return Err(Error::setting(what, "a finite number, 0 or above", value));
+            }
+        }
+        let channel = |name: &String| {
+            let level = *noise.levels.get(name)?;
+            let mut stream = ChaCha8Rng::seed_from_u64(noise.seed);
+            stream.set_stream(fnv1a(name));
+            Some(Channel {
+                level,
+                stream,
+                deviate: 0.0,
+            })
+        };
+        Ok(Self {
+            channels: outputs.iter().map(channel).collect(),
+        })
+    }
+
+    /// True where every output is exact.
+    pub(crate) fn are_exact(&self) -> bool {
+        self.channels.iter().all(Option::is_none)
+    }
+
+    /// Draws the next sample of every channel.
+    pub(crate) fn draw(&mut self) {
+        for channel in self.channels.iter_mut().flatten() {
+            channel.deviate = StandardNormal.sample(&mut channel.stream);
+        }
+    }
+
+    /// What sensor `index` shows of the value.
+    pub(crate) fn measured(&self, index: usize, value: f64) -> f64 {
+        match &self.channels[index] {
+            None => value,
+            Some(Channel { level, deviate, .. }) => match level {
+                Level::Absolute(deviation) => value + deviation * deviate,
+                Level::Relative(fraction) => value * (1.0 + fraction * deviate),
+            },
+        }
+    }
+}
+
+/// 64-bit FNV-1a.
+fn fnv1a(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draws(seed: u64, outputs: &[&str], of: usize, count: usize) -> Vec<f64> {
+        let outputs: Vec<String> = outputs.iter().map(ToString::to_string).collect();
+        let levels = outputs.iter().map(|n| (n.clone(), Level::Absolute(2.0)));
+        let noise = Noise {
+            seed,
+            sample_step: None,
+            levels: levels.collect(),
+        };
+        let mut sensors = Sensors::new(&noise, &outputs).unwrap();
+        let draw = |_| {
+            sensors.draw();
+            sensors.measured(of, 10.0)
+        };
+        (0..count).map(draw).collect()
+    }
+
+    #[test]
+    fn a_sensor_keeps_its_noise_when_another_joins() {
+        assert_eq!(draws(7, &["a"], 0, 50), draws(7, &["b", "a"], 1, 50));
+        assert_ne!(draws(7, &["a"], 0, 50), draws(7, &["b", "a"], 0, 50));
+        assert_ne!(draws(7, &["a"], 0, 50), draws(8, &["a"], 0, 50));
+    }
+
+    #[test]
+    fn the_stream_is_fixed() {
+        let expected = [0.0, 0.0, 0.0];
+        let found = draws(1, &["y"], 0, 3);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found:?} {expected}");
+        }
+    }
+
+    #[test]
+    fn mean_deviation_and_tails_are_normal() {
+        let n = 200_000;
+        let z: Vec<f64> = draws(3, &["y"], 0, n)
+            .iter()
+            .map(|y| (y - 10.0) / 2.0)
+            .collect();
+        let mean = z.iter().sum::<f64>() / n as f64;
+        let variance = z.iter().map(|z| z * z).sum::<f64>() / n as f64 - mean * mean;
+        let beyond = z.iter().filter(|z| z.abs() > 1.959_964).count() as f64 / n as f64;
+        let lag: f64 = z.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n as f64;
+        assert!(mean.abs() < 0.01 && lag.abs() < 0.01, "{mean} {lag}");
+        assert!((variance - 1.0).abs() < 0.015, "{variance}");
+        assert!((beyond - 0.05).abs() < 0.002, "{beyond}");
+    }
+
+    #[test]
+    fn impossible_levels_are_refused() {
+        let outputs = ["y".to_string()];
+        for (name, level) in [("z", Level::Absolute(1.0)), ("y", Level::Relative(-0.1))] {
+            let noise = Noise {
+                levels: [(name.to_string(), level)].into(),
+                ..Noise::default()
+            };
+            let error = Sensors::new(&noise, &outputs).unwrap_err();
+            assert!(matches!(error, Error::Setting { .. }), "{error}");
+        }
+    }
+}

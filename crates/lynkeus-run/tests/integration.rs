@@ -1,0 +1,193 @@
+//! Integrators against solutions that are known.
+
+use lynkeus_run::{Error, Function, Integrator, Method, Step, Tolerances};
+
+fn tight() -> Tolerances {
+    Tolerances {
+        relative: 1e-10,
+        absolute: 1e-13,
+        ..Tolerances::default()
+    }
+}
+
+fn adaptive_methods() -> [Method; 3] {
+    [
+        Method::Adaptive(tight()),
+        Method::Explicit(tight()),
+        Method::Stiff(tight()),
+    ]
+}
+
+fn run<const N: usize>(
+    method: Method,
+    f: impl FnMut(f64, &[f64], &mut [f64]),
+    start: [f64; N],
+    stops: &[f64],
+) -> Result<[f64; N], Error> {
+    let mut f = Function::new(N, f);
+    let mut x = start;
+    let mut t = 0.0;
+    let mut integrator = Integrator::new(method, N)?;
+    for &stop in stops {
+        integrator.advance(&mut f, t, stop, &mut x)?;
+        t = stop;
+    }
+    Ok(x)
+}
+
+fn close(found: f64, expected: f64, relative: f64) {
+    let error = (found - expected).abs() / expected.abs();
+    assert!(
+        error <= relative,
+        "{found} is {error:e} away from {expected}"
+    );
+}
+
+#[test]
+fn linear_and_logistic_equations() {
+    for method in adaptive_methods() {
+        let oscillator = |_: f64, x: &[f64], dx: &mut [f64]| {
+            dx[0] = x[1];
+            dx[1] = -x[0];
+        };
+        let x = run(method, oscillator, [0.0, 1.0], &[3.0, 10.0]).unwrap();
+        close(x[0], 10.0_f64.sin(), 2e-8);
+        let logistic = |_: f64, x: &[f64], dx: &mut [f64]| dx[0] = x[0] * (1.0 - x[0]);
+        let x = run(method, logistic, [0.1], &[7.0]).unwrap();
+        close(x[0], 1.0 / (1.0 + 9.0 * (-7.0_f64).exp()), 1e-9);
+    }
+}
+
+fn robertson(_: f64, x: &[f64], dx: &mut [f64]) {
+    dx[0] = -0.04 * x[0] + 1e4 * x[1] * x[2];
+    dx[2] = 3e7 * x[1] * x[1];
+    dx[1] = -dx[0] - dx[2];
+}
+
+#[test]
+fn robertson_is_found_stiff_and_solved() {
+    let stops = [0.4, 4.0, 40.0, 400.0, 4000.0, 4e4];
+    for method in [Method::Adaptive(tight()), Method::Stiff(tight())] {
+        let x = run(method, robertson, [1.0, 0.0, 0.0], &stops).unwrap();
+        // two other integrators at 1e-10 agree on these digits
+        close(x[0], 0.038_983_377_1, 2e-8);
+        close(x[1], 1.621_768_32e-7, 2e-8);
+        close(x[2], 0.961_016_460_7, 2e-8);
+    }
+}
+
+#[test]
+fn van_der_pol_with_many_stops() {
+    let van_der_pol = |_: f64, x: &[f64], dx: &mut [f64]| {
+        dx[0] = x[1];
+        dx[1] = 1000.0 * ((1.0 - x[0] * x[0]) * x[1]) - x[0];
+    };
+    let grid: Vec<f64> = (1..=2000).map(f64::from).collect();
+    for stops in [&[2000.0][..], &grid] {
+        let x = run(Method::Adaptive(tight()), van_der_pol, [2.0, 0.0], stops).unwrap();
+        // the reference of the test set for initial value problem solvers, rescaled
+        close(x[0], 1.706_167_732_17, 1e-8);
+        close(x[1], -8.928_097_010_248e-4, 1e-7);
+    }
+}
+
+#[test]
+fn stiff_forcing_does_not_cost_small_steps() {
+    let mut evaluations = 0;
+    let forced = |t: f64, x: &[f64], dx: &mut [f64]| {
+        evaluations += 1;
+        dx[0] = -1e6 * (x[0] - t.cos()) - t.sin();
+    };
+    let x = run(Method::default(), forced, [1.5], &[10.0]).unwrap();
+    close(x[0], 10.0_f64.cos(), 1e-7);
+    // an explicit method alone would need 10·1e6/6 steps of 15 evaluations
+    assert!(evaluations < 20_000, "{evaluations} evaluations");
+}
+
+#[test]
+fn a_finite_escape_is_reported_where_it_happens() {
+    for method in adaptive_methods() {
+        let escape = |_: f64, x: &[f64], dx: &mut [f64]| dx[0] = x[0] * x[0];
+        let error = run(method, escape, [1.0], &[2.0]).unwrap_err();
+        let (Error::StepUnderflow { time, .. }
+        | Error::StepBudget { time, .. }
+        | Error::NotFinite { time, .. }) = error
+        else {
+            panic!("{method:?}: {error}");
+        };
+        assert!((time - 1.0).abs() < 1e-6, "{method:?}: {error}");
+    }
+}
+
+#[test]
+fn leaving_the_domain_is_reported_where_it_happens() {
+    for method in adaptive_methods() {
+        // reaches 0 at t = 2 and cannot go on
+        let emptying = |_: f64, x: &[f64], dx: &mut [f64]| dx[0] = -x[0].sqrt() - 1e-3;
+        let error = run(method, emptying, [1.0], &[4.0]).unwrap_err();
+        let Error::NotFinite { time, .. } = error else {
+            panic!("{method:?}: {error}");
+        };
+        assert!((time - 2.0).abs() < 0.02, "{method:?}: {error}");
+    }
+}
+
+#[test]
+fn a_step_into_the_undefined_is_only_rejected() {
+    for method in adaptive_methods() {
+        // f is defined for x > 0 only; x decays fast and stays positive
+        let decay =
+            |_: f64, x: &[f64], dx: &mut [f64]| dx[0] = -50.0 * x[0] * (1.0 + 0.1 * x[0].ln());
+        let x = run(method, decay, [1.0], &[5.0]).unwrap();
+        // ln x + 10 = 10·exp(−5t)
+        close(x[0], (10.0 * (-25.0_f64).exp() - 10.0).exp(), 1e-7);
+    }
+}
+
+#[test]
+fn the_budget_ends_a_run() {
+    let tolerances = Tolerances {
+        budget: 20,
+        ..tight()
+    };
+    let fast = |_: f64, x: &[f64], dx: &mut [f64]| {
+        dx[0] = 100.0 * x[1];
+        dx[1] = -100.0 * x[0];
+    };
+    let error = run(Method::Explicit(tolerances), fast, [0.0, 1.0], &[10.0]).unwrap_err();
+    assert!(
+        matches!(error, Error::StepBudget { steps: 20, .. }),
+        "{error}"
+    );
+}
+
+#[test]
+fn automatic_fixed_steps_are_stable() {
+    let stiff = |t: f64, x: &[f64], dx: &mut [f64]| dx[0] = -500.0 * (x[0] - t);
+    let x = run(Method::Rk4(Step::Auto), stiff, [1.0], &[1.0, 2.0]).unwrap();
+    close(x[0], 2.0 - 1.0 / 500.0, 1e-6);
+    let impossible = |t: f64, x: &[f64], dx: &mut [f64]| dx[0] = -1e9 * (x[0] - t);
+    let error = run(Method::Rk4(Step::Auto), impossible, [1.0], &[1.0]).unwrap_err();
+    assert!(matches!(error, Error::TooStiff { .. }), "{error}");
+}
+
+#[test]
+fn impossible_settings_are_refused() {
+    let bad = [
+        Method::Rk4(Step::AtMost(0.0)),
+        Method::Rk4(Step::AtMost(f64::NAN)),
+        Method::Rk4(Step::Substeps(0)),
+        Method::Adaptive(Tolerances {
+            relative: 0.0,
+            ..tight()
+        }),
+        Method::Stiff(Tolerances {
+            absolute: f64::NAN,
+            ..tight()
+        }),
+    ];
+    for method in bad {
+        let error = Integrator::new(method, 1).unwrap_err();
+        assert!(matches!(error, Error::Setting { .. }), "{error}");
+    }
+}

@@ -1,0 +1,289 @@
+//! Simulations against closed forms.
+
+mod common;
+
+use std::ops::ControlFlow;
+
+use common::system;
+use lynkeus_expr::{Expr, Graph};
+use lynkeus_run::{Error, Level, Method, Noise, Simulation, Step, System, Tolerances};
+
+fn tight() -> Method {
+    Method::Adaptive(Tolerances {
+        relative: 1e-12,
+        absolute: 1e-14,
+        ..Tolerances::default()
+    })
+}
+
+/// x' = a·(u − x), y = x
+fn lag(g: &Graph) -> System {
+    let (x, u) = (g.symbol("x"), g.symbol("u"));
+    system(g, &[("x", 0.5, (u - x) * 2.0)], &["u"], &[("y", x)])
+}
+
+fn input<'g>(g: &'g Graph, u: Expr<'g>) -> System {
+    system(g, &[], &[], &[("u", u)])
+}
+
+/// The lag's answer to an input that is constant between switches.
+fn piecewise(times: &[f64], values: &[f64], until: f64) -> f64 {
+    let mut x = 0.5;
+    for (k, u) in values.iter().enumerate() {
+        let from = if k == 0 { 0.0 } else { times[k - 1] };
+        let to = times.get(k).copied().unwrap_or(until).min(until);
+        if to > from {
+            x = u + (x - u) * (-2.0 * (to - from)).exp();
+        }
+    }
+    x
+}
+
+fn final_x(simulation: &Simulation) -> f64 {
+    *simulation
+        .run()
+        .unwrap()
+        .column("x")
+        .unwrap()
+        .last()
+        .unwrap()
+}
+
+#[test]
+fn jumps_of_the_input_are_stepped_onto() {
+    let g = Graph::new();
+    let t = g.symbol("time");
+    let high = t.less(g.constant(0.37)).or(t.greater_eq(g.constant(1.61)));
+    let u = high.select(g.constant(0.75), g.constant(0.38));
+    let expected = piecewise(&[0.37, 1.61], &[0.75, 0.38, 0.75], 3.0);
+    // the grid never meets the jumps
+    for (method, tolerance) in [
+        (tight(), 1e-12),
+        (Method::Rk4(Step::AtMost(0.002)), 1e-12),
+        (Method::Stiff(Tolerances::default()), 1e-8),
+    ] {
+        let mut simulation = Simulation::new(lag(&g), input(&g, u), 3.0, 0.5);
+        simulation.method = method;
+        let error = (final_x(&simulation) - expected).abs();
+        assert!(error < tolerance, "{method:?}: {error:e}");
+    }
+}
+
+#[test]
+fn floor_sign_and_relations_that_are_not_affine() {
+    let g = Graph::new();
+    let t = g.symbol("time");
+    // a square wave through mod, and one through a sine
+    let modulo = t - (t / 0.7).floor() * 0.7;
+    let cases = [
+        (modulo.less(g.constant(0.35)), 0.35),
+        (
+            (t * (std::f64::consts::PI / 0.35))
+                .sin()
+                .greater(g.constant(0.0)),
+            0.35,
+        ),
+    ];
+    for (wave, half_period) in cases {
+        let u = wave.select(g.constant(1.0), g.constant(-1.0));
+        let times: Vec<f64> = (1..8).map(|k| half_period * f64::from(k)).collect();
+        let values: Vec<f64> = (0..8)
+            .map(|k| if k % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
+        let mut simulation = Simulation::new(lag(&g), input(&g, u), 2.6, 0.4);
+        simulation.method = tight();
+        let error = (final_x(&simulation) - piecewise(&times, &values, 2.6)).abs();
+        assert!(error < 1e-11, "{error:e}");
+    }
+    let sign = (t - 1.2345).sign();
+    let mut simulation = Simulation::new(lag(&g), input(&g, sign), 2.0, 1.0);
+    simulation.method = tight();
+    let error = (final_x(&simulation) - piecewise(&[1.2345], &[-1.0, 1.0], 2.0)).abs();
+    assert!(error < 1e-12, "{error:e}");
+}
+
+#[test]
+fn rows_show_the_input_from_the_right() {
+    let g = Graph::new();
+    let t = g.symbol("time");
+    let u = t
+        .less(g.constant(0.5))
+        .select(g.constant(1.0), g.constant(2.0));
+    let table = Simulation::new(lag(&g), input(&g, u), 0.9, 0.25)
+        .run()
+        .unwrap();
+    assert_eq!(table.times(), [0.0, 0.25, 0.5, 0.75, 0.9]);
+    assert_eq!(table.column("u").unwrap(), [1.0, 1.0, 2.0, 2.0, 2.0]);
+    assert_eq!(table.names(), ["x", "u"]);
+}
+
+/// The lag with an observer x̂' = 2(u − x̂) + 5(y − x̂).
+fn observed(g: &Graph) -> Simulation {
+    let (x_hat, u, y) = (g.symbol("x_hat"), g.symbol("u"), g.symbol("y"));
+    let dx = (u - x_hat) * 2.0 + (y - x_hat) * 5.0;
+    let observer = system(g, &[("x_hat", -1.0, dx)], &["y", "u"], &[]);
+    let mut simulation = Simulation::new(lag(g), input(g, g.symbol("time").sin()), 2.0, 0.1);
+    simulation.observer = Some(observer);
+    simulation
+}
+
+#[test]
+fn an_observer_runs_along() {
+    let g = Graph::new();
+    let mut simulation = observed(&g);
+    simulation.method = tight();
+    let table = simulation.run().unwrap();
+    let (x, x_hat) = (table.column("x").unwrap(), table.column("x_hat").unwrap());
+    for ((t, x), x_hat) in table.times().iter().zip(x).zip(x_hat) {
+        // e' = −7e
+        assert!((x_hat - x + 1.5 * (-7.0 * t).exp()).abs() < 1e-11);
+    }
+}
+
+#[test]
+fn noise_is_held_recorded_and_repeatable() {
+    let g = Graph::new();
+    let mut simulation = observed(&g);
+    simulation.record_outputs = true;
+    simulation.method = tight();
+    simulation.noise = Noise {
+        seed: 11,
+        sample_step: Some(0.2),
+        levels: [("y".to_string(), Level::Absolute(0.3))].into(),
+    };
+    let table = simulation.run().unwrap();
+    assert_eq!(table, simulation.run().unwrap());
+    let (y, measured) = (
+        table.column("y").unwrap(),
+        table.column("y_measured").unwrap(),
+    );
+    let noise: Vec<f64> = measured.iter().zip(&y).map(|(m, y)| m - y).collect();
+    let x_hat = table.column("x_hat").unwrap();
+    let mut error = x_hat[0] - y[0];
+    for k in 0..20 {
+        if k % 2 == 0 {
+            assert!(
+                (noise[k] - noise[k + 1]).abs() < 1e-15,
+                "held over a sample"
+            );
+        } else {
+            assert!((noise[k] - noise[k + 1]).abs() > 1e-6, "drawn anew");
+        }
+        // e' = −7e + 5·noise, exactly
+        let rest = 5.0 / 7.0 * noise[k];
+        error = rest + (error - rest) * (-0.7_f64).exp();
+        assert!((x_hat[k + 1] - y[k + 1] - error).abs() < 1e-10, "row {k}");
+    }
+    simulation.noise.seed = 12;
+    assert_ne!(table, simulation.run().unwrap());
+}
+
+#[test]
+fn what_is_not_connected_is_named() {
+    let g = Graph::new();
+    let nothing = system(&g, &[], &[], &[]);
+    let error = Simulation::new(lag(&g), nothing, 1.0, 0.1)
+        .run()
+        .unwrap_err();
+    assert!(
+        matches!(&error.error, Error::Unconnected { reader: "plant", name, .. } if name == "u"),
+        "{error}"
+    );
+    let mut simulation = observed(&g);
+    let z = g.symbol("z");
+    simulation.observer = Some(system(&g, &[("x_hat", 0.0, z)], &["z"], &[]));
+    let error = simulation.run().unwrap_err();
+    assert!(error.to_string().contains("observer reads 'z'"), "{error}");
+    assert!(error.to_string().contains("y, u"), "{error}");
+}
+
+#[test]
+fn an_undefined_operation_is_named_with_its_time_and_state() {
+    let g = Graph::new();
+    let h = g.symbol("h");
+    let tank = system(&g, &[("h", 1.0, -h.sqrt() - 0.5)], &[], &[]);
+    let mut simulation = Simulation::new(tank, system(&g, &[], &[], &[]), 5.0, 0.1);
+    for method in [Method::default(), Method::Rk4(Step::AtMost(0.01))] {
+        simulation.method = method;
+        let error = simulation.run().unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("sqrt(h) is NaN") && text.contains("h = -"),
+            "{text}"
+        );
+        // empty at t = 2 − ln 3
+        let last = *error.partial.times().last().unwrap();
+        assert!((0.7..0.95).contains(&last), "rows up to {last}");
+        assert!(
+            error
+                .partial
+                .column("h")
+                .unwrap()
+                .iter()
+                .all(|h| h.is_finite())
+        );
+    }
+}
+
+#[test]
+fn an_input_that_is_not_finite_is_named() {
+    let g = Graph::new();
+    let u = (g.symbol("time") - 0.5).ln();
+    let error = Simulation::new(lag(&g), input(&g, u), 1.0, 0.1)
+        .run()
+        .unwrap_err();
+    assert!(
+        error.to_string().contains("ln(time - 0.5) is NaN"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_run_reports_progress_and_can_be_stopped() {
+    let g = Graph::new();
+    let mut fractions = vec![];
+    let stopped = observed(&g).run_watched(&mut |fraction| {
+        fractions.push(fraction);
+        if fractions.len() == 5 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    let error = stopped.unwrap_err();
+    assert!(matches!(error.error, Error::Cancelled { .. }), "{error}");
+    assert_eq!((error.partial.len(), fractions[4]), (6, 0.25));
+}
+
+#[test]
+fn impossible_grids_are_refused() {
+    let g = Graph::new();
+    let base = observed(&g);
+    let changes: [fn(&mut Simulation); 6] = [
+        |s| s.until = 0.0,
+        |s| s.until = f64::NAN,
+        |s| s.output_step = 0.0,
+        |s| s.output_step = 1e-12,
+        |s| s.start = f64::INFINITY,
+        |s| s.noise.sample_step = Some(-1.0),
+    ];
+    for change in changes {
+        let mut simulation = base.clone();
+        change(&mut simulation);
+        let error = simulation.run().unwrap_err();
+        assert!(matches!(error.error, Error::Setting { .. }), "{error}");
+    }
+}
+
+#[test]
+fn too_many_jumps_are_refused() {
+    let g = Graph::new();
+    let u = (g.symbol("time") * 1e9).floor();
+    let error = Simulation::new(lag(&g), input(&g, u), 1.0, 0.1)
+        .run()
+        .unwrap_err();
+    assert!(
+        matches!(error.error, Error::TooManySwitches { .. }),
+        "{error}"
+    );
+}
