@@ -70,7 +70,11 @@ impl Region {
             let middle = between(low, high);
             (middle, middle)
         };
-        if !(low < high) || (left == low && right == high && low.next_up() >= high) {
+        let splits = match self.dimensions[widest].integer {
+            true => low < high,
+            false => low < left && right < high,
+        };
+        if !splits {
             return None;
         }
         let (mut first, mut second) = (cell.clone(), cell.clone());

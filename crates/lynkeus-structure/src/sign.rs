@@ -1,7 +1,7 @@
 //! Does an expression keep its sign on the box?
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Graph, MissingInput, Node, Tape};
+use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::condition::short;
 use crate::{Check, Condition, Point, Range, Region, Witness, range};
@@ -109,22 +109,36 @@ fn witness(
     let (Some(lowest), Some(highest)) = (&found.lowest, &found.highest) else {
         return Ok(None);
     };
-    if lowest.value == 0.0 || highest.value == 0.0 {
-        let zero = if lowest.value == 0.0 { lowest } else { highest };
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let exact = |point: &&Point| {
+        let value = enclosure(&tape, point);
+        value.lo() == 0.0 && value.hi() == 0.0
+    };
+    if let Some(zero) = [lowest, highest].into_iter().find(exact) {
         return Ok(Some(Witness {
             points: vec![zero.clone()],
         }));
     }
-    if !(lowest.value < 0.0 && highest.value > 0.0) {
+    if !(enclosure(&tape, lowest).is_negative() && enclosure(&tape, highest).is_positive()) {
         return Ok(None);
     }
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut points = vec![lowest.clone(), highest.clone()];
     if let Some(zero) = zero_between(tape, &region, lowest, highest) {
         points.insert(0, zero);
     }
     Ok(Some(Witness { points }))
+}
+
+/// The value at a point, rounding errors included: an underflow or a cancellation
+/// must not refute anything.
+fn enclosure(tape: &Tape, point: &Point) -> Interval {
+    let cell: Vec<Interval> = point
+        .coordinates
+        .iter()
+        .map(|c| Interval::point(c.1))
+        .collect();
+    tape.eval_in(&Intervals, &cell)[0]
 }
 
 /// Bisection along the straight line between two points of opposite sign.

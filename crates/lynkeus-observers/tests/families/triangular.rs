@@ -1,40 +1,14 @@
 //! The family `triangular` against hand-computed observers.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 
-use lynkeus_expr::Tape;
-use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{
-    Design, DesignError, Family, Fit, Initial, Tuning, Value, triangular::Triangular,
-};
-use lynkeus_structure::{Condition, Extended, Sensors};
-
-fn plant(text: &str) -> Plant {
-    Plant::from_modelica(text, "plant.mo", &LoadOptions::default()).unwrap()
-}
+use crate::common::{assert_close, design_with, plant, slope};
+use lynkeus_model::Plant;
+use lynkeus_observers::{Design, DesignError, Fit, Initial, Tuning, Value, triangular::Triangular};
+use lynkeus_structure::Condition;
 
 fn design(plant: &Plant, unknown: &[&str], tuning: &Tuning) -> Result<Design, DesignError> {
-    let unknown = unknown.iter().map(|s| s.to_string()).collect();
-    let sensors = Sensors {
-        unknown,
-        ..Sensors::default()
-    };
-    Triangular.design(&Extended::new(plant, &sensors).unwrap(), tuning)
-}
-
-/// x̂' at a state, an input and a measurement.
-fn slope(plant: &Plant, design: &Design, hat: &[f64], u: &[f64], y: &[f64]) -> Vec<f64> {
-    let observer = &design.observer;
-    let mut inputs = vec![observer.time];
-    inputs.extend(observer.states.iter().map(|(s, _)| s.symbol));
-    inputs.extend(observer.inputs.iter().map(|s| s.symbol));
-    inputs.extend(observer.measured.iter().map(|s| s.symbol));
-    let tape = Tape::new(&plant.graph, &inputs, &observer.derivatives).unwrap();
-    let mut out = vec![0.0; hat.len()];
-    tape.evaluator()
-        .eval(&[&[0.0], hat, u, y].concat(), &mut out);
-    out
+    design_with(&Triangular, plant, unknown, tuning)
 }
 
 fn matrix(diag: &[f64], off: &[f64]) -> Value {
@@ -52,17 +26,6 @@ fn with_poles(θ: f64) -> Tuning {
     let s = matrix(&[4.0 / 3.0, 10.0 / 9.0, 1.0], &[-1.0, -1.0 / 3.0]);
     tuning.values.insert("S".into(), s);
     tuning
-}
-
-fn assert_close(found: &[f64], expected: &[f64]) {
-    assert_eq!(found.len(), expected.len());
-    for (found, expected) in found.iter().zip(expected) {
-        let scale = expected.abs().max(1e-3);
-        assert!(
-            (found - expected).abs() < 1e-13 * scale,
-            "{found} against {expected}"
-        );
-    }
 }
 
 const TANKS: &str = "model Tanks

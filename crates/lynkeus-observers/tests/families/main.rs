@@ -1,0 +1,6 @@
+//! Every family against hand-computed observers and the formulas of its paper.
+#![allow(clippy::unwrap_used)]
+
+mod block_triangular;
+mod common;
+mod triangular;
