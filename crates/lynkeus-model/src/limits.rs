@@ -9,6 +9,8 @@ use crate::syntax::{Problem, Result, Span};
 pub(crate) const MAX_SOURCE_BYTES: usize = 64 << 20;
 /// Deepest nesting of expressions and equations.
 pub(crate) const MAX_NESTING: usize = 200;
+/// Most iterators of one loop or comprehension.
+pub(crate) const MAX_ITERATORS: usize = 32;
 /// Most expressions, equations and declarations in one file.
 pub(crate) const MAX_SYNTAX_NODES: usize = 2_000_000;
 /// Most scalar operations while `for` loops and arrays are written out.

@@ -5,7 +5,8 @@ pub(crate) fn near<'a>(wanted: &str, known: impl Iterator<Item = &'a str>) -> Ve
     if wanted.len() > 64 {
         return vec![];
     }
-    let allowed = 1 + wanted.chars().count() / 4;
+    let allowed = wanted.chars().count().div_ceil(3).min(3);
+    let allowed = if wanted.len() < 2 { 0 } else { allowed };
     let mut found: Vec<(usize, &str)> = known
         .filter(|name| name.len() <= 64)
         .map(|name| (distance(wanted, name), name))
@@ -59,7 +60,7 @@ mod tests {
     #[test]
     fn finds_neighbours() {
         let known = ["level", "lower", "pump", "Level"];
-        assert_eq!(near("levle", known.into_iter()), ["level"]);
+        assert_eq!(near("levle", known.into_iter()), ["level", "Level"]);
         assert_eq!(near("LEVEL", known.into_iter()), ["Level", "level"]);
         assert!(near("temperature", known.into_iter()).is_empty());
     }

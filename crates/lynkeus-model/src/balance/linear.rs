@@ -151,6 +151,7 @@ impl Linear<'_> {
         let zero = || self.graph.constant(0.0).node();
         let value = self.minus(right.rest, left.rest).unwrap_or_else(zero);
         Some(match self.graph.constant_value(coefficient) {
+            Some(0.0) => return None,
             Some(1.0) => value,
             Some(-1.0) => self.negated(value),
             _ => self.graph.binary(Binary::Div, value, coefficient),

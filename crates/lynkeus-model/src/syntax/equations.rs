@@ -4,6 +4,7 @@ use super::ast::{Equation, EquationKind, Iterator};
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token};
 use super::{Problem, Result, Span};
+use crate::limits::MAX_ITERATORS;
 
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
@@ -124,6 +125,9 @@ impl Parser<'_> {
         let mut iterators: Vec<Iterator> = vec![];
         loop {
             let name = self.identifier("the name of an iterator")?;
+            if iterators.len() >= MAX_ITERATORS {
+                return Err(Problem::new(name, format!("more than {MAX_ITERATORS} iterators")));
+            }
             self.refuse_repeated(&iterators, name)?;
             if !self.at_word(Keyword::In) {
                 let problem = self.unexpected("`in` and a range");

@@ -1,0 +1,11 @@
+//! The crate from outside, in one binary.
+#![allow(clippy::unwrap_used)]
+
+mod balance;
+mod examples;
+mod hostile;
+mod language;
+mod parameters;
+mod refusals;
+mod soup;
+mod support;
