@@ -7,20 +7,26 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Graph, Interval, Jets, Node, Nodes, Reals, Tape};
 use proptest::prelude::*;
 
-const ORDER: usize = 8;
+/// Highest order tested.
+pub const ORDER: usize = 8;
 /// Differences of order 8 with steps of 2⁻⁶⁴ lose 512 bits.
 const SPACE: Exact = Exact(896);
 const STEP: i32 = -64;
 
 /// The polynomial arguments of a case: one series of `ORDER + 1` coefficients per symbol.
 fn arguments(case: &Case, places: &[f64]) -> Vec<Vec<f64>> {
+    arguments_between(&case.domain, places)
+}
+
+/// One series for each interval, with its first coefficient in there.
+pub fn arguments_between(domain: &[(f64, f64)], places: &[f64]) -> Vec<Vec<f64>> {
     let value = |k: usize| places[k % places.len()];
     let series = |(i, &(lo, hi)): (usize, &(f64, f64))| {
         let start = lo + value(i) * (hi - lo);
         let rest = (1..=ORDER).map(|k| (value(7 * i + 3 * k) - 0.5) / k as f64);
         std::iter::once(start).chain(rest).collect()
     };
-    case.domain.iter().enumerate().map(series).collect()
+    domain.iter().enumerate().map(series).collect()
 }
 
 fn polynomial(series: &[f64], shift: &BigFloat) -> BigFloat {
@@ -30,7 +36,7 @@ fn polynomial(series: &[f64], shift: &BigFloat) -> BigFloat {
 }
 
 /// Newton's forward differences: cₖ ≈ Δᵏf/(k! hᵏ), off by about h·cₖ₊₁.
-fn reference(tape: &Tape, arguments: &[Vec<f64>]) -> Vec<BigFloat> {
+pub fn reference(tape: &Tape, arguments: &[Vec<f64>]) -> Vec<BigFloat> {
     let step = SPACE.power_of_two(STEP);
     let mut row: Vec<BigFloat> = (0..=ORDER)
         .map(|j| {
@@ -52,7 +58,13 @@ fn reference(tape: &Tape, arguments: &[Vec<f64>]) -> Vec<BigFloat> {
     coefficients
 }
 
-fn jets<A: Algebra>(inner: &A, tape: &Tape, x: &[Vec<A::Value>], order: usize) -> Vec<A::Value> {
+/// The coefficients of the first output, with zeros up to the order.
+pub fn jets<A: Algebra>(
+    inner: &A,
+    tape: &Tape,
+    x: &[Vec<A::Value>],
+    order: usize,
+) -> Vec<A::Value> {
     let mut jet = tape.eval_in(&Jets { inner, order }, x).remove(0);
     assert!(
         jet.len() <= order + 1,

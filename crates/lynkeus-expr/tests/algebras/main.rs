@@ -2,10 +2,13 @@
 
 mod derivatives;
 mod exact;
+mod flows;
 mod interval_operations;
 mod interval_systems;
 mod interval_tightness;
 mod jets;
 mod operations;
+mod random_graphs;
+mod recipe;
 mod sample;
 mod values;

@@ -1,0 +1,120 @@
+//! Random graphs: recipes that can be followed again and again, on any graph.
+
+use crate::sample::{BINARY, UNARY};
+use lynkeus_expr::{Binary, Expr, Graph, Node, Unary};
+use proptest::prelude::*;
+use proptest::sample::Index;
+
+/// Symbols of every random graph.
+pub const INPUTS: usize = 3;
+
+#[derive(Clone, Debug)]
+enum Kind {
+    Constant(f64),
+    Unary(Unary),
+    Binary(Binary),
+    Powi(i32),
+    Select,
+    Solve,
+}
+
+/// One operation on results of earlier steps.
+#[derive(Clone, Debug)]
+pub struct Step {
+    kind: Kind,
+    operands: [Index; 3],
+}
+
+/// What operands an operation is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Style {
+    /// Earlier results as they are, wherever that leads.
+    Wild,
+    /// Earlier results brought into the domain of the operation, and kept from growing fast.
+    Tame,
+}
+
+/// Recipes of `steps` operations.
+pub fn recipe(steps: usize) -> impl Strategy<Value = Vec<Step>> {
+    let kind = prop_oneof![
+        1 => (-2.0..2.0).prop_map(Kind::Constant),
+        1 => prop::sample::select(vec![0.0, 1.0, -1.0, 2.0]).prop_map(Kind::Constant),
+        8 => prop::sample::select(&UNARY[..]).prop_map(Kind::Unary),
+        10 => prop::sample::select(&BINARY[..]).prop_map(Kind::Binary),
+        // Powers in which the order of the products makes no difference.
+        2 => prop::sample::select(vec![-1, 0, 2, 3]).prop_map(Kind::Powi),
+        1 => Just(Kind::Select),
+        1 => Just(Kind::Solve),
+    ];
+    let step = (kind, any::<[Index; 3]>()).prop_map(|(kind, operands)| Step { kind, operands });
+    prop::collection::vec(step, steps)
+}
+
+/// Recipes without linear systems.
+pub fn without_systems(recipe: &[Step]) -> Vec<Step> {
+    let keep = |step: &&Step| !matches!(step.kind, Kind::Solve);
+    recipe.iter().filter(keep).cloned().collect()
+}
+
+/// The symbols of a random graph.
+pub fn symbols(graph: &Graph) -> Vec<Node> {
+    (0..INPUTS)
+        .map(|i| graph.symbol(&format!("x{i}")).node())
+        .collect()
+}
+
+/// Follows a recipe: the result of every step.
+pub fn follow(recipe: &[Step], graph: &Graph, style: Style) -> Vec<Node> {
+    let mut known = symbols(graph);
+    for step in recipe {
+        let pick = |i: usize| graph.expr(*step.operands[i].get(&known));
+        let [a, b, c] = [pick(0), pick(1), pick(2)];
+        let node = match style {
+            Style::Wild => wild(graph, &step.kind, a, b, c),
+            Style::Tame => tame(graph, &step.kind, a, b, c),
+        };
+        known.push(node);
+    }
+    known.split_off(INPUTS)
+}
+
+fn wild<'g>(graph: &'g Graph, kind: &Kind, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Node {
+    let [x, y, z] = [a.node(), b.node(), c.node()];
+    match *kind {
+        Kind::Constant(value) => graph.constant(value).node(),
+        Kind::Unary(op) => graph.unary(op, x),
+        Kind::Binary(op) => graph.binary(op, x, y),
+        Kind::Powi(n) => graph.powi(x, n),
+        Kind::Select => graph.select(x, y, z),
+        Kind::Solve => graph.solve(&[x, y, z, x], &[y, z]).x[1],
+    }
+}
+
+fn tame<'g>(graph: &'g Graph, kind: &Kind, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Node {
+    let positive = 1.0 + a * a;
+    let result = match *kind {
+        Kind::Constant(value) => graph.constant(value),
+        Kind::Unary(Unary::Sqrt) => positive.sqrt(),
+        Kind::Unary(Unary::Ln) => positive.ln(),
+        Kind::Unary(op @ (Unary::Asin | Unary::Acos)) => {
+            graph.expr(graph.unary(op, (0.9 * a.sin()).node()))
+        }
+        Kind::Unary(op @ (Unary::Exp | Unary::Sinh | Unary::Cosh | Unary::Tan)) => {
+            graph.expr(graph.unary(op, a.sin().node()))
+        }
+        Kind::Binary(Binary::Mul) => a * b.sin(),
+        Kind::Binary(Binary::Div) => b / positive,
+        Kind::Binary(Binary::Pow) => positive.pow(b.cos()),
+        Kind::Binary(Binary::Atan2) => b.atan2(positive),
+        Kind::Powi(n) => (2.0 + a.sin()).powi(n),
+        Kind::Select => graph.expr(graph.select(a.less(b).node(), c.node(), (a - c).node())),
+        Kind::Solve => {
+            let diagonal = 3.0 + a.sin();
+            let matrix = [diagonal, b.sin(), c.cos(), diagonal].map(|entry| entry.node());
+            graph.expr(graph.solve(&matrix, &[b.node(), c.node()]).x[1])
+        }
+        Kind::Unary(op) => graph.expr(graph.unary(op, a.node())),
+        Kind::Binary(op) => graph.expr(graph.binary(op, a.node(), b.node())),
+    };
+    result.node()
+}
