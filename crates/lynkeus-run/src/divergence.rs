@@ -26,8 +26,14 @@ impl Bound {
     }
 
     /// # Errors
-    /// [`Error::Diverged`] for a value beyond the bound, or not finite.
-    pub(crate) fn check(&self, time: f64, names: &[String], values: &[f64]) -> Result<(), Error> {
+    /// [`Error::Diverged`], with the hint, for a value beyond the bound, or NaN.
+    pub(crate) fn check(
+        &self,
+        time: f64,
+        names: &[String],
+        values: &[f64],
+        hint: impl FnOnce() -> String,
+    ) -> Result<(), Error> {
         let inside = |v: &f64| v.abs() <= FACTOR * self.scale;
         match values.iter().position(|v| !inside(v)) {
             None => Ok(()),
@@ -35,7 +41,7 @@ impl Bound {
                 time,
                 name: names.get(i).cloned().unwrap_or_default(),
                 value: values[i],
-                hint: String::new(),
+                hint: hint(),
             }),
         }
     }

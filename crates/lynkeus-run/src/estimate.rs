@@ -74,16 +74,6 @@ impl Log {
         };
         observer.signals().iter().map(column).collect()
     }
-
-    /// The median time between rows; zero for a single row.
-    fn typical_interval(&self) -> f64 {
-        let mut intervals: Vec<f64> = self.times.windows(2).map(|w| w[1] - w[0]).collect();
-        intervals.sort_unstable_by(f64::total_cmp);
-        intervals
-            .get(intervals.len() / 2)
-            .copied()
-            .unwrap_or_default()
-    }
 }
 
 fn check_times(times: &[f64]) -> Result<(), Error> {
@@ -109,8 +99,7 @@ fn check_times(times: &[f64]) -> Result<(), Error> {
 pub struct Estimates {
     /// the estimates at the log's times, columns as [`System::estimates`]
     pub trajectory: Trajectory,
-    /// for fixed steps: the step in use at the start, over the median interval,
-    /// beside the step that the observer needs
+    /// for fixed steps: the step in use beside the step that the observer needs
     pub advice: Option<StepAdvice>,
 }
 
@@ -169,9 +158,7 @@ fn replay(
         }
         let estimates = estimator.push(t, &signals)?;
         result.trajectory.push(t, estimates);
-        if k == 0 {
-            result.advice = estimator.advice(log.typical_interval());
-        }
+        result.advice = estimator.advice();
         if watch((k + 1) as f64 / log.times.len() as f64).is_break() {
             return Err(Error::Cancelled { time: t });
         }

@@ -36,8 +36,8 @@ impl Default for EstimatorSettings {
 
 /// An observer that takes one sample after the other, live or from a log.
 ///
-/// With [`Step::Substeps`] or [`Step::AtMost`] a push does not allocate (linear
-/// systems in the observer's equations apart).
+/// With [`Step::Substeps`] or [`Step::AtMost`] a push does not allocate after the
+/// second (linear systems in the observer's equations apart).
 ///
 /// ```
 /// use lynkeus_expr::Graph;
@@ -103,15 +103,8 @@ impl Estimator {
             None => self.driven.start(signals),
             Some(before) => {
                 self.driven.aim(before, t, signals);
-                let Self {
-                    driven,
-                    integrator,
-                    x,
-                    ..
-                } = self;
-                if let Err(error) = integrator.advance(driven, before, t, x) {
-                    return Err(self.explained(error, before, t));
-                }
+                self.integrator
+                    .advance(&mut self.driven, before, t, &mut self.x)?;
                 self.driven.arrive();
             }
         }
@@ -129,12 +122,10 @@ impl Estimator {
         self.time
     }
 
-    /// The fixed step in use over an interval of this length beside the one that
-    /// the observer needs at its present state; none for adaptive methods.
-    pub fn advice(&mut self, interval: f64) -> Option<StepAdvice> {
-        let t = self.time.unwrap_or(0.0);
-        self.integrator
-            .advice(&mut self.driven, t, &self.x, interval)
+    /// For fixed steps: the step in use beside the one that the observer needs, as
+    /// of [`Integrator::advice`]; none before the second sample.
+    pub fn advice(&self) -> Option<StepAdvice> {
+        self.integrator.advice()
     }
 
     fn check_sample(&self, t: f64, signals: &[f64]) -> Result<(), Error> {
@@ -166,7 +157,8 @@ impl Estimator {
 
     fn report(&mut self, t: f64) -> Result<&[f64], Error> {
         let names = self.driven.evaluation.system().states();
-        self.bound.check(t, names, &self.x)?;
+        self.bound
+            .check(t, names, &self.x, || self.integrator.hint())?;
         let evaluation = &mut self.driven.evaluation;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.estimates);
@@ -174,36 +166,6 @@ impl Estimator {
             return Err(evaluation.not_finite(t, &self.x));
         }
         Ok(&self.estimates)
-    }
-
-    /// Blames a fixed step that is too large, where that is the cause.
-    fn explained(&mut self, error: Error, before: f64, t: f64) -> Error {
-        let Error::NotFinite { time, .. } = error else {
-            return error;
-        };
-        let advice = self
-            .integrator
-            .advice(&mut self.driven, before, &self.x, t - before);
-        let Some(advice) = advice.filter(StepAdvice::is_unstable) else {
-            return error;
-        };
-        let largest =
-            (0..self.x.len()).max_by(|&i, &j| self.x[i].abs().total_cmp(&self.x[j].abs()));
-        let largest = largest.unwrap_or_default();
-        Error::Diverged {
-            time,
-            name: self
-                .driven
-                .names()
-                .get(largest)
-                .cloned()
-                .unwrap_or_default(),
-            value: self.x.get(largest).copied().unwrap_or_default(),
-            hint: format!(
-                "; the step {:.3e} is too large for it, try {:.1e} or less",
-                advice.used, advice.needed
-            ),
-        }
     }
 }
 

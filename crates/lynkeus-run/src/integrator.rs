@@ -63,10 +63,11 @@ enum Stepper {
 struct Fixed {
     step: Step,
     rk4: Rk4,
-    /// automatic step; not known before the first interval
-    auto: Option<f64>,
+    advice: Option<StepAdvice>,
+    /// intervals since the last look, for automatic steps
     since_look: usize,
-    retry: Vec<f64>,
+    /// state at the start of the interval
+    begin: Vec<f64>,
 }
 
 impl Integrator {
@@ -85,9 +86,9 @@ impl Integrator {
             Method::Rk4(step) => Stepper::Fixed(Fixed {
                 step,
                 rk4: Rk4::new(dimension),
-                auto: None,
+                advice: None,
                 since_look: 0,
-                retry: vec![0.0; dimension],
+                begin: vec![0.0; dimension],
             }),
         };
         Ok(Self {
@@ -101,7 +102,8 @@ impl Integrator {
     ///
     /// # Errors
     /// [`Error::NotFinite`], [`Error::StepUnderflow`], [`Error::StepBudget`],
-    /// [`Error::TooStiff`] and [`Error::TooManySwitches`].
+    /// [`Error::TooStiff`], [`Error::TooManySwitches`]; [`Error::Diverged`] where a
+    /// fixed step is too large.
     pub fn advance(
         &mut self,
         f: &mut impl Dynamics,
@@ -115,7 +117,26 @@ impl Integrator {
             .switches(from, to, &mut instants)
             .and_then(|()| self.segments(f, from, to, &mut instants, x));
         self.instants = instants;
-        result
+        result.map_err(|error| self.explained(error, f, x))
+    }
+
+    /// Blames a fixed step that is too large for a value that is not finite.
+    fn explained(&self, error: Error, f: &impl Dynamics, x: &[f64]) -> Error {
+        let (Error::NotFinite { time, .. }, hint) = (&error, self.hint()) else {
+            return error;
+        };
+        if hint.is_empty() {
+            return error;
+        }
+        let largest = (0..x.len()).max_by(|&i, &j| x[i].abs().total_cmp(&x[j].abs()));
+        Error::Diverged {
+            time: *time,
+            name: largest
+                .and_then(|i| f.names().get(i).cloned())
+                .unwrap_or_default(),
+            value: largest.map_or(0.0, |i| x[i]),
+            hint,
+        }
     }
 
     fn segments(
@@ -145,30 +166,25 @@ impl Integrator {
         Ok(())
     }
 
-    /// For [`Method::Rk4`]: the step in use over an interval of this length
-    /// beside the step that the Jacobian at (t, x) asks for.
-    pub fn advice(
-        &self,
-        f: &mut impl Dynamics,
-        t: f64,
-        x: &[f64],
-        interval: f64,
-    ) -> Option<StepAdvice> {
-        let Stepper::Fixed(fixed) = &self.stepper else {
-            return None;
-        };
-        let spectral_radius = spectral_radius(f, t, x);
-        let needed = AUTO_PRODUCT / spectral_radius;
-        let used = match fixed.step {
-            Step::Auto => needed.min(interval),
-            Step::AtMost(h) => h.min(interval),
-            Step::Substeps(n) => interval / n as f64,
-        };
-        Some(StepAdvice {
-            spectral_radius,
-            needed,
-            used,
-        })
+    /// For [`Method::Rk4`]: the step in use beside the step that the Jacobian asks
+    /// for, at the last look at it (before the first interval and, for automatic
+    /// steps, every so often).
+    pub fn advice(&self) -> Option<StepAdvice> {
+        match &self.stepper {
+            Stepper::Adaptive(_) => None,
+            Stepper::Fixed(fixed) => fixed.advice,
+        }
+    }
+
+    /// What to say of a divergence: that the step is too large, if it is.
+    pub(crate) fn hint(&self) -> String {
+        match self.advice() {
+            Some(advice) if advice.is_unstable() => format!(
+                "; the step {:.3e} is too large for the fastest mode, try {:.1e} or less",
+                advice.used, advice.needed
+            ),
+            _ => String::new(),
+        }
     }
 }
 
@@ -181,13 +197,27 @@ impl Fixed {
         whole: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let h = match self.step {
-            Step::AtMost(h) => h,
+        let used = match self.step {
+            Step::AtMost(h) => h.min(whole),
             Step::Substeps(n) => whole / n as f64,
             Step::Auto => return self.auto(f, from, to, x),
         };
-        let steps = count(from, to, h)?;
-        self.rk4.advance(f, from, to, steps, x)
+        if self.advice.is_none() {
+            self.look(f, from, x, used);
+        }
+        let steps = count(from, to, used).ok_or_else(|| {
+            let least = (to - from) / MOST_STEPS as f64;
+            let expected = format!("at least {least:e} for the interval from {from} to {to}");
+            Error::setting("step", expected, used)
+        })?;
+        self.begin.copy_from_slice(x);
+        let result = self.rk4.advance(f, from, to, steps, x);
+        if let Err(Error::NotFinite { .. }) = result {
+            let begin = std::mem::take(&mut self.begin);
+            self.look(f, from, &begin, used);
+            self.begin = begin;
+        }
+        result
     }
 
     /// With a step from the spectral radius; a failed interval is tried again
@@ -199,43 +229,55 @@ impl Fixed {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        if self.auto.is_none() || self.since_look >= LOOK_EVERY {
-            let needed = AUTO_PRODUCT / spectral_radius(f, from, x);
-            self.auto = Some(if needed.is_nan() {
-                f64::INFINITY
-            } else {
-                needed
-            });
-            self.since_look = 0;
+        if self.since_look == 0 {
+            self.look(f, from, x, to - from);
         }
-        self.since_look += 1;
-        let h = self.auto.unwrap_or(f64::INFINITY);
-        self.retry.copy_from_slice(x);
-        let mut steps = count(from, to, h)?;
+        self.since_look = (self.since_look + 1) % LOOK_EVERY;
+        let needed = self.advice.map_or(f64::INFINITY, |advice| advice.needed);
+        let mut steps = count(from, to, needed).ok_or(Error::TooStiff {
+            time: from,
+            needed,
+            substeps: (to - from) / needed,
+            limit: MOST_STEPS,
+        })?;
+        self.begin.copy_from_slice(x);
         for _ in 0..RETRIES {
             if self.rk4.advance(f, from, to, steps, x).is_ok() {
                 return Ok(());
             }
-            x.copy_from_slice(&self.retry);
+            x.copy_from_slice(&self.begin);
             steps = steps.saturating_mul(4).min(MOST_STEPS);
-            // look again at the next interval
-            self.auto = None;
+            self.since_look = 0;
         }
         self.rk4.advance(f, from, to, steps, x)
     }
+
+    /// Looks at the fastest mode at (t, x).
+    fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], used: f64) {
+        let spectral_radius = spectral_radius(f, t, x);
+        let needed = AUTO_PRODUCT / spectral_radius;
+        // where the Jacobian is not defined there is nothing to go by
+        let needed = if needed.is_nan() {
+            f64::INFINITY
+        } else {
+            needed
+        };
+        let used = if self.step == Step::Auto {
+            used.min(needed)
+        } else {
+            used
+        };
+        self.advice = Some(StepAdvice {
+            spectral_radius,
+            needed,
+            used,
+        });
+    }
 }
 
-/// How many equal steps of at most `h` make the interval.
-fn count(from: f64, to: f64, h: f64) -> Result<usize, Error> {
+/// How many equal steps of at most `h` make the interval; none if too many.
+fn count(from: f64, to: f64, h: f64) -> Option<usize> {
     // a step that divides the interval up to rounding must not take one more
     let steps = ((to - from) / h * (1.0 - 1e-12)).ceil().max(1.0);
-    if steps <= MOST_STEPS as f64 {
-        return Ok(steps as usize);
-    }
-    Err(Error::TooStiff {
-        time: from,
-        needed: h,
-        substeps: steps,
-        limit: MOST_STEPS,
-    })
+    (steps <= MOST_STEPS as f64).then_some(steps as usize)
 }

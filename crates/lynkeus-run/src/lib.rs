@@ -1,4 +1,82 @@
 //! Simulation and log replay of systems and their observers.
+//!
+//! A [`System`] is x' = f(t, x, w) with outputs, compiled from expressions; a
+//! plant, an observer and the inputs of a study are all systems. A
+//! [`Simulation`] runs a plant, and an observer with it; [`estimate`] replays a
+//! log through an observer; an [`Estimator`] takes samples one by one, live.
+//!
+//! ```
+//! use lynkeus_expr::Graph;
+//! use lynkeus_run::{EstimatorSettings, Log, Simulation, System, estimate};
+//!
+//! let g = Graph::new();
+//! let [time, x, u, y, x̂] = ["time", "x", "u", "y", "x_hat"].map(|name| g.symbol(name));
+//! let named = |name: &str, e: lynkeus_expr::Expr<'_>| (name.to_string(), e.node());
+//!
+//! // a tank: x' = u − √x, y = x; the valve u opens at t = 2
+//! let level = [("x".to_string(), x.node(), 1.0)];
+//! let dx = u - x.sqrt();
+//! let tank = System::new(&g, time.node(), &level, &[named("u", u)], &[dx.node()], &[named("y", x)])?;
+//! let valve = time.less(g.constant(2.0)).select(g.constant(0.5), g.constant(1.5));
+//! let inputs = System::new(&g, time.node(), &[], &[], &[], &[named("u", valve)])?;
+//!
+//! // its observer: x̂' = u − √|x̂| + 5(y − x̂)
+//! let estimate_of_level = [("x_hat".to_string(), x̂.node(), 3.0)];
+//! let dx̂ = u - x̂.abs().sqrt() + (y - x̂) * 5.0;
+//! let signals = [named("u", u), named("y", y)];
+//! let observer = System::new(&g, time.node(), &estimate_of_level, &signals, &[dx̂.node()], &[])?;
+//!
+//! let mut simulation = Simulation::new(tank, inputs, 4.0, 0.05);
+//! simulation.observer = Some(observer.clone());
+//! simulation.record_outputs = true;
+//! let table = simulation.run()?;
+//! let (_, last) = table.row(table.len() - 1).unwrap();
+//! assert_eq!(table.names(), ["x", "u", "y", "y_measured", "x_hat"]);
+//! assert!((last[0] - last[4]).abs() < 1e-6);
+//!
+//! // the same observer on what was recorded
+//! let columns = ["u", "y"].map(|name| table.column(name).unwrap()).to_vec();
+//! let log = Log::new(vec!["u".into(), "y".into()], table.times().to_vec(), columns)?;
+//! let estimates = estimate(&observer, &log, EstimatorSettings::default())?.trajectory;
+//! let (_, replayed) = estimates.row(estimates.len() - 1).unwrap();
+//! assert!((replayed[0] - last[0]).abs() < 0.02); // held samples lag behind
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What a run guarantees
+//!
+//! - Integration stops at every row, at every noise sample, and at every instant
+//!   at which an expression *of time alone* jumps (relations, `floor`, `sign`) or
+//!   has a kink (`abs`, `min`, `max`). Instants affine in time are solved for, others
+//!   are sampled at 24 points between stops and bisected to the last bit. Jumps that
+//!   depend on states are left to the error control.
+//! - A value that is NaN or infinite never becomes an estimate: an adaptive step
+//!   into it is shortened, and if the solution really leads there the run ends with
+//!   the time, the state and the operation, keeping the rows before.
+//! - The same settings and seed give the same numbers ([`Noise`] says how).
+//! - Fixed steps come with [`StepAdvice`]; automatic ones are small enough for the
+//!   fastest mode.
+//!
+//! # Choice of the integrator
+//!
+//! [`Method::Adaptive`] starts explicit, looks at the spectral radius of the
+//! Jacobian every 40 steps, and changes to the implicit method where stability and
+//! not accuracy holds the explicit one back, and back again.
+//!
+//! The explicit method is DOP853 (order 8) of the `differential-equations` crate,
+//! driven step by step; the implicit one is our Radau IIA of order 5 (three stages,
+//! after Hairer and Wanner). Three crates were built and run on the oscillator,
+//! Robertson's reaction (to t = 4·10⁴), van der Pol's equation (μ = 1000), a finite
+//! escape and a derivative that turns NaN, at relative tolerances 1e-6 to 1e-10:
+//!
+//! | crate | added crates, clean build (2 cores) | explicit | stiff | NaN, escape |
+//! |---|---|---|---|---|
+//! | `differential-equations` 0.7 | 16, 16 s | DOP853: error 6e-10 at 1e-10 in 63 µs, exact stops | Radau5 panics for states of dynamic length, and with fixed length is wrong by 1e-7 at 1e-10; BDF fails to start below 1e-8 | DOP853 rejects the step; Radau5 accepts NaN |
+//! | `diffsol` 0.18 (only `nalgebra`) | 106, 223 s | Tsit45: 2e-10 in 506 µs | BDF accurate: 0.33 ms for Robertson at 1e-10 | Tsit45 accepts NaN |
+//! | `ode_solvers` 0.6 | 33, not built | DOP853 | none | not run |
+//!
+//! So: the explicit method of the first, and for stiff systems a method of our own,
+//! which is tested against values on which two of them agree.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod adaptive;

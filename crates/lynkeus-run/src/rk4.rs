@@ -46,9 +46,9 @@ impl Rk4 {
         h: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        for stage in 0..STAGES.len() {
+        for (stage, (c, _)) in STAGES.iter().enumerate() {
             self.place(stage, h, x);
-            f.derivatives(t + STAGES[stage].0 * h, &self.stage, &mut self.k[stage]);
+            f.derivatives(t + c * h, &self.stage, &mut self.k[stage]);
         }
         let [k1, k2, k3, k4] = &self.k;
         for (i, &x) in x.iter().enumerate() {

@@ -232,7 +232,8 @@ impl<'a> Run<'a> {
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);
-        self.bound.check(t, names, estimate)?;
+        self.bound
+            .check(t, names, estimate, || self.integrator.hint())?;
         self.table.push(t, &self.row);
         Ok(())
     }

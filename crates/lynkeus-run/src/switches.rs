@@ -11,7 +11,7 @@
 //! each interval and bisected to the last bit, so a pulse shorter than a
 //! twenty-fourth of the interval (the output step of a simulation) can be missed.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Evaluator, Graph, MissingInput, Node, Op, Tape, Unary};
 
@@ -66,8 +66,7 @@ impl Switches {
         let of_time = functions_of_time(graph, time, roots);
         let (jumps, kinks) = jumps_and_kinks(graph, &of_time, roots);
         let affine = affine_in_time(graph, time, &of_time);
-        let mode = |(i, &jump): (usize, &Node)| (jump, graph.symbol(&format!("mode {i}")).node());
-        let modes: Vec<(Node, Node)> = jumps.iter().enumerate().map(mode).collect();
+        let modes = mode_symbols(graph, roots, &jumps);
         let map: HashMap<Node, Node> = modes.iter().copied().collect();
         let both = jumps.iter().chain(&kinks);
         let detectors = both.clone().map(|&node| detector(graph, node, &affine));
@@ -214,6 +213,23 @@ fn functions_of_time(graph: &Graph, time: Node, roots: &[Node]) -> HashMap<Node,
     uses
 }
 
+/// A fresh symbol for each jump, named as the jump reads, for messages.
+fn mode_symbols(graph: &Graph, roots: &[Node], jumps: &[Node]) -> Vec<(Node, Node)> {
+    let symbols = graph.symbols_of(roots);
+    let mut taken: HashSet<String> = symbols
+        .iter()
+        .filter_map(|&symbol| graph.symbol_name(symbol))
+        .collect();
+    let mut fresh = |&jump: &Node| {
+        let mut name = format!("({})", graph.render(jump, 80));
+        while !taken.insert(name.clone()) {
+            name.push('\'');
+        }
+        (jump, graph.symbol(&name).node())
+    };
+    jumps.iter().map(&mut fresh).collect()
+}
+
 /// Nodes that jump with time, and nodes that have kinks.
 fn jumps_and_kinks(
     graph: &Graph,
@@ -299,5 +315,77 @@ fn detector(graph: &Graph, node: Node, affine: &HashMap<Node, (f64, f64)>) -> De
             _ => Detector::Zero(-offset / slope),
         },
         _ => Detector::Sampled,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lynkeus_expr::Expr;
+
+    fn instants(build: fn(Expr<'_>) -> Expr<'_>, from: f64, to: f64) -> Vec<f64> {
+        let g = Graph::new();
+        let time = g.symbol("time");
+        let root = build(time).node();
+        let mut extracted = Switches::extract(&g, time.node(), &[root]).unwrap();
+        let mut times = vec![];
+        extracted.switches.between(from, to, &mut times).unwrap();
+        times.sort_unstable_by(f64::total_cmp);
+        times
+    }
+
+    #[test]
+    fn affine_relations_are_solved_exactly() {
+        fn relation(t: Expr<'_>) -> Expr<'_> {
+            (20.0 - t * 2.0).less_eq(t * 3.0 + 10.0)
+        }
+        assert_eq!(instants(|t| relation(t) * 3.0, 0.0, 10.0), [2.0]);
+        assert_eq!(instants(|t| relation(t) * 3.0, 2.0, 10.0), []);
+        assert_eq!(instants(|t| (t * 0.5).floor(), 0.0, 6.0), [2.0, 4.0]);
+        assert_eq!(instants(|t| (1.0 - t).sign(), 0.0, 6.0), [1.0]);
+        assert_eq!(instants(|t| t.sin(), 0.0, 6.0), []);
+    }
+
+    #[test]
+    fn kinks_are_stops_too() {
+        assert_eq!(instants(|t| (t - 3.0).abs(), 0.0, 6.0), [3.0]);
+        assert_eq!(
+            instants(|t| (t / 5.0).min(t.graph().constant(0.5)), 0.0, 6.0),
+            [2.5]
+        );
+    }
+
+    #[test]
+    fn other_relations_are_bisected_to_the_last_bit() {
+        let found = instants(|t| t.sin().less(t.graph().constant(0.5)), 0.0, 7.0);
+        let expected = [
+            std::f64::consts::FRAC_PI_6,
+            5.0 * std::f64::consts::FRAC_PI_6,
+            13.0 * std::f64::consts::FRAC_PI_6,
+        ];
+        assert_eq!(found.len(), 3);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 4e-15, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn relations_of_states_are_left_alone() {
+        let g = Graph::new();
+        let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+        let root = (x.less(time) + x.floor()).node();
+        let extracted = Switches::extract(&g, time.node(), &[root]).unwrap();
+        assert_eq!((extracted.modes.len(), extracted.roots), (0, vec![root]));
+    }
+
+    #[test]
+    fn modes_do_not_take_names_in_use() {
+        let g = Graph::new();
+        let time = g.symbol("time");
+        let relation = time.less(g.constant(2.0));
+        let root = (g.symbol("(time < 2)") + relation).node();
+        let extracted = Switches::extract(&g, time.node(), &[root]).unwrap();
+        let name = g.symbol_name(extracted.modes[0]).unwrap();
+        assert_eq!(name, "(time < 2)'");
     }
 }

@@ -30,7 +30,7 @@ const Y: [f64; 7] = [1.0, 1.5, 0.3, 0.2, -2.0, 4.0, 1.0];
 fn log() -> Log {
     let names = ["spare", "y", "u"].map(String::from).to_vec();
     let columns = vec![vec![f64::NAN; 7], Y.to_vec(), U.to_vec()];
-    Log::new(names, TIMES.to_vec(), columns).unwrap()
+    Log::new(names, TIMES.to_vec(), columns).expect("a good log")
 }
 
 /// x' = −3x + (b + c·s) with s from 0 to h.

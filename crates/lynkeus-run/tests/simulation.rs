@@ -40,13 +40,9 @@ fn piecewise(times: &[f64], values: &[f64], until: f64) -> f64 {
 }
 
 fn final_x(simulation: &Simulation) -> f64 {
-    *simulation
-        .run()
-        .unwrap()
-        .column("x")
-        .unwrap()
-        .last()
-        .unwrap()
+    let table = simulation.run().expect("a simulation that ends");
+    let x = table.column("x").expect("the state");
+    x[x.len() - 1]
 }
 
 #[test]

@@ -8,21 +8,23 @@ use differential_equations::methods::{DormandPrince, ExplicitRungeKutta, Ordinar
 use differential_equations::ode::{ODE, OrdinaryNumericalMethod};
 use differential_equations::status::Status;
 
-use super::{Adaptive, Leg, Ran};
+use super::{Adaptive, Leg, Point, Ran};
 use crate::{Dynamics, Error, Tolerances};
 
 type Dop853 = ExplicitRungeKutta<Ordinary, DormandPrince, f64, Vec<f64>, 8, 12, 16>;
 
 /// Dynamics as the crate wants them: shared, without errors. The last point
 /// whose derivative is not finite is kept.
-struct Watched<'a, D>(RefCell<(&'a mut D, Option<(f64, Vec<f64>)>)>);
+struct Watched<'a, D> {
+    f: RefCell<&'a mut D>,
+    bad: RefCell<Option<Point>>,
+}
 
 impl<D: Dynamics> ODE<f64, Vec<f64>> for Watched<'_, D> {
     fn diff(&self, t: f64, x: &Vec<f64>, dx: &mut Vec<f64>) {
-        let (f, bad) = &mut *self.0.borrow_mut();
-        f.derivatives(t, x, dx);
+        self.f.borrow_mut().derivatives(t, x, dx);
         if dx.iter().any(|v| !v.is_finite()) {
-            *bad = Some((t, x.clone()));
+            self.bad.replace(Some((t, x.clone())));
         }
     }
 }
@@ -36,16 +38,16 @@ impl Adaptive {
         if leg.at_the_end() || leg.x.is_empty() {
             return Ok(Ran::ToTheEnd);
         }
-        let watched = Watched(RefCell::new((f, None)));
+        let watched = Watched {
+            f: RefCell::new(f),
+            bad: RefCell::new(None),
+        };
         let mut method = self.started(&watched, leg)?;
         loop {
             let proposed = method.h();
             let step = leg.step(proposed);
-            {
-                let (f, bad) = &mut *watched.0.borrow_mut();
-                leg.check_step(*f, step, bad.as_ref())?;
-                leg.spend(*f, self.tolerances.budget)?;
-            }
+            leg.check_step(*watched.f.borrow_mut(), step, watched.bad.borrow().as_ref())?;
+            leg.spend(*watched.f.borrow_mut(), self.tolerances.budget)?;
             method.set_h(step);
             let failed = match method.step(&watched) {
                 // its own alarm for stiffness; ours decides
@@ -75,12 +77,11 @@ impl Adaptive {
             };
             method.set_h(next);
             self.pace.next = next;
-            let (f, bad) = &mut *watched.0.borrow_mut();
-            *bad = None;
+            watched.bad.replace(None);
             if leg.at_the_end() {
                 return Ok(Ran::ToTheEnd);
             }
-            if self.should_change(*f, leg.t, leg.x, step) {
+            if self.should_change(*watched.f.borrow_mut(), leg.t, leg.x, step) {
                 return Ok(Ran::ToTheChange);
             }
         }
@@ -105,8 +106,7 @@ impl Adaptive {
         match method.init(watched, leg.t, leg.to, &x) {
             Ok(_) => Ok(method),
             Err(_) => {
-                let (f, bad) = &mut *watched.0.borrow_mut();
-                leg.check_step(*f, 0.0, bad.as_ref())?;
+                leg.check_step(*watched.f.borrow_mut(), 0.0, watched.bad.borrow().as_ref())?;
                 Ok(method)
             }
         }

@@ -51,6 +51,9 @@ struct Pace {
     agreeing: usize,
 }
 
+/// A time and a state.
+type Point = (f64, Vec<f64>);
+
 /// Why a method returned without an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ran {
@@ -180,7 +183,7 @@ impl Leg<'_> {
         &self,
         f: &mut impl Dynamics,
         step: f64,
-        bad: Option<&(f64, Vec<f64>)>,
+        bad: Option<&Point>,
     ) -> Result<(), Error> {
         if step > resolution(self.t) {
             return Ok(());

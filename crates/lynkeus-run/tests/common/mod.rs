@@ -24,5 +24,6 @@ pub fn system<'g>(
         .iter()
         .map(|(name, e)| (name.to_string(), e.node()))
         .collect();
-    System::new(g, symbol("time"), &named, &signals, &derivatives, &outputs).unwrap()
+    System::new(g, symbol("time"), &named, &signals, &derivatives, &outputs)
+        .expect("the expressions read known symbols")
 }
