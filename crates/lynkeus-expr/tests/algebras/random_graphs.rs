@@ -210,11 +210,13 @@ proptest! {
                 prop_assert!(pattern[row].contains(&column));
                 dense[row][column] = to_f64(value);
             }
-            for column in 0..INPUTS {
-                for (row, exact) in differences(&tape, &x, column).into_iter().enumerate() {
-                    let off = (dense[row][column] - exact).abs() / exact.abs().max(1.0);
-                    prop_assert!(off < 1e-10, "{} for {exact}: {}",
-                        dense[row][column], graph.render(outputs[row], 400));
+            let exact: Vec<Vec<f64>> =
+                (0..INPUTS).map(|column| differences(&tape, &x, column)).collect();
+            for (row, dense) in dense.iter().enumerate() {
+                for (found, exact) in dense.iter().zip(&exact) {
+                    let off = (found - exact[row]).abs() / exact[row].abs().max(1.0);
+                    prop_assert!(off < 1e-10, "{found} for {}: {}",
+                        exact[row], graph.render(outputs[row], 400));
                 }
             }
         }
