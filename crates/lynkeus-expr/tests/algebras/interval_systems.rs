@@ -1,7 +1,7 @@
 //! Enclosures of linear systems hold the exact solutions of every system inside.
 
 use crate::exact::{Exact, holds};
-use crate::sample::{member, moderate};
+use crate::sample::{interval_and_member, member, moderate};
 use astro_float::BigFloat;
 use lynkeus_expr::Algebra;
 use lynkeus_expr::interval::{Interval, solve};
@@ -58,6 +58,16 @@ proptest! {
         let a: Vec<Interval> = a.iter().zip(inside).map(|(x, p)| x.hull(Interval::point(p))).collect();
         let (x, regular) = solve(&a, &b);
         prop_assert!(!regular && x.iter().all(|x| !x.is_defined() && *x == Interval::ENTIRE.hull(*x)));
+    }
+
+    /// Whatever the coefficients, there is an answer, and no bound is NaN.
+    #[test]
+    fn any_system_is_answered(entries in prop::collection::vec(interval_and_member(), 0..20), n in 0_usize..5) {
+        let entries: Vec<Interval> = entries.into_iter().map(|(x, _)| x).collect();
+        let (b, a) = entries.split_at(n.min(entries.len()));
+        let (x, regular) = solve(&a[..(n * n).min(a.len())], b);
+        prop_assert_eq!(x.len(), b.len());
+        prop_assert!(x.iter().all(|x| x.lo() <= x.hi() && (regular || !x.is_defined())));
     }
 
     /// Without uncertainty in the data the enclosure is about as wide as the condition of the matrix explains.
