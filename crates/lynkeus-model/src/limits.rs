@@ -17,8 +17,10 @@ pub(crate) const MAX_SYNTAX_NODES: usize = 2_000_000;
 pub(crate) const MAX_ELABORATED: u64 = 2_000_000;
 /// Most scalar variables and parameters of one model.
 pub(crate) const MAX_SCALARS: u64 = 200_000;
+/// Most derivatives that may share their equations.
+pub(crate) const MAX_COUPLED: usize = 64;
 /// Most steps while equations are solved for their unknowns.
-pub(crate) const MAX_SOLVE_STEPS: u64 = 20_000_000;
+pub(crate) const MAX_SOLVE_STEPS: u64 = 5_000_000;
 
 /// Counts scalar operations against a limit.
 #[derive(Debug)]

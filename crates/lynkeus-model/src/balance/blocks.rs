@@ -8,7 +8,7 @@ use super::incidence::{Incidence, arguments};
 use super::linear::{Form, Linear};
 use super::matching::Matching;
 use super::{FlatEquation, System, Unknown};
-use crate::limits::{Budget, MAX_SOLVE_STEPS};
+use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
 use crate::syntax::{Problem, Result};
 
 pub(super) struct Solver<'a> {
@@ -90,9 +90,8 @@ impl<'a> Solver<'a> {
         if pairs.iter().any(|(_, unknown)| unknown.state.is_none()) {
             return Err(self.algebraic_loop(pairs));
         }
-        let n = pairs.len() as u64;
-        if let Some((equation, _)) = pairs.first() {
-            self.budget.charge(n.saturating_mul(n), equation.span)?;
+        if pairs.len() > MAX_COUPLED {
+            return Err(too_many_coupled(pairs));
         }
         let zero = self.system.graph.constant(0.0).node();
         let (mut matrix, mut right) = (vec![], vec![]);
@@ -201,6 +200,17 @@ impl<'a> Solver<'a> {
             .label(format!("the equations of the loop are on {lines}"))
             .hint("solve them by hand, so that each variable follows from those before it")
     }
+}
+
+fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)]) -> Problem {
+    let span = pairs
+        .iter()
+        .map(|(equation, _)| equation.span)
+        .min_by_key(|span| span.start);
+    let n = pairs.len();
+    let message = format!("{n} derivatives share their equations; at most {MAX_COUPLED} may");
+    Problem::new(span.unwrap_or_default(), message)
+        .hint("write the equations solved for their derivatives")
 }
 
 fn not_linear(equation: &FlatEquation, unknown: &Unknown) -> Problem {

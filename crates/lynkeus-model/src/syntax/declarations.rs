@@ -138,7 +138,7 @@ impl Parser<'_> {
     }
 
     fn declarator(&mut self, prefix: Prefix) -> Result<Declaration> {
-        self.count()?;
+        self.count(8)?;
         let name = self.identifier("the name of a variable")?;
         let mut dimensions = vec![];
         if self.at(Symbol::OpenBracket) {

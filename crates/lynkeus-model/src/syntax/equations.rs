@@ -12,7 +12,7 @@ impl Parser<'_> {
     }
 
     fn equation_here(&mut self) -> Result<Equation> {
-        self.count()?;
+        self.count(2)?;
         let start = self.span;
         self.refuse_unsupported_equation()?;
         let kind = match self.token {
@@ -126,7 +126,10 @@ impl Parser<'_> {
         loop {
             let name = self.identifier("the name of an iterator")?;
             if iterators.len() >= MAX_ITERATORS {
-                return Err(Problem::new(name, format!("more than {MAX_ITERATORS} iterators")));
+                return Err(Problem::new(
+                    name,
+                    format!("more than {MAX_ITERATORS} iterators"),
+                ));
             }
             self.refuse_repeated(&iterators, name)?;
             if !self.at_word(Keyword::In) {

@@ -63,7 +63,7 @@ impl Parser<'_> {
         let mut rest = vec![];
         while let Some(operator) = chain_operator(self.token, level) {
             self.advance()?;
-            self.count()?;
+            self.count(1)?;
             rest.push((operator, self.chain_operand(level, false)?));
         }
         if rest.is_empty() {

@@ -150,9 +150,9 @@ impl<'s> Parser<'s> {
         result
     }
 
-    /// Counts one more part of the syntax tree.
-    pub(super) fn count(&mut self) -> Result<()> {
-        self.nodes += 1;
+    /// Counts one more part of the syntax tree, as many as its memory weighs.
+    pub(super) fn count(&mut self, weight: usize) -> Result<()> {
+        self.nodes += weight;
         if self.nodes > MAX_SYNTAX_NODES {
             let limit = grouped(MAX_SYNTAX_NODES as u64);
             let message = format!("the text has more than {limit} operands and operators");
@@ -163,7 +163,7 @@ impl<'s> Parser<'s> {
 
     /// Adds an expression that spans from `start` to the last token.
     pub(super) fn push(&mut self, kind: Kind, start: Span, first: ExprId) -> Result<ExprId> {
-        self.count()?;
+        self.count(1)?;
         let id = self.next_id();
         let span = start.to(self.last);
         self.ast.expressions.push(Expression { kind, span, first });

@@ -19,7 +19,10 @@ fn factors_of_derivatives() {
         "(x^2 + 1)*der(x) = 3*x*(1 + x^2);",
         "if x > 0 then 2*der(x) else der(x) = if x > 0 then 6*x else 0;",
     ] {
-        let equation = equation.replace("if x > 0 then 2*der(x) else der(x) =", "(if x > 0 then 2*der(x) else der(x)) =");
+        let equation = equation.replace(
+            "if x > 0 then 2*der(x) else der(x) =",
+            "(if x > 0 then 2*der(x) else der(x)) =",
+        );
         let plant = plant(&model("Real x;", &equation));
         assert_eq!(slopes(&plant, &[("x", 4.0)]), [12.0], "{equation}");
     }
@@ -40,10 +43,16 @@ fn algebraic_variables_are_sorted() {
 
 #[test]
 fn an_output_may_be_a_state() {
-    let plant = plant(&model("output Real x(min = 1); Real z = der(x);", "der(x) = -x;"));
+    let plant = plant(&model(
+        "output Real x(min = 1); Real z = der(x);",
+        "der(x) = -x;",
+    ));
     assert_eq!((plant.states.len(), plant.outputs.len()), (1, 1));
     assert_eq!(plant.outputs[0].node, plant.states[0].node);
-    assert_eq!(values(&plant, &[plant.algebraics[0].node], &[("x", 3.0)]), [-3.0]);
+    assert_eq!(
+        values(&plant, &[plant.algebraics[0].node], &[("x", 3.0)]),
+        [-3.0]
+    );
 }
 
 #[test]
@@ -78,17 +87,42 @@ fn missing_equations_name_the_variable() {
     );
     let found = refused(&model("Real x; Real a; Real b;", "der(x) = a;\na + b = x;"));
     assert!(found.message.ends_with("lacks an equation"), "{found}");
-    assert!(found.hint.unwrap().contains("2 equations on lines 4 and 5 contain 3 unknowns: `der(x)`, `a`, `b`"));
+    assert!(
+        found
+            .hint
+            .unwrap()
+            .contains("2 equations on lines 4 and 5 contain 3 unknowns: `der(x)`, `a`, `b`")
+    );
 }
 
 #[test]
 fn surplus_equations_name_the_line() {
     let cases = [
-        ("Real x; Real y;", "der(x) = 1;\ny = x;\ny = 2*x;", 6, "line 5 already determines `y`"),
+        (
+            "Real x; Real y;",
+            "der(x) = 1;\ny = x;\ny = 2*x;",
+            6,
+            "line 5 already determines `y`",
+        ),
         ("Real x;", "der(x) = 1;\nx = 3;", 5, "`x` is a state"),
-        ("Real x; input Real u;", "der(x) = u;\nu = 3;", 5, "`u` is an input"),
-        ("Real x; input Real u;", "der(x) = u;\nx + u = 3;", 5, "nothing that is still"),
-        ("Real x; Real y; Real z;", "der(x) = y;\ny = x;\ny = 2*x;", 6, "variable `z` lacks"),
+        (
+            "Real x; input Real u;",
+            "der(x) = u;\nu = 3;",
+            5,
+            "`u` is an input",
+        ),
+        (
+            "Real x; input Real u;",
+            "der(x) = u;\nx + u = 3;",
+            5,
+            "nothing that is still",
+        ),
+        (
+            "Real x; Real y; Real z;",
+            "der(x) = y;\ny = x;\ny = 2*x;",
+            6,
+            "variable `z` lacks",
+        ),
     ];
     for (declarations, equations, line, hint) in cases {
         let found = refused(&model(declarations, equations));
@@ -100,10 +134,16 @@ fn surplus_equations_name_the_line() {
 
 #[test]
 fn loops_name_their_variables() {
-    let found = refused(&model("Real x; Real a; Real b;", "der(x) = a;\na = b + x;\nb = sin(a);"));
+    let found = refused(&model(
+        "Real x; Real a; Real b;",
+        "der(x) = a;\na = b + x;\nb = sin(a);",
+    ));
     assert_eq!(found.message, "algebraic loop: `a`, `b` need each other");
     assert_eq!(found.line, 5);
-    assert_eq!(found.label.unwrap(), "the equations of the loop are on lines 5 and 6");
+    assert_eq!(
+        found.label.unwrap(),
+        "the equations of the loop are on lines 5 and 6"
+    );
 }
 
 #[test]

@@ -4,16 +4,22 @@ use std::time::{Duration, Instant};
 
 use lynkeus_model::{Diagnostic, LoadOptions, Plant, parse_expression};
 
-/// The refusal, which must come within a second.
+/// A second on an idle machine; the bound leaves room for a busy one.
+const SOON: Duration = Duration::from_secs(5);
+
+/// The refusal, which must come soon.
 fn refused(text: &str) -> Diagnostic {
     let start = Instant::now();
     let result = Plant::from_modelica(text, "hostile.mo", &LoadOptions::default());
     let elapsed = start.elapsed();
-    eprintln!("{elapsed:?} {}", text.chars().take(70).collect::<String>());
-    assert!(elapsed < Duration::from_secs(1), "{elapsed:?}");
+    assert!(elapsed < SOON, "{elapsed:?}");
     let refused = result.err().expect("must be refused");
     // Also the rendered text stays short.
-    assert!(refused.to_string().len() < 4000, "{}", refused.to_string().len());
+    assert!(
+        refused.to_string().len() < 4000,
+        "{}",
+        refused.to_string().len()
+    );
     refused
 }
 
@@ -46,13 +52,27 @@ fn deep_nesting() {
     }
     let nested = format!("{}1{}", "(".repeat(n), ")".repeat(n));
     let graph = lynkeus_expr::Graph::new();
-    assert_eq!(parse_expression(&nested, &graph, &|_| None).unwrap_err().message, levels);
+    assert_eq!(
+        parse_expression(&nested, &graph, &|_| None)
+            .unwrap_err()
+            .message,
+        levels
+    );
 }
 
 #[test]
 fn the_deepest_allowed_nesting_is_taken() {
-    for (open, close) in [("(", ")"), ("-(", ")"), ("sin(", ")"), ("if x > 0 then 1 else (", ")")] {
-        let n = if open.len() > 5 || open == "-(" { 60 } else { 180 };
+    for (open, close) in [
+        ("(", ")"),
+        ("-(", ")"),
+        ("sin(", ")"),
+        ("if x > 0 then 1 else (", ")"),
+    ] {
+        let n = if open.len() > 5 || open == "-(" {
+            60
+        } else {
+            180
+        };
         let text = equation(&format!("der(x) = {}x{}", open.repeat(n), close.repeat(n)));
         let plant = Plant::from_modelica(&text, "deep.mo", &LoadOptions::default());
         assert!(plant.is_ok(), "{open}: {}", plant.unwrap_err());
@@ -63,11 +83,14 @@ fn the_deepest_allowed_nesting_is_taken() {
 fn long_chains() {
     // Taken, or refused by a limit: never a stack overflow, also when all is dropped.
     for operator in ["+", "-", "*", "/", ".+"] {
-        let text = equation(&format!("der(x) = {}x", format!("x{operator}").repeat(400_000)));
+        let text = equation(&format!(
+            "der(x) = {}x",
+            format!("x{operator}").repeat(400_000)
+        ));
         let start = Instant::now();
         let plant = Plant::from_modelica(&text, "chain.mo", &LoadOptions::default());
         assert!(plant.is_ok(), "{}", plant.unwrap_err());
-        assert!(start.elapsed() < Duration::from_secs(2), "{:?}", start.elapsed());
+        assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
     }
     for word in [" and ", " or "] {
         let chain = format!("x > 0{word}").repeat(100_000);
@@ -76,16 +99,26 @@ fn long_chains() {
     }
     let million = equation(&format!("der(x) = {}x", "x+".repeat(1_000_000)));
     let found = refused(&million);
-    assert_eq!(found.message, "the text has more than 2,000,000 operands and operators");
+    assert_eq!(
+        found.message,
+        "the text has more than 2,000,000 operands and operators"
+    );
 }
 
 #[test]
 fn a_line_of_ten_megabytes() {
     let long = "x".repeat(10 << 20);
     let found = refused(&equation(&format!("der(x) = {long}")));
-    assert!(found.message.starts_with("unknown name `xxxx"), "{}", found.message);
+    assert!(
+        found.message.starts_with("unknown name `xxxx"),
+        "{}",
+        found.message
+    );
     let found = refused(&equation(&format!("der(x) = /*{long}*/ y")));
-    assert_eq!(found.column as usize, 1 + "model M Real x; equation der(x) = /**/ ".len() + long.len());
+    assert_eq!(
+        found.column as usize,
+        1 + "model M Real x; equation der(x) = /**/ ".len() + long.len()
+    );
     assert!(found.to_string().contains("*/ y; end M;"), "{found}");
     refused(&format!("model M \"{long}\" Real"));
     refused(&"é".repeat(5 << 20));
@@ -101,24 +134,72 @@ fn huge_sizes_and_loops() {
     let scalars = "200,000 scalar variables and parameters";
     let operations = "2,000,000 scalar operations";
     for (text, limit) in [
-        (format!("model M Real x[{million}]; equation der(x) = x; end M;"), scalars),
-        (format!("model M Real x[{million},{million},{million}]; end M;"), scalars),
+        (
+            format!("model M Real x[{million}]; equation der(x) = x; end M;"),
+            scalars,
+        ),
+        (
+            format!("model M Real x[{million},{million},{million}]; end M;"),
+            scalars,
+        ),
         (format!("model M Real x[{million},0]; end M;"), scalars),
-        (format!("model M Real x[1000,1000]; equation der(x) = x; end M;"), scalars),
-        (format!("model M parameter Real p[{million}] = ones({million}); end M;"), operations),
-        (equation(&format!("for i in 1:{million} loop der(x) = x; end for")), operations),
-        (equation(&format!("for i in 1:{million} loop end for")), operations),
-        (equation("for i in 1:2000, j in 1:2000 loop end for"), operations),
-        (equation("for i in 1:9000000000000000000 loop end for"), operations),
-        (equation("for i in -9000000000000000000:9000000000000000000 loop end for"), operations),
+        (
+            format!("model M Real x[1000,1000]; equation der(x) = x; end M;"),
+            scalars,
+        ),
+        (
+            format!("model M parameter Real p[{million}] = ones({million}); end M;"),
+            operations,
+        ),
+        (
+            equation(&format!("for i in 1:{million} loop der(x) = x; end for")),
+            operations,
+        ),
+        (
+            equation(&format!("for i in 1:{million} loop end for")),
+            operations,
+        ),
+        (
+            equation("for i in 1:2000, j in 1:2000 loop end for"),
+            operations,
+        ),
+        (
+            equation("for i in 1:9000000000000000000 loop end for"),
+            operations,
+        ),
+        (
+            equation("for i in -9000000000000000000:9000000000000000000 loop end for"),
+            operations,
+        ),
         (equation("for i in 0:1e-300:1 loop end for"), operations),
-        (equation(&format!("der(x) = sum(zeros({million}))")), operations),
-        (equation(&format!("der(x) = sum(zeros({million}, 0))")), operations),
-        (equation(&format!("der(x) = sum(identity({million}))")), operations),
-        (equation(&format!("der(x) = sum(linspace(0, 1, {million}))")), operations),
-        (equation("der(x) = sum(i*j*k for i in 1:1000, j in 1:1000, k in 1:1000)"), operations),
-        (equation("der(x) = sum({{{0 for i in 1:1000} for j in 1:1000} for k in 1:1000})"), operations),
-        (equation("der(x) = sum(ones(1000, 1000)*ones(1000, 1000))"), operations),
+        (
+            equation(&format!("der(x) = sum(zeros({million}))")),
+            operations,
+        ),
+        (
+            equation(&format!("der(x) = sum(zeros({million}, 0))")),
+            operations,
+        ),
+        (
+            equation(&format!("der(x) = sum(identity({million}))")),
+            operations,
+        ),
+        (
+            equation(&format!("der(x) = sum(linspace(0, 1, {million}))")),
+            operations,
+        ),
+        (
+            equation("der(x) = sum(i*j*k for i in 1:1000, j in 1:1000, k in 1:1000)"),
+            operations,
+        ),
+        (
+            equation("der(x) = sum({{{0 for i in 1:1000} for j in 1:1000} for k in 1:1000})"),
+            operations,
+        ),
+        (
+            equation("der(x) = sum(ones(1000, 1000)*ones(1000, 1000))"),
+            operations,
+        ),
         (equation("der(x) = sum(fill(1, 200, 200, 200))"), operations),
     ] {
         let found = refused(&text);
@@ -136,12 +217,21 @@ fn many_iterators() {
 #[test]
 fn long_chains_of_parameters() {
     let n = 50_000;
-    let chain: Vec<String> = (1..n).map(|i| format!("parameter Real p{i} = p{};", i + 1)).collect();
+    let chain: Vec<String> = (1..n)
+        .map(|i| format!("parameter Real p{i} = p{};", i + 1))
+        .collect();
     let text = |last: &str| {
-        format!("model M {} {last} Real x; equation der(x) = p1; end M;", chain.join(" "))
+        format!(
+            "model M {} {last} Real x; equation der(x) = p1; end M;",
+            chain.join(" ")
+        )
     };
     let cycle = refused(&text(&format!("parameter Real p{n} = p1;")));
-    assert!(cycle.message.contains("… 49992 more …"), "{}", cycle.message);
+    assert!(
+        cycle.message.contains("… 49992 more …"),
+        "{}",
+        cycle.message
+    );
     let taken = text(&format!("parameter Real p{n} = 3;"));
     assert!(Plant::from_modelica(&taken, "chain.mo", &LoadOptions::default()).is_ok());
 }
@@ -156,10 +246,14 @@ fn long_chains_of_algebraic_variables() {
         )
     };
     let found = refused(&text("a[1]"));
-    assert!(found.message.starts_with("algebraic loop: `a[1]`, "), "{}", found.message);
+    assert!(
+        found.message.starts_with("algebraic loop: `a[1]`, "),
+        "{}",
+        found.message
+    );
     let start = Instant::now();
     assert!(Plant::from_modelica(&text("x"), "chain.mo", &LoadOptions::default()).is_ok());
-    assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+    assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
 }
 
 #[test]
@@ -167,15 +261,32 @@ fn dense_systems() {
     let text = "model M parameter Integer n = 500; Real a[n]; Real x; equation der(x) = 1; \
                 for i in 1:n loop a[i] = sum(a); end for; end M;";
     assert!(refused(text).message.starts_with("algebraic loop"));
-    let mass = "model M parameter Integer n = 400; Real v[n]; equation \
-                for i in 1:n loop sum(der(v)) + der(v[i]) = 1; end for; end M;";
-    let found = refused(mass);
-    assert!(found.message.contains("20,000,000 steps"), "{}", found.message);
+    let mass = |n: usize| {
+        format!(
+            "model M parameter Integer n = {n}; Real v[n]; equation \
+             for i in 1:n loop sum(der(v)) + der(v[i]) = 1; end for; end M;"
+        )
+    };
+    let found = refused(&mass(400));
+    assert_eq!(
+        found.message,
+        "400 derivatives share their equations; at most 64 may"
+    );
+    let start = Instant::now();
+    assert!(Plant::from_modelica(&mass(64), "mass.mo", &LoadOptions::default()).is_ok());
+    assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
 }
 
 #[test]
 fn control_characters() {
-    for text in ["\0", "model M\0 end M;", "\u{1b}[31m", "model \u{200b}M", "\r\r\r", "model M;\r\n;"] {
+    for text in [
+        "\0",
+        "model M\0 end M;",
+        "\u{1b}[31m",
+        "model \u{200b}M",
+        "\r\r\r",
+        "model M;\r\n;",
+    ] {
         refused(text);
     }
 }
@@ -190,11 +301,23 @@ fn numbers_at_the_edge() {
         "integer(1e300)",
     ] {
         let found = refused(&equation(&format!("der(x) = {expression}")));
-        assert!(found.message.contains("does not fit in 64 bits"), "{expression}: {found}");
+        assert!(
+            found.message.contains("does not fit in 64 bits"),
+            "{expression}: {found}"
+        );
     }
-    for expression in ["rem(-9223372036854775807 - 1, -1)", "0^0", "2^10000", "(-8)^(1/3)"] {
+    for expression in [
+        "rem(-9223372036854775807 - 1, -1)",
+        "0^0",
+        "2^10000",
+        "(-8)^(1/3)",
+    ] {
         // Taken or refused, without a panic.
         let text = equation(&format!("der(x) = {expression}"));
-        drop(Plant::from_modelica(&text, "edge.mo", &LoadOptions::default()));
+        drop(Plant::from_modelica(
+            &text,
+            "edge.mo",
+            &LoadOptions::default(),
+        ));
     }
 }

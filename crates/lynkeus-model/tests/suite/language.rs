@@ -1,6 +1,6 @@
 //! Constructs of the language mean what Modelica says.
-use lynkeus_model::{LoadOptions, Plant, parse_expression};
 use crate::support::{plant, slopes, values};
+use lynkeus_model::{LoadOptions, Plant, parse_expression};
 
 /// A state whose derivative is the expression, evaluated with x = 2, u = 3, time = 5.
 fn value(expression: &str) -> f64 {
@@ -53,15 +53,24 @@ fn scalar_functions() {
         ("sqrt(x)", 2f64.sqrt()),
         ("exp(x) + log(x)", 2f64.exp() + 2f64.ln()),
         ("log10(x*50)", 2.0),
-        ("sin(x) + cos(x) + tan(x)", 2f64.sin() + 2f64.cos() + 2f64.tan()),
+        (
+            "sin(x) + cos(x) + tan(x)",
+            2f64.sin() + 2f64.cos() + 2f64.tan(),
+        ),
         ("asin(x/4) + acos(x/4)", 0.5f64.asin() + 0.5f64.acos()),
         ("atan(x) + atan2(x, u)", 2f64.atan() + 2f64.atan2(3.0)),
-        ("sinh(x) + cosh(x) + tanh(x)", 2f64.sinh() + 2f64.cosh() + 2f64.tanh()),
+        (
+            "sinh(x) + cosh(x) + tanh(x)",
+            2f64.sinh() + 2f64.cosh() + 2f64.tanh(),
+        ),
         ("abs(-x) + sign(-x)", 1.0),
         ("min(x, u) + 10*max(x, u)", 32.0),
         ("floor(-2.5) + ceil(x + 0.1)", 0.0),
         ("integer(u + 0.7)", 3.0),
-        ("mod(-7, 3) + 10*rem(-7, 3) + 100*div(-7, 3)", 2.0 - 10.0 - 200.0),
+        (
+            "mod(-7, 3) + 10*rem(-7, 3) + 100*div(-7, 3)",
+            2.0 - 10.0 - 200.0,
+        ),
         ("mod(7, -3)", -2.0),
         ("mod(-3.5*x, u)", 2.0),
         ("rem(-3.5*x, u)", -1.0),
@@ -137,11 +146,25 @@ fn array_equations_and_slices() {
            der(z) = A*z + {0, 1}*u;
          end Heat;",
     );
-    let names: Vec<&str> = plant.states.iter().map(|state| state.name.as_str()).collect();
+    let names: Vec<&str> = plant
+        .states
+        .iter()
+        .map(|state| state.name.as_str())
+        .collect();
     assert_eq!(names, ["x[1]", "x[2]", "x[3]", "x[4]", "z[1]", "z[2]"]);
-    assert_eq!((plant.states[1].start, plant.states[5].start), (Some(1.0), Some(6.0)));
+    assert_eq!(
+        (plant.states[1].start, plant.states[5].start),
+        (Some(1.0), Some(6.0))
+    );
     assert_eq!(plant.states[3].min, 0.0);
-    let given = [("x[1]", 1.0), ("x[3]", 5.0), ("x[4]", 2.0), ("z[1]", 3.0), ("z[2]", 7.0), ("u", 10.0)];
+    let given = [
+        ("x[1]", 1.0),
+        ("x[3]", 5.0),
+        ("x[4]", 2.0),
+        ("z[1]", 3.0),
+        ("z[2]", 7.0),
+        ("u", 10.0),
+    ];
     assert_eq!(slopes(&plant, &given), [0.0, 6.0, -8.0, 10.0, 7.0, -17.0]);
 }
 
@@ -171,7 +194,10 @@ fn known_conditions_leave_the_other_branch_unread() {
            end for;
          end M;",
     );
-    assert_eq!(slopes(&plant, &[("x[1]", 1.0), ("x[2]", 2.0)]), [7.0, 1.0, 2.0]);
+    assert_eq!(
+        slopes(&plant, &[("x[1]", 1.0), ("x[2]", 2.0)]),
+        [7.0, 1.0, 2.0]
+    );
 }
 
 #[test]
@@ -230,11 +256,28 @@ fn several_models_in_a_text() {
                 model B Real y; equation der(y) = 2; end B;";
     let load = |model: Option<&str>| {
         let model = model.map(str::to_owned);
-        Plant::from_modelica(text, "t.mo", &LoadOptions { model, ..LoadOptions::default() })
+        Plant::from_modelica(
+            text,
+            "t.mo",
+            &LoadOptions {
+                model,
+                ..LoadOptions::default()
+            },
+        )
     };
     assert_eq!(load(Some("B")).unwrap().states[0].name, "y");
-    assert!(load(None).unwrap_err().one_line().contains("its models are A, B"));
-    assert!(load(Some("Bb")).unwrap_err().one_line().contains("did you mean `B`"));
+    assert!(
+        load(None)
+            .unwrap_err()
+            .one_line()
+            .contains("its models are A, B")
+    );
+    assert!(
+        load(Some("Bb"))
+            .unwrap_err()
+            .one_line()
+            .contains("did you mean `B`")
+    );
 }
 
 #[test]
@@ -249,13 +292,33 @@ fn study_expressions() {
     tape.evaluator().eval(&[4.0, 0.25], &mut out);
     assert_eq!(out, [9.0]);
     for (text, expected) in [
-        ("tme", "expression:1:1: unknown name `tme` (did you mean `time`?)"),
-        ("1 +", "expression:1:4: expected an operand, found the end of the text"),
-        ("1 2", "expression:1:3: expected an operator or the end of the expression, found `2`"),
-        ("{1, 2}", "expression:1:1: expected a number, found an array or a condition"),
-        ("der(time)", "expression:1:5: `der(time)`: `time` is not a Real variable (inputs and \
-          parameters have no derivative in the equations)"),
+        (
+            "tme",
+            "expression:1:1: unknown name `tme` (did you mean `time`?)",
+        ),
+        (
+            "1 +",
+            "expression:1:4: expected an operand, found the end of the text",
+        ),
+        (
+            "1 2",
+            "expression:1:3: expected an operator or the end of the expression, found `2`",
+        ),
+        (
+            "{1, 2}",
+            "expression:1:1: expected a number, found an array or a condition",
+        ),
+        (
+            "der(time)",
+            "expression:1:5: `der(time)`: `time` is not a Real variable (inputs and \
+          parameters have no derivative in the equations)",
+        ),
     ] {
-        assert_eq!(parse_expression(text, &graph, &names).unwrap_err().one_line(), expected);
+        assert_eq!(
+            parse_expression(text, &graph, &names)
+                .unwrap_err()
+                .one_line(),
+            expected
+        );
     }
 }

@@ -20,8 +20,15 @@ equation
 end M;";
 
 fn load(text: &str, parameters: &[(&str, f64)], symbolic: bool) -> Result<Plant, Diagnostic> {
-    let parameters = parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
-    let options = LoadOptions { parameters, symbolic_parameters: symbolic, model: None };
+    let parameters = parameters
+        .iter()
+        .map(|(name, value)| ((*name).to_owned(), *value))
+        .collect();
+    let options = LoadOptions {
+        parameters,
+        symbolic_parameters: symbolic,
+        model: None,
+    };
     Plant::from_modelica(text, "test.mo", &options)
 }
 
@@ -84,13 +91,20 @@ fn symbolic_parameters_without_value() {
     end M;";
     let plant = load(text, &[], true).unwrap();
     assert_eq!((plant.states[0].start, plant.states[0].max), (None, 1.0));
-    let names: Vec<&str> = plant.parameters.iter().map(|p| p.variable.name.as_str()).collect();
+    let names: Vec<&str> = plant
+        .parameters
+        .iter()
+        .map(|p| p.variable.name.as_str())
+        .collect();
     assert_eq!(names, ["k", "w[1]", "w[2]"]);
     let given = [("k", 3.0), ("x", 2.0), ("w[1]", 10.0), ("w[2]", 20.0)];
     assert_eq!(slopes(&plant, &given), [42.0]);
     assert_eq!(values(&plant, &[plant.outputs[0].node], &given), [6.0]);
     let refused = load(text, &[], false).unwrap_err();
-    assert_eq!((refused.line, refused.message.as_str()), (2, "parameter `k` has no value"));
+    assert_eq!(
+        (refused.line, refused.message.as_str()),
+        (2, "parameter `k` has no value")
+    );
     let with_values = load(text, &[("k", 3.0), ("w[1]", 10.0), ("w[2]", 20.0)], false).unwrap();
     assert_eq!(slopes(&with_values, &[("x", 2.0)]), [42.0]);
     assert_eq!(with_values.states[0].start, Some(3.0));
@@ -100,7 +114,11 @@ fn symbolic_parameters_without_value() {
 fn a_size_without_value() {
     let text = "model M parameter Integer n; Real x[n]; equation der(x) = -x; end M;";
     let refused = load(text, &[], true).unwrap_err();
-    assert!(refused.message.contains("parameter `n` has no value, but one is needed"));
+    assert!(
+        refused
+            .message
+            .contains("parameter `n` has no value, but one is needed")
+    );
     assert_eq!(load(text, &[("n", 4.0)], true).unwrap().states.len(), 4);
 }
 
@@ -120,14 +138,42 @@ fn symbolic_exponents_and_conditions() {
 #[test]
 fn refused_overrides() {
     for (name, value, expected) in [
-        ("k4", 1.0, "test.mo:1:7: model `M` has no parameter `k4` (did you mean `k1` or `k2` or"),
+        (
+            "k4",
+            1.0,
+            "test.mo:1:7: model `M` has no parameter `k4` (did you mean `k1` or `k2` or",
+        ),
         ("zzz", 1.0, "(its parameters are n, k3, k2, k1, H)"),
-        ("c", 1.0, "`c` is a final parameter; its value cannot be set from outside"),
-        ("g", 1.0, "`g` is a constant; its value cannot be set from outside"),
-        ("x", 1.0, "`x` is a variable; its value cannot be set from outside"),
-        ("H", 1.0, "a value is given for `H` a scalar, which has the size [2]"),
-        ("H[3]", 1.0, "a value is given for `H` [3], which has the size [2]"),
-        ("k1[1]", 1.0, "a value is given for `k1` [1], which has the size a scalar"),
+        (
+            "c",
+            1.0,
+            "`c` is a final parameter; its value cannot be set from outside",
+        ),
+        (
+            "g",
+            1.0,
+            "`g` is a constant; its value cannot be set from outside",
+        ),
+        (
+            "x",
+            1.0,
+            "`x` is a variable; its value cannot be set from outside",
+        ),
+        (
+            "H",
+            1.0,
+            "a value is given for `H` a scalar, which has the size [2]",
+        ),
+        (
+            "H[3]",
+            1.0,
+            "a value is given for `H` [3], which has the size [2]",
+        ),
+        (
+            "k1[1]",
+            1.0,
+            "a value is given for `k1` [1], which has the size a scalar",
+        ),
         ("H[", 1.0, "`H[` is not the name of a parameter"),
         ("n", 2.5, "`n` is an Integer and is given the value 2.5"),
         ("k1", f64::NAN, "parameter `k1` is given the value NaN"),

@@ -29,7 +29,12 @@ pub fn values(plant: &Plant, nodes: &[Node], given: &[(&str, f64)]) -> Vec<f64> 
         .collect();
     symbols.push(("time", plant.time));
     let inputs: Vec<Node> = symbols.iter().map(|(_, node)| *node).collect();
-    let value = |name: &str| given.iter().find(|(known, _)| *known == name).map_or(0.0, |g| g.1);
+    let value = |name: &str| {
+        given
+            .iter()
+            .find(|(known, _)| *known == name)
+            .map_or(0.0, |g| g.1)
+    };
     let numbers: Vec<f64> = symbols.iter().map(|(name, _)| value(name)).collect();
     let tape = Tape::new(&plant.graph, &inputs, nodes).unwrap();
     let mut out = vec![0.0; nodes.len()];
