@@ -1,6 +1,6 @@
 //! One integrator for every method, stopping at every switch.
 
-use crate::adaptive::{Adaptive, Choice};
+use crate::adaptive::{Adaptive, Choice, resolution};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 
 /// Most fixed steps in one interval.
@@ -101,7 +101,8 @@ impl Integrator {
     /// is the last state reached.
     ///
     /// # Errors
-    /// [`Error::NotFinite`], [`Error::StepUnderflow`], [`Error::StepBudget`],
+    /// [`Error::Setting`] for an interval that is empty or too short for the
+    /// resolution of time; [`Error::NotFinite`], [`Error::StepUnderflow`], [`Error::StepBudget`],
     /// [`Error::TooStiff`], [`Error::TooManySwitches`]; [`Error::Diverged`] where a
     /// fixed step is too large.
     pub fn advance(
@@ -111,6 +112,14 @@ impl Integrator {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
+        let shortest = 4.0 * resolution(to);
+        let length = to - from;
+        if length.is_nan() || length <= shortest {
+            let what = format!("interval from t = {from} to {to}");
+            let expected =
+                format!("more than {shortest:e}, which time resolves (shift its origin)");
+            return Err(Error::setting(what, expected, length));
+        }
         let mut instants = std::mem::take(&mut self.instants);
         instants.clear();
         let result = f

@@ -105,6 +105,50 @@ fn stiff_forcing_does_not_cost_small_steps() {
 }
 
 #[test]
+fn the_explicit_method_can_be_forced_on_a_stiff_system() {
+    let forced = |t: f64, x: &[f64], dx: &mut [f64]| dx[0] = -2e3 * (x[0] - t.cos()) - t.sin();
+    let x = run(Method::Explicit(tight()), forced, [1.5], &[10.0]).unwrap();
+    close(x[0], 10.0_f64.cos(), 1e-9);
+}
+
+#[test]
+fn stiffness_may_end() {
+    // stiff before t = 1, then an oscillation with many periods
+    let count = |method| {
+        let mut evaluations = 0;
+        let changing = |t: f64, x: &[f64], dx: &mut [f64]| {
+            evaluations += 1;
+            let rate = 1e6 * (1.0 - t).clamp(0.0, 1.0).powi(6);
+            dx[0] = 40.0 * x[1];
+            dx[1] = -40.0 * x[0];
+            dx[2] = -rate * (x[2] - 1.0);
+        };
+        let x = run(method, changing, [0.0, 1.0, 0.0], &[1.0, 20.0]).unwrap();
+        assert!((x[0] - 800.0_f64.sin()).abs() < 1e-5 && (x[2] - 1.0).abs() < 1e-7);
+        evaluations
+    };
+    let (auto, stiff) = (
+        count(Method::default()),
+        count(Method::Stiff(Tolerances::default())),
+    );
+    assert!(2 * auto < stiff, "{auto} evaluations, {stiff} all stiff");
+}
+
+#[test]
+fn intervals_below_the_resolution_of_time_are_refused() {
+    let still = |_: f64, _: &[f64], dx: &mut [f64]| dx[0] = 1.0;
+    for method in [Method::default(), Method::Rk4(Step::Auto)] {
+        let mut x = [0.0];
+        let mut integrator = Integrator::new(method, 1).unwrap();
+        for to in [1.7e9, 1.7e9 + 1e-5, f64::NAN] {
+            let mut f = Function::new(1, still);
+            let error = integrator.advance(&mut f, 1.7e9, to, &mut x).unwrap_err();
+            assert!(matches!(error, Error::Setting { .. }), "{error}");
+        }
+    }
+}
+
+#[test]
 fn a_finite_escape_is_reported_where_it_happens() {
     for method in adaptive_methods() {
         let escape = |_: f64, x: &[f64], dx: &mut [f64]| dx[0] = x[0] * x[0];

@@ -283,3 +283,55 @@ fn too_many_jumps_are_refused() {
         "{error}"
     );
 }
+
+#[test]
+fn a_plant_may_have_no_states() {
+    let g = Graph::new();
+    let u = g.symbol("u");
+    let static_plant = system(&g, &[], &["u"], &[("y", u * 2.0)]);
+    let mut simulation = Simulation::new(static_plant, input(&g, g.symbol("time")), 1.0, 0.25);
+    simulation.record_outputs = true;
+    for method in [Method::default(), Method::Rk4(Step::Auto)] {
+        simulation.method = method;
+        let table = simulation.run().unwrap();
+        assert_eq!(table.column("y").unwrap(), [0.0, 0.5, 1.0, 1.5, 2.0]);
+    }
+}
+
+#[test]
+fn a_diverging_observer_keeps_its_rows() {
+    let g = Graph::new();
+    let (x_hat, y) = (g.symbol("x_hat"), g.symbol("y"));
+    let mut simulation = observed(&g);
+    let unstable = (x_hat - y) * 30.0;
+    simulation.observer = Some(system(&g, &[("x_hat", -1.0, unstable)], &["y"], &[]));
+    let error = simulation.run().unwrap_err();
+    assert!(
+        matches!(&error.error, Error::Diverged { name, .. } if name == "x_hat"),
+        "{error}"
+    );
+    // 1.5·exp(30 t) passes 1e12 at t = 0.91
+    assert_eq!(error.partial.times().last(), Some(&0.9));
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn any_steps_of_the_input_match_the_closed_form(
+        mut times in proptest::collection::vec(0.01..2.9_f64, 1..6),
+        values in proptest::collection::vec(-2.0..2.0_f64, 7),
+        output_step in 0.05..3.0_f64,
+    ) {
+        times.sort_by(f64::total_cmp);
+        let g = Graph::new();
+        let t = g.symbol("time");
+        let u = times.iter().zip(&values).rev().fold(g.constant(values[times.len()]), |rest, (&end, &value)| {
+            t.less(g.constant(end)).select(g.constant(value), rest)
+        });
+        let mut simulation = Simulation::new(lag(&g), input(&g, u), 3.0, output_step);
+        simulation.method = tight();
+        let expected = piecewise(&times, &values[..=times.len()], 3.0);
+        proptest::prop_assert!((final_x(&simulation) - expected).abs() < 1e-11);
+    }
+}

@@ -50,8 +50,9 @@ impl Adaptive {
             leg.spend(*watched.f.borrow_mut(), self.tolerances.budget)?;
             method.set_h(step);
             let failed = match method.step(&watched) {
-                // its own alarm for stiffness; ours decides
-                Err(StepError::Stiffness { .. }) | Ok(_) => false,
+                Ok(_) => false,
+                // its own alarm, raised once and before the step is taken; ours decides
+                Err(StepError::Stiffness { .. }) => continue,
                 Err(_) => true,
             };
             let accepted = !failed && !matches!(method.status(), Status::RejectedStep);

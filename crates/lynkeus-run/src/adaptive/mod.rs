@@ -200,6 +200,6 @@ impl Leg<'_> {
 }
 
 /// Steps shorter than this do not move time reliably.
-fn resolution(t: f64) -> f64 {
+pub(crate) fn resolution(t: f64) -> f64 {
     (16.0 * f64::EPSILON * t.abs()).max(f64::MIN_POSITIVE)
 }
