@@ -52,12 +52,9 @@ impl<'g> Expr<'g> {
         Self::new(self.graph, self.graph.powi(self.node, n))
     }
 
-    /// Power with a real exponent; a constant integer exponent becomes [`Expr::powi`].
+    /// Power with a real exponent; a constant whole exponent becomes [`Expr::powi`].
     pub fn pow(self, exponent: Self) -> Self {
-        match self.graph.constant_value(exponent.node) {
-            Some(n) if n == n.trunc() && n.abs() <= 1024.0 => self.powi(n as i32),
-            _ => self.binary(Binary::Pow, exponent),
-        }
+        self.binary(Binary::Pow, exponent)
     }
 
     /// Decimal logarithm.

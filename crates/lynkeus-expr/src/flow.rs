@@ -8,7 +8,8 @@ use crate::{Graph, Jets, MissingInput, Node, Nodes, Tape};
 pub struct InputJet {
     /// the input's symbol
     pub symbol: Node,
-    /// expressions of the input's derivatives of order 0, 1, 2, …
+    /// expressions of the input's derivatives of order 0, 1, 2, …; none for an
+    /// input that is constant
     pub derivatives: Vec<Node>,
 }
 
@@ -88,7 +89,11 @@ impl Program {
             if let Some(i) = flow.states.iter().position(|s| s == symbol) {
                 return x[i][..=order.min(x[i].len() - 1)].to_vec();
             }
-            if let Some(input) = flow.inputs.iter().find(|i| i.symbol == *symbol) {
+            if let Some(input) = flow
+                .inputs
+                .iter()
+                .find(|i| i.symbol == *symbol && !i.derivatives.is_empty())
+            {
                 return input_coefficients(graph, &input.derivatives, order);
             }
             if *symbol == flow.time && order > 0 {

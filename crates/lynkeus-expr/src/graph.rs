@@ -205,13 +205,17 @@ impl Graph {
             .intern(Key::Powi(a, n), Op::Powi(a, n))
     }
 
-    /// A function of two nodes.
+    /// A function of two nodes. A power with a constant whole exponent becomes
+    /// [`Graph::powi`]: the same domain, and derivatives that exist at zero.
     pub fn binary(&self, op: Binary, a: Node, b: Node) -> Node {
         let (x, y) = (self.constant_value(a), self.constant_value(b));
         if let (Some(x), Some(y)) = (x, y)
             && let Some(folded) = self.fold(real::binary(op, x, y))
         {
             return folded;
+        }
+        if let (Binary::Pow, Some(n)) = (op, y.and_then(whole)) {
+            return self.powi(a, n);
         }
         if let Some(same) = self.identity(op, a, b, x, y) {
             return same;
@@ -335,6 +339,11 @@ impl Graph {
         symbols.retain(|&node| matches!(self.op(node), Op::Symbol(_)));
         symbols
     }
+}
+
+/// The exponent of an integer power.
+fn whole(exponent: f64) -> Option<i32> {
+    (exponent == exponent.trunc() && exponent.abs() <= 1024.0).then_some(exponent as i32)
 }
 
 #[cfg(test)]

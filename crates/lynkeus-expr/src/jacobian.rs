@@ -191,7 +191,7 @@ pub fn reverse(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
         entries: vec![],
     };
     for (row, &output) in outputs.iter().enumerate() {
-        let adjoints = adjoints(graph, output);
+        let adjoints = adjoints(graph, output, inputs);
         for (column, input) in inputs.iter().enumerate() {
             if let Some(&adjoint) = adjoints.get(input) {
                 jacobian.entries.push((row, column, adjoint));
@@ -201,8 +201,9 @@ pub fn reverse(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
     jacobian
 }
 
-/// ∂(output)/∂(node) for every node that the output depends on.
-fn adjoints(graph: &Graph, output: Node) -> BTreeMap<Node, Node> {
+/// ∂(output)/∂(node) for every node that the output depends on; inputs count as
+/// independent, also where they are expressions.
+fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node> {
     let build = Builder { graph };
     let mut adjoints = BTreeMap::from([(output, graph.constant(1.0).node())]);
     let mut results: HashMap<Node, BTreeMap<u32, Node>> = HashMap::new();
@@ -216,6 +217,9 @@ fn adjoints(graph: &Graph, output: Node) -> BTreeMap<Node, Node> {
         let Some(&bar) = adjoints.get(&node) else {
             continue;
         };
+        if inputs.contains(&node) {
+            continue;
+        }
         match variation(graph, node) {
             Variation::Sum(terms) => {
                 for (argument, slope) in terms {

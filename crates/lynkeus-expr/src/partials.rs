@@ -25,7 +25,7 @@ pub(crate) fn variation(graph: &Graph, node: Node) -> Variation {
         ),
         Op::Powi(_, 0) => Variation::Sum(vec![]),
         Op::Powi(a, n) => {
-            let slope = f64::from(n) * graph.expr(a).powi(n - 1);
+            let slope = f64::from(n) * graph.expr(a).powi(n.saturating_sub(1));
             Variation::Sum(vec![(a, slope.node())])
         }
         Op::Binary(op, a, b) => binary(graph, op, a, b, value),
@@ -62,7 +62,7 @@ fn binary(graph: &Graph, op: Binary, a: Node, b: Node, f: Expr<'_>) -> Variation
         Binary::Sub => (graph.constant(1.0), graph.constant(-1.0)),
         Binary::Mul => (y, x),
         Binary::Div => (1.0 / y, -(f / y)),
-        Binary::Pow => (y * pow(x, y - 1.0), f * x.ln()),
+        Binary::Pow => (y * x.pow(y - 1.0), f * x.ln()),
         Binary::Atan2 => {
             let norm = x.powi(2) + y.powi(2);
             (y / norm, -(x / norm))
@@ -74,11 +74,4 @@ fn binary(graph: &Graph, op: Binary, a: Node, b: Node, f: Expr<'_>) -> Variation
         }
     };
     Variation::Sum(vec![(a, dx.node()), (b, dy.node())])
-}
-
-/// A real power stays one: x^(1.5 − 1) must not become an integer power only
-/// because the exponent happens to fold to one for some parameter value.
-fn pow<'g>(x: Expr<'g>, y: Expr<'g>) -> Expr<'g> {
-    x.graph()
-        .expr(x.graph().binary(Binary::Pow, x.node(), y.node()))
 }

@@ -236,12 +236,18 @@ impl<'g> Compiler<'g> {
             },
             nodes,
         };
-        compiler.place_leaves()?;
+        compiler.place_leaves(outputs)?;
         compiler.count_uses(outputs);
         Ok(compiler)
     }
 
-    fn place_leaves(&mut self) -> Result<(), MissingInput> {
+    fn place_leaves(&mut self, outputs: &[Node]) -> Result<(), MissingInput> {
+        // a system has results but no value of its own
+        let valueless = |&&node: &&Node| matches!(self.graph.op(node), Op::Solve(_));
+        if let Some(&node) = outputs.iter().find(valueless) {
+            let name = self.graph.render(node, 20);
+            return Err(MissingInput { name });
+        }
         for &node in &self.nodes {
             match self.graph.op(node) {
                 Op::Constant(value) => {

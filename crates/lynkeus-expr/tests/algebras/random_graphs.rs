@@ -6,7 +6,7 @@ use crate::recipe::{INPUTS, Style, follow, recipe, symbols, without_systems};
 use crate::sample::member;
 use astro_float::BigFloat;
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Graph, Interval, Node, Nodes, Op, Reals, Tape, jacobian};
+use lynkeus_expr::{Algebra, Graph, Interval, Lanes, Node, Nodes, Op, Reals, Tape, jacobian};
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -99,6 +99,20 @@ proptest! {
         for &node in &nodes[STEPS - 6..] {
             let found = evaluate(&graph, &[node], &x)[0];
             prop_assert!(same(found, values[&node]), "{found} for {} alone", values[&node]);
+        }
+    }
+
+    #[test]
+    fn lanes_equal_numbers_bit_for_bit(recipe in recipe(STEPS), x in prop::array::uniform3(inputs())) {
+        let graph = Graph::new();
+        let nodes = follow(&recipe, &graph, Style::Wild);
+        let tape = Tape::new(&graph, &symbols(&graph), &nodes).expect("symbols are inputs");
+        let packed: Vec<[f64; 3]> = (0..INPUTS).map(|i| x.each_ref().map(|x| x[i])).collect();
+        let found = tape.eval_in(&Lanes::<3>, &packed);
+        for (lane, x) in x.iter().enumerate() {
+            for (found, expected) in found.iter().zip(evaluate(&graph, &nodes, x)) {
+                prop_assert!(same(found[lane], expected), "{found:?} for {expected} in {lane}");
+            }
         }
     }
 
