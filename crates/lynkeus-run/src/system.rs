@@ -253,3 +253,48 @@ impl Dynamics for Evaluation {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn build(graph: &Graph, derivatives: &[Node]) -> Result<System, Error> {
+        let [time, x] = ["time", "x"].map(|name| graph.symbol(name).node());
+        let output = ("half".to_string(), (graph.expr(x) * 0.5).node());
+        let states = [("x".to_string(), x, 4.0)];
+        System::new(graph, time, &states, &[], derivatives, &[output])
+    }
+
+    #[test]
+    fn a_system_is_shared_between_threads_and_outlives_its_graph() {
+        let system = {
+            let g = Graph::new();
+            build(&g, &[(-g.symbol("x").sqrt()).node()]).unwrap()
+        };
+        let evaluate = || {
+            let (mut dx, mut y) = ([0.0], [0.0]);
+            let mut evaluation = system.evaluation();
+            evaluation.derivatives(0.0, system.start(), &mut dx);
+            evaluation.outputs(0.0, system.start(), &mut y);
+            (dx[0], y[0])
+        };
+        let found = std::thread::scope(|scope| scope.spawn(evaluate).join().unwrap());
+        assert_eq!(found, (-2.0, 2.0));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let g = Graph::new();
+        let pump = g.symbol("pump").node();
+        let missing = build(&g, &[pump]).unwrap_err();
+        assert!(missing.to_string().contains("'pump'"), "{missing}");
+        let none = build(&g, &[]).unwrap_err();
+        assert!(none.to_string().contains("expected 1"), "{none}");
+        let system = build(&g, &[g.symbol("x").node()]).unwrap();
+        for start in [vec![], vec![f64::NAN]] {
+            let error = system.clone().with_start(start).unwrap_err();
+            assert!(matches!(error, Error::Setting { .. }), "{error}");
+        }
+        assert_eq!(system.with_start(vec![1.0]).unwrap().start(), [1.0]);
+    }
+}
