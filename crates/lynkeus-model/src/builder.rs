@@ -64,6 +64,9 @@ pub enum ModelError {
         /// the name
         name: String,
     },
+    /// An expression was made by another model.
+    #[error("{0} is an expression of another model")]
+    Foreign(String),
     /// The range of a variable is empty or not a number.
     #[error("`{0}` has an empty range: min must not exceed max")]
     EmptyRange(String),
@@ -84,6 +87,8 @@ struct Parts {
     outputs: Vec<Variable>,
     parameters: Vec<Parameter>,
     derivatives: Vec<(Node, Node)>,
+    /// what was given an expression of another graph, whose nodes mean nothing here
+    foreign: Option<String>,
 }
 
 impl Model {
@@ -133,14 +138,29 @@ impl Model {
 
     /// States the derivative of a state.
     pub fn der(&self, state: Expr<'_>, derivative: Expr<'_>) {
-        let pair = (state.node(), derivative.node());
-        self.parts.borrow_mut().derivatives.push(pair);
+        if self.is_own(state, "a state in `der`") && self.is_own(derivative, "a derivative") {
+            let pair = (state.node(), derivative.node());
+            self.parts.borrow_mut().derivatives.push(pair);
+        }
     }
 
     /// Declares an output with its value.
     pub fn output(&self, name: &str, value: Expr<'_>, attributes: Attributes) {
-        let output = variable(name, value.node(), attributes);
-        self.parts.borrow_mut().outputs.push(output);
+        if self.is_own(value, &format!("the value of output `{name}`")) {
+            let output = variable(name, value.node(), attributes);
+            self.parts.borrow_mut().outputs.push(output);
+        }
+    }
+
+    fn is_own(&self, expression: Expr<'_>, what: &str) -> bool {
+        let is_own = std::ptr::eq(expression.graph(), &self.graph);
+        if !is_own {
+            self.parts
+                .borrow_mut()
+                .foreign
+                .get_or_insert_with(|| what.to_owned());
+        }
+        is_own
     }
 
     /// The plant.
@@ -151,6 +171,9 @@ impl Model {
     pub fn finish(self) -> Result<Plant, ModelError> {
         let derivatives = {
             let parts = self.parts.borrow();
+            if let Some(what) = &parts.foreign {
+                return Err(ModelError::Foreign(what.clone()));
+            }
             check_names(&parts)?;
             check_ranges(&parts)?;
             let derivatives = self.match_derivatives(&parts)?;
@@ -263,7 +286,8 @@ fn check_names(parts: &Parts) -> Result<(), ModelError> {
 }
 
 fn check_ranges(parts: &Parts) -> Result<(), ModelError> {
-    match all(parts).find(|variable| !(variable.min <= variable.max)) {
+    let is_range = |variable: &&Variable| variable.min <= variable.max;
+    match all(parts).find(|variable| !is_range(variable)) {
         Some(variable) => Err(ModelError::EmptyRange(variable.name.clone())),
         None => Ok(()),
     }
@@ -321,6 +345,18 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "y reads `q`, which is not declared in the model"
+        );
+    }
+
+    #[test]
+    fn expressions_of_another_model() {
+        let (model, other) = (with_state(), with_state());
+        let x = other.graph().symbol("x");
+        model.output("y", x, Attributes::default());
+        let error = model.finish().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the value of output `y` is an expression of another model"
         );
     }
 

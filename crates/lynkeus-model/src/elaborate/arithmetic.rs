@@ -167,7 +167,8 @@ impl Evaluator<'_> {
         elementwise: bool,
         span: Span,
     ) -> Result<Value> {
-        if !elementwise && !(base.dims().is_empty() && exponent.dims().is_empty()) {
+        let are_scalars = base.dims().is_empty() && exponent.dims().is_empty();
+        if !elementwise && !are_scalars {
             return Err(Problem::new(span, "powers of arrays are not supported")
                 .hint("`.^` takes the power of every element"));
         }

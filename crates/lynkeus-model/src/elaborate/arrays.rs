@@ -58,7 +58,9 @@ impl<'a> Evaluator<'a> {
         let mut dims = first.dims.clone();
         let without_axis = |dims: &[usize]| {
             let mut dims = dims.to_vec();
-            dims.get_mut(axis).map(|dim| *dim = 0);
+            if let Some(dim) = dims.get_mut(axis) {
+                *dim = 0;
+            }
             dims
         };
         let differs = |part: &&Array| without_axis(&part.dims) != without_axis(&dims);

@@ -67,7 +67,7 @@ impl Parser<'_> {
         }
         let hint = match self.token {
             Token::Symbol(Symbol::Assign) => Some("`:=` assigns in algorithms; write `=`"),
-            Token::Symbol(Symbol::Equal2) => Some("an equation is written with one `=`"),
+            Token::Symbol(Symbol::EqualEqual) => Some("an equation is written with one `=`"),
             _ => None,
         };
         Err(self.unexpected("`=`").maybe_hint(hint.map(str::to_owned)))

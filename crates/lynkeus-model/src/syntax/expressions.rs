@@ -364,7 +364,7 @@ fn relation_operator(token: Token) -> Option<Relation> {
         Symbol::LessEqual => Relation::LessEqual,
         Symbol::Greater => Relation::Greater,
         Symbol::GreaterEqual => Relation::GreaterEqual,
-        Symbol::Equal2 => Relation::Equal,
+        Symbol::EqualEqual => Relation::Equal,
         Symbol::NotEqual => Relation::NotEqual,
         _ => return None,
     })

@@ -55,7 +55,7 @@ words! {
     Symbol,
     ElementPlus = ".+", ElementMinus = ".-", ElementTimes = ".*", ElementOver = "./",
     ElementPower = ".^", Assign = ":=", NotEqual = "<>", LessEqual = "<=",
-    GreaterEqual = ">=", Equal2 = "==", Plus = "+", Minus = "-", Times = "*", Over = "/",
+    GreaterEqual = ">=", EqualEqual = "==", Plus = "+", Minus = "-", Times = "*", Over = "/",
     Power = "^", Equal = "=", Less = "<", Greater = ">", OpenParen = "(", CloseParen = ")",
     OpenBracket = "[", CloseBracket = "]", OpenBrace = "{", CloseBrace = "}", Comma = ",",
     Semicolon = ";", Colon = ":", Dot = ".",

@@ -13,149 +13,55 @@ fn one_line(declarations: &str, equations: &str) -> String {
     refused(&text).one_line()
 }
 
-fn check(cases: &[(&str, &str, &str)]) {
-    for (declarations, equations, expected) in cases {
-        let found = one_line(declarations, equations);
-        assert!(
-            found.contains(expected),
-            "{declarations} {equations}\n{found}"
-        );
+/// Lines of `declarations | equations | part of the refusal`.
+fn check(cases: &str) {
+    for case in cases.lines().filter(|line| !line.trim().is_empty()) {
+        let mut parts = case.split('|').map(str::trim);
+        let mut part = || parts.next().unwrap();
+        let found = one_line(part(), part());
+        assert!(found.contains(part()), "{case}\n{found}");
     }
 }
 
 #[test]
 fn constructs_outside_the_subset() {
-    check(&[
-        (
-            "",
-            "when time > 1 then z = 1; end when;",
-            ":5:3: a `when` equation is not supported (an",
-        ),
-        (
-            "",
-            "connect(a, b);",
-            ":5:3: `connect` is not supported (write the equations",
-        ),
-        (
-            "",
-            "z = pre(z);",
-            ":5:7: `pre` is not supported (models with events",
-        ),
-        (
-            "",
-            "z = delay(z, 1);",
-            ":5:7: `delay` is not supported (a delay has",
-        ),
-        ("", "z = homotopy(z, z);", "`homotopy` is not supported"),
-        ("", "assert(z > 0, \"negative\");", "is not supported"),
-        ("", "reinit(z, 0);", "`reinit` is not supported"),
-        (
-            "",
-            "z := 1;",
-            ":5:5: expected `=`, found `:=` (`:=` assigns in algorithms",
-        ),
-        ("", "z == 1;", "expected `=`, found `;`"),
-        (
-            "",
-            "(z, u) = f(x);",
-            "a list in parentheses is not supported",
-        ),
-        (
-            "",
-            "z = f(x);",
-            "unknown function `f` (functions of your own",
-        ),
-        ("", "z = ln(u);", "the natural logarithm is `log`"),
-        ("", "z = srt(u);", "did you mean `sqrt`?"),
-        ("", "z = x(1);", "subscripts stand in `[…]`"),
-        (
-            "Boolean b;",
-            "",
-            ":3:3: Boolean variables are not supported (use a Real",
-        ),
-        ("String s;", "", "String variables are not supported"),
-        (
-            "Tank tank;",
-            "",
-            ":3:3: unknown type `Tank` (components of other models",
-        ),
-        (
-            "Modelica.Units.SI.Mass m;",
-            "",
-            "the library type `Modelica.Units.SI.Mass`",
-        ),
-        (
-            "extends Base;",
-            "",
-            ":3:3: `extends` is not supported (copy",
-        ),
-        (
-            "import Modelica.Constants.pi;",
-            "",
-            "`import` is not supported (write full",
-        ),
-        (
-            "function f end f;",
-            "",
-            "a function definition is not supported",
-        ),
-        (
-            "discrete Real d;",
-            "",
-            "a `discrete` variable is not supported",
-        ),
-        ("flow Real q;", "", "a connector variable is not supported"),
-        (
-            "replaceable Real q;",
-            "",
-            "a replaceable element is not supported",
-        ),
-        (
-            "Real q if u > 0;",
-            "",
-            "a conditional component is not supported",
-        ),
-        (
-            "model Inner end Inner;",
-            "",
-            "a class inside a model is not supported",
-        ),
-        (
-            "der(z) = 1;",
-            "",
-            ":3:3: expected a declaration, `equation` or `end`, found `der`",
-        ),
-        (
-            "z = 1;",
-            "",
-            "(a declaration reads `Real x;`; equations follow after the word",
-        ),
-        (
-            "if z > 0 then",
-            "",
-            "equations follow after the word `equation`",
-        ),
-        (
-            "",
-            "Real late;",
-            "declarations come before the word `equation`",
-        ),
-        (
-            "",
-            "parameter Real late;",
-            "declarations come before the word `equation`",
-        ),
-        (
-            "",
-            "initial equation z = 1;",
-            "an `initial` section is not supported (give the start",
-        ),
-        (
-            "",
-            "algorithm z := 1;",
-            "an `algorithm` section is not supported",
-        ),
-    ]);
+    check(
+        r#"
+         | when time > 1 then z = 1; end when; | :5:3: a `when` equation is not supported (an
+         | connect(a, b); | :5:3: `connect` is not supported (write the equations
+         | z = pre(z); | :5:7: `pre` is not supported (models with events
+         | z = delay(z, 1); | :5:7: `delay` is not supported (a delay has
+         | z = homotopy(z, z); | `homotopy` is not supported
+         | assert(z > 0, "negative"); | is not supported
+         | reinit(z, 0); | `reinit` is not supported
+         | z := 1; | :5:5: expected `=`, found `:=` (`:=` assigns in algorithms
+         | z == 1; | expected `=`, found `;`
+         | (z, u) = f(x); | a list in parentheses is not supported
+         | z = f(x); | unknown function `f` (functions of your own
+         | z = ln(u); | the natural logarithm is `log`
+         | z = srt(u); | did you mean `sqrt`?
+         | z = x(1); | subscripts stand in `[…]`
+        Boolean b; |  | :3:3: Boolean variables are not supported (use a Real
+        String s; |  | String variables are not supported
+        Tank tank; |  | :3:3: unknown type `Tank` (components of other models
+        Modelica.Units.SI.Mass m; |  | the library type `Modelica.Units.SI.Mass`
+        extends Base; |  | :3:3: `extends` is not supported (copy
+        import Modelica.Constants.pi; |  | `import` is not supported (write full
+        function f end f; |  | a function definition is not supported
+        discrete Real d; |  | a `discrete` variable is not supported
+        flow Real q; |  | a connector variable is not supported
+        replaceable Real q; |  | a replaceable element is not supported
+        Real q if u > 0; |  | a conditional component is not supported
+        model Inner end Inner; |  | a class inside a model is not supported
+        der(z) = 1; |  | :3:3: expected a declaration, `equation` or `end`, found `der`
+        z = 1; |  | (a declaration reads `Real x;`; equations follow after the word
+        if z > 0 then |  | equations follow after the word `equation`
+         | Real late; | declarations come before the word `equation`
+         | parameter Real late; | declarations come before the word `equation`
+         | initial equation z = 1; | an `initial` section is not supported (give the start
+         | algorithm z := 1; | an `algorithm` section is not supported
+        "#,
+    );
     assert!(
         refused("block B end B;")
             .one_line()
@@ -170,77 +76,35 @@ fn constructs_outside_the_subset() {
 
 #[test]
 fn syntax() {
-    check(&[
-        (
-            "",
-            "z = 1",
-            ":5:7: expected `;` after this (every declaration and every equation ends",
-        ),
-        ("Real q", "", ":3:8: expected `;` after this"),
-        ("", "z = 1 2;", ":5:9: expected `;`, found `2`"),
-        ("", "z = (1;", ":5:9: expected `)`, found `;`"),
-        ("", "z = 1 + ;", ":5:11: expected an operand, found `;`"),
-        ("", "z = 2x;", ":5:7: a number runs into a name"),
-        (
-            "",
-            "z = a < b < c;",
-            "expected one comparison, found `<` (join comparisons",
-        ),
-        ("", "z = 2^3^2;", "expected one `^`"),
-        (
-            "",
-            "z = 1 + if u > 0 then 1 else 2;",
-            "put parentheses around an `if`",
-        ),
-        ("", "z = if u > 0 then 1;", "expected `else`, found `;`"),
-        (
-            "",
-            "z = 99999999999999999999;",
-            "the Integer 99999999999999999999 is too large",
-        ),
-        ("", "z = 1e999;", "the number 1e999 is too large"),
-        ("", "z = u && u;", "unexpected character '&' (write `and`)"),
-        ("", "z = θ;", "unexpected character 'θ' (names are ASCII"),
-        ("", "z = \"text\";", "a string here is not supported"),
-        (
-            "",
-            "z = smooth(order = 1, u);",
-            "a named argument is not supported",
-        ),
-        (
-            "",
-            "for i loop z = 1; end for;",
-            "expected `in` and a range, found `loop`",
-        ),
-        (
-            "",
-            "for i in 1:2, i in 1:2 loop z = 1; end for;",
-            "iterator `i` is used twice",
-        ),
-        (
-            "",
-            "for i in 1:2 loop z = 1; end if;",
-            "expected `for`, found `if`",
-        ),
-        (
-            "Real q(statr = 1);",
-            "",
-            "unknown attribute `statr` (the attributes are start, min",
-        ),
-        (
-            "Real q(start = 1, start = 2);",
-            "der(q) = 1;",
-            "this attribute is given twice",
-        ),
-        ("Real time;", "", "`time` is a word of the language"),
-        (
-            "Real z;",
-            "",
-            ":3:8: `z` is declared twice (it is first declared on line 2)",
-        ),
-        ("/* Real q;", "", ":3:3: this comment has no end"),
-        ("annotation(a(b);", "", "this annotation has no end"),
-    ]);
+    check(
+        r#"
+         | z = 1 | :5:7: expected `;` after this (every declaration and every equation ends
+        Real q |  | :3:8: expected `;` after this
+         | z = 1 2; | :5:9: expected `;`, found `2`
+         | z = (1; | :5:9: expected `)`, found `;`
+         | z = 1 + ; | :5:11: expected an operand, found `;`
+         | z = 2x; | :5:7: a number runs into a name
+         | z = a < b < c; | expected one comparison, found `<` (join comparisons
+         | z = 2^3^2; | expected one `^`
+         | z = 1 + if u > 0 then 1 else 2; | put parentheses around an `if`
+         | z = if u > 0 then 1; | expected `else`, found `;`
+         | z = 99999999999999999999; | the Integer 99999999999999999999 is too large
+         | z = 1e999; | the number 1e999 is too large
+         | z = u && u; | unexpected character '&' (write `and`)
+         | z = θ; | unexpected character 'θ' (names are ASCII
+         | z = "text"; | a string here is not supported
+         | z = smooth(order = 1, u); | a named argument is not supported
+         | for i loop z = 1; end for; | expected `in` and a range, found `loop`
+         | for i in 1:2, i in 1:2 loop z = 1; end for; | iterator `i` is used twice
+         | for i in 1:2 loop z = 1; end if; | expected `for`, found `if`
+        Real q(statr = 1); |  | unknown attribute `statr` (the attributes are start, min
+        Real q(start = 1, start = 2); | der(q) = 1; | this attribute is given twice
+        Real time; |  | `time` is a word of the language
+        Real z; |  | :3:8: `z` is declared twice (it is first declared on line 2)
+        /* Real q; |  | :3:3: this comment has no end
+        annotation(a(b); |  | this annotation has no end
+        "#,
+    );
     assert!(
         refused("model M end N;")
             .one_line()
@@ -261,227 +125,85 @@ fn syntax() {
 
 #[test]
 fn names_and_sizes() {
-    check(&[
-        ("", "z = levle + zz;", "unknown name `levle`"),
-        (
-            "Real level;",
-            "level = z; z = levle;",
-            "(did you mean `level`?)",
-        ),
-        (
-            "",
-            "z = pi;",
-            "unknown name `pi` (write `Modelica.Constants.pi`)",
-        ),
-        (
-            "",
-            "z = tank.level;",
-            "unknown name `tank.level` (components of other models",
-        ),
-        ("", "z = x[4];", ":5:9: subscript 4 of `x` is outside 1..3"),
-        ("", "z = x[n - 3];", "subscript 0 of `x` is outside 1..3"),
-        ("", "z = x[1, 2];", "2 subscripts, but `x` has the size [3]"),
-        ("", "z = u[1];", "`u` is a scalar and takes no subscripts"),
-        (
-            "",
-            "z = x[n/2];",
-            "a subscript must be an Integer or a range of Integers (`/` and",
-        ),
-        (
-            "",
-            "z = x[u];",
-            "`u` is a variable, but a known value is needed here",
-        ),
-        (
-            "",
-            "z = x;",
-            "the sides differ in size: left is a scalar, right is [3]",
-        ),
-        (
-            "Real y[2] = x;",
-            "",
-            "`y` has the size [2], its value has [3]",
-        ),
-        (
-            "Real y[n - 4];",
-            "",
-            ":3:10: a size must not be negative, this is -1",
-        ),
-        (
-            "Real y[n/1];",
-            "",
-            "a size must be an Integer, found a Real (`/` and `^` always",
-        ),
-        (
-            "Real y[z];",
-            "",
-            "`z` is a variable, but a known value is needed here",
-        ),
-        (
-            "Real y[:] = x;",
-            "",
-            "the size of variable `y` must be given",
-        ),
-        (
-            "parameter Real p[:];",
-            "",
-            "the size `:` needs a value to be taken from",
-        ),
-        (
-            "Real y(start = {1, 2}) = 1;",
-            "",
-            "the attribute has the size [2], its variable has",
-        ),
-        (
-            "Real y(min = 2, max = 1) = 1;",
-            "",
-            "the range of `y` is empty: min 2 > max 1",
-        ),
-        ("Real y(unit = 3) = 1;", "", "expected a string"),
-        (
-            "",
-            "z = sum(x + u*{1, 2});",
-            "the sizes differ: left is [3], right is [2]",
-        ),
-        (
-            "",
-            "z = sum(x + 1);",
-            "`.+` and `.-` take a scalar with every element",
-        ),
-        (
-            "",
-            "z = sum(1/x);",
-            "division by an array (`./` divides by every element)",
-        ),
-        ("", "z = sum(x^2);", "`.^` takes the power of every element"),
-        (
-            "",
-            "z = sum([1, 2; 3, 4]*x);",
-            "no product of sizes [2, 2] and [3]",
-        ),
-        (
-            "",
-            "z = sum({1, {2}});",
-            "the elements differ in size: a scalar and [1]",
-        ),
-        ("", "z = sum([1, 2; 3]);", "the sizes differ"),
-        ("", "z = sqrt(u, 2);", "`sqrt` takes 1 argument, found 2"),
-        (
-            "",
-            "z = size(x, 2);",
-            "there is no dimension 2: the size is [3]",
-        ),
-        ("", "z = max(zeros(0));", "`max` of no elements"),
-        (
-            "",
-            "for i in 3 loop z = i; end for;",
-            "expected a range, found a scalar",
-        ),
-        ("", "z = sum(1:0:3);", "the step of a range is zero"),
-        ("", "z = x[end + 1];", "subscript 4 of `x` is outside 1..3"),
-        ("", "z = end;", "`end` stands only in subscripts"),
-    ]);
+    check(
+        r#"
+         | z = levle + zz; | unknown name `levle`
+        Real level; | level = z; z = levle; | (did you mean `level`?)
+         | z = pi; | unknown name `pi` (write `Modelica.Constants.pi`)
+         | z = tank.level; | unknown name `tank.level` (components of other models
+         | z = x[4]; | :5:9: subscript 4 of `x` is outside 1..3
+         | z = x[n - 3]; | subscript 0 of `x` is outside 1..3
+         | z = x[1, 2]; | 2 subscripts, but `x` has the size [3]
+         | z = u[1]; | `u` is a scalar and takes no subscripts
+         | z = x[n/2]; | a subscript must be an Integer or a range of Integers (`/` and
+         | z = x[u]; | `u` is a variable, but a known value is needed here
+         | z = x; | the sides differ in size: left is a scalar, right is [3]
+        Real y[2] = x; |  | `y` has the size [2], its value has [3]
+        Real y[n - 4]; |  | :3:10: a size must not be negative, this is -1
+        Real y[n/1]; |  | a size must be an Integer, found a Real (`/` and `^` always
+        Real y[z]; |  | `z` is a variable, but a known value is needed here
+        Real y[:] = x; |  | the size of variable `y` must be given
+        parameter Real p[:]; |  | the size `:` needs a value to be taken from
+        Real y(start = {1, 2}) = 1; |  | the attribute has the size [2], its variable has
+        Real y(min = 2, max = 1) = 1; |  | the range of `y` is empty: min 2 > max 1
+        Real y(unit = 3) = 1; |  | expected a string
+         | z = sum(x + u*{1, 2}); | the sizes differ: left is [3], right is [2]
+         | z = sum(x + 1); | `.+` and `.-` take a scalar with every element
+         | z = sum(1/x); | division by an array (`./` divides by every element)
+         | z = sum(x^2); | `.^` takes the power of every element
+         | z = sum([1, 2; 3, 4]*x); | no product of sizes [2, 2] and [3]
+         | z = sum({1, {2}}); | the elements differ in size: a scalar and [1]
+         | z = sum([1, 2; 3]); | the sizes differ
+         | z = sqrt(u, 2); | `sqrt` takes 1 argument, found 2
+         | z = size(x, 2); | there is no dimension 2: the size is [3]
+         | z = max(zeros(0)); | `max` of no elements
+         | for i in 3 loop z = i; end for; | expected a range, found a scalar
+         | z = sum(1:0:3); | the step of a range is zero
+         | z = x[end + 1]; | subscript 4 of `x` is outside 1..3
+         | z = end; | `end` stands only in subscripts
+        "#,
+    );
 }
 
 #[test]
 fn types_and_numbers() {
-    check(&[
-        (
-            "",
-            "z = u > 1;",
-            "an equation between Booleans is not supported",
-        ),
-        ("", "z = 1 + (u > 1);", "expected a number, found a Boolean"),
-        (
-            "",
-            "z = if u then 1 else 2;",
-            "expected a condition, found a number (compare it",
-        ),
-        ("", "z = 1/0;", "division by zero"),
-        ("", "z = mod(3, 0);", "division by zero"),
-        (
-            "",
-            "z = 9000000000000000000 + 9000000000000000000;",
-            "does not fit in 64 bits",
-        ),
-        ("", "z = -9000000000000000000*2;", "does not fit in 64 bits"),
-        ("", "z = div(n, 0);", "division by zero"),
-        ("", "der(u) = 1;", "`der(u)`: `u` is not a Real variable"),
-        ("", "der(n) = 1;", "`der(n)`: `n` is not a Real variable"),
-        (
-            "",
-            "der(z*u) = 1;",
-            "`der` takes a variable, not an expression",
-        ),
-        (
-            "Integer k;",
-            "der(k) = 1;",
-            "`der(k)`: `k` is not a Real variable",
-        ),
-        (
-            "input Real w = 1;",
-            "",
-            "input `w` must not have an equation",
-        ),
-        (
-            "parameter input Real w = 1;",
-            "",
-            "`w` is both a parameter and an input",
-        ),
-        (
-            "parameter Real p;",
-            "",
-            "parameter `p` has no value (write `p = …` here, or give",
-        ),
-        (
-            "parameter Real p(start = 1);",
-            "",
-            "parameter `p` has no value",
-        ),
-        (
-            "parameter Real p = sqrt(-1);",
-            "",
-            "the value of `p` is not a finite number",
-        ),
-        (
-            "parameter Real p = u;",
-            "",
-            "`u` is a variable, but a known value is needed here",
-        ),
-        (
-            "parameter Real p = time;",
-            "",
-            "`time` is a variable, but a known value",
-        ),
-        (
-            "parameter Integer p = 1.5;",
-            "",
-            "`p` is an Integer, its value is a Real",
-        ),
-        ("parameter Real p[2] = 1;", "", "(use `fill(value, size)`)"),
-        (
-            "",
-            "if u > 0 then z = 1; end if;",
-            "the branches have 1 and 0 equations",
-        ),
-    ]);
+    check(
+        r#"
+         | z = u > 1; | an equation between Booleans is not supported
+         | z = 1 + (u > 1); | expected a number, found a Boolean
+         | z = if u then 1 else 2; | expected a condition, found a number (compare it
+         | z = 1/0; | division by zero
+         | z = mod(3, 0); | division by zero
+         | z = 9000000000000000000 + 9000000000000000000; | does not fit in 64 bits
+         | z = -9000000000000000000*2; | does not fit in 64 bits
+         | z = div(n, 0); | division by zero
+         | der(u) = 1; | `der(u)`: `u` is not a Real variable
+         | der(n) = 1; | `der(n)`: `n` is not a Real variable
+         | der(z*u) = 1; | `der` takes a variable, not an expression
+        Integer k; | der(k) = 1; | `der(k)`: `k` is not a Real variable
+        input Real w = 1; |  | input `w` must not have an equation
+        parameter input Real w = 1; |  | `w` is both a parameter and an input
+        parameter Real p; |  | parameter `p` has no value (write `p = …` here, or give
+        parameter Real p(start = 1); |  | parameter `p` has no value
+        parameter Real p = sqrt(-1); |  | the value of `p` is not a finite number
+        parameter Real p = u; |  | `u` is a variable, but a known value is needed here
+        parameter Real p = time; |  | `time` is a variable, but a known value
+        parameter Integer p = 1.5; |  | `p` is an Integer, its value is a Real
+        parameter Real p[2] = 1; |  | (use `fill(value, size)`)
+         | if u > 0 then z = 1; end if; | the branches have 1 and 0 equations
+        "#,
+    );
 }
 
 #[test]
 fn cycles_name_their_members() {
-    check(&[
-        (
-            "parameter Real a = b; parameter Real b = 2*c; parameter Real c = a;",
-            "",
-            ":3:18: these declarations need each other: `a` → `b` → `c` → `a` (give one of",
-        ),
-        ("parameter Real p = p + 1;", "", "`p` → `p`"),
-        (
-            "parameter Integer a = size(b, 1); parameter Real b[a] = ones(a);",
-            "",
-            "`a` → `b` → `a`",
-        ),
-    ]);
+    check(
+        r#"
+        parameter Real a = b; parameter Real b = 2*c; parameter Real c = a; |  | :3:18: these declarations need each other: `a` → `b` → `c` → `a` (give one of
+        parameter Real p = p + 1; |  | `p` → `p`
+        parameter Integer a = size(b, 1); parameter Real b[a] = ones(a); |  | `a` → `b` → `a`
+        "#,
+    );
 }
 
 #[test]
