@@ -76,7 +76,7 @@
 //! | `ode_solvers` 0.6 | 33, not built | DOP853 | none | not run |
 //!
 //! So: the explicit method of the first, and for stiff systems a method of our own,
-//! which is tested against values on which two of them agree.
+//! which is tested against values that other integrators give at tighter tolerances.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod adaptive;
