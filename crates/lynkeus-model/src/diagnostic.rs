@@ -54,6 +54,7 @@ struct Excerpt {
 
 impl Diagnostic {
     pub(crate) fn new(problem: Problem, file: &str, source: &str) -> Self {
+        let problem = problem.into_details();
         let start = floor_boundary(source, problem.span.start as usize);
         let end = floor_boundary(source, problem.span.end as usize).max(start);
         let line_start = source[..start].rfind('\n').map_or(0, |i| i + 1);
@@ -135,7 +136,8 @@ impl Excerpt {
         let to = floor_boundary(source, (marked_end + WINDOW).min(line.end));
         let marked_end = floor_boundary(source, marked_end).max(marked.start);
         Self {
-            text: source[from..to].trim_end_matches('\r').to_owned(),
+            // A carriage return would move the caret; it takes one byte, as a space does.
+            text: source[from..to].replace('\r', " "),
             marked: marked.start - from..marked_end - from,
             cut: from > line.start || to < line.end,
         }

@@ -5,34 +5,49 @@ use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token, shortened};
 use super::{Problem, Result, Span};
 
-/// Left-associative operators, loosest first; `not`, relations and signs stand between.
+/// How tightly operators bind, loosest first.
 const OR: u8 = 0;
 const AND: u8 = 1;
-const SUM: u8 = 2;
-const PRODUCT: u8 = 3;
+const NOT: u8 = 2;
+const RELATION: u8 = 3;
+const SUM: u8 = 4;
+const PRODUCT: u8 = 5;
+const POWER: u8 = 6;
+const OPERAND: u8 = 7;
+
+/// What may stand between two operands.
+enum Infix {
+    Chain(BinaryOperator),
+    Relation(Relation),
+    /// true for `.^`
+    Power(bool),
+}
+
+/// Operators of one level, collected from the left.
+type Pending = Vec<(BinaryOperator, ExprId)>;
 
 impl Parser<'_> {
-    /// Any expression but a range.
+    /// Any expression.
     pub(super) fn expression(&mut self) -> Result<ExprId> {
-        self.nested(|parser| match parser.token {
-            Token::Keyword(Keyword::If) => parser.if_expression(),
-            _ => parser.simple(),
-        })
+        if self.at_word(Keyword::If) {
+            return self.nested(Self::if_expression);
+        }
+        self.range()
     }
 
     /// `a`, `a:b` or `a:step:b`.
-    fn simple(&mut self) -> Result<ExprId> {
+    fn range(&mut self) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
-        let low = self.chain(OR)?;
+        let low = self.operators(OR)?;
         if !self.at(Symbol::Colon) {
             return Ok(low);
         }
         self.advance()?;
-        let second = self.chain(OR)?;
+        let second = self.operators(OR)?;
         if !self.accept(Symbol::Colon)? {
             return self.push(Kind::Range(low, None, second), start, first);
         }
-        let high = self.chain(OR)?;
+        let high = self.operators(OR)?;
         self.push(Kind::Range(low, Some(second), high), start, first)
     }
 
@@ -56,107 +71,85 @@ impl Parser<'_> {
         self.push(Kind::If(branches, otherwise), start, first)
     }
 
-    /// Operators of one level, collected from the left into one flat chain.
-    fn chain(&mut self, level: u8) -> Result<ExprId> {
+    /// Operands joined by operators that bind at least as tightly as `least`.
+    fn operators(&mut self, least: u8) -> Result<ExprId> {
+        self.nested(|parser| parser.operators_here(least))
+    }
+
+    /// Precedence climbing. Operators of one level make one flat chain, so that the depth of
+    /// the tree does not grow with its length.
+    fn operators_here(&mut self, least: u8) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
-        let head = self.chain_operand(level, true)?;
-        let mut rest = vec![];
-        while let Some(operator) = chain_operator(self.token, level) {
+        let mut left = self.prefixed(least)?;
+        let mut pending: Pending = vec![];
+        let mut pending_level = OPERAND;
+        while let Some((infix, level)) = infix(self.token).filter(|(_, level)| *level >= least) {
+            if level != pending_level {
+                left = self.close(left, &mut pending, start, first)?;
+                pending_level = level;
+            }
             self.advance()?;
-            self.count(1)?;
-            rest.push((operator, self.chain_operand(level, false)?));
+            let right = self.operators(level + 1)?;
+            match infix {
+                Infix::Chain(operator) => {
+                    self.count(1)?;
+                    pending.push((operator, right));
+                    continue;
+                }
+                Infix::Relation(relation) => {
+                    self.refuse_second(RELATION, "comparison", "join comparisons with `and`")?;
+                    left = self.push(Kind::Relation(relation, left, right), start, first)?;
+                }
+                Infix::Power(elementwise) => {
+                    let hint = "write `(a^b)^c` or `a^(b^c)`: `^` has no order of its own";
+                    self.refuse_second(POWER, "`^`", hint)?;
+                    left = self.push(Kind::Power(left, right, elementwise), start, first)?;
+                }
+            }
+            pending_level = OPERAND;
         }
-        if rest.is_empty() {
+        self.close(left, &mut pending, start, first)
+    }
+
+    fn close(
+        &mut self,
+        head: ExprId,
+        pending: &mut Pending,
+        start: Span,
+        first: ExprId,
+    ) -> Result<ExprId> {
+        if pending.is_empty() {
             return Ok(head);
         }
-        self.push(Kind::Chain(head, rest), start, first)
+        self.push(Kind::Chain(head, std::mem::take(pending)), start, first)
     }
 
-    fn chain_operand(&mut self, level: u8, is_head: bool) -> Result<ExprId> {
-        match level {
-            OR => self.chain(AND),
-            AND => self.logical_factor(),
-            // `-a*b` is −(a b): only the first term of a sum carries a sign.
-            SUM if is_head && self.sign().is_some() => self.signed(|parser| parser.chain(PRODUCT)),
-            SUM => self.chain(PRODUCT),
-            _ => self.factor(),
+    /// Comparisons and powers have no order among themselves.
+    fn refuse_second(&self, level: u8, what: &str, hint: &str) -> Result<()> {
+        match infix(self.token) {
+            Some((_, next)) if next == level => {
+                Err(self.unexpected(&format!("one {what}")).hint(hint))
+            }
+            _ => Ok(()),
         }
     }
 
-    fn logical_factor(&mut self) -> Result<ExprId> {
-        if !self.at_word(Keyword::Not) {
-            return self.relation();
-        }
-        self.nested(|parser| {
-            let (start, first) = (parser.advance()?, parser.next_id());
-            let operand = parser.logical_factor()?;
-            parser.push(Kind::Unary(UnaryOperator::Not, operand), start, first)
-        })
-    }
-
-    fn relation(&mut self) -> Result<ExprId> {
-        let (start, first) = (self.span, self.next_id());
-        let left = self.chain(SUM)?;
-        let Some(relation) = relation_operator(self.token) else {
-            return Ok(left);
+    /// An operand, or `not` or a sign with what it applies to: `-a*b` is −(a b), `2*-a^2` is
+    /// 2 (−(a²)).
+    fn prefixed(&mut self, least: u8) -> Result<ExprId> {
+        let (operator, level) = match self.token {
+            Token::Keyword(Keyword::Not) if least <= NOT => (UnaryOperator::Not, NOT),
+            Token::Symbol(Symbol::Minus | Symbol::ElementMinus) => {
+                (UnaryOperator::Minus, least.max(PRODUCT))
+            }
+            Token::Symbol(Symbol::Plus | Symbol::ElementPlus) => {
+                (UnaryOperator::Plus, least.max(PRODUCT))
+            }
+            _ => return self.primary(),
         };
-        self.advance()?;
-        let right = self.chain(SUM)?;
-        if relation_operator(self.token).is_some() {
-            return Err(self
-                .unexpected("one comparison")
-                .hint("join comparisons with `and`"));
-        }
-        self.push(Kind::Relation(relation, left, right), start, first)
-    }
-
-    fn sign(&self) -> Option<UnaryOperator> {
-        match self.token {
-            Token::Symbol(Symbol::Minus | Symbol::ElementMinus) => Some(UnaryOperator::Minus),
-            Token::Symbol(Symbol::Plus | Symbol::ElementPlus) => Some(UnaryOperator::Plus),
-            _ => None,
-        }
-    }
-
-    fn signed(&mut self, operand: impl FnOnce(&mut Self) -> Result<ExprId>) -> Result<ExprId> {
-        let Some(operator) = self.sign() else {
-            return operand(self);
-        };
-        self.nested(|parser| {
-            let (start, first) = (parser.advance()?, parser.next_id());
-            let operand = match parser.sign() {
-                Some(_) => parser.signed(operand)?,
-                None => operand(parser)?,
-            };
-            parser.push(Kind::Unary(operator, operand), start, first)
-        })
-    }
-
-    /// A power, or a signed one as in `2*-x`.
-    fn factor(&mut self) -> Result<ExprId> {
-        if self.sign().is_some() {
-            return self.signed(Self::power);
-        }
-        self.power()
-    }
-
-    fn power(&mut self) -> Result<ExprId> {
-        let (start, first) = (self.span, self.next_id());
-        let base = self.primary()?;
-        let Some(elementwise) = power_operator(self.token) else {
-            return Ok(base);
-        };
-        self.advance()?;
-        let exponent = match self.sign() {
-            Some(_) => self.signed(Self::primary)?,
-            None => self.primary()?,
-        };
-        if power_operator(self.token).is_some() {
-            return Err(self
-                .unexpected("one `^`")
-                .hint("write `(a^b)^c` or `a^(b^c)`: `^` has no order of its own"));
-        }
-        self.push(Kind::Power(base, exponent, elementwise), start, first)
+        let (start, first) = (self.advance()?, self.next_id());
+        let operand = self.operators(level)?;
+        self.push(Kind::Unary(operator, operand), start, first)
     }
 
     fn primary(&mut self) -> Result<ExprId> {
@@ -334,47 +327,33 @@ impl Parser<'_> {
     }
 }
 
-fn chain_operator(token: Token, level: u8) -> Option<BinaryOperator> {
+fn infix(token: Token) -> Option<(Infix, u8)> {
     use BinaryOperator as B;
-    let (operator, its_level) = match token {
-        Token::Keyword(Keyword::Or) => (B::Or, OR),
-        Token::Keyword(Keyword::And) => (B::And, AND),
-        Token::Symbol(symbol) => match symbol {
-            Symbol::Plus => (B::Add, SUM),
-            Symbol::Minus => (B::Subtract, SUM),
-            Symbol::ElementPlus => (B::ElementAdd, SUM),
-            Symbol::ElementMinus => (B::ElementSubtract, SUM),
-            Symbol::Times => (B::Multiply, PRODUCT),
-            Symbol::Over => (B::Divide, PRODUCT),
-            Symbol::ElementTimes => (B::ElementMultiply, PRODUCT),
-            Symbol::ElementOver => (B::ElementDivide, PRODUCT),
-            _ => return None,
-        },
+    let chain = |operator, level| Some((Infix::Chain(operator), level));
+    let relation = |relation| Some((Infix::Relation(relation), RELATION));
+    let symbol = match token {
+        Token::Keyword(Keyword::Or) => return chain(B::Or, OR),
+        Token::Keyword(Keyword::And) => return chain(B::And, AND),
+        Token::Symbol(symbol) => symbol,
         _ => return None,
     };
-    (its_level == level).then_some(operator)
-}
-
-fn relation_operator(token: Token) -> Option<Relation> {
-    let Token::Symbol(symbol) = token else {
-        return None;
-    };
-    Some(match symbol {
-        Symbol::Less => Relation::Less,
-        Symbol::LessEqual => Relation::LessEqual,
-        Symbol::Greater => Relation::Greater,
-        Symbol::GreaterEqual => Relation::GreaterEqual,
-        Symbol::EqualEqual => Relation::Equal,
-        Symbol::NotEqual => Relation::NotEqual,
-        _ => return None,
-    })
-}
-
-/// Whether `^` (false) or `.^` (true) comes.
-fn power_operator(token: Token) -> Option<bool> {
-    match token {
-        Token::Symbol(Symbol::Power) => Some(false),
-        Token::Symbol(Symbol::ElementPower) => Some(true),
+    match symbol {
+        Symbol::Plus => chain(B::Add, SUM),
+        Symbol::Minus => chain(B::Subtract, SUM),
+        Symbol::ElementPlus => chain(B::ElementAdd, SUM),
+        Symbol::ElementMinus => chain(B::ElementSubtract, SUM),
+        Symbol::Times => chain(B::Multiply, PRODUCT),
+        Symbol::Over => chain(B::Divide, PRODUCT),
+        Symbol::ElementTimes => chain(B::ElementMultiply, PRODUCT),
+        Symbol::ElementOver => chain(B::ElementDivide, PRODUCT),
+        Symbol::Less => relation(Relation::Less),
+        Symbol::LessEqual => relation(Relation::LessEqual),
+        Symbol::Greater => relation(Relation::Greater),
+        Symbol::GreaterEqual => relation(Relation::GreaterEqual),
+        Symbol::EqualEqual => relation(Relation::Equal),
+        Symbol::NotEqual => relation(Relation::NotEqual),
+        Symbol::Power => Some((Infix::Power(false), POWER)),
+        Symbol::ElementPower => Some((Infix::Power(true), POWER)),
         _ => None,
     }
 }

@@ -211,6 +211,7 @@ mod tests {
                 Lexer::new(text)
                     .next()
                     .unwrap_err()
+                    .into_details()
                     .message
                     .contains("no end")
             );

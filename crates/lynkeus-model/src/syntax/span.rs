@@ -33,9 +33,14 @@ impl Span {
     }
 }
 
-/// What is wrong and where, before it is tied to a file.
+/// What is wrong and where, before it is tied to a file. Boxed, so that the results of the
+/// recursive parts of the reader stay small.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Problem {
+pub(crate) struct Problem(Box<Details>);
+
+/// The parts of a [`Problem`].
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Details {
     pub span: Span,
     pub message: String,
     pub label: Option<String>,
@@ -46,29 +51,34 @@ pub(crate) type Result<T> = std::result::Result<T, Problem>;
 
 impl Problem {
     pub(crate) fn new(span: Span, message: impl Into<String>) -> Self {
-        Self {
+        let message = message.into();
+        Self(Box::new(Details {
             span,
-            message: message.into(),
+            message,
             label: None,
             hint: None,
-        }
+        }))
     }
 
     /// Text beside the caret.
     pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
-        self.label = Some(label.into());
+        self.0.label = Some(label.into());
         self
     }
 
     /// What to do about it.
     pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
-        self.hint = Some(hint.into());
+        self.0.hint = Some(hint.into());
         self
     }
 
     /// A hint where there is one.
     pub(crate) fn maybe_hint(mut self, hint: Option<String>) -> Self {
-        self.hint = hint;
+        self.0.hint = hint;
         self
+    }
+
+    pub(crate) fn into_details(self) -> Details {
+        *self.0
     }
 }

@@ -62,17 +62,22 @@ fn deep_nesting() {
 
 #[test]
 fn the_deepest_allowed_nesting_is_taken() {
-    for (open, close) in [
-        ("(", ")"),
-        ("-(", ")"),
-        ("sin(", ")"),
-        ("if x > 0 then 1 else (", ")"),
+    // Levels that one repetition costs: its bracket, and the operand it stands in.
+    for (open, close, levels) in [
+        ("(", ")", 1),
+        ("-(", ")", 2),
+        ("sin(", ")", 1),
+        ("{1, 2}*{1, ", "}", 2),
+        ("if x > 0 then 1 else (", ")", 2),
+        ("1 + 2*(", ")", 3),
+        ("2^(", ")", 2),
+        (
+            "x^(1 + (if x > 0 and x < 1 or 1 > 2*(",
+            ")) then 1 else 2))",
+            7,
+        ),
     ] {
-        let n = if open.len() > 5 || open == "-(" {
-            60
-        } else {
-            180
-        };
+        let n = 190 / levels;
         let text = equation(&format!("der(x) = {}x{}", open.repeat(n), close.repeat(n)));
         let plant = Plant::from_modelica(&text, "deep.mo", &LoadOptions::default());
         assert!(plant.is_ok(), "{open}: {}", plant.unwrap_err());

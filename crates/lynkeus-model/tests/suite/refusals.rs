@@ -229,6 +229,15 @@ fn rendering() {
 }
 
 #[test]
+fn carriage_returns() {
+    let found = refused("model M\r\n  Real x;\r\nequation\r\n  der(x) = y;\r\nend M;\r\n");
+    assert_eq!((found.line, found.column), (4, 12));
+    assert!(!found.to_string().contains('\r'));
+    let found = refused("model M Real x; equation der(x) =\r\r\u{13}\r\r x; end M;");
+    assert!(found.to_string().contains('^'));
+}
+
+#[test]
 fn columns_count_characters() {
     let found = refused("model M\n  Real x \"größe\"; Real y = z;\nequation der(x) = 1; end M;");
     assert_eq!((found.line, found.column), (2, 28));
