@@ -2,7 +2,7 @@
 
 use crate::exact::{Exact, holds, to_f64};
 use crate::jets::{ORDER, arguments_between, jets, reference};
-use crate::recipe::{INPUTS, Style, follow, recipe, symbols, without_systems};
+use crate::recipe::{INPUTS, Style, compute, follow, recipe, symbols, without_systems};
 use crate::sample::member;
 use astro_float::BigFloat;
 use lynkeus_expr::interval::Intervals;
@@ -99,6 +99,17 @@ proptest! {
         for &node in &nodes[STEPS - 6..] {
             let found = evaluate(&graph, &[node], &x)[0];
             prop_assert!(same(found, values[&node]), "{found} for {} alone", values[&node]);
+        }
+    }
+
+    /// Folding, identities and sharing change no bit of a value.
+    #[test]
+    fn graphs_equal_plain_arithmetic(recipe in recipe(STEPS), x in inputs()) {
+        let graph = Graph::new();
+        let nodes = follow(&recipe, &graph, Style::Wild);
+        let plain = compute(&recipe, &Reals, &x);
+        for ((node, found), plain) in nodes.iter().zip(evaluate(&graph, &nodes, &x)).zip(plain) {
+            prop_assert!(same(found, plain), "{found} for {plain}: {}", graph.render(*node, 400));
         }
     }
 

@@ -1,7 +1,7 @@
 //! Random graphs: recipes that can be followed again and again, on any graph.
 
 use crate::sample::{BINARY, UNARY};
-use lynkeus_expr::{Binary, Expr, Graph, Node, Unary};
+use lynkeus_expr::{Algebra, Binary, Expr, Graph, Node, Nodes, Unary};
 use proptest::prelude::*;
 use proptest::sample::Index;
 
@@ -66,28 +66,45 @@ pub fn symbols(graph: &Graph) -> Vec<Node> {
 /// Follows a recipe: the result of every step.
 pub fn follow(recipe: &[Step], graph: &Graph, style: Style) -> Vec<Node> {
     let mut known = symbols(graph);
+    if style == Style::Wild {
+        return compute(recipe, &Nodes(graph), &known);
+    }
     for step in recipe {
         let pick = |i: usize| graph.expr(*step.operands[i].get(&known));
         let [a, b, c] = [pick(0), pick(1), pick(2)];
-        let node = match style {
-            Style::Wild => wild(graph, &step.kind, a, b, c),
-            Style::Tame => tame(graph, &step.kind, a, b, c),
-        };
-        known.push(node);
+        known.push(tame(graph, &step.kind, a, b, c));
     }
     known.split_off(INPUTS)
 }
 
-fn wild<'g>(graph: &'g Graph, kind: &Kind, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Node {
-    let [x, y, z] = [a.node(), b.node(), c.node()];
-    match *kind {
-        Kind::Constant(value) => graph.constant(value).node(),
-        Kind::Unary(op) => graph.unary(op, x),
-        Kind::Binary(op) => graph.binary(op, x, y),
-        Kind::Powi(n) => graph.powi(x, n),
-        Kind::Select => graph.select(x, y, z),
-        Kind::Solve => graph.solve(&[x, y, z, x], &[y, z]).x[1],
+/// Follows a recipe in any algebra, operands as they are: with nodes for values it builds the wild graph, with numbers
+/// it computes without any graph.
+pub fn compute<A: Algebra>(recipe: &[Step], algebra: &A, inputs: &[A::Value]) -> Vec<A::Value> {
+    let mut known = inputs.to_vec();
+    for step in recipe {
+        let [x, y, z] = step
+            .operands
+            .each_ref()
+            .map(|operand| operand.get(&known).clone());
+        let value = match step.kind {
+            Kind::Constant(value) => algebra.constant(value),
+            Kind::Unary(op) => algebra.unary(op, &x),
+            // Graphs turn constant whole exponents into integer powers, which round differently.
+            Kind::Binary(Binary::Pow) => {
+                let exponent = algebra.binary(Binary::Add, &y, &algebra.constant(0.25));
+                algebra.binary(Binary::Pow, &x, &exponent)
+            }
+            Kind::Binary(op) => algebra.binary(op, &x, &y),
+            Kind::Powi(n) => algebra.powi(&x, n),
+            Kind::Select => algebra.select(&x, &y, &z),
+            Kind::Solve => algebra
+                .solve(&[x.clone(), y.clone(), z.clone(), x], &[y, z])
+                .0
+                .remove(1),
+        };
+        known.push(value);
     }
+    known.split_off(inputs.len())
 }
 
 fn tame<'g>(graph: &'g Graph, kind: &Kind, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Node {
