@@ -1,60 +1,74 @@
 //! The pictures of the documentation, drawn by the tool from the studies that the repository ships.
 //!
-//! `examples/<plant>/study.toml` becomes `docs/pictures/<plant>.svg` and `study-<what>.toml`
-//! becomes `<plant>-<what>.svg`. Where a `log.csv` lies beside a `study.toml` the picture shows
-//! the estimates from that log, else a simulation.
+//! `examples/<plant>/study.toml` becomes `docs/pictures/<plant>.svg`; `study-<what>.toml` and
+//! `<what>.toml` become `<plant>-<what>.svg`. Where a `log.csv` lies beside a `study.toml` the
+//! picture shows the estimates from that log, else a simulation.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::process::{cargo, root, run};
 
+/// What the tool says of a study whose answer is no: such studies have no picture.
+const REFUSED: i32 = 1;
+
 /// Draws every picture again.
 pub fn draw() -> Result<(), String> {
     let pictures = root().join("docs").join("pictures");
     fs::create_dir_all(&pictures).map_err(|error| at(&pictures, &error))?;
+    run(&mut cargo(&["build", "--release", "--package", "lynkeus"]))?;
     for folder in sorted(&root().join("examples"))? {
-        if folder.is_dir() {
-            draw_folder(&folder, &pictures)?;
+        let plant = name_of(&folder);
+        for study in sorted(&folder)? {
+            if study
+                .extension()
+                .is_some_and(|extension| extension == "toml")
+            {
+                let picture = pictures.join(format!("{}.svg", title(&plant, &study)));
+                draw_study(&study, &picture)?;
+            }
         }
     }
     Ok(())
 }
 
-fn draw_folder(folder: &Path, pictures: &Path) -> Result<(), String> {
-    let plant = name_of(folder);
-    for study in sorted(folder)? {
-        let file = name_of(&study);
-        let Some(variant) = file
-            .strip_prefix("study")
-            .and_then(|rest| rest.strip_suffix(".toml"))
-        else {
-            continue;
-        };
-        let picture = pictures.join(format!("{plant}{variant}.svg"));
-        let log = folder.join("log.csv");
-        let mut tool = cargo(&["run", "--release", "--quiet", "--package", "lynkeus", "--"]);
-        if variant.is_empty() && log.exists() {
-            tool.arg("estimate").arg(&study).arg(log);
-        } else {
-            tool.arg("simulate").arg(&study);
-        }
-        run(tool
-            .arg("--output")
-            .arg(scratch())
-            .arg("--plot")
-            .arg(&picture))?;
-        eprintln!("drew {}", picture.display());
+/// `two-tanks` for `study.toml`, `two-tanks-noise` for `study-noise.toml` and `noise.toml`.
+fn title(plant: &str, study: &Path) -> String {
+    let file = name_of(study);
+    let stem = file.strip_suffix(".toml").unwrap_or(&file);
+    match stem
+        .strip_prefix("study")
+        .unwrap_or(stem)
+        .trim_start_matches('-')
+    {
+        "" => plant.to_owned(),
+        what => format!("{plant}-{what}"),
+    }
+}
+
+fn draw_study(study: &Path, picture: &Path) -> Result<(), String> {
+    let mut tool = cargo(&["run", "--release", "--quiet", "--package", "lynkeus", "--"]);
+    let log = study.with_file_name("log.csv");
+    if name_of(study) == "study.toml" && log.exists() {
+        tool.arg("estimate").arg(study).arg(log);
+    } else {
+        tool.arg("simulate").arg(study);
+    }
+    tool.arg("--quiet").arg("--plot").arg(picture);
+    let status = tool.status().map_err(|error| format!("cargo: {error}"))?;
+    match status.code() {
+        Some(0) => eprintln!("drew {}", picture.display()),
+        Some(REFUSED) => eprintln!("no picture of {}: its answer is no", study.display()),
+        _ => return Err(format!("{}: the tool ended with {status}", study.display())),
     }
     Ok(())
 }
 
-/// Where the estimates go that belong to a picture: nobody reads them.
-fn scratch() -> PathBuf {
-    std::env::temp_dir().join("lynkeus-gallery.csv")
-}
-
+/// The entries of a folder by name; of anything else, none.
 fn sorted(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    if !folder.is_dir() {
+        return Ok(vec![]);
+    }
     let entries = fs::read_dir(folder).map_err(|error| at(folder, &error))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     paths.sort();
@@ -70,4 +84,17 @@ fn name_of(path: &Path) -> String {
 
 fn at(path: &Path, error: &std::io::Error) -> String {
     format!("{}: {error}", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_named_after_plant_and_study() {
+        let named = |study| title("column", Path::new(study));
+        assert_eq!(named("study.toml"), "column");
+        assert_eq!(named("study-noise.toml"), "column-noise");
+        assert_eq!(named("examples/column/theta-4.2.toml"), "column-theta-4.2");
+    }
 }
