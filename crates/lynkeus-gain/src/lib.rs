@@ -14,6 +14,7 @@
 
 pub mod lemma1;
 mod tridiagonal;
+pub mod vandermonde;
 
 pub use lemma1::Bounds;
 pub use tridiagonal::{Tridiagonal, TridiagonalError};

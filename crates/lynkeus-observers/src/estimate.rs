@@ -128,6 +128,7 @@ impl Copy<'_, '_> {
             states: self.states(tuning)?,
             derivatives,
             inputs: self.extended.inputs.iter().map(signal).collect(),
+            input_derivatives: vec![],
             measured: self.measured(),
             estimates: self.estimates(),
             monitors: vec![],

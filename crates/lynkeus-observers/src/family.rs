@@ -4,11 +4,12 @@ use lynkeus_expr::MissingInput;
 use lynkeus_structure::{Check, Condition, Extended};
 
 use crate::{
-    Observer, Tuning, TuningError, block_triangular::BlockTriangular, triangular::Triangular,
+    Observer, Tuning, TuningError, block_triangular::BlockTriangular,
+    drift_observable::DriftObservable, triangular::Triangular,
 };
 
 /// Every family, in the order in which `auto` tries them.
-pub const FAMILIES: &[&dyn Family] = &[&Triangular, &BlockTriangular];
+pub const FAMILIES: &[&dyn Family] = &[&Triangular, &BlockTriangular, &DriftObservable];
 
 /// The family of that name.
 pub fn find(name: &str) -> Option<&'static dyn Family> {

@@ -12,6 +12,7 @@
 
 pub mod block_triangular;
 mod conditions;
+pub mod drift_observable;
 mod estimate;
 mod family;
 mod observer;
@@ -19,5 +20,5 @@ pub mod triangular;
 mod tuning;
 
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
-pub use observer::{Estimate, Monitor, Observer, Signal};
+pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
 pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -1,6 +1,7 @@
 //! An observer as a system of expressions.
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::flow::{self, Flow};
+use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Variable;
 
 /// A named symbol.
@@ -37,6 +38,22 @@ pub struct Monitor {
     pub meaning: String,
 }
 
+/// A derivative of a known input that the observer's equations read. Whoever runs
+/// the observer supplies it like an input: exact, from the study's expressions
+/// ([`Observer::input_derivative_expressions`]). A log does not hold it, and
+/// differences of its samples would not do: there the observer has to be refused,
+/// with the advice to take one that estimates the derivatives itself
+/// (`variant = "practical"` of the family `drift-observable`).
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputDerivative {
+    /// name of the input
+    pub input: String,
+    /// 1 for u', 2 for u'', …
+    pub order: usize,
+    /// the symbol, named like `u'`
+    pub signal: Signal,
+}
+
 /// z' = F(t, z, u, y), x̂ = z or a function of it, over the graph of the plant.
 #[derive(Clone, Debug)]
 pub struct Observer {
@@ -50,6 +67,8 @@ pub struct Observer {
     pub derivatives: Vec<Node>,
     /// known inputs u
     pub inputs: Vec<Signal>,
+    /// derivatives of the known inputs; empty for most families
+    pub input_derivatives: Vec<InputDerivative>,
     /// measured outputs y
     pub measured: Vec<Signal>,
     /// what is estimated, plant states first
@@ -59,6 +78,34 @@ pub struct Observer {
 }
 
 impl Observer {
+    /// (name, expression of time) of each of `input_derivatives`, given those of
+    /// the inputs; inputs that are not among `inputs` are left out.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an expression reads a symbol of another graph.
+    pub fn input_derivative_expressions(
+        &self,
+        graph: &Graph,
+        inputs: &[(String, Node)],
+    ) -> Result<Vec<(String, Node)>, MissingInput> {
+        let flow = Flow {
+            time: self.time,
+            states: &[],
+            derivatives: &[],
+            inputs: &[],
+        };
+        let mut found = vec![];
+        for needed in &self.input_derivatives {
+            let input = inputs.iter().find(|(name, _)| *name == needed.input);
+            let Some((_, u)) = input else { continue };
+            let jets = flow::derivatives(graph, &flow, &[*u], needed.order)?;
+            if let Some(&last) = jets.iter().flatten().last() {
+                found.push((needed.signal.name.clone(), last));
+            }
+        }
+        Ok(found)
+    }
+
     /// The symbol of an estimated quantity. The name cannot be a Modelica one, so
     /// that it never meets a variable of the plant.
     pub(crate) fn hat(graph: &Graph, name: &str) -> Signal {

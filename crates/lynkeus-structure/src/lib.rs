@@ -12,9 +12,11 @@ pub mod blocks;
 pub mod chains;
 mod condition;
 mod extended;
+pub mod output_map;
 mod range;
 mod region;
 pub mod sign;
+mod vanish;
 pub mod visibility;
 
 pub use blocks::Blocks;
@@ -23,3 +25,4 @@ pub use condition::{Check, Condition, Point, Witness};
 pub use extended::{Extended, Measurement, Sensors, SensorsError};
 pub use range::{Range, range};
 pub use region::{Dimension, Region};
+pub use vanish::{Vanishing, vanishes};

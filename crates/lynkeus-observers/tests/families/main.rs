@@ -3,4 +3,5 @@
 
 mod block_triangular;
 mod common;
+mod drift_observable;
 mod triangular;

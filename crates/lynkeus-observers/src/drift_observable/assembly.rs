@@ -1,0 +1,316 @@
+//! The observers (3.1), (4.1) and (4.22) as expressions.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Expr, Graph, Node};
+use lynkeus_model::Variable;
+use lynkeus_structure::Extended;
+
+use super::conditions::Form;
+use super::keys::{Gains, Variant, list};
+use super::{NAME, derivative_name};
+use crate::estimate::Copy;
+use crate::{ChainGain, Design, DesignError, InputDerivative, Monitor, Signal, Tuning};
+
+/// Below this rcond of Q̄, with rows and columns scaled, the flag is raised.
+const ALARM: f64 = 1e-2;
+/// The correction is multiplied by 1 − exp(−(rcond/WITHDRAWN)²): exactly 1 in `f64`
+/// from 6·WITHDRAWN on, and small enough below for Q̄⁻¹, which grows like
+/// 1/rcond, to pass a singularity in bounds.
+const WITHDRAWN: f64 = 1e-4;
+
+pub(super) fn design(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: Form,
+    gains: Gains,
+) -> Result<Design, DesignError> {
+    let graph = extended.graph();
+    let copy = Copy::new(extended, tuning);
+    let filters = filters(extended, &form, &gains);
+    let seen = filters.seen();
+    // the plant and its map at x̂, and at x̂_a where (4.22) has it
+    let at = |expressions: &[Node]| graph.substitute(&copy.at_estimate(expressions), &seen);
+    let right = innovations(extended, &copy, &form, &gains, &filters, &at);
+    let Q = numbers(graph, &form.Q, &at);
+    let solution = solve(extended, &Q, &right);
+    let f = at(&extended.derivatives);
+    let derivatives = f.iter().zip(&solution.x);
+    let mut derivatives: Vec<Node> = derivatives
+        .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
+        .collect();
+    derivatives.extend(filters.derivatives(graph, &gains));
+    let mut observer = copy.observer(NAME, tuning, derivatives)?;
+    observer.states.extend(filters.states(&gains));
+    observer.monitors.push(Monitor {
+        name: "rcond".into(),
+        node: solution.rcond,
+        alarm_below: ALARM,
+        meaning: format!(
+            "{} is close to singular: the outputs and their derivatives hardly tell the states apart here, and the correction is large or withdrawn",
+            if form.variant == Variant::Bounded { "Q" } else { "Q̄" }
+        ),
+    });
+    if form.variant == Variant::Theoretical {
+        observer.input_derivatives = input_derivatives(extended, &form);
+    }
+    Ok(Design {
+        notes: notes(extended, &form, &observer.input_derivatives),
+        observer,
+        gains: table(extended, &form, &gains),
+        parameters: parameters(extended, &form, &gains),
+        examination: form.examination,
+    })
+}
+
+/// x̂_a: per input the symbols of its filter, empty where there is none.
+struct Filters {
+    input: Vec<Variable>,
+    x_a: Vec<Vec<Signal>>,
+    U: Vec<Vec<Node>>,
+}
+
+fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Filters {
+    let graph = extended.graph();
+    let state = |input: &Variable, k: usize| {
+        let name = format!("filter of {}", derivative_name(&input.name, k));
+        let symbol = graph.symbol(&name).node();
+        Signal { name, symbol }
+    };
+    let pairs = extended.inputs.iter().zip(&gains.K2);
+    Filters {
+        input: extended.inputs.clone(),
+        x_a: pairs
+            .map(|(input, K2)| (0..K2.len()).map(|k| state(input, k)).collect())
+            .collect(),
+        U: form.U.clone(),
+    }
+}
+
+impl Filters {
+    /// u, u', … ↦ x̂_a
+    fn seen(&self) -> HashMap<Node, Node> {
+        let pairs = self.U.iter().zip(&self.x_a);
+        pairs
+            .flat_map(|(U, x_a)| U.iter().zip(x_a).map(|(&u, x)| (u, x.symbol)))
+            .collect()
+    }
+
+    /// u − C x̂_a
+    fn innovation<'g>(&self, graph: &'g Graph, j: usize) -> Option<Expr<'g>> {
+        let first = self.x_a[j].first()?;
+        Some(graph.expr(self.input[j].node) - graph.expr(first.symbol))
+    }
+
+    fn states(&self, gains: &Gains) -> Vec<(Signal, f64)> {
+        let signals = self.x_a.iter().flatten().cloned();
+        signals.zip(gains.filter_start.concat()).collect()
+    }
+
+    /// x̂_a' = A x̂_a + K₂(u − C x̂_a)
+    fn derivatives(&self, graph: &Graph, gains: &Gains) -> Vec<Node> {
+        let mut derivatives = vec![];
+        for (j, x_a) in self.x_a.iter().enumerate() {
+            let Some(e) = self.innovation(graph, j) else {
+                continue;
+            };
+            for (k, &gain) in gains.K2[j].iter().enumerate() {
+                let correction = gain * e;
+                derivatives.push(match x_a.get(k + 1) {
+                    Some(next) => (graph.expr(next.symbol) + correction).node(),
+                    None => correction.node(),
+                });
+            }
+        }
+        derivatives
+    }
+}
+
+/// K(y − h(x̂)) and, for (4.22), − Q̄_a K₂(u − C x̂_a).
+fn innovations(
+    extended: &Extended<'_>,
+    copy: &Copy<'_, '_>,
+    form: &Form,
+    gains: &Gains,
+    filters: &Filters,
+    at: &dyn Fn(&[Node]) -> Vec<Node>,
+) -> Vec<Node> {
+    let graph = extended.graph();
+    let y = copy.measured();
+    let x̂: HashMap<Node, Node> = extended
+        .symbols()
+        .into_iter()
+        .zip(copy.hats.iter().map(|hat| hat.symbol))
+        .collect();
+    let e: Vec<Expr<'_>> = extended
+        .outputs
+        .iter()
+        .zip(&y)
+        .map(|(output, y)| {
+            // the innovation sees the estimate itself, as in the other families,
+            // except where h may leave its domain
+            let h = match output.state {
+                Some(_) => graph.substitute(&[output.variable.node], &x̂),
+                None => copy.at_estimate(&[output.variable.node]),
+            };
+            h.iter()
+                .fold(graph.expr(y.symbol), |y, &h| y - graph.expr(h))
+        })
+        .collect();
+    let row = |(place, &(i, k)): (usize, &(usize, usize))| {
+        let mut sum = gains.K[i][k] * e[i];
+        let mut column = 0;
+        for (j, U) in form.U.iter().enumerate() {
+            for l in 0..U.len() {
+                let entry = form.Q_a.get(place).and_then(|row| row[column]);
+                column += 1;
+                let (Some(entry), Some(e_a)) = (entry, filters.innovation(graph, j)) else {
+                    continue;
+                };
+                let [entry] = at(&[entry])[..] else { continue };
+                sum = sum - graph.expr(entry) * (gains.K2[j][l] * e_a);
+            }
+        }
+        sum.node()
+    };
+    form.rows.iter().enumerate().map(row).collect()
+}
+
+fn numbers(
+    graph: &Graph,
+    rows: &[Vec<Option<Node>>],
+    at: &dyn Fn(&[Node]) -> Vec<Node>,
+) -> Vec<Node> {
+    let zero = graph.constant(0.0).node();
+    let entries: Vec<Node> = rows.iter().flatten().map(|e| e.unwrap_or(zero)).collect();
+    at(&entries)
+}
+
+/// The correction and the rcond that it was found with.
+struct Solution {
+    x: Vec<Node>,
+    rcond: Node,
+}
+
+/// x with Q x = b. Columns are scaled by the states' ranges and rows to length
+/// one, so that rcond does not depend on units; where it nearly vanishes the
+/// correction is withdrawn smoothly.
+fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
+    let graph = extended.graph();
+    let n = b.len();
+    let scales: Vec<f64> = extended.states.iter().map(scale).collect();
+    let (mut A, mut right) = (vec![], vec![]);
+    for i in 0..n {
+        let row: Vec<Expr<'_>> = (0..n)
+            .map(|j| graph.expr(Q[n * i + j]) * scales[j])
+            .collect();
+        let squares = row.iter().map(|q| q.powi(2));
+        // a row of zeros stays one: it is singular, not a division by zero
+        let norm = squares
+            .fold(graph.constant(1e-300), |sum, square| sum + square)
+            .sqrt();
+        A.extend(row.iter().map(|&q| (q / norm).node()));
+        right.push((graph.expr(b[i]) / norm).node());
+    }
+    let solution = graph.solve(&A, &right);
+    let ratio = graph.expr(solution.rcond) / WITHDRAWN;
+    let share = 1.0 - (-(ratio * ratio)).exp();
+    let x = solution.x.iter().zip(&scales);
+    Solution {
+        x: x.map(|(&x, &scale)| (graph.expr(x) * scale * share).node())
+            .collect(),
+        rcond: solution.rcond,
+    }
+}
+
+/// A typical size of a state's variation.
+fn scale(state: &Variable) -> f64 {
+    let width = state.max - state.min;
+    match (width.is_finite() && width > 0.0, state.nominal) {
+        (true, _) => width,
+        (false, Some(nominal)) if nominal != 0.0 => nominal.abs(),
+        _ => 1.0,
+    }
+}
+
+fn input_derivatives(extended: &Extended<'_>, form: &Form) -> Vec<InputDerivative> {
+    let mut needed = vec![];
+    for (input, U) in extended.inputs.iter().zip(&form.U) {
+        for (order, &symbol) in U.iter().enumerate().skip(1) {
+            needed.push(InputDerivative {
+                input: input.name.clone(),
+                order,
+                signal: Signal {
+                    name: derivative_name(&input.name, order),
+                    symbol,
+                },
+            });
+        }
+    }
+    needed
+}
+
+fn notes(extended: &Extended<'_>, form: &Form, derivatives: &[InputDerivative]) -> Vec<String> {
+    let mut notes = vec![];
+    if let [_, _, ..] = form.indices[..] {
+        let outputs = extended.outputs.iter().zip(&form.indices);
+        let parts: Vec<String> = outputs
+            .map(|(o, μ)| format!("{} {μ}", o.variable.name))
+            .collect();
+        notes.push(format!(
+            "derivatives used of each output: {}; the key 'indices' decides otherwise",
+            parts.join(", ")
+        ));
+    }
+    if !derivatives.is_empty() {
+        let names: Vec<&str> = derivatives.iter().map(|d| d.signal.name.as_str()).collect();
+        notes.push(format!(
+            "the theoretical observer needs {} exactly, which only a simulation has; for a log use variant = \"practical\"",
+            names.join(", ")
+        ));
+    }
+    if form.variant == Variant::Bounded && form.U.iter().any(|U| !U.is_empty()) {
+        notes.push("the bounded variant converges for small inputs only (Theorem 3.3)".to_owned());
+    }
+    notes
+}
+
+/// K₁ per output and K₂ per filter, against the derivative each entry corrects.
+fn table(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Vec<ChainGain> {
+    let row = |name: &str, output: String, K: &[f64]| ChainGain {
+        output,
+        entries: K
+            .iter()
+            .enumerate()
+            .map(|(k, &gain)| (derivative_name(name, k), gain))
+            .collect(),
+    };
+    let outputs = extended.outputs.iter().zip(&form.indices).zip(&gains.K);
+    let outputs = outputs
+        .filter(|((_, μ), _)| **μ > 0)
+        .map(|((o, _), K)| row(&o.variable.name, o.variable.name.clone(), K));
+    let inputs = extended.inputs.iter().zip(&gains.K2);
+    let filters = inputs
+        .filter(|(_, K2)| !K2.is_empty())
+        .map(|(input, K2)| row(&input.name, format!("filter of {}", input.name), K2));
+    outputs.chain(filters).collect()
+}
+
+fn parameters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Vec<(String, String)> {
+    let mut rows = vec![("variant".to_owned(), form.variant.word().to_owned())];
+    for (output, λ) in extended.outputs.iter().zip(&gains.λ) {
+        if !λ.is_empty() {
+            rows.push((format!("λ of {}", output.variable.name), list(λ)));
+        }
+    }
+    for (input, λ) in extended.inputs.iter().zip(&gains.filter_λ) {
+        if !λ.is_empty() {
+            rows.push((format!("λ of the filter of {}", input.name), list(λ)));
+        }
+    }
+    for found in &gains.lemma {
+        rows.push(("σ of Lemma 3.2".to_owned(), found.σ.to_string()));
+        rows.push(("√cn(P)".to_owned(), found.peaking.to_string()));
+    }
+    rows
+}

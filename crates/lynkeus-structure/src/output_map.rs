@@ -1,0 +1,379 @@
+//! The map from the state to the derivatives of the outputs: Lie derivatives along
+//! the drift, relative degrees, observability indices, and the map along the flow
+//! with its inputs, after Germani and Manes (1999), section 2.
+//!
+//! x' = f(x) + Σ_j g_j(x) u_j, y_i = h_i(x). With u = 0 the derivatives of the
+//! outputs are L_f^k h_i(x), and their Jacobian is Q(x). With inputs they are
+//! functions of x and of u, u', …; input j appears first in the derivative of
+//! order r_ij, the observation relative degree of Definition 2.2.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::flow::{self, Flow, InputJet};
+use lynkeus_expr::{Expr, Graph, MissingInput, Node, Tape, jacobian};
+use nalgebra::DVector;
+
+use crate::visibility::{inside, spread};
+use crate::{Extended, Vanishing, vanishes};
+
+/// Points at which the rank of the rows is tried.
+const POINTS: usize = 5;
+/// A row of unit length that keeps less than this beside the rows before it
+/// depends on them.
+const RANK_TOLERANCE: f64 = 1e-8;
+
+/// A matrix row by row; none where an entry is zero everywhere.
+pub type Rows = Vec<Vec<Option<Node>>>;
+
+/// f and g of x' = f(x) + g(x)u.
+#[derive(Clone, Debug)]
+pub struct AffineForm {
+    /// f, one expression per extended state
+    pub drift: Vec<Node>,
+    /// g_j, one column per known input
+    pub input_columns: Vec<Vec<Option<Node>>>,
+}
+
+/// Writes the plant as x' = f(x) + g(x)u, y = h(x).
+///
+/// # Errors
+/// Inside: the first equation that breaks the form, in words.
+pub fn affine_form(extended: &Extended<'_>) -> Result<Result<AffineForm, String>, MissingInput> {
+    let graph = extended.graph();
+    let region = extended.region();
+    let u: Vec<Node> = extended.inputs.iter().map(|i| i.node).collect();
+    let g = jacobian::forward(graph, &extended.derivatives, &u);
+    let slopes: Vec<Node> = g.entries.iter().map(|e| e.2).collect();
+    let second = jacobian::forward(graph, &slopes, &u);
+    for (entry, j, node) in second.entries {
+        if vanishes(graph, node, &region)? != Vanishing::Everywhere {
+            let (state, input) = (g.entries[entry].0, &extended.inputs[j].name);
+            return Ok(Err(format!(
+                "the equation of {} is not affine in the input {input}; the form is x' = f(x) + g(x)u",
+                extended.states[state].name
+            )));
+        }
+    }
+    let of_u = |node: Node| {
+        jacobian::pattern(graph, &[node], &u)[0]
+            .first()
+            .map(|&j| &extended.inputs[j].name)
+    };
+    for output in &extended.outputs {
+        if let Some(input) = of_u(output.variable.node) {
+            return Ok(Err(format!(
+                "the output {} reads the input {input}; the form is y = h(x)",
+                output.variable.name
+            )));
+        }
+    }
+    let zero = graph.constant(0.0).node();
+    let silent: HashMap<Node, Node> = u.iter().map(|&u| (u, zero)).collect();
+    let n = extended.states.len();
+    Ok(Ok(AffineForm {
+        drift: graph.substitute(&extended.derivatives, &silent),
+        input_columns: (0..u.len())
+            .map(|j| (0..n).map(|i| g.get(i, j)).collect())
+            .collect(),
+    }))
+}
+
+/// L_f^k h_i for every output i and k = 0 … order.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn lie_derivatives(
+    extended: &Extended<'_>,
+    form: &AffineForm,
+    order: usize,
+) -> Result<Vec<Vec<Node>>, MissingInput> {
+    along(extended, &form.drift, &[], order)
+}
+
+/// y_i^(k) as functions of x and U, where `U[j]` holds the symbols of input j
+/// and of its derivatives; k = 0 … order.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn output_derivatives(
+    extended: &Extended<'_>,
+    U: &[Vec<Node>],
+    order: usize,
+) -> Result<Vec<Vec<Node>>, MissingInput> {
+    let jets = extended.inputs.iter().zip(U).map(|(input, jet)| InputJet {
+        symbol: input.node,
+        derivatives: match jet.is_empty() {
+            true => vec![input.node],
+            false => jet.clone(),
+        },
+    });
+    let jets: Vec<InputJet> = jets.collect();
+    along(extended, &extended.derivatives, &jets, order)
+}
+
+fn along(
+    extended: &Extended<'_>,
+    right: &[Node],
+    inputs: &[InputJet],
+    order: usize,
+) -> Result<Vec<Vec<Node>>, MissingInput> {
+    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let flow = Flow {
+        time: extended.plant.time,
+        states: &extended.symbols(),
+        derivatives: right,
+        inputs,
+    };
+    flow::derivatives(extended.graph(), &flow, &outputs, order)
+}
+
+/// ∂(functions)/∂(symbols)
+pub fn jacobian_rows(graph: &Graph, functions: &[Node], symbols: &[Node]) -> Rows {
+    let jacobian = jacobian::forward(graph, functions, symbols);
+    let row = |i| (0..symbols.len()).map(|j| jacobian.get(i, j)).collect();
+    (0..functions.len()).map(row).collect()
+}
+
+/// L_g of a function with the gradient `row`.
+fn along_column(graph: &Graph, row: &[Option<Node>], column: &[Option<Node>]) -> Option<Node> {
+    let pairs = row.iter().zip(column);
+    let terms = pairs.filter_map(|(&q, &g)| Some(graph.expr(q?) * graph.expr(g?)));
+    terms.reduce(|a, b| a + b).map(Expr::node)
+}
+
+/// The observation relative degree of an output with respect to an input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Degree {
+    /// r: the input appears first in the derivative of order r; `length` where it
+    /// does not appear before
+    pub r: usize,
+    /// the L_g L_f^k h taken as zero are zero by proof
+    pub proved: bool,
+    /// what was found, in words
+    pub detail: String,
+}
+
+/// The relative degree of an output whose Lie derivatives have the gradients
+/// `rows`, with respect to input j.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn relative_degree(
+    extended: &Extended<'_>,
+    rows: &[Vec<Option<Node>>],
+    form: &AffineForm,
+    j: usize,
+) -> Result<Degree, MissingInput> {
+    let graph = extended.graph();
+    let region = extended.region();
+    let input = &extended.inputs[j].name;
+    let mut proved = true;
+    for (k, row) in rows.iter().enumerate() {
+        let Some(node) = along_column(graph, row, &form.input_columns[j]) else {
+            continue;
+        };
+        match vanishes(graph, node, &region)? {
+            Vanishing::Everywhere => {}
+            Vanishing::Undecided => proved = false,
+            Vanishing::NotAt(point) => {
+                let detail = format!("{input} appears in y^({}): L_g L_f^{k} h is {point}", k + 1);
+                return Ok(Degree {
+                    r: k + 1,
+                    proved,
+                    detail,
+                });
+            }
+        }
+    }
+    Ok(Degree {
+        r: rows.len(),
+        proved,
+        detail: format!("{input} does not appear before y^({})", rows.len()),
+    })
+}
+
+/// The observability indices μ_i with Σμ_i = n: rows dL_f^k h_i are taken in the
+/// order k = 0, 1, …, within k in the order of the outputs, and kept while they
+/// are independent of those before; an output that fails once is left out from
+/// there on (Krener and Respondek, SIAM J. Control Optim. 23 (1985) 197–216,
+/// after Brunovsky). Ranks are those at generic points of the box. Fewer than n
+/// in sum where no point shows more.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn observability_indices(
+    extended: &Extended<'_>,
+    rows: &[Rows],
+) -> Result<Vec<usize>, MissingInput> {
+    let n = extended.states.len();
+    let zero = extended.graph().constant(0.0).node();
+    let entries: Vec<Node> = rows
+        .iter()
+        .flatten()
+        .flatten()
+        .map(|e| e.unwrap_or(zero))
+        .collect();
+    let variables: Vec<_> = extended.states.iter().chain(&extended.inputs).collect();
+    let mut symbols: Vec<Node> = variables.iter().map(|v| v.node).collect();
+    symbols.push(extended.plant.time);
+    let tape = Tape::new(extended.graph(), &symbols, &entries)?;
+    let mut evaluator = tape.evaluator();
+    let mut best: Vec<usize> = vec![0; rows.len()];
+    for point in 0..POINTS {
+        let mut at: Vec<f64> = variables
+            .iter()
+            .enumerate()
+            .map(|(i, v)| inside(v.min, v.max, spread(point, i)))
+            .collect();
+        at.push(0.37 * point as f64);
+        let mut values = vec![0.0; entries.len()];
+        evaluator.eval(&at, &mut values);
+        if !values.iter().all(|v| v.is_finite()) {
+            continue;
+        }
+        let indices = indices_at(&values, rows.len(), n);
+        if indices.iter().sum::<usize>() > best.iter().sum() {
+            best = indices;
+        }
+    }
+    Ok(best)
+}
+
+/// `values`: output by output, order by order, n numbers per row.
+fn indices_at(values: &[f64], outputs: usize, n: usize) -> Vec<usize> {
+    let orders = values.len() / (outputs * n).max(1);
+    let mut kept: Vec<DVector<f64>> = vec![];
+    let mut indices = vec![0; outputs];
+    for k in 0..orders {
+        for (i, index) in indices.iter_mut().enumerate() {
+            if *index < k || kept.len() == n {
+                continue;
+            }
+            let start = (i * orders + k) * n;
+            let mut row = DVector::from_column_slice(&values[start..start + n]);
+            let norm = row.norm();
+            if norm == 0.0 {
+                continue;
+            }
+            row /= norm;
+            // twice is enough for orthogonality to rounding
+            for _ in 0..2 {
+                for q in &kept {
+                    let share = q.dot(&row);
+                    row.axpy(-share, q, 1.0);
+                }
+            }
+            let left = row.norm();
+            if left > RANK_TOLERANCE {
+                kept.push(row / left);
+                *index = k + 1;
+            }
+        }
+    }
+    indices
+}
+
+/// The determinant by Laplace expansion with shared minors: 2ⁿ of them at most, so
+/// only for small matrices. None where it is zero everywhere by its pattern.
+pub fn determinant(graph: &Graph, rows: &[Vec<Option<Node>>]) -> Option<Node> {
+    let mut minors: HashMap<u64, Option<Node>> = HashMap::new();
+    minor(graph, rows, 0, &mut minors)
+}
+
+/// The minor of the last rows without the columns in `used`.
+fn minor(
+    graph: &Graph,
+    rows: &[Vec<Option<Node>>],
+    used: u64,
+    minors: &mut HashMap<u64, Option<Node>>,
+) -> Option<Node> {
+    let row = used.count_ones() as usize;
+    let Some(entries) = rows.get(row) else {
+        return Some(graph.constant(1.0).node());
+    };
+    if let Some(&known) = minors.get(&used) {
+        return known;
+    }
+    let mut sum: Option<Expr<'_>> = None;
+    let free = (0..entries.len()).filter(|j| used >> j & 1 == 0);
+    for (place, j) in free.enumerate() {
+        let Some(entry) = entries[j] else { continue };
+        let Some(rest) = minor(graph, rows, used | 1 << j, minors) else {
+            continue;
+        };
+        let term = graph.expr(entry) * graph.expr(rest);
+        sum = Some(match (sum, place.is_multiple_of(2)) {
+            (None, true) => term,
+            (None, false) => -term,
+            (Some(sum), true) => sum + term,
+            (Some(sum), false) => sum - term,
+        });
+    }
+    let value = sum.map(Expr::node);
+    minors.insert(used, value);
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sensors;
+    use lynkeus_model::{LoadOptions, Plant};
+    use proptest::prelude::*;
+
+    fn indices(text: &str) -> Vec<usize> {
+        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
+        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+        let form = affine_form(&extended).unwrap().unwrap();
+        let n = extended.states.len();
+        let h = lie_derivatives(&extended, &form, n - 1).unwrap();
+        let rows: Vec<Rows> = h
+            .iter()
+            .map(|h| jacobian_rows(&plant.graph, h, &extended.symbols()))
+            .collect();
+        observability_indices(&extended, &rows).unwrap()
+    }
+
+    /// Two sensors on chains of 3 and 1, and a third that adds nothing.
+    #[test]
+    fn rows_are_taken_while_they_are_independent() {
+        let text = "model P Real a; Real b; Real c; Real d;
+          output Real y = a; output Real z = a + d; output Real w = 2*a;
+          equation der(a) = b; der(b) = c + d*a; der(c) = -sin(a); der(d) = -d; end P;";
+        assert_eq!(indices(text), [3, 1, 0]);
+    }
+
+    #[test]
+    fn what_no_output_feels_leaves_the_sum_short() {
+        let text = "model P Real a; Real b; output Real y = a;
+          equation der(a) = -a; der(b) = a; end P;";
+        assert_eq!(indices(text), [1]);
+    }
+
+    #[test]
+    fn the_first_equation_that_is_not_affine_is_named() {
+        let text = "model P input Real u; Real a; Real b; output Real y = a;
+          equation der(a) = b + u; der(b) = u*u; end P;";
+        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
+        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+        let why = affine_form(&extended).unwrap().unwrap_err();
+        assert!(
+            why.contains("equation of b is not affine in the input u"),
+            "{why}"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn determinants_agree_with_elimination(a in prop::array::uniform16(-1.0..1.0f64), holes in any::<u16>()) {
+            let graph = Graph::new();
+            let hole = |k: usize| holes >> k & 1 == 1 && k.is_multiple_of(3);
+            let rows: Rows = (0..4)
+                .map(|i| (0..4).map(|j| (!hole(4 * i + j)).then(|| graph.constant(a[4 * i + j]).node())).collect())
+                .collect();
+            let matrix = nalgebra::Matrix4::from_fn(|i, j| if hole(4 * i + j) { 0.0 } else { a[4 * i + j] });
+            let found = determinant(&graph, &rows).map_or(0.0, |d| graph.constant_value(d).unwrap());
+            prop_assert!((found - matrix.determinant()).abs() < 1e-13);
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Is an expression identically zero on the box?
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
+
+use crate::visibility::{inside, spread};
+use crate::{Point, Region};
+
+/// Points tried beside those on the edges of the box.
+const POINTS: usize = 12;
+
+/// Whether an expression is zero everywhere on a region.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Vanishing {
+    /// it is, by interval arithmetic
+    Everywhere,
+    /// it is not: the value at this point cannot be a rounding error
+    NotAt(Point),
+    /// it may be zero at every point tried, yet that is no proof
+    Undecided,
+}
+
+/// Decides whether `node` is zero on the whole region.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Vanishing, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let value = |cell: &[Interval]| tape.eval_in(&Intervals, cell)[0];
+    let whole = region.cell();
+    let enclosure = value(&whole);
+    if enclosure.lo() == 0.0 && enclosure.hi() == 0.0 {
+        return Ok(Vanishing::Everywhere);
+    }
+    let mut points: Vec<Vec<f64>> = (0..POINTS).map(|p| generic(&region, p)).collect();
+    points.extend(region.samples(&whole));
+    for point in points {
+        let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
+        let enclosure = value(&cell);
+        let sure = enclosure.is_positive() || enclosure.is_negative();
+        if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
+            let names = region.dimensions.iter().map(|d| d.name.clone());
+            return Ok(Vanishing::NotAt(Point {
+                coordinates: names.zip(point).collect(),
+                value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
+            }));
+        }
+    }
+    Ok(Vanishing::Undecided)
+}
+
+/// A point inside the region on no particular surface.
+fn generic(region: &Region, point: usize) -> Vec<f64> {
+    let sides = region.dimensions.iter().enumerate();
+    let coordinate = |(i, d): (usize, &crate::Dimension)| {
+        let x = inside(d.min, d.max, spread(point, i));
+        if d.integer { x.round() } else { x }
+    };
+    sides.map(coordinate).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Dimension;
+
+    #[test]
+    fn zero_everywhere_somewhere_and_perhaps() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let region = Region {
+            dimensions: vec![Dimension {
+                name: "x".into(),
+                symbol: x.node(),
+                min: f64::NEG_INFINITY,
+                max: f64::INFINITY,
+                integer: false,
+            }],
+        };
+        let decide = |node| vanishes(&g, node, &region).unwrap();
+        assert_eq!(decide((0.0 * x).node()), Vanishing::Everywhere);
+        // zero at the middle of the box, which is not enough
+        assert!(matches!(decide((x * x).node()), Vanishing::NotAt(_)));
+        let one = x.sin().powi(2) + x.cos().powi(2) - 1.0;
+        assert_eq!(decide(one.node()), Vanishing::Undecided);
+    }
+}
