@@ -17,6 +17,14 @@ pub(crate) const MAX_SYNTAX_NODES: usize = 2_000_000;
 pub(crate) const MAX_ELABORATED: u64 = 2_000_000;
 /// Most scalar variables and parameters of one model.
 pub(crate) const MAX_SCALARS: u64 = 200_000;
+/// Most bytes of names, units and descriptions when arrays are written out.
+pub(crate) const MAX_TEXT: u64 = 32 << 20;
+/// Longest name in bytes.
+pub(crate) const MAX_NAME: usize = 250;
+/// Most dimensions of an array.
+pub(crate) const MAX_RANK: usize = 32;
+/// Most names that a misspelt one is compared with.
+pub(crate) const MAX_SUGGESTIONS: usize = 5_000;
 /// Most derivatives that may share their equations.
 pub(crate) const MAX_COUPLED: usize = 64;
 /// Most steps while equations are solved for their unknowns.

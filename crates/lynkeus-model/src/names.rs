@@ -1,5 +1,7 @@
 //! "Did you mean …?"
 
+use crate::limits::MAX_SUGGESTIONS;
+
 /// The names closest to `wanted`, best first, at most three.
 pub(crate) fn near<'a>(wanted: &str, known: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     if wanted.len() > 64 {
@@ -9,6 +11,7 @@ pub(crate) fn near<'a>(wanted: &str, known: impl Iterator<Item = &'a str>) -> Ve
     let allowed = if wanted.len() < 2 { 0 } else { allowed };
     let mut found: Vec<(usize, &str)> = known
         .filter(|name| name.len() <= 64)
+        .take(MAX_SUGGESTIONS)
         .map(|name| (distance(wanted, name), name))
         .filter(|(distance, _)| *distance <= allowed)
         .collect();

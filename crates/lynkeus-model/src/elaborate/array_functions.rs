@@ -2,8 +2,9 @@
 
 use super::evaluate::Evaluator;
 use super::value::{Array, Scalar, Value, describe_dims, element_count};
+use crate::limits::MAX_RANK;
 use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind};
-use crate::syntax::{Problem, Result, Span};
+use crate::syntax::{Problem, Result, Span, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
     /// `None` where there is no such function.
@@ -106,6 +107,9 @@ impl<'a> Evaluator<'a> {
         let dims = dims?;
         if dims.is_empty() {
             return Err(Problem::new(span, "expected at least one size"));
+        }
+        if dims.len() > MAX_RANK {
+            return Err(too_many_dimensions(span));
         }
         // Sizes beside a size of zero count too: other functions walk along them.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();

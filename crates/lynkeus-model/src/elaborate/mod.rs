@@ -61,7 +61,11 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
 fn choose<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a ModelSyntax> {
     let name = |model: &ModelSyntax| model.name.text(source).to_owned();
     let names: Vec<String> = ast.models.iter().map(name).collect();
-    let listed = || names.join(", ");
+    let listed = || {
+        let shown: Vec<&str> = names.iter().take(12).map(String::as_str).collect();
+        let more = if names.len() > 12 { ", …" } else { "" };
+        format!("its models are {}{more}", shown.join(", "))
+    };
     let Some(wanted) = &options.model else {
         return match ast.models.as_slice() {
             [model] => Ok(model),
@@ -74,7 +78,7 @@ fn choose<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a M
                     names.len()
                 ),
             )
-            .hint(format!("its models are {}", listed()))),
+            .hint(listed())),
         };
     };
     let found = ast
@@ -87,8 +91,7 @@ fn choose<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a M
             .first()
             .map(|model| model.name)
             .unwrap_or_default();
-        let hint = did_you_mean(wanted, names.iter().map(String::as_str))
-            .unwrap_or_else(|| format!("its models are {}", listed()));
+        let hint = did_you_mean(wanted, names.iter().map(String::as_str)).unwrap_or_else(listed);
         Problem::new(place, format!("the text holds no model `{wanted}`")).hint(hint)
     })
 }

@@ -2,9 +2,8 @@
 
 use super::overrides::Overrides;
 use super::scope::Mode;
-use super::symbols::{Component, Context, Symbols};
+use super::symbols::{Component, Context, Sizes, Symbols};
 use super::value::{Array, Scalar, describe_dims, element_name};
-use crate::limits::Budget;
 use crate::syntax::ast::{Causality, Declaration, ExprId, Variability};
 use crate::syntax::{Problem, Result, Span};
 
@@ -14,7 +13,7 @@ impl<'a> Symbols<'a> {
         &self,
         context: &Context<'a>,
         overrides: &Overrides,
-        scalars: &Budget,
+        sizes: &Sizes,
         place: usize,
     ) -> Result<Component> {
         let (declaration, dependent) = (&self.declarations[place], self.dependent[place]);
@@ -29,7 +28,7 @@ impl<'a> Symbols<'a> {
             && !declaration.prefix.integer;
         let known = self.binding(context, declaration, Mode::Structural)?;
         let dims = self.parameter_dims(context, declaration, known.as_ref())?;
-        self.check_count(scalars, &dims, declaration)?;
+        sizes.charge(context, &dims, declaration)?;
         let given = overrides.of(place, name, &dims, declaration.name)?;
         let parts = Parts {
             context,

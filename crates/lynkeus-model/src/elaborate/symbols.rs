@@ -11,7 +11,7 @@ use super::overrides::Overrides;
 use super::scope::{Mode, Named, Scope};
 use super::value::{Scalar, element_count, element_name};
 use crate::LoadOptions;
-use crate::limits::{Budget, MAX_SCALARS};
+use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
 use crate::syntax::ast::{Ast, Causality, Declaration, Kind, ModelSyntax, Variability};
 use crate::syntax::{Problem, Result};
 
@@ -64,9 +64,9 @@ impl<'a> Symbols<'a> {
             graph: context.graph,
             dependent,
         };
-        let scalars = Budget::new(MAX_SCALARS, "scalar variables and parameters");
+        let sizes = Sizes::new();
         for place in sequence {
-            let component = symbols.component(context, &overrides, &scalars, place)?;
+            let component = symbols.component(context, &overrides, &sizes, place)?;
             if let Some(slot) = symbols.components.get_mut(place) {
                 *slot = Some(component);
             }
@@ -100,13 +100,13 @@ impl<'a> Symbols<'a> {
         &self,
         context: &Context<'a>,
         overrides: &Overrides,
-        scalars: &Budget,
+        sizes: &Sizes,
         place: usize,
     ) -> Result<Component> {
         let declaration = &self.declarations[place];
         let name = declaration.name.text(context.source);
         if declaration.prefix.variability != Variability::Continuous {
-            return self.parameter(context, overrides, scalars, place);
+            return self.parameter(context, overrides, sizes, place);
         }
         let dims = self.dims(context, declaration)?.into_iter();
         let dims: Option<Vec<usize>> = dims.collect();
@@ -117,7 +117,7 @@ impl<'a> Symbols<'a> {
             )
             .hint("write a number or a parameter instead of `:`")
         })?;
-        self.check_count(scalars, &dims, declaration)?;
+        sizes.charge(context, &dims, declaration)?;
         let count: usize = dims.iter().product();
         let may_have_derivative =
             declaration.prefix.causality != Causality::Input && !declaration.prefix.integer;
@@ -151,17 +151,48 @@ impl<'a> Symbols<'a> {
         };
         declaration.dimensions.iter().map(length).collect()
     }
+}
 
-    pub(super) fn check_count(
+/// Budgets of what declarations are written out to.
+pub(super) struct Sizes {
+    scalars: Budget,
+    text: Budget,
+}
+
+impl Sizes {
+    fn new() -> Self {
+        Self {
+            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
+            text: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
+        }
+    }
+
+    pub(super) fn charge(
         &self,
-        scalars: &Budget,
+        context: &Context<'_>,
         dims: &[usize],
         declaration: &Declaration,
     ) -> Result<()> {
         // A size beside a size of zero counts as well: slices walk along it.
         let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
         let count = element_count(&walked).unwrap_or(u64::MAX);
-        scalars.charge(count, declaration.name)
+        self.scalars.charge(count, declaration.name)?;
+        let description = declaration.description.as_ref().map_or(0, String::len);
+        let is_text = |id| matches!(context.ast.expression(id).kind, Kind::Text);
+        let texts = declaration
+            .attributes
+            .iter()
+            .map(|attribute| attribute.value);
+        let texts = texts
+            .filter(|&id| is_text(id))
+            .map(|id| context.ast.expression(id).span);
+        let length: u64 = texts
+            .chain([declaration.name])
+            .map(|span| u64::from(span.end.saturating_sub(span.start)))
+            .sum();
+        let each = length.saturating_add(description as u64);
+        self.text
+            .charge(count.saturating_mul(each), declaration.name)
     }
 }
 

@@ -4,6 +4,7 @@ use super::ast::{BinaryOperator, Call, ExprId, Kind, Relation, UnaryOperator};
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token, shortened};
 use super::{Problem, Result, Span};
+use crate::limits::MAX_RANK;
 
 /// How tightly operators bind, loosest first.
 const OR: u8 = 0;
@@ -321,10 +322,18 @@ impl Parser<'_> {
             if !self.accept(Symbol::Comma)? {
                 break;
             }
+            if subscripts.len() >= MAX_RANK {
+                return Err(too_many_dimensions(self.span));
+            }
         }
         self.expect(Symbol::CloseBracket)?;
         Ok(subscripts)
     }
+}
+
+/// Refuses arrays of more dimensions than the limit.
+pub(crate) fn too_many_dimensions(span: Span) -> Problem {
+    Problem::new(span, format!("an array of more than {MAX_RANK} dimensions"))
 }
 
 fn infix(token: Token) -> Option<(Infix, u8)> {

@@ -2,6 +2,7 @@
 
 use super::token::{Keyword, Symbol, Token};
 use super::{Problem, Result, Span};
+use crate::limits::MAX_NAME;
 
 /// Reads tokens from a text.
 pub(crate) struct Lexer<'s> {
@@ -28,6 +29,11 @@ impl<'s> Lexer<'s> {
             Some(b'\'') => self.quoted(b'\'', "quoted name", Token::Identifier)?,
             Some(_) => self.symbol()?,
         };
+        if token == Token::Identifier && self.position - start > MAX_NAME {
+            let span = Span::new(start, self.position);
+            let message = format!("this name is longer than {MAX_NAME} characters");
+            return Err(Problem::new(span, message).hint("choose a shorter name"));
+        }
         Ok((token, Span::new(start, self.position)))
     }
 

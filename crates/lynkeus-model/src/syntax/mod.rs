@@ -9,6 +9,7 @@ mod parser;
 mod span;
 mod token;
 
+pub(crate) use expressions::too_many_dimensions;
 pub(crate) use parser::{parse_file, parse_single_expression, unquoted};
 pub use span::Span;
 pub(crate) use span::{Problem, Result};
