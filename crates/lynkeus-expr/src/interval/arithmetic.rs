@@ -1,7 +1,9 @@
 //! The four operations, and the others whose bounds are exact or correctly rounded.
 
 use super::Interval;
-use super::rounding::{add_down, add_up, div_down, div_up, mul_down, mul_up, sqrt_down, sqrt_up};
+use super::rounding::{
+    add_down, add_up, div_down, div_up, mul_down, mul_outward, mul_up, sqrt_down, sqrt_up,
+};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 impl Neg for Interval {
@@ -36,10 +38,15 @@ impl Mul for Interval {
 
     fn mul(self, other: Self) -> Self {
         self.combine(other, |a, b| {
+            if a.lo >= 0.0 && b.lo >= 0.0 {
+                return (mul_down(a.lo, b.lo), mul_up(a.hi, b.hi));
+            }
             let corners = [(a.lo, b.lo), (a.lo, b.hi), (a.hi, b.lo), (a.hi, b.hi)];
-            let lo = corners.map(|(x, y)| mul_down(x, y));
-            let hi = corners.map(|(x, y)| mul_up(x, y));
-            (smallest(lo), largest(hi))
+            let products = corners.map(|(x, y)| mul_outward(x, y));
+            (
+                smallest(products.map(|(down, _)| down)),
+                largest(products.map(|(_, up)| up)),
+            )
         })
     }
 }

@@ -9,8 +9,7 @@ impl Interval {
     /// The exponentials.
     #[must_use]
     pub fn exp(self) -> Self {
-        let (down, up) = (exp_down, exp_up);
-        self.monotone(|x| (down(x.lo), up(x.hi)))
+        self.monotone(|x| (exp_down(x.lo), exp_up(x.hi)))
     }
 
     /// The natural logarithms of the members above zero.
@@ -104,27 +103,19 @@ impl Interval {
 }
 
 fn exp_down(x: f64) -> f64 {
-    if x == 0.0 {
-        1.0
-    } else {
-        library_down(x.exp()).max(0.0)
-    }
+    library_down(x.exp()).max(if x >= 0.0 { 1.0 } else { 0.0 })
 }
 
 fn exp_up(x: f64) -> f64 {
-    match x {
-        0.0 => 1.0,
-        f64::NEG_INFINITY => 0.0,
-        x => library_up(x.exp()),
-    }
+    library_up(x.exp()).min(if x <= 0.0 { 1.0 } else { f64::INFINITY })
 }
 
 fn ln_down(x: f64) -> f64 {
-    if x == 1.0 { 0.0 } else { library_down(x.ln()) }
+    library_down(x.ln()).max(if x >= 1.0 { 0.0 } else { f64::NEG_INFINITY })
 }
 
 fn ln_up(x: f64) -> f64 {
-    if x == 1.0 { 0.0 } else { library_up(x.ln()) }
+    library_up(x.ln()).min(if x <= 1.0 { 0.0 } else { f64::INFINITY })
 }
 
 #[cfg(test)]

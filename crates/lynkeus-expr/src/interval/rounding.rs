@@ -119,6 +119,12 @@ pub fn mul_up(a: f64, b: f64) -> f64 {
     residual.up(p)
 }
 
+/// Lower and upper bound of a product.
+pub fn mul_outward(a: f64, b: f64) -> (f64, f64) {
+    let (p, residual) = product(a, b);
+    (residual.down(p), residual.up(p))
+}
+
 /// `a / b` for `b ≠ 0`, not both infinite.
 pub fn div_down(a: f64, b: f64) -> f64 {
     let (q, residual) = quotient(a, b);
