@@ -14,7 +14,9 @@
 
 pub mod lemma1;
 mod tridiagonal;
+mod unit_factor;
 pub mod vandermonde;
 
 pub use lemma1::Bounds;
 pub use tridiagonal::{Tridiagonal, TridiagonalError};
+pub use unit_factor::{FactorError, UnitFactor};

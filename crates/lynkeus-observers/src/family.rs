@@ -5,11 +5,16 @@ use lynkeus_structure::{Check, Condition, Extended};
 
 use crate::{
     Observer, Tuning, TuningError, block_triangular::BlockTriangular,
-    drift_observable::DriftObservable, triangular::Triangular,
+    drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
 };
 
 /// Every family, in the order in which `auto` tries them.
-pub const FAMILIES: &[&dyn Family] = &[&Triangular, &BlockTriangular, &DriftObservable];
+pub const FAMILIES: &[&dyn Family] = &[
+    &Triangular,
+    &BlockTriangular,
+    &StateAffine,
+    &DriftObservable,
+];
 
 /// The family of that name.
 pub fn find(name: &str) -> Option<&'static dyn Family> {

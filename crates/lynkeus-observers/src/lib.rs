@@ -16,6 +16,7 @@ pub mod drift_observable;
 mod estimate;
 mod family;
 mod observer;
+pub mod state_affine;
 pub mod triangular;
 mod tuning;
 

@@ -16,6 +16,7 @@ pub mod output_map;
 mod range;
 mod region;
 pub mod sign;
+pub mod superdiagonal;
 mod vanish;
 pub mod visibility;
 
@@ -25,4 +26,5 @@ pub use condition::{Check, Condition, Point, Witness};
 pub use extended::{Extended, Measurement, Sensors, SensorsError};
 pub use range::{Range, range};
 pub use region::{Dimension, Region};
+pub use superdiagonal::Superdiagonal;
 pub use vanish::{Vanishing, vanishes};

@@ -4,4 +4,5 @@
 mod block_triangular;
 mod common;
 mod drift_observable;
+mod state_affine;
 mod triangular;

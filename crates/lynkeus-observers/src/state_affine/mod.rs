@@ -1,0 +1,347 @@
+//! Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa, *High gain observer design for a
+//! class of MIMO non uniformly observable uncertain systems*.
+//!
+//! x' = F(u, x) x + φ(u, x) + Bε, y = C(u) x (1)–(2) with rectangular blocks
+//! F_k(u, x¹, …, x^k) above the diagonal that need not have full rank at any
+//! instant; ε acts on the last block. Observer (7) with the Lyapunov ODE (8):
+//!
+//! x̂' = F(u, x̂) x̂ + φ(u, x̂) − θ Δ_θ⁻¹ S⁻¹ Cᵀ(u) (C(u) x̂ − y),
+//! S' = −θ (S + Fᵀ(u, x̂) S + S F(u, x̂) − Cᵀ(u) C(u)).
+//!
+//! S is integrated in factors ([`lyapunov`]), its smallest eigenvalue watched
+//! ([`excitation`]).
+//!
+//! Corrections to the print: B has the sign of (29), + in the last block; the
+//! inputs of Theorem 1's remark satisfy A4, not A3; the error decays like
+//! e^{−θμ_θt} with μ_θ → ½, as (24) and (26) have it, not e^{−μ_θt} with μ_θ → 1.
+//! Beyond the print: C(u) need not be square, and y = C(u)x + d(u) is understood.
+
+mod excitation;
+mod lyapunov;
+
+use lynkeus_expr::{Expr, Graph, Node, jacobian};
+use lynkeus_gain::UnitFactor;
+use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal};
+
+use crate::conditions::{fit, lipschitz, names};
+use crate::estimate::Copy;
+use crate::{
+    Design, DesignError, Examination, Family, Fit, Monitor, Observer, Tuning, TuningError, Value,
+};
+use excitation::least_eigenvalue;
+use lyapunov::{Factor, Sparse};
+
+const NAME: &str = "state-affine";
+
+/// The alarm is raised at this fraction of the information that the best
+/// excitation could leave in the least visible state.
+const ALARM: f64 = 1e-6;
+
+/// The family `state-affine`.
+#[derive(Clone, Copy, Debug)]
+pub struct StateAffine;
+
+impl Family for StateAffine {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn paper(&self) -> &'static str {
+        "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)"
+    }
+
+    fn keys(&self) -> &'static [&'static str] {
+        &["theta", "S0", "alarm"]
+    }
+
+    fn examine(
+        &self,
+        extended: &Extended<'_>,
+        _tuning: &Tuning,
+    ) -> Result<Examination, DesignError> {
+        Ok(match form(extended)? {
+            Ok((_, examination)) | Err(examination) => examination,
+        })
+    }
+
+    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
+        match form(extended)? {
+            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
+                assemble(extended, tuning, &form, examination)
+            }
+            Ok((_, examination)) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+}
+
+/// The blocks with what is known of A2 and A4.
+fn form(
+    extended: &Extended<'_>,
+) -> Result<Result<(Superdiagonal, Examination), Examination>, DesignError> {
+    let form = match superdiagonal::find(extended) {
+        Ok(form) => form,
+        Err(summary) => {
+            let (fit, chains, checks) = (Fit::DoesNotFit, vec![], vec![]);
+            return Ok(Err(Examination {
+                family: NAME,
+                fit,
+                summary,
+                chains,
+                checks,
+            }));
+        }
+    };
+    let region = extended.region();
+    let mut checks = vec![];
+    for (k, factor) in form.factors.iter().enumerate() {
+        checks.push(factor.column_rank(extended, k, &region)?);
+    }
+    let rank = |c: &lynkeus_structure::Check| matches!(c.verdict, Condition::Undecided(_));
+    let excited = checks.iter().any(rank);
+    checks.push(lipschitz(extended, &region)?);
+    let mut summary = form.describe(extended);
+    if excited {
+        summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
+    }
+    let examination = Examination {
+        family: NAME,
+        fit: fit(&checks),
+        summary,
+        chains: form
+            .declared()
+            .map(|block| names(extended, &block))
+            .collect(),
+        checks,
+    };
+    Ok(Ok((form, examination)))
+}
+
+/// The study's numbers.
+struct Keys {
+    θ: f64,
+    /// S(0) in the order of the blocks
+    S0: UnitFactor,
+    alarm: Option<f64>,
+}
+
+impl Keys {
+    /// `order`: the states in the order of the blocks.
+    fn new(tuning: &Tuning, order: &[usize]) -> Result<Self, TuningError> {
+        let expected = "a positive number (the gain of block k grows like theta^k)";
+        let missing = || TuningError::new("theta", expected, "nothing");
+        Ok(Self {
+            θ: positive(tuning, "theta", expected)?.ok_or_else(missing)?,
+            S0: start(tuning, order)?,
+            alarm: positive(tuning, "alarm", "a positive number")?,
+        })
+    }
+}
+
+fn positive(tuning: &Tuning, key: &str, expected: &str) -> Result<Option<f64>, TuningError> {
+    match tuning.values.get(key) {
+        None => Ok(None),
+        Some(Value::Number(x)) if *x > 0.0 && x.is_finite() => Ok(Some(*x)),
+        Some(other) => Err(TuningError::new(key, expected, other)),
+    }
+}
+
+/// S(0): s·I for a number s, or a matrix in the order of the plant's states.
+fn start(tuning: &Tuning, order: &[usize]) -> Result<UnitFactor, TuningError> {
+    let n = order.len();
+    let expected = format!(
+        "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
+    );
+    let wrong = |found: String| TuningError::new("S0", expected.clone(), found);
+    let given = match tuning.values.get("S0") {
+        None => scaled_identity(n, 1.0),
+        Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => scaled_identity(n, *s),
+        Some(Value::List(rows)) => {
+            let entry = |x: &Value| match x {
+                Value::Number(x) => Ok(*x),
+                other => Err(wrong(other.to_string())),
+            };
+            let row = |row: &Value| match row {
+                Value::List(row) => row.iter().map(entry).collect::<Result<Vec<f64>, _>>(),
+                other => Err(wrong(other.to_string())),
+            };
+            rows.iter().map(row).collect::<Result<Vec<_>, _>>()?
+        }
+        Some(other) => return Err(wrong(other.to_string())),
+    };
+    if given.len() != n {
+        return Err(wrong(format!("{} rows", given.len())));
+    }
+    // refused in the user's order, factored in that of the blocks
+    UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
+    let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
+    let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
+    UnitFactor::new(&ordered).map_err(|error| wrong(error.to_string()))
+}
+
+fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {
+    let entry = |i: usize, j: usize| if i == j { s } else { 0.0 };
+    (0..n)
+        .map(|i| (0..n).map(|j| entry(i, j)).collect())
+        .collect()
+}
+
+/// Observer (7)–(8).
+fn assemble(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: &Superdiagonal,
+    examination: Examination,
+) -> Result<Design, DesignError> {
+    let graph = extended.graph();
+    let order: Vec<usize> = form.blocks().flatten().copied().collect();
+    let keys = Keys::new(tuning, &order)?;
+    let copy = Copy::new(extended, tuning);
+    let Matrices { C, F } = Matrices::new(&copy, form, &order);
+    let names: Vec<&str> = order
+        .iter()
+        .map(|&i| extended.states[i].name.as_str())
+        .collect();
+    let factor = Factor::new(graph, &names, &keys.S0);
+    let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
+    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
+    let powers = form
+        .blocks()
+        .enumerate()
+        .flat_map(|(k, block)| block.iter().map(move |_| keys.θ.powi(k as i32 + 1)));
+    let correction = factor.gain(&v, &innovations(&copy));
+    for ((&state, power), z) in order.iter().zip(powers).zip(correction) {
+        if let Some(z) = z {
+            derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
+        }
+    }
+    derivatives.extend(factor.derivatives(keys.θ, &F, &v));
+    let alarm = match keys.alarm {
+        Some(alarm) => alarm,
+        None => ALARM * least_reach(extended, form)?,
+    };
+    let mut observer = copy.observer(NAME, tuning, derivatives)?;
+    observer.monitors.extend(monitor(&factor, alarm));
+    observer.states.extend(factor.states);
+    let parameters = vec![
+        ("θ".to_owned(), keys.θ.to_string()),
+        ("blocks".to_owned(), form.describe(extended)),
+        ("alarm".to_owned(), format!("excitation below {alarm:.3e}")),
+    ];
+    Ok(Design {
+        observer,
+        notes: outside_last(extended, form).into_iter().collect(),
+        examination,
+        gains: vec![],
+        parameters,
+    })
+}
+
+/// λ_min(S) with the flag that excitation is lost.
+fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
+    let bound = least_eigenvalue(&factor.inverse_entries())?;
+    Some(Monitor {
+        name: "excitation".into(),
+        node: bound.node(),
+        alarm_below,
+        meaning: "excitation is lost: the inputs and the estimate do not move enough to tell every state apart (A4), so some states are not corrected any more".into(),
+    })
+}
+
+/// C(u) and F(u, x̂), dense, in the order of the blocks.
+struct Matrices<'g> {
+    C: Vec<Vec<Sparse<'g>>>,
+    F: Vec<Vec<Sparse<'g>>>,
+}
+
+impl<'g> Matrices<'g> {
+    fn new(copy: &Copy<'_, 'g>, form: &Superdiagonal, order: &[usize]) -> Self {
+        let graph: &'g Graph = copy.extended.graph();
+        let n = order.len();
+        let place = |state: usize| order.iter().position(|&i| i == state);
+        let mut matrices = Self {
+            C: vec![vec![None; n]; copy.extended.outputs.len()],
+            F: vec![vec![None; n]; n],
+        };
+        for (k, factor) in form.factors.iter().enumerate() {
+            for &(i, j, node) in &factor.entries {
+                let entry: Expr<'g> = graph.expr(copy.at_estimate(&[node])[0]);
+                let Some(column) = place(factor.columns[j]) else {
+                    continue;
+                };
+                match (k, place(factor.rows[i])) {
+                    (0, _) => matrices.C[factor.rows[i]][column] = Some(entry),
+                    (_, Some(row)) => matrices.F[row][column] = Some(entry),
+                    (_, None) => {}
+                }
+            }
+        }
+        matrices
+    }
+}
+
+/// C(u)x̂ − y, one per output.
+fn innovations<'g>(copy: &Copy<'_, 'g>) -> Vec<Expr<'g>> {
+    let extended = copy.extended;
+    let graph: &'g Graph = extended.graph();
+    let hats = extended.states.iter().zip(&copy.hats);
+    let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
+    let innovation = |o: &lynkeus_structure::Measurement| {
+        let y = Observer::measurement(graph, &o.variable.name);
+        let h = graph.substitute(&[o.variable.node], &unlimited)[0];
+        graph.expr(h) - graph.expr(y.symbol)
+    };
+    extended.outputs.iter().map(innovation).collect()
+}
+
+/// How large the diagonal of S could be at best for the least visible state:
+/// g = 1 for an output, g_j = Σ_i g_i max|F_ij|² for a state. It carries the units
+/// of F, so that the alarm does not depend on them. Unbounded entries count as 1.
+fn least_reach(extended: &Extended<'_>, form: &Superdiagonal) -> Result<f64, DesignError> {
+    let (graph, region) = (extended.graph(), extended.region());
+    let mut reach = vec![1.0; extended.outputs.len()];
+    let mut least = f64::INFINITY;
+    for factor in &form.factors {
+        let mut next = vec![0.0; factor.columns.len()];
+        for &(i, j, node) in &factor.entries {
+            let found = range(graph, node, &region)?.enclosure;
+            let size = found.hi().max(-found.lo());
+            next[j] += reach[i] * if size.is_finite() { size * size } else { 1.0 };
+        }
+        let positive = next.iter().copied().filter(|g| *g > 0.0);
+        least = positive.fold(least, f64::min);
+        reach = next;
+    }
+    Ok(if least.is_finite() { least } else { 1.0 })
+}
+
+/// (1) has ε in the last block only. Elsewhere its trace in the blocks behind
+/// does not shrink as θ grows: worth a note, no reason to refuse.
+fn outside_last(extended: &Extended<'_>, form: &Superdiagonal) -> Option<String> {
+    let plant = extended.plant;
+    let last = form.declared().last()?;
+    let known = |v: &lynkeus_model::Variable| {
+        extended.inputs.iter().any(|i| i.node == v.node) || extended.state_index(&v.name).is_some()
+    };
+    let ε: Vec<Node> = plant
+        .inputs
+        .iter()
+        .filter(|v| !known(v))
+        .map(|v| v.node)
+        .collect();
+    let pattern = jacobian::pattern(extended.graph(), &plant.derivatives, &ε);
+    let acts = |&i: &usize| {
+        let unknown_input = i >= extended.plant_states();
+        !last.contains(&i) && (unknown_input || !pattern[i].is_empty())
+    };
+    let states: Vec<usize> = (0..extended.states.len()).filter(acts).collect();
+    (!states.is_empty()).then(|| {
+        format!(
+            "an uncertainty acts on {}, outside of the last block ({}); Theorem 1 covers the last one only, and the error of the blocks behind need not shrink as theta grows",
+            names(extended, &states).join(", "),
+            names(extended, &last).join(", ")
+        )
+    })
+}

@@ -1,0 +1,295 @@
+//! The form that is affine block by block, found in the equations.
+//!
+//! Ltaief et al., eq. (1)–(2): y = F_0(u) x¹ and, for blocks x¹, …, x^q of states,
+//! (x^k)' = F_k(u, x¹, …, x^k) x^{k+1} + φ^k(u, x¹, …, x^k).
+//!
+//! The blocks are determined by the equations. A state of x^{k+1} may appear in
+//! block k at the earliest, so it can be no deeper than its distance from the
+//! outputs; and a state whose column of F is empty leaves nothing in the Gramian,
+//! so some state of block k has to depend on it and it can be no shallower. Hence
+//! x¹ are the states in the outputs and x^{k+1} the new ones in the equations of x^k.
+
+mod rank;
+
+use lynkeus_expr::{Binary, Graph, Node, Op, Tape, Unary, jacobian};
+
+use crate::Extended;
+use crate::chains::names;
+use crate::visibility::{inside, spread};
+
+/// One rectangular block: F_k.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Factor {
+    /// measured outputs for k = 0, else states: x^k
+    pub rows: Vec<usize>,
+    /// states: x^{k+1}
+    pub columns: Vec<usize>,
+    /// (place in `rows`, place in `columns`, expression); others are zero everywhere
+    pub entries: Vec<(usize, usize, Node)>,
+}
+
+/// A plant in the form (1)–(2).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Superdiagonal {
+    /// F_0 = C(u), F_1, …, F_{q−1}
+    pub factors: Vec<Factor>,
+}
+
+impl Superdiagonal {
+    /// The states of x¹, …, x^q, in the order of the columns.
+    pub fn blocks(&self) -> impl Iterator<Item = &[usize]> {
+        self.factors.iter().map(|factor| &factor.columns[..])
+    }
+
+    /// In words: `(x1) → (x2, x3)`.
+    pub fn describe(&self, extended: &Extended<'_>) -> String {
+        let block = |states: Vec<usize>| format!("({})", names(extended, states));
+        self.declared().map(block).collect::<Vec<_>>().join(" → ")
+    }
+
+    /// The blocks with their states in the order of declaration, for people.
+    pub fn declared(&self) -> impl Iterator<Item = Vec<usize>> {
+        self.blocks().map(|block| {
+            let mut block = block.to_vec();
+            block.sort_unstable();
+            block
+        })
+    }
+}
+
+/// Finds the blocks.
+///
+/// # Errors
+/// The first output or equation that breaks the form; the states that no block reaches.
+pub fn find(extended: &Extended<'_>) -> Result<Superdiagonal, String> {
+    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let output = |i: usize| format!("the output {}", extended.outputs[i].variable.name);
+    let all: Vec<usize> = (0..extended.states.len()).collect();
+    let rows: Vec<usize> = (0..outputs.len()).collect();
+    let mut factors = vec![factor(extended, rows, &outputs, &all, output)?];
+    let mut left: Vec<usize> = all;
+    loop {
+        let block = factors[factors.len() - 1].columns.clone();
+        left.retain(|state| !block.contains(state));
+        if left.is_empty() {
+            arrange(extended, &mut factors);
+            return Ok(Superdiagonal { factors });
+        }
+        let derivatives: Vec<Node> = block.iter().map(|&i| extended.derivatives[i]).collect();
+        let equation = |i: usize| format!("the equation of {}", extended.states[block[i]].name);
+        let next = factor(extended, block.clone(), &derivatives, &left, equation)?;
+        if next.columns.is_empty() {
+            return Err(format!(
+                "no equation on the way from the outputs depends on {}; measure another output",
+                names(extended, left)
+            ));
+        }
+        factors.push(next);
+    }
+}
+
+/// Orders the columns of each F_k by what the equations make of them at a point of
+/// the box, not by declaration: a factor of S, and with it every rounding, is then
+/// the same however the states are declared. States that are equal there keep
+/// their order.
+fn arrange(extended: &Extended<'_>, factors: &mut [Factor]) {
+    let Some(values) = at_a_point(extended, factors) else {
+        return;
+    };
+    let (derivatives, entries) = values.split_at(extended.states.len());
+    let mut entries = entries.iter();
+    let mut rows: Vec<usize> = (0..extended.outputs.len()).collect();
+    for factor in factors {
+        let mut columns: Vec<Vec<f64>> = vec![vec![]; factor.columns.len()];
+        for (&(_, j, _), value) in factor.entries.iter().zip(&mut entries) {
+            columns[j].push(value.abs());
+        }
+        columns.iter_mut().for_each(|c| c.sort_by(f64::total_cmp));
+        let size = |j: usize| columns[j].iter().map(|x| x * x).sum::<f64>();
+        let slope = |j: usize| derivatives[factor.columns[j]];
+        let mut order: Vec<usize> = (0..columns.len()).collect();
+        // the most visible state first
+        order.sort_by(|&i, &j| {
+            let sizes = size(j).total_cmp(&size(i));
+            sizes.then(slope(i).total_cmp(&slope(j)))
+        });
+        factor.permute(&rows, &order);
+        rows = order;
+    }
+}
+
+/// Every derivative, then the entries of every F_k, at one point of the box.
+fn at_a_point(extended: &Extended<'_>, factors: &[Factor]) -> Option<Vec<f64>> {
+    let entries = factors.iter().flat_map(|f| &f.entries);
+    let nodes: Vec<Node> = extended
+        .derivatives
+        .iter()
+        .copied()
+        .chain(entries.map(|&(.., node)| node))
+        .collect();
+    let states = extended.states.iter().map(|v| inside(v.min, v.max, 0.37));
+    let inputs = extended.inputs.iter().enumerate();
+    let inputs = inputs.map(|(i, v)| inside(v.min, v.max, spread(0, i)));
+    let point: Vec<f64> = states.chain(inputs).chain([0.37]).collect();
+    let symbols = extended.region().symbols();
+    let tape = Tape::new(extended.graph(), &symbols, &nodes).ok()?;
+    let mut values = vec![0.0; nodes.len()];
+    tape.evaluator().eval(&point, &mut values);
+    Some(values)
+}
+
+/// ∂(functions)/∂x for the states among `candidates` that the functions depend on.
+fn factor(
+    extended: &Extended<'_>,
+    rows: Vec<usize>,
+    functions: &[Node],
+    candidates: &[usize],
+    title: impl Fn(usize) -> String,
+) -> Result<Factor, String> {
+    let graph = extended.graph();
+    let symbol = |&i: &usize| extended.states[i].node;
+    let symbols: Vec<Node> = candidates.iter().map(symbol).collect();
+    let pattern = jacobian::pattern(graph, functions, &symbols);
+    let new = (0..candidates.len()).filter(|j| pattern.iter().any(|row| row.contains(j)));
+    let columns: Vec<usize> = new.map(|j| candidates[j]).collect();
+    let symbols: Vec<Node> = columns.iter().map(symbol).collect();
+    for (i, &function) in functions.iter().enumerate() {
+        if let Some(culprit) = not_affine(graph, function, &symbols) {
+            return Err(format!(
+                "{} is not affine in {}: {}",
+                title(i),
+                names(extended, columns.iter().copied()),
+                culprit
+            ));
+        }
+    }
+    let jacobian = jacobian::forward(graph, functions, &symbols);
+    Ok(Factor {
+        rows,
+        columns,
+        entries: jacobian.entries,
+    })
+}
+
+/// What keeps a function from being affine in `symbols`.
+fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<String> {
+    let depends = |node: Node| !jacobian::pattern(graph, &[node], symbols)[0].is_empty();
+    let step = |node: &Node| is_step(graph.op(*node)) && depends(*node);
+    if let Some(step) = graph.reachable(&[function]).into_iter().find(step) {
+        return Some(format!("it switches with {}", graph.render(step, 60)));
+    }
+    let slopes = jacobian::forward(graph, &[function], symbols).entries;
+    let (_, column, slope) = slopes.into_iter().find(|&(.., slope)| depends(slope))?;
+    Some(format!(
+        "∂/∂{} = {}",
+        graph.symbol_name(symbols[column]).unwrap_or_default(),
+        graph.render(slope, 60)
+    ))
+}
+
+/// Operations whose derivative is zero wherever it exists.
+fn is_step(op: Op) -> bool {
+    use Binary::{And, Equal, Less, LessEq, Or};
+    match op {
+        Op::Unary(op, _) => matches!(op, Unary::Sign | Unary::Floor | Unary::Not),
+        Op::Binary(op, ..) => matches!(op, Less | LessEq | Equal | And | Or),
+        _ => false,
+    }
+}
+
+impl Factor {
+    /// Row i becomes what was row `rows[i]`, and alike for the columns.
+    fn permute(&mut self, rows: &[usize], columns: &[usize]) {
+        let place = |order: &[usize], old: usize| order.iter().position(|&o| o == old);
+        self.rows = rows.iter().map(|&i| self.rows[i]).collect();
+        self.columns = columns.iter().map(|&j| self.columns[j]).collect();
+        for (i, j, _) in &mut self.entries {
+            *i = place(rows, *i).unwrap_or(*i);
+            *j = place(columns, *j).unwrap_or(*j);
+        }
+        self.entries.sort_unstable();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Condition, Sensors};
+    use lynkeus_model::{LoadOptions, Plant};
+
+    fn examined<T>(text: &str, look: impl Fn(&Extended<'_>) -> T) -> T {
+        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
+        look(&Extended::new(&plant, &Sensors::default()).unwrap())
+    }
+
+    fn words(text: &str) -> Result<String, String> {
+        examined(text, |e| Ok(find(e)?.describe(e)))
+    }
+
+    fn verdicts(text: &str) -> Vec<Condition> {
+        examined(text, |e| {
+            let form = find(e).unwrap();
+            let check = |(k, f): (usize, &Factor)| f.column_rank(e, k, &e.region()).unwrap();
+            let checks = form.factors.iter().enumerate().map(check);
+            checks.map(|c| c.verdict).collect()
+        })
+    }
+
+    #[test]
+    fn blocks_are_found_in_any_order() {
+        let text = "model P input Real u; Real d; Real a; Real c; Real b; output Real y = 2*a + u;
+          equation der(a) = u*b + a^2*c + sin(a); der(b) = b*c*d - c^3; der(c) = d - b; der(d) = d^2; end P;";
+        assert_eq!(words(text).unwrap(), "(a) → (c, b) → (d)");
+    }
+
+    #[test]
+    fn what_breaks_the_form_is_named() {
+        let square =
+            "model P Real a; Real b; output Real y = a; equation der(a) = b^2; der(b) = 1; end P;";
+        let text = words(square).unwrap_err();
+        assert!(
+            text.contains("equation of a is not affine in b: ∂/∂b = b*2"),
+            "{text}"
+        );
+        let product = "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b*c; der(b) = 1; der(c) = 1; end P;";
+        assert!(words(product).unwrap_err().contains("∂/∂b = c"));
+        let output = "model P Real a; output Real y = a^2; equation der(a) = 1; end P;";
+        assert!(
+            words(output)
+                .unwrap_err()
+                .contains("output y is not affine in a")
+        );
+        let unseen =
+            "model P Real a; Real b; output Real y = a; equation der(a) = 1; der(b) = a; end P;";
+        assert!(words(unseen).unwrap_err().contains("depends on b; measure"));
+        let switch = "model P Real a; Real b; output Real y = a; equation der(a) = b + (if b > 0 then 1 else 2); der(b) = 1; end P;";
+        let text = words(switch).unwrap_err();
+        assert!(text.contains("switches with"), "{text}");
+    }
+
+    #[test]
+    fn constant_columns_that_coincide_hide_a_direction() {
+        let text = "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b + c; der(b) = -b; der(c) = b; end P;";
+        let Condition::Refuted(witness) = &verdicts(text)[1] else {
+            panic!()
+        };
+        let ξ: Vec<f64> = witness.points[0].coordinates.iter().map(|c| c.1).collect();
+        assert!((ξ[0] + ξ[1]).abs() < 1e-14 && ξ[0].abs() > 0.7);
+    }
+
+    #[test]
+    fn ranks_are_decided_on_the_box() {
+        let plant = |low: f64| {
+            format!(
+                "model P input Real u(min = {low}, max = 3); Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
+                 equation der(a) = u*c + d; der(b) = c + 5*d; der(c) = 0; der(d) = 0; end P;"
+            )
+        };
+        // det F_1 = 5u − 1
+        let found = verdicts(&plant(0.3));
+        assert_eq!(found, [Condition::Proved, Condition::Proved]);
+        assert!(matches!(verdicts(&plant(0.1))[1], Condition::Undecided(_)));
+        let wide = "model P input Real u; Real a; Real b; Real c; output Real y = a; equation der(a) = b + u*c; der(b) = 0; der(c) = 0; end P;";
+        assert!(matches!(verdicts(wide)[1], Condition::Undecided(_)));
+    }
+}

@@ -1,0 +1,153 @@
+//! What the rank of F_k says before any input is known.
+
+use lynkeus_expr::{Graph, MissingInput, Node};
+use nalgebra::DMatrix;
+
+use super::Factor;
+use crate::chains::names;
+use crate::{Check, Condition, Extended, Point, Region, Witness, sign};
+
+/// More minors than this are left undecided.
+const MAX_MINORS: usize = 400;
+
+impl Factor {
+    /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
+    /// whatever the input. Refuted, with the direction ξ that F_k ξ = 0 hides,
+    /// only where F_k is a matrix of numbers: anything that moves may turn the
+    /// hidden direction, and the excitation decides.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an entry depends on a symbol outside the region.
+    pub fn column_rank(
+        &self,
+        extended: &Extended<'_>,
+        k: usize,
+        region: &Region,
+    ) -> Result<Check, MissingInput> {
+        let graph = extended.graph();
+        let mut declared = self.columns.clone();
+        declared.sort_unstable();
+        let states = names(extended, declared);
+        let name = format!("F_{k} ξ ≠ 0 for every direction ξ of ({states})");
+        let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
+        if let Some(direction) = self.hidden(extended) {
+            let witness = Witness {
+                points: vec![direction],
+            };
+            let detail = format!(
+                "{shape} and constant: no input ever tells these states apart; measure another output"
+            );
+            return Ok(Check {
+                name,
+                verdict: Condition::Refuted(witness),
+                detail,
+            });
+        }
+        let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
+        let used = region.restricted(&graph.symbols_of(&entries));
+        let sides: Vec<(String, f64, f64)> = used.named(&used.cell());
+        let Some(minors) = self.minors(graph) else {
+            let detail = format!(
+                "{shape}: it shows these states only while its entries move, so convergence rests on the excitation (A4)"
+            );
+            return Ok(Check {
+                name,
+                verdict: Condition::Undecided(sides),
+                detail,
+            });
+        };
+        let found = sign::keeps_sign(graph, name, minors, region)?.check;
+        Ok(match found.verdict {
+            Condition::Refuted(witness) => Check {
+                detail: format!(
+                    "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
+                ),
+                verdict: Condition::Undecided(sides),
+                ..found
+            },
+            _ => Check {
+                detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
+                ..found
+            },
+        })
+    }
+
+    /// A direction that a matrix of numbers maps to zero.
+    fn hidden(&self, extended: &Extended<'_>) -> Option<Point> {
+        // at least as many rows as columns, for all right singular vectors
+        let rows = self.rows.len().max(self.columns.len());
+        let mut matrix = DMatrix::zeros(rows, self.columns.len());
+        for &(i, j, node) in &self.entries {
+            matrix[(i, j)] = extended.graph().constant_value(node)?;
+        }
+        let svd = matrix.svd(false, true);
+        let (smallest, value) = svd.singular_values.argmin();
+        if value > 1e-13 * svd.singular_values.max() {
+            return None;
+        }
+        let ξ = svd.v_t?.row(smallest).into_owned();
+        let component = |(&i, &x): (&usize, &f64)| (extended.states[i].name.clone(), x);
+        Some(Point {
+            coordinates: self.columns.iter().zip(ξ.iter()).map(component).collect(),
+            value: 0.0,
+        })
+    }
+
+    /// det FᵀF as the sum of the squared minors (Cauchy and Binet); none where F
+    /// is wider than tall or the minors are too many.
+    fn minors(&self, graph: &Graph) -> Option<Node> {
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        let count = (0..columns).fold(1usize, |c, k| c.saturating_mul(rows.saturating_sub(k)));
+        if columns > rows || count > MAX_MINORS {
+            return None;
+        }
+        let mut dense = vec![vec![None; columns]; rows];
+        for &(i, j, node) in &self.entries {
+            dense[i][j] = Some(node);
+        }
+        let squares = subsets(rows, columns)
+            .into_iter()
+            .filter_map(|rows| determinant(graph, &dense, &rows, 0))
+            .map(|minor| graph.expr(minor).powi(2));
+        let zero = || graph.constant(0.0);
+        Some(squares.reduce(|a, b| a + b).unwrap_or_else(zero).node())
+    }
+}
+
+/// Every increasing choice of `k` of `n` indices.
+fn subsets(n: usize, k: usize) -> Vec<Vec<usize>> {
+    let mut all: Vec<Vec<usize>> = vec![vec![]];
+    for _ in 0..k {
+        let extended = all.iter().flat_map(|chosen| {
+            let from = chosen.last().map_or(0, |last| last + 1);
+            (from..n).map(move |next| [&chosen[..], &[next]].concat())
+        });
+        all = extended.collect();
+    }
+    all
+}
+
+/// The determinant of the given rows and the columns from `column` on, along the
+/// first of these; none where it is zero everywhere.
+fn determinant(
+    graph: &Graph,
+    dense: &[Vec<Option<Node>>],
+    rows: &[usize],
+    column: usize,
+) -> Option<Node> {
+    if rows.is_empty() {
+        return Some(graph.constant(1.0).node());
+    }
+    let term = |place: usize| {
+        let entry = graph.expr(dense[rows[place]][column]?);
+        let rest = [&rows[..place], &rows[place + 1..]].concat();
+        let minor = entry * graph.expr(determinant(graph, dense, &rest, column + 1)?);
+        Some(if place.is_multiple_of(2) {
+            minor
+        } else {
+            -minor
+        })
+    };
+    let sum = (0..rows.len()).filter_map(term).reduce(|a, b| a + b)?;
+    Some(sum.node())
+}
