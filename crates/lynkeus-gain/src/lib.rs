@@ -12,6 +12,7 @@
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod integrators;
 pub mod lemma1;
 mod tridiagonal;
 mod unit_factor;

@@ -137,7 +137,7 @@ impl Copy<'_, '_> {
 }
 
 /// max(min, min(max, x̂)) with the ends that are declared.
-fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
+pub(crate) fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
     let mut image = graph.expr(hat);
     if variable.max.is_finite() {
         image = image.min(graph.constant(variable.max));

@@ -6,6 +6,7 @@ use lynkeus_structure::{Check, Condition, Extended};
 use crate::{
     Observer, Tuning, TuningError, block_triangular::BlockTriangular,
     drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
+    unknown_input::UnknownInput,
 };
 
 /// Every family, in the order in which `auto` tries them.
@@ -13,6 +14,7 @@ pub const FAMILIES: &[&dyn Family] = &[
     &Triangular,
     &BlockTriangular,
     &StateAffine,
+    &UnknownInput,
     &DriftObservable,
 ];
 

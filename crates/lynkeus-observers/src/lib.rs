@@ -19,6 +19,7 @@ mod observer;
 pub mod state_affine;
 pub mod triangular;
 mod tuning;
+pub mod unknown_input;
 
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};

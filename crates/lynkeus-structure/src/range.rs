@@ -34,12 +34,26 @@ pub struct Range {
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn range(graph: &Graph, node: Node, region: &Region) -> Result<Range, MissingInput> {
+    range_within(graph, node, region, BUDGET)
+}
+
+/// [`range`] with at most `budget` cells examined per end: quicker and looser.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn range_within(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    budget: usize,
+) -> Result<Range, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut search = Search {
         evaluator: tape.evaluator(),
         tape,
         region: &region,
+        budget,
     };
     let lower = search.minimum(1.0);
     let upper = search.minimum(-1.0);
@@ -90,6 +104,7 @@ struct Search<'a> {
     tape: Tape,
     evaluator: Evaluator,
     region: &'a Region,
+    budget: usize,
 }
 
 impl Search<'_> {
@@ -99,7 +114,7 @@ impl Search<'_> {
         let (bound, defined) = self.bound(&whole, sign);
         let mut best = self.sample(&whole, sign, None);
         let mut open = BinaryHeap::from([Open { bound, cell: whole }]);
-        for _ in 0..BUDGET {
+        for _ in 0..self.budget {
             let Some(weakest) = open.peek() else { break };
             if close(weakest.bound, best.as_ref()) {
                 break;

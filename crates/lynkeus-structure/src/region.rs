@@ -88,8 +88,9 @@ impl Region {
         let whole = self.dimensions[i].max - self.dimensions[i].min;
         match whole.is_finite() && whole > 0.0 {
             true => width / whole,
-            false if width > 0.0 => width.min(1e300),
-            false => 0.0,
+            // on a scale where the line has length one: an unbounded side, such as
+            // that of time, must not keep the others from being halved
+            false => (side.hi().atan() - side.lo().atan()) / std::f64::consts::PI,
         }
     }
 

@@ -6,3 +6,4 @@ mod common;
 mod drift_observable;
 mod state_affine;
 mod triangular;
+mod unknown_input;

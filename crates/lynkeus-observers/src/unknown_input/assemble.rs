@@ -1,0 +1,197 @@
+//! Observer (14) from a form.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Expr, Node};
+use lynkeus_gain::integrators;
+use lynkeus_structure::{Extended, Matrix};
+
+use super::NAME;
+use super::bound;
+use super::form::Form;
+use crate::conditions::names;
+use crate::estimate::{Copy, limited};
+use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
+
+/// θ₁ and θ₂ with what is to be said about them.
+pub(super) struct Thetas {
+    pub θ1: f64,
+    pub θ2: f64,
+    pub notes: Vec<String>,
+}
+
+pub(super) fn design(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: &Form<'_, '_>,
+    examination: Examination,
+) -> Result<Design, DesignError> {
+    let thetas = match given(tuning)? {
+        Some(thetas) => thetas,
+        None => bound::thetas(form)?,
+    };
+    let copy = Copy::new(extended, tuning);
+    let derivatives = derivatives(form, &copy, tuning, &thetas);
+    let outputs: Vec<&str> = form
+        .first
+        .iter()
+        .map(|&i| extended.outputs[i].variable.name.as_str())
+        .collect();
+    Ok(Design {
+        observer: copy.observer(NAME, tuning, derivatives)?,
+        gains: gains(form, &thetas),
+        parameters: vec![
+            ("θ1".into(), thetas.θ1.to_string()),
+            ("θ2".into(), thetas.θ2.to_string()),
+            ("partition".into(), outputs.join(", ")),
+        ],
+        notes: thetas.notes,
+        examination,
+    })
+}
+
+fn given(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
+    let Some(found) = tuning.numbers("theta")? else {
+        return Ok(None);
+    };
+    let expected = "two positive numbers [θ1, θ2]: θ1 for the unknown inputs, θ2 for the states";
+    let [θ1, θ2] = found[..] else {
+        let found = format!("{} number(s)", found.len());
+        return Err(TuningError::new("theta", expected, found));
+    };
+    if let Some(wrong) = [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
+        return Err(TuningError::new("theta", expected, wrong));
+    }
+    let notes = vec![];
+    Ok(Some(Thetas { θ1, θ2, notes }))
+}
+
+/// The right-hand side of (14), in the order of the extended states.
+fn derivatives(
+    form: &Form<'_, '_>,
+    copy: &Copy<'_, '_>,
+    tuning: &Tuning,
+    thetas: &Thetas,
+) -> Vec<Node> {
+    let extended = form.extended;
+    let (graph, n) = (extended.graph(), extended.plant_states());
+    let v: Vec<Node> = extended.symbols().split_off(n);
+    let v̂ = column(graph, &copy.at_estimate(&v));
+    // s: the measured signals in place of the states they show
+    let measured: HashMap<Node, Node> = (0..extended.outputs.len())
+        .filter_map(|i| copy.measured_state(i))
+        .map(|(state, y)| (extended.states[state].node, y))
+        .collect();
+    let factors = &form.layers.factors;
+    let at_s = factors.map(|node| graph.substitute(&[node], &measured)[0]);
+    let e1 = column(graph, &innovations(copy, &form.first));
+    let e2 = column(graph, &innovations(copy, &form.second));
+    let Thetas { θ1, θ2, .. } = *thetas;
+    let drift = copy.at_estimate(&form.layers.drift);
+    let input = at_s.times(&v̂);
+    let mut total: Vec<Expr<'_>> = (0..n)
+        .map(|i| graph.expr(drift[i]) + graph.expr(input.node(i, 0)))
+        .collect();
+
+    for (row, &state) in form.x11().iter().enumerate() {
+        total[state] = total[state] - 2.0 * θ1 * graph.expr(e1.node(row, 0));
+    }
+    // D (9) at s; G at s makes left inverses and products at s
+    let at_measured = Form {
+        layers: lynkeus_structure::Layers {
+            factors: at_s,
+            ..form.layers.clone()
+        },
+        ..form.clone()
+    };
+    let D_e1: Vec<Matrix<'_>> = (1..=form.q())
+        .map(|k| at_measured.γ_times(k, &e1))
+        .collect();
+    let Λ2 = at_tilde(&at_measured, copy, tuning, &measured, &D_e1);
+    let K = integrators::Chain::new(form.q()).gain;
+    for k in 1..=form.q() {
+        let correction = Λ2[k - 1].left_divide(&e2);
+        let gain = θ2.powi(k as i32) * K[k - 1];
+        for (row, &state) in form.block(k).iter().enumerate() {
+            total[state] = total[state]
+                - gain * graph.expr(correction.node(row, 0))
+                - 2.0 * θ1 * graph.expr(D_e1[k - 1].node(row, 0));
+        }
+    }
+    let v_correction = at_measured.G11().left_divide(&e1);
+    total.extend((0..v.len()).map(|j| -(θ1 * θ1) * graph.expr(v_correction.node(j, 0))));
+    total.into_iter().map(Expr::node).collect()
+}
+
+fn column<'g>(graph: &'g lynkeus_expr::Graph, entries: &[Node]) -> Matrix<'g> {
+    Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
+}
+
+/// x̂ − y for some measured outputs. The form has only outputs that show a state.
+fn innovations(copy: &Copy<'_, '_>, outputs: &[usize]) -> Vec<Node> {
+    let innovations = outputs.iter().filter_map(|&i| copy.innovation(i));
+    innovations.collect()
+}
+
+/// Λ₂ at x₁¹ = y₁ and X̃² = X̂² − D (x̂₁¹ − y₁).
+fn at_tilde<'p>(
+    form: &Form<'_, 'p>,
+    copy: &Copy<'_, '_>,
+    tuning: &Tuning,
+    measured: &HashMap<Node, Node>,
+    D_e1: &[Matrix<'_>],
+) -> Vec<Matrix<'p>> {
+    let extended = form.extended;
+    let graph = extended.graph();
+    let mut seen = HashMap::new();
+    for state in form.x11() {
+        let x = extended.states[state].node;
+        seen.insert(x, measured.get(&x).copied().unwrap_or(x));
+    }
+    for k in 1..=form.q() {
+        for (row, &state) in form.block(k).iter().enumerate() {
+            let hat = graph.expr(copy.hats[state].symbol);
+            let tilde = (hat - graph.expr(D_e1[k - 1].node(row, 0))).node();
+            let variable = &extended.states[state];
+            let image = match tuning.clamp {
+                true => limited(graph, tilde, variable),
+                false => tilde,
+            };
+            seen.insert(variable.node, image);
+        }
+    }
+    let blocks = form.Λ2().into_iter();
+    blocks
+        .map(|block| block.map(|node| graph.substitute(&[node], &seen)[0]))
+        .collect()
+}
+
+/// What multiplies the innovations before the left inverses.
+fn gains(form: &Form<'_, '_>, thetas: &Thetas) -> Vec<ChainGain> {
+    let extended = form.extended;
+    let joined = |states: &[usize]| names(extended, states).join(", ");
+    let output = |i: &usize| extended.outputs[*i].variable.name.clone();
+    let unknown: Vec<usize> = (extended.plant_states()..extended.states.len()).collect();
+    let Thetas { θ1, θ2, .. } = *thetas;
+    let heads = &form.layers.layers[0];
+    let first = form.first.iter().map(|i| ChainGain {
+        output: output(i),
+        entries: vec![
+            (joined(&[heads[*i]]), 2.0 * θ1),
+            (joined(&unknown), θ1 * θ1),
+        ],
+    });
+    let K = integrators::Chain::new(form.q()).gain;
+    let second = form.second.iter().map(|i| {
+        let state = |k: usize| match k {
+            1 => joined(&[heads[*i]]),
+            _ => joined(&form.block(k)),
+        };
+        let entry = |k: usize| (state(k), θ2.powi(k as i32) * K[k - 1]);
+        ChainGain {
+            output: output(i),
+            entries: (1..=form.q()).map(entry).collect(),
+        }
+    });
+    first.chain(second).collect()
+}

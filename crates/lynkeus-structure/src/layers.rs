@@ -1,0 +1,220 @@
+//! Measured states, the states their equations reveal, the states these reveal, …
+//!
+//! The form (1) of Farza, M'Saad, Liu and Targui: x = (x¹, …, x^q) with x¹ measured
+//! and f^k a function of x¹ … x^{k+1}, where the unknown inputs v enter through
+//! factors that are known, f = f̃(u, x) + G(u, s) v (H3). The layers follow from
+//! the equations alone: x^{k+1} is what f̃^k reads beyond x¹ … x^k.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Node, jacobian};
+
+use crate::chains::{heads, names};
+use crate::{Extended, Matrix};
+
+/// A plant in layers.
+#[derive(Clone, Debug)]
+pub struct Layers<'p> {
+    /// x¹, …, x^q as indices of states; x¹ in the order of the measured outputs
+    pub layers: Vec<Vec<usize>>,
+    /// f̃, one expression per state of the plant
+    pub drift: Vec<Node>,
+    /// G, one row per state of the plant, one column per unknown input
+    pub factors: Matrix<'p>,
+}
+
+impl Layers<'_> {
+    /// In words: `(x1, x2, x3) → (x4) → (x5)`.
+    pub fn describe(&self, extended: &Extended<'_>) -> String {
+        let layer = |l: &Vec<usize>| format!("({})", names(extended, l.iter().copied()));
+        let layers: Vec<String> = self.layers.iter().map(layer).collect();
+        layers.join(" → ")
+    }
+}
+
+/// The layers of a plant with unknown inputs.
+///
+/// # Errors
+/// The first equation that breaks the form, or what is missing.
+pub fn find<'p>(extended: &Extended<'p>) -> Result<Layers<'p>, String> {
+    let n = extended.plant_states();
+    let m = extended.states.len() - n;
+    if m == 0 {
+        return Err("no input is unknown; name those that nobody measures under 'unknown'".into());
+    }
+    let heads = heads(extended)?;
+    if let Some(&v) = heads.iter().find(|&&head| head >= n) {
+        let name = &extended.states[v].name;
+        return Err(format!(
+            "the unknown input {name} is measured itself; leave it out of 'unknown'"
+        ));
+    }
+    let factors = factors(extended, &heads)?;
+    let zero = extended.graph().constant(0.0).node();
+    let silent: HashMap<Node, Node> = unknown(extended).into_iter().map(|v| (v, zero)).collect();
+    let drift = extended
+        .graph()
+        .substitute(&extended.derivatives[..n], &silent);
+    let layers = layers(extended, &drift, heads)?;
+    let (p, n2) = (layers[0].len(), layers.get(1).map_or(0, Vec::len));
+    if p < m + n2.max(1) {
+        return Err(format!(
+            "{p} measured outputs are too few: (H4) needs at least {}, one for each unknown input ({}) and each state that the measured equations reveal ({}); measure another output",
+            m + n2.max(1),
+            names(extended, n..n + m),
+            if n2 == 0 {
+                "at least one".into()
+            } else {
+                names(extended, layers[1].iter().copied())
+            },
+        ));
+    }
+    Ok(Layers {
+        layers,
+        drift,
+        factors,
+    })
+}
+
+fn unknown(extended: &Extended<'_>) -> Vec<Node> {
+    extended.symbols().split_off(extended.plant_states())
+}
+
+/// G = ∂f/∂v, which must be known: no unknown input and no state that is not
+/// measured may enter it.
+fn factors<'p>(extended: &Extended<'p>, heads: &[usize]) -> Result<Matrix<'p>, String> {
+    let (graph, n) = (extended.graph(), extended.plant_states());
+    let v = unknown(extended);
+    let factors = Matrix::jacobian(graph, &extended.derivatives[..n], &v);
+    let symbols = extended.symbols();
+    for row in 0..n {
+        let equation = &extended.states[row].name;
+        for (column, input) in extended.states[n..].iter().enumerate() {
+            let factor = factors.get(row, column);
+            let reads = factor.map_or(vec![], |g| {
+                jacobian::pattern(graph, &[g], &symbols).swap_remove(0)
+            });
+            let step = factor.is_none() && extended.pattern[row].contains(&(n + column));
+            if step || reads.iter().any(|&i| i >= n) {
+                return Err(format!(
+                    "the equation of {equation} is not affine in the unknown input {}; (H3) asks for f̃ + G v",
+                    input.name
+                ));
+            }
+            let hidden = reads.iter().copied().filter(|i| !heads.contains(i));
+            let hidden: Vec<usize> = hidden.collect();
+            if !hidden.is_empty() {
+                return Err(format!(
+                    "in the equation of {equation} the factor of {} depends on {}, which is not measured; (H3) asks for a factor that is known",
+                    input.name,
+                    names(extended, hidden)
+                ));
+            }
+        }
+    }
+    Ok(factors)
+}
+
+fn layers(
+    extended: &Extended<'_>,
+    drift: &[Node],
+    heads: Vec<usize>,
+) -> Result<Vec<Vec<usize>>, String> {
+    let n = drift.len();
+    let pattern = jacobian::pattern(extended.graph(), drift, &extended.symbols()[..n]);
+    let mut taken = vec![false; n];
+    heads.iter().for_each(|&i| taken[i] = true);
+    let mut layers = vec![heads];
+    loop {
+        let last = &layers[layers.len() - 1];
+        let read = |i: &usize| last.iter().any(|&row| pattern[row].contains(i));
+        let next: Vec<usize> = (0..n).filter(|i| !taken[*i]).filter(read).collect();
+        if next.is_empty() {
+            break;
+        }
+        if next.len() > last.len() {
+            return Err(format!(
+                "the equations of {} depend on {} at once; the form (1) asks that each layer has no more states than the one before",
+                names(extended, last.iter().copied()),
+                names(extended, next.iter().copied())
+            ));
+        }
+        next.iter().for_each(|&i| taken[i] = true);
+        layers.push(next);
+    }
+    let left: Vec<usize> = (0..n).filter(|&i| !taken[i]).collect();
+    match left.is_empty() {
+        true => Ok(layers),
+        false => Err(format!(
+            "no equation on the way from the measured states reads {}; measure another output",
+            names(extended, left)
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sensors;
+    use lynkeus_model::{LoadOptions, Plant};
+
+    fn found(equations: &str, measured: &[&str]) -> Result<Vec<Vec<usize>>, String> {
+        let text = format!(
+            "model P input Real v; Real a; Real b; Real c; Real d;
+             output Real ya = a; output Real yb = 2*b; output Real yc = c; output Real yd = d;
+             equation {equations} end P;"
+        );
+        let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
+        let sensors = Sensors {
+            measured: measured.iter().map(|s| s.to_string()).collect(),
+            unknown: vec!["v".into()],
+            ..Sensors::default()
+        };
+        find(&Extended::new(&plant, &sensors).unwrap()).map(|l| l.layers)
+    }
+
+    #[test]
+    fn layers_follow_the_measured_outputs() {
+        let form = "der(c) = b*v + a; der(b) = d + v; der(d) = a; der(a) = -d;";
+        let layers = found(form, &["yc", "yb", "ya"]).unwrap();
+        assert_eq!(layers, [vec![2, 1, 0], vec![3]]);
+        let deep = "der(a) = v; der(b) = -a + c; der(c) = a + d; der(d) = c;";
+        assert_eq!(
+            found(deep, &["yb", "ya"]).unwrap(),
+            [vec![1, 0], vec![2], vec![3]]
+        );
+    }
+
+    #[test]
+    fn what_breaks_the_form_is_named() {
+        let few = "too few: (H4) needs at least 3, one for each unknown input (v) and each state that the measured equations reveal (c, d)";
+        let cases = [
+            (
+                "der(a) = v^2 + c; der(b) = v; der(c) = d; der(d) = 0;",
+                "equation of a is not affine in the unknown input v",
+            ),
+            (
+                "der(a) = c*v; der(b) = v + c; der(c) = d; der(d) = 0;",
+                "factor of v depends on c, which is not measured",
+            ),
+            (
+                "der(a) = v + c; der(b) = -b; der(c) = -c; der(d) = c;",
+                "reads d; measure another output",
+            ),
+            (
+                "der(a) = v + c; der(b) = -b + d; der(c) = -c; der(d) = c;",
+                few,
+            ),
+        ];
+        for (equations, expected) in cases {
+            let text = found(equations, &["ya", "yb"]).unwrap_err();
+            assert!(text.contains(expected), "{text}");
+        }
+        let wide = "der(a) = v + c + d; der(b) = v; der(c) = 0; der(d) = 0;";
+        let text = found(wide, &["ya"]).unwrap_err();
+        assert!(
+            text.contains("equations of a depend on c, d at once"),
+            "{text}"
+        );
+    }
+}
