@@ -23,11 +23,13 @@ fn free_trajectories_agree() {
         println!("skipped: LYNKEUS_PYTHON names no Python with rumoca");
         return;
     };
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    let models = models_below(&folder);
-    assert!(!models.is_empty(), "no model in {}", folder.display());
-    for path in models {
-        compare(&python, &path);
+    for folder in ["tests/models", "../../examples"] {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
+        let models = models_below(&folder);
+        assert!(!models.is_empty(), "no model in {}", folder.display());
+        for path in models {
+            compare(&python, &path);
+        }
     }
 }
 

@@ -33,7 +33,7 @@ def main() -> None:
     rumoca.Session().loads(source, model=model)
 
     held = hold_inputs(source, dict(item.split("=", 1) for item in inputs))
-    config = rumoca.SimConfig(solver="bdf", rtol=1e-11, atol=1e-13, dt=float(step))
+    config = rumoca.SimConfig(solver="bdf", rtol=1e-11, atol=1e-13, dt=float(step), max_wall_seconds=60)
     compiled = rumoca.Session().loads(held, model=model)
     result = compiled.simulate(t=(0.0, float(step) * int(count)), config=config)
 

@@ -45,7 +45,9 @@ impl Balance<'_> {
 
     fn count(&self) -> String {
         let (equations, unknowns) = (self.system.equations.len(), self.system.unknowns.len());
-        format!("{equations} equations for {unknowns} unknowns")
+        let plural = |n: usize| if n == 1 { "" } else { "s" };
+        let (e, u) = (plural(equations), plural(unknowns));
+        format!("{equations} equation{e} for {unknowns} unknown{u}")
     }
 
     /// The unknowns and equations that share the lack, by alternating paths.

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Graph, Unary};
 
+use super::arithmetic::unequal_sizes;
 use super::scope::{Mode, Named, Scope};
 use super::value::{Scalar, Value};
 use crate::limits::Budget;
@@ -279,6 +280,9 @@ impl<'a> Evaluator<'a> {
         for (condition, value) in open.into_iter().rev() {
             let span = self.span(value);
             let value = self.value(value)?;
+            if value.dims() != result.dims() {
+                return Err(unequal_sizes(value.dims(), result.dims(), span));
+            }
             result = self.elementwise(value, result, span, |evaluator, a, b, span| {
                 evaluator.select(condition, a, b, span)
             })?;

@@ -148,6 +148,7 @@ fn names_and_sizes() {
         Real y(min = 2, max = 1) = 1; |  | the range of `y` is empty: min 2 > max 1
         Real y(unit = 3) = 1; |  | expected a string
          | z = sum(x + u*{1, 2}); | the sizes differ: left is [3], right is [2]
+         | z = sum(if u > 0 then x else 1); | the sizes differ: left is [3], right is a scalar
          | z = sum(x + 1); | `.+` and `.-` take a scalar with every element
          | z = sum(1/x); | division by an array (`./` divides by every element)
          | z = sum(x^2); | `.^` takes the power of every element
