@@ -36,7 +36,7 @@ impl Renderer<'_> {
         }
         let depth = depth - 1;
         match self.graph.op(node) {
-            Op::Constant(value) => text.push_str(&value.to_string()),
+            Op::Constant(value) => text.push_str(&brief(value)),
             Op::Symbol(_) => text.push_str(&self.graph.symbol_name(node).unwrap_or_default()),
             Op::Unary(Unary::Neg, a) => self.grouped(outer > 1, text, |text| {
                 text.push('-');
@@ -89,6 +89,13 @@ impl Renderer<'_> {
     }
 }
 
+/// Six significant digits: 0.65 for the sum that is 0.6499999999999999.
+fn brief(value: f64) -> String {
+    let rounded = format!("{value:.5e}").parse().unwrap_or(value);
+    let value: f64 = if value.is_finite() { rounded } else { value };
+    value.to_string()
+}
+
 fn infix(op: Binary) -> Option<(&'static str, u8)> {
     Some(match op {
         Binary::Add => (" + ", 1),
@@ -119,6 +126,7 @@ mod tests {
             ((-x).powi(2), "(-x)^2"),
             (x / (y * x), "x/(x*y)"),
             (x.sqrt() / 2.0, "sqrt(x)/2"),
+            (x * (1.65 - 1.0), "x*0.65"),
         ];
         for (expression, text) in cases {
             assert_eq!(g.render(expression.node(), 80), text);

@@ -1,14 +1,77 @@
 //! From a plant's equations and a few sensors to estimates of what nobody measures.
+//!
+//! A plant is written in Modelica, or in Rust as functions over expressions. Both
+//! give the same observer and the same estimate:
+//!
+//! ```
+//! use lynkeus::model::{Attributes, LoadOptions, Model, Plant};
+//! use lynkeus::observers::{Family, Tuning, triangular::Triangular};
+//! use lynkeus::run::{Estimator, EstimatorSettings};
+//! use lynkeus::structure::{Extended, Sensors};
+//!
+//! // A tank of unknown inflow: der(level) = inflow - 0.5*sqrt(level).
+//! let in_modelica = Plant::from_modelica(
+//!     "model Tank
+//!        input Real inflow;
+//!        Real level(start = 4, min = 0.1, max = 10);
+//!        output Real y = level;
+//!      equation
+//!        der(level) = inflow - 0.5*sqrt(level);
+//!      end Tank;",
+//!     "tank.mo",
+//!     &LoadOptions::default(),
+//! )?;
+//!
+//! let model = Model::new("Tank");
+//! let inflow = model.input("inflow", Attributes::default());
+//! let range = Attributes { start: Some(4.0), min: 0.1, max: 10.0, ..Attributes::default() };
+//! let level = model.state("level", range);
+//! model.der(level, inflow - 0.5 * level.sqrt());
+//! model.output("y", level, Attributes::default());
+//! let in_rust = model.finish()?;
+//!
+//! // The sensor shows a tank at rest at 4: what flows in?
+//! for plant in [in_modelica, in_rust] {
+//!     let sensors = Sensors { unknown: vec!["inflow".into()], ..Sensors::default() };
+//!     let extended = Extended::new(&plant, &sensors)?;
+//!     let design = Triangular.design(&extended, &Tuning::from([("theta", 1.0)]))?;
+//!     let observer = lynkeus::observer_system(&plant, &design.observer)?;
+//!     let mut estimator = Estimator::new(&observer, EstimatorSettings::default())?;
+//!     for second in 0..60 {
+//!         estimator.push(f64::from(second), &[4.0])?;
+//!     }
+//!     let [level, inflow] = estimator.state() else { unreachable!() };
+//!     assert!((level - 4.0).abs() < 1e-6 && (inflow - 1.0).abs() < 1e-6);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! With files instead, [`Study::load`] reads a study, and [`check`], [`simulate`] and
+//! [`estimate`] do what the commands of the same names do.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod check;
 mod error;
+mod estimate;
+mod figure;
 mod files;
 mod near;
+mod outcome;
+pub mod plot;
+pub mod prepare;
+mod simulate;
 pub mod study;
+mod systems;
 pub mod table;
 
+pub use check::{Report, check};
 pub use error::{Error, ErrorKind};
+pub use estimate::estimate;
+pub use figure::figure;
+pub use outcome::{Outcome, Quantity, Watch};
+pub use simulate::simulate;
 pub use study::Study;
+pub use systems::observer as observer_system;
 pub use table::Table;
 
 pub use lynkeus_expr as expr;

@@ -21,7 +21,6 @@
 
 mod estimate;
 mod observer;
-//mod plant;
 mod section;
 mod sensors;
 mod simulate;
@@ -34,7 +33,7 @@ use std::sync::Arc;
 use toml::de::DeTable;
 
 pub use estimate::{BetweenSamples, EstimateSettings};
-pub use observer::{Family, Gain, InitialEstimate, ObserverSettings, Tridiagonal};
+pub use observer::ObserverSettings;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
@@ -75,6 +74,8 @@ pub struct Study {
     pub estimate: EstimateSettings,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
     pub show: Option<Vec<Name>>,
+    /// The unit on the time axis.
+    pub time_unit: Option<String>,
 }
 
 impl Study {
@@ -106,6 +107,7 @@ impl Study {
         let table = DeTable::parse(text).map_err(|e| not_toml(&source, &e))?;
         let mut top = Section::new(&source, "the study", table.into_inner(), KEYS)?;
         let simulate = top.optional("simulate", simulate::read)?;
+        let (show, time_unit) = top.optional("plot", plot)?.unwrap_or_default();
         Ok(Self {
             file: file.to_owned(),
             plant: top
@@ -123,7 +125,8 @@ impl Study {
             estimate: top
                 .optional("estimate", estimate::read)?
                 .unwrap_or_default(),
-            show: top.optional("plot", plot)?.flatten(),
+            show,
+            time_unit,
         })
     }
 }
@@ -145,10 +148,12 @@ fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error>
         .collect()
 }
 
-fn plot(entry: section::Entry<'_>) -> Result<Option<Vec<Name>>, Error> {
-    entry
-        .section("[plot]", &["show"])?
-        .optional("show", |e| e.list_of(section::Entry::name))
+/// `show` and `time_unit` of `[plot]`.
+fn plot(entry: section::Entry<'_>) -> Result<(Option<Vec<Name>>, Option<String>), Error> {
+    let mut section = entry.section("[plot]", &["show", "time_unit"])?;
+    let show = section.optional("show", |e| e.list_of(section::Entry::name))?;
+    let unit = section.optional("time_unit", section::Entry::name)?;
+    Ok((show, unit.map(|name| name.text)))
 }
 
 #[cfg(test)]

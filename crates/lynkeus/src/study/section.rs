@@ -59,6 +59,11 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// The refusal of the table as a whole.
+    pub fn refuse(&self, why: &str) -> Error {
+        Error::input(format!("{}: {why}", self.name)).at(&self.source.file)
+    }
+
     /// Reads `key` with `read`, or gives `None` where it is absent.
     pub fn optional<T>(
         &mut self,
@@ -124,10 +129,7 @@ impl<'a> Entry<'a> {
 
     /// `true` or `false`.
     pub fn boolean(self) -> Result<bool, Error> {
-        match self.value.get_ref() {
-            DeValue::Boolean(b) => Ok(*b),
-            _ => Err(self.wrong("true or false")),
-        }
+        self.as_boolean().ok_or_else(|| self.wrong("true or false"))
     }
 
     /// A text, as a name with its place.
@@ -184,17 +186,6 @@ impl<'a> Entry<'a> {
         self.list()?.into_iter().map(read).collect()
     }
 
-    /// One value, or a list of them.
-    pub fn one_or_list<T>(
-        self,
-        read: impl Fn(Entry<'a>) -> Result<T, Error>,
-    ) -> Result<Vec<T>, Error> {
-        match self.value.get_ref() {
-            DeValue::Array(_) => self.list_of(read),
-            _ => Ok(vec![read(self)?]),
-        }
-    }
-
     /// A table with known keys, called `name` in messages.
     pub fn section(self, name: &str, known: &[&str]) -> Result<Section<'a>, Error> {
         let source = self.source;
@@ -238,6 +229,24 @@ impl<'a> Entry<'a> {
             DeValue::String(text) => Some(text),
             _ => None,
         }
+    }
+
+    /// The truth value, `None` for any other type.
+    pub fn as_boolean(&self) -> Option<bool> {
+        match self.value.get_ref() {
+            DeValue::Boolean(flag) => Some(*flag),
+            _ => None,
+        }
+    }
+
+    /// Whether the value is a list.
+    pub fn is_list(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Array(_))
+    }
+
+    /// Whether the value is a table.
+    pub fn is_table(&self) -> bool {
+        matches!(self.value.get_ref(), DeValue::Table(_))
     }
 
     /// The place of the value.

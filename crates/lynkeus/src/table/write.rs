@@ -16,7 +16,7 @@ pub fn significant(x: f64) -> String {
 ///
 /// # Errors
 /// What the writer reports.
-pub fn write_csv<'a>(to: &mut dyn Write, columns: &[(&str, &'a [f64])]) -> io::Result<()> {
+pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<()> {
     let mut writer = csv::Writer::from_writer(to);
     writer.write_record(columns.iter().map(|(name, _)| name))?;
     let rows = columns.iter().map(|(_, v)| v.len()).min().unwrap_or(0);

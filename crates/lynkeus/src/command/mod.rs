@@ -1,0 +1,115 @@
+//! The `lynkeus` command.
+
+mod output;
+mod progress;
+mod run;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use lynkeus::{Error, ErrorKind, Study};
+
+/// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.
+#[derive(Debug, Parser)]
+#[command(name = "lynkeus", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  lynkeus check study.toml
+  lynkeus simulate study.toml -o run.csv --plot run.svg
+  lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
+
+Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence), 2 bad input.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// What can be estimated from these sensors, by which observer, and what fails where
+    Check {
+        /// The study (TOML)
+        study: PathBuf,
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// Run the plant and its observer together, with noise
+    Simulate {
+        /// The study (TOML)
+        study: PathBuf,
+        #[command(flatten)]
+        output: Output,
+        /// Seed of the noise, instead of the study's
+        #[arg(long, value_name = "N")]
+        seed: Option<u64>,
+        /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
+        #[arg(long, value_name = "FILE.csv")]
+        log: Option<PathBuf>,
+    },
+    /// Replay a measured log through the observer
+    Estimate {
+        /// The study (TOML)
+        study: PathBuf,
+        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name)
+        log: PathBuf,
+        #[command(flatten)]
+        output: Output,
+    },
+}
+
+/// Where results go.
+#[derive(Debug, Args)]
+struct Output {
+    /// Write the columns as CSV ("-": standard output, the default without --json)
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+    /// Draw the result
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print one JSON object that sums the result up
+    #[arg(long)]
+    json: bool,
+    /// No progress bar and no notes
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match execute(cli.command) {
+        Ok(code) => code,
+        Err(error) => {
+            output::complain(&error);
+            match error.kind() {
+                ErrorKind::Refused => ExitCode::from(1),
+                _ => ExitCode::from(2),
+            }
+        }
+    }
+}
+
+fn execute(command: Command) -> Result<ExitCode, Error> {
+    match command {
+        Command::Check { study, json } => run::check(&Study::load(study)?, json),
+        Command::Simulate {
+            study,
+            output,
+            seed,
+            log,
+        } => {
+            let mut study = Study::load(study)?;
+            if let (Some(seed), Some(settings)) = (seed, &mut study.simulate) {
+                settings.seed = seed;
+            }
+            run::simulate(&study, &output, log.as_deref())
+        }
+        Command::Estimate { study, log, output } => {
+            run::estimate(&Study::load(study)?, &log, &output)
+        }
+    }
+}

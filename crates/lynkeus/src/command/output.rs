@@ -1,0 +1,79 @@
+//! Files written whole or not at all, and words for people.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use lynkeus::{Error, table};
+
+/// Writes a file through a temporary one beside it.
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let failed = |e: io::Error| Error::input(format!("cannot write {}: {e}", path.display()));
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut file = tempfile::Builder::new()
+        .prefix(".lynkeus-")
+        .tempfile_in(folder)
+        .map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    readable(file.as_file()).map_err(failed)?;
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+/// Temporary files are private; results have the permissions of ordinary files.
+#[cfg(unix)]
+fn readable(file: &std::fs::File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn readable(_: &std::fs::File) -> io::Result<()> {
+    Ok(())
+}
+
+/// Columns as CSV text.
+pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
+    let named: Vec<(&str, &[f64])> = columns
+        .iter()
+        .map(|(name, values)| (name.as_str(), *values))
+        .collect();
+    let mut bytes = vec![];
+    table::write_csv(&mut bytes, &named)
+        .map_err(|e| Error::input(format!("cannot write CSV: {e}")))?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Columns into a CSV file.
+pub(super) fn write_table(path: &Path, columns: &[(String, &[f64])]) -> Result<(), Error> {
+    write(path, csv(columns)?.as_bytes())
+}
+
+/// Text to standard output; a reader that went away (`| head`) is no error.
+pub(super) fn print(text: &str) -> Result<(), Error> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Error::input(format!(
+            "cannot write to standard output: {e}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+pub(super) fn note(text: &str) {
+    // nothing can be done where standard error is closed
+    let _ = writeln!(io::stderr(), "note: {text}");
+}
+
+pub(super) fn complain(error: &Error) {
+    let text = error.to_string();
+    // a Modelica diagnostic brings its own heading
+    let heading = if text.starts_with("error") {
+        ""
+    } else {
+        "error: "
+    };
+    let _ = writeln!(io::stderr(), "{heading}{text}");
+}

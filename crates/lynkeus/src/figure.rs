@@ -1,0 +1,120 @@
+//! The picture of an outcome.
+
+use crate::plot::{Curve, Figure, Kind, Panel};
+use crate::study::Name;
+use crate::{Error, Outcome, Quantity};
+
+/// Panels drawn where the study does not say which.
+const PANELS: usize = 6;
+
+/// The picture: the quantities of `show`, else unknown inputs and hidden states
+/// first, then what is measured, six at most; then the monitors.
+///
+/// # Errors
+/// `show` names something that is neither estimated nor measured.
+pub fn figure(
+    outcome: &Outcome,
+    time_unit: Option<&str>,
+    show: Option<&[Name]>,
+) -> Result<Figure, Error> {
+    let chosen = match show {
+        Some(names) => names
+            .iter()
+            .map(|name| find(outcome, name))
+            .collect::<Result<Vec<_>, _>>()?,
+        None => interesting(outcome),
+    };
+    let mut panels: Vec<Panel> = chosen.into_iter().map(|q| panel(outcome, q)).collect();
+    panels.extend(outcome.watches.iter().map(|watch| Panel {
+        caption: format!(
+            "{} (alarm below {})",
+            watch.monitor.name, watch.monitor.alarm_below
+        ),
+        curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
+    }));
+    let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    Ok(Figure {
+        title: format!(
+            "{}: {} observer",
+            outcome.plant, outcome.design.observer.family
+        ),
+        time_label: format!("time{unit}"),
+        panels,
+    })
+}
+
+fn find<'o>(outcome: &'o Outcome, name: &Name) -> Result<&'o Quantity, Error> {
+    outcome
+        .quantities
+        .iter()
+        .find(|q| q.name == name.text)
+        .ok_or_else(|| {
+            let names = outcome.quantities.iter().map(|q| q.name.as_str());
+            let refusal = Error::input(format!("`show` of [plot]: nothing is called \"{name}\""));
+            name.blame(refusal.hint(crate::near::suggest(&name.text, names)))
+        })
+}
+
+fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
+    let mut all: Vec<&Quantity> = outcome
+        .quantities
+        .iter()
+        .filter(|q| q.estimate.is_some() || q.measured.is_some())
+        .collect();
+    all.sort_by_key(|q| (q.measured.is_some(), !q.unknown_input));
+    if all.len() > PANELS {
+        let measured = all.iter().filter(|q| q.measured.is_some()).count().min(2);
+        let hidden: Vec<&Quantity> = spread(
+            all.iter()
+                .copied()
+                .filter(|q| q.measured.is_none())
+                .collect(),
+            PANELS - measured,
+        );
+        let shown = all
+            .iter()
+            .copied()
+            .filter(|q| q.measured.is_some())
+            .take(measured);
+        return hidden.into_iter().chain(shown).collect();
+    }
+    all
+}
+
+/// At most `count` of them, evenly spread: of a long chain the ends and the middle.
+fn spread<T: Copy>(all: Vec<T>, count: usize) -> Vec<T> {
+    if all.len() <= count || count < 2 {
+        return all.into_iter().take(count).collect();
+    }
+    (0..count)
+        .map(|k| all[k * (all.len() - 1) / (count - 1)])
+        .collect()
+}
+
+fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
+    // "1" is Modelica's unit of numbers without one
+    let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
+    let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
+    let mut caption = format!("{}{unit}", quantity.name);
+    if let Some(description) = &quantity.description {
+        caption = format!("{}: {description}{unit}", quantity.name);
+    }
+    let series = [
+        (Kind::True, &quantity.truth),
+        (Kind::Measured, &quantity.measured),
+        (Kind::Estimated, &quantity.estimate),
+    ];
+    let curves = series
+        .into_iter()
+        .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
+        .collect();
+    Panel { caption, curves }
+}
+
+fn curve(outcome: &Outcome, kind: Kind, values: &[f64]) -> Curve {
+    Curve {
+        kind,
+        time: outcome.time.clone(),
+        values: values.to_vec(),
+    }
+}

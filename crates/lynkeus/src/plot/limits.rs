@@ -1,0 +1,143 @@
+//! The limits of a panel's axis, such that a peak does not hide the rest.
+
+use std::ops::Range;
+
+use super::{Kind, Panel};
+
+/// A panel is cut when its curves span more than this many times what is worth seeing.
+const TOO_TALL: f64 = 4.0;
+
+/// The axis of a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// What the axis shows.
+    pub shown: Range<f64>,
+    /// The extreme value of the estimate that lies farthest outside, where the axis is cut.
+    pub beyond: Option<f64>,
+}
+
+impl Panel {
+    /// The limits of the value axis: everything, unless the estimate peaks.
+    ///
+    /// The core of a panel is the span of its true and measured values together with the middle
+    /// 90 % of the estimate. Where all values span more than 4 times the core, the axis ends one
+    /// core's height beyond it on either side. `None` when nothing is finite.
+    pub fn limits(&self) -> Option<Limits> {
+        let all = extremes(self.values(|_| true))?;
+        let core = self.core().unwrap_or_else(|| all.clone());
+        let height = core.end - core.start;
+        if height > 0.0 && all.end - all.start > TOO_TALL * height {
+            let shown = (core.start - height).max(all.start)..(core.end + height).min(all.end);
+            let beyond = match shown.start - all.start > all.end - shown.end {
+                true => all.start,
+                false => all.end,
+            };
+            return Some(Limits {
+                shown: padded(shown),
+                beyond: Some(beyond),
+            });
+        }
+        Some(Limits {
+            shown: padded(all),
+            beyond: None,
+        })
+    }
+
+    fn core(&self) -> Option<Range<f64>> {
+        let known = extremes(self.values(|kind| kind != Kind::Estimated));
+        let mut estimated: Vec<f64> = self.values(|kind| kind == Kind::Estimated).collect();
+        estimated.sort_by(f64::total_cmp);
+        let cut = estimated.len() / 20;
+        let middle = extremes(
+            estimated
+                .iter()
+                .copied()
+                .take(estimated.len() - cut)
+                .skip(cut),
+        );
+        match (known, middle) {
+            (Some(a), Some(b)) => Some(a.start.min(b.start)..a.end.max(b.end)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    fn values(&self, of: impl Fn(Kind) -> bool) -> impl Iterator<Item = f64> {
+        self.curves
+            .iter()
+            .filter(move |c| of(c.kind))
+            .flat_map(|c| c.values.iter().copied())
+            .filter(|v| v.is_finite())
+    }
+}
+
+/// The least and the greatest of the finite values.
+pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    values.filter(|v| v.is_finite()).fold(None, |range, v| {
+        Some(range.map_or(v..v, |r: Range<f64>| r.start.min(v)..r.end.max(v)))
+    })
+}
+
+/// Some air above and below; a constant gets an axis around it.
+fn padded(range: Range<f64>) -> Range<f64> {
+    let height = range.end - range.start;
+    let scale = range.start.abs().max(range.end.abs());
+    let air = match height > 1e-9 * scale {
+        true => 0.06 * height,
+        false if scale > 0.0 => 0.1 * scale,
+        false => 1.0,
+    };
+    range.start - air..range.end + air
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Curve;
+
+    fn curve(kind: Kind, values: Vec<f64>) -> Curve {
+        Curve {
+            kind,
+            time: (0..values.len()).map(|i| i as f64).collect(),
+            values,
+        }
+    }
+
+    fn panel(curves: Vec<Curve>) -> Panel {
+        Panel {
+            caption: String::new(),
+            curves,
+        }
+    }
+
+    #[test]
+    fn a_peak_is_cut_and_told() {
+        let mut estimate = vec![0.5; 100];
+        estimate[1] = -40.0;
+        let truth = curve(Kind::True, vec![0.0, 1.0]);
+        let limits = panel(vec![truth, curve(Kind::Estimated, estimate)])
+            .limits()
+            .unwrap();
+        assert_eq!(limits.beyond, Some(-40.0));
+        assert!(limits.shown.start > -1.2 && limits.shown.start < -1.0);
+        assert!(limits.shown.end > 1.0 && limits.shown.end < 1.2);
+    }
+
+    #[test]
+    fn a_modest_overshoot_is_shown_whole() {
+        let truth = curve(Kind::True, vec![0.0, 1.0]);
+        let limits = panel(vec![truth, curve(Kind::Estimated, vec![0.0, 3.0, 1.0])])
+            .limits()
+            .unwrap();
+        assert_eq!(limits.beyond, None);
+        assert!(limits.shown.end > 3.0);
+    }
+
+    #[test]
+    fn constants_zeros_and_nothing_have_an_axis_or_none() {
+        let of = |values| panel(vec![curve(Kind::True, values)]).limits();
+        assert_eq!(of(vec![5.0, 5.0]).unwrap().shown, 4.5..5.5);
+        assert_eq!(of(vec![0.0]).unwrap().shown, -1.0..1.0);
+        assert_eq!(of(vec![f64::NAN]), None);
+        assert_eq!(of(vec![]), None);
+    }
+}

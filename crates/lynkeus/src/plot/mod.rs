@@ -1,0 +1,91 @@
+//! Time series as SVG pictures: panels one above the other that share the time axis.
+//!
+//! Each panel shows one quantity: what is true as a broad grey line, what is estimated as a blue
+//! line over it, what is measured as orange dots (Okabe and Ito's colours, safe for the
+//! colour-blind). An estimate that peaks far beyond everything else would flatten the rest of its
+//! panel; the axis is then cut and the panel's caption says how far the peak goes
+//! ([`Panel::limits`] has the rule).
+
+mod decimate;
+mod limits;
+mod render;
+
+use std::ops::Range;
+
+/// A picture: panels that share the time axis.
+#[derive(Clone, Debug, Default)]
+pub struct Figure {
+    /// The line above everything.
+    pub title: String,
+    /// The label of the time axis, with its unit.
+    pub time_label: String,
+    /// The panels, from the top.
+    pub panels: Vec<Panel>,
+}
+
+/// One quantity over time.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    /// The quantity's name, description and unit.
+    pub caption: String,
+    /// Its curves.
+    pub curves: Vec<Curve>,
+}
+
+/// One curve of a panel; a NaN breaks the line.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// What the values are.
+    pub kind: Kind,
+    /// Instants, increasing.
+    pub time: Vec<f64>,
+    /// Values, as many as instants.
+    pub values: Vec<f64>,
+}
+
+/// What the values of a curve are; it decides colour and line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// What the plant really does: simulated, or an unknown input that happens to be logged.
+    True,
+    /// What a sensor reads.
+    Measured,
+    /// What the observer makes of it.
+    Estimated,
+}
+
+impl Kind {
+    /// The word of the legend.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::True => "true",
+            Self::Measured => "measured",
+            Self::Estimated => "estimated",
+        }
+    }
+}
+
+impl Figure {
+    /// The picture as SVG text.
+    ///
+    /// # Errors
+    /// There is nothing finite to draw.
+    pub fn to_svg(&self) -> Result<String, crate::Error> {
+        render::svg(self)
+    }
+
+    /// The span of time that all curves cover together.
+    fn time_range(&self) -> Option<Range<f64>> {
+        let times = self.panels.iter().flat_map(|p| &p.curves);
+        limits::extremes(times.flat_map(|c| c.time.iter().copied()))
+    }
+
+    /// The kinds of curves that occur, in the order of the legend.
+    fn kinds(&self) -> Vec<Kind> {
+        let curves = self.panels.iter().flat_map(|p| &p.curves);
+        let mut kinds: Vec<Kind> = curves.map(|c| c.kind).collect();
+        kinds.sort();
+        kinds.dedup();
+        kinds
+    }
+}

@@ -1,0 +1,293 @@
+//! Figures drawn with `plotters` onto its SVG backend.
+
+use std::ops::Range;
+
+use plotters::chart::ChartContext;
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::decimate::{clipped, decimated};
+use super::limits::Limits;
+use super::{Curve, Figure, Kind, Panel};
+use crate::Error;
+
+const WIDTH: u32 = 900;
+const HEAD: u32 = 52;
+const CAPTION: u32 = 24;
+const TIME_AXIS: u32 = 50;
+const LEFT: u32 = 78;
+const RIGHT: u32 = 22;
+const FONT: &str = "sans-serif";
+
+const INK: RGBColor = RGBColor(38, 38, 38);
+const FAINT: RGBColor = RGBColor(226, 226, 226);
+const FRAME: RGBColor = RGBColor(150, 150, 150);
+const GREY: RGBColor = RGBColor(140, 140, 140);
+const BLUE: RGBColor = RGBColor(0, 114, 178);
+const ORANGE: RGBColor = RGBColor(230, 159, 0);
+const VERMILION: RGBColor = RGBColor(213, 94, 0);
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+
+/// The whole figure as SVG text.
+pub(super) fn svg(figure: &Figure) -> Result<String, Error> {
+    let Some(time) = figure.time_range().filter(|t| t.end > t.start) else {
+        return Err(Error::input("nothing to draw: no finite values over time"));
+    };
+    let mut text = String::new();
+    draw(figure, &time, &mut text).map_err(|e| Error::input(format!("cannot draw: {e}")))?;
+    Ok(titled(text, &figure.title))
+}
+
+fn draw(figure: &Figure, time: &Range<f64>, text: &mut String) -> Drawn {
+    let panel = panel_height(figure.panels.len());
+    let count = u32::try_from(figure.panels.len()).unwrap_or(u32::MAX);
+    let height = HEAD + count.saturating_mul(panel + CAPTION) + TIME_AXIS;
+    let root = SVGBackend::with_string(text, (WIDTH, height)).into_drawing_area();
+    root.fill(&WHITE)?;
+    head(&root, figure)?;
+    let mut top = HEAD;
+    for (i, content) in figure.panels.iter().enumerate() {
+        let last = i + 1 == figure.panels.len();
+        let below = if last { TIME_AXIS } else { 0 };
+        let area = root
+            .clone()
+            .shrink((0, top), (WIDTH, CAPTION + panel + below));
+        draw_panel(&area, content, time, last.then_some(&figure.time_label))?;
+        top += CAPTION + panel;
+    }
+    root.present()
+}
+
+fn panel_height(panels: usize) -> u32 {
+    match panels {
+        0 | 1 => 320,
+        2 => 220,
+        3 | 4 => 165,
+        _ => 132,
+    }
+}
+
+/// The title on the left, the legend on the right.
+fn head(root: &Area<'_>, figure: &Figure) -> Drawn {
+    let title = (FONT, 18).into_font().style(FontStyle::Bold).color(&INK);
+    root.draw(&Text::new(figure.title.clone(), (LEFT as i32, 16), title))?;
+    let mut right = (WIDTH - RIGHT) as i32;
+    for kind in figure.kinds().into_iter().rev() {
+        let words = (FONT, 14)
+            .into_font()
+            .color(&INK)
+            .pos(Pos::new(HPos::Right, VPos::Center));
+        root.draw(&Text::new(kind.label(), (right, 26), words))?;
+        right -= 8 * kind.label().len() as i32 + 4;
+        sample(root, kind, right - 28, right)?;
+        right -= 28 + 20;
+    }
+    Ok(())
+}
+
+/// A short piece of a curve for the legend.
+fn sample(root: &Area<'_>, kind: Kind, from: i32, to: i32) -> Drawn {
+    match kind {
+        Kind::Measured => {
+            for x in [from + 6, from + 14, from + 22] {
+                root.draw(&Circle::new((x, 26), 2, ORANGE.filled()))?;
+            }
+            Ok(())
+        }
+        _ => root.draw(&PathElement::new([(from, 26), (to, 26)], stroke(kind))),
+    }
+}
+
+fn stroke(kind: Kind) -> ShapeStyle {
+    match kind {
+        Kind::True => GREY.stroke_width(4),
+        Kind::Estimated => BLUE.stroke_width(2),
+        Kind::Measured => ORANGE.filled(),
+    }
+}
+
+fn draw_panel(
+    area: &Area<'_>,
+    panel: &Panel,
+    time: &Range<f64>,
+    time_label: Option<&String>,
+) -> Drawn {
+    let limits = panel.limits().unwrap_or(Limits {
+        shown: -1.0..1.0,
+        beyond: None,
+    });
+    caption(area, panel, &limits)?;
+    let mut chart = ChartBuilder::on(area)
+        .margin_top(CAPTION)
+        .margin_right(RIGHT)
+        .set_label_area_size(LabelAreaPosition::Left, LEFT)
+        .set_label_area_size(
+            LabelAreaPosition::Bottom,
+            if time_label.is_some() { TIME_AXIS } else { 0 },
+        )
+        .build_cartesian_2d(time.clone(), limits.shown.clone())?;
+    axes(&mut chart, time_label)?;
+    let mut curves: Vec<&Curve> = panel.curves.iter().collect();
+    curves.sort_by_key(|c| c.kind);
+    for curve in curves {
+        draw_curve(&mut chart, curve, &limits.shown)?;
+    }
+    Ok(())
+}
+
+fn caption(area: &Area<'_>, panel: &Panel, limits: &Limits) -> Drawn {
+    let baseline = CAPTION as i32 - 5;
+    let style = (FONT, 14)
+        .into_font()
+        .color(&INK)
+        .pos(Pos::new(HPos::Left, VPos::Bottom));
+    area.draw(&Text::new(
+        panel.caption.clone(),
+        (LEFT as i32, baseline),
+        style,
+    ))?;
+    let Some(beyond) = limits.beyond else {
+        return Ok(());
+    };
+    let note = (FONT, 13)
+        .into_font()
+        .color(&VERMILION)
+        .pos(Pos::new(HPos::Right, VPos::Bottom));
+    area.draw(&Text::new(
+        format!("estimate peaks at {} (axis cut)", tick(&rounded(beyond, 3))),
+        ((WIDTH - RIGHT) as i32, baseline),
+        note,
+    ))
+}
+
+fn axes(chart: &mut Chart<'_>, time_label: Option<&String>) -> Drawn {
+    let ticks = (FONT, 13).into_font().color(&INK);
+    let mut mesh = chart.configure_mesh();
+    mesh.bold_line_style(FAINT)
+        .light_line_style(TRANSPARENT)
+        .axis_style(FRAME)
+        .x_labels(9)
+        .y_labels(5)
+        .label_style(ticks)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
+        .axis_desc_style((FONT, 14).into_font().color(&INK));
+    if let Some(label) = time_label {
+        mesh.x_desc(label);
+    }
+    mesh.draw()
+}
+
+fn draw_curve(chart: &mut Chart<'_>, curve: &Curve, shown: &Range<f64>) -> Drawn {
+    let columns = (WIDTH - LEFT - RIGHT) as usize;
+    let points = decimated(&curve.time, &curve.values, columns);
+    if curve.kind == Kind::Measured {
+        let dots = points.into_iter().filter(|p| shown.contains(&p.1));
+        let style = ORANGE.mix(0.75).filled();
+        chart.draw_series(dots.map(|p| Circle::new(p, 2, style)))?;
+        return Ok(());
+    }
+    for piece in clipped(&points, shown) {
+        chart.draw_series([PathElement::new(piece, stroke(curve.kind))])?;
+    }
+    Ok(())
+}
+
+/// A tick's number without the dust of binary fractions.
+fn tick(value: &f64) -> String {
+    let value = rounded(*value, 9);
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    match value.abs() {
+        1e-4..1e6 => format!("{value}").replace('-', "\u{2212}"),
+        _ => format!("{value:e}").replace('-', "\u{2212}"),
+    }
+}
+
+fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(value)
+}
+
+/// Names the picture for screen readers and hovering.
+fn titled(svg: String, title: &str) -> String {
+    let Some(end) = svg
+        .find("<svg")
+        .and_then(|at| Some(at + svg.get(at..)?.find('>')? + 1))
+    else {
+        return svg;
+    };
+    let (head, body) = svg.split_at(end);
+    let title = title
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;");
+    format!("{head}\n<title>{title}</title>{body}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(kind: Kind, n: usize) -> Curve {
+        let time: Vec<f64> = (0..n).map(|i| i as f64 / 10.0).collect();
+        let values = time.iter().map(|t| (t / 3.0).sin()).collect();
+        Curve { kind, time, values }
+    }
+
+    fn figure(curves: Vec<Curve>) -> Figure {
+        Figure {
+            title: "Tank <1> & 2".to_owned(),
+            time_label: "time (s)".to_owned(),
+            panels: vec![Panel {
+                caption: "level (m)".to_owned(),
+                curves,
+            }],
+        }
+    }
+
+    #[test]
+    fn a_picture_names_everything() {
+        let picture = figure(vec![wave(Kind::True, 300), wave(Kind::Estimated, 300)]);
+        let svg = picture.to_svg().unwrap();
+        for words in [
+            "<title>Tank &lt;1&gt; &amp; 2</title>",
+            "level (m)",
+            "time (s)",
+            "estimated",
+            "true",
+        ] {
+            assert!(svg.contains(words), "{words}");
+        }
+        assert!(!svg.contains("measured"));
+        assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn long_curves_give_small_pictures() {
+        let svg = figure(vec![wave(Kind::Estimated, 200_000)])
+            .to_svg()
+            .unwrap();
+        assert!(svg.len() < 150_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error() {
+        assert!(figure(vec![]).to_svg().is_err());
+        assert!(figure(vec![wave(Kind::True, 1)]).to_svg().is_err());
+    }
+
+    #[test]
+    fn ticks_are_plain() {
+        assert_eq!(tick(&0.300_000_000_000_000_04), "0.3");
+        assert_eq!(tick(&-2.0), "\u{2212}2");
+        assert_eq!(tick(&1e7), "1e7");
+        assert_eq!(tick(&0.0), "0");
+    }
+}

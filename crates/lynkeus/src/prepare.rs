@@ -1,0 +1,115 @@
+//! From a study to its plant and its observer.
+
+use lynkeus_model::{LoadOptions, Plant};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Fit};
+use lynkeus_structure::{Extended, Sensors, SensorsError};
+
+use crate::study::Name;
+use crate::{Error, Study};
+
+/// The plant of a study, with the study's parameters.
+///
+/// # Errors
+/// No plant, a file that cannot be read, or a model that is refused.
+pub fn plant(study: &Study) -> Result<Plant, Error> {
+    let Some(path) = &study.plant else {
+        let message = "the study names no plant: expected `plant = \"FILE.mo\"`";
+        return Err(Error::input(message).at(&study.file));
+    };
+    crate::files::must_exist(path, "plant", &study.file)?;
+    let options = LoadOptions {
+        model: study.model.clone(),
+        parameters: study.parameters.clone(),
+        symbolic_parameters: false,
+    };
+    Plant::load(path, &options).map_err(|error| Error::input(error.to_string()))
+}
+
+/// The plant as the observer of a study sees it.
+///
+/// # Errors
+/// Names among the sensors that the plant does not have.
+pub fn extended<'p>(study: &Study, plant: &'p Plant) -> Result<Extended<'p>, Error> {
+    let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
+    let sensors = Sensors {
+        measured: texts(study.sensors.measured.as_deref().unwrap_or_default()),
+        unknown: texts(&study.sensors.unknown),
+        disturbances: texts(&study.sensors.disturbances),
+    };
+    Extended::new(plant, &sensors).map_err(|error| blame(study, &error))
+}
+
+/// The place in the study of a name that does not fit.
+fn blame(study: &Study, error: &SensorsError) -> Error {
+    let name = match error {
+        SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
+        SensorsError::NothingMeasured { .. } => {
+            return Error::input(error.to_string()).at(&study.file);
+        }
+    };
+    let sensors = &study.sensors;
+    let lists = [
+        sensors.measured.as_deref().unwrap_or_default(),
+        &sensors.unknown,
+        &sensors.disturbances,
+    ];
+    let refusal = Error::input(error.to_string());
+    match lists.into_iter().flatten().rfind(|n| n.text == *name) {
+        Some(found) => found.blame(refusal),
+        None => refusal.at(&study.file),
+    }
+}
+
+/// What every family that the study allows finds in the plant.
+///
+/// # Errors
+/// Keys of `[observer]` that cannot be used.
+pub fn examinations(study: &Study, extended: &Extended<'_>) -> Result<Vec<Examination>, Error> {
+    let examine = |family: &dyn Family| {
+        family
+            .examine(extended, &study.observer.tuning)
+            .map_err(|error| refusal(study, &error))
+    };
+    study.observer.families().map(examine).collect()
+}
+
+/// The family to use: the first that fits, else the first that is undecided.
+pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
+    let with = |fit: Fit| examinations.iter().find(move |e| e.fit == fit);
+    with(Fit::Fits).or_else(|| with(Fit::Undecided))
+}
+
+/// The observer of a study.
+///
+/// # Errors
+/// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
+/// `[observer]` cannot be used.
+pub fn design(study: &Study, extended: &Extended<'_>) -> Result<Design, Error> {
+    let examinations = examinations(study, extended)?;
+    let Some(chosen) = recommended(&examinations) else {
+        return Err(none_fits(study, &examinations));
+    };
+    let family = lynkeus_observers::find(chosen.family)
+        .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
+    family
+        .design(extended, &study.observer.tuning)
+        .map_err(|error| refusal(study, &error))
+}
+
+fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
+    let reasons: Vec<String> = examinations
+        .iter()
+        .map(|e| DesignError::Refused(Box::new(e.clone())).to_string())
+        .collect();
+    Error::refused(reasons.join("\n"))
+        .at(&study.file)
+        .hint("`lynkeus check` shows every condition")
+}
+
+fn refusal(study: &Study, error: &DesignError) -> Error {
+    match error {
+        DesignError::Tuning(error) => study.observer.blame(error, &study.file),
+        DesignError::Refused(_) => Error::refused(error.to_string()).at(&study.file),
+        DesignError::MissingInput(_) => Error::input(error.to_string()).at(&study.file),
+    }
+}

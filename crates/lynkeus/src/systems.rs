@@ -1,0 +1,155 @@
+//! Plants, inputs and observers as systems that can be run.
+
+use lynkeus_expr::Node;
+use lynkeus_model::{Plant, Variable, parse_expression};
+use lynkeus_observers::Observer;
+use lynkeus_run::System;
+
+use crate::study::{Name, SimulateSettings};
+use crate::{Error, Study};
+
+/// The column of an estimate.
+pub(crate) fn hat(name: &str) -> String {
+    format!("{name}_hat")
+}
+
+/// An observer as a system that can be run: its signals are the measured outputs,
+/// then the known inputs, by name; its outputs are the estimates (`<name>_hat`),
+/// then its monitors.
+///
+/// # Errors
+/// The observer's expressions read a symbol that it does not list.
+pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
+    let states: Vec<(String, Node, f64)> = observer
+        .states
+        .iter()
+        .map(|(signal, start)| (signal.name.clone(), signal.symbol, *start))
+        .collect();
+    let read = observer.measured.iter().chain(&observer.inputs);
+    let derivatives = observer.input_derivatives.iter().map(|d| &d.signal);
+    let signals: Vec<(String, Node)> = read
+        .chain(derivatives)
+        .map(|signal| (signal.name.clone(), signal.symbol))
+        .collect();
+    let estimates = observer
+        .estimates
+        .iter()
+        .map(|e| (hat(&e.variable.name), e.node));
+    let monitors = observer.monitors.iter().map(|m| (m.name.clone(), m.node));
+    let outputs: Vec<(String, Node)> = estimates.chain(monitors).collect();
+    System::new(
+        &plant.graph,
+        observer.time,
+        &states,
+        &signals,
+        &observer.derivatives,
+        &outputs,
+    )
+    .map_err(|error| Error::input(error.to_string()))
+}
+
+/// The plant with the study's start values; its outputs are those of the model.
+pub(crate) fn plant(plant: &Plant, settings: &SimulateSettings) -> Result<System, Error> {
+    for (name, _) in &settings.initial {
+        if !plant.states.iter().any(|s| s.name == name.text) {
+            return Err(name.blame(unknown(plant, "state", &plant.states, name)));
+        }
+    }
+    let start = |variable: &Variable| {
+        let given = settings
+            .initial
+            .iter()
+            .find(|(name, _)| name.text == variable.name);
+        // Modelica's own default
+        given.map(|(_, x)| *x).or(variable.start).unwrap_or(0.0)
+    };
+    let states: Vec<(String, Node, f64)> = plant
+        .states
+        .iter()
+        .map(|s| (s.name.clone(), s.node, start(s)))
+        .collect();
+    let named = |variables: &[Variable]| -> Vec<(String, Node)> {
+        variables.iter().map(|v| (v.name.clone(), v.node)).collect()
+    };
+    System::new(
+        &plant.graph,
+        plant.time,
+        &states,
+        &named(&plant.inputs),
+        &plant.derivatives,
+        &named(&plant.outputs),
+    )
+    .map_err(|error| Error::input(error.to_string()))
+}
+
+fn unknown(plant: &Plant, kind: &str, variables: &[Variable], name: &Name) -> Error {
+    let names = variables.iter().map(|v| v.name.as_str());
+    let message = format!("the plant '{}' has no {kind} named \"{name}\"", plant.name);
+    Error::input(message).hint(crate::near::suggest(&name.text, names))
+}
+
+/// The plant's inputs as expressions of time, and the derivatives that the
+/// observer reads.
+pub(crate) fn inputs(
+    study: &Study,
+    plant: &Plant,
+    settings: &SimulateSettings,
+    observer: &Observer,
+) -> Result<System, Error> {
+    for (name, _) in &settings.inputs {
+        if !plant.inputs.iter().any(|i| i.name == name.text) {
+            return Err(name.blame(unknown(plant, "input", &plant.inputs, name)));
+        }
+    }
+    let mut outputs = plant
+        .inputs
+        .iter()
+        .map(|input| {
+            Ok((
+                input.name.clone(),
+                input_expression(study, plant, settings, input)?,
+            ))
+        })
+        .collect::<Result<Vec<_>, Error>>()?;
+    let derivatives = observer
+        .input_derivative_expressions(&plant.graph, &outputs)
+        .map_err(|error| Error::input(error.to_string()))?;
+    outputs.extend(derivatives);
+    System::new(&plant.graph, plant.time, &[], &[], &[], &outputs)
+        .map_err(|error| Error::input(error.to_string()))
+}
+
+/// The study's expression, else the input's start value; a disturbance is zero
+/// unless it is given.
+fn input_expression(
+    study: &Study,
+    plant: &Plant,
+    settings: &SimulateSettings,
+    input: &Variable,
+) -> Result<Node, Error> {
+    let graph = &plant.graph;
+    let given = settings
+        .inputs
+        .iter()
+        .find(|(name, _)| name.text == input.name);
+    if let Some((_, expression)) = given {
+        let source = &expression.source;
+        let names = |name: &str| (name == "time").then_some(plant.time);
+        return parse_expression(&source.text, graph, &names)
+            .map_err(|error| source.blame(Error::input(error.one_line())));
+    }
+    let disturbance = study
+        .sensors
+        .disturbances
+        .iter()
+        .any(|d| d.text == input.name);
+    match input.start.or(disturbance.then_some(0.0)) {
+        Some(value) => Ok(graph.constant(value).node()),
+        None => Err(Error::input(format!(
+            "the input \"{}\" has no value: expected an expression of time under `inputs` of [simulate]",
+            input.name
+        ))
+        .at(&study.file)
+        .hint(format!("add inputs = {{ {} = \"…\" }}, or a start value in the model", input.name))),
+    }
+}

@@ -1,0 +1,128 @@
+//! What succeeds.
+
+use crate::{Folder, csv, examples, run};
+
+#[test]
+fn a_log_becomes_estimates_and_a_picture() {
+    let folder = Folder::new();
+    let ended = folder.run(&[
+        "estimate",
+        "study.toml",
+        "log.csv",
+        "-o",
+        "e.csv",
+        "--plot",
+        "e.svg",
+    ]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(ended.err.contains("looks ahead one sample"));
+    let (header, rows) = csv(&folder.read("e.csv"));
+    assert_eq!(header, ["t", "upper_hat", "lower_hat", "pump_hat"]);
+    assert_eq!(rows.len(), csv(&folder.read("log.csv")).1.len());
+    let svg = folder.read("e.svg");
+    for word in ["pump: Pump voltage (V)", "time (s)", "estimated", "true"] {
+        assert!(svg.contains(word), "{word}");
+    }
+    assert_eq!(
+        folder.files(),
+        ["e.csv", "e.svg", "log.csv", "study.toml", "two_tanks.mo"]
+    );
+}
+
+/// With constant input the estimates converge to the simulated truth.
+#[test]
+fn simulate_gives_truth_and_estimates_by_name() {
+    let folder = Folder::new();
+    folder.change("study.toml", "noise = { level = 0.02 }", "");
+    let (start, end) = (folder.read("study.toml"), "inputs = { pump = 3 }");
+    let line = start.lines().find(|l| l.starts_with("inputs")).unwrap();
+    folder.change("study.toml", line, end);
+    let ended = folder.run(&["simulate", "study.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (header, rows) = csv(&ended.out);
+    assert_eq!(
+        header,
+        [
+            "t",
+            "upper",
+            "lower",
+            "pump",
+            "upper_hat",
+            "lower_hat",
+            "pump_hat"
+        ]
+    );
+    let last = rows.last().unwrap();
+    for state in 1..=3 {
+        assert!((last[state] - last[state + 3]).abs() < 1e-6, "{last:?}");
+    }
+}
+
+#[test]
+fn the_shipped_log_is_what_simulate_writes() {
+    let folder = Folder::new();
+    let shipped = folder.read("log.csv");
+    let ended = folder.run(&[
+        "simulate",
+        "study.toml",
+        "--log",
+        "again.csv",
+        "-o",
+        "all.csv",
+    ]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let ((header, shipped), (again_header, again)) =
+        (csv(&shipped), csv(&folder.read("again.csv")));
+    assert_eq!(header, again_header);
+    for (row, same) in shipped.iter().zip(&again) {
+        for (x, y) in row.iter().zip(same) {
+            assert!((x - y).abs() <= 1e-9 * x.abs().max(1.0), "{x} against {y}");
+        }
+    }
+}
+
+#[test]
+fn the_seed_decides_the_noise() {
+    let folder = Folder::new();
+    let noisy = |seed: &str| folder.run(&["simulate", "study.toml", "--seed", seed]).out;
+    assert_eq!(noisy("7"), noisy("7"));
+    assert_ne!(noisy("7"), noisy("8"));
+}
+
+#[test]
+fn json_sums_up() {
+    let folder = Folder::new();
+    let json = folder.run(&["simulate", "study.toml", "--json"]).json();
+    assert_eq!(json["family"], "triangular");
+    assert_eq!(json["columns"][6], "pump_hat");
+    assert!(json["final"]["pump"].is_number() && json["rms_error_last_half"]["upper"].is_number());
+    let json = folder.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(json["recommended"], "triangular");
+    assert_eq!(json["families"][0]["chains"][0][2], "pump");
+    assert_eq!(json["visible"]["upper"], true);
+}
+
+#[test]
+fn check_explains_the_column() {
+    let ended = run(&examples().join("column"), &["check", "study.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let chains = "(x[1] → x[2] → x[3] → x[4] → x[5] → x[6] → x[7]) and (x[12] → x[11] → x[10] → x[9] → x[8] → Zf)";
+    assert!(ended.out.contains(chains), "{}", ended.out);
+    assert!(ended.out.lines().count() < 25, "more than a screen");
+}
+
+/// A logger's own names, a semicolon and decimal commas.
+#[test]
+fn other_headers_are_mapped_by_the_study() {
+    let folder = Folder::new();
+    let log = folder
+        .read("log.csv")
+        .replace('.', "#")
+        .replace(',', ";")
+        .replace('#', ",");
+    folder.write("log.csv", &log.replacen("t;level;pump", "zeit;AI-101;u", 1));
+    let end = "[estimate]\ntime = \"zeit\"\ncolumns = { level = \"AI-101\", pump = \"u\" }";
+    folder.change("study.toml", "[estimate]", end);
+    let ended = folder.run(&["estimate", "study.toml", "log.csv", "-o", "e.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
