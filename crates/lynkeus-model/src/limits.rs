@@ -14,7 +14,7 @@ pub(crate) const MAX_ITERATORS: usize = 32;
 /// Most expressions, equations and declarations in one file.
 pub(crate) const MAX_SYNTAX_NODES: usize = 2_000_000;
 /// Most scalar operations while `for` loops and arrays are written out.
-pub(crate) const MAX_ELABORATED: u64 = 2_000_000;
+pub(crate) const MAX_ELABORATED: u64 = 1_000_000;
 /// Most scalar variables and parameters of one model.
 pub(crate) const MAX_SCALARS: u64 = 200_000;
 /// Most bytes of names, units and descriptions when arrays are written out.
