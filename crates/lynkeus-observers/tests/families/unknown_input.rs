@@ -5,9 +5,10 @@ use crate::common::{
 };
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Fit, Tuning, TuningError, Value, unknown_input::UnknownInput,
+    Design, DesignError, FAMILIES, Family, Fit, Tuning, TuningError, Value,
+    unknown_input::UnknownInput,
 };
-use lynkeus_structure::Condition;
+use lynkeus_structure::{Condition, Extended, Sensors};
 
 /// System (15) with a = 1, which the paper leaves open.
 const EXAMPLE: &str = "model Farza
@@ -378,4 +379,21 @@ fn a_rank_that_is_lost_is_refuted() {
     let refuted = examination.refuted().unwrap();
     assert!(refuted.name.starts_with("(H1)"), "{}", refuted.name);
     assert!(matches!(refuted.verdict, Condition::Refuted(_)));
+}
+
+/// `auto` takes the first family that fits: of this plant no other does for sure.
+#[test]
+fn no_family_before_it_fits_the_example() {
+    let plant = plant(EXAMPLE);
+    let sensors = Sensors {
+        unknown: vec!["v".into()],
+        ..Sensors::default()
+    };
+    let extended = Extended::new(&plant, &sensors).unwrap();
+    let fits = |family: &&&dyn Family| {
+        let found = family.examine(&extended, &Tuning::default()).unwrap();
+        found.fit == Fit::Fits
+    };
+    let first = FAMILIES.iter().find(fits).unwrap();
+    assert_eq!(first.name(), "unknown-input");
 }
