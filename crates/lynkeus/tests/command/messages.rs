@@ -137,7 +137,7 @@ fn models_that_cannot_be_read() {
         |f| f.change("two_tanks.mo", "k3*sqrt(lower)", "k3*sqrt(lowr)"),
         2,
     );
-    says(&text, &["two_tanks.mo:13", "lowr", "lower", "^"]);
+    says(&text, &["two_tanks.mo:12", "lowr", "lower", "^"]);
     let text = refused(
         |f| {
             f.change(
