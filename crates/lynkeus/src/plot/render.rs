@@ -131,7 +131,7 @@ fn draw_panel(
             if time_label.is_some() { TIME_AXIS } else { 0 },
         )
         .build_cartesian_2d(time.clone(), limits.shown.clone())?;
-    axes(&mut chart, time_label)?;
+    axes(&mut chart, time_label, &limits.shown)?;
     let mut curves: Vec<&Curve> = panel.curves.iter().collect();
     curves.sort_by_key(|c| c.kind);
     for curve in curves {
@@ -165,7 +165,9 @@ fn caption(area: &Area<'_>, panel: &Panel, limits: &Limits) -> Drawn {
     ))
 }
 
-fn axes(chart: &mut Chart<'_>, time_label: Option<&String>) -> Drawn {
+fn axes(chart: &mut Chart<'_>, time_label: Option<&String>, shown: &Range<f64>) -> Drawn {
+    let height = shown.end - shown.start;
+    let level = |value: &f64| tick(&unless_dust(*value, height));
     let ticks = (FONT, 13).into_font().color(&INK);
     let mut mesh = chart.configure_mesh();
     mesh.bold_line_style(FAINT)
@@ -175,7 +177,7 @@ fn axes(chart: &mut Chart<'_>, time_label: Option<&String>) -> Drawn {
         .y_labels(5)
         .label_style(ticks)
         .x_label_formatter(&tick)
-        .y_label_formatter(&tick)
+        .y_label_formatter(&level)
         .axis_desc_style((FONT, 14).into_font().color(&INK));
     if let Some(label) = time_label {
         mesh.x_desc(label);
@@ -207,6 +209,15 @@ fn tick(value: &f64) -> String {
     match value.abs() {
         1e-4..1e6 => format!("{value}").replace('-', "\u{2212}"),
         _ => format!("{value:e}").replace('-', "\u{2212}"),
+    }
+}
+
+/// Zero for the tick that only rounding keeps from it.
+fn unless_dust(value: f64, height: f64) -> f64 {
+    if value.abs() < 1e-9 * height {
+        0.0
+    } else {
+        value
     }
 }
 
@@ -289,5 +300,6 @@ mod tests {
         assert_eq!(tick(&-2.0), "\u{2212}2");
         assert_eq!(tick(&1e7), "1e7");
         assert_eq!(tick(&0.0), "0");
+        assert_eq!(tick(&unless_dust(-5.55e-17, 1.0)), "0");
     }
 }
