@@ -157,18 +157,18 @@ fn innovations(
                 .fold(graph.expr(y.symbol), |y, &h| y - graph.expr(h))
         })
         .collect();
+    // K₂(u − C x̂_a), an entry per column of Q̄_a; none without a filter
+    let filtered: Vec<Expr<'_>> = (0..form.U.len())
+        .filter_map(|j| Some((j, filters.innovation(graph, j)?)))
+        .flat_map(|(j, e_a)| gains.K2[j].iter().map(move |&gain| gain * e_a))
+        .collect();
+    let Q_a = numbers(graph, &form.Q_a, at);
     let row = |(place, &(i, k)): (usize, &(usize, usize))| {
         let mut sum = gains.K[i][k] * e[i];
-        let mut column = 0;
-        for (j, U) in form.U.iter().enumerate() {
-            for l in 0..U.len() {
-                let entry = form.Q_a.get(place).and_then(|row| row[column]);
-                column += 1;
-                let (Some(entry), Some(e_a)) = (entry, filters.innovation(graph, j)) else {
-                    continue;
-                };
-                let [entry] = at(&[entry])[..] else { continue };
-                sum = sum - graph.expr(entry) * (gains.K2[j][l] * e_a);
+        let entries = form.Q_a.get(place).into_iter().flatten().enumerate();
+        for ((column, entry), &e_a) in entries.zip(&filtered) {
+            if entry.is_some() {
+                sum = sum - graph.expr(Q_a[place * filtered.len() + column]) * e_a;
             }
         }
         sum.node()

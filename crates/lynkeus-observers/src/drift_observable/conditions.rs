@@ -1,5 +1,7 @@
 //! The form and its conditions: relative degrees, indices, Q and Q̄.
 
+use std::collections::HashMap;
+
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, Degree, Rows};
 use lynkeus_structure::{Check, Condition, Dimension, Extended, Region, sign, visibility};
@@ -126,7 +128,7 @@ fn blind(extended: &Extended<'_>, indices: &[usize]) -> Result<String, DesignErr
     let hidden: Vec<usize> = (0..n).filter(|&i| !seen[i]).collect();
     let found: usize = indices.iter().sum();
     let advice = match hidden.is_empty() {
-        true => "the inputs must move before the outputs show every state".to_owned(),
+        true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
         false => format!(
             "no measured output feels {}; measure more",
             names(extended, &hidden).join(", ")
@@ -221,9 +223,19 @@ fn regular(
         });
     }
     let det = output_map::determinant(graph, Q).unwrap_or_else(|| graph.constant(0.0).node());
-    let mut check = sign::keeps_sign(graph, name, det, region)?.check;
-    check.detail = format!("det = {}", check.detail);
-    Ok(check)
+    let found = sign::keeps_sign(graph, name, det, region)?;
+    let (low, high) = found.bounds;
+    let detail = match found.check.verdict {
+        Condition::Proved => format!("|det| lies in [{low:.4}, {high:.4}]"),
+        Condition::Refuted(_) => "det vanishes or changes its sign".to_owned(),
+        Condition::Undecided(_) => {
+            format!("|det| lies in [{low:.4}, {high:.4}] as far as can be proved")
+        }
+    };
+    Ok(Check {
+        detail,
+        ..found.check
+    })
 }
 
 /// What the observer needs of the input where r < n.
@@ -240,6 +252,29 @@ fn input_check(
             detail: "the input appears before the n-th derivative of the output and (3.1) takes no account of it: it converges for u_M ≤ β λ_min(P) only; variant = \"theoretical\" or \"practical\" does not need that".into(),
         });
     }
+    let name = "Q̄(x, U) is regular on the box for every U (uniformly observable)";
+    // a singular point for a constant input is the better witness
+    let graph = extended.graph();
+    let zero = graph.constant(0.0).node();
+    let slopes = U.iter().flat_map(|jet| jet.iter().skip(1));
+    let still: HashMap<Node, Node> = slopes.map(|&symbol| (symbol, zero)).collect();
+    let constant = |row: &Vec<Option<Node>>| {
+        let entry = |e: &Option<Node>| Some(graph.substitute(&[(*e)?], &still)[0]);
+        row.iter().map(entry).collect()
+    };
+    let at_rest: Rows = Q̄.iter().map(constant).collect();
+    let mut check = regular(extended, name, &at_rest, &extended.region())?;
+    if !matches!(check.verdict, Condition::Refuted(_)) && !still.is_empty() {
+        check = regular(extended, name, Q̄, &with_slopes(extended, U))?;
+    }
+    if check.verdict != Condition::Proved {
+        check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
+    }
+    Ok(check)
+}
+
+/// The box with u', u'', … free.
+fn with_slopes(extended: &Extended<'_>, U: &[Vec<Node>]) -> Region {
     let mut region = extended.region();
     for (input, jet) in extended.inputs.iter().zip(U) {
         let further = jet
@@ -255,12 +290,7 @@ fn input_check(
             });
         region.dimensions.extend(further);
     }
-    let name = "Q̄(x, U) is regular on the box for every U (uniformly observable)";
-    let mut check = regular(extended, name, Q̄, &region)?;
-    if check.verdict != Condition::Proved {
-        check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
-    }
-    Ok(check)
+    region
 }
 
 fn summary(
