@@ -51,6 +51,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod check;
+mod design;
 mod error;
 mod estimate;
 mod figure;
@@ -65,6 +66,7 @@ mod systems;
 pub mod table;
 
 pub use check::{Report, check};
+pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
 pub use figure::figure;

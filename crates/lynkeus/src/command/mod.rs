@@ -22,6 +22,7 @@ struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   lynkeus check study.toml
+  lynkeus design study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
 
@@ -34,6 +35,17 @@ enum Command {
         /// The study (TOML)
         study: PathBuf,
         /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// Gains, matrices and parameters of the observer
+    Design {
+        /// The study (TOML)
+        study: PathBuf,
+        /// Save the text (or the JSON) instead of printing it
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// One JSON object
         #[arg(long)]
         json: bool,
     },
@@ -96,6 +108,11 @@ pub fn main() -> ExitCode {
 fn execute(command: Command) -> Result<ExitCode, Error> {
     match command {
         Command::Check { study, json } => run::check(&Study::load(study)?, json),
+        Command::Design {
+            study,
+            output,
+            json,
+        } => run::design(&Study::load(study)?, output.as_deref(), json),
         Command::Simulate {
             study,
             output,

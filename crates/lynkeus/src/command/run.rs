@@ -21,6 +21,19 @@ pub(super) fn check(study: &Study, json: bool) -> Result<ExitCode, Error> {
     })
 }
 
+pub(super) fn design(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    let report = lynkeus::design(study)?;
+    let text = match json {
+        true => format!("{:#}\n", report.to_json()),
+        false => report.to_string(),
+    };
+    match file {
+        Some(path) => output::write(path, text.as_bytes())?,
+        None => print(&text)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 pub(super) fn simulate(
     study: &Study,
     output: &Output,

@@ -102,6 +102,22 @@ fn json_sums_up() {
     assert_eq!(json["visible"]["upper"], true);
 }
 
+/// r θ^{jδ} (S⁻¹Cᵀ)_j with the paper's S: the last gain of the first chain is
+/// 3.5⁷·0.0009.
+#[test]
+fn design_gives_the_gains_of_the_column() {
+    let folder = examples().join("column");
+    let json = run(&folder, &["design", "study.toml", "--json"]).json();
+    let gain = |state: &str, output: &str| json["gain"][state][output].as_f64().unwrap();
+    assert!((gain("x[1]", "top") - 3.5 * 0.7610).abs() < 2e-4);
+    assert!((gain("x[7]", "top") / 3.5f64.powi(7) - 0.0009).abs() < 5e-5);
+    assert!((gain("Zf", "bottom") / 3.5f64.powf(6.0 * 14.0 / 11.0) - 0.0029).abs() < 5e-5);
+    let text = run(&folder, &["design", "study.toml"]).out;
+    for words in ["gain of top on", "θ              3.5, 3.5", "x[8] → Zf"] {
+        assert!(text.contains(words), "no {words:?} in {text}");
+    }
+}
+
 #[test]
 fn check_explains_the_column() {
     let ended = run(&examples().join("column"), &["check", "study.toml"]);

@@ -1,0 +1,109 @@
+//! The gains, matrices and parameters of a study's observer.
+
+use std::fmt;
+
+use lynkeus_observers::{Design, Fit};
+use serde_json::{Map, Value, json};
+
+use crate::{Error, Study, prepare};
+
+/// The answer of `lynkeus design`.
+#[derive(Debug)]
+pub struct DesignReport {
+    /// name of the plant
+    pub plant: String,
+    /// the design
+    pub design: Design,
+}
+
+/// Designs the study's observer.
+///
+/// # Errors
+/// A study that does not fit its plant, or no family that does.
+pub fn design(study: &Study) -> Result<DesignReport, Error> {
+    let plant = prepare::plant(study)?;
+    let extended = prepare::extended(study, &plant)?;
+    let design = prepare::design(study, &extended)?;
+    Ok(DesignReport {
+        plant: plant.name.clone(),
+        design,
+    })
+}
+
+impl DesignReport {
+    /// The report for machines; `gain` is by state, then by measured output.
+    pub fn to_json(&self) -> Value {
+        let Design {
+            observer,
+            examination,
+            gains,
+            parameters,
+            notes,
+        } = &self.design;
+        let mut gain = Map::new();
+        for chain in gains {
+            for (state, k) in &chain.entries {
+                gain.insert(state.clone(), json!({ &chain.output: k }));
+            }
+        }
+        let parameters: Map<String, Value> = parameters
+            .iter()
+            .map(|(name, value)| (name.clone(), json!(value)))
+            .collect();
+        let starts: Map<String, Value> = observer
+            .states
+            .iter()
+            .map(|(signal, start)| (signal.name.clone(), json!(start)))
+            .collect();
+        json!({
+            "plant": self.plant,
+            "family": observer.family,
+            "fit": examination.fit.words(),
+            "chains": examination.chains,
+            "gain": gain,
+            "parameters": parameters,
+            "initial": starts,
+            "notes": notes,
+        })
+    }
+}
+
+impl fmt::Display for DesignReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Design {
+            observer,
+            examination,
+            gains,
+            parameters,
+            notes,
+        } = &self.design;
+        writeln!(
+            f,
+            "{}: {} observer, {} states",
+            self.plant,
+            observer.family,
+            observer.states.len()
+        )?;
+        writeln!(f, "  {}", examination.summary)?;
+        if examination.fit == Fit::Undecided {
+            writeln!(
+                f,
+                "  not every condition is decided on the box; `lynkeus check` shows them"
+            )?;
+        }
+        writeln!(f, "\nparameters")?;
+        for (name, value) in parameters {
+            writeln!(f, "  {name:<14} {value}")?;
+        }
+        for chain in gains {
+            writeln!(f, "\ngain of {} on", chain.output)?;
+            for (state, k) in &chain.entries {
+                writeln!(f, "  {state:<14} {k:.6e}")?;
+            }
+        }
+        for note in notes {
+            writeln!(f, "\nnote: {note}")?;
+        }
+        Ok(())
+    }
+}
