@@ -5,10 +5,13 @@ use nalgebra::DMatrix;
 
 use super::Factor;
 use crate::chains::names;
-use crate::{Check, Condition, Extended, Point, Region, Witness, sign};
+use crate::rank::subsets;
+use crate::{Check, Condition, Extended, Matrix, Point, Region, Witness, sign};
 
+/// Larger minors are not expanded.
+const MAX_COLUMNS: usize = 5;
 /// More minors than this are left undecided.
-const MAX_MINORS: usize = 400;
+const MAX_MINORS: usize = 250;
 
 impl Factor {
     /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
@@ -97,57 +100,19 @@ impl Factor {
     /// is wider than tall or the minors are too many.
     fn minors(&self, graph: &Graph) -> Option<Node> {
         let (rows, columns) = (self.rows.len(), self.columns.len());
-        let count = (0..columns).fold(1usize, |c, k| c.saturating_mul(rows.saturating_sub(k)));
-        if columns > rows || count > MAX_MINORS {
+        if columns > rows || columns > MAX_COLUMNS {
             return None;
         }
-        let mut dense = vec![vec![None; columns]; rows];
-        for &(i, j, node) in &self.entries {
-            dense[i][j] = Some(node);
-        }
-        let squares = subsets(rows, columns)
+        let entry = |i: usize, j: usize| {
+            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
+            found.map(|&(.., node)| node)
+        };
+        let matrix = Matrix::from_fn(graph, (rows, columns), entry);
+        let squares = subsets(rows, columns, MAX_MINORS)?
             .into_iter()
-            .filter_map(|rows| determinant(graph, &dense, &rows, 0))
+            .filter_map(|rows| matrix.select_rows(&rows).determinant())
             .map(|minor| graph.expr(minor).powi(2));
         let zero = || graph.constant(0.0);
         Some(squares.reduce(|a, b| a + b).unwrap_or_else(zero).node())
     }
-}
-
-/// Every increasing choice of `k` of `n` indices.
-fn subsets(n: usize, k: usize) -> Vec<Vec<usize>> {
-    let mut all: Vec<Vec<usize>> = vec![vec![]];
-    for _ in 0..k {
-        let extended = all.iter().flat_map(|chosen| {
-            let from = chosen.last().map_or(0, |last| last + 1);
-            (from..n).map(move |next| [&chosen[..], &[next]].concat())
-        });
-        all = extended.collect();
-    }
-    all
-}
-
-/// The determinant of the given rows and the columns from `column` on, along the
-/// first of these; none where it is zero everywhere.
-fn determinant(
-    graph: &Graph,
-    dense: &[Vec<Option<Node>>],
-    rows: &[usize],
-    column: usize,
-) -> Option<Node> {
-    if rows.is_empty() {
-        return Some(graph.constant(1.0).node());
-    }
-    let term = |place: usize| {
-        let entry = graph.expr(dense[rows[place]][column]?);
-        let rest = [&rows[..place], &rows[place + 1..]].concat();
-        let minor = entry * graph.expr(determinant(graph, dense, &rest, column + 1)?);
-        Some(if place.is_multiple_of(2) {
-            minor
-        } else {
-            -minor
-        })
-    };
-    let sum = (0..rows.len()).filter_map(term).reduce(|a, b| a + b)?;
-    Some(sum.node())
 }
