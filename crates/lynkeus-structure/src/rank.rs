@@ -124,7 +124,7 @@ fn copies(
     region: &mut Region,
 ) -> std::collections::HashMap<Node, Node> {
     let copy = |side: &Dimension| {
-        let name = format!("{} between, row {}", side.name, row + 1);
+        let name = format!("[{} in row {}]", side.name, row + 1);
         let symbol = graph.symbol(&name).node();
         Dimension {
             name,
