@@ -19,8 +19,9 @@ use crate::{Extended, Vanishing, vanishes};
 /// Points at which the rank of the rows is tried.
 const POINTS: usize = 5;
 /// A row of unit length that keeps less than this beside the rows before it
-/// depends on them.
-const RANK_TOLERANCE: f64 = 1e-8;
+/// depends on them. Long chains lose about a digit per row without being
+/// singular, rounding leaves 1e-15.
+const RANK_TOLERANCE: f64 = 1e-12;
 
 /// A matrix row by row; none where an entry is zero everywhere.
 pub type Rows = Vec<Vec<Option<Node>>>;
