@@ -39,7 +39,7 @@ impl Family for BlockTriangular {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["theta", "k", "correction", "chains"]
+        &["theta", "k", "k_poles", "correction", "chains"]
     }
 
     fn examine(
@@ -69,7 +69,7 @@ fn form(
     extended: &Extended<'_>,
     tuning: &Tuning,
 ) -> Result<Result<(Blocks, Examination), Examination>, DesignError> {
-    let lengths = poles(tuning)?.map(|k| k.iter().map(Vec::len).collect());
+    let lengths = given(tuning)?.map(|k| k.iter().map(Vec::len).collect());
     let request = chain_request(extended, tuning, "k", lengths)?;
     let mut refused = None;
     let arrangements = match blocks::find(extended, &request) {
@@ -124,12 +124,43 @@ fn examined(extended: &Extended<'_>, blocks: &Blocks) -> Result<Examination, Des
     })
 }
 
-/// K_i as the study gives them, in the order of the measured outputs.
-fn poles(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
-    let Some(value) = tuning.values.get("k") else {
+/// K_i as the study gives them, or from the eigenvalues of A − KC, in the order
+/// of the measured outputs.
+fn given(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+    match (number_lists(tuning, "k")?, number_lists(tuning, "k_poles")?) {
+        (Some(_), Some(_)) => {
+            let expected = "k or k_poles, which both decide K";
+            Err(TuningError::new("k_poles", expected, "both"))
+        }
+        (k, None) => Ok(k),
+        (None, Some(poles)) => {
+            if let Some(pole) = poles.iter().flatten().find(|pole| **pole >= 0.0) {
+                return Err(TuningError::new("k_poles", "negative numbers", pole));
+            }
+            Ok(Some(poles.iter().map(|poles| placed(poles)).collect()))
+        }
+    }
+}
+
+/// K with the eigenvalues of A − KC at the poles: the coefficients of Π(s − pole).
+fn placed(poles: &[f64]) -> Vec<f64> {
+    let mut coefficients = vec![1.0];
+    for pole in poles {
+        let shifted = coefficients.iter().map(|c| -pole * c);
+        let mut next: Vec<f64> = coefficients.iter().copied().chain([0.0]).collect();
+        for (sum, term) in next[1..].iter_mut().zip(shifted) {
+            *sum += term;
+        }
+        coefficients = next;
+    }
+    coefficients.split_off(1)
+}
+
+fn number_lists(tuning: &Tuning, key: &str) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+    let Some(value) = tuning.values.get(key) else {
         return Ok(None);
     };
-    let wrong = || TuningError::new("k", "a list of lists of numbers, one per chain", value);
+    let wrong = || TuningError::new(key, "a list of lists of numbers, one per chain", value);
     let Value::List(rows) = value else {
         return Err(wrong());
     };
@@ -142,17 +173,6 @@ fn poles(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
         _ => Err(wrong()),
     };
     rows.iter().map(row).collect::<Result<_, _>>().map(Some)
-}
-
-/// K with every eigenvalue of A − KC at −1: the coefficients of (s+1)ⁿ.
-fn binomial(n: usize) -> Vec<f64> {
-    let next = |k: &f64, j: usize| k * (n - j) as f64 / (j + 1) as f64;
-    (0..n)
-        .scan(1.0, |k, j| {
-            *k = next(k, j);
-            Some(*k)
-        })
-        .collect()
 }
 
 /// Observer (7) or (3).
@@ -169,7 +189,10 @@ fn assemble(
     let θ = tuning
         .positive_per_chain("theta", count)?
         .ok_or_else(missing)?;
-    let K = poles(tuning)?.unwrap_or_else(|| blocks.lengths().into_iter().map(binomial).collect());
+    let K = given(tuning)?.unwrap_or_else(|| {
+        let all_at_one = |n: usize| placed(&vec![-1.0; n]);
+        blocks.lengths().into_iter().map(all_at_one).collect()
+    });
     let classical = tuning
         .choice("correction", &["lee", "classical"])?
         .as_deref()

@@ -184,6 +184,32 @@ fn conditions(f: &mut fmt::Formatter<'_>, examination: &Examination) -> fmt::Res
 }
 
 impl Report {
+    /// Why the family is recommended.
+    fn reason(&self) -> String {
+        let chosen = self
+            .examinations
+            .iter()
+            .find(|e| Some(e.family) == self.recommended);
+        let others = self
+            .examinations
+            .iter()
+            .filter(|e| e.fit == Fit::Fits)
+            .count()
+            > 1;
+        match chosen.map(|e| (e.family, e.fit)) {
+            Some((family, Fit::Fits)) if others => {
+                format!("{family} comes first: of the families that fit, it has the simplest gain")
+            }
+            Some((family, Fit::Fits)) => {
+                format!("{family} is the one whose every condition is proved")
+            }
+            Some((family, _)) => format!(
+                "{family} is not proved to fit, but nothing refutes it; watch its monitors, or tighten min and max"
+            ),
+            None => String::new(),
+        }
+    }
+
     fn conclusion(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let named = |seen: bool| -> Vec<&str> {
             self.visible
@@ -196,7 +222,8 @@ impl Report {
         match self.recommended {
             Some(family) => {
                 let all: Vec<&str> = self.visible.iter().map(|(name, _)| name.as_str()).collect();
-                writeln!(f, "can be estimated: {} (by {family})", all.join(", "))
+                writeln!(f, "can be estimated: {} (by {family})", all.join(", "))?;
+                writeln!(f, "{}", self.reason())
             }
             None => {
                 writeln!(f, "no observer of this version fits these sensors")?;

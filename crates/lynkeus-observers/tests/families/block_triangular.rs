@@ -137,3 +137,27 @@ fn an_equation_with_two_new_states_is_named() {
         examination.summary
     );
 }
+
+/// Poles −1, −1 are the paper's K = (2, 1); k and poles together are refused.
+#[test]
+fn poles_decide_k() {
+    let plant = plant(EXAMPLE);
+    let list = |x: [f64; 2]| Value::List(x.map(Value::Number).to_vec());
+    let mut placed = tuning("lee");
+    placed.values.remove("k");
+    placed
+        .values
+        .insert("k_poles".into(), Value::List(vec![list([-1.0, -1.0]); 2]));
+    let gains =
+        |tuning: &Tuning| design_with(&BlockTriangular, &plant, &[], tuning).map(|d| d.gains);
+    assert_eq!(gains(&placed).unwrap(), gains(&tuning("lee")).unwrap());
+    placed
+        .values
+        .insert("k".into(), Value::List(vec![list([2.0, 1.0]); 2]));
+    assert!(
+        gains(&placed)
+            .unwrap_err()
+            .to_string()
+            .starts_with("k_poles: ")
+    );
+}

@@ -1,6 +1,7 @@
 //! The command as a user types it.
 #![allow(clippy::unwrap_used)]
 
+mod families;
 mod messages;
 mod references;
 mod runs;
@@ -14,10 +15,14 @@ struct Folder {
 }
 
 impl Folder {
-    fn new() -> Self {
-        let folder = Self {
+    fn empty() -> Self {
+        Self {
             path: tempfile::tempdir().unwrap(),
-        };
+        }
+    }
+
+    fn new() -> Self {
+        let folder = Self::empty();
         for file in ["two_tanks.mo", "study.toml", "log.csv"] {
             let text = std::fs::read_to_string(examples().join("two-tanks").join(file)).unwrap();
             folder.write(file, &text);

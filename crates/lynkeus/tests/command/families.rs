@@ -1,0 +1,325 @@
+//! The five papers' examples through the command: from a `.mo` and a `.toml`.
+
+use crate::{Folder, csv, examples, run, shared};
+
+/// (study, reference)
+const REFERENCES: [(&str, &str); 6] = [
+    ("lee/study.toml", "lee_observer7.csv"),
+    ("lee/classical.toml", "lee_observer3.csv"),
+    ("ltaief/study.toml", "ltaief_theta10.csv"),
+    ("farza/study.toml", "farza_a1.csv"),
+    ("germani-manes/theoretical.toml", "germani_theoretical.csv"),
+    (
+        "germani-manes/practical.toml",
+        "germani_practical_xa_true_start.csv",
+    ),
+];
+
+/// A study with its plant, alone in a folder.
+fn copied(study: &str) -> (Folder, String) {
+    let folder = Folder::empty();
+    let source = examples().join(study);
+    for entry in std::fs::read_dir(source.parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "mo" || e == "toml") {
+            let name = path.file_name().unwrap().to_str().unwrap();
+            folder.write(name, &std::fs::read_to_string(&path).unwrap());
+        }
+    }
+    (
+        folder,
+        source.file_name().unwrap().to_str().unwrap().to_owned(),
+    )
+}
+
+/// Every state and estimate, every row, to 1e-6 relative (where a curve passes
+/// through zero, relative to a thousandth of its largest value). What the
+/// reference has beside them (S, filter states) is not a column of ours.
+#[test]
+fn every_reference_is_reproduced() {
+    for (study, reference) in REFERENCES {
+        let Some(path) = shared(&format!("reference/{reference}")) else {
+            return;
+        };
+        let (names, expected) = csv(&std::fs::read_to_string(path).unwrap());
+        let (folder, file) = copied(study);
+        if reference.contains("true_start") {
+            folder.change(
+                &file,
+                "filter_initial = [5, 0]",
+                "filter_initial = [5, 12.566370614359172]",
+            );
+        }
+        let ended = folder.run(&["simulate", &file]);
+        assert_eq!(ended.code, 0, "{study}: {}", ended.err);
+        let (header, rows) = csv(&ended.out);
+        let compared: Vec<(usize, usize)> = names
+            .iter()
+            .enumerate()
+            .filter_map(|(i, name)| Some((i, header.iter().position(|n| n == name)?)))
+            .collect();
+        assert!(compared.len() >= 7, "{study}: {header:?}");
+        for (i, j) in compared {
+            let largest = expected.iter().map(|row| row[i].abs()).fold(0.0, f64::max);
+            for row in &expected {
+                let found = rows.iter().find(|r| (r[0] - row[0]).abs() < 1e-9).unwrap()[j];
+                let scale = row[i].abs().max(1e-3 * largest);
+                let wrong = (found - row[i]).abs();
+                assert!(
+                    wrong <= 1e-6 * scale,
+                    "{study}: {} at t = {}: {found} against {}",
+                    names[i],
+                    row[0],
+                    row[i]
+                );
+            }
+        }
+    }
+}
+
+/// The observer of Germani and Manes from x̂_a(0) = (5, 0) grazes det Q̄ = 0 and
+/// gets through, by both methods, with its flag raised.
+#[test]
+fn the_practical_observer_passes_its_singularity() {
+    let (folder, file) = copied("germani-manes/practical.toml");
+    let by_error_control = folder.run(&["simulate", &file, "--json", "-o", "a.csv"]);
+    folder.change(
+        &file,
+        "[simulate]",
+        "[simulate]\nmethod = \"rk4\"\nstep = 5e-3",
+    );
+    let by_fixed_steps = folder.run(&["simulate", &file, "--json", "-o", "b.csv"]);
+    for (ended, csv_file) in [(by_error_control, "a.csv"), (by_fixed_steps, "b.csv")] {
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let alarm = ended.json()["monitors"]["rcond"]["alarm_at"]
+            .as_f64()
+            .unwrap();
+        assert!((0.0..0.4).contains(&alarm), "flag at {alarm}");
+        assert!(ended.err.contains("rcond fell below"), "{}", ended.err);
+        let (header, rows) = csv(&folder.read(csv_file));
+        let column = |name: &str| header.iter().position(|n| n == name).unwrap();
+        let error = |row: &[f64]| {
+            let pairs =
+                ["x1", "x2", "x3"].map(|x| (row[column(x)], row[column(&format!("{x}_hat"))]));
+            pairs
+                .iter()
+                .map(|(x, hat)| (hat - x).abs())
+                .fold(0.0, f64::max)
+        };
+        assert!(rows.iter().all(|row| error(row) < 5.0), "bounded");
+        assert!(
+            error(rows.last().unwrap()) < 0.2,
+            "{}",
+            error(rows.last().unwrap())
+        );
+    }
+}
+
+/// Renames whole words.
+fn renamed(text: &str, pairs: &[(&str, &str)]) -> String {
+    let mut out = String::new();
+    let mut word = String::new();
+    for c in text.chars().chain(['\0']) {
+        if c.is_alphanumeric() || c == '_' {
+            word.push(c);
+            continue;
+        }
+        let new = pairs
+            .iter()
+            .find(|(old, _)| *old == word)
+            .map(|(_, new)| *new);
+        out.push_str(new.unwrap_or(&word));
+        word.clear();
+        if c != '\0' {
+            out.push(c);
+        }
+    }
+    out
+}
+
+/// The lines that declare states in reverse order.
+fn reversed(text: &str, states: &[&str]) -> String {
+    let declares = |line: &str| {
+        let rest = line.trim_start().strip_prefix("Real ").unwrap_or("");
+        states.iter().any(|s| {
+            rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+                .next()
+                == Some(s)
+        })
+    };
+    let mut declared: Vec<&str> = text.lines().filter(|l| declares(l)).collect();
+    let lines: Vec<&str> = text
+        .lines()
+        .map(|line| {
+            if declares(line) {
+                declared.pop().unwrap()
+            } else {
+                line
+            }
+        })
+        .collect();
+    lines.join("\n")
+}
+
+#[test]
+fn other_names_and_another_order_change_nothing() {
+    let new = ["kappa", "alpha", "omega", "beta", "zeta"];
+    for (study, n) in [
+        ("lee/study.toml", 4),
+        ("ltaief/study.toml", 3),
+        ("farza/study.toml", 5),
+        ("germani-manes/theoretical.toml", 3),
+    ] {
+        let old: Vec<String> = (1..=n).map(|i| format!("x{i}")).collect();
+        let pairs: Vec<(&str, &str)> = old.iter().map(String::as_str).zip(new).collect();
+        let (folder, file) = copied(study);
+        let model = examples().join(study).with_file_name(format!(
+            "{}.mo",
+            study.split('/').next().unwrap().replace('-', "_")
+        ));
+        let model = model.file_name().unwrap().to_str().unwrap().to_owned();
+        let run = || {
+            let json = folder.run(&["simulate", &file, "--json", "-o", "run.csv"]);
+            assert_eq!(json.code, 0, "{study}: {}", json.err);
+            (json.json()["family"].clone(), csv(&folder.read("run.csv")))
+        };
+        let (family, (header, rows)) = run();
+        let text = renamed(&folder.read(&model), &pairs);
+        let shuffled = reversed(&text, &new);
+        assert_ne!(text, shuffled, "{study}: the states were not reordered");
+        folder.write(&model, &shuffled);
+        folder.write(&file, &renamed(&folder.read(&file), &pairs));
+        let (same_family, (new_header, new_rows)) = run();
+        assert_eq!(family, same_family, "{study}");
+        for (old, new) in &pairs {
+            let place = |header: &[String], name: &str| {
+                header
+                    .iter()
+                    .position(|n| *n == format!("{name}_hat"))
+                    .unwrap()
+            };
+            let (i, j) = (place(&header, old), place(&new_header, new));
+            let largest = rows.iter().map(|r| r[i].abs()).fold(0.0, f64::max);
+            for (row, other) in rows.iter().zip(&new_rows) {
+                assert!(
+                    (row[i] - other[j]).abs() <= 1e-9 * largest,
+                    "{study}: {old} at t = {}",
+                    row[0]
+                );
+            }
+        }
+    }
+}
+
+/// Without any key of [observer] the tool finds a family that works, and says
+/// why within a screen.
+#[test]
+fn the_family_is_chosen_automatically() {
+    let expected = [
+        ("column/study.toml", "triangular"),
+        ("lee/study.toml", "triangular"),
+        ("ltaief/study.toml", "state-affine"),
+        ("farza/study.toml", "unknown-input"),
+        ("germani-manes/practical.toml", "drift-observable"),
+    ];
+    for (study, family) in expected {
+        let (folder, file) = copied(study);
+        let text = folder.read(&file);
+        let (before, rest) = text.split_once("[observer]").unwrap();
+        let (_, after) = rest.split_once("\n[").unwrap();
+        folder.write(&file, &format!("{before}[{after}"));
+        let json = folder.run(&["check", &file, "--json"]).json();
+        assert_eq!(json["recommended"], family, "{study}");
+        let ended = folder.run(&["check", &file]);
+        assert_eq!(ended.code, 0, "{study}");
+        assert!(ended.out.lines().count() <= 50, "{study}: {}", ended.out);
+    }
+}
+
+/// One wrong key per family: the key, what was expected, what was found.
+#[test]
+fn wrong_keys_of_each_family_are_named() {
+    let cases = [
+        (
+            "column/study.toml",
+            "theta = 3.5",
+            "theta = [1, 2, 3]",
+            ["`theta`", "one per measured output (2)"],
+        ),
+        (
+            "lee/study.toml",
+            "k = [[2, 1], [2, 1]]",
+            "k = [[2, 1, 1], [2, 1]]",
+            ["(x1 → x2)", "the equations allow"],
+        ),
+        (
+            "lee/study.toml",
+            "theta = [3, 9]",
+            "theta = [3, -9]",
+            ["`theta`", "positive"],
+        ),
+        (
+            "ltaief/study.toml",
+            "theta = 10",
+            "theta = 0",
+            ["`theta`", "found 0"],
+        ),
+        (
+            "farza/study.toml",
+            "[simulate]",
+            "[sensors.extra]\n[simulate]",
+            ["extra", "unknown key"],
+        ),
+        (
+            "germani-manes/practical.toml",
+            "poles = [-4, -4.8, -5.76]",
+            "poles = [-4, -4.8]",
+            ["`poles`", "found"],
+        ),
+    ];
+    for (study, from, to, words) in cases {
+        let (folder, file) = copied(study);
+        folder.change(&file, from, to);
+        let ended = folder.run(&["simulate", &file]);
+        assert!(ended.code == 1 || ended.code == 2, "{study}: {}", ended.err);
+        for word in words {
+            assert!(
+                ended.err.contains(word),
+                "{study}: no {word:?} in {}",
+                ended.err
+            );
+        }
+    }
+}
+
+/// A log holds no derivatives of the inputs.
+#[test]
+fn a_log_without_input_derivatives_gets_the_remedy() {
+    let (folder, file) = copied("germani-manes/theoretical.toml");
+    folder.write("log.csv", "t,y,u\n0,1,5\n1,1,5\n");
+    let ended = folder.run(&["estimate", &file, "log.csv"]);
+    assert_eq!(ended.code, 2);
+    assert!(
+        ended.err.contains("variant = \"practical\""),
+        "{}",
+        ended.err
+    );
+}
+
+/// The gallery's plants are simulated by the command as they ship.
+#[test]
+fn every_shipped_study_runs() {
+    for folder in std::fs::read_dir(examples()).unwrap() {
+        let folder = folder.unwrap().path();
+        if !folder.is_dir() {
+            continue;
+        }
+        for file in std::fs::read_dir(&folder).unwrap() {
+            let name = file.unwrap().file_name().to_str().unwrap().to_owned();
+            if name.ends_with(".toml") {
+                let ended = run(&folder, &["simulate", &name, "--json"]);
+                assert_eq!(ended.code, 0, "{}/{name}: {}", folder.display(), ended.err);
+            }
+        }
+    }
+}
