@@ -1,0 +1,32 @@
+model InductionMotor "Two-phase model of an induction motor in the fixed frame"
+  parameter Real Rs(unit = "Ohm") = 8 "Resistance of the stator";
+  parameter Real Rr(unit = "Ohm") = 4 "Resistance of the rotor";
+  parameter Real Ls(unit = "H") = 0.47 "Inductance of the stator";
+  parameter Real Lr(unit = "H") = 0.47 "Inductance of the rotor";
+  parameter Real M(unit = "H") = 0.44 "Mutual inductance";
+  parameter Real p = 2 "Pole pairs";
+  parameter Real J(unit = "kg.m2") = 0.01 "Inertia of rotor and load";
+  parameter Real b(unit = "N.m.s") = 0.01 "Friction";
+  parameter Real sigma = 1 - M^2/(Ls*Lr) "Leakage";
+  parameter Real a(unit = "1/s") = Rr/Lr "Inverse of the rotor's time constant";
+  parameter Real K(unit = "1/H") = M/(sigma*Ls*Lr);
+  parameter Real g(unit = "1/s") = Rs/(sigma*Ls) + Rr*M^2/(sigma*Ls*Lr^2);
+  input Real ua(unit = "V", min = -320, max = 320) "Voltage of phase a";
+  input Real ub(unit = "V", min = -320, max = 320) "Voltage of phase b";
+  input Real load(unit = "N.m", min = 0, max = 10) "Torque of the load";
+  Real ia(start = 0, unit = "A", min = -40, max = 40) "Current of phase a";
+  Real ib(start = 0, unit = "A", min = -40, max = 40) "Current of phase b";
+  Real w(start = 0, unit = "rad/s", min = -50, max = 200) "Speed";
+  Real fa(start = 0, unit = "Wb", min = -2, max = 2) "Flux of the rotor, phase a";
+  Real fb(start = 0, unit = "Wb", min = -2, max = 2) "Flux of the rotor, phase b";
+  output Real current_a(unit = "A") = ia;
+  output Real current_b(unit = "A") = ib;
+  output Real speed(unit = "rad/s") = w;
+equation
+  der(ia) = K*(a*fa + p*w*fb) - g*ia + ua/(sigma*Ls);
+  der(ib) = K*(a*fb - p*w*fa) - g*ib + ub/(sigma*Ls);
+  der(w) = p*M/(J*Lr)*(fa*ib - fb*ia) - (b*w + load)/J;
+  der(fa) = a*(M*ia - fa) - p*w*fb;
+  der(fb) = a*(M*ib - fb) + p*w*fa;
+  annotation(experiment(StopTime = 1));
+end InductionMotor;
