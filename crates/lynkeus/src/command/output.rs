@@ -5,10 +5,19 @@ use std::path::Path;
 
 use lynkeus::{Error, table};
 
-/// Writes a file through a temporary one beside it.
+/// Writes a file through a temporary one beside it, so that it is whole or absent.
+/// A link is followed; a device or a pipe is written to, never replaced.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let failed = |e: io::Error| Error::input(format!("cannot write {}: {e}", path.display()));
-    let folder = match path.parent() {
+    let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if std::fs::metadata(&place).is_ok_and(|data| !data.is_file()) {
+        let mut device = std::fs::OpenOptions::new()
+            .write(true)
+            .open(&place)
+            .map_err(failed)?;
+        return device.write_all(bytes).map_err(failed);
+    }
+    let folder = match place.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
@@ -18,7 +27,7 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         .map_err(failed)?;
     file.write_all(bytes).map_err(failed)?;
     readable(file.as_file()).map_err(failed)?;
-    file.persist(path).map_err(|e| failed(e.error))?;
+    file.persist(&place).map_err(|e| failed(e.error))?;
     Ok(())
 }
 

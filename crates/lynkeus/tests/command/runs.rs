@@ -142,3 +142,34 @@ fn other_headers_are_mapped_by_the_study() {
     let ended = folder.run(&["estimate", "study.toml", "log.csv", "-o", "e.csv"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
 }
+
+/// A pipe given as output is written to and stays one; a link stays a link.
+#[cfg(unix)]
+#[test]
+fn what_is_no_ordinary_file_is_never_replaced() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = Folder::new();
+    let pipe = folder.path.path().join("pipe.csv");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read_to_string(pipe).unwrap()
+    });
+    let ended = folder.run(&["estimate", "study.toml", "log.csv", "-o", "pipe.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(reader.join().unwrap().starts_with("t,upper_hat"));
+    assert!(
+        std::fs::symlink_metadata(&pipe)
+            .unwrap()
+            .file_type()
+            .is_fifo()
+    );
+
+    folder.write("real.csv", "");
+    let link = folder.path.path().join("link.csv");
+    std::os::unix::fs::symlink("real.csv", &link).unwrap();
+    let ended = folder.run(&["estimate", "study.toml", "log.csv", "-o", "link.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(link.is_symlink() && folder.read("real.csv").starts_with("t,upper_hat"));
+}
