@@ -41,19 +41,24 @@ fn links_between_files_lead_somewhere() {
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
 }
 
-/// Every Markdown file of the root and of `docs`, relative to the root.
+/// Every Markdown file of the root, of `docs` and of the examples, relative to the root.
 fn pages() -> Vec<PathBuf> {
-    ["", "docs"]
-        .iter()
-        .flat_map(|folder| {
-            let entries = fs::read_dir(root().join(folder)).expect("a folder");
-            let names = entries.flatten().map(|entry| entry.file_name());
-            names
-                .map(|name| Path::new(folder).join(name))
-                .collect::<Vec<_>>()
-        })
+    let examples = names_in(Path::new("examples"));
+    [PathBuf::new(), "docs".into(), "examples".into()]
+        .into_iter()
+        .chain(examples.filter(|path| root().join(path).is_dir()))
+        .flat_map(|folder| names_in(&folder))
         .filter(|path| path.extension().is_some_and(|extension| extension == "md"))
         .collect()
+}
+
+/// The entries of a folder, relative to the root.
+fn names_in(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    let entries = fs::read_dir(root().join(folder)).expect("a folder");
+    let folder = folder.to_path_buf();
+    entries
+        .flatten()
+        .map(move |entry| folder.join(entry.file_name()))
 }
 
 /// The targets of `[text](target)` that are files, without their anchors.
