@@ -242,7 +242,7 @@ mod tests {
     }
 
     /// The S printed in the paper satisfies (17) for no ρ: the largest eigenvalue
-    /// of P tends to a positive limit as ρ grows (NOTES (d): +8.7).
+    /// of P tends to a positive limit as ρ grows, about 8.7.
     #[test]
     fn the_printed_matrix_fails_its_own_lemma() {
         let s = Tridiagonal::new(

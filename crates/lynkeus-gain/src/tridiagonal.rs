@@ -114,7 +114,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// The two matrices printed in the paper, and the gains that belong to them
-    /// (the second printed gain repeats the first: NOTES (c)).
+    /// (the second printed gain repeats the first six of the first).
     #[test]
     fn gains_of_the_column() {
         let diagonal = [1.5, 2.0, 4.0, 8.0, 10.5, 15.5, 17.5];

@@ -8,8 +8,8 @@
 //! x̂' = F(u, x̂) x̂ + φ(u, x̂) − θ Δ_θ⁻¹ S⁻¹ Cᵀ(u) (C(u) x̂ − y),
 //! S' = −θ (S + Fᵀ(u, x̂) S + S F(u, x̂) − Cᵀ(u) C(u)).
 //!
-//! S is integrated in factors ([`lyapunov`]), its smallest eigenvalue watched
-//! ([`excitation`]).
+//! S is integrated in factors (`lyapunov`), its smallest eigenvalue watched
+//! (`excitation`).
 //!
 //! Corrections to the print: B has the sign of (29), + in the last block; the
 //! inputs of Theorem 1's remark satisfy A4, not A3; the error decays like
