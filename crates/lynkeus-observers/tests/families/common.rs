@@ -66,7 +66,11 @@ pub fn assert_close(found: &[f64], expected: &[f64]) {
 pub fn reference(name: &str) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
     let shared = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/reference/");
     let Ok(text) = std::fs::read_to_string(format!("{shared}{name}")) else {
-        eprintln!("skipped: {shared}{name} is not at hand");
+        // past the capture of passing tests, so that a skip is seen
+        let _ = std::io::Write::write_fmt(
+            &mut std::io::stderr(),
+            format_args!("skipped: {shared}{name} is not at hand\n"),
+        );
         return None;
     };
     let mut lines = text.lines();
