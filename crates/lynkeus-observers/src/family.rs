@@ -4,7 +4,7 @@ use lynkeus_expr::MissingInput;
 use lynkeus_structure::{Check, Condition, Extended};
 
 use crate::{
-    Observer, Tuning, TuningError, block_triangular::BlockTriangular,
+    Assumptions, Certificate, Observer, Tuning, TuningError, block_triangular::BlockTriangular,
     drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
     unknown_input::UnknownInput,
 };
@@ -46,6 +46,25 @@ pub trait Family: Sync {
     /// [`DesignError::Refused`] where the family does not fit; tuning keys that
     /// cannot be used.
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError>;
+    /// What the paper's theorem guarantees for this plant and tuning: its
+    /// hypotheses with verdicts, its constants (θ0 among them), and where all hold
+    /// the rate and the ultimate bound.
+    ///
+    /// # Errors
+    /// As [`Family::design`].
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        let examination = self.examine(extended, tuning)?;
+        Ok(Certificate::new(
+            self.paper(),
+            &assumptions.region,
+            examination.checks,
+        ))
+    }
 }
 
 /// Whether a family fits a plant.

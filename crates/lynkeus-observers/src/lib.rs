@@ -11,6 +11,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod block_triangular;
+mod certificate;
 mod conditions;
 pub mod drift_observable;
 mod estimate;
@@ -21,6 +22,7 @@ pub mod triangular;
 mod tuning;
 pub mod unknown_input;
 
+pub use certificate::{Assumptions, Certificate, Constant, Verdict};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
 pub use tuning::{Initial, Tuning, TuningError, Value};

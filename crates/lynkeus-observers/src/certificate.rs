@@ -1,0 +1,121 @@
+//! What can be guaranteed about an observer, and why.
+
+use lynkeus_structure::{Check, Condition, Region};
+
+use crate::Fit;
+
+/// What a guarantee may take for granted beside the plant's equations.
+#[derive(Clone, Debug)]
+pub struct Assumptions {
+    /// the box in which plant and estimate stay: extended states, known inputs, time
+    pub region: Region,
+    /// per extended state: a bound of |x' − f(x, u)|, that is of what acts on the
+    /// plant and the observer does not know (disturbances; v' of an unknown input)
+    pub drift: Vec<f64>,
+    /// per measured output: a bound of the measurement error, in the output's unit
+    pub noise: Vec<f64>,
+}
+
+/// The verdict on a guarantee.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// the error decays at the stated rate, for everything in the box
+    Proved,
+    /// a point of the box shows that it does not
+    Refuted,
+    /// neither
+    Undecided,
+}
+
+impl Verdict {
+    /// One word: `proved`, `refuted` or `undecided`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Proved => "proved",
+            Verdict::Refuted => "refuted",
+            Verdict::Undecided => "undecided",
+        }
+    }
+
+    /// Refuted if a hypothesis is, undecided if one is, else proved.
+    pub fn of(hypotheses: &[Check]) -> Self {
+        match crate::conditions::fit(hypotheses) {
+            Fit::Fits => Verdict::Proved,
+            Fit::Undecided => Verdict::Undecided,
+            Fit::DoesNotFit => Verdict::Refuted,
+        }
+    }
+}
+
+/// A number that a proof rests on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    /// its letter in the paper, e.g. `θ0`
+    pub name: String,
+    /// its value
+    pub value: f64,
+    /// what it is, in a few words
+    pub meaning: String,
+}
+
+impl Constant {
+    /// The constant `name` = `value`.
+    pub fn new(name: &str, value: f64, meaning: impl Into<String>) -> Self {
+        Self {
+            name: name.to_owned(),
+            value,
+            meaning: meaning.into(),
+        }
+    }
+}
+
+/// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
+/// while plant and estimate stay in the box.
+#[derive(Clone, Debug)]
+pub struct Certificate {
+    /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
+    /// `linear matrix inequality`
+    pub basis: String,
+    /// the verdict
+    pub verdict: Verdict,
+    /// guaranteed decay rate, 1/time unit; only where proved
+    pub rate: Option<f64>,
+    /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
+    /// assumed drift and noise; only where proved
+    pub ultimate_bound: Option<f64>,
+    /// the same per extended state: (name, bound); empty where not known
+    pub ultimate: Vec<(String, f64)>,
+    /// the box: (name, smallest, largest)
+    pub region: Vec<(String, f64, f64)>,
+    /// what has to hold, with verdicts and witnesses
+    pub hypotheses: Vec<Check>,
+    /// the numbers of the proof
+    pub constants: Vec<Constant>,
+    /// what the reader should know, in words
+    pub notes: Vec<String>,
+}
+
+impl Certificate {
+    /// A certificate without rate, bounds, constants and notes; its verdict is
+    /// that of the hypotheses.
+    pub fn new(basis: impl Into<String>, region: &Region, hypotheses: Vec<Check>) -> Self {
+        let sides = region.dimensions.iter().filter(|d| d.name != "time");
+        Self {
+            basis: basis.into(),
+            verdict: Verdict::of(&hypotheses),
+            rate: None,
+            ultimate_bound: None,
+            ultimate: vec![],
+            region: sides.map(|d| (d.name.clone(), d.min, d.max)).collect(),
+            hypotheses,
+            constants: vec![],
+            notes: vec![],
+        }
+    }
+
+    /// The first hypothesis that is not proved.
+    pub fn weakest(&self) -> Option<&Check> {
+        let open = |check: &&Check| check.verdict != Condition::Proved;
+        self.hypotheses.iter().find(open)
+    }
+}
