@@ -1,0 +1,169 @@
+//! The constant gain: Δ_θ, S by Lemma 1 or given, r, and the window of Theorem 2.
+
+use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
+
+use super::form::{Form, Partial};
+use crate::{Tuning, TuningError};
+
+/// The numbers of the gain.
+pub(super) struct Gains {
+    pub θ: Vec<f64>,
+    pub δ: Vec<f64>,
+    pub r: Vec<f64>,
+    pub S: Vec<Tridiagonal>,
+    pub divided: bool,
+    pub notes: Vec<String>,
+}
+
+impl Gains {
+    pub fn new(form: &Form, tuning: &Tuning) -> Result<Self, TuningError> {
+        let count = form.assignment.chains.len();
+        let missing = || {
+            TuningError::new(
+                "theta",
+                "a positive number (the gain grows like theta^n)",
+                "nothing",
+            )
+        };
+        let θ = tuning
+            .positive_per_chain("theta", count)?
+            .ok_or_else(missing)?;
+        let divided = tuning.flag("partials")?;
+        tuning.choice("gain", &["lemma1"])?;
+        let (S, ρ) = match explicit(tuning)? {
+            Some(S) => (S, None),
+            None => lemma1_matrices(form, divided)?,
+        };
+        let r = match tuning.positive_per_chain("r", count)? {
+            Some(r) => r,
+            // (9) with r = ρ/2; an explicit S comes without its ρ: the example's r = 1
+            None => vec![ρ.map_or(1.0, |ρ| ρ / 2.0); count],
+        };
+        let mut gains = Self {
+            θ,
+            δ: exponents(form, tuning)?,
+            r,
+            S,
+            divided,
+            notes: vec![],
+        };
+        gains.notes.extend(window(form, &gains.δ));
+        Ok(gains)
+    }
+
+    /// r Δ_θ S⁻¹Cᵀ of chain i.
+    pub fn chain(&self, i: usize) -> Vec<f64> {
+        let power = |j: usize| self.θ[i].powf(self.δ[i] * (j + 1) as f64);
+        let column = self.S[i].gain().into_iter().enumerate();
+        column.map(|(j, s)| self.r[i] * power(j) * s).collect()
+    }
+
+    /// The numbers, for the reader.
+    pub fn parameters(&self) -> Vec<(String, String)> {
+        let list = |values: &[f64]| {
+            let values: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
+            values.join(", ")
+        };
+        let mut rows = vec![
+            ("θ".to_owned(), list(&self.θ)),
+            ("δ".to_owned(), list(&self.δ)),
+            ("r".to_owned(), list(&self.r)),
+        ];
+        for (i, s) in self.S.iter().enumerate() {
+            rows.push((format!("S{} diagonal", i + 1), list(s.diagonal())));
+            rows.push((format!("S{} beside it", i + 1), list(s.off_diagonal())));
+        }
+        rows
+    }
+}
+
+fn lemma1_matrices(
+    form: &Form,
+    divided: bool,
+) -> Result<(Vec<Tridiagonal>, Option<f64>), TuningError> {
+    let mut ρ = None;
+    let mut matrix = |chain: &Vec<Partial>| {
+        let bounds = |p: &Partial| match divided {
+            // dividing by the partials leaves a chain of integrators
+            true => Bounds {
+                lower: 1.0,
+                upper: 1.0,
+            },
+            false => Bounds {
+                lower: p.bounds.0,
+                upper: p.bounds.1,
+            },
+        };
+        let bounds: Vec<Bounds> = chain.iter().map(bounds).collect();
+        let found = lemma1::construct(&bounds).map_err(|error| {
+            let expected = "partial derivatives with known positive bounds for Lemma 1; declare min and max in the model, give S, or set partials = true";
+            TuningError::new("gain", expected, error)
+        })?;
+        ρ = Some(found.ρ);
+        Ok(found.S)
+    };
+    let S = form
+        .partials
+        .iter()
+        .map(&mut matrix)
+        .collect::<Result<_, _>>()?;
+    Ok((S, ρ))
+}
+
+/// δ: given, or δ = 1 for the leading chain and 2n₁/(2n₂−1) for the other, the
+/// middle of Theorem 2's window.
+fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, TuningError> {
+    let lengths = form.assignment.lengths();
+    if let Some(δ) = tuning.positive_per_chain("delta", lengths.len())? {
+        return Ok(δ);
+    }
+    let lead = form.assignment.leading;
+    let exponent = |i: usize| match i == lead {
+        true => 1.0,
+        false => 2.0 * lengths[lead] as f64 / (2.0 * lengths[i] as f64 - 1.0),
+    };
+    Ok((0..lengths.len()).map(exponent).collect())
+}
+
+/// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁.
+fn window(form: &Form, δ: &[f64]) -> Option<String> {
+    let lengths = form.assignment.lengths();
+    let [_, _] = lengths[..] else { return None };
+    let lead = form.assignment.leading;
+    let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
+    let (low, high) = (
+        (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
+        (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
+    );
+    let ratio = δ[1 - lead] / δ[lead];
+    let inside = low < ratio && ratio < high;
+    (!inside).then(|| {
+        format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
+    })
+}
+
+/// S as the study gives it.
+pub(super) fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
+    let Some(tables) = tuning.number_tables("S", &["diag", "off"])? else {
+        return Ok(None);
+    };
+    let matrix = |(i, mut table): (usize, Vec<Vec<f64>>)| {
+        let (off, diagonal) = (
+            table.pop().unwrap_or_default(),
+            table.pop().unwrap_or_default(),
+        );
+        Tridiagonal::new(diagonal, off).map_err(|error| {
+            TuningError::new(
+                "S",
+                format!("a positive definite tridiagonal matrix as entry {}", i + 1),
+                error,
+            )
+        })
+    };
+    tables
+        .into_iter()
+        .enumerate()
+        .map(matrix)
+        .collect::<Result<_, _>>()
+        .map(Some)
+}
