@@ -18,6 +18,8 @@ pub struct Chain {
     pub smallest: f64,
     /// largest eigenvalue of S
     pub largest: f64,
+    /// diagonal of S: the binomial coefficients C^{i−1}_{2i−2}
+    pub diagonal: Vec<f64>,
     /// diagonal of S⁻¹: xᵢ² ≤ (S⁻¹)ᵢᵢ xᵀSx
     pub inverse_diagonal: Vec<f64>,
 }
@@ -27,11 +29,12 @@ impl Chain {
     pub fn new(n: usize) -> Self {
         let S = matrix(n);
         let values = SymmetricEigen::new(S.clone()).eigenvalues;
-        let inverse = S.cholesky().map(|c| c.inverse());
+        let inverse = S.clone().cholesky().map(|c| c.inverse());
         let inverse_diagonal = inverse.map_or(vec![f64::INFINITY; n], |inverse| {
             inverse.diagonal().iter().copied().collect()
         });
         Self {
+            diagonal: S.diagonal().iter().copied().collect(),
             gain: (1..=n).map(|i| binomial(n, i)).collect(),
             smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
             largest: values.iter().copied().fold(0.0, f64::max),

@@ -12,8 +12,12 @@
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod decay;
+pub mod definite;
 pub mod integrators;
 pub mod lemma1;
+pub mod lmi;
+pub mod low_power;
 mod tridiagonal;
 mod unit_factor;
 pub mod vandermonde;

@@ -1,0 +1,98 @@
+//! The fastest decay that can be proved for a given error system.
+
+use nalgebra::DMatrix;
+
+use super::{ErrorModel, Proof, check::holds, scale::Scale};
+use crate::lmi::{Affine, Problem};
+
+/// The rate is found to this relative accuracy.
+const ACCURACY: f64 = 0.01;
+/// Rates below this share of the limit count as none.
+const NEGLIGIBLE: f64 = 1e-7;
+
+/// A proof of decay at `rate`, accepted by [`holds`]; none where there is none of this
+/// form or it cannot be found. `scale` is the size of each state that counts as one.
+pub fn prove(models: &[ErrorModel], scale: &[f64], rate: f64) -> Option<Proof> {
+    let n = models.first()?.size();
+    if !models.iter().all(|m| m.size() == n && m.is_bounded()) {
+        return None;
+    }
+    let scale = Scale::of(models, scale);
+    let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
+
+    let proof = scale.restored(models, &candidate(&scaled, rate * scale.unit)?);
+    let proof = Proof { rate, ..proof };
+    holds(models, &proof).then_some(proof)
+}
+
+/// What the solver says, unchecked.
+fn candidate(models: &[ErrorModel], rate: f64) -> Option<Proof> {
+    let n = models.first()?.size();
+    let mut problem = Problem::new();
+    let P = problem.symmetric(n);
+    problem.positive(P.clone());
+    problem.positive(Affine::identity(n).minus(&P));
+    let mut multipliers = vec![];
+    for model in models {
+        let PA = P.times(&model.nominal());
+        multipliers.push(inequality(&mut problem, model, &P, &PA, rate));
+    }
+    let solution = problem.inside().ok()?;
+    let diagonal = |T: &Affine| solution.value(T).diagonal();
+    Some(Proof {
+        rate,
+        P: symmetric(&solution.value(&P)),
+        multipliers: multipliers.iter().map(diagonal).collect(),
+    })
+}
+
+/// The proof of the fastest decay up to `limit`, by bisection; none where not even a
+/// rate of zero can be proved.
+pub fn fastest(models: &[ErrorModel], scale: &[f64], limit: f64) -> Option<Proof> {
+    let mut best = prove(models, scale, 0.0)?;
+    if let Some(proof) = prove(models, scale, limit) {
+        return Some(proof);
+    }
+    let (mut low, mut high) = (0.0, limit);
+    // slow decay is worth knowing as precisely as fast decay: bisect on a
+    // logarithmic scale once a positive rate is found
+    while low < high * (1.0 - ACCURACY) && high > NEGLIGIBLE * limit {
+        let rate = match low > 0.0 {
+            true => (low * high).sqrt(),
+            false => high * 0.25,
+        };
+        match prove(models, scale, rate) {
+            Some(proof) => (low, best) = (rate, proof),
+            None => high = rate,
+        }
+    }
+    Some(best)
+}
+
+/// Adds the inequality of [`super`] for one model, PA given; returns T.
+pub(super) fn inequality(
+    problem: &mut Problem,
+    model: &ErrorModel,
+    P: &Affine,
+    PA: &Affine,
+    rate: f64,
+) -> Affine {
+    let q = model.sectors.len();
+    let decay = PA.he().plus(&P.scaled(2.0 * rate));
+    let T = problem.diagonal(q);
+    let mut selector = DMatrix::zeros(model.size(), q);
+    for (k, sector) in model.sectors.iter().enumerate() {
+        selector[(sector.column, k)] = 1.0;
+    }
+    let paid = T.after(&selector).times(&selector.transpose());
+    let corner = decay.plus(&paid);
+    let PB = P.times(&model.spread());
+    let block = Affine::symmetric_blocks(&corner, &PB, &T.scaled(-1.0));
+    problem.positive(block.scaled(-1.0));
+    T
+}
+
+/// (P + Pᵀ)/2, symmetric to the last bit.
+pub(super) fn symmetric(P: &DMatrix<f64>) -> DMatrix<f64> {
+    (P + P.transpose()) * 0.5
+}

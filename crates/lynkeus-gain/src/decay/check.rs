@@ -1,0 +1,102 @@
+//! The independent check: the inequality of [`super`] in interval arithmetic, from the
+//! numbers of a [`Proof`] alone. No result of a solver enters but those numbers.
+
+use lynkeus_expr::Interval;
+use nalgebra::{DMatrix, DVector};
+
+use super::{ErrorModel, Proof};
+use crate::definite::{IntervalMatrix, is_positive_definite};
+
+/// Whether the proof holds for every model: P > 0, every multiplier positive, and
+/// He(P A(θ)) + 2·rate·P < 0 for every θ in the ranges.
+pub fn holds(models: &[ErrorModel], proof: &Proof) -> bool {
+    let n = proof.P.nrows();
+    let sizes = models.iter().all(|m| m.size() == n && m.is_bounded());
+    let numbers = proof.P.iter().all(|x| x.is_finite()) && proof.rate.is_finite();
+    sizes
+        && numbers
+        && models.len() == proof.multipliers.len()
+        && is_symmetric(&proof.P)
+        && is_positive_definite(&points(&proof.P))
+        && models
+            .iter()
+            .zip(&proof.multipliers)
+            .all(|(model, t)| model_holds(model, proof, t))
+}
+
+/// Whether P − βQ is positive definite for a symmetric Q: a bound of one quadratic form
+/// by another.
+pub fn is_below(Q: &DMatrix<f64>, β: f64, P: &DMatrix<f64>) -> bool {
+    let β = Interval::point(β);
+    let (P, Q) = (points(P), points(Q));
+    let rows = P.iter().zip(&Q);
+    let difference: IntervalMatrix = rows
+        .map(|(p, q)| p.iter().zip(q).map(|(p, q)| *p - β * *q).collect())
+        .collect();
+    is_positive_definite(&difference)
+}
+
+fn is_symmetric(P: &DMatrix<f64>) -> bool {
+    P.is_square() && *P == P.transpose()
+}
+
+fn points(P: &DMatrix<f64>) -> IntervalMatrix {
+    let row = |i: usize| P.row(i).iter().map(|&x| Interval::point(x)).collect();
+    (0..P.nrows()).map(row).collect()
+}
+
+fn product(P: &IntervalMatrix, column: &[Interval]) -> Vec<Interval> {
+    let row = |row: &Vec<Interval>| {
+        let products = row.iter().zip(column).map(|(a, b)| *a * *b);
+        products.fold(Interval::ZERO, |sum, x| sum + x)
+    };
+    P.iter().map(row).collect()
+}
+
+/// One inequality: the negative of the block matrix is positive definite.
+fn model_holds(model: &ErrorModel, proof: &Proof, t: &DVector<f64>) -> bool {
+    let (n, q) = (model.size(), model.sectors.len());
+    if t.len() != q || !t.iter().all(|t| *t > 0.0 && t.is_finite()) {
+        return false;
+    }
+    let P = points(&proof.P);
+    let twice_rate = Interval::point(2.0) * Interval::point(proof.rate);
+    let PA = columns_times(&P, &nominal(model));
+    let mut matrix: IntervalMatrix = vec![];
+    for i in 0..n {
+        let entry = |j: usize| -(PA[j][i] + PA[i][j] + twice_rate * P[i][j]);
+        matrix.push((0..=i).map(entry).collect());
+    }
+    for (sector, &t) in model.sectors.iter().zip(t) {
+        let corner = &mut matrix[sector.column][sector.column];
+        *corner = *corner - Interval::point(t);
+    }
+    for (k, sector) in model.sectors.iter().enumerate() {
+        let h = Interval::point(sector.half());
+        let spread: Vec<Interval> = sector.direction.iter().map(|b| h * *b).collect();
+        let mut row: Vec<Interval> = product(&P, &spread).into_iter().map(|x| -x).collect();
+        row.extend(vec![Interval::ZERO; k]);
+        row.push(Interval::point(t[k]));
+        matrix.push(row);
+    }
+    is_positive_definite(&matrix)
+}
+
+/// A_m = A₀ + Σ m_k b_k e_{s_k}ᵀ, column by column.
+fn nominal(model: &ErrorModel) -> IntervalMatrix {
+    let n = model.size();
+    let column = |j: usize| (0..n).map(|i| model.constant[i][j]).collect();
+    let mut columns: IntervalMatrix = (0..n).map(column).collect();
+    for sector in &model.sectors {
+        let m = Interval::point(sector.middle());
+        for (entry, b) in columns[sector.column].iter_mut().zip(&sector.direction) {
+            *entry = *entry + m * *b;
+        }
+    }
+    columns
+}
+
+/// The columns of PA from those of A: (PA)[j][i] is row i, column j.
+fn columns_times(P: &IntervalMatrix, columns: &IntervalMatrix) -> IntervalMatrix {
+    columns.iter().map(|column| product(P, column)).collect()
+}

@@ -1,0 +1,124 @@
+//! The error system as linear plus bounded slopes.
+
+use lynkeus_expr::Interval;
+use nalgebra::DMatrix;
+
+use crate::definite::IntervalMatrix;
+
+/// θ b e_sᵀ with θ in a range: the slope of one nonlinear term in one state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sector {
+    /// s, the state the term depends on
+    pub column: usize,
+    /// b, the weight of the term in each equation
+    pub direction: Vec<Interval>,
+    /// range of the slope θ
+    pub range: Interval,
+}
+
+impl Sector {
+    /// m, the middle of the range.
+    pub fn middle(&self) -> f64 {
+        self.range.midpoint()
+    }
+
+    /// h with m − h ≤ θ ≤ m + h.
+    pub fn half(&self) -> f64 {
+        let from_middle = self.range - Interval::point(self.middle());
+        from_middle.magnitude()
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        self.direction[row].midpoint()
+    }
+}
+
+/// e' = (A₀ + Σ θ_k b_k e_{s_k}ᵀ) e
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorModel {
+    /// A₀, n×n
+    pub constant: IntervalMatrix,
+    /// the uncertain terms
+    pub sectors: Vec<Sector>,
+}
+
+impl ErrorModel {
+    /// Number of states.
+    pub fn size(&self) -> usize {
+        self.constant.len()
+    }
+
+    /// The model with A₀ − KC, where output j shows the state `measured[j]`.
+    pub fn corrected(&self, K: &DMatrix<f64>, measured: &[usize]) -> Self {
+        let mut corrected = self.clone();
+        for (i, row) in corrected.constant.iter_mut().enumerate() {
+            for (j, &state) in measured.iter().enumerate() {
+                row[state] = row[state] - Interval::point(K[(i, j)]);
+            }
+        }
+        corrected
+    }
+
+    /// The model of e/scale: A becomes D⁻¹AD with D = diag(scale), over `unit` of time.
+    pub fn scaled(&self, scale: &[f64], unit: f64) -> Self {
+        let point = Interval::point;
+        let factor = |i: usize, j: usize| point(scale[j]) / point(scale[i]) * point(unit);
+        let mut scaled = self.clone();
+        for (i, row) in scaled.constant.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = *entry * factor(i, j);
+            }
+        }
+        for sector in &mut scaled.sectors {
+            for (i, entry) in sector.direction.iter_mut().enumerate() {
+                *entry = *entry * factor(i, sector.column);
+            }
+        }
+        scaled
+    }
+
+    /// A₀ + Σ m_k b_k e_{s_k}ᵀ, in numbers.
+    pub(super) fn nominal(&self) -> DMatrix<f64> {
+        self.at(&self.sectors.iter().map(Sector::middle).collect::<Vec<_>>())
+    }
+
+    /// A(θ), in numbers.
+    pub fn at(&self, θ: &[f64]) -> DMatrix<f64> {
+        let n = self.size();
+        let mut A = DMatrix::from_fn(n, n, |i, j| self.constant[i][j].midpoint());
+        for (sector, θ) in self.sectors.iter().zip(θ) {
+            for i in 0..n {
+                A[(i, sector.column)] += θ * sector.weight(i);
+            }
+        }
+        A
+    }
+
+    /// B = (h_k b_k), in numbers.
+    pub(super) fn spread(&self) -> DMatrix<f64> {
+        let n = self.size();
+        DMatrix::from_fn(n, self.sectors.len(), |i, k| {
+            self.sectors[k].half() * self.sectors[k].weight(i)
+        })
+    }
+
+    /// Whether every number is finite.
+    pub fn is_bounded(&self) -> bool {
+        let finite = |x: &Interval| x.magnitude().is_finite() && x.is_defined();
+        let entries = self.constant.iter().flatten();
+        let directions = self.sectors.iter().flat_map(|s| &s.direction);
+        let ranges = self.sectors.iter().map(|s| &s.range);
+        entries.chain(directions).chain(ranges).all(finite)
+    }
+
+    /// The model with every range shrunk about its middle, θ_k = m_k + factor_k·(…).
+    pub fn shrunk(&self, factor: impl Fn(usize) -> f64) -> Self {
+        let mut shrunk = self.clone();
+        for (k, sector) in shrunk.sectors.iter_mut().enumerate() {
+            let (middle, half) = (sector.middle(), sector.half() * factor(k));
+            // a half-width that is finite leaves ordered bounds
+            sector.range = Interval::new(middle - half, middle + half).unwrap_or(sector.range);
+        }
+        shrunk
+    }
+}

@@ -1,0 +1,284 @@
+//! Gains with a proof: K and P together, by the change of variables Y = PK.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::analysis::{inequality, prove, symmetric};
+use super::{ErrorModel, Proof, scale::Scale};
+use crate::lmi::{Affine, Failure, Problem, Solution};
+
+/// Rounds of the alternation between K and P.
+const ROUNDS: usize = 6;
+/// A share of the noise where the peak is the objective: it keeps the gain finite.
+const SHARE: f64 = 1e-4;
+/// Bound of P relative to the first point's.
+const CEILING: f64 = 10.0;
+/// Bounds of Y in the first phase, where P ≤ I: the larger is tried where the smaller
+/// leaves no gain.
+const LARGE: [f64; 2] = [30.0, 3e3];
+/// A gain is sought for a rate larger by this share, so that its proof has room.
+const RESERVE: f64 = 0.01;
+/// A round has to lower the largest entry by this share to be worth another.
+const PROGRESS: f64 = 0.02;
+
+/// What to make small for the required decay.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Aim {
+    /// tr(W KᵀPK) with P ≥ I: a bound of how measurement noise reaches the estimate
+    #[default]
+    Noise,
+    /// cond(P): |e(t)| ≤ √cond(P)·e^(−rate·t)·|e(0)|, the bound of the transient's peak
+    Peak,
+    /// the largest entry of K
+    Gain,
+}
+
+/// What is asked of a gain.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// required decay, 1/time unit
+    pub rate: f64,
+    /// per output: the state it shows
+    pub measured: Vec<usize>,
+    /// per output: the size of its measurement error, for [`Aim::Noise`]
+    pub noise: Vec<f64>,
+    /// per state: the size that counts as one
+    pub scale: Vec<f64>,
+    /// what to make small
+    pub aim: Aim,
+    /// largest entry allowed
+    pub limit: Option<f64>,
+}
+
+/// A gain with the proof of its decay.
+#[derive(Clone, Debug)]
+pub struct Gain {
+    /// K, one row per state, one column per output
+    pub K: DMatrix<f64>,
+    /// the proof, accepted by [`super::holds`] for the models corrected by K
+    pub proof: Proof,
+}
+
+/// Why there is no gain.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoGain {
+    /// an uncertain term without bound
+    #[error("a slope is unbounded")]
+    Unbounded,
+    /// no gain reaches the rate by a proof of this form
+    #[error("no gain is proved to reach the rate: {0}")]
+    Rate(Failure),
+    /// gains reach the rate, but with larger entries than allowed
+    #[error("the smallest largest entry found is {0:.4}")]
+    Limit(f64),
+    /// the interval check rejected the solver's answer
+    #[error("the solver's answer does not stand the interval check")]
+    Rejected,
+}
+
+/// A gain that is proved to reach the rate.
+///
+/// # Errors
+/// [`NoGain`].
+pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> {
+    if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
+        return Err(NoGain::Unbounded);
+    }
+    let scale = Scale::of(models, &request.scale);
+    let scaled = Scaled {
+        models: models.iter().map(|m| scale.model(m)).collect(),
+        rate: request.rate * scale.unit * (1.0 + RESERVE),
+        request,
+        scale: &scale,
+    };
+    let mut K = scaled.direct().map_err(NoGain::Rate)?;
+    let over = |K: &DMatrix<f64>| request.limit.is_some_and(|limit| K.amax() > limit);
+    if request.aim == Aim::Gain || over(&K) {
+        K = scaled.alternated(K);
+    }
+    if over(&K) {
+        return Err(NoGain::Limit(K.amax()));
+    }
+    let corrected: Vec<ErrorModel> = models
+        .iter()
+        .map(|m| m.corrected(&K, &request.measured))
+        .collect();
+    let proof = prove(&corrected, &request.scale, request.rate).ok_or(NoGain::Rejected)?;
+    Ok(Gain { K, proof })
+}
+
+struct Scaled<'a> {
+    models: Vec<ErrorModel>,
+    rate: f64,
+    request: &'a Request,
+    scale: &'a Scale,
+}
+
+impl Scaled<'_> {
+    fn size(&self) -> usize {
+        self.scale.states.len()
+    }
+
+    /// C, one row per output.
+    fn selector(&self) -> DMatrix<f64> {
+        let mut C = DMatrix::zeros(self.request.measured.len(), self.size());
+        for (j, &state) in self.request.measured.iter().enumerate() {
+            C[(j, state)] = 1.0;
+        }
+        C
+    }
+
+    /// One factor per entry of K: from scaled to the user's units.
+    fn unit(&self, i: usize, j: usize) -> f64 {
+        let s = &self.scale.states;
+        s[i] / (s[self.request.measured[j]] * self.scale.unit)
+    }
+
+    fn in_units(&self, K: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * self.unit(i, j))
+    }
+
+    /// The convex problem in P and Y = PK.
+    fn direct(&self) -> Result<DMatrix<f64>, Failure> {
+        let (n, p) = (self.size(), self.request.measured.len());
+        let mut problem = Problem::new();
+        let P = problem.symmetric(n);
+        let Y = problem.matrix(n, p);
+        problem.positive(P.clone());
+        let YC = Y.times(&self.selector());
+        for model in &self.models {
+            let PA = P.times(&model.nominal()).minus(&YC);
+            inequality(&mut problem, model, &P, &PA, self.rate);
+        }
+        let first = normalised(&problem, &P, &Y)?;
+        // Z ≥ YᵀP⁻¹Y = KᵀPK and β ≥ |P|
+        let (Z, β) = (problem.symmetric(p), problem.matrix(1, 1));
+        problem.positive(Affine::symmetric_blocks(&Z, &Y.transposed(), &P));
+        problem.positive(Affine::multiple_of_identity(&β, n).minus(&P));
+        let (start, largest) = roomy(&first, &P, &Y)?;
+        let ceiling = Affine::identity(1).scaled(CEILING * largest);
+        problem.positive(ceiling.minus(&β));
+        problem.positive(P.minus(&Affine::identity(n)));
+        let noise = Z.times(&self.weights()).trace();
+        problem.minimise(&match self.request.aim {
+            Aim::Noise | Aim::Gain => noise,
+            Aim::Peak => β.plus(&noise.scaled(SHARE)),
+        });
+        let solution = problem.solve_from(&start)?;
+        let factor = symmetric(&solution.value(&P)).cholesky();
+        let P = factor.ok_or(Failure::Numerical)?;
+        Ok(self.in_units(&P.solve(&solution.value(&Y))))
+    }
+
+    /// Squares of the outputs' errors in scaled units, the largest as one.
+    fn weights(&self) -> DMatrix<f64> {
+        let states = &self.scale.states;
+        let relative = |(j, noise): (usize, &f64)| noise / states[self.request.measured[j]];
+        let sizes: Vec<f64> = self
+            .request
+            .noise
+            .iter()
+            .enumerate()
+            .map(relative)
+            .collect();
+        let largest = sizes.iter().fold(0.0, |a: f64, b| a.max(*b));
+        let weight = |j: usize| match largest > 0.0 {
+            true => (sizes[j] / largest).powi(2).max(1e-4),
+            false => 1.0,
+        };
+        DMatrix::from_diagonal(&DVector::from_fn(sizes.len(), |j, _| weight(j)))
+    }
+
+    /// Smaller largest entries: P for K, then K for that P, while it helps.
+    fn alternated(&self, start: DMatrix<f64>) -> DMatrix<f64> {
+        let mut best = start;
+        for _ in 0..ROUNDS {
+            let Some(P) = self.central(&best) else { break };
+            let Some(K) = self.smallest(&P) else { break };
+            let gained = K.amax() < best.amax() * (1.0 - PROGRESS);
+            if K.amax() < best.amax() && self.central(&K).is_some() {
+                best = K;
+            }
+            if !gained {
+                break;
+            }
+        }
+        best
+    }
+
+    /// P with the inequality for a given K satisfied by the largest margin.
+    fn central(&self, K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let n = self.size();
+        let K = DMatrix::from_fn(n, K.ncols(), |i, j| K[(i, j)] / self.unit(i, j));
+        let KC = K * self.selector();
+        let mut problem = Problem::new();
+        let P = problem.symmetric(n);
+        problem.positive(P.clone());
+        problem.positive(Affine::identity(n).minus(&P));
+        for model in &self.models {
+            let PA = P.times(&(model.nominal() - &KC));
+            inequality(&mut problem, model, &P, &PA, self.rate);
+        }
+        let solution = problem.inside().ok()?;
+        Some(symmetric(&solution.value(&P)))
+    }
+
+    /// K with the smallest largest entry for a given P.
+    fn smallest(&self, P: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let (n, p) = (self.size(), self.request.measured.len());
+        let mut problem = Problem::new();
+        let K = problem.matrix(n, p);
+        let g = problem.matrix(1, 1);
+        for i in 0..n {
+            for j in 0..p {
+                let entry = K.at_entry(i, j).scaled(self.unit(i, j));
+                problem.positive(g.minus(&entry));
+                problem.positive(g.plus(&entry));
+            }
+        }
+        let PKC = K.after(P).times(&self.selector());
+        let constant = Affine::constant(P);
+        for model in &self.models {
+            let PA = constant.times(&model.nominal()).minus(&PKC);
+            inequality(&mut problem, model, &constant, &PA, self.rate);
+        }
+        problem.minimise(&g);
+        let solution = problem.solve().ok()?;
+        Some(self.in_units(&solution.value(&K)))
+    }
+}
+
+/// A point inside, from the same problem with P and Y bounded above, scaled so that
+/// P > I: the inequalities are homogeneous.
+fn normalised(problem: &Problem, P: &Affine, Y: &Affine) -> Result<Solution, Failure> {
+    let bounded = |large: f64| {
+        let mut bounded = problem.clone();
+        bounded.positive(Affine::identity(P.rows()).minus(P));
+        let wide = |n: usize| Affine::identity(n).scaled(large);
+        let Y = Affine::symmetric_blocks(&wide(Y.rows()), Y, &wide(Y.columns()));
+        bounded.positive(Y);
+        bounded.inside()
+    };
+    let inside = bounded(LARGE[0]).or_else(|_| bounded(LARGE[1]))?;
+    let smallest = symmetric(&inside.value(P)).symmetric_eigenvalues().min();
+    if smallest <= 0.0 {
+        return Err(Failure::Numerical);
+    }
+    Ok(inside.scaled(1.1 / smallest))
+}
+
+/// Values for Z and β with room to spare, and |P|.
+fn roomy(first: &Solution, P: &Affine, Y: &Affine) -> Result<(Solution, f64), Failure> {
+    let (P, Y) = (symmetric(&first.value(P)), first.value(Y));
+    let largest = P.symmetric_eigenvalues().max();
+    let factor = P.cholesky().ok_or(Failure::Numerical)?;
+    let Z = symmetric(&(Y.transpose() * factor.solve(&Y))) * 2.0;
+    let room = 1.0 + Z.trace() * 1e-3;
+    let mut newer = vec![];
+    for j in 0..Z.ncols() {
+        for i in 0..=j {
+            newer.push(Z[(i, j)] + if i == j { room } else { 0.0 });
+        }
+    }
+    newer.push(2.0 * largest);
+    Ok((first.with(&newer), largest))
+}

@@ -1,0 +1,241 @@
+//! Newton's method on t·cᵀx − Σ log det F_j(x) − log(R² − |x|²).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::Affine;
+
+/// t grows by this factor between centrings.
+const GROWTH: f64 = 12.0;
+/// A point counts as central when Newton's decrement is below this.
+const CENTRAL: f64 = 0.1;
+/// Newton steps altogether.
+const STEPS: usize = 400;
+
+/// One inequality F(x) = F₀ + Σ x_k F_k > 0 with sparse symmetric F_k.
+pub(super) struct Block {
+    size: usize,
+    constant: DMatrix<f64>,
+    /// per unknown that occurs: entries (i, j, value) with i ≤ j
+    terms: Vec<(usize, Vec<(usize, usize, f64)>)>,
+}
+
+impl Block {
+    pub(super) fn new(F: &Affine) -> Self {
+        let n = F.rows();
+        let mut terms: std::collections::BTreeMap<usize, Vec<(usize, usize, f64)>> =
+            std::collections::BTreeMap::new();
+        for i in 0..n {
+            for j in i..n {
+                for (unknown, value) in F.terms(i, j).filter(|(_, value)| *value != 0.0) {
+                    terms.entry(unknown).or_default().push((i, j, value));
+                }
+            }
+        }
+        Self {
+            size: n,
+            constant: DMatrix::from_fn(n, n, |i, j| F.constant_at(i.min(j), i.max(j))),
+            terms: terms.into_iter().collect(),
+        }
+    }
+
+    fn value(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let mut F = self.constant.clone();
+        for (unknown, entries) in &self.terms {
+            for &(i, j, value) in entries {
+                F[(i, j)] += x[*unknown] * value;
+                if i != j {
+                    F[(j, i)] += x[*unknown] * value;
+                }
+            }
+        }
+        F
+    }
+
+    /// Adds −∇ log det and its Hessian: with W = F⁻¹, g_k = −tr(W F_k) and
+    /// H_kl = tr(W F_k W F_l).
+    fn derivatives(&self, W: &DMatrix<f64>, g: &mut DVector<f64>, H: &mut DMatrix<f64>) {
+        for (a, (k, entries)) in self.terms.iter().enumerate() {
+            g[*k] -= inner(entries, W);
+            let G = sandwiched(entries, W, self.size);
+            for (l, others) in &self.terms[a..] {
+                let h = inner(others, &G);
+                H[(*k, *l)] += h;
+                if k != l {
+                    H[(*l, *k)] += h;
+                }
+            }
+        }
+    }
+}
+
+/// tr(F G) for symmetric G.
+fn inner(F: &[(usize, usize, f64)], G: &DMatrix<f64>) -> f64 {
+    let entry =
+        |&(i, j, value): &(usize, usize, f64)| value * G[(i, j)] * if i == j { 1.0 } else { 2.0 };
+    F.iter().map(entry).sum()
+}
+
+/// W F W
+fn sandwiched(F: &[(usize, usize, f64)], W: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
+    // many entries: (W F) W costs n³; few: one rank-two update per entry
+    if F.len() < n / 2 {
+        let mut G = DMatrix::zeros(n, n);
+        for &(i, j, value) in F {
+            if i == j {
+                G.ger(value, &W.column(i), &W.column(i), 1.0);
+            } else {
+                G.ger(value, &W.column(i), &W.column(j), 1.0);
+                G.ger(value, &W.column(j), &W.column(i), 1.0);
+            }
+        }
+        return G;
+    }
+    let mut WF = DMatrix::zeros(n, n);
+    for &(i, j, value) in F {
+        WF.column_mut(j).axpy(value, &W.column(i), 1.0);
+        if i != j {
+            WF.column_mut(i).axpy(value, &W.column(j), 1.0);
+        }
+    }
+    WF * W
+}
+
+/// A barrier problem.
+pub(super) struct Barrier<'a> {
+    pub blocks: &'a [Block],
+    pub cost: DVector<f64>,
+    pub radius: f64,
+}
+
+impl Barrier<'_> {
+    /// From a point inside to near the minimum, until `good(x, gap)`: the gap bounds
+    /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget of
+    /// steps, the last point is returned: it is still inside. None where the start is
+    /// not.
+    pub(super) fn minimise(
+        &self,
+        mut x: DVector<f64>,
+        good: impl Fn(&DVector<f64>, f64) -> bool,
+    ) -> Option<DVector<f64>> {
+        let order = 1.0 + self.blocks.iter().map(|b| b.size as f64).sum::<f64>();
+        let mut t = self.first(&x, order)?;
+        for _ in 0..STEPS {
+            let factors = self.factors(&x)?;
+            let (g, H) = self.derivatives(&x, &factors, t);
+            let Some(step) = newton(H, &g) else {
+                return Some(x);
+            };
+            let decrement = -g.dot(&step);
+            if decrement < CENTRAL {
+                if good(&x, order / t) {
+                    return Some(x);
+                }
+                t *= GROWTH;
+                continue;
+            }
+            match self.advanced(&x, &step, &factors, t, decrement) {
+                Some(next) => x = next,
+                None => return Some(x),
+            }
+        }
+        Some(x)
+    }
+
+    /// The t for which the start is most nearly central, within reason:
+    /// it minimises |tc + g| in the metric of the barrier's inverse Hessian.
+    fn first(&self, x: &DVector<f64>, order: f64) -> Option<f64> {
+        let usual = order / (1.0 + self.cost.dot(x).abs());
+        let (g, H) = self.derivatives(x, &self.factors(x)?, 0.0);
+        let towards = newton(H, &self.cost)?;
+        let nearest = -towards.dot(&g) / towards.dot(&self.cost);
+        Some(nearest.clamp(30.0 * usual, 1e4 * usual))
+    }
+
+    pub(super) fn is_inside(&self, x: &DVector<f64>) -> bool {
+        self.factors(x).is_some()
+    }
+
+    fn factors(&self, x: &DVector<f64>) -> Option<Vec<Cholesky<f64, Dyn>>> {
+        if x.norm_squared() >= self.radius * self.radius {
+            return None;
+        }
+        self.blocks
+            .iter()
+            .map(|block| block.value(x).cholesky())
+            .collect()
+    }
+
+    fn derivatives(
+        &self,
+        x: &DVector<f64>,
+        factors: &[Cholesky<f64, Dyn>],
+        t: f64,
+    ) -> (DVector<f64>, DMatrix<f64>) {
+        let slack = self.radius * self.radius - x.norm_squared();
+        let mut g = &self.cost * t + x * (2.0 / slack);
+        let m = x.len();
+        let mut H = DMatrix::identity(m, m) * (2.0 / slack);
+        H.ger(4.0 / (slack * slack), x, x, 1.0);
+        for (block, factor) in self.blocks.iter().zip(factors) {
+            block.derivatives(&factor.inverse(), &mut g, &mut H);
+        }
+        (g, H)
+    }
+
+    fn merit(&self, x: &DVector<f64>, factors: &[Cholesky<f64, Dyn>], t: f64) -> f64 {
+        let log_det = |factor: &Cholesky<f64, Dyn>| -> f64 {
+            2.0 * factor
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|d| d.ln())
+                .sum::<f64>()
+        };
+        let slack = self.radius * self.radius - x.norm_squared();
+        t * self.cost.dot(x) - slack.ln() - factors.iter().map(log_det).sum::<f64>()
+    }
+
+    /// A step along Newton's direction that lowers the merit.
+    fn advanced(
+        &self,
+        x: &DVector<f64>,
+        step: &DVector<f64>,
+        factors: &[Cholesky<f64, Dyn>],
+        t: f64,
+        decrement: f64,
+    ) -> Option<DVector<f64>> {
+        let merit = self.merit(x, factors, t);
+        let mut length = 1.0;
+        while length > 1e-12 {
+            let next = x + step * length;
+            if let Some(factors) = self.factors(&next)
+                && self.merit(&next, &factors, t) <= merit - 1e-4 * length * decrement
+            {
+                return Some(next);
+            }
+            length *= 0.6;
+        }
+        None
+    }
+}
+
+/// −H⁻¹g, with unknowns scaled so that H has a unit diagonal.
+fn newton(mut H: DMatrix<f64>, g: &DVector<f64>) -> Option<DVector<f64>> {
+    let scale = H.diagonal().map(|h| 1.0 / h.sqrt());
+    for j in 0..H.ncols() {
+        for i in 0..H.nrows() {
+            H[(i, j)] *= scale[i] * scale[j];
+        }
+    }
+    let right = -g.component_mul(&scale);
+    let mut ridge = 1e-14;
+    while ridge < 1e-4 {
+        let mut regular = H.clone();
+        regular.fill_diagonal(1.0 + ridge);
+        if let Some(factor) = regular.cholesky() {
+            return Some(factor.solve(&right).component_mul(&scale));
+        }
+        ridge *= 100.0;
+    }
+    None
+}

@@ -1,0 +1,217 @@
+//! Linear matrix inequalities: minimise a linear function of unknowns over
+//! symmetric matrices that are affine in them and have to be positive definite.
+//!
+//! ```
+//! use lynkeus_gain::lmi::{Affine, Problem};
+//! use nalgebra::dmatrix;
+//!
+//! // the smallest P ≥ I with AᵀP + PA ≤ −I
+//! let A = dmatrix![-1.0, 4.0; 0.0, -2.0];
+//! let mut problem = Problem::new();
+//! let P = problem.symmetric(2);
+//! let identity = Affine::identity(2);
+//! problem.positive(P.minus(&identity));
+//! problem.positive(P.times(&A).he().scaled(-1.0).minus(&identity));
+//! problem.minimise(&P.trace());
+//! let solution = problem.solve().unwrap();
+//! let P = solution.value(&P);
+//! assert!((A.transpose() * &P + &P * A).symmetric_eigenvalues().max() < -0.99);
+//! ```
+//!
+//! Problems here are small and dense (tens of states, hundreds of unknowns), and a
+//! point well inside the inequalities is worth more than the last digit of the
+//! objective, because the answer is checked afterwards by interval arithmetic
+//! ([`crate::definite`]). So it is a primal barrier method: Newton's method on
+//! t·cᵀx − Σ log det F_j(x) for growing t (Boyd, El Ghaoui, Feron and Balakrishnan,
+//! *Linear matrix inequalities in system and control theory*, SIAM 1994, section 2.4),
+//! after a first phase that finds a point inside.
+
+mod affine;
+mod barrier;
+
+pub use affine::Affine;
+
+use barrier::{Barrier, Block};
+use nalgebra::{DMatrix, DVector};
+
+/// Unknowns larger than this do not occur in a well scaled problem; the bound keeps
+/// the feasible set compact.
+const RADIUS: f64 = 1e12;
+/// A point is inside if every inequality holds with this margin.
+const MARGIN: f64 = 1e-8;
+/// A point inside is sought until its margin is this close to the largest, relatively.
+const INSIDE: f64 = 0.3;
+/// Gap at which the objective is as good as its minimum, relative to its size.
+const GAP: f64 = 1e-4;
+
+/// A minimisation under linear matrix inequalities.
+#[derive(Clone, Debug, Default)]
+pub struct Problem {
+    unknowns: usize,
+    inequalities: Vec<Affine>,
+    objective: Option<Affine>,
+}
+
+/// Values of the unknowns strictly inside every inequality.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    values: DVector<f64>,
+}
+
+/// Why there is no solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Failure {
+    /// no point satisfies every inequality
+    #[error("the inequalities contradict each other")]
+    Infeasible,
+    /// the arithmetic gave out before a decision
+    #[error("the inequalities could not be decided in double precision; scale the problem")]
+    Numerical,
+}
+
+impl Problem {
+    /// No unknowns, no inequalities.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn fresh(&mut self, count: usize) -> std::ops::Range<usize> {
+        let first = self.unknowns;
+        self.unknowns += count;
+        first..self.unknowns
+    }
+
+    /// An unknown symmetric n×n matrix.
+    pub fn symmetric(&mut self, n: usize) -> Affine {
+        let first = self.fresh(n * (n + 1) / 2).start;
+        let place = |i: usize, j: usize| {
+            let (i, j) = (i.min(j), i.max(j));
+            first + j * (j + 1) / 2 + i
+        };
+        Affine::unknown(n, n, |i, j| Some(place(i, j)))
+    }
+
+    /// An unknown matrix.
+    pub fn matrix(&mut self, rows: usize, columns: usize) -> Affine {
+        let first = self.fresh(rows * columns).start;
+        Affine::unknown(rows, columns, |i, j| Some(first + i * columns + j))
+    }
+
+    /// An unknown diagonal n×n matrix.
+    pub fn diagonal(&mut self, n: usize) -> Affine {
+        let first = self.fresh(n).start;
+        Affine::unknown(n, n, |i, j| (i == j).then_some(first + i))
+    }
+
+    /// Demands F(x) > 0.
+    pub fn positive(&mut self, inequality: Affine) {
+        debug_assert_eq!(inequality.rows(), inequality.columns());
+        self.inequalities.push(inequality);
+    }
+
+    /// The objective, a 1×1 matrix.
+    pub fn minimise(&mut self, objective: &Affine) {
+        self.objective = Some(objective.clone());
+    }
+
+    fn cost(&self) -> DVector<f64> {
+        let mut cost = DVector::zeros(self.unknowns);
+        for (unknown, coefficient) in self.objective.iter().flat_map(|o| o.terms(0, 0)) {
+            cost[unknown] += coefficient;
+        }
+        cost
+    }
+
+    /// A point inside, near the minimum of the objective where there is one.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    pub fn solve(&self) -> Result<Solution, Failure> {
+        self.solve_from(&self.inside()?)
+    }
+
+    /// The same from a known point inside.
+    ///
+    /// # Errors
+    /// [`Failure::Infeasible`] where the point is not inside.
+    pub fn solve_from(&self, start: &Solution) -> Result<Solution, Failure> {
+        let blocks: Vec<Block> = self.inequalities.iter().map(Block::new).collect();
+        let barrier = Barrier {
+            blocks: &blocks,
+            cost: self.cost(),
+            radius: RADIUS,
+        };
+        if !barrier.is_inside(&start.values) {
+            return Err(Failure::Infeasible);
+        }
+        let good = |x: &DVector<f64>, gap: f64| gap < GAP * (1e-3 + barrier.cost.dot(x).abs());
+        let found = barrier.minimise(start.values.clone(), good);
+        let values = found.ok_or(Failure::Numerical)?;
+        Ok(Solution { values })
+    }
+
+    /// A point inside every inequality, by about the largest margin that there is.
+    /// Inequalities that hold where every unknown is zero are kept from the start; of
+    /// the others, all are relaxed by the same s, which is then minimised.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    pub fn inside(&self) -> Result<Solution, Failure> {
+        let s = self.unknowns;
+        let relaxed = |f: &Affine| {
+            let slack = Affine::unknown(f.rows(), f.rows(), |i, j| (i == j).then_some(s));
+            match f.holds_at_zero() {
+                true => Block::new(f),
+                false => Block::new(&f.plus(&slack)),
+            }
+        };
+        let mut blocks: Vec<Block> = self.inequalities.iter().map(relaxed).collect();
+        // s > −1: an inequality without bound has no need to hold by more
+        let floor = Affine::unknown(1, 1, |_, _| Some(s)).plus(&Affine::identity(1));
+        blocks.push(Block::new(&floor));
+        let norms = self.inequalities.iter().map(Affine::constant_norm);
+        let mut start = DVector::zeros(s + 1);
+        start[s] = 1.0 + norms.fold(0.0, f64::max);
+        let mut cost = DVector::zeros(s + 1);
+        cost[s] = 1.0;
+        let barrier = Barrier {
+            blocks: &blocks,
+            cost,
+            radius: RADIUS,
+        };
+        let decided = |x: &DVector<f64>, gap: f64| {
+            gap < INSIDE * x[s].abs() || x[s] > 0.0 && gap < MARGIN || gap < 1e-2 * MARGIN
+        };
+        let x = barrier.minimise(start, decided).ok_or(Failure::Numerical)?;
+        match x[s] < -MARGIN {
+            true => Ok(Solution {
+                values: x.rows(0, s).into_owned(),
+            }),
+            false => Err(Failure::Infeasible),
+        }
+    }
+}
+
+impl Solution {
+    /// The matrix at the solution.
+    pub fn value(&self, matrix: &Affine) -> DMatrix<f64> {
+        matrix.at(&self.values)
+    }
+
+    /// The point with values for unknowns that were introduced since, in the order of
+    /// their introduction.
+    pub fn with(&self, newer: &[f64]) -> Self {
+        let values = self.values.iter().chain(newer).copied();
+        Self {
+            values: DVector::from_iterator(self.values.len() + newer.len(), values),
+        }
+    }
+
+    /// Every unknown multiplied by a factor: inside again where the inequalities are
+    /// homogeneous.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            values: &self.values * factor,
+        }
+    }
+}
