@@ -3,10 +3,10 @@
 //!
 //! ```
 //! use lynkeus_gain::lmi::{Affine, Problem};
-//! use nalgebra::dmatrix;
+//! use nalgebra::DMatrix;
 //!
 //! // the smallest P ≥ I with AᵀP + PA ≤ −I
-//! let A = dmatrix![-1.0, 4.0; 0.0, -2.0];
+//! let A = DMatrix::from_row_slice(2, 2, &[-1.0, 4.0, 0.0, -2.0]);
 //! let mut problem = Problem::new();
 //! let P = problem.symmetric(2);
 //! let identity = Affine::identity(2);
