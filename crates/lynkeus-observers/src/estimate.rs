@@ -15,6 +15,7 @@ pub(crate) struct Copy<'e, 'p> {
     pub hats: Vec<Signal>,
     /// x ↦ x̂, limited to [min, max] if the tuning says so
     seen: HashMap<Node, Node>,
+    clamp: bool,
 }
 
 impl<'e, 'p> Copy<'e, 'p> {
@@ -25,24 +26,38 @@ impl<'e, 'p> Copy<'e, 'p> {
             .iter()
             .map(|state| Observer::hat(graph, &state.name))
             .collect();
-        let seen = extended.states.iter().zip(&hats).map(|(state, hat)| {
-            let image = match tuning.clamp {
-                true => limited(graph, hat.symbol, state),
-                false => hat.symbol,
-            };
-            (state.node, image)
-        });
-        let seen = seen.collect();
-        Self {
+        let mut copy = Self {
             extended,
             hats,
-            seen,
+            seen: HashMap::new(),
+            clamp: tuning.clamp,
+        };
+        let seen =
+            |(i, hat): (usize, &Signal)| (extended.states[i].node, copy.seen_as(i, hat.symbol));
+        copy.seen = copy.hats.iter().enumerate().map(seen).collect();
+        copy
+    }
+
+    /// How the plant's functions see a state whose estimate is `hat`.
+    pub fn seen_as(&self, state: usize, hat: Node) -> Node {
+        match self.clamp {
+            true => limited(self.extended.graph(), hat, &self.extended.states[state]),
+            false => hat,
         }
     }
 
     /// Expressions of the plant at the estimate: f(x̂, u) from f(x, u).
     pub fn at_estimate(&self, expressions: &[Node]) -> Vec<Node> {
         self.extended.graph().substitute(expressions, &self.seen)
+    }
+
+    /// The same where some states, by their places, have another estimate.
+    pub fn at_estimate_with(&self, expressions: &[Node], others: &[(usize, Node)]) -> Vec<Node> {
+        let mut seen = self.seen.clone();
+        let image =
+            |&(i, hat): &(usize, Node)| (self.extended.states[i].node, self.seen_as(i, hat));
+        seen.extend(others.iter().map(image));
+        self.extended.graph().substitute(expressions, &seen)
     }
 
     /// x̂ with its starts: the named value, else the default, else the plant's

@@ -17,6 +17,7 @@ pub mod drift_observable;
 mod estimate;
 mod family;
 mod observer;
+mod peaking;
 pub mod state_affine;
 pub mod triangular;
 mod tuning;

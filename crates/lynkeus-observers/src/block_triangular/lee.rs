@@ -5,7 +5,7 @@ use lynkeus_structure::{Chain, Extended};
 
 /// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
 /// triangular solve.
-pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, constants: &[f64]) -> Vec<Node> {
+pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
     let graph = extended.graph();
     let n = chain.states.len();
     let F = own_jacobian(extended, chain);
@@ -35,8 +35,8 @@ pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, constants: &[f64]) -> 
     // Step 5, multiplied out
     let v: Vec<Sparse> = L
         .iter()
-        .zip(constants)
-        .map(|(&l, &k)| sum(graph, l, Some(graph.constant(k).node())))
+        .zip(gains)
+        .map(|(&l, &k)| sum(graph, l, Some(k)))
         .collect();
     let right: Vec<Sparse> = W.iter().map(|row| dot(graph, row, &v)).collect();
     let zero = graph.constant(0.0).node();

@@ -17,6 +17,7 @@
 mod form;
 mod gains;
 mod lee;
+mod low_power;
 
 use std::collections::HashMap;
 
@@ -25,6 +26,7 @@ use lynkeus_structure::{Blocks, Extended};
 
 use crate::conditions::names;
 use crate::estimate::Copy;
+use crate::peaking::{self, InnovationLimit, Transient, transient};
 use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
 use form::form;
 use gains::{given, placed};
@@ -46,7 +48,18 @@ impl Family for BlockTriangular {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["theta", "k", "k_poles", "correction", "chains"]
+        &[
+            "theta",
+            "k",
+            "k_poles",
+            "correction",
+            "chains",
+            "innovation_limit",
+            "transient",
+            "form",
+            "low_power_poles",
+            "low_power_k",
+        ]
     }
 
     fn examine(
@@ -62,6 +75,12 @@ impl Family for BlockTriangular {
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended, tuning)? {
             Ok((blocks, examination)) if examination.fit != Fit::DoesNotFit => {
+                let low_power = peaking::asked_for(tuning, &["k", "k_poles"])?;
+                let assemble = if low_power {
+                    low_power::assemble
+                } else {
+                    assemble
+                };
                 Ok(assemble(extended, tuning, &blocks, examination)?)
             }
             Ok((_, examination)) | Err(examination) => {
@@ -77,14 +96,12 @@ fn assemble(
     tuning: &Tuning,
     blocks: &Blocks,
     examination: Examination,
-) -> Result<Design, TuningError> {
+) -> Result<Design, DesignError> {
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
-    let missing = || TuningError::new("theta", "a positive number per chain", "nothing");
-    let count = blocks.order.len();
-    let θ = tuning
-        .positive_per_chain("theta", count)?
-        .ok_or_else(missing)?;
+    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
+    let transient = Transient::read(tuning, blocks.order.len())?;
+    let θ = theta(tuning, blocks.order.len())?;
     let K = given(tuning)?.unwrap_or_else(|| {
         let all_at_one = |n: usize| placed(&vec![-1.0; n]);
         blocks.lengths().into_iter().map(all_at_one).collect()
@@ -97,7 +114,7 @@ fn assemble(
     let mut gains = vec![];
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
         let injected = injected(&copy, blocks, place);
-        let Some(innovation) = copy.innovation(*output) else {
+        let Some(innovation) = limit.innovation(&copy, *output) else {
             continue;
         };
         let constants: Vec<f64> = K[*output]
@@ -105,12 +122,12 @@ fn assemble(
             .enumerate()
             .map(|(j, k)| θ[*output].powi(j as i32 + 1) * k)
             .collect();
+        let powers = constants.iter().enumerate();
+        let steady: Vec<(f64, f64)> = powers.map(|(j, k)| (*k, (j + 1) as f64)).collect();
+        let timed = transient::gains(transient.as_ref(), &copy, *output, θ[*output], &steady);
         let gain = match classical {
-            true => constants
-                .iter()
-                .map(|&k| graph.constant(k).node())
-                .collect(),
-            false => lee(extended, chain, &constants),
+            true => timed,
+            false => lee(extended, chain, &timed),
         };
         let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
         let f: Vec<Node> = chain
@@ -132,6 +149,7 @@ fn assemble(
     }
     let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
     let mut parameters = vec![("θ".to_owned(), text(&θ))];
+    parameters.extend(transient.as_ref().map(Transient::parameter));
     parameters.extend(
         K.iter()
             .enumerate()
@@ -144,6 +162,14 @@ fn assemble(
         gains,
         parameters,
     })
+}
+
+/// θ, which has no default.
+fn theta(tuning: &Tuning, chains: usize) -> Result<Vec<f64>, TuningError> {
+    let missing = || TuningError::new("theta", "a positive number per chain", "nothing");
+    tuning
+        .positive_per_chain("theta", chains)?
+        .ok_or_else(missing)
 }
 
 /// y_{i+1}, …, y_p in place of the states they show.

@@ -1,8 +1,11 @@
 //! The constant gain: Δ_θ, S by Lemma 1 or given, r, and the window of Theorem 2.
 
+use lynkeus_expr::Node;
 use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
 
 use super::form::{Form, Partial};
+use crate::estimate::Copy;
+use crate::peaking::{Transient, transient};
 use crate::{Tuning, TuningError};
 
 /// The numbers of the gain.
@@ -12,22 +15,14 @@ pub(super) struct Gains {
     pub r: Vec<f64>,
     pub S: Vec<Tridiagonal>,
     pub divided: bool,
+    pub transient: Option<Transient>,
     pub notes: Vec<String>,
 }
 
 impl Gains {
     pub fn new(form: &Form, tuning: &Tuning) -> Result<Self, TuningError> {
         let count = form.assignment.chains.len();
-        let missing = || {
-            TuningError::new(
-                "theta",
-                "a positive number (the gain grows like theta^n)",
-                "nothing",
-            )
-        };
-        let θ = tuning
-            .positive_per_chain("theta", count)?
-            .ok_or_else(missing)?;
+        let θ = theta(tuning, count)?;
         let divided = tuning.flag("partials")?;
         tuning.choice("gain", &["lemma1"])?;
         let (S, ρ) = match explicit(tuning)? {
@@ -45,6 +40,7 @@ impl Gains {
             r,
             S,
             divided,
+            transient: Transient::read(tuning, count)?,
             notes: vec![],
         };
         gains.notes.extend(window(form, &gains.δ));
@@ -58,6 +54,14 @@ impl Gains {
         column.map(|(j, s)| self.r[i] * power(j) * s).collect()
     }
 
+    /// The same at time t.
+    pub fn timed(&self, copy: &Copy<'_, '_>, i: usize) -> Vec<Node> {
+        let exponent = |j: usize| self.δ[i] * (j + 1) as f64;
+        let constants = self.chain(i).into_iter().enumerate();
+        let steady: Vec<(f64, f64)> = constants.map(|(j, gain)| (gain, exponent(j))).collect();
+        transient::gains(self.transient.as_ref(), copy, i, self.θ[i], &steady)
+    }
+
     /// The numbers, for the reader.
     pub fn parameters(&self) -> Vec<(String, String)> {
         let list = |values: &[f64]| {
@@ -69,12 +73,22 @@ impl Gains {
             ("δ".to_owned(), list(&self.δ)),
             ("r".to_owned(), list(&self.r)),
         ];
+        rows.extend(self.transient.as_ref().map(Transient::parameter));
         for (i, s) in self.S.iter().enumerate() {
             rows.push((format!("S{} diagonal", i + 1), list(s.diagonal())));
             rows.push((format!("S{} beside it", i + 1), list(s.off_diagonal())));
         }
         rows
     }
+}
+
+/// θ, which has no default.
+pub(super) fn theta(tuning: &Tuning, chains: usize) -> Result<Vec<f64>, TuningError> {
+    let expected = "a positive number (the gain grows like theta^n)";
+    let missing = || TuningError::new("theta", expected, "nothing");
+    tuning
+        .positive_per_chain("theta", chains)?
+        .ok_or_else(missing)
 }
 
 fn lemma1_matrices(
@@ -112,7 +126,7 @@ fn lemma1_matrices(
 
 /// δ: given, or δ = 1 for the leading chain and 2n₁/(2n₂−1) for the other, the
 /// middle of Theorem 2's window.
-fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, TuningError> {
+pub(super) fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, TuningError> {
     let lengths = form.assignment.lengths();
     if let Some(δ) = tuning.positive_per_chain("delta", lengths.len())? {
         return Ok(δ);
@@ -126,7 +140,7 @@ fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, TuningError> {
 }
 
 /// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁.
-fn window(form: &Form, δ: &[f64]) -> Option<String> {
+pub(super) fn window(form: &Form, δ: &[f64]) -> Option<String> {
     let lengths = form.assignment.lengths();
     let [_, _] = lengths[..] else { return None };
     let lead = form.assignment.leading;

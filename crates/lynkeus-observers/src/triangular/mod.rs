@@ -11,12 +11,14 @@
 
 mod form;
 mod gains;
+mod low_power;
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
 
 use crate::conditions::names;
 use crate::estimate::Copy;
+use crate::peaking::{self, InnovationLimit};
 use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
 use form::{Form, Partial, form};
 use gains::Gains;
@@ -37,7 +39,20 @@ impl Family for Triangular {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["theta", "delta", "r", "gain", "S", "partials", "chains"]
+        &[
+            "theta",
+            "delta",
+            "r",
+            "gain",
+            "S",
+            "partials",
+            "chains",
+            "innovation_limit",
+            "transient",
+            "form",
+            "low_power_poles",
+            "low_power_k",
+        ]
     }
 
     fn examine(
@@ -58,6 +73,9 @@ impl Family for Triangular {
                 return Err(DesignError::Refused(Box::new(examination)));
             }
         };
+        if peaking::asked_for(tuning, &["S", "r", "gain"])? {
+            return Ok(low_power::assemble(extended, tuning, form)?);
+        }
         let gains = Gains::new(&form, tuning)?;
         Ok(assemble(extended, tuning, form, &gains)?)
     }
@@ -72,14 +90,16 @@ fn assemble(
 ) -> Result<Design, TuningError> {
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
+    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let mut table = vec![];
     for (i, chain) in form.assignment.chains.iter().enumerate() {
-        let Some(innovation) = copy.innovation(i) else {
+        let Some(innovation) = limit.innovation(&copy, i) else {
             continue;
         };
         let constants = gains.chain(i);
-        let scaled = scaled(graph, &copy, &form.partials[i], &constants, gains.divided);
+        let timed = gains.timed(&copy, i);
+        let scaled = scaled(graph, &copy, &form.partials[i], &timed, gains.divided);
         for (&state, gain) in chain.states.iter().zip(scaled) {
             let correction = graph.expr(gain) * graph.expr(innovation);
             derivatives[state] = (graph.expr(derivatives[state]) - correction).node();
@@ -108,7 +128,7 @@ fn scaled(
     graph: &Graph,
     copy: &Copy<'_, '_>,
     partials: &[Partial],
-    constants: &[f64],
+    gains: &[Node],
     divided: bool,
 ) -> Vec<Node> {
     let nodes: Vec<Node> = partials.iter().map(|p| p.node).collect();
@@ -116,14 +136,14 @@ fn scaled(
     let mut ε = 1.0;
     let mut product = graph.constant(1.0);
     let mut scaled = vec![];
-    for (j, &constant) in constants.iter().enumerate() {
+    for (j, &gain) in gains.iter().enumerate() {
         if j > 0 {
             ε *= partials[j - 1].sign;
             product = product * graph.expr(at_estimate[j - 1]);
         }
         scaled.push(match divided {
-            true => (graph.constant(constant) / product).node(),
-            false => graph.constant(ε * constant).node(),
+            true => (graph.expr(gain) / product).node(),
+            false => (graph.constant(ε) * graph.expr(gain)).node(),
         });
     }
     scaled

@@ -4,6 +4,7 @@
 mod block_triangular;
 mod common;
 mod drift_observable;
+mod peaking;
 mod state_affine;
 mod triangular;
 mod unknown_input;

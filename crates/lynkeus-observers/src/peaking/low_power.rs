@@ -1,0 +1,297 @@
+//! Astolfi and Marconi, *A high-gain nonlinear observer with limited gain power*,
+//! IEEE Trans. Automatic Control 60 (2015) 3059–3064.
+//!
+//! For x_i' = x_{i+1}, x_n' = φ(x) the paper has n − 1 blocks ξ_i ∈ R² with
+//! ξ_i' = A ξ_i + N ξ_{i+1} + D₂(ℓ) K_i e_i, D₂ = diag(ℓ, ℓ²), e_1 = y − Cξ_1,
+//! e_i = Bᵀξ_{i−1} − Cξ_i: every gain is at most ℓ², where the standard observer has ℓⁿ.
+//! The first entry of ξ_i is x̂_i, the second another estimate c_{i+1} of x_{i+1}, and
+//! x̂_n = c_n.
+//!
+//! Here x_i' = f_i(x_1, …, x_{i+1}, u) with partials a_i = ∂f_i/∂x_{i+1}. In the coordinates
+//! a_1 ⋯ a_{i−1} x_i the plant is one of integrators up to terms that a large ℓ
+//! suppresses; back from there only the second gain of a block keeps a partial, and
+//! that is a single one:
+//!
+//! x̂_i'     = f_i(x̂_1, …, x̂_i, c_{i+1}, u)                + ℓ k_i1 e_i
+//! c_{i+1}' = f_{i+1}(x̂_1, …, x̂_i, c_{i+1}, c_{i+2}, u) + ℓ² k_i2/a_i e_i,   e_i = c_i − x̂_i.
+//!
+//! With `clamp` every c is limited to its range where it drives something else: in f, and in
+//! e_{i+1}. Then each block is driven by bounded signals and peaks by a power of ℓ at
+//! most one, not n − 1; that is the saturation of Astolfi, Marconi, Praly and Teel, *Low-power
+//! peaking-free high-gain observers*, Automatica 98 (2018) 169–179.
+
+use lynkeus_expr::{Graph, Node};
+use lynkeus_gain::low_power::{self, Coefficients};
+
+use super::transient::{self, Transient};
+use crate::estimate::Copy;
+use crate::{Observer, Signal, Tuning, TuningError, Value};
+
+/// The choice of form.
+pub(crate) const FORM: &str = "form";
+/// Eigenvalues of M.
+pub(crate) const POLES: &str = "low_power_poles";
+/// The coefficients themselves.
+pub(crate) const GIVEN: &str = "low_power_k";
+
+/// Whether the study asks for this form. If so, the keys that belong to the standard one are
+/// refused; if not, those of this one.
+pub(crate) fn asked_for(tuning: &Tuning, of_standard: &[&str]) -> Result<bool, TuningError> {
+    let form = tuning.choice(FORM, &["standard", "low-power"])?;
+    let low_power = form.as_deref() == Some("low-power");
+    let foreign: &[&str] = if low_power {
+        of_standard
+    } else {
+        &[POLES, GIVEN]
+    };
+    match foreign.iter().find(|key| tuning.values.contains_key(**key)) {
+        None => Ok(low_power),
+        Some(key) => {
+            let asked = if low_power { "low-power" } else { "standard" };
+            let expected = format!("no such key with form = \"{asked}\", which does not read it");
+            Err(TuningError::new(key, expected, &tuning.values[*key]))
+        }
+    }
+}
+
+/// K_1, …, K_{n−1} of each chain.
+pub(crate) struct LowPower {
+    pub K: Vec<Coefficients>,
+}
+
+impl LowPower {
+    /// Given, or by the eigenvalues of M, which are all −1 if nothing is given.
+    pub fn read(tuning: &Tuning, lengths: &[usize]) -> Result<Self, TuningError> {
+        let K = match (tuning.values.get(GIVEN), tuning.values.get(POLES)) {
+            (Some(_), Some(_)) => {
+                let expected = format!("{GIVEN} or {POLES}, which both decide the coefficients");
+                return Err(TuningError::new(POLES, expected, "both"));
+            }
+            (Some(given), None) => explicit(given, lengths)?,
+            (None, Some(poles)) => placed(poles, lengths)?,
+            (None, None) => lengths.iter().map(|n| low_power::at_one(n - 1)).collect(),
+        };
+        Ok(Self { K })
+    }
+
+    /// For the reader.
+    pub fn parameters(&self) -> Vec<(String, String)> {
+        let pair = |k: &[f64; 2]| format!("({}, {})", k[0], k[1]);
+        let row = |(i, K): (usize, &Coefficients)| {
+            let K: Vec<String> = K.iter().map(pair).collect();
+            (format!("K of chain {}", i + 1), K.join(", "))
+        };
+        self.K.iter().enumerate().map(row).collect()
+    }
+}
+
+/// Lists of pairs (k_i1, k_i2), one list per chain.
+fn explicit(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
+    let expected = "one list per chain of a pair [k1, k2] per state but the last";
+    let chains = rows(GIVEN, given, lengths.len(), expected)?;
+    let mut found = vec![];
+    for (chain, n) in chains.iter().zip(lengths) {
+        let pairs = rows(GIVEN, chain, n - 1, expected)?;
+        let pair = |pair: &Value| match pair {
+            Value::List(pair) => match pair[..] {
+                [Value::Number(a), Value::Number(b)] => Ok([a, b]),
+                _ => Err(TuningError::new(GIVEN, expected, given)),
+            },
+            _ => Err(TuningError::new(GIVEN, expected, given)),
+        };
+        let coefficients: Coefficients = pairs.iter().map(pair).collect::<Result<_, _>>()?;
+        let abscissa = low_power::abscissa(&coefficients);
+        // a chain of one state has no block, hence no eigenvalue
+        let stable = coefficients.is_empty() || abscissa < 0.0;
+        if !stable {
+            let expected =
+                "coefficients that make M stable, every eigenvalue with a negative real part";
+            let found = format!("{chain}, with an eigenvalue of real part {abscissa:.4}");
+            return Err(TuningError::new(GIVEN, expected, found));
+        }
+        found.push(coefficients);
+    }
+    Ok(found)
+}
+
+/// Lists of 2n − 2 negative numbers, one list per chain.
+fn placed(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
+    let expected = "one list per chain of 2n − 2 negative numbers, n being its states";
+    let chains = rows(POLES, given, lengths.len(), expected)?;
+    let mut found = vec![];
+    for (chain, n) in chains.iter().zip(lengths) {
+        let number = |pole: &Value| match pole {
+            Value::Number(pole) if *pole < 0.0 => Ok(*pole),
+            _ => Err(TuningError::new(POLES, expected, given)),
+        };
+        let poles = rows(POLES, chain, 2 * (n - 1), expected)?;
+        let poles: Vec<f64> = poles.iter().map(number).collect::<Result<_, _>>()?;
+        let beyond = "poles whose coefficients stay in the range of numbers";
+        let K = low_power::place(&poles).ok_or_else(|| TuningError::new(POLES, beyond, chain))?;
+        found.push(K);
+    }
+    Ok(found)
+}
+
+fn rows<'v>(
+    key: &str,
+    value: &'v Value,
+    count: usize,
+    expected: &str,
+) -> Result<&'v [Value], TuningError> {
+    match value {
+        Value::List(rows) if rows.len() == count => Ok(rows),
+        _ => Err(TuningError::new(
+            key,
+            format!("{expected} ({count} here)"),
+            value,
+        )),
+    }
+}
+
+/// The partial that a constant gain is made for: with the sign that is proved, between
+/// its bounds in the middle of ratios.
+pub(crate) fn nominal(sign: f64, bounds: (f64, f64)) -> Option<f64> {
+    let middle = (bounds.0 * bounds.1).sqrt();
+    (middle > 0.0 && middle.is_finite()).then_some(sign * middle)
+}
+
+/// A chain to be put in this form.
+pub(crate) struct Part<'a> {
+    /// places of its states, sensor end first
+    pub states: &'a [usize],
+    /// f_1, …, f_n over the plant's symbols
+    pub f: &'a [Node],
+    /// what the second gain of each block is divided by, over the plant's symbols
+    pub divisors: &'a [Node],
+    /// x̂_1 − y
+    pub innovation: Node,
+    /// K_i
+    pub K: &'a [[f64; 2]],
+    /// ℓ = θ^δ
+    pub θ: f64,
+    pub δ: f64,
+    /// number of the chain in `theta`
+    pub number: usize,
+}
+
+/// The observer while its chains are added.
+pub(crate) struct Run<'c, 'e, 'p> {
+    copy: &'c Copy<'e, 'p>,
+    transient: Option<&'c Transient>,
+    starts: Vec<f64>,
+    derivatives: Vec<Node>,
+    /// c with its start and its derivative
+    copies: Vec<((Signal, f64), Node)>,
+}
+
+impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
+    pub fn new(
+        copy: &'c Copy<'e, 'p>,
+        tuning: &Tuning,
+        transient: Option<&'c Transient>,
+    ) -> Result<Self, TuningError> {
+        let starts = copy.states(tuning)?.into_iter().map(|(_, start)| start);
+        Ok(Self {
+            copy,
+            transient,
+            starts: starts.collect(),
+            derivatives: copy.at_estimate(&copy.extended.derivatives),
+            copies: vec![],
+        })
+    }
+
+    /// Corrects one chain; the steady gains with the states that they act on.
+    pub fn add(&mut self, part: &Part<'_>) -> Vec<(String, f64)> {
+        let n = part.states.len();
+        let constants = constants(part);
+        let gains = transient::gains(self.transient, self.copy, part.number, part.θ, &constants);
+        let graph = self.copy.extended.graph();
+        let signals: Vec<Signal> = (0..n).map(|j| self.second(part, j)).collect();
+        let mut names = vec![];
+        // a chain of one state has no block: its correction is ℓ e_1
+        for i in 0..n.max(2) - 1 {
+            let e = self.innovation(part, &signals, i);
+            let here = self.seen(part, &signals, &[i + 1]);
+            let f = self.copy.at_estimate_with(&part.f[i..=i], &here)[0];
+            self.derivatives[part.states[i]] = plus(graph, f, gains[2 * i], e);
+            names.push(self.copy.hats[part.states[i]].name.clone());
+            if i + 1 == n {
+                break;
+            }
+            let divisor = self.copy.at_estimate_with(&part.divisors[i..=i], &here)[0];
+            let gain = graph.expr(gains[2 * i + 1]) / graph.expr(divisor);
+            let next = self.seen(part, &signals, &[i + 1, i + 2]);
+            let f = self.copy.at_estimate_with(&part.f[i + 1..=i + 1], &next)[0];
+            let derivative = plus(graph, f, gain.node(), e);
+            names.push(signals[i + 1].name.clone());
+            if i + 2 == n {
+                self.derivatives[part.states[n - 1]] = derivative;
+            } else {
+                let start = self.starts[part.states[i + 1]];
+                self.copies
+                    .push(((signals[i + 1].clone(), start), derivative));
+            }
+        }
+        names
+            .into_iter()
+            .zip(constants.iter().map(|c| c.0))
+            .collect()
+    }
+
+    /// c_{j+1}, counted from 0: x̂_n for the last.
+    fn second(&self, part: &Part<'_>, j: usize) -> Signal {
+        let hat = &self.copy.hats[part.states[j]];
+        if j + 1 == part.states.len() {
+            return hat.clone();
+        }
+        let name = format!("second estimate of {}", hat.name);
+        let symbol = self.copy.extended.graph().symbol(&name).node();
+        Signal { name, symbol }
+    }
+
+    /// y − x̂_1, then c_i − x̂_i.
+    fn innovation(&self, part: &Part<'_>, signals: &[Signal], i: usize) -> Node {
+        let graph = self.copy.extended.graph();
+        match i {
+            0 => (-graph.expr(part.innovation)).node(),
+            _ => {
+                let state = part.states[i];
+                let c = self.copy.seen_as(state, signals[i].symbol);
+                (graph.expr(c) - graph.expr(self.copy.hats[state].symbol)).node()
+            }
+        }
+    }
+
+    /// x_{j+1} as c_{j+1} for the given j, counted from 0.
+    fn seen(&self, part: &Part<'_>, signals: &[Signal], places: &[usize]) -> Vec<(usize, Node)> {
+        let inside = places.iter().filter(|&&j| j < part.states.len());
+        inside
+            .map(|&j| (part.states[j], signals[j].symbol))
+            .collect()
+    }
+
+    /// The observer, dimension Σ max(1, 2n − 2).
+    pub fn finish(self, family: &'static str, tuning: &Tuning) -> Result<Observer, TuningError> {
+        let mut observer = self.copy.observer(family, tuning, self.derivatives)?;
+        for (state, derivative) in self.copies {
+            observer.states.push(state);
+            observer.derivatives.push(derivative);
+        }
+        Ok(observer)
+    }
+}
+
+/// (ℓk_i1, 1), (ℓ²k_i2, 2), … with their powers of ℓ as powers of θ.
+fn constants(part: &Part<'_>) -> Vec<(f64, f64)> {
+    let (L, δ) = (part.θ.powf(part.δ), part.δ);
+    if part.K.is_empty() {
+        return vec![(L, δ)];
+    }
+    let block = |k: &[f64; 2]| [(L * k[0], δ), (L * L * k[1], 2.0 * δ)];
+    part.K.iter().flat_map(block).collect()
+}
+
+fn plus(graph: &Graph, f: Node, gain: Node, e: Node) -> Node {
+    (graph.expr(f) + graph.expr(gain) * graph.expr(e)).node()
+}

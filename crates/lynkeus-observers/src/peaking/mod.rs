@@ -1,0 +1,10 @@
+//! Remedies against peaking and noise that families share: a limit on the
+//! innovation, another θ in the transient, the low-power form.
+
+mod innovation;
+mod low_power;
+pub(crate) mod transient;
+
+pub(crate) use innovation::InnovationLimit;
+pub(crate) use low_power::{LowPower, Part, Run, asked_for, nominal};
+pub(crate) use transient::Transient;

@@ -1,0 +1,119 @@
+//! Another θ in the transient than in the steady state.
+
+use std::collections::BTreeMap;
+
+use lynkeus_expr::Node;
+
+use crate::estimate::Copy;
+use crate::{Tuning, TuningError, Value};
+
+/// The study's key.
+pub(crate) const KEY: &str = "transient";
+
+/// θ(t): one value up to `until`, the study's `theta` after it, at once or falling
+/// (or rising) to it exponentially.
+pub(crate) struct Transient {
+    /// per chain
+    pub θ: Vec<f64>,
+    /// on the axis of time of the study
+    until: f64,
+    /// time constant of the change
+    fall: Option<f64>,
+}
+
+impl Transient {
+    /// The key `transient`, for `count` chains.
+    pub fn read(tuning: &Tuning, count: usize) -> Result<Option<Self>, TuningError> {
+        let Some(value) = tuning.values.get(KEY) else {
+            return Ok(None);
+        };
+        let expected = "a table { theta = …, until = time }, and fall = time constant if the change is to be smooth";
+        let wrong = || TuningError::new(KEY, expected, value);
+        let Value::Table(table) = value else {
+            return Err(wrong());
+        };
+        if table
+            .keys()
+            .any(|k| !["theta", "until", "fall"].contains(&k.as_str()))
+        {
+            return Err(wrong());
+        }
+        let (Some(_), Some(Value::Number(until))) = (table.get("theta"), table.get("until")) else {
+            return Err(wrong());
+        };
+        let θ = positive(table, "theta", count)?.ok_or_else(wrong)?;
+        let fall = positive(table, "fall", 1)?.map(|fall| fall[0]);
+        Ok(Some(Self {
+            θ,
+            until: *until,
+            fall,
+        }))
+    }
+
+    /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the steady `θ`.
+    pub fn gains(
+        &self, copy: &Copy<'_, '_>, i: usize, θ: f64, steady: &[(f64, f64)]
+    ) -> Vec<Node> {
+        let graph = copy.extended.graph();
+        let time = graph.expr(copy.extended.plant.time);
+        let until = graph.constant(self.until);
+        let ratio = self.θ[i] / θ;
+        let gain = |&(gain, exponent): &(f64, f64)| match self.fall {
+            None => {
+                let transient = graph.constant(gain * ratio.powf(exponent));
+                time.less(until).select(transient, graph.constant(gain))
+            }
+            Some(fall) => {
+                let since = (time - until).max(graph.constant(0.0));
+                let left = (-since / graph.constant(fall)).exp();
+                // θ(t)/θ
+                let ratio = graph.constant(1.0) + graph.constant(ratio - 1.0) * left;
+                graph.constant(gain) * ratio.pow(graph.constant(exponent))
+            }
+        };
+        steady.iter().map(gain).map(|gain| gain.node()).collect()
+    }
+
+    /// For the reader.
+    pub fn parameter(&self) -> (String, String) {
+        let θ: Vec<String> = self.θ.iter().map(f64::to_string).collect();
+        let mut text = format!("{} until t = {}", θ.join(", "), self.until);
+        if let Some(fall) = self.fall {
+            text += &format!(", then to θ with the time constant {fall}");
+        }
+        ("θ in the transient".to_owned(), text)
+    }
+}
+
+/// The gains of chain `i`, with or without a transient.
+pub(crate) fn gains(
+    transient: Option<&Transient>,
+    copy: &Copy<'_, '_>,
+    i: usize,
+    θ: f64,
+    steady: &[(f64, f64)],
+) -> Vec<Node> {
+    let graph = copy.extended.graph();
+    match transient {
+        Some(transient) => transient.gains(copy, i, θ, steady),
+        None => steady
+            .iter()
+            .map(|(gain, _)| graph.constant(*gain).node())
+            .collect(),
+    }
+}
+
+/// A positive number or one per chain, with the key named as `transient.theta`.
+fn positive(
+    table: &BTreeMap<String, Value>,
+    field: &str,
+    count: usize,
+) -> Result<Option<Vec<f64>>, TuningError> {
+    let inner = Tuning {
+        values: table.clone(),
+        ..Tuning::default()
+    };
+    inner.positive_per_chain(field, count).map_err(|error| {
+        TuningError::new(KEY, format!("{} for {field}", error.expected), error.found)
+    })
+}

@@ -1,0 +1,103 @@
+//! The chains in the low-power form: dimension 2n − 2, gains of at most ℓ² with ℓ = θ^δ.
+//!
+//! Its errors have the sizes of the standard form's, x_j like ℓ^{j−1}, so that the
+//! exponents of Theorem 2 serve two chains here as well.
+
+use lynkeus_expr::Node;
+use lynkeus_gain::low_power::tolerates;
+use lynkeus_structure::Extended;
+
+use super::NAME;
+use super::form::{Form, Partial};
+use super::gains::{exponents, theta, window};
+use crate::estimate::Copy;
+use crate::peaking::{InnovationLimit, LowPower, Part, Run, Transient, nominal};
+use crate::{ChainGain, Design, Tuning, TuningError};
+
+pub(super) fn assemble(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: Form,
+) -> Result<Design, TuningError> {
+    let chains = &form.assignment.chains;
+    let (θ, δ) = (theta(tuning, chains.len())?, exponents(&form, tuning)?);
+    let transient = Transient::read(tuning, chains.len())?;
+    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
+    let coefficients = LowPower::read(tuning, &form.assignment.lengths())?;
+    let divided = tuning.flag("partials")?;
+    let copy = Copy::new(extended, tuning);
+    let mut run = Run::new(&copy, tuning, transient.as_ref())?;
+    let (mut gains, mut notes) = (vec![], vec![]);
+    for (i, chain) in chains.iter().enumerate() {
+        let Some(innovation) = limit.innovation(&copy, i) else {
+            continue;
+        };
+        let derivative = |&state: &usize| extended.derivatives[state];
+        let f: Vec<Node> = chain.states.iter().map(derivative).collect();
+        let output = &extended.outputs[i].variable.name;
+        if !divided {
+            notes.extend(variation(output, &form.partials[i], &coefficients.K[i]));
+        }
+        let entries = run.add(&Part {
+            states: &chain.states,
+            f: &f,
+            divisors: &divisors(extended, &form.partials[i], divided)?,
+            innovation,
+            K: &coefficients.K[i],
+            θ: θ[i],
+            δ: δ[i],
+            number: i,
+        });
+        let output = output.clone();
+        gains.push(ChainGain { output, entries });
+    }
+    notes.extend(window(&form, &δ));
+    let list = |values: &[f64]| {
+        values
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let mut parameters = vec![("θ".to_owned(), list(&θ)), ("δ".to_owned(), list(&δ))];
+    parameters.extend(transient.as_ref().map(Transient::parameter));
+    parameters.extend(coefficients.parameters());
+    Ok(Design {
+        observer: run.finish(NAME, tuning)?,
+        examination: form.examination,
+        gains,
+        parameters,
+        notes,
+    })
+}
+
+/// a_i itself, or the constant that stands for it.
+fn divisors(
+    extended: &Extended<'_>,
+    partials: &[Partial],
+    divided: bool,
+) -> Result<Vec<Node>, TuningError> {
+    let divisor = |partial: &Partial| match (divided, nominal(partial.sign, partial.bounds)) {
+        (true, _) => Ok(partial.node),
+        (false, Some(middle)) => Ok(extended.graph().constant(middle).node()),
+        (false, None) => {
+            let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model, or set partials = true";
+            let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
+            Err(TuningError::new("form", expected, found))
+        }
+    };
+    partials.iter().map(divisor).collect()
+}
+
+/// What the reader should know where the partials move and the gain does not.
+fn variation(output: &str, partials: &[Partial], K: &[[f64; 2]]) -> Option<String> {
+    // to the geometric mean, which the gain is made for
+    let ratio = |p: &Partial| {
+        let half = (p.bounds.1 / p.bounds.0).sqrt();
+        (1.0 / half, half)
+    };
+    let ratios: Vec<(f64, f64)> = partials.iter().map(ratio).collect();
+    (!partials.is_empty() && !tolerates(K, &ratios)).then(|| {
+        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; partials = true makes M constant")
+    })
+}
