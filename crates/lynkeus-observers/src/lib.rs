@@ -14,6 +14,7 @@ pub mod block_triangular;
 mod certificate;
 mod conditions;
 pub mod drift_observable;
+mod enclosure;
 mod estimate;
 mod family;
 mod observer;

@@ -50,7 +50,7 @@ pub(super) fn design(
     })
 }
 
-fn given(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
+pub(super) fn given(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
     let Some(found) = tuning.numbers("theta")? else {
         return Ok(None);
     };

@@ -19,20 +19,19 @@
 //! blocks of Λ₂ have to be square: else the correction is Π_k ζ₁, and the step to (24)
 //! does not hold as printed.
 
-use lynkeus_expr::{Binary, Node, Op, Unary, jacobian};
+use lynkeus_expr::{Node, jacobian};
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{Matrix, Region, range_within};
+use lynkeus_structure::{Matrix, Region};
 
 use super::assemble::Thetas;
 use super::form::Form;
+use crate::enclosure::Enclosure;
 use crate::{DesignError, TuningError};
 
 /// θ₁ exceeds its bound by this factor.
 const MARGIN: f64 = 1.1;
 /// Larger gains are not chosen: no integrator follows them.
 const LARGEST: f64 = 1e6;
-/// Cells examined per end of the range of an entry.
-const CELLS: usize = 300;
 
 /// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so.
 pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Thetas, DesignError> {
@@ -154,35 +153,16 @@ fn rate<'p>(form: &Form<'_, 'p>, A: &Matrix<'p>) -> Result<Matrix<'p>, DesignErr
 /// An upper bound over the box of the Frobenius norm, hence of the spectral norm.
 fn norm(form: &Form<'_, '_>, A: &Matrix<'_>) -> Result<f64, DesignError> {
     let region = form.extended.region();
+    let box_ = Enclosure::new(form.extended.graph(), &region);
     let mut sum = 0.0;
     for node in A.nonzero() {
-        let bound = magnitude(form, node, &region)?;
+        let bound = box_.magnitude(node)?;
         if !bound.is_finite() {
             return Err(unbounded(form, node, &region));
         }
         sum += bound * bound;
     }
     Ok(sum.sqrt())
-}
-
-/// An upper bound of |node| over the box: of the whole expression or, where that
-/// is too hard, of its factors and terms one by one.
-fn magnitude(form: &Form<'_, '_>, node: Node, region: &Region) -> Result<f64, DesignError> {
-    let graph = form.extended.graph();
-    let bound = range_within(graph, node, region, CELLS)?
-        .enclosure
-        .magnitude();
-    if bound.is_finite() {
-        return Ok(bound);
-    }
-    let part = |node: Node| magnitude(form, node, region);
-    Ok(match graph.op(node) {
-        Op::Unary(Unary::Neg, a) => part(a)?,
-        Op::Binary(Binary::Add | Binary::Sub, a, b) => part(a)? + part(b)?,
-        Op::Binary(Binary::Mul, a, b) => part(a)? * part(b)?,
-        Op::Powi(a, n) if n > 0 => part(a)?.powi(n),
-        _ => bound,
-    })
 }
 
 fn unbounded(form: &Form<'_, '_>, node: Node, region: &Region) -> DesignError {

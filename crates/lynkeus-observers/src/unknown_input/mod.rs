@@ -20,12 +20,14 @@
 
 mod assemble;
 mod bound;
+mod constants;
 mod form;
 mod partition;
+mod theorem;
 
 use lynkeus_structure::Extended;
 
-use crate::{Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
 
 const NAME: &str = "unknown-input";
 
@@ -51,15 +53,40 @@ impl Family for UnknownInput {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        Ok(match partition::search(extended, tuning)? {
-            Ok((_, examination)) | Err(examination) => examination,
-        })
+        Ok(
+            match partition::search(extended, tuning, &extended.region())? {
+                Ok((_, examination)) | Err(examination) => examination,
+            },
+        )
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match partition::search(extended, tuning)? {
+        match partition::search(extended, tuning, &extended.region())? {
             Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
                 assemble::design(extended, tuning, &form, examination)
+            }
+            Ok((_, examination)) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        match partition::search(extended, tuning, &assumptions.region)? {
+            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
+                theorem::certificate(&form, examination, tuning, assumptions)
+            }
+            Ok((_, examination)) | Err(examination) if examination.refuted().is_some() => {
+                let checks = examination.checks;
+                Ok(Certificate::new(
+                    theorem::BASIS,
+                    &assumptions.region,
+                    checks,
+                ))
             }
             Ok((_, examination)) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))

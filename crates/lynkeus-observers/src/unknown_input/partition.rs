@@ -18,6 +18,7 @@ type Found<'e, 'p> = Result<(Form<'e, 'p>, Examination), Examination>;
 pub(super) fn search<'e, 'p>(
     extended: &'e Extended<'p>,
     tuning: &Tuning,
+    region: &Region,
 ) -> Result<Found<'e, 'p>, DesignError> {
     let (fit, chains, checks) = (Fit::DoesNotFit, vec![], vec![]);
     let layers = match layers::find(extended) {
@@ -33,8 +34,7 @@ pub(super) fn search<'e, 'p>(
         }
     };
     let given = given(extended, &layers, tuning)?;
-    let region = extended.region();
-    let shared = shared(extended, &layers, &region)?;
+    let shared = shared(extended, &layers, region)?;
     let candidates = match &given {
         Some(first) => vec![first.clone()],
         None => candidates(extended, &layers),
@@ -42,7 +42,7 @@ pub(super) fn search<'e, 'p>(
     let (mut undecided, mut refuted) = (None, vec![]);
     for first in candidates {
         let form = form(extended, &layers, first);
-        let own = conditions(&form, &region)?;
+        let own = conditions(&form, region)?;
         match crate::conditions::fit(&own) {
             Fit::Fits => return Ok(Ok(finish(form, shared, own))),
             Fit::Undecided => {

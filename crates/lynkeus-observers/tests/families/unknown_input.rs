@@ -1,5 +1,7 @@
 //! The family `unknown-input` against the formulas of its paper.
 
+mod theorem;
+
 use crate::common::{
     assert_close, assert_follows, design_with, plant, reference, refused, run, slope,
 };

@@ -1,0 +1,370 @@
+//! The constants of the proof of Theorem 1, for errors of any size inside the box.
+//!
+//! With e¹ = (e₁, G₁¹(v̂ − v)), e₁ = x̂₁¹ − x₁¹, the point X̃² = X̂² − D e₁ moves like
+//! X̃²' = f̄(x̂) + D x₁¹' − Ḋ e₁ − gain, free of v̂; so does X² with f̄(x), f̄_k = f̃^k − γ_k f̃₁¹.
+//! In the coordinates Z₁ = x₂¹, Z_k = P_{k−1} f̄_{k−1}, P_k the block k of Λ₂, where
+//! ∂Z_k/∂x^k = P_k and the signals s, x₁¹, t and their slopes are the same for both,
+//! e²_k = Z_k(X̃²) − Z_k(X²) obeys
+//!
+//! e₁'   = −2θ₁e₁ + e¹₂ + N₀e₁ + Σ_j N_j η_j,                        η = X̃² − X²
+//! e¹₂'  = −θ₁² Π e₁ + Ġ₁¹(G₁¹)⁺ e¹₂ − G₁¹ v'
+//! e²_k' = e²_{k+1} + Σ_{j≤k} Ψ_kj η_j + Σ_{j≤k} ∂Z_k/∂x^j Y_j e₁
+//!         − Σ_{j≤k} ∂Z_k/∂x^j P_j⁻¹ θ₂^j C^j_q (e²_1 + γ₁e₁)
+//!
+//! by the mean value theorem, each matrix a mean over a line inside the box. As
+//! η_k = P̄_k⁻¹ (e²_k − Σ_{j<k} ∂Z_k/∂x^j η_j), bounds of the entries bound everything.
+//! Π projects on the range of G₁¹; it only adds −2θ₁|e₁ − Πe₁|² to V̇₁.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{MissingInput, Node, jacobian};
+use lynkeus_gain::integrators::Chain;
+use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, sign};
+
+use super::form::Form;
+use crate::Assumptions;
+use crate::enclosure::{Enclosure, length, norm, product, times, up};
+
+/// Norms over the box of the matrices above.
+pub(super) struct Norms {
+    /// N₀
+    pub N0: f64,
+    /// N₁ and N₂
+    pub N: [f64; 2],
+    /// Ġ₁¹(G₁¹)⁺
+    pub turning: f64,
+    /// G₁¹ and its left inverse
+    pub G11: f64,
+    pub left: f64,
+    /// γ_k
+    pub γ: Vec<f64>,
+    /// ∂Z_k/∂x^j for j ≤ k
+    pub Z: Vec<Vec<f64>>,
+    /// |η_j| ≤ Σ_i W_ji |e²_i|
+    pub W: Vec<Vec<f64>>,
+    /// Ψ_kj
+    pub Ψ: Vec<Vec<f64>>,
+    /// Y_k
+    pub Y: Vec<f64>,
+    /// 1/P_k at points and for means
+    pub P_inverse: Vec<f64>,
+    /// whether Λ₂ is regular with the signals apart from the states they show
+    pub regular: Check,
+    /// what has no bound on the box
+    pub open: Vec<String>,
+}
+
+/// c₁, c₂, c₄ and c₅ of (24).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Constants {
+    pub c1: f64,
+    pub c2: f64,
+    pub c4: f64,
+    pub c5: f64,
+}
+
+/// The form at the signals that the observer knows, and how these move.
+struct Signals<'e, 'p> {
+    form: Form<'e, 'p>,
+    /// (signal, slope)
+    slopes: Vec<(Node, Node)>,
+    box_: Enclosure<'p>,
+}
+
+pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<Norms, MissingInput> {
+    let signals = Signals::new(form, assumptions)?;
+    let (form, box_) = (&signals.form, &signals.box_);
+    let q = form.q();
+    let (first, own) = (form.x11(), form.block(1));
+    let one = |n: usize| Matrix::identity(form.extended.graph(), n);
+    let γ: Vec<Matrix<'_>> = (1..=q)
+        .map(|k| form.γ_times(k, &one(first.len())))
+        .collect();
+    let left = form.G11().left_divide(&one(first.len()));
+
+    let N1 = form.jacobian(&first, &own);
+    let mut N0 = form.jacobian(&first, &first).plus(&N1.times(&γ[0]));
+    let mut N = [box_.norm(&N1)?, 0.0];
+    if q > 1 {
+        let N2 = form.jacobian(&first, &form.block(2));
+        N0 = N0.plus(&N2.times(&γ[1]));
+        N[1] = box_.norm(&N2)?;
+    }
+    let P = form.Λ2();
+    let Z = signals.coordinates(&P);
+    let inverse = |P: &Matrix<'_>| box_.inverse_norm(P);
+    let P_inverse: Vec<f64> = P.iter().map(inverse).collect::<Result<_, _>>()?;
+    let Z_norms = signals.lower(&Z)?;
+    let ψ = signals.remainders(&P, &Z, &γ);
+    let each = |A: &Matrix<'_>| box_.norm(A);
+    let Y: Vec<Matrix<'_>> = (1..=q).map(|k| signals.Y(k, &γ)).collect();
+    let turning = signals.along(&form.G11()).times(&left);
+    Ok(Norms {
+        N0: box_.norm(&N0)?,
+        N,
+        turning: box_.norm(&turning)?,
+        G11: box_.norm(&form.G11())?,
+        left: box_.norm(&left)?,
+        γ: γ.iter().map(each).collect::<Result<_, _>>()?,
+        W: inverse_triangle(&Z_norms, &P_inverse),
+        Z: Z_norms,
+        Ψ: signals.lower(&ψ)?,
+        Y: Y.iter().map(each).collect::<Result<_, _>>()?,
+        P_inverse,
+        regular: signals.regular(&P)?,
+        open: box_.open(),
+    })
+}
+
+impl<'e, 'p> Signals<'e, 'p> {
+    /// A symbol for each measured signal that G reads, apart from the state that it
+    /// shows: a mean over states does not move the signal.
+    fn new(form: &Form<'e, 'p>, assumptions: &Assumptions) -> Result<Self, MissingInput> {
+        let extended: &'e Extended<'p> = form.extended;
+        let graph = extended.graph();
+        let mut box_ = Enclosure::new(graph, &assumptions.region);
+        let mut slopes = vec![(extended.plant.time, graph.constant(1.0).node())];
+        let mut measured = HashMap::new();
+        for &state in &form.layers.layers[0] {
+            let variable = &extended.states[state];
+            let drift = assumptions.drift.get(state).copied().unwrap_or(0.0);
+            let slope = slope(extended, state, drift, &mut box_)?;
+            let symbol = graph
+                .symbol(&format!("{} as measured", variable.name))
+                .node();
+            let (min, max) = box_.side(variable.node);
+            box_.add(format!("{} as measured", variable.name), symbol, min, max);
+            measured.insert(variable.node, symbol);
+            slopes.push((symbol, slope));
+            // x₁¹ is a signal wherever it stands
+            if form.x11().contains(&state) {
+                slopes.push((variable.node, slope));
+            }
+        }
+        for input in &extended.inputs {
+            let name = format!("the derivative of {}", input.name);
+            slopes.push((input.node, box_.within(name, f64::INFINITY)));
+        }
+        let factors = &form.layers.factors;
+        let factors = factors.map(|node| graph.substitute(&[node], &measured)[0]);
+        let layers = Layers {
+            factors,
+            ..form.layers.clone()
+        };
+        let form = Form {
+            layers,
+            ..form.clone()
+        };
+        Ok(Self { form, slopes, box_ })
+    }
+
+    /// The derivative of each entry while states other than x₁¹ rest.
+    fn along(&self, A: &Matrix<'p>) -> Matrix<'p> {
+        let graph = self.form.extended.graph();
+        let signals: Vec<Node> = self.slopes.iter().map(|s| s.0).collect();
+        A.map(|node| {
+            let gradient = jacobian::forward(graph, &[node], &signals);
+            let terms = gradient
+                .row(0)
+                .map(|(i, d)| graph.expr(d) * graph.expr(self.slopes[i].1));
+            let sum = terms.reduce(|a, b| a + b);
+            sum.unwrap_or_else(|| graph.constant(0.0)).node()
+        })
+    }
+
+    fn column(&self, entries: &[Node]) -> Matrix<'p> {
+        let graph = self.form.extended.graph();
+        Matrix::from_fn(graph, (entries.len(), 1), |i, _| Some(entries[i]))
+    }
+
+    fn symbols(&self, states: &[usize]) -> Vec<Node> {
+        let states = states.iter();
+        states.map(|&i| self.form.extended.states[i].node).collect()
+    }
+
+    /// f̄_k
+    fn reduced(&self, k: usize) -> Matrix<'p> {
+        let form = &self.form;
+        let first = self.column(&form.drift(&form.x11()));
+        self.column(&form.drift(&form.block(k)))
+            .minus(&form.γ_times(k, &first))
+    }
+
+    /// Z₁, …, Z_q
+    fn coordinates(&self, P: &[Matrix<'p>]) -> Vec<Matrix<'p>> {
+        let first = self.column(&self.symbols(&self.form.block(1)));
+        let further = (1..self.form.q()).map(|k| P[k - 1].times(&self.reduced(k)));
+        std::iter::once(first).chain(further).collect()
+    }
+
+    /// ∂(column)/∂x^j
+    fn slopes_in(&self, column: &Matrix<'p>, j: usize) -> Matrix<'p> {
+        let x = self.symbols(&self.form.block(j));
+        Matrix::jacobian(column.graph(), &column.dense(), &x)
+    }
+
+    /// Norms of ∂(columns_k)/∂x^j for j ≤ k.
+    fn lower(&self, columns: &[Matrix<'p>]) -> Result<Vec<Vec<f64>>, MissingInput> {
+        let one = |k: usize, j: usize| match j <= k {
+            true => self.box_.norm(&self.slopes_in(&columns[k], j + 1)),
+            false => Ok(0.0),
+        };
+        let q = columns.len();
+        let row = |k| (0..q).map(|j| one(k, j)).collect();
+        (0..q).map(row).collect()
+    }
+
+    /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
+    /// signals. That it is singular there refutes the proof, not the observer.
+    fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, MissingInput> {
+        let graph = self.form.extended.graph();
+        let name = "Λ₂ is regular for estimates that differ from the measured signals";
+        for (k, P) in P
+            .iter()
+            .enumerate()
+            .skip(1)
+            .filter(|(_, P)| P.rows == P.columns)
+        {
+            let det = P
+                .determinant()
+                .unwrap_or_else(|| graph.constant(0.0).node());
+            let found = sign::keeps_sign(graph, name.to_owned(), det, self.box_.region())?.check;
+            if found.verdict != Condition::Proved {
+                return Ok(Check {
+                    verdict: Condition::Undecided(vec![]),
+                    detail: format!("block {}: {} ({})", k + 1, found.detail, found.verdict),
+                    ..found
+                });
+            }
+        }
+        Ok(Check {
+            name: name.to_owned(),
+            verdict: Condition::Proved,
+            detail: "each block's determinant keeps its sign".to_owned(),
+        })
+    }
+
+    /// ψ_k = Z_k' − Z_{k+1}, where X² moves by f̄ + D x₁¹' and the signals by their slopes.
+    fn remainders(&self, P: &[Matrix<'p>], Z: &[Matrix<'p>], γ: &[Matrix<'p>]) -> Vec<Matrix<'p>> {
+        let q = self.form.q();
+        let slope = |state: usize| {
+            let x = self.form.extended.states[state].node;
+            let found = self.slopes.iter().find(|s| s.0 == x);
+            found.map_or(x, |s| s.1)
+        };
+        let first: Vec<Node> = self.form.x11().into_iter().map(slope).collect();
+        let first = self.column(&first);
+        let moved = |j: usize| self.reduced(j).plus(&γ[j - 1].times(&first));
+        let one = |k: usize| {
+            let mut sum = self.along(&Z[k - 1]);
+            for j in 1..k {
+                sum = sum.plus(&self.slopes_in(&Z[k - 1], j).times(&moved(j)));
+            }
+            let last = match k == q {
+                true => moved(k),
+                false => γ[k - 1].times(&first),
+            };
+            sum.plus(&P[k - 1].times(&last))
+        };
+        (1..=q).map(one).collect()
+    }
+
+    /// Y_k = ∂f̄_k/∂x₁¹ + Σ_j ∂f̄_k/∂x^j γ_j − γ_k': what e₁ does to X̃².
+    fn Y(&self, k: usize, γ: &[Matrix<'p>]) -> Matrix<'p> {
+        let reduced = self.reduced(k);
+        let x = self.symbols(&self.form.x11());
+        let direct = Matrix::jacobian(reduced.graph(), &reduced.dense(), &x);
+        let mut sum = direct.minus(&self.along(&γ[k - 1]));
+        for j in 1..=(k + 1).min(self.form.q()) {
+            sum = sum.plus(&self.slopes_in(&reduced, j).times(&γ[j - 1]));
+        }
+        sum
+    }
+}
+
+/// A symbol with the range of x', drift included.
+fn slope(
+    extended: &Extended<'_>,
+    state: usize,
+    drift: f64,
+    box_: &mut Enclosure<'_>,
+) -> Result<Node, MissingInput> {
+    let name = &extended.states[state].name;
+    // what is open here must not be mixed up with what was before
+    let inside = Enclosure::new(extended.graph(), box_.region());
+    let (low, high) = inside.range(extended.derivatives[state])?;
+    let open = inside.open();
+    let label = match open.is_empty() {
+        true => format!("the slope of {name}"),
+        false => open.join(", "),
+    };
+    let symbol = extended.graph().symbol(&format!("slope of {name}")).node();
+    box_.add(label, symbol, low - drift, high + drift);
+    Ok(symbol)
+}
+
+/// W from |η_k| ≤ w_k (|e²_k| + Σ_{j<k} Z_kj |η_j|).
+fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
+    let q = w.len();
+    let mut W = vec![vec![0.0; q]; q];
+    for k in 0..q {
+        W[k][k] = w[k];
+        let through = |i: usize| {
+            let terms = (i..k).map(|j| times(Z[k][j], W[j][i]));
+            up(times(w[k], terms.sum()))
+        };
+        let row: Vec<f64> = (0..k).map(through).collect();
+        W[k][..k].copy_from_slice(&row);
+    }
+    W
+}
+
+impl Norms {
+    /// c₁, c₂, c₄ and c₅ for every θ₂ ≥ 1.
+    pub fn constants(&self) -> Constants {
+        let q = self.W.len();
+        let (S2, root) = (Chain::new(q), f64::sqrt);
+        let at = |i: usize| root(S2.inverse_diagonal[i]);
+        // |e₁| ≤ √2 √V₁, |e¹₂| ≤ θ₁ √V₁; √(1, 0)S₁(1, 0)ᵀ = 1, √(0, 1)S₁(0, 1)ᵀ = √2
+        let c1 = up(8f64.sqrt() * (self.N0 + self.turning));
+        let N = [self.N.to_vec()];
+        let through = product(&N, &self.W[..q.min(2)]);
+        let sum: f64 = (0..q.min(2)).map(|i| times(through[0][i], at(i))).sum();
+        let c2 = up(2.0 * sum);
+
+        let mut B = product(&self.Ψ, &self.W);
+        let back: Vec<f64> = (0..q).map(|k| self.back(&S2, k)).collect();
+        for (row, back) in B.iter_mut().zip(&back) {
+            row[0] += back;
+        }
+        let weighted = |k: usize| {
+            let terms = (0..q).map(|i| times(B[k][i], at(i)));
+            root(S2.diagonal[k]) * terms.sum::<f64>()
+        };
+        let weighted: f64 = (0..q).map(weighted).sum();
+        let κ = root(S2.largest / S2.smallest);
+        let c4 = up(2.0 * weighted.min(κ * norm(&B)));
+
+        let γ1 = self.γ[0];
+        let pushed = product(
+            &self.Z,
+            &self.Y.iter().map(|&y| vec![y]).collect::<Vec<_>>(),
+        );
+        let p: Vec<f64> = (0..q).map(|k| pushed[k][0] + times(back[k], γ1)).collect();
+        let c5 = up(8f64.sqrt() * (in_S(&S2, &p) + at(0) * γ1));
+        Constants { c1, c2, c4, c5 }
+    }
+
+    /// Σ_{j<k} ‖∂Z_k/∂x^j P_j⁻¹‖ C^j_q: what Λ₂ leaves of the correction beside the
+    /// constant gain.
+    pub fn back(&self, S2: &Chain, k: usize) -> f64 {
+        let terms = (0..k).map(|j| times(self.Z[k][j], self.P_inverse[j]) * S2.gain[j]);
+        up(terms.sum())
+    }
+}
+
+/// A bound of √(pᵀSp) for entries up to p.
+pub(super) fn in_S(S: &Chain, p: &[f64]) -> f64 {
+    let weighted: f64 = p.iter().zip(&S.diagonal).map(|(p, s)| p * s.sqrt()).sum();
+    up(weighted).min(up(S.largest.sqrt() * length(p) * (1.0 + 1e-9)))
+}

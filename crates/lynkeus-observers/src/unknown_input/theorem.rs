@@ -1,0 +1,342 @@
+//! What Theorem 1 guarantees, with the constants of its proof.
+//!
+//! V = V₁ + V₂ obeys, for θ₂ ≥ 1,
+//!
+//! V̇ ≤ −(θ₁ − c₁) V₁ − (θ₂ − c₄) V₂ + (c₂ + c₅) θ₂ √V₁ √V₂ + 2 (δ₁ √V₁ + δ₂ √V₂)
+//!
+//! where δ₁ and δ₂ hold what the observer does not know: v', disturbances, noise. The
+//! quadratic form is at most −λ V, λ > 0 where θ₂ > c₄ and
+//! θ₁ > c₁ + (c₂ + c₅)²θ₂²/(4(θ₂ − c₄)), so √V falls at the rate λ/2 down to 2|δ|/λ.
+
+use lynkeus_gain::integrators::Chain;
+use lynkeus_structure::{Check, Condition};
+
+use super::assemble::{Thetas, given};
+use super::bound;
+use super::constants::{self, Constants, Norms, in_S};
+use super::form::Form;
+use crate::enclosure::{figures, length, times, up};
+use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Tuning};
+
+pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
+/// Numbers that have to be exceeded are by this factor at least.
+const CLEAR: f64 = 1.0 + 1e-9;
+
+pub(super) fn certificate(
+    form: &Form<'_, '_>,
+    examination: Examination,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let norms = constants::norms(form, assumptions)?;
+    let c = norms.constants();
+    let thetas = match given(tuning)? {
+        Some(thetas) => Some(thetas),
+        None => bound::thetas(form).ok(),
+    };
+    let proof = Proof { form, norms, c };
+    let mut hypotheses = examination.checks;
+    hypotheses.push(proof.square());
+    hypotheses.push(proof.norms.regular.clone());
+    hypotheses.push(proof.finite());
+    hypotheses.push(proof.slow(assumptions));
+    hypotheses.extend(proof.gains(thetas.as_ref()));
+    let mut found = Certificate::new(BASIS, &assumptions.region, hypotheses);
+    proof.print_constants(thetas.as_ref(), &mut found.constants);
+    found.notes = proof.notes();
+    let proved = found.weakest().is_none();
+    if let Some(Thetas { θ1, θ2, .. }) = thetas.filter(|_| proved) {
+        proof.conclude([θ1, θ2], assumptions, &mut found)?;
+    }
+    Ok(found)
+}
+
+/// A form with the constants of its proof.
+struct Proof<'f, 'e, 'p> {
+    form: &'f Form<'e, 'p>,
+    norms: Norms,
+    c: Constants,
+}
+
+fn check(name: impl Into<String>, holds: bool, detail: impl Into<String>) -> Check {
+    Check {
+        name: name.into(),
+        verdict: match holds {
+            true => Condition::Proved,
+            // sufficient conditions: that they fail refutes nothing
+            false => Condition::Undecided(vec![]),
+        },
+        detail: detail.into(),
+    }
+}
+
+impl Proof<'_, '_, '_> {
+    fn square(&self) -> Check {
+        let wide = self.form.second.len();
+        let sizes: Vec<usize> = (1..=self.form.q())
+            .map(|k| self.form.block(k).len())
+            .collect();
+        let square = sizes.iter().all(|&size| size == wide);
+        let detail = match square {
+            true => format!("{wide} states in each block of X²"),
+            false => format!(
+                "{wide} outputs in x₂¹ for layers of {sizes:?} states: Λ₂⁺Λ₂ is a projection, and the step to (24) does not hold as printed"
+            ),
+        };
+        check("the blocks of Λ₂ are square", square, detail)
+    }
+
+    fn finite(&self) -> Check {
+        let Constants { c1, c2, c4, c5 } = self.c;
+        let finite = [c1, c2, c4, c5].iter().all(|c| c.is_finite());
+        let shown: Vec<&str> = self.norms.open.iter().map(String::as_str).take(4).collect();
+        let further = self.norms.open.len() > shown.len();
+        let detail = match (finite, self.norms.open.is_empty()) {
+            (true, _) => "bounds of f, G and their derivatives on the box".to_owned(),
+            (false, false) => format!(
+                "no bound of {}: declare min and max{}",
+                shown.join(", "),
+                if further { ", and so on" } else { "" }
+            ),
+            (false, true) => "Λ₂ has no bounded inverse as far as interval arithmetic can tell on a box this large: declare a smaller one".to_owned(),
+        };
+        check("c1, c2, c4 and c5 are finite on the box", finite, detail)
+    }
+
+    /// (H5)
+    fn slow(&self, assumptions: &Assumptions) -> Check {
+        let ε = self.unknown_drift(assumptions);
+        let detail = match ε == 0.0 {
+            true => "assumed constant".to_owned(),
+            false => format!("assumed: |v'| ≤ {}", figures(ε)),
+        };
+        check("(H5) v' is bounded", ε.is_finite(), detail)
+    }
+
+    /// θ₂ and θ₁ against what they have to exceed.
+    fn gains(&self, thetas: Option<&Thetas>) -> Vec<Check> {
+        let Some(&Thetas { θ1, θ2, .. }) = thetas else {
+            let (first, second) = self.smallest();
+            let detail = match first.is_finite() {
+                true => format!(
+                    "no theta is given; the proof asks for one like [{}, {}]",
+                    figures(first * 1.1),
+                    figures(second)
+                ),
+                false => "no theta is given, and the proof gives none on this box".to_owned(),
+            };
+            return vec![check("θ1 ≥ θ1*", false, detail)];
+        };
+        let second = self.c.c4.max(1.0) * CLEAR;
+        let first = self.first(θ2) * CLEAR;
+        let against = |found: f64, least: f64| {
+            let word = if found >= least { "≥" } else { "<" };
+            format!("{} {word} {}", figures(found), figures(least))
+        };
+        let mut checks = vec![check(
+            "θ2 ≥ θ2* = max(1, c4)",
+            θ2 >= second,
+            against(θ2, second),
+        )];
+        if θ2 >= second {
+            let name = "θ1 ≥ θ1* = c1 + (c2 + c5)²θ2²/(4(θ2 − c4))";
+            checks.push(check(name, θ1 >= first, against(θ1, first)));
+        }
+        checks
+    }
+
+    /// What θ₁ has to exceed for this θ₂ > c₄.
+    fn first(&self, θ2: f64) -> f64 {
+        let Constants { c1, c2, c4, c5 } = self.c;
+        let c = times(c2 + c5, θ2);
+        up(up(c1 + times(c, c) / (4.0 * (θ2 - c4))))
+    }
+
+    /// (θ₁*, θ₂) with the smallest θ₁* of all θ₂.
+    fn smallest(&self) -> (f64, f64) {
+        let θ2 = (2.0 * self.c.c4).max(1.0) * CLEAR;
+        (self.first(θ2), θ2)
+    }
+
+    fn print_constants(&self, thetas: Option<&Thetas>, constants: &mut Vec<Constant>) {
+        let Constants { c1, c2, c4, c5 } = self.c;
+        let c3 = up(8f64.sqrt() * self.norms.G11);
+        let (first, second) = self.smallest();
+        let mut list = vec![
+            ("c1", c1, "what f̃₁¹ and the turning of G₁¹ take from θ₁"),
+            ("c2", c2, "from V₂ to V₁ in (24), times θ₂"),
+            ("c3", c3, "of |v'|, divided by θ₁, in (24)"),
+            ("c4", c4, "what the nonlinearities of X² take from θ₂"),
+            ("c5", c5, "from V₁ to V₂ in (24), times θ₂"),
+            ("θ2*", c4.max(1.0), "θ₂ has to exceed it"),
+        ];
+        if let Some(Thetas { θ2, .. }) = thetas.filter(|t| t.θ2 > c4) {
+            list.push(("θ1*", self.first(*θ2), "θ₁ has to exceed it, with this θ₂"));
+        }
+        list.push(("θ1,0", first, "the smallest θ₁* of all θ₂"));
+        list.push(("θ2,0", second, "the θ₂ that allows it"));
+        let finite = list.into_iter().filter(|c| c.1.is_finite());
+        constants.extend(finite.map(|(name, value, meaning)| Constant::new(name, value, meaning)));
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![];
+        if self.norms.γ.iter().any(|&γ| γ > 0.0) {
+            notes.push("in the box beside plant and estimate: X̃² = X̂² − D (x̂₁¹ − y₁), at which Λ₂ is taken; with the key 'clamp' the observer sees to Λ₂'s argument, not to X̃² itself".to_owned());
+        }
+        notes
+    }
+
+    fn unknown_drift(&self, assumptions: &Assumptions) -> f64 {
+        let n = self.form.extended.plant_states();
+        length(assumptions.drift.get(n..).unwrap_or_default())
+    }
+
+    /// Rate, peak and ultimate bounds for gains that meet the hypotheses.
+    fn conclude(
+        &self,
+        θ: [f64; 2],
+        assumptions: &Assumptions,
+        found: &mut Certificate,
+    ) -> Result<(), DesignError> {
+        let λ = self.λ(θ);
+        found.rate = Some(λ / 2.0);
+        let peak = up(self.root_V_of(θ) * length(&self.out_of_V(θ)));
+        let list = &mut found.constants;
+        list.push(Constant::new(
+            "μ",
+            λ / 2.0,
+            "guaranteed decay rate of the error",
+        ));
+        list.push(Constant::new(
+            "λθ1",
+            peak,
+            "the factor by which the error may peak",
+        ));
+        let Some(δ) = self.unknown_forces(θ, assumptions)? else {
+            found.notes.push("no ultimate bound: G or Λ₂ reads measured signals, and the proof does not cover noise in them".to_owned());
+            return Ok(());
+        };
+        let root_V = up(2.0 * δ / λ);
+        let sizes: Vec<f64> = self.out_of_V(θ).iter().map(|s| up(s * root_V)).collect();
+        found.ultimate_bound = Some(length(&sizes));
+        found.ultimate = self.per_state(&sizes);
+        Ok(())
+    }
+
+    /// The smallest eigenvalue of −V̇ as a form in √V₁ and √V₂, rounded down.
+    fn λ(&self, [θ1, θ2]: [f64; 2]) -> f64 {
+        let Constants { c1, c2, c4, c5 } = self.c;
+        let (a, b, half) = (θ1 - c1, θ2 - c4, (c2 + c5) * θ2 / 2.0);
+        let root = ((a - b) * (a - b) / 4.0 + half * half).sqrt();
+        let determinant = a * b / up(1.0) - up(half * half);
+        determinant / up(up((a + b) / 2.0 + root))
+    }
+
+    /// |e₁|, |v̂ − v| and the |X̂² − X²| of each block for √V = 1.
+    fn out_of_V(&self, [θ1, θ2]: [f64; 2]) -> Vec<f64> {
+        let S2 = Chain::new(self.form.q());
+        let mut sizes = vec![2f64.sqrt(), times(self.norms.left, θ1)];
+        for (row, γ) in self.norms.W.iter().zip(&self.norms.γ) {
+            let term = |(i, W): (usize, &f64)| {
+                times(*W, θ2.powi(i as i32) * S2.inverse_diagonal[i].sqrt())
+            };
+            let η: f64 = row.iter().enumerate().map(term).sum();
+            sizes.push(up(η + γ * 2f64.sqrt()));
+        }
+        sizes
+    }
+
+    /// √V for an error of length one.
+    fn root_V_of(&self, [θ1, θ2]: [f64; 2]) -> f64 {
+        let (S1, S2) = (Chain::new(2), Chain::new(self.form.q()));
+        let largest = |S: &Chain| S.largest.sqrt() * CLEAR;
+        let V1 = largest(&S1) * (self.norms.G11 / θ1).max(1.0);
+        let γ = 1.0 + length(&self.norms.γ);
+        let row = |(k, row): (usize, &Vec<f64>)| length(row) / θ2.powi(k as i32);
+        let rows: Vec<f64> = self.norms.Z.iter().enumerate().map(row).collect();
+        up(length(&[V1, largest(&S2) * length(&rows) * γ]))
+    }
+
+    /// |(δ₁, δ₂)|; none where noise gets where the proof does not follow it.
+    fn unknown_forces(
+        &self,
+        [θ1, θ2]: [f64; 2],
+        assumptions: &Assumptions,
+    ) -> Result<Option<f64>, DesignError> {
+        let of = |states: &[usize]| {
+            let drifts = states
+                .iter()
+                .map(|&i| assumptions.drift.get(i).copied().unwrap_or(0.0));
+            length(&drifts.collect::<Vec<_>>())
+        };
+        let (S2, q) = (Chain::new(self.form.q()), self.form.q());
+        let first = of(&self.form.x11());
+        let ε = self.unknown_drift(assumptions);
+        let mut δ1 = first + up(2f64.sqrt() * self.norms.G11 * ε / θ1);
+        let pushed = |k: usize| -> f64 {
+            let force = |j: usize| of(&self.form.block(j + 1)) + self.norms.γ[j] * first;
+            let sum: f64 = (0..=k).map(|j| times(self.norms.Z[k][j], force(j))).sum();
+            sum / θ2.powi(k as i32)
+        };
+        let mut δ2 = in_S(&S2, &(0..q).map(pushed).collect::<Vec<_>>());
+        let [n1, n2] = self.noise(assumptions)?;
+        if n1 > 0.0 || n2 > 0.0 {
+            if self.reads_states() {
+                return Ok(None);
+            }
+            let square = self.form.first.len() == self.form.layers.factors.columns;
+            // 2I − Π is I for a square G₁¹
+            δ1 += θ1 * 2f64.sqrt() * if square { n1 } else { 2.0 * n1 };
+            let back: Vec<f64> = (0..q).map(|k| self.norms.back(&S2, k) * n2).collect();
+            δ2 += θ2 * S2.inverse_diagonal[0].sqrt() * n2 + in_S(&S2, &back);
+        }
+        Ok(Some(up(length(&[δ1, δ2]))))
+    }
+
+    /// Whether G or Λ₂ changes with the states.
+    fn reads_states(&self) -> bool {
+        let graph = self.form.extended.graph();
+        let mut nodes = self.form.layers.factors.nonzero();
+        nodes.extend(self.form.Λ2().iter().flat_map(|block| block.nonzero()));
+        let used = graph.symbols_of(&nodes);
+        self.form
+            .extended
+            .symbols()
+            .iter()
+            .any(|x| used.contains(x))
+    }
+
+    /// Lengths of the errors of y₁ and y₂, in units of the states they show.
+    fn noise(&self, assumptions: &Assumptions) -> Result<[f64; 2], DesignError> {
+        let extended = self.form.extended;
+        let graph = extended.graph();
+        let box_ = crate::enclosure::Enclosure::new(graph, &assumptions.region);
+        let one = |i: &usize| -> Result<f64, DesignError> {
+            let noise = assumptions.noise.get(*i).copied().unwrap_or(0.0);
+            let Some((_, slope, _)) = extended.outputs[*i].state.filter(|_| noise > 0.0) else {
+                return Ok(0.0);
+            };
+            let inverse = (1.0 / graph.expr(slope)).node();
+            Ok(up(noise * box_.magnitude(inverse)?))
+        };
+        let of = |outputs: &[usize]| -> Result<f64, DesignError> {
+            let sizes: Vec<f64> = outputs.iter().map(one).collect::<Result<_, _>>()?;
+            Ok(length(&sizes))
+        };
+        Ok([of(&self.form.first)?, of(&self.form.second)?])
+    }
+
+    fn per_state(&self, sizes: &[f64]) -> Vec<(String, f64)> {
+        let (form, extended) = (self.form, self.form.extended);
+        let n = extended.plant_states();
+        let unknown: Vec<usize> = (n..extended.states.len()).collect();
+        let mut groups = vec![form.x11(), unknown];
+        groups.extend((1..=form.q()).map(|k| form.block(k)));
+        let place = |i: usize| groups.iter().position(|g| g.contains(&i));
+        let states = extended.states.iter().enumerate();
+        states
+            .filter_map(|(i, s)| Some((s.name.clone(), *sizes.get(place(i)?)?)))
+            .collect()
+    }
+}
