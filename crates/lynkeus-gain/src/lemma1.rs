@@ -17,7 +17,11 @@
 //! instead, and its constants explode doubly exponentially with the length. Then
 //! s_kk > s²/d_{k−1} (Schur again, d the pivots of S) keeps S positive definite.
 
+mod kernel;
+
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+pub use kernel::{Breaking, Kernel, kernel};
 
 use crate::{Tridiagonal, TridiagonalError};
 
@@ -98,20 +102,7 @@ const RHO: f64 = 2.0;
 /// Bounds that are not positive and finite, a chain longer than 16, or bounds so
 /// far apart that the construction leaves the range of `f64`.
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
-    for (index, b) in bounds.iter().enumerate() {
-        let fine = b.lower > 0.0 && b.lower <= b.upper && b.upper.is_finite();
-        if !fine {
-            return Err(Error::Bounds {
-                index: index + 1,
-                lower: b.lower,
-                upper: b.upper,
-            });
-        }
-    }
-    let size = bounds.len() + 1;
-    if size > MAX_SIZE {
-        return Err(Error::TooLong { size });
-    }
+    let size = check(bounds)?;
     let w = scale(bounds);
     let scaled: Vec<Bounds> = bounds.iter().map(|b| b.times(w)).collect();
     let (mut diagonal, mut off) = (vec![1.0], vec![]);
@@ -131,6 +122,25 @@ pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
         true => Ok(Lemma1 { S, ρ: RHO, η }),
         false => Err(lost),
     }
+}
+
+/// The number of states of a chain with these bounds, if Lemma 1 can treat it.
+fn check(bounds: &[Bounds]) -> Result<usize, Error> {
+    for (index, b) in bounds.iter().enumerate() {
+        let fine = b.lower > 0.0 && b.lower <= b.upper && b.upper.is_finite();
+        if !fine {
+            return Err(Error::Bounds {
+                index: index + 1,
+                lower: b.lower,
+                upper: b.upper,
+            });
+        }
+    }
+    let size = bounds.len() + 1;
+    if size > MAX_SIZE {
+        return Err(Error::TooLong { size });
+    }
+    Ok(size)
 }
 
 /// 1/geometric mean of the bounds: w·a is then around one. In the coordinates

@@ -19,6 +19,7 @@ mod estimate;
 mod family;
 mod observer;
 mod peaking;
+mod proof;
 pub mod state_affine;
 pub mod triangular;
 mod tuning;

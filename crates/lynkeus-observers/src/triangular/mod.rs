@@ -9,9 +9,12 @@
 //! r = ρ/2 > 0 throughout; the signs of Remark 2 multiply along the chain,
 //! ε_{j+1} = ε_j·sign(∂f_j/∂x_{j+1}), with ε_1 = 1 because y is measured.
 
+mod facts;
 mod form;
 mod gains;
+mod lemma;
 mod low_power;
+mod theorem;
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
@@ -19,7 +22,10 @@ use lynkeus_structure::Extended;
 use crate::conditions::names;
 use crate::estimate::Copy;
 use crate::peaking::{self, InnovationLimit};
-use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
+use crate::{
+    Assumptions, Certificate, ChainGain, Design, DesignError, Examination, Family, Fit, Tuning,
+    TuningError,
+};
 use form::{Form, Partial, form};
 use gains::Gains;
 
@@ -78,6 +84,15 @@ impl Family for Triangular {
         }
         let gains = Gains::new(&form, tuning)?;
         Ok(assemble(extended, tuning, form, &gains)?)
+    }
+
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        theorem::certificate(extended, tuning, assumptions)
     }
 }
 

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_observers::{
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning,
+};
+use lynkeus_structure::{Check, Extended, Sensors};
 
 /// A plant from its text.
 pub fn plant(text: &str) -> Plant {
@@ -197,4 +199,57 @@ pub fn run(
         rows: found,
         monitors: lowest,
     }
+}
+
+/// A plant measured by all of its outputs, a tuning, and bounds of what acts on it.
+pub struct Guaranteed<'a> {
+    pub family: &'a dyn Family,
+    pub plant: &'a Plant,
+    pub unknown: &'a [&'a str],
+    pub tuning: Tuning,
+    pub drift: Vec<f64>,
+    pub noise: Vec<f64>,
+}
+
+impl Guaranteed<'_> {
+    /// What the family's theorem guarantees on the declared box.
+    pub fn certificate(&self) -> Certificate {
+        let sensors = Sensors {
+            unknown: self.unknown.iter().map(|s| s.to_string()).collect(),
+            ..Sensors::default()
+        };
+        let extended = Extended::new(self.plant, &sensors).unwrap();
+        let assumptions = Assumptions {
+            region: extended.region(),
+            drift: self.drift.clone(),
+            noise: self.noise.clone(),
+        };
+        self.family
+            .theorem(&extended, &self.tuning, &assumptions)
+            .unwrap()
+    }
+}
+
+/// The constant of that name.
+pub fn constant(certificate: &Certificate, name: &str) -> f64 {
+    let found = certificate.constants.iter().find(|c| c.name == name);
+    found
+        .unwrap_or_else(|| panic!("no {name} in {:?}", certificate.constants))
+        .value
+}
+
+/// The hypothesis whose name holds `part`.
+pub fn hypothesis<'c>(certificate: &'c Certificate, part: &str) -> &'c Check {
+    let found = certificate
+        .hypotheses
+        .iter()
+        .find(|c| c.name.contains(part));
+    found.unwrap_or_else(|| panic!("no {part} in {:?}", certificate.hypotheses))
+}
+
+/// On the safe side of `exact` and no further from it than rounding explains.
+pub fn assert_safely(found: f64, exact: f64, above: bool) {
+    let excess = (found - exact) / exact.abs();
+    let excess = if above { excess } else { -excess };
+    assert!((-1e-14..1e-8).contains(&excess), "{found} against {exact}");
 }

@@ -6,5 +6,6 @@ mod common;
 mod drift_observable;
 mod peaking;
 mod state_affine;
+mod theorem_triangular;
 mod triangular;
 mod unknown_input;

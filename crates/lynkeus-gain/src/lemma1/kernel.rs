@@ -1,0 +1,155 @@
+//! Whether a given S satisfies (17) for some ρ.
+//!
+//! Only the first diagonal entry of P(a) knows ρ. With P̂ the rest of the matrix,
+//! that is P on the kernel of C, and p the rest of its first column, Schur's
+//! complement says that P is negative definite exactly if P̂ is and
+//!
+//! ρ > P₁₁ + pᵀ(−P̂)⁻¹p,  P₁₁ = 0.
+//!
+//! So an S whose P̂ has a positive eigenvalue at some vertex of the bounds
+//! satisfies the lemma for no ρ, and the eigenvector is the direction that shows it.
+//! Both λ_max(P̂(a)) and pᵀ(−P̂)⁻¹p are convex in a: the vertices decide.
+
+use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+
+use super::{Bounds, Error, check, vertices};
+use crate::Tridiagonal;
+
+/// What (17) asks of ρ.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kernel {
+    /// it holds for every ρ above this one
+    Holds {
+        /// the least ρ
+        ρ: f64,
+    },
+    /// it holds for no ρ
+    Breaks(Breaking),
+}
+
+/// Where and in which direction (17) fails for every ρ.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Breaking {
+    /// the partials a₁, a₂, … of the worst vertex
+    pub a: Vec<f64>,
+    /// largest eigenvalue of P̂ there: what that of P tends to as ρ grows
+    pub eigenvalue: f64,
+    /// unit eigenvector, its first entry 0, its largest positive
+    pub direction: Vec<f64>,
+}
+
+/// Decides for which ρ the matrix `S` satisfies (17) on the bounds.
+///
+/// # Errors
+/// Bounds that are not positive and finite or of another number than S has
+/// partials for; a chain longer than 16.
+pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
+    check(bounds)?;
+    let n = S.size();
+    if bounds.len() + 1 != n {
+        return Err(Error::Lost { row: n });
+    }
+    let (mut least, mut worst): (f64, Option<Breaking>) = (0.0, None);
+    for a in vertices(bounds) {
+        let P = inequality(S, &a);
+        let Phat = P.view((1, 1), (n - 1, n - 1)).into_owned();
+        let p = P.view((1, 0), (n - 1, 1)).into_owned();
+        match Cholesky::new(-&Phat) {
+            Some(factor) => least = least.max(p.dot(&factor.solve(&p))),
+            None => {
+                let found = breaking(a, Phat);
+                if worst
+                    .as_ref()
+                    .is_none_or(|w| found.eigenvalue > w.eigenvalue)
+                {
+                    worst = Some(found);
+                }
+            }
+        }
+    }
+    Ok(worst.map_or(Kernel::Holds { ρ: least }, Kernel::Breaks))
+}
+
+/// A(a)ᵀS + S A(a).
+fn inequality(S: &Tridiagonal, a: &[f64]) -> DMatrix<f64> {
+    let n = S.size();
+    let SA = DMatrix::from_fn(n, n, |i, j| match j {
+        0 => 0.0,
+        _ => S.get(i, j - 1) * a[j - 1],
+    });
+    &SA + SA.transpose()
+}
+
+fn breaking(a: Vec<f64>, Phat: DMatrix<f64>) -> Breaking {
+    let eigen = SymmetricEigen::new(Phat);
+    let place = eigen.eigenvalues.imax();
+    let column = eigen.eigenvectors.column(place);
+    // a direction has no sign; the largest entry is shown as positive
+    let sign = column[column.iamax()].signum();
+    let direction = std::iter::once(0.0).chain(column.iter().map(|x| sign * x));
+    Breaking {
+        a,
+        eigenvalue: eigen.eigenvalues[place],
+        direction: direction.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lemma1::{RHO, construct, decay};
+
+    const ONE: Bounds = Bounds {
+        lower: 1.0,
+        upper: 1.0,
+    };
+
+    /// Against NumPy's eigvalsh of the 6×6 and the 5×5 matrix on the kernel of C.
+    #[test]
+    fn the_printed_matrices_break_for_every_ρ() {
+        let diagonal = [1.5, 2.0, 4.0, 8.0, 10.5, 15.5, 17.5];
+        let off = [-0.5, -1.5, -2.0, -3.0, -4.0, -5.0];
+        for (n, expected) in [(7, 8.747_348_170_830_902), (6, 5.751_599_097_749_908)] {
+            let S = Tridiagonal::new(diagonal[..n].to_vec(), off[..n - 1].to_vec()).unwrap();
+            let found = kernel(&S, &vec![ONE; n - 1]).unwrap();
+            let Kernel::Breaks(found) = found else {
+                panic!("{found:?}")
+            };
+            assert!(
+                (found.eigenvalue - expected).abs() < 1e-9,
+                "{}",
+                found.eigenvalue
+            );
+            assert_eq!((found.direction.len(), found.direction[0]), (n, 0.0));
+        }
+    }
+
+    /// n = 2: P = [−ρ, a; a, 2sa] asks for ρ > a/(2|s|), at worst a = α₂.
+    #[test]
+    fn the_least_ρ_by_hand() {
+        let S = Tridiagonal::new(vec![1.0, 3.0], vec![-0.8]).unwrap();
+        let bounds = Bounds {
+            lower: 0.5,
+            upper: 2.0,
+        };
+        let Kernel::Holds { ρ } = kernel(&S, &[bounds]).unwrap() else {
+            panic!()
+        };
+        assert!((ρ - 2.0 / 1.6).abs() < 1e-14, "{ρ}");
+        assert!(decay(&S, ρ * 1.001, &[bounds]) > 0.0 && decay(&S, ρ * 0.999, &[bounds]) < 0.0);
+    }
+
+    /// The construction keeps its own ρ above the least one.
+    #[test]
+    fn lemma_1_satisfies_itself() {
+        let bounds = [Bounds {
+            lower: 0.5,
+            upper: 1.5,
+        }; 4];
+        let found = construct(&bounds).unwrap();
+        let Kernel::Holds { ρ } = kernel(&found.S, &bounds).unwrap() else {
+            panic!()
+        };
+        assert!(ρ < RHO, "{ρ}");
+    }
+}

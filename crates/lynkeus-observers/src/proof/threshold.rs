@@ -1,0 +1,54 @@
+//! θ0: from where on the decay is proved.
+
+use lynkeus_structure::Check;
+
+use super::words::{proved, shown, undecided};
+
+/// The hypothesis θ ≥ θ0; `holds`: the inequality is proved at θ itself.
+pub(crate) fn reached(θ: f64, θ0: Option<f64>, holds: bool) -> Check {
+    let name = format!("θ = {} is at least θ0", shown(θ));
+    match (θ0, holds) {
+        (Some(θ0), true) => proved(name, format!("θ0 = {}", shown(θ0))),
+        (Some(θ0), false) => undecided(
+            name,
+            format!(
+                "θ0 = {}: the theorem proves the decay from there on and says nothing below; it is sufficient, not necessary",
+                shown(θ0)
+            ),
+        ),
+        (None, true) => proved(name, "no θ0 was found, but the inequality holds at this θ"),
+        (None, false) => undecided(name, "no θ0 was found up to 1e12 times the study's θ"),
+    }
+}
+
+/// The least θ from which on a test that is passed by every larger θ holds, up to
+/// a relative 1e-9 and on the side where it holds; 0 where it never fails.
+pub(crate) fn first(start: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let mut high = start;
+    let mut doublings = 0;
+    while !holds(high) {
+        high *= 2.0;
+        doublings += 1;
+        if doublings > 40 {
+            return None;
+        }
+    }
+    let mut low = high;
+    for _ in 0..80 {
+        low /= 2.0;
+        if !holds(low) {
+            break;
+        }
+    }
+    if holds(low) {
+        return Some(0.0);
+    }
+    while high - low > 1e-9 * high {
+        let middle = 0.5 * (low + high);
+        match holds(middle) {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    Some(high)
+}

@@ -1,0 +1,133 @@
+//! Phrases that the theorems of several families share.
+
+use lynkeus_expr::Interval;
+use lynkeus_structure::{Check, Condition, Extended, Point, Region, Witness, range};
+
+use super::Ultimate;
+use crate::{Certificate, Constant, DesignError, Verdict};
+
+/// Six significant digits.
+pub(crate) fn shown(x: f64) -> String {
+    let size = x.abs();
+    match size == 0.0 || (1e-4..1e6).contains(&size) {
+        true => {
+            let digits = if size == 0.0 {
+                0
+            } else {
+                (5 - size.log10().floor() as i32).max(0)
+            };
+            let text = format!("{x:.*}", digits as usize);
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+                false => text,
+            }
+        }
+        false => format!("{x:.5e}"),
+    }
+}
+
+pub(crate) fn proved(name: impl Into<String>, detail: impl Into<String>) -> Check {
+    Check {
+        name: name.into(),
+        verdict: Condition::Proved,
+        detail: detail.into(),
+    }
+}
+
+/// A hypothesis that could not be established, or that a sufficient condition misses.
+pub(crate) fn undecided(name: impl Into<String>, detail: impl Into<String>) -> Check {
+    Check {
+        name: name.into(),
+        verdict: Condition::Undecided(vec![]),
+        detail: detail.into(),
+    }
+}
+
+pub(crate) fn refuted(name: impl Into<String>, point: Point, detail: impl Into<String>) -> Check {
+    Check {
+        name: name.into(),
+        verdict: Condition::Refuted(Witness {
+            points: vec![point],
+        }),
+        detail: detail.into(),
+    }
+}
+
+/// Bounds of the error of the states that the outputs show: that of the output
+/// divided by the least slope.
+pub(crate) fn state_noise(
+    extended: &Extended<'_>,
+    region: &Region,
+    noise: &[f64],
+) -> Result<Vec<f64>, DesignError> {
+    let mut found = vec![];
+    for (i, output) in extended.outputs.iter().enumerate() {
+        let bound = noise.get(i).copied().unwrap_or(f64::INFINITY);
+        let Some((_, slope, _)) = output.state else {
+            found.push(f64::INFINITY);
+            continue;
+        };
+        let least = range(extended.graph(), slope, region)?
+            .enclosure
+            .mignitude();
+        found.push(match bound == 0.0 {
+            true => 0.0,
+            false => (Interval::point(bound) / Interval::point(least)).hi(),
+        });
+    }
+    Ok(found)
+}
+
+/// Fills in what the rate σ guarantees, where every hypothesis holds.
+pub(crate) fn conclude(
+    certificate: &mut Certificate,
+    extended: &Extended<'_>,
+    σ: f64,
+    ultimate: Option<Ultimate>,
+) {
+    if certificate.verdict != Verdict::Proved {
+        return;
+    }
+    let mut constant = |name: &str, value: f64, meaning: &str| {
+        certificate
+            .constants
+            .push(Constant::new(name, value, meaning));
+    };
+    constant(
+        "σ",
+        σ,
+        "decay rate of the error at the study's θ, 1/time unit",
+    );
+    if let Some(found) = &ultimate {
+        constant(
+            "λ1",
+            found.overshoot,
+            "overshoot: |e(t)| ≤ λ1 e^(−σt) |e(0)| + ultimate bound",
+        );
+        let gain = (Interval::point(found.overshoot) / Interval::point(σ)).hi();
+        constant(
+            "λ2",
+            gain,
+            "λ1/σ: error as t → ∞ per unit of drift, in Euclidean norms",
+        );
+    }
+    certificate.rate = Some(σ);
+    match ultimate {
+        Some(found) if found.norm.is_finite() => {
+            certificate.ultimate_bound = Some(found.norm);
+            let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound);
+            certificate.ultimate = found.states.into_iter().map(name).collect();
+        }
+        _ => certificate.notes.push(
+            "no ultimate bound: the assumed drift or noise has no bound, or S⁻¹ could not be enclosed".into(),
+        ),
+    }
+}
+
+/// What the box means for the guarantee.
+pub(crate) fn box_note(clamp: bool) -> String {
+    match clamp {
+        true => "The guarantee holds while plant and estimate stay in the box. Limiting what the functions see ('clamp') is no prolongation as the paper's: where an estimate is outside of its range, the functions do not react to it any more and the proof does not cover that time.".into(),
+        false => "The guarantee holds while plant and estimate stay in the box, or the functions are prolonged outside of it with the same bounds of their partial derivatives.".into(),
+    }
+}

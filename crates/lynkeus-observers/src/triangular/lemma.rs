@@ -1,0 +1,143 @@
+//! Lemma 1 for one chain of an observer: does its S satisfy (17), with which ρ, η?
+
+use lynkeus_expr::Interval;
+use lynkeus_gain::lemma1::{self, Breaking, Kernel};
+use lynkeus_gain::{Bounds, Tridiagonal};
+use lynkeus_structure::{Check, Point};
+
+use crate::Constant;
+use crate::proof::words::{proved, refuted, shown, undecided};
+use crate::proof::{Chain, sum};
+
+/// What Lemma 1 says of a chain.
+pub(super) struct Verified {
+    pub check: Check,
+    /// AᵀS + SA − ρCᵀC ≤ −μ·diag(S) with ρ = 2r; none where it is not proved
+    pub μ: Option<f64>,
+    pub constants: Vec<Constant>,
+}
+
+/// Checks (17) with ρ = 2r. `names`: the states of the chain; `suffix` tells the
+/// constants of several chains apart.
+pub(super) fn verify(
+    chain: &Chain,
+    S: &Tridiagonal,
+    r: f64,
+    names: &[String],
+    suffix: &str,
+) -> Verified {
+    let title = format!(
+        "Lemma 1 for ({}): A(a)ᵀS + SA(a) − ρCᵀC < 0 for every a in its bounds, ρ = 2r = {}",
+        names.join(" → "),
+        shown(2.0 * r)
+    );
+    let open = |check: Check| Verified {
+        check,
+        μ: None,
+        constants: vec![],
+    };
+    let bounds = |&(lower, upper): &(f64, f64)| Bounds { lower, upper };
+    let bounds: Vec<Bounds> = chain.partials.iter().map(bounds).collect();
+    let least = match lemma1::kernel(S, &bounds) {
+        Ok(Kernel::Holds { ρ }) => ρ,
+        Ok(Kernel::Breaks(found)) => return open(breaks(title, S, &found, names)),
+        Err(error) => return open(undecided(title, error.to_string())),
+    };
+    let Some(μ) = chain.decay() else {
+        let detail = match 2.0 * r > least {
+            true => {
+                "it holds in floating point, but with less than the rounding errors to spare".into()
+            }
+            false => format!(
+                "this S satisfies it for ρ > {} only; choose r > {}",
+                shown(least),
+                shown(least / 2.0)
+            ),
+        };
+        return open(undecided(title, detail));
+    };
+    let smallest = S.diagonal().iter().copied().fold(f64::INFINITY, f64::min);
+    let η = (Interval::point(μ) * Interval::point(smallest)).lo();
+    let constants = constants(chain, suffix, [least, 2.0 * r, η, μ]);
+    let detail = format!(
+        "with η = {}; it holds for every ρ above {}",
+        shown(η),
+        shown(least)
+    );
+    Verified {
+        check: proved(title, detail),
+        μ: Some(μ),
+        constants,
+    }
+}
+
+fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<Constant> {
+    let (lower, upper) = chain
+        .partials
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(l, u), &(a, b)| {
+            (l.min(a), u.max(b))
+        });
+    let mut list = vec![];
+    let mut add = |name: &str, value: f64, meaning: &str| {
+        list.push(Constant::new(&format!("{name}{suffix}"), value, meaning));
+    };
+    if upper > 0.0 {
+        add("α1", lower, "lower bound of the partials along the chain");
+        add("α2", upper, "upper bound of the partials along the chain");
+    }
+    add(
+        "ρ_min",
+        least,
+        "Lemma 1 holds for every ρ above it (floating point)",
+    );
+    add("ρ", ρ, "2r, the ρ of the proof");
+    add("η", η, "Lemma 1: AᵀS + SA − ρCᵀC ≤ −ηI");
+    add(
+        "μ",
+        μ,
+        "the same weighed by S: AᵀS + SA − ρCᵀC ≤ −μ·diag(S)",
+    );
+    list
+}
+
+/// The refutation: at a vertex of the bounds, in a direction that C does not see.
+fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) -> Check {
+    let value = quotient(S, found);
+    let direction: Vec<String> = names
+        .iter()
+        .zip(&found.direction)
+        .filter(|(_, v)| v.abs() > 5e-4)
+        .map(|(name, v)| format!("{v:+.3}·{name}"))
+        .collect();
+    let detail = format!(
+        "this S satisfies it for no ρ: in the direction {}, which the sensor does not see, AᵀS + SA is +{} there (a_j: the partials along the chain), whatever ρ is",
+        direction.join(" "),
+        shown(found.eigenvalue)
+    );
+    if !value.is_positive() {
+        return undecided(
+            title,
+            format!("{detail}; rounding errors keep this from being a refutation"),
+        );
+    }
+    let name = |j: usize| format!("a{}", j + 1);
+    let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
+    let point = Point {
+        coordinates: coordinates.collect(),
+        value: found.eigenvalue,
+    };
+    refuted(title, point, detail)
+}
+
+/// vᵀ(AᵀS + SA)v, rounding included: a proof that the form is positive somewhere.
+fn quotient(S: &Tridiagonal, found: &Breaking) -> Interval {
+    let v = |i: usize| Interval::point(found.direction[i]);
+    let n = S.size();
+    let pairs = (0..n).flat_map(|i| (1..n).map(move |j| (i, j)));
+    let terms = pairs.map(|(i, j)| {
+        let SA = Interval::point(S.get(i, j - 1)) * Interval::point(found.a[j - 1]);
+        Interval::point(2.0) * v(i) * SA * v(j)
+    });
+    sum(terms)
+}

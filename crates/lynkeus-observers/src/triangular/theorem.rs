@@ -1,0 +1,329 @@
+//! Theorems 1 and 2: what they guarantee for a plant and a tuning.
+//!
+//! The hypotheses are decided on the box of the assumptions; the inequalities stand
+//! in [`proof`](crate::proof), with s_j = θ^{jδ} in the coordinates of Remark 2, or
+//! divided by the partials where those are numbers. In ε scaled by θ^{δ_i/2} as in
+//! the paper every entry of the comparison matrix beside −μ carries a power of θ:
+//! −δ_i(1 + j − k) ≤ −δ_i inside a chain, at most n₂δ₂ − n₁δ₁ − (δ₁ + δ₂)/2 and
+//! n₁δ₁ − (n₂ − 1)δ₂ − (δ₁ + δ₂)/2 between the chains. Both are negative exactly in
+//! the window of Theorem 2. So its largest eigenvalue falls with θ, and from the
+//! first θ0 for which it is negative on the decay is proved, θ < 1 included.
+
+use lynkeus_expr::Interval;
+use lynkeus_structure::{Check, Condition, Extended};
+
+use super::Triangular;
+use super::facts::{Facts, foreign, remainder, without_bounds};
+use super::form::{Form, form};
+use super::gains::Gains;
+use super::lemma::verify;
+use crate::conditions::{fit, names};
+use crate::proof::threshold::{first, reached};
+use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
+use crate::proof::{Chain, Comparison, Disturbance, ultimate};
+use crate::{Assumptions, Certificate, Constant, DesignError, Family, Fit, Tuning};
+
+const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
+
+/// How much the gain may differ from the computed one, relatively: rounding of
+/// the powers of θ in the observer.
+const GAIN_ERROR: f64 = 1e-12;
+
+pub(super) fn certificate(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let form = match form(extended, tuning)? {
+        Ok(form) => form,
+        Err(examination) => return Err(DesignError::Refused(Box::new(examination))),
+    };
+    let region = &assumptions.region;
+    let facts = Facts::new(extended, &form, region)?;
+    let mut checks = facts.checks.clone();
+    checks.extend(foreign(tuning));
+    let unbounded = facts
+        .bounds
+        .iter()
+        .flatten()
+        .any(|&(low, high)| !(low > 0.0 && high.is_finite()));
+    let given = tuning.values.contains_key("S") || tuning.flag("partials")?;
+    if unbounded {
+        checks.extend(without_bounds(extended, &form, &facts, region));
+    }
+    if fit(&checks) == Fit::DoesNotFit || (unbounded && !given) {
+        let mut certificate = Certificate::new(BASIS, region, checks);
+        certificate.notes.push(remainder(&facts));
+        return Ok(certificate);
+    }
+    // the observer under study, for its refusals and its gain
+    Triangular.design(extended, tuning)?;
+    let gains = Gains::new(&form, tuning)?;
+    Study {
+        extended,
+        tuning,
+        assumptions,
+        form: &form,
+        facts: &facts,
+        gains: &gains,
+    }
+    .certificate(checks)
+}
+
+struct Study<'a> {
+    extended: &'a Extended<'a>,
+    tuning: &'a Tuning,
+    assumptions: &'a Assumptions,
+    form: &'a Form,
+    facts: &'a Facts,
+    gains: &'a Gains,
+}
+
+impl Study<'_> {
+    fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
+        let (mut constants, mut μ) = (vec![], vec![]);
+        checks.extend(self.constant_gain());
+        let count = self.form.assignment.chains.len();
+        for i in 0..count {
+            let states = names(self.extended, &self.form.assignment.chains[i].states);
+            let suffix = match count {
+                1 => String::new(),
+                _ => format!(" of chain {}", i + 1),
+            };
+            let chain = self.chain(i, self.gains.θ[i], 1.0);
+            let found = verify(&chain, &self.gains.S[i], self.gains.r[i], &states, &suffix);
+            checks.push(found.check);
+            constants.extend(found.constants);
+            μ.extend(found.μ);
+        }
+        checks.extend(self.window(&mut constants));
+        let (lipschitz, known) = self.steepest();
+        constants.push(Constant::new(
+            "c",
+            lipschitz,
+            "upper bound of every |∂f/∂x| beside the chains' own partials",
+        ));
+        let ready = known && μ.len() == count && fit(&checks) != Fit::DoesNotFit;
+        let rate = if ready {
+            self.rate(&μ, &mut checks, &mut constants)
+        } else {
+            None
+        };
+        let mut certificate = Certificate::new(BASIS, &self.assumptions.region, checks);
+        certificate.constants = constants;
+        certificate.notes.push(box_note(self.tuning.clamp));
+        self.explain(&mut certificate);
+        if let Some((σ, c)) = rate {
+            self.conclude(&mut certificate, σ, c)?;
+        }
+        Ok(certificate)
+    }
+
+    /// Chain i at θ, in the coordinates x̃ = T x; c weighs the second chain's V.
+    fn chain(&self, i: usize, θ: f64, c: f64) -> Chain {
+        let states = self.form.assignment.chains[i].states.clone();
+        let gains = self.gains;
+        let speed = Interval::point(θ).pow(Interval::point(gains.δ[i]));
+        let bounds = &self.facts.bounds[i];
+        let mut T = Interval::ONE;
+        let mut scales = vec![speed];
+        for (j, &(low, high)) in bounds.iter().enumerate() {
+            if gains.divided {
+                T = T * Interval::new(low, high).unwrap_or(Interval::ENTIRE);
+            }
+            scales.push(speed.powi(j as i32 + 2) / T);
+        }
+        let error = Interval::new(1.0 - GAIN_ERROR, 1.0 + GAIN_ERROR).unwrap_or(Interval::ONE);
+        let S = &gains.S[i];
+        let weight = Interval::point(if i == 0 { 1.0 } else { c });
+        let entry = |j: usize| {
+            (0..S.size())
+                .map(move |k| weight * Interval::point(S.get(j, k)))
+                .collect()
+        };
+        let g = S
+            .gain()
+            .into_iter()
+            .map(|s| Interval::point(gains.r[i] * s) * error);
+        let partials = match gains.divided {
+            true => vec![(1.0, 1.0); bounds.len()],
+            false => bounds.clone(),
+        };
+        Chain {
+            states,
+            speed,
+            scales,
+            S: (0..S.size()).map(entry).collect(),
+            g: g.collect(),
+            partials,
+        }
+    }
+
+    fn comparison(&self, μ: &[f64], θ: impl Fn(usize) -> f64, c: f64) -> Comparison {
+        let chains: Vec<Chain> = (0..μ.len()).map(|i| self.chain(i, θ(i), c)).collect();
+        Comparison::new(&chains, μ, &self.facts.slopes)
+    }
+
+    /// (c, θ0) for V = V1 + c·V2 with the weight c, of those tried, that gives the
+    /// least θ0. The paper has c = 1; any c > 0 does, for S and ρ scale together.
+    fn least(&self, μ: &[f64], θ: f64) -> (f64, Option<f64>) {
+        let at = |c: f64| first(θ, |θ| self.comparison(μ, |_| θ, c).holds());
+        let mut best = (1.0, at(1.0));
+        if μ.len() < 2 {
+            return best;
+        }
+        for step in [4.0, 1.0, 0.25, 0.0625] {
+            let centre: f64 = best.0;
+            for k in [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0] {
+                let c = centre * 10f64.powf(k * step);
+                if let Some(θ0) = at(c)
+                    && best.1.is_none_or(|b| θ0 < b)
+                {
+                    best = (c, Some(θ0));
+                }
+            }
+        }
+        best
+    }
+
+    /// `partials = true` divides by the partials at the estimate.
+    fn constant_gain(&self) -> Option<Check> {
+        let varies = self
+            .facts
+            .bounds
+            .iter()
+            .flatten()
+            .any(|(low, high)| low != high);
+        (self.gains.divided && varies).then(|| {
+            undecided(
+                "the gain is constant",
+                "partials = true divides it by the partials at the estimate, which vary on the box: the theorem covers a constant gain, and of this one only the case of constant partials. What is missing is a bound of how fast they change along the estimate and of how much they differ between plant and estimate",
+            )
+        })
+    }
+
+    /// Theorem 2's window for δ2/δ1.
+    fn window(&self, constants: &mut Vec<Constant>) -> Option<Check> {
+        let lengths = self.form.assignment.lengths();
+        let [_, _] = lengths[..] else { return None };
+        let lead = self.form.assignment.leading;
+        let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
+        let (low, high) = (
+            (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
+            (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
+        );
+        let ratio = self.gains.δ[1 - lead] / self.gains.δ[lead];
+        let mut add = |name: &str, value: f64, meaning: &str| {
+            constants.push(Constant::new(name, value, meaning))
+        };
+        add(
+            "(2n1−1)/(2n2−1)",
+            low,
+            "lower end of Theorem 2's window for δ2/δ1",
+        );
+        add("δ2/δ1", ratio, "ratio of the exponents");
+        add("(2n1+1)/(2n2−1)", high, "upper end of the window");
+        let name = "δ2/δ1 lies in the window of Theorem 2";
+        let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
+        Some(match low < ratio && ratio < high {
+            true => proved(name, text),
+            false => undecided(
+                name,
+                format!(
+                    "not {text}: no θ0 is known, the couplings between the chains grow faster than the decay"
+                ),
+            ),
+        })
+    }
+
+    /// (largest |∂f/∂x| beside the chains, whether all are known)
+    fn steepest(&self) -> (f64, bool) {
+        let largest = self
+            .facts
+            .slopes
+            .iter()
+            .fold(0.0, |m: f64, s| m.max(s.size));
+        (largest, largest.is_finite())
+    }
+
+    /// (σ, c) at the study's θ, with the hypothesis θ ≥ θ0.
+    fn rate(
+        &self,
+        μ: &[f64],
+        checks: &mut Vec<Check>,
+        constants: &mut Vec<Constant>,
+    ) -> Option<(f64, f64)> {
+        let θ = &self.gains.θ;
+        let alike = θ.iter().all(|x| *x == θ[0]);
+        let windowed = checks
+            .iter()
+            .all(|c| !c.name.contains("window") || c.verdict == Condition::Proved);
+        let (c, θ0) = match alike && windowed {
+            true => self.least(μ, θ[0]),
+            false => (1.0, None),
+        };
+        let σ = self.comparison(μ, |i| θ[i], c).rate();
+        if μ.len() > 1 {
+            constants.push(Constant::new(
+                "c of V",
+                c,
+                "weight of the second chain in V = V1 + c·V2",
+            ));
+        }
+        if let Some(θ0) = θ0 {
+            constants.push(Constant::new(
+                "θ0",
+                θ0,
+                "the decay is proved for every θ from here on",
+            ));
+        }
+        checks.push(match alike {
+            true => reached(θ[0], θ0, σ.is_some()),
+            false => at_these(σ.is_some()),
+        });
+        σ.map(|σ| (σ, c))
+    }
+
+    fn conclude(&self, certificate: &mut Certificate, σ: f64, c: f64) -> Result<(), DesignError> {
+        let noise = state_noise(
+            self.extended,
+            &self.assumptions.region,
+            &self.assumptions.noise,
+        )?;
+        let count = self.form.assignment.chains.len();
+        let chain = |i: usize| self.chain(i, self.gains.θ[i], c);
+        let chains: Vec<Chain> = (0..count).map(chain).collect();
+        let outside = Disturbance {
+            drift: &self.assumptions.drift,
+            noise: &noise,
+        };
+        conclude(
+            certificate,
+            self.extended,
+            σ,
+            ultimate(&chains, σ, &outside),
+        );
+        Ok(())
+    }
+
+    fn explain(&self, certificate: &mut Certificate) {
+        let broken = |c: &&Check| {
+            matches!(c.verdict, Condition::Refuted(_)) && c.name.starts_with("Lemma 1")
+        };
+        if certificate.hypotheses.iter().any(|c| broken(&c)) {
+            certificate.notes.push("A refuted Lemma 1 ends this proof, whatever θ is. It does not say that the estimate diverges: a plant that is damped by itself may carry the observer. Lemma 1's own S (leave the key S out) satisfies it.".into());
+        }
+    }
+}
+
+/// One θ per chain: there is no common θ0.
+fn at_these(holds: bool) -> Check {
+    let name = "the comparison matrix is negative definite at the study's θ";
+    match holds {
+        true => proved(name, "one θ per chain has no common θ0: checked at these"),
+        false => undecided(
+            name,
+            "it is not; the theorem is sufficient, not necessary: try a larger θ, the same for both chains",
+        ),
+    }
+}
