@@ -18,6 +18,7 @@ pub mod integrators;
 pub mod lemma1;
 pub mod lmi;
 pub mod low_power;
+pub mod riccati;
 mod tridiagonal;
 mod unit_factor;
 pub mod vandermonde;

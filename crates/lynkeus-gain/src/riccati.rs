@@ -1,0 +1,202 @@
+//! The Riccati inequality of Germani and Manes (1999), for a gain that is given:
+//!
+//! A P + P Aᵀ + E Eᵀ + 2αP + γ²P² ≤ 0,  P > 0   (3.2), (3.16), (4.7), (4.33)
+//!
+//! where A holds the gain already. With ν = eᵀP⁻¹e and e' = Ae + Ev, |v| ≤ γ|e|, it
+//! gives ν' ≤ −2αν. P is found by Newton's method from below (Kleinman's iteration)
+//! and counts only if the inequality holds in interval arithmetic.
+
+use lynkeus_expr::Interval;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+use crate::definite::is_positive_definite;
+
+/// Newton steps; convergence is quadratic.
+const STEPS: usize = 40;
+/// Halvings of the interval in which the largest rate or bound is sought.
+const HALVINGS: usize = 40;
+/// The inequality is solved with a little more, so that rounding does not decide.
+const SLACK: f64 = 1e-7;
+
+/// A matrix row by row.
+type Rows = [Vec<f64>];
+
+/// A solution P with bounds of what proofs need of it.
+#[derive(Clone, Debug)]
+pub struct Riccati {
+    /// P
+    pub P: Vec<Vec<f64>>,
+    /// α
+    pub α: f64,
+    /// an upper bound of ‖P‖
+    pub largest: f64,
+    /// a lower bound of the smallest eigenvalue of P
+    pub smallest: f64,
+}
+
+impl Riccati {
+    /// A proved solution of the inequality; none where none was found.
+    ///
+    /// ```
+    /// use lynkeus_gain::riccati::Riccati;
+    ///
+    /// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
+    /// let one = |x: f64| vec![vec![x]];
+    /// let found = Riccati::solve(&one(-3.0), &one(1.0), 0.5, 2.0).unwrap();
+    /// let P = found.P[0][0];
+    /// assert!(-6.0 * P + 1.0 + P + 4.0 * P * P <= 0.0);
+    /// assert!(Riccati::solve(&one(-3.0), &one(1.0), 3.0, 2.0).is_none());
+    /// ```
+    pub fn solve(A: &Rows, E: &Rows, α: f64, γ: f64) -> Option<Self> {
+        let (A, E) = (matrix(A), matrix(E));
+        let n = A.nrows();
+        let scale = E.norm_squared().max(f64::MIN_POSITIVE);
+        let W = &E * E.transpose() + DMatrix::identity(n, n) * (SLACK * scale);
+        let P = newton(&(&A + DMatrix::identity(n, n) * α), &W, γ)?;
+        if !holds(&A, &E, α, γ, &P) {
+            return None;
+        }
+        let values = SymmetricEigen::new(P.clone()).eigenvalues;
+        let bound = |s: f64, sign: f64| {
+            let shifted = |i: usize, j: usize| {
+                let entry = Interval::point(P[(i, j)]);
+                let shifted = entry - Interval::point(if i == j { s } else { 0.0 });
+                shifted * Interval::point(sign)
+            };
+            is_positive_definite(&rows(n, shifted)).then_some(s)
+        };
+        Some(Self {
+            α,
+            largest: bound(values.max() * (1.0 + 1e-6), -1.0)?,
+            smallest: bound(values.min() * (1.0 - 1e-3), 1.0)?,
+            P: (0..n).map(|i| P.row(i).iter().copied().collect()).collect(),
+        })
+    }
+
+    /// A solution with the largest α below `limit`.
+    pub fn fastest(A: &Rows, E: &Rows, γ: f64, limit: f64) -> Option<Self> {
+        let mut best = Self::solve(A, E, 1e-6 * limit, γ)?;
+        let (mut low, mut high) = (best.α, limit);
+        for _ in 0..HALVINGS {
+            let middle = low + (high - low) / 2.0;
+            match Self::solve(A, E, middle, γ) {
+                Some(found) => (low, best) = (middle, found),
+                None => high = middle,
+            }
+            if high - low < 1e-4 * high {
+                break;
+            }
+        }
+        Some(best)
+    }
+
+    /// An upper bound of √(fᵀP⁻¹f): P − ffᵀ/t > 0 says fᵀP⁻¹f < t.
+    pub fn weight(&self, f: &[f64]) -> f64 {
+        let n = self.P.len();
+        let size: f64 = f.iter().map(|x| x * x).sum();
+        let coarse = size / self.smallest * (1.0 + 1e-9);
+        let P = matrix(&self.P);
+        let Some(inverse) = P.cholesky().map(|c| c.inverse()) else {
+            return coarse.sqrt();
+        };
+        let f = DVector::from_column_slice(f);
+        let t = (f.transpose() * inverse * &f)[(0, 0)] * (1.0 + 1e-6) + f64::MIN_POSITIVE;
+        let rest = |i: usize, j: usize| {
+            let product = Interval::point(f[i]) * Interval::point(f[j]);
+            Interval::point(self.P[i][j]) - product / Interval::point(t)
+        };
+        match is_positive_definite(&rows(n, rest)) {
+            true => t.sqrt() * (1.0 + 1e-15),
+            false => coarse.sqrt(),
+        }
+    }
+}
+
+fn matrix(rows: &Rows) -> DMatrix<f64> {
+    let columns = rows.first().map_or(0, Vec::len);
+    DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j])
+}
+
+fn rows(n: usize, entry: impl Fn(usize, usize) -> Interval) -> Vec<Vec<Interval>> {
+    let row = |i| (0..n).map(|j| entry(i, j)).collect();
+    (0..n).map(row).collect()
+}
+
+/// The smallest P with A P + P Aᵀ + W + γ²P² = 0.
+fn newton(A: &DMatrix<f64>, W: &DMatrix<f64>, γ: f64) -> Option<DMatrix<f64>> {
+    let mut P = lyapunov(A, W)?;
+    for _ in 0..STEPS {
+        let next = lyapunov(&(A + &P * (γ * γ)), &(W - &P * &P * (γ * γ)))?;
+        let change = (&next - &P).norm();
+        P = next;
+        if change <= 1e-13 * P.norm() {
+            return Some(P);
+        }
+    }
+    None
+}
+
+/// P > 0 with A P + P Aᵀ + W = 0; none where A is not Hurwitz, as far as P tells.
+fn lyapunov(A: &DMatrix<f64>, W: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = A.nrows();
+    let identity = DMatrix::identity(n, n);
+    let both = identity.kronecker(A) + A.kronecker(&identity);
+    let right = -DVector::from_column_slice(W.as_slice());
+    let P = DMatrix::from_column_slice(n, n, both.lu().solve(&right)?.as_slice());
+    let P = (&P + P.transpose()) / 2.0;
+    P.clone().cholesky().map(|_| P)
+}
+
+/// The inequality, in interval arithmetic.
+fn holds(A: &DMatrix<f64>, E: &DMatrix<f64>, α: f64, γ: f64, P: &DMatrix<f64>) -> bool {
+    let n = P.nrows();
+    let product = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
+        // row i of a times column j of bᵀ
+        let terms = (0..a.ncols()).map(|k| Interval::point(a[(i, k)]) * Interval::point(b[(j, k)]));
+        terms.fold(Interval::point(0.0), |sum, term| sum + term)
+    };
+    let entry = |i: usize, j: usize| {
+        let linear = product(A, i, P, j) + product(P, i, A, j);
+        let square = product(P, i, P, j) * Interval::point(γ).powi(2);
+        let rate = Interval::point(2.0 * α) * Interval::point(P[(i, j)]);
+        Interval::point(0.0) - (linear + product(E, i, E, j) + rate + square)
+    };
+    is_positive_definite(&rows(n, entry))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn companion(K: &[f64]) -> Vec<Vec<f64>> {
+        let entry = |i: usize, j: usize| {
+            f64::from(u8::from(j == i + 1)) - if j == 0 { K[i] } else { 0.0 }
+        };
+        let row = |i| (0..K.len()).map(|j| entry(i, j)).collect();
+        (0..K.len()).map(row).collect()
+    }
+
+    /// For A − KC with the poles −1, −2 and B = (0, 1)ᵀ the transfer function from v to e
+    /// is (1, s + 3)ᵀ/(s² + 3s + 2), of norm √10/2 at s = 0: the limit of γ at α = 0.
+    #[test]
+    fn the_limit_is_the_bounded_real_lemmas() {
+        let A = companion(&[3.0, 2.0]);
+        let E = [vec![0.0], vec![1.0]];
+        let limit = 2.0 / 10f64.sqrt();
+        assert!(Riccati::solve(&A, &E, 1e-9, limit * 0.999).is_some());
+        assert!(Riccati::solve(&A, &E, 1e-9, limit * 1.001).is_none());
+    }
+
+    /// Without perturbation the rate is that of the slowest pole.
+    #[test]
+    fn the_rate_without_perturbation() {
+        let found = Riccati::fastest(&companion(&[3.0, 2.0]), &[vec![0.0], vec![1.0]], 1e-6, 1.0);
+        let found = found.unwrap();
+        assert!(found.α > 0.99 && found.smallest <= found.largest);
+        // eᵢ'P⁻¹e against the definition
+        let P = matrix(&found.P);
+        let exact = P.cholesky().unwrap().inverse()[(1, 1)].sqrt();
+        let weight = found.weight(&[0.0, 1.0]);
+        assert!(weight >= exact && weight < exact * (1.0 + 1e-5));
+    }
+}
