@@ -146,6 +146,14 @@ pub enum DesignError {
     /// a key of the study
     #[error(transparent)]
     Tuning(#[from] TuningError),
+    /// no gain of the kind asked for exists, or none is proved
+    #[error("{reason}")]
+    NoGain {
+        /// the key that asks for too much
+        key: &'static str,
+        /// what blocks it and what to do
+        reason: String,
+    },
     /// the plant has parameters without value
     #[error(transparent)]
     MissingInput(#[from] MissingInput),

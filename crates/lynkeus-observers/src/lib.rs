@@ -17,6 +17,7 @@ pub mod drift_observable;
 mod enclosure;
 mod estimate;
 mod family;
+mod guarantee;
 mod observer;
 mod peaking;
 mod proof;
@@ -27,5 +28,6 @@ pub mod unknown_input;
 
 pub use certificate::{Assumptions, Certificate, Constant, Verdict};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
+pub use guarantee::certify;
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
 pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -58,6 +58,32 @@ pub enum SensorsError {
     },
 }
 
+/// A side of a smaller box that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NarrowError {
+    /// no such state or input
+    #[error(
+        "the box has no side '{name}': expected a state or an input ({})",
+        list(found)
+    )]
+    NoSuchName {
+        /// the name in question
+        name: String,
+        /// the names there are
+        found: Vec<String>,
+    },
+    /// nothing in common with the declared range
+    #[error("'{name}' is declared in [{min}, {max}]: expected a part of that range")]
+    Outside {
+        /// the variable
+        name: String,
+        /// its declared minimum
+        min: f64,
+        /// its declared maximum
+        max: f64,
+    },
+}
+
 fn list(names: &[String]) -> String {
     match names.is_empty() {
         true => "none".to_owned(),
@@ -132,6 +158,44 @@ impl<'p> Extended<'p> {
             outputs,
             pattern,
         })
+    }
+
+    /// The same on a smaller box: states and inputs named by `side` (an array's name
+    /// stands for its elements) are limited to [low, high] as well.
+    ///
+    /// # Errors
+    /// No such variable, or nothing in common with its declared range.
+    pub fn narrow(&mut self, side: &str, low: f64, high: f64) -> Result<(), NarrowError> {
+        let is_meant = |name: &str| {
+            let element = name.strip_prefix(side);
+            element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+        };
+        let variables = self.states.iter_mut().chain(&mut self.inputs);
+        let mut found = false;
+        for variable in variables.filter(|v| is_meant(&v.name)) {
+            found = true;
+            let (min, max) = (variable.min.max(low), variable.max.min(high));
+            if min > max {
+                return Err(NarrowError::Outside {
+                    name: variable.name.clone(),
+                    min: variable.min,
+                    max: variable.max,
+                });
+            }
+            (variable.min, variable.max) = (min, max);
+        }
+        match found {
+            true => Ok(()),
+            false => Err(NarrowError::NoSuchName {
+                name: side.to_owned(),
+                found: self
+                    .states
+                    .iter()
+                    .chain(&self.inputs)
+                    .map(|v| v.name.clone())
+                    .collect(),
+            }),
+        }
     }
 
     /// The graph of the plant.

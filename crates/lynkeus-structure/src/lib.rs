@@ -28,7 +28,7 @@ pub mod visibility;
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
 pub use condition::{Check, Condition, Point, Witness};
-pub use extended::{Extended, Measurement, Sensors, SensorsError};
+pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
 pub use range::{Range, range, range_within};

@@ -123,7 +123,7 @@ fn family(examination: &Examination) -> Value {
     })
 }
 
-fn point(point: &Point) -> Value {
+pub(crate) fn point(point: &Point) -> Value {
     let at = point
         .coordinates
         .iter()

@@ -36,16 +36,10 @@ impl DesignReport {
         let Design {
             observer,
             examination,
-            gains,
             parameters,
             notes,
+            ..
         } = &self.design;
-        let mut gain = Map::new();
-        for chain in gains {
-            for (state, k) in &chain.entries {
-                gain.insert(state.clone(), json!({ &chain.output: k }));
-            }
-        }
         let parameters: Map<String, Value> = parameters
             .iter()
             .map(|(name, value)| (name.clone(), json!(value)))
@@ -60,12 +54,24 @@ impl DesignReport {
             "family": observer.family,
             "fit": examination.fit.words(),
             "chains": examination.chains,
-            "gain": gain,
+            "gain": gain_json(&self.design),
             "parameters": parameters,
             "initial": starts,
             "notes": notes,
         })
     }
+}
+
+/// The gain by state, then by measured output.
+pub(crate) fn gain_json(design: &Design) -> Value {
+    let mut gain: Map<String, Value> = Map::new();
+    for chain in &design.gains {
+        for (state, k) in &chain.entries {
+            let row = gain.entry(state.clone()).or_insert_with(|| json!({}));
+            row[&chain.output] = json!(k);
+        }
+    }
+    Value::Object(gain)
 }
 
 impl fmt::Display for DesignReport {

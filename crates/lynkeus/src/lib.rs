@@ -50,6 +50,7 @@
 //! [`estimate`] do what the commands of the same names do.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod certify;
 mod check;
 mod design;
 mod error;
@@ -64,7 +65,9 @@ mod simulate;
 pub mod study;
 mod systems;
 pub mod table;
+mod words;
 
+pub use certify::{CertifyReport, certify};
 pub use check::{Report, check};
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};

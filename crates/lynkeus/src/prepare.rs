@@ -1,7 +1,7 @@
 //! From a study to its plant and its observer.
 
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Fit};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Fit, Tuning};
 use lynkeus_structure::{Extended, Sensors, SensorsError};
 
 use crate::study::Name;
@@ -36,7 +36,13 @@ pub fn extended<'p>(study: &Study, plant: &'p Plant) -> Result<Extended<'p>, Err
         unknown: texts(&study.sensors.unknown),
         disturbances: texts(&study.sensors.disturbances),
     };
-    Extended::new(plant, &sensors).map_err(|error| blame(study, &error))
+    let mut extended = Extended::new(plant, &sensors).map_err(|error| blame(study, &error))?;
+    for (name, low, high) in &study.narrower {
+        extended
+            .narrow(&name.text, *low, *high)
+            .map_err(|error| name.blame(Error::input(error.to_string())))?;
+    }
+    Ok(extended)
 }
 
 /// The place in the study of a name that does not fit.
@@ -85,6 +91,15 @@ pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
 /// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
 /// `[observer]` cannot be used.
 pub fn design(study: &Study, extended: &Extended<'_>) -> Result<Design, Error> {
+    design_with(study, extended, &study.observer.tuning)
+}
+
+/// The same with another tuning.
+pub(crate) fn design_with(
+    study: &Study,
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+) -> Result<Design, Error> {
     let examinations = examinations(study, extended)?;
     let Some(chosen) = recommended(&examinations) else {
         return Err(none_fits(study, &examinations));
@@ -92,7 +107,7 @@ pub fn design(study: &Study, extended: &Extended<'_>) -> Result<Design, Error> {
     let family = lynkeus_observers::find(chosen.family)
         .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
     family
-        .design(extended, &study.observer.tuning)
+        .design(extended, tuning)
         .map_err(|error| refusal(study, &error))
 }
 
@@ -106,10 +121,11 @@ fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
         .hint("`lynkeus check` shows every condition")
 }
 
-fn refusal(study: &Study, error: &DesignError) -> Error {
+pub(crate) fn refusal(study: &Study, error: &DesignError) -> Error {
     match error {
         DesignError::Tuning(error) => study.observer.blame(error, &study.file),
         DesignError::Refused(_) => Error::refused(error.to_string()).at(&study.file),
+        DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, error),
         DesignError::MissingInput(_) => Error::input(error.to_string()).at(&study.file),
     }
 }

@@ -121,7 +121,7 @@ pub(crate) fn inputs(
 
 /// The study's expression, else the input's start value; a disturbance is zero
 /// unless it is given.
-fn input_expression(
+pub(crate) fn input_expression(
     study: &Study,
     plant: &Plant,
     settings: &SimulateSettings,

@@ -22,7 +22,7 @@ mod synthesis;
 
 pub use analysis::{fastest, prove};
 pub use check::{holds, is_below};
-pub use model::{ErrorModel, Sector};
+pub use model::{ErrorModel, Sector, expanded};
 pub use synthesis::{Aim, Gain, NoGain, Request, design};
 
 use nalgebra::{DMatrix, DVector};

@@ -121,4 +121,38 @@ impl ErrorModel {
         }
         shrunk
     }
+
+    /// The models at the ends of every slope's range: without sectors.
+    fn vertices(&self) -> Vec<Self> {
+        let vertex = |ends: usize| {
+            let mut constant = self.constant.clone();
+            for (k, sector) in self.sectors.iter().enumerate() {
+                let end = match ends >> k & 1 {
+                    0 => sector.range.lo(),
+                    _ => sector.range.hi(),
+                };
+                for (row, weight) in constant.iter_mut().zip(&sector.direction) {
+                    row[sector.column] = row[sector.column] + Interval::point(end) * *weight;
+                }
+            }
+            let sectors = vec![];
+            Self { constant, sectors }
+        };
+        (0..1_usize << self.sectors.len()).map(vertex).collect()
+    }
+}
+
+/// The same error systems by their vertices where these are at most `limit`: an
+/// inequality at every vertex asks for less than one with multipliers.
+pub fn expanded(models: &[ErrorModel], limit: usize) -> Vec<ErrorModel> {
+    let count = |m: &ErrorModel| 1_usize.checked_shl(m.sectors.len() as u32);
+    let total = models
+        .iter()
+        .try_fold(0_usize, |sum, m| sum.checked_add(count(m)?));
+    match total {
+        Some(total) if total <= limit && models.iter().all(ErrorModel::is_bounded) => {
+            models.iter().flat_map(ErrorModel::vertices).collect()
+        }
+        _ => models.to_vec(),
+    }
 }

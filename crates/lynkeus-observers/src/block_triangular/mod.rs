@@ -26,6 +26,7 @@ use lynkeus_structure::{Blocks, Extended};
 
 use crate::conditions::names;
 use crate::estimate::Copy;
+use crate::guarantee;
 use crate::peaking::{self, InnovationLimit, Transient, transient};
 use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
 use form::form;
@@ -54,6 +55,10 @@ impl Family for BlockTriangular {
             "k_poles",
             "correction",
             "chains",
+            "gain",
+            "rate",
+            "gain_limit",
+            "minimise",
             "innovation_limit",
             "transient",
             "form",
@@ -75,6 +80,9 @@ impl Family for BlockTriangular {
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended, tuning)? {
             Ok((blocks, examination)) if examination.fit != Fit::DoesNotFit => {
+                if guarantee::asked_for(tuning, &[])? {
+                    return guarantee::design_lmi(extended, tuning, NAME, examination);
+                }
                 let low_power = peaking::asked_for(tuning, &["k", "k_poles"])?;
                 let assemble = if low_power {
                     low_power::assemble

@@ -24,7 +24,6 @@ impl Gains {
         let count = form.assignment.chains.len();
         let θ = theta(tuning, count)?;
         let divided = tuning.flag("partials")?;
-        tuning.choice("gain", &["lemma1"])?;
         let (S, ρ) = match explicit(tuning)? {
             Some(S) => (S, None),
             None => lemma1_matrices(form, divided)?,

@@ -21,6 +21,7 @@ use lynkeus_structure::Extended;
 
 use crate::conditions::names;
 use crate::estimate::Copy;
+use crate::guarantee;
 use crate::peaking::{self, InnovationLimit};
 use crate::{
     Assumptions, Certificate, ChainGain, Design, DesignError, Examination, Family, Fit, Tuning,
@@ -53,6 +54,9 @@ impl Family for Triangular {
             "S",
             "partials",
             "chains",
+            "rate",
+            "gain_limit",
+            "minimise",
             "innovation_limit",
             "transient",
             "form",
@@ -79,6 +83,9 @@ impl Family for Triangular {
                 return Err(DesignError::Refused(Box::new(examination)));
             }
         };
+        if guarantee::asked_for(tuning, &["lemma1"])? {
+            return guarantee::design_lmi(extended, tuning, NAME, form.examination);
+        }
         if peaking::asked_for(tuning, &["S", "r", "gain"])? {
             return Ok(low_power::assemble(extended, tuning, form)?);
         }

@@ -23,6 +23,7 @@ const EXAMPLES: &str = "\
 Examples:
   lynkeus check study.toml
   lynkeus design study.toml
+  lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
 
@@ -40,6 +41,17 @@ enum Command {
     },
     /// Gains, matrices and parameters of the observer
     Design {
+        /// The study (TOML)
+        study: PathBuf,
+        /// Save the text (or the JSON) instead of printing it
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// One JSON object
+        #[arg(long)]
+        json: bool,
+    },
+    /// Proves, refutes or leaves undecided that the observer converges, with rate and bounds
+    Certify {
         /// The study (TOML)
         study: PathBuf,
         /// Save the text (or the JSON) instead of printing it
@@ -113,6 +125,11 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output,
             json,
         } => run::design(&Study::load(study)?, output.as_deref(), json),
+        Command::Certify {
+            study,
+            output,
+            json,
+        } => run::certify(&Study::load(study)?, output.as_deref(), json),
         Command::Simulate {
             study,
             output,

@@ -34,6 +34,22 @@ pub(super) fn design(study: &Study, file: Option<&Path>, json: bool) -> Result<E
     Ok(ExitCode::SUCCESS)
 }
 
+pub(super) fn certify(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    let report = lynkeus::certify(study)?;
+    let text = match json {
+        true => format!("{:#}\n", report.to_json()),
+        false => report.to_string(),
+    };
+    match file {
+        Some(path) => output::write(path, text.as_bytes())?,
+        None => print(&text)?,
+    }
+    Ok(match report.is_refuted() {
+        true => ExitCode::from(1),
+        false => ExitCode::SUCCESS,
+    })
+}
+
 pub(super) fn simulate(
     study: &Study,
     output: &Output,

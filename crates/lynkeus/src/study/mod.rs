@@ -19,6 +19,7 @@
 //! between_samples = "linear"
 //! ```
 
+mod certify;
 mod estimate;
 mod observer;
 mod section;
@@ -32,6 +33,7 @@ use std::sync::Arc;
 
 use toml::de::DeTable;
 
+pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings};
 pub use observer::ObserverSettings;
 pub use sensors::{Noise, Sensors};
@@ -48,6 +50,8 @@ const KEYS: &[&str] = &[
     "parameters",
     "sensors",
     "observer",
+    "box",
+    "certify",
     "simulate",
     "estimate",
     "plot",
@@ -68,6 +72,10 @@ pub struct Study {
     pub sensors: Sensors,
     /// The observer family and its tuning.
     pub observer: ObserverSettings,
+    /// Ranges narrower than the model's.
+    pub narrower: Box,
+    /// What a certificate takes for granted.
+    pub certify: CertifySettings,
     /// How to simulate; `None` where the study has no `[simulate]`.
     pub simulate: Option<SimulateSettings>,
     /// How to replay a log.
@@ -121,6 +129,8 @@ impl Study {
             observer: top
                 .optional("observer", observer::read)?
                 .unwrap_or_default(),
+            narrower: top.optional("box", certify::read_box)?.unwrap_or_default(),
+            certify: top.optional("certify", certify::read)?.unwrap_or_default(),
             simulate,
             estimate: top
                 .optional("estimate", estimate::read)?

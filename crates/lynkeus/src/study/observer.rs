@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use lynkeus_observers::{FAMILIES, Family, Initial, Tuning, TuningError, Value};
+use lynkeus_observers::{DesignError, FAMILIES, Family, Initial, Tuning, TuningError, Value};
 
 use super::section::{Entry, Section};
 use super::{Name, Place};
@@ -38,6 +38,15 @@ impl ObserverSettings {
                     .keys()
                     .all(|key| family.keys().contains(&key.as_str())),
             })
+    }
+
+    /// The answer no to what a key asks for, with the key's place.
+    pub(crate) fn place(&self, key: &str, file: &str, error: &DesignError) -> Error {
+        let refusal = Error::refused(format!("`{key}` of [observer]: {error}"));
+        match self.places.get(key) {
+            Some(place) => refusal.at(place),
+            None => refusal.at(file),
+        }
     }
 
     /// A family's refusal of a key, with the key's place.

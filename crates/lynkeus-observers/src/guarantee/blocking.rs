@@ -1,0 +1,73 @@
+//! Why there is no proof, or no gain: which range stands in the way.
+
+use lynkeus_gain::decay::{self, ErrorModel, Request};
+use lynkeus_structure::Slopes;
+
+use super::error_system::ErrorSystem;
+use super::expanded;
+
+/// Bisections of the share of the ranges.
+const HALVINGS: usize = 6;
+
+/// The models with every slope's range cut by a factor that may depend on the slope.
+fn cut(slopes: &Slopes, factor: impl Fn(usize) -> f64 + Copy) -> Vec<ErrorModel> {
+    let cut: Vec<ErrorModel> = slopes.models.iter().map(|m| m.shrunk(factor)).collect();
+    expanded(&cut)
+}
+
+/// The largest share of every range, about its middle, for which `works`; none where
+/// not even a hundredth works.
+fn share(slopes: &Slopes, works: impl Fn(&[ErrorModel]) -> bool) -> Option<f64> {
+    let at = |share: f64| works(&cut(slopes, |_| share));
+    let (mut low, mut high) = (0.01, 1.0);
+    if !at(low) {
+        return None;
+    }
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(low, high);
+        match at(middle) {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Some(low)
+}
+
+/// The share of the ranges for which some decay of the observer is proved.
+pub(super) fn provable_share(system: &ErrorSystem) -> Option<f64> {
+    share(&system.slopes, |models| {
+        decay::prove(models, &system.scale, 0.0).is_some()
+    })
+}
+
+/// In words: what keeps every gain from a proof of the requested rate.
+pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
+    let slopes = &system.slopes;
+    let works = |models: &[ErrorModel]| decay::design(models, request).is_ok();
+    let Some(share) = share(slopes, works) else {
+        return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
+    };
+    let range = |k: usize| {
+        let slope = &slopes.slopes[k];
+        format!(
+            "the slope of {} in [{:.4}, {:.4}]{}",
+            slope.term,
+            slope.range.lo(),
+            slope.range.hi(),
+            match slope.variables.is_empty() {
+                true => String::new(),
+                false => format!(" (over the range of {})", slope.variables.join(", ")),
+            }
+        )
+    };
+    let mut blocking = (0..slopes.slopes.len())
+        .filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
+    let blocked = match blocking.next() {
+        Some(k) => format!("{} alone blocks it; ", range(k)),
+        None => String::new(),
+    };
+    format!(
+        "{blocked}with every slope's range cut to {:.0} % about its middle there is a gain: narrow the box",
+        100.0 * share
+    )
+}

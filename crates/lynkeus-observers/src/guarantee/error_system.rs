@@ -1,0 +1,194 @@
+//! The error system of an observer on a box.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
+use lynkeus_gain::decay::ErrorModel;
+use lynkeus_structure::{
+    Check, Condition, Dimension, Extended, Region, Slopes, range, range_within,
+};
+use nalgebra::DMatrix;
+
+use super::expanded;
+use crate::{Assumptions, Observer};
+
+/// Cells examined per end of the range of an injection.
+const CELLS: usize = 200;
+
+/// e' = A(θ) e with everything that the proofs need.
+pub(super) struct ErrorSystem {
+    /// estimate, known inputs, measurements, time
+    pub region: Region,
+    pub slopes: Slopes,
+    /// for the proofs: by vertices where these are few
+    pub models: Vec<ErrorModel>,
+    /// per state: the size that counts as one
+    pub scale: Vec<f64>,
+    /// bounds of |∂F_i/∂y_j|, one row per state
+    pub injection: Vec<Vec<f64>>,
+    /// A at a point of the region, row by row
+    jacobian: Tape,
+}
+
+impl ErrorSystem {
+    /// The error system of an observer, or why it has none.
+    pub fn new(
+        extended: &Extended<'_>,
+        observer: &Observer,
+        assumptions: &Assumptions,
+    ) -> Result<Result<Self, String>, MissingInput> {
+        let pairs = observer.states.iter().zip(&observer.estimates);
+        let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
+        if same != observer.states.len() || same != extended.states.len() {
+            let reason = format!(
+                "the observer has {} states for {} quantities to estimate: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
+                observer.states.len(),
+                extended.states.len()
+            );
+            return Ok(Err(reason));
+        }
+        let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+        let region = seen_by(extended, observer, assumptions)?;
+        let mut system = Self::of(extended, &observer.derivatives, &symbols, region)?;
+        system.injection = injection(extended, observer, &system.region)?;
+        Ok(Ok(system))
+    }
+
+    /// The error system of a copy of the plant without correction.
+    pub fn open_loop(extended: &Extended<'_>, region: &Region) -> Result<Self, MissingInput> {
+        let symbols = extended.symbols();
+        Self::of(extended, &extended.derivatives, &symbols, region.clone())
+    }
+
+    fn of(
+        extended: &Extended<'_>,
+        derivatives: &[Node],
+        symbols: &[Node],
+        region: Region,
+    ) -> Result<Self, MissingInput> {
+        let graph = extended.graph();
+        let slopes = Slopes::new(graph, derivatives, symbols, &region)?;
+        let jacobian = jacobian::forward(graph, derivatives, symbols);
+        let zero = graph.constant(0.0).node();
+        let n = symbols.len();
+        let entry = |k: usize| jacobian.get(k / n, k % n).unwrap_or(zero);
+        let entries: Vec<Node> = (0..n * n).map(entry).collect();
+        Ok(Self {
+            jacobian: Tape::new(graph, &region.symbols(), &entries)?,
+            models: expanded(&slopes.models),
+            scale: extended.states.iter().map(size).collect(),
+            injection: vec![],
+            slopes,
+            region,
+        })
+    }
+
+    pub fn is_bounded(&self) -> bool {
+        self.models.iter().all(ErrorModel::is_bounded)
+    }
+
+    /// The hypothesis that every slope is bounded.
+    pub fn bounded(&self) -> Check {
+        let name = "every slope of a nonlinear term is bounded on the box".to_owned();
+        let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
+            let detail = format!("{} slopes enclosed", self.slopes.slopes.len());
+            let verdict = Condition::Proved;
+            return Check {
+                name,
+                verdict,
+                detail,
+            };
+        };
+        let cure = match open.is_empty() {
+            true => {
+                "it jumps or its derivative is infinite at the edge of the box: tighten min and max"
+                    .to_owned()
+            }
+            false => format!("declare min and max of {}", open.join(", ")),
+        };
+        let sides = self.region.dimensions.iter();
+        let left = sides
+            .filter(|d| slope.variables.contains(&d.name))
+            .map(|d| (d.name.clone(), d.min, d.max));
+        Check {
+            name,
+            verdict: Condition::Undecided(left.collect()),
+            detail: format!("the slope of {} has no bound; {cure}", slope.term),
+        }
+    }
+
+    pub fn evaluator(&self) -> Evaluator {
+        self.jacobian.evaluator()
+    }
+
+    /// A at a point of the region.
+    pub fn at(&self, evaluator: &mut Evaluator, point: &[f64]) -> DMatrix<f64> {
+        let n = self.scale.len();
+        let mut entries = vec![0.0; n * n];
+        evaluator.eval(point, &mut entries);
+        DMatrix::from_row_slice(n, n, &entries)
+    }
+}
+
+/// The box in the observer's symbols, with the ranges of what is measured.
+fn seen_by(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    assumptions: &Assumptions,
+) -> Result<Region, MissingInput> {
+    let region = &assumptions.region;
+    let hats: HashMap<Node, Node> = extended
+        .states
+        .iter()
+        .zip(&observer.states)
+        .map(|(state, (hat, _))| (state.node, hat.symbol))
+        .collect();
+    let mut seen = region.clone();
+    for side in &mut seen.dimensions {
+        side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
+    }
+    for (j, (signal, output)) in observer.measured.iter().zip(&extended.outputs).enumerate() {
+        let values = range(extended.graph(), output.variable.node, region)?.enclosure;
+        let values = values.inflate(assumptions.noise.get(j).copied().unwrap_or(0.0));
+        seen.dimensions.push(Dimension {
+            name: signal.name.clone(),
+            symbol: signal.symbol,
+            min: values.lo(),
+            max: values.hi(),
+            integer: false,
+        });
+    }
+    Ok(seen)
+}
+
+/// Bounds of |∂F_i/∂y_j|: how measurement errors reach the estimate.
+fn injection(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    region: &Region,
+) -> Result<Vec<Vec<f64>>, MissingInput> {
+    let graph = extended.graph();
+    let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
+    let jacobian = jacobian::forward(graph, &observer.derivatives, &measured);
+    let mut bounds = vec![vec![0.0; measured.len()]; observer.states.len()];
+    for &(i, j, node) in &jacobian.entries {
+        bounds[i][j] = range_within(graph, node, region, CELLS)?
+            .enclosure
+            .magnitude();
+    }
+    Ok(bounds)
+}
+
+/// The width of the declared range, else the nominal value, else the start's size.
+fn size(variable: &lynkeus_model::Variable) -> f64 {
+    let width = variable.max - variable.min;
+    if width.is_finite() && width > 0.0 {
+        return width;
+    }
+    let usable = |x: &f64| x.is_finite() && *x != 0.0;
+    let typical = variable
+        .nominal
+        .filter(usable)
+        .or(variable.start.filter(usable));
+    typical.map_or(1.0, f64::abs)
+}

@@ -1,0 +1,215 @@
+//! `gain = "lmi"`: a constant gain that comes with a proof.
+//!
+//! x̂' = f(x̂, u) − K (Cx̂ − y) with a full K: every output corrects every state. The
+//! form of the equations does not matter, only the slopes of their nonlinear terms.
+
+use lynkeus_gain::decay::{self, Aim, Gain, NoGain, Request};
+use lynkeus_structure::Extended;
+
+use super::blocking;
+use super::error_system::ErrorSystem;
+use crate::estimate::Copy;
+use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
+
+/// Bisections of the rate where only the gain is limited.
+const HALVINGS: usize = 9;
+
+/// Whether the study asks for such a gain; `others` are the family's own words for
+/// `gain`.
+///
+/// # Errors
+/// Another word, or keys of this gain without it.
+pub(crate) fn asked_for(tuning: &Tuning, others: &[&str]) -> Result<bool, TuningError> {
+    let words: Vec<&str> = others.iter().copied().chain(["lmi"]).collect();
+    let asked = tuning.choice("gain", &words)?.as_deref() == Some("lmi");
+    let own = ["rate", "gain_limit", "minimise"];
+    match own
+        .iter()
+        .find(|key| !asked && tuning.values.contains_key(**key))
+    {
+        Some(key) => {
+            let expected = "this key only with gain = \"lmi\"";
+            Err(TuningError::new(key, expected, "another gain"))
+        }
+        None => Ok(asked),
+    }
+}
+
+/// The observer with a certified gain, under the name of the family that asked.
+pub(crate) fn design(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    family: &'static str,
+    examination: Examination,
+) -> Result<Design, DesignError> {
+    let copy = Copy::new(extended, tuning);
+    let measured = measured(extended, &copy)?;
+    let system = ErrorSystem::open_loop(extended, &extended.region())?;
+    if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
+        let cure = match open.is_empty() {
+            true => "tighten its range".to_owned(),
+            false => format!("declare min and max of {}", open.join(", ")),
+        };
+        return Err(DesignError::NoGain {
+            key: "gain",
+            reason: format!(
+                "the slope of {} has no bound on the box; {cure}",
+                slope.term
+            ),
+        });
+    }
+    let request = Request {
+        rate: positive(tuning, "rate")?.unwrap_or(0.0),
+        noise: vec![1.0; measured.len()],
+        measured,
+        scale: system.scale.clone(),
+        aim: aim(tuning)?,
+        limit: positive(tuning, "gain_limit")?,
+    };
+    let gain = match (tuning.values.contains_key("rate"), request.limit) {
+        (true, _) => decay::design(&system.models, &request)
+            .map_err(|error| refusal(&system, &request, error))?,
+        (false, Some(_)) => fastest(&system, request.clone())?,
+        (false, None) => {
+            let expected = "the required decay, 1/time unit (or gain_limit alone, for the fastest decay within it)";
+            return Err(TuningError::new("rate", expected, "nothing").into());
+        }
+    };
+    assemble(
+        extended,
+        tuning,
+        &copy,
+        family,
+        examination,
+        &request,
+        &gain,
+    )
+}
+
+fn measured(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Vec<usize>, TuningError> {
+    let shown = |i: usize| {
+        copy.measured_state(i)
+            .map(|(state, _)| state)
+            .ok_or_else(|| {
+                let name = &extended.outputs[i].variable.name;
+                let expected = "outputs that each show one state (y = c·x + d)";
+                TuningError::new("gain", expected, format!("the output {name}"))
+            })
+    };
+    (0..extended.outputs.len()).map(shown).collect()
+}
+
+fn positive(tuning: &Tuning, key: &str) -> Result<Option<f64>, TuningError> {
+    Ok(tuning.positive_per_chain(key, 1)?.map(|x| x[0]))
+}
+
+fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
+    let chosen = tuning.choice("minimise", &["noise", "peak", "gain"])?;
+    Ok(match chosen.as_deref() {
+        Some("peak") => Aim::Peak,
+        Some("gain") => Aim::Gain,
+        _ => Aim::Noise,
+    })
+}
+
+fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignError {
+    match error {
+        NoGain::Limit(found) => DesignError::NoGain {
+            key: "gain_limit",
+            reason: format!(
+                "the rate {} needs larger gains than {}: the smallest largest entry found is {found:.4}; raise gain_limit or lower rate",
+                request.rate,
+                request.limit.unwrap_or(f64::INFINITY)
+            ),
+        },
+        _ => DesignError::NoGain {
+            key: "rate",
+            reason: format!(
+                "no gain is proved to reach {} on the box: {}",
+                request.rate,
+                blocking::reason(system, request)
+            ),
+        },
+    }
+}
+
+/// The fastest decay within the limit of the gain.
+fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignError> {
+    let mut at = |rate: f64| {
+        request.rate = rate;
+        decay::design(&system.models, &request)
+    };
+    // the pace of the plant itself, from which to search
+    let pace = system
+        .models
+        .iter()
+        .map(|m| m.scaled(&system.scale, 1.0).at(&middles(m)).amax());
+    let mut high = pace.fold(0.0, f64::max).max(1e-9);
+    let mut best = None;
+    let mut low = 0.0;
+    for _ in 0..HALVINGS {
+        let rate = if low > 0.0 {
+            f64::midpoint(low, high)
+        } else {
+            0.3 * high
+        };
+        match at(rate) {
+            Ok(gain) => (low, best) = (rate, Some(gain)),
+            Err(_) => high = rate,
+        }
+    }
+    best.ok_or_else(|| {
+        request.rate = high;
+        let error = decay::design(&system.models, &request)
+            .err()
+            .unwrap_or(NoGain::Rejected);
+        refusal(system, &request, error)
+    })
+}
+
+fn middles(model: &lynkeus_gain::decay::ErrorModel) -> Vec<f64> {
+    model.sectors.iter().map(|s| s.middle()).collect()
+}
+
+fn assemble(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    copy: &Copy<'_, '_>,
+    family: &'static str,
+    examination: Examination,
+    request: &Request,
+    gain: &Gain,
+) -> Result<Design, DesignError> {
+    let graph = extended.graph();
+    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let mut gains = vec![];
+    for (j, output) in extended.outputs.iter().enumerate() {
+        let Some(innovation) = copy.innovation(j) else {
+            continue;
+        };
+        let mut entries = vec![];
+        for (i, state) in extended.states.iter().enumerate() {
+            let k = gain.K[(i, j)];
+            let correction = graph.constant(k) * graph.expr(innovation);
+            derivatives[i] = (graph.expr(derivatives[i]) - correction).node();
+            entries.push((state.name.clone(), k));
+        }
+        gains.push(ChainGain {
+            output: output.variable.name.clone(),
+            entries,
+        });
+    }
+    let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
+    let parameters = vec![
+        ("rate".to_owned(), format!("{}", request.rate)),
+        ("largest gain".to_owned(), format!("{:.6}", gain.K.amax())),
+        ("slopes".to_owned(), format!("{slopes}")),
+    ];
+    Ok(Design {
+        observer: copy.observer(family, tuning, derivatives)?,
+        examination,
+        gains,
+        parameters,
+        notes: vec![],
+    })
+}

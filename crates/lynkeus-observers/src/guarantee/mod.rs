@@ -1,0 +1,152 @@
+//! Guarantees by linear matrix inequalities, for any observer whose states are the
+//! estimate itself.
+//!
+//! Such an observer x̂' = F(x̂, u, y) reproduces the plant where it is right,
+//! F(x, u, h(x)) = f(x, u). So the error e = x̂ − x obeys
+//!
+//! e' = F(x̂, u, h(x)) − F(x, u, h(x)) = A(θ) e,
+//!
+//! with the slopes θ of the nonlinear terms of F ([`lynkeus_structure::slopes`]). A
+//! common Lyapunov function eᵀPe for every θ on the box proves the decay, whatever
+//! family the observer is of. Linear matrix inequalities find P
+//! ([`lynkeus_gain::decay`]); interval arithmetic accepts or rejects it.
+
+mod blocking;
+mod error_system;
+mod lmi;
+mod refute;
+mod ultimate;
+
+use lynkeus_gain::decay::{self, ErrorModel, Proof};
+use lynkeus_structure::{Check, Condition, Extended};
+
+use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};
+use error_system::ErrorSystem;
+pub(crate) use lmi::{asked_for, design as design_lmi};
+
+const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";
+/// Vertices up to which slopes are taken by their ends instead of by multipliers.
+const VERTICES: usize = 32;
+
+/// The fastest decay of the observer's error that can be proved on the box, a point of
+/// the box that refutes any, or neither.
+///
+/// # Errors
+/// Parameters without value.
+pub fn certify(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let system = match ErrorSystem::new(extended, observer, assumptions)? {
+        Ok(system) => system,
+        Err(reason) => return Ok(not_covered(assumptions, reason)),
+    };
+    let mut hypotheses = vec![system.bounded()];
+    let sample = refute::worst(&system)?;
+    if let Some(witness) = sample.witness {
+        let check = Check {
+            name: STABLE.to_owned(),
+            verdict: Condition::Refuted(witness),
+            detail: "the real part of an eigenvalue of the error's Jacobian is not negative, so no Lyapunov function covers the box".into(),
+        };
+        hypotheses.push(check);
+        return Ok(Certificate::new(BASIS, &assumptions.region, hypotheses));
+    }
+    let found = match system.is_bounded() {
+        true => decay::fastest(&system.models, &system.scale, sample.slowest),
+        false => None,
+    };
+    hypotheses.push(inequality(&system, found.as_ref()));
+    let mut certificate = Certificate::new(BASIS, &assumptions.region, hypotheses);
+    match found {
+        Some(proof) => fill(&mut certificate, extended, &system, &proof, assumptions),
+        None => certificate
+            .notes
+            .extend(still_said(&system, sample.slowest)),
+    }
+    Ok(certificate)
+}
+
+const STABLE: &str = "the error's Jacobian is stable everywhere on the box";
+
+fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
+    let check = Check {
+        name: "the observer's states are the estimate".into(),
+        verdict: Condition::Undecided(vec![]),
+        detail: reason,
+    };
+    Certificate::new(BASIS, &assumptions.region, vec![check])
+}
+
+fn inequality(system: &ErrorSystem, proof: Option<&Proof>) -> Check {
+    let count = system.slopes.slopes.len();
+    let name = "one Lyapunov function eᵀPe for the whole box".to_owned();
+    match proof.filter(|proof| proof.rate > 0.0) {
+        Some(proof) => Check {
+            name,
+            verdict: Condition::Proved,
+            detail: format!(
+                "He(P J) + 2·{:.4}·P < 0 for all {count} slopes within their ranges, by interval Cholesky factorisation",
+                proof.rate
+            ),
+        },
+        None => Check {
+            name,
+            verdict: Condition::Undecided(vec![]),
+            detail: format!("none was found for all {count} slopes within their ranges"),
+        },
+    }
+}
+
+/// What can be said without a proof on the whole box.
+fn still_said(system: &ErrorSystem, slowest: f64) -> Vec<String> {
+    let mut notes = vec![format!(
+        "at every point examined the error's Jacobian is stable, the slowest mode decaying at {slowest:.4}"
+    )];
+    if system.is_bounded()
+        && let Some(share) = blocking::provable_share(system)
+    {
+        notes.push(format!(
+            "the inequality holds once every slope's range is cut to {:.0} % about its middle: a smaller box would do",
+            100.0 * share
+        ));
+    }
+    notes
+}
+
+/// Rate, bounds and constants of a proof.
+fn fill(
+    certificate: &mut Certificate,
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+) {
+    if certificate.verdict != Verdict::Proved {
+        return;
+    }
+    certificate.rate = Some(proof.rate);
+    let eigenvalues = proof.P.symmetric_eigenvalues();
+    let spread = (eigenvalues.max() / eigenvalues.min()).sqrt();
+    certificate.constants = vec![
+        Constant::new("rate", proof.rate, "V' ≤ −2·rate·V for V = eᵀPe"),
+        Constant::new(
+            "√cond(P)",
+            spread,
+            "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
+        ),
+    ];
+    if let Some(bounds) = ultimate::bounds(extended, system, proof, assumptions) {
+        certificate.ultimate_bound = Some(bounds.norm);
+        certificate.ultimate = bounds.states;
+    }
+    certificate.notes.push(
+        "holds while plant and estimate stay in the box; an estimate that starts near the plant stays near it".into(),
+    );
+}
+
+/// The models by their vertices where these are few.
+fn expanded(models: &[ErrorModel]) -> Vec<ErrorModel> {
+    decay::expanded(models, VERTICES)
+}

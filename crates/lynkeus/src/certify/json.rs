@@ -1,0 +1,74 @@
+//! Certificates for machines.
+
+use lynkeus_observers::Certificate;
+use lynkeus_structure::{Check, Condition};
+use serde_json::{Map, Value, json};
+
+use super::CertifyReport;
+use crate::check::point;
+
+/// `{verdict, rate, ultimate_bound, box, hypotheses, …}`; the hypotheses are those of
+/// the inequality, then those of the theorem.
+pub(crate) fn certificate(report: &CertifyReport) -> Value {
+    let best = report.best();
+    let theorem = report.theorem.iter().flat_map(|t| &t.hypotheses);
+    let hypotheses: Vec<Value> = report
+        .certificate
+        .hypotheses
+        .iter()
+        .chain(theorem)
+        .map(hypothesis)
+        .collect();
+    let mut object = summary(best);
+    object["verdict"] = json!(report.verdict().word());
+    object["hypotheses"] = json!(hypotheses);
+    let notes = report.theorem.iter().flat_map(|t| &t.notes);
+    object["notes"] = json!(
+        report
+            .certificate
+            .notes
+            .iter()
+            .chain(notes)
+            .collect::<Vec<_>>()
+    );
+    if let Some(theorem) = &report.theorem {
+        object["theorem"] = summary(theorem);
+    }
+    object
+}
+
+fn summary(certificate: &Certificate) -> Value {
+    let sides = certificate
+        .region
+        .iter()
+        .map(|(name, low, high)| (name.clone(), json!([low, high])));
+    let bounds = certificate
+        .ultimate
+        .iter()
+        .map(|(name, bound)| (name.clone(), json!(bound)));
+    let constants = certificate
+        .constants
+        .iter()
+        .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.meaning }));
+    json!({
+        "basis": certificate.basis,
+        "verdict": certificate.verdict.word(),
+        "rate": certificate.rate,
+        "ultimate_bound": certificate.ultimate_bound,
+        "ultimate_bounds": bounds.collect::<Map<_, _>>(),
+        "box": sides.collect::<Map<_, _>>(),
+        "constants": constants.collect::<Vec<_>>(),
+    })
+}
+
+fn hypothesis(check: &Check) -> Value {
+    let mut entry = json!({
+        "name": check.name,
+        "verdict": check.verdict.word(),
+        "detail": check.detail,
+    });
+    if let Condition::Refuted(witness) = &check.verdict {
+        entry["witness"] = witness.points.iter().map(point).collect();
+    }
+    entry
+}
