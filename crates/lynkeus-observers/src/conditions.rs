@@ -50,6 +50,20 @@ pub(crate) fn names(extended: &Extended<'_>, states: &[usize]) -> Vec<String> {
         .collect()
 }
 
+/// Gains on the error of the state that output `i` shows as gains on ŷ − y: divided by
+/// the output's slope in that state, where it is a number.
+pub(crate) fn on_output(
+    extended: &Extended<'_>,
+    i: usize,
+    states: &[usize],
+    gains: &[f64],
+) -> Vec<(String, f64)> {
+    let shown = extended.outputs[i].state;
+    let slope = shown.and_then(|(_, slope, _)| extended.graph().constant_value(slope));
+    let gains = gains.iter().map(|k| k / slope.unwrap_or(1.0));
+    names(extended, states).into_iter().zip(gains).collect()
+}
+
 pub(crate) fn fit(checks: &[Check]) -> Fit {
     let any = |test: fn(&Condition) -> bool| checks.iter().any(|check| test(&check.verdict));
     if any(|v| matches!(v, Condition::Refuted(_))) {

@@ -113,12 +113,12 @@ impl Examination {
     }
 }
 
-/// The constant part of the gain of one chain.
+/// The constant gain on the error ŷ − y of one output: x̂' = f(x̂, u) − K (ŷ − y).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChainGain {
-    /// name of the measured output that drives the chain
+    /// name of the measured output
     pub output: String,
-    /// (state, gain before the division by partials)
+    /// (state, gain; before the division by partials where that is asked for)
     pub entries: Vec<(String, f64)>,
 }
 

@@ -101,6 +101,11 @@ impl CertifyReport {
         self.verdict() == Verdict::Proved
     }
 
+    /// The verdict in a sentence.
+    pub fn conclusion(&self) -> String {
+        print::conclusion(self)
+    }
+
     /// Whether a point of the box shows that there is no decay.
     pub fn is_refuted(&self) -> bool {
         self.verdict() == Verdict::Refuted

@@ -5,28 +5,28 @@ use std::fmt;
 use lynkeus_observers::{Design, Fit};
 use serde_json::{Map, Value, json};
 
-use crate::{Error, Study, prepare};
+use crate::certify::certificate_json;
+
+use crate::{CertifyReport, Error, Study};
 
 /// The answer of `lynkeus design`.
 #[derive(Debug)]
 pub struct DesignReport {
     /// name of the plant
     pub plant: String,
-    /// the design
-    pub design: Design,
+    /// the design with what is guaranteed about it
+    pub certified: CertifyReport,
 }
 
-/// Designs the study's observer.
+/// Designs the study's observer and certifies it.
 ///
 /// # Errors
 /// A study that does not fit its plant, or no family that does.
 pub fn design(study: &Study) -> Result<DesignReport, Error> {
-    let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = prepare::design(study, &extended)?;
+    let certified = crate::certify(study)?;
     Ok(DesignReport {
-        plant: plant.name.clone(),
-        design,
+        plant: certified.plant.clone(),
+        certified,
     })
 }
 
@@ -39,7 +39,7 @@ impl DesignReport {
             parameters,
             notes,
             ..
-        } = &self.design;
+        } = &self.certified.design;
         let parameters: Map<String, Value> = parameters
             .iter()
             .map(|(name, value)| (name.clone(), json!(value)))
@@ -54,9 +54,10 @@ impl DesignReport {
             "family": observer.family,
             "fit": examination.fit.words(),
             "chains": examination.chains,
-            "gain": gain_json(&self.design),
+            "gain": gain_json(&self.certified.design),
             "parameters": parameters,
             "initial": starts,
+            "certificate": certificate_json(&self.certified),
             "notes": notes,
         })
     }
@@ -82,7 +83,7 @@ impl fmt::Display for DesignReport {
             gains,
             parameters,
             notes,
-        } = &self.design;
+        } = &self.certified.design;
         writeln!(
             f,
             "{}: {} observer, {} states",
@@ -107,6 +108,11 @@ impl fmt::Display for DesignReport {
                 writeln!(f, "  {state:<14} {k:.6e}")?;
             }
         }
+        writeln!(
+            f,
+            "\n{}; `lynkeus certify` says more",
+            self.certified.conclusion()
+        )?;
         for note in notes {
             writeln!(f, "\nnote: {note}")?;
         }

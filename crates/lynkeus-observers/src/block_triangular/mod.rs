@@ -24,7 +24,7 @@ use std::collections::HashMap;
 use lynkeus_expr::Node;
 use lynkeus_structure::{Blocks, Extended};
 
-use crate::conditions::names;
+use crate::conditions::on_output;
 use crate::estimate::Copy;
 use crate::guarantee;
 use crate::peaking::{self, InnovationLimit, Transient, transient};
@@ -149,10 +149,7 @@ fn assemble(
         }
         gains.push(ChainGain {
             output: extended.outputs[*output].variable.name.clone(),
-            entries: names(extended, &chain.states)
-                .into_iter()
-                .zip(constants)
-                .collect(),
+            entries: on_output(extended, *output, &chain.states, &constants),
         });
     }
     let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");

@@ -26,8 +26,12 @@ pub(super) struct ErrorSystem {
     pub scale: Vec<f64>,
     /// bounds of |∂F_i/∂y_j|, one row per state
     pub injection: Vec<Vec<f64>>,
-    /// A at a point of the region, row by row
-    jacobian: Tape,
+    /// A at x̂ = x, row by row, at a point of `sides`
+    right: Tape,
+    /// A as an expression, row by row
+    entries: Vec<Node>,
+    /// estimate (here also the state), known inputs and time
+    pub sides: Region,
 }
 
 impl ErrorSystem {
@@ -51,6 +55,7 @@ impl ErrorSystem {
         let region = seen_by(extended, observer, assumptions)?;
         let mut system = Self::of(extended, &observer.derivatives, &symbols, region)?;
         system.injection = injection(extended, observer, &system.region)?;
+        (system.right, system.sides) = right(extended, observer, &system)?;
         Ok(Ok(system))
     }
 
@@ -74,7 +79,9 @@ impl ErrorSystem {
         let entry = |k: usize| jacobian.get(k / n, k % n).unwrap_or(zero);
         let entries: Vec<Node> = (0..n * n).map(entry).collect();
         Ok(Self {
-            jacobian: Tape::new(graph, &region.symbols(), &entries)?,
+            right: Tape::new(graph, &region.symbols(), &entries)?,
+            entries,
+            sides: region.clone(),
             models: expanded(&slopes.models),
             scale: extended.states.iter().map(size).collect(),
             injection: vec![],
@@ -118,16 +125,43 @@ impl ErrorSystem {
     }
 
     pub fn evaluator(&self) -> Evaluator {
-        self.jacobian.evaluator()
+        self.right.evaluator()
     }
 
-    /// A at a point of the region.
+    /// A at x̂ = x, at a point of `sides`.
     pub fn at(&self, evaluator: &mut Evaluator, point: &[f64]) -> DMatrix<f64> {
         let n = self.scale.len();
         let mut entries = vec![0.0; n * n];
         evaluator.eval(point, &mut entries);
         DMatrix::from_row_slice(n, n, &entries)
     }
+}
+
+/// A where the estimate is right: what is measured is then h at the estimate.
+fn right(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    system: &ErrorSystem,
+) -> Result<(Tape, Region), MissingInput> {
+    let graph = extended.graph();
+    let hats = extended.states.iter().zip(&observer.states);
+    let hats: HashMap<Node, Node> = hats
+        .map(|(state, (hat, _))| (state.node, hat.symbol))
+        .collect();
+    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let seen = graph.substitute(&outputs, &hats);
+    let measured: HashMap<Node, Node> = observer
+        .measured
+        .iter()
+        .map(|m| m.symbol)
+        .zip(seen)
+        .collect();
+    let entries = graph.substitute(&system.entries, &measured);
+    let mut sides = system.region.clone();
+    sides
+        .dimensions
+        .retain(|d| !measured.contains_key(&d.symbol));
+    Ok((Tape::new(graph, &sides.symbols(), &entries)?, sides))
 }
 
 /// The box in the observer's symbols, with the ranges of what is measured.

@@ -8,6 +8,7 @@ use lynkeus_structure::Extended;
 
 use super::blocking;
 use super::error_system::ErrorSystem;
+use crate::conditions::on_output;
 use crate::estimate::Copy;
 use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
 
@@ -187,13 +188,13 @@ fn assemble(
         let Some(innovation) = copy.innovation(j) else {
             continue;
         };
-        let mut entries = vec![];
-        for (i, state) in extended.states.iter().enumerate() {
-            let k = gain.K[(i, j)];
+        let K: Vec<f64> = gain.K.column(j).iter().copied().collect();
+        for (derivative, &k) in derivatives.iter_mut().zip(&K) {
             let correction = graph.constant(k) * graph.expr(innovation);
-            derivatives[i] = (graph.expr(derivatives[i]) - correction).node();
-            entries.push((state.name.clone(), k));
+            *derivative = (graph.expr(*derivative) - correction).node();
         }
+        let all: Vec<usize> = (0..K.len()).collect();
+        let entries = on_output(extended, j, &all, &K);
         gains.push(ChainGain {
             output: output.variable.name.clone(),
             entries,

@@ -1,4 +1,5 @@
-//! The search for a point of the box at which the error's Jacobian is not stable.
+//! The search for a point of the box at which the error's Jacobian is not stable: a
+//! right estimate does not stay right there.
 
 use lynkeus_expr::Evaluator;
 use lynkeus_structure::{Dimension, Point, Witness};
@@ -27,7 +28,7 @@ pub(super) fn worst(system: &ErrorSystem) -> Result<Sample, DesignError> {
     let mut search = Search {
         system,
         evaluator: system.evaluator(),
-        sides: system.region.dimensions.iter().map(finite).collect(),
+        sides: system.sides.dimensions.iter().map(finite).collect(),
     };
     let (mut best, mut highest) = (search.point(0), f64::NEG_INFINITY);
     for index in 0..POINTS {
@@ -43,7 +44,7 @@ pub(super) fn worst(system: &ErrorSystem) -> Result<Sample, DesignError> {
     }
     let A = system.at(&mut search.evaluator, &best);
     let refuted = highest > CLEAR * A.amax();
-    let coordinates = system.region.dimensions.iter().zip(&best);
+    let coordinates = system.sides.dimensions.iter().zip(&best);
     let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
     let named = named.filter(|(name, _)| name != "time").collect();
     let point = Point {

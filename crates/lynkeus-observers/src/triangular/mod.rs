@@ -19,7 +19,7 @@ mod theorem;
 use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
 
-use crate::conditions::names;
+use crate::conditions::on_output;
 use crate::estimate::Copy;
 use crate::guarantee;
 use crate::peaking::{self, InnovationLimit};
@@ -128,10 +128,12 @@ fn assemble(
         }
         table.push(ChainGain {
             output: extended.outputs[i].variable.name.clone(),
-            entries: names(extended, &chain.states)
-                .into_iter()
-                .zip(constants)
-                .collect(),
+            entries: on_output(
+                extended,
+                i,
+                &chain.states,
+                &signed(&form.partials[i], constants),
+            ),
         });
     }
     Ok(Design {
@@ -141,6 +143,18 @@ fn assemble(
         gains: table,
         examination: form.examination,
     })
+}
+
+/// The gains with the signs of Remark 2.
+fn signed(partials: &[Partial], gains: Vec<f64>) -> Vec<f64> {
+    let mut ε = 1.0;
+    let signed = gains.into_iter().enumerate().map(|(j, gain)| {
+        if j > 0 {
+            ε *= partials[j - 1].sign;
+        }
+        ε * gain
+    });
+    signed.collect()
 }
 
 /// The gains in the coordinates of the plant: with the signs of Remark 2, or

@@ -27,6 +27,8 @@ use linear::Splitter;
 const VERTEX_INPUTS: usize = 4;
 /// Cells examined per end of a slope's range.
 const BUDGET: usize = 1500;
+/// Cells examined to see whether a slope has a bound at all.
+const GLANCE: usize = 50;
 
 /// The error system of a right-hand side on a box.
 #[derive(Clone, Debug)]
@@ -279,7 +281,12 @@ fn slope(
     let symbols = graph.symbols_of(&[sum]);
     let variables = region.restricted(&symbols).dimensions;
     let names = variables.into_iter().map(|d| d.name).collect();
-    let found = range_within(graph, sum, region, BUDGET)?;
+    // where a few cells leave no bound, more hardly ever do
+    let first = range_within(graph, sum, region, GLANCE)?;
+    let found = match first.enclosure.magnitude().is_finite() {
+        true => range_within(graph, sum, region, BUDGET)?,
+        false => first,
+    };
     let range = match found.defined && !jumps {
         true => found.enclosure + rest,
         false => Interval::ENTIRE,

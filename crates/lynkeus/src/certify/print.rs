@@ -33,8 +33,7 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
     Ok(())
 }
 
-/// The verdict in a sentence.
-fn conclusion(report: &CertifyReport) -> String {
+pub(super) fn conclusion(report: &CertifyReport) -> String {
     let best = report.best();
     match (report.verdict(), best.rate) {
         (Verdict::Proved, Some(rate)) => {
