@@ -3,35 +3,50 @@
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_structure::{Chain, Extended};
 
+/// M̄, L and W of the five steps.
+struct Steps {
+    M̄: Vec<Vec<Sparse>>,
+    L: Vec<Sparse>,
+    W: Vec<Vec<Sparse>>,
+}
+
+impl Steps {
+    fn new(extended: &Extended<'_>, chain: &Chain) -> Self {
+        let graph = extended.graph();
+        let n = chain.states.len();
+        let F = own_jacobian(extended, chain);
+        // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
+        let mut rows = vec![unit(graph, n)];
+        for k in 0..n {
+            rows.push(times(graph, &rows[k], &F));
+        }
+        let next = rows.pop().unwrap_or_default();
+        let M̄ = rows;
+        // Steps 2 and 3: the last row q of M̄FM̄⁻¹ − A solves q M̄ = CFⁿ; L_j = q_{n−j+1}
+        let q = solve_left(graph, &M̄, next);
+        let L: Vec<Sparse> = q.into_iter().rev().collect();
+        // Step 4: W = (C; C(A + LC); …)
+        let Ā = |row: &[Sparse]| -> Vec<Sparse> {
+            (0..n)
+                .map(|j| match j {
+                    0 => dot(graph, row, &L),
+                    _ => row[j - 1],
+                })
+                .collect()
+        };
+        let mut W = vec![unit(graph, n)];
+        for k in 1..n {
+            W.push(Ā(&W[k - 1]));
+        }
+        Self { M̄, L, W }
+    }
+}
+
 /// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
 /// triangular solve.
 pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
     let graph = extended.graph();
-    let n = chain.states.len();
-    let F = own_jacobian(extended, chain);
-    // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
-    let mut rows = vec![unit(graph, n)];
-    for k in 0..n {
-        rows.push(times(graph, &rows[k], &F));
-    }
-    let next = rows.pop().unwrap_or_default();
-    let M̄ = rows;
-    // Steps 2 and 3: the last row q of M̄FM̄⁻¹ − A solves q M̄ = CFⁿ; L_j = q_{n−j+1}
-    let q = solve_left(graph, &M̄, next);
-    let L: Vec<Sparse> = q.into_iter().rev().collect();
-    // Step 4: W = (C; C(A + LC); …)
-    let Ā = |row: &[Sparse]| -> Vec<Sparse> {
-        (0..n)
-            .map(|j| match j {
-                0 => dot(graph, row, &L),
-                _ => row[j - 1],
-            })
-            .collect()
-    };
-    let mut W = vec![unit(graph, n)];
-    for k in 1..n {
-        W.push(Ā(&W[k - 1]));
-    }
+    let Steps { M̄, L, W } = Steps::new(extended, chain);
     // Step 5, multiplied out
     let v: Vec<Sparse> = L
         .iter()
@@ -44,11 +59,39 @@ pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, gains: &[Node]) -> Vec
     gain.into_iter().map(|g| g.unwrap_or(zero)).collect()
 }
 
+/// The similarity transformation of the error, row by row.
+pub(super) struct Transformation {
+    /// M = W⁻¹M̄
+    pub M: Vec<Vec<Sparse>>,
+    /// M⁻¹ = M̄⁻¹W
+    pub inverse: Vec<Vec<Sparse>>,
+    /// L
+    pub L: Vec<Sparse>,
+}
+
+/// M, M⁻¹ and L of Step 5, for the proof; the observer needs none of them.
+pub(super) fn transformation(extended: &Extended<'_>, chain: &Chain) -> Transformation {
+    let graph = extended.graph();
+    let Steps { M̄, L, W } = Steps::new(extended, chain);
+    let solved = |A: &[Vec<Sparse>], B: &[Vec<Sparse>]| {
+        let n = A.len();
+        let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
+        let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
+        let row = |i: usize| columns.iter().map(|c| c[i]).collect();
+        (0..n).map(row).collect()
+    };
+    Transformation {
+        M: solved(&W, &M̄),
+        inverse: solved(&M̄, &W),
+        L,
+    }
+}
+
 /// An entry that may be zero everywhere.
-type Sparse = Option<Node>;
+pub(super) type Sparse = Option<Node>;
 
 /// F_i = ∂f_i/∂x_i, row by row.
-fn own_jacobian(extended: &Extended<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
+pub(super) fn own_jacobian(extended: &Extended<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
     let f: Vec<Node> = chain
         .states
         .iter()

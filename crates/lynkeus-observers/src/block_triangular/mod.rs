@@ -14,10 +14,13 @@
 //! lengths it asks for 1 ≤ θ_i and θ_{i−1}^{n_{i−1}} ≤ θ_i. The rule between
 //! neighbours suffices: θ_k^{n_k} ≤ θ_{k+1} ≤ θ_{k+1}^{n_{k+1}} ≤ θ_{k+2} ≤ ….
 
+mod figures;
 mod form;
 mod gains;
 mod lee;
 mod low_power;
+mod theorem;
+mod transformed;
 
 use std::collections::HashMap;
 
@@ -28,7 +31,10 @@ use crate::conditions::on_output;
 use crate::estimate::Copy;
 use crate::guarantee;
 use crate::peaking::{self, InnovationLimit, Transient, transient};
-use crate::{ChainGain, Design, DesignError, Examination, Family, Fit, Tuning, TuningError};
+use crate::{
+    Assumptions, Certificate, ChainGain, Design, DesignError, Examination, Family, Fit, Tuning,
+    TuningError,
+};
 use form::form;
 use gains::{given, placed};
 use lee::lee;
@@ -77,6 +83,15 @@ impl Family for BlockTriangular {
         })
     }
 
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        theorem::certificate(extended, tuning, assumptions)
+    }
+
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended, tuning)? {
             Ok((blocks, examination)) if examination.fit != Fit::DoesNotFit => {
@@ -110,14 +125,8 @@ fn assemble(
     let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
     let transient = Transient::read(tuning, blocks.order.len())?;
     let θ = theta(tuning, blocks.order.len())?;
-    let K = given(tuning)?.unwrap_or_else(|| {
-        let all_at_one = |n: usize| placed(&vec![-1.0; n]);
-        blocks.lengths().into_iter().map(all_at_one).collect()
-    });
-    let classical = tuning
-        .choice("correction", &["lee", "classical"])?
-        .as_deref()
-        == Some("classical");
+    let K = coefficients(tuning, blocks)?;
+    let classical = classical(tuning)?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let mut gains = vec![];
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
@@ -167,6 +176,20 @@ fn assemble(
         gains,
         parameters,
     })
+}
+
+/// K, every eigenvalue of A − KC at −1 by default.
+fn coefficients(tuning: &Tuning, blocks: &Blocks) -> Result<Vec<Vec<f64>>, TuningError> {
+    Ok(given(tuning)?.unwrap_or_else(|| {
+        let all_at_one = |n: usize| placed(&vec![-1.0; n]);
+        blocks.lengths().into_iter().map(all_at_one).collect()
+    }))
+}
+
+/// Observer (3) instead of (7).
+fn classical(tuning: &Tuning) -> Result<bool, TuningError> {
+    let choice = tuning.choice("correction", &["lee", "classical"])?;
+    Ok(choice.as_deref() == Some("classical"))
 }
 
 /// θ, which has no default.

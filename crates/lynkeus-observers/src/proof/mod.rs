@@ -19,6 +19,7 @@
 //! outward-rounded bound.
 
 pub(crate) mod definite;
+pub(crate) mod lyapunov;
 pub(crate) mod metzler;
 pub(crate) mod slopes;
 pub(crate) mod threshold;

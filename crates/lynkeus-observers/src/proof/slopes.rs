@@ -29,6 +29,13 @@ pub(crate) fn slopes(
     let (mut found, mut open) = (vec![], vec![]);
     for row in 0..symbols.len() {
         let jump = jump(graph, extended.derivatives[row], &symbols);
+        // a jump spoils the whole equation, its skipped entries too
+        open.extend(jump.map(|node| Open {
+            row,
+            column: row,
+            node: Some(node),
+            jumps: true,
+        }));
         for &column in extended.pattern[row].iter().filter(|&&b| !skip(row, b)) {
             let node = jacobian.get(row, column);
             let size = match (jump, node) {
@@ -36,12 +43,12 @@ pub(crate) fn slopes(
                 (None, Some(node)) => magnitude(graph, node, region)?,
                 (None, None) => 0.0,
             };
-            if size.is_infinite() {
+            if size.is_infinite() && jump.is_none() {
                 open.push(Open {
                     row,
                     column,
-                    node: jump.or(node),
-                    jumps: jump.is_some(),
+                    node,
+                    jumps: false,
                 });
             }
             found.push(Slope { row, column, size });

@@ -52,3 +52,33 @@ pub(crate) fn first(start: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     }
     Some(high)
 }
+
+/// A weight further from 1 makes the overshoot larger: it has to lower θ0 by this.
+const WORTHWHILE: f64 = 0.999;
+
+/// Weights c_2, c_3, … of the chains beside c_1 = 1 for which θ0 is least, of those
+/// tried, one chain after the other. Any positive weights make a proof: S and the
+/// inequality it satisfies scale together.
+pub(crate) fn lightest(
+    chains: usize,
+    at: impl Fn(&[f64]) -> Option<f64>,
+) -> (Vec<f64>, Option<f64>) {
+    let mut c = vec![1.0; chains];
+    let mut best = at(&c);
+    for step in [4.0, 1.0, 0.25, 0.0625] {
+        for i in 1..chains {
+            let centre = c[i];
+            for k in [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0] {
+                let mut trial = c.clone();
+                trial[i] = centre * 10f64.powf(k * step);
+                let found = at(&trial);
+                if let Some(θ0) = found
+                    && best.is_none_or(|b| θ0 < WORTHWHILE * b)
+                {
+                    (c, best) = (trial, found);
+                }
+            }
+        }
+    }
+    (c, best)
+}

@@ -18,7 +18,7 @@ use super::form::{Form, form};
 use super::gains::Gains;
 use super::lemma::verify;
 use crate::conditions::{fit, names};
-use crate::proof::threshold::{first, reached};
+use crate::proof::threshold::{first, lightest, reached};
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
 use crate::proof::{Chain, Comparison, Disturbance, ultimate};
 use crate::{Assumptions, Certificate, Constant, DesignError, Family, Fit, Tuning};
@@ -164,26 +164,14 @@ impl Study<'_> {
         Comparison::new(&chains, μ, &self.facts.slopes)
     }
 
-    /// (c, θ0) for V = V1 + c·V2 with the weight c, of those tried, that gives the
-    /// least θ0. The paper has c = 1; any c > 0 does, for S and ρ scale together.
+    /// (c, θ0) for V = V1 + c·V2; the paper has c = 1.
     fn least(&self, μ: &[f64], θ: f64) -> (f64, Option<f64>) {
-        let at = |c: f64| first(θ, |θ| self.comparison(μ, |_| θ, c).holds());
-        let mut best = (1.0, at(1.0));
-        if μ.len() < 2 {
-            return best;
-        }
-        for step in [4.0, 1.0, 0.25, 0.0625] {
-            let centre: f64 = best.0;
-            for k in [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0] {
-                let c = centre * 10f64.powf(k * step);
-                if let Some(θ0) = at(c)
-                    && best.1.is_none_or(|b| θ0 < b)
-                {
-                    best = (c, Some(θ0));
-                }
-            }
-        }
-        best
+        let at = |c: &[f64]| {
+            let c = c.get(1).copied().unwrap_or(1.0);
+            first(θ, |θ| self.comparison(μ, |_| θ, c).holds())
+        };
+        let (c, θ0) = lightest(μ.len(), at);
+        (c.get(1).copied().unwrap_or(1.0), θ0)
     }
 
     /// `partials = true` divides by the partials at the estimate.

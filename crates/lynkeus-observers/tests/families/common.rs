@@ -253,3 +253,13 @@ pub fn assert_safely(found: f64, exact: f64, above: bool) {
     let excess = if above { excess } else { -excess };
     assert!((-1e-14..1e-8).contains(&excess), "{found} against {exact}");
 }
+
+/// Deterministic numbers in (0, 1).
+pub fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = seed
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    }
+}

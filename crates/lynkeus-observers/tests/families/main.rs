@@ -6,6 +6,7 @@ mod common;
 mod drift_observable;
 mod peaking;
 mod state_affine;
+mod theorem_block_triangular;
 mod theorem_triangular;
 mod triangular;
 mod unknown_input;

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::common::{Guaranteed, assert_safely, constant, design_with, hypothesis, plant, run};
+use crate::common::{
+    Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
+};
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{Certificate, Initial, Tuning, Value, Verdict, triangular::Triangular};
 use lynkeus_structure::Condition;
@@ -240,16 +242,6 @@ fn the_column_of_the_paper() {
     assert!(constant(&own, "η of chain 1") > 7e-6 && constant(&own, "η of chain 2") > 1.9e-3);
     let θ0 = constant(&own, "θ0");
     assert!((1e7..3e7).contains(&θ0), "{θ0}");
-}
-
-/// Deterministic numbers in (0, 1).
-fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
 
 /// Twenty plants of two to four states with random partials and nonlinearities:

@@ -1,0 +1,176 @@
+//! The paper's constants, and what the decay of ẽ says of the error itself.
+
+use lynkeus_expr::Interval;
+
+use super::theorem::{Facts, Study};
+use super::transformed::{Similar, Table, product};
+use crate::proof::{Chain, Disturbance, Ultimate, metzler, square, ultimate, upper};
+use crate::{Constant, DesignError};
+
+impl Study<'_> {
+    /// μ_ij and θ_i0 as in the proof, with norms, at the study's θ.
+    pub(super) fn paper_constants(
+        &self,
+        facts: &Facts,
+        P: &[Table],
+        constants: &mut Vec<Constant>,
+    ) {
+        let count = P.len();
+        let λ: Vec<f64> = P
+            .iter()
+            .map(|P| metzler::spectral_radius(&absolute(P)))
+            .collect();
+        let mut μ = vec![vec![0.0; count]; count];
+        for i in 0..count {
+            for j in 0..=i {
+                let norm = self.scaled_norm(facts, i, j);
+                match i == j {
+                    true => μ[i][i] += (Interval::point(2.0 * λ[i]) * Interval::point(norm)).hi(),
+                    // 2ab ≤ a² + b²
+                    false => {
+                        let half = (Interval::point(λ[i]) * Interval::point(norm)).hi();
+                        μ[i][j] = half;
+                        μ[j][i] = half;
+                    }
+                }
+            }
+        }
+        for (i, row) in μ.iter().enumerate() {
+            for (j, &μ) in row.iter().enumerate().filter(|(_, μ)| **μ > 0.0) {
+                let name = format!("μ{}{}", i + 1, j + 1);
+                constants.push(Constant::new(
+                    &name,
+                    μ,
+                    "of (13), norms bounded at the study's θ",
+                ));
+            }
+            let needed = row
+                .iter()
+                .fold(Interval::ZERO, |s, &μ| s + Interval::point(μ))
+                .hi();
+            let name = format!("θ{}0", i + 1);
+            constants.push(Constant::new(
+                &name,
+                needed,
+                "Σ_j μ_ij: what the proof of the paper asks of θ_i",
+            ));
+        }
+    }
+
+    /// ‖Δ_i H_ij Δ_j⁻¹‖ at the study's θ.
+    fn scaled_norm(&self, facts: &Facts, i: usize, j: usize) -> f64 {
+        let (rows, columns) = (
+            &self.blocks().order[i].1.states,
+            &self.blocks().order[j].1.states,
+        );
+        let mut H = vec![vec![0.0; columns.len()]; rows.len()];
+        for term in &facts.terms {
+            let l = rows.iter().position(|s| *s == term.row);
+            let m = columns.iter().position(|s| *s == term.column);
+            if let (Some(l), Some(m)) = (l, m) {
+                let scale = |θ: f64, k: usize| Interval::point(θ).powi(k as i32 + 1);
+                let size = Interval::point(term.at(&self.θ).size);
+                H[l][m] = (size * scale(self.θ[j], m) / scale(self.θ[i], l)).hi();
+            }
+        }
+        let transposed: Table = (0..columns.len())
+            .map(|m| H.iter().map(|row| row[m]).collect())
+            .collect();
+        let square = metzler::spectral_radius(&product(&transposed, &H));
+        Interval::point(square).sqrt().hi()
+    }
+
+    /// The bounds of ē taken back to e = M⁻¹ ē.
+    pub(super) fn ultimate(
+        &self,
+        facts: &Facts,
+        chains: &[Chain],
+        σ: f64,
+    ) -> Result<Option<Ultimate>, DesignError> {
+        let drift = self.drift(facts)?;
+        let outside = Disturbance {
+            drift: &drift,
+            noise: &self.plant.noise,
+        };
+        let Some(mut found) = ultimate(chains, σ, &outside) else {
+            return Ok(None);
+        };
+        let mut states = vec![];
+        let mut next = found.states.iter();
+        for (i, chain) in chains.iter().enumerate() {
+            let column: Table = next
+                .by_ref()
+                .take(chain.states.len())
+                .map(|&(_, b)| vec![b])
+                .collect();
+            let back = match facts.similar.get(i) {
+                Some(similar) => product(&similar.inverse, &column),
+                None => column,
+            };
+            states.extend(
+                chain
+                    .states
+                    .iter()
+                    .copied()
+                    .zip(back.iter().map(|row| row[0])),
+            );
+        }
+        let squares = states
+            .iter()
+            .map(|&(_, b)| Interval::point(b) * Interval::point(b));
+        found.norm = crate::proof::sum(squares).sqrt().hi();
+        found.states = states;
+        // e(0) goes through M of that time, ē(t) back through M⁻¹ of another
+        let norms = |table: fn(&Similar) -> &Table| {
+            let all = facts.similar.iter().map(|s| norm(table(s)));
+            Interval::point(all.fold(1.0, f64::max))
+        };
+        let factor = norms(|s| &s.M) * norms(|s| &s.inverse);
+        found.overshoot = (Interval::point(found.overshoot) * factor).hi();
+        Ok(Some(found))
+    }
+
+    /// What acts on ē beside K·noise: M d, L w, and the noise of the heads of later
+    /// chains, which the equations read.
+    fn drift(&self, facts: &Facts) -> Result<Vec<f64>, DesignError> {
+        let order = &self.blocks().order;
+        let given = &self.plant.assumptions.drift;
+        let mut drift = vec![0.0; self.plant.extended.states.len()];
+        for (i, (_, chain)) in order.iter().enumerate() {
+            let mut column: Table = vec![];
+            for &state in &chain.states {
+                let mut d = Interval::point(given.get(state).copied().unwrap_or(f64::INFINITY));
+                for (k, (_, later)) in order.iter().enumerate().skip(i + 1) {
+                    let slope = self.plant.jacobian(&[state], &later.states[..1])?[0][0];
+                    if slope != 0.0 && self.plant.noise[k] != 0.0 {
+                        d = d + Interval::point(slope) * Interval::point(self.plant.noise[k]);
+                    }
+                }
+                column.push(vec![d.hi()]);
+            }
+            let (column, L) = match facts.similar.get(i) {
+                Some(similar) => (product(&similar.M, &column), similar.L.clone()),
+                None => (column, vec![0.0; chain.states.len()]),
+            };
+            for ((&state, d), l) in chain.states.iter().zip(column).zip(L) {
+                let noisy = product(&[vec![l]], &[vec![self.plant.noise[i]]])[0][0];
+                drift[state] = (d[0] + noisy).next_up();
+            }
+        }
+        Ok(drift)
+    }
+}
+
+fn absolute(P: &Table) -> Table {
+    upper(&square(P.len(), |i, j| Interval::point(P[i][j].abs())))
+}
+
+/// ‖M‖ ≤ √ρ(|M|ᵀ|M|)
+fn norm(M: &Table) -> f64 {
+    let transposed: Table = (0..M.len())
+        .map(|j| M.iter().map(|row| row[j]).collect())
+        .collect();
+    Interval::point(metzler::spectral_radius(&product(&transposed, M)))
+        .sqrt()
+        .hi()
+}

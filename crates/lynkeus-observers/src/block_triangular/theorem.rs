@@ -1,0 +1,345 @@
+//! Theorem 1: what it guarantees for a plant and a tuning.
+//!
+//! With ẽ_i = Δ_θi M_i(x̂) e_i (M = I for the classical observer), P_i from
+//! (A − KC)ᵀP + P(A − KC) = −I and V = Σ c_i ẽ_iᵀP_iẽ_i the decay is proved by the
+//! comparison matrix of [`proof`](crate::proof) at the study's θ; `transformed` has the
+//! bounds of its entries. The paper's μ_ij are formed of the same bounds.
+
+use lynkeus_expr::Interval;
+use lynkeus_structure::{Blocks, Check, Extended};
+
+use super::form::form;
+use super::transformed::{Plant, Similar, Table, Term};
+use super::{chain_rule, classical, coefficients, theta};
+use crate::conditions::{fit, names, output_slope, partial};
+use crate::proof::slopes::{Slope, slopes};
+use crate::proof::threshold::{first, lightest};
+use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
+use crate::proof::{Chain, Comparison, lyapunov};
+use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning};
+
+const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
+
+/// Keys that this proof knows; others change the observer.
+const COVERED: &[&str] = &["theta", "k", "k_poles", "correction", "chains"];
+
+pub(super) fn certificate(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let blocks = match form(extended, tuning)? {
+        Ok((blocks, _)) => blocks,
+        Err(examination) if examination.checks.is_empty() => {
+            return Err(DesignError::Refused(Box::new(examination)));
+        }
+        Err(examination) => {
+            return Ok(Certificate::new(
+                BASIS,
+                &assumptions.region,
+                examination.checks,
+            ));
+        }
+    };
+    let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
+    let by_output = theta(tuning, order.len())?;
+    let K = coefficients(tuning, &blocks)?;
+    let noise = state_noise(extended, &assumptions.region, &assumptions.noise)?;
+    let pick = |x: &[f64]| order.iter().map(|&o| x[o]).collect::<Vec<f64>>();
+    let plant = Plant {
+        extended,
+        blocks: &blocks,
+        assumptions,
+        K: order.iter().map(|&o| K[o].clone()).collect(),
+        noise: pick(&noise),
+    };
+    let study = Study {
+        classical: classical(tuning)?,
+        θ: pick(&by_output),
+        rule: chain_rule(&blocks, &by_output),
+        plant: &plant,
+        tuning,
+    };
+    study.certificate()
+}
+
+pub(super) struct Study<'a> {
+    pub plant: &'a Plant<'a>,
+    tuning: &'a Tuning,
+    classical: bool,
+    /// in the order of the blocks
+    pub θ: Vec<f64>,
+    /// what breaks Lemma 2's rule
+    rule: Option<String>,
+}
+
+/// Everything that does not depend on θ.
+pub(super) struct Facts {
+    checks: Vec<Check>,
+    partials: Vec<Vec<(f64, f64)>>,
+    pub similar: Vec<Similar>,
+    pub terms: Vec<Term>,
+}
+
+impl Study<'_> {
+    pub fn blocks(&self) -> &Blocks {
+        self.plant.blocks
+    }
+
+    fn certificate(&self) -> Result<Certificate, DesignError> {
+        let extended = self.plant.extended;
+        let region = &self.plant.assumptions.region;
+        let facts = self.facts()?;
+        let mut checks = facts.checks.clone();
+        let mut constants = vec![];
+        let mut found = None;
+        if fit(&checks) != Fit::DoesNotFit
+            && let Some((P, μ)) = self.first_inequality(&facts, &mut checks)
+        {
+            self.paper_constants(&facts, &P, &mut constants);
+            found = self.second_inequality(&facts, &P, &μ, &mut checks, &mut constants);
+        }
+        let mut certificate = Certificate::new(BASIS, region, checks);
+        certificate.constants = constants;
+        certificate.notes = self.notes();
+        if let Some((σ, chains)) = found {
+            let ultimate = self.ultimate(&facts, &chains, σ)?;
+            conclude(&mut certificate, extended, σ, ultimate);
+        }
+        Ok(certificate)
+    }
+
+    fn facts(&self) -> Result<Facts, DesignError> {
+        let extended = self.plant.extended;
+        let region = &self.plant.assumptions.region;
+        let order = &self.blocks().order;
+        let (mut checks, mut partials) = (vec![], vec![]);
+        for (output, chain) in order {
+            checks.extend(output_slope(extended, *output, region)?);
+            let mut row = vec![];
+            for pair in chain.states.windows(2) {
+                let (_, found) = partial(extended, pair[0], pair[1], region)?;
+                checks.push(found.check);
+                row.push(match (self.classical, found.sign < 0.0) {
+                    // M takes the partials out: a chain of integrators is left
+                    (false, _) => (1.0, 1.0),
+                    (true, false) => found.bounds,
+                    (true, true) => (-found.bounds.1, -found.bounds.0),
+                });
+            }
+            partials.push(row);
+        }
+        let (plain, check) = slopes(extended, region, |a, b| self.skipped(a, b))?;
+        checks.push(check);
+        checks.extend(self.foreign());
+        let similar: Vec<Similar> = match self.classical {
+            true => vec![],
+            false => (0..order.len())
+                .map(|i| self.plant.similar(i))
+                .collect::<Result<_, _>>()?,
+        };
+        let terms = match self.classical {
+            true => plain.into_iter().map(steady).collect(),
+            false => self.plant.terms(&similar)?,
+        };
+        if terms.iter().any(|t: &Term| !t.at(&self.θ).size.is_finite()) && fit(&checks) == Fit::Fits
+        {
+            checks.push(self.unbounded());
+        }
+        Ok(Facts {
+            checks,
+            partials,
+            similar,
+            terms,
+        })
+    }
+
+    /// The partial along a chain, which is in A, and measured heads of later chains.
+    fn skipped(&self, row: usize, column: usize) -> bool {
+        let order = &self.blocks().order;
+        let place = |state: usize| order.iter().position(|(_, c)| c.states.contains(&state));
+        let along = order
+            .iter()
+            .any(|(_, c)| c.states.windows(2).any(|p| p == [row, column]));
+        along || place(column) > place(row)
+    }
+
+    fn foreign(&self) -> Option<Check> {
+        let mut keys = self.tuning.values.keys();
+        let key = keys.find(|key| !COVERED.contains(&key.as_str()))?;
+        let detail =
+            format!("the key '{key}' makes another observer, which the theorem does not cover");
+        Some(undecided(
+            "the observer is (7) or (3) with a constant θ",
+            detail,
+        ))
+    }
+
+    fn unbounded(&self) -> Check {
+        undecided(
+            "M R M⁻¹ and Ṁ M⁻¹ have bounds on the box (Assumption 1)",
+            "they have none: M needs declared ranges of the states it depends on and of the heads of the chains (the correction moves M), and where it depends on an input, a bound of that input's derivative, which no key declares; correction = \"classical\" needs none of this",
+        )
+    }
+
+    /// P_i and μ_i of the first inequality, where it holds for every chain.
+    fn first_inequality(
+        &self,
+        facts: &Facts,
+        checks: &mut Vec<Check>,
+    ) -> Option<(Vec<Table>, Vec<f64>)> {
+        let (mut all, mut decays) = (vec![], vec![]);
+        for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
+            let states = names(self.plant.extended, &chain.states).join(" → ");
+            let name = format!("(A − KC)ᵀP + P(A − KC) < 0 for ({states})");
+            let found = lyapunov::chain(&self.plant.K[i]).and_then(|P| {
+                let μ = self.chain(i, facts, &P, self.θ[i], 1.0).decay()?;
+                Some((P, μ))
+            });
+            match found {
+                Some((P, μ)) => {
+                    let detail = format!("≤ −{}·diag(P), for every ∂f/∂x along the chain", shown(μ));
+                    checks.push(proved(name, detail));
+                    all.push(P);
+                    decays.push(μ);
+                }
+                None => checks.push(undecided(
+                    name,
+                    "not with the P of partials that are 1: K does not stabilise the chain, or (classical observer) the partials vary too much or are negative",
+                )),
+            }
+        }
+        (all.len() == self.θ.len()).then_some((all, decays))
+    }
+
+    fn chain(&self, i: usize, facts: &Facts, P: &Table, θ: f64, c: f64) -> Chain {
+        let states = self.blocks().order[i].1.states.clone();
+        let speed = Interval::point(θ);
+        let weighed = |row: &Vec<f64>| {
+            row.iter()
+                .map(|&p| Interval::point(c) * Interval::point(p))
+                .collect()
+        };
+        let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
+        Chain {
+            scales: (1..=states.len()).map(|j| speed.powi(j as i32)).collect(),
+            states,
+            speed,
+            S: P.iter().map(weighed).collect(),
+            g: self.plant.K[i]
+                .iter()
+                .map(|&k| Interval::point(k) * error)
+                .collect(),
+            partials: facts.partials[i].clone(),
+        }
+    }
+
+    fn chains(&self, facts: &Facts, P: &[Table], θ: &[f64], c: &[f64]) -> Vec<Chain> {
+        (0..P.len())
+            .map(|i| self.chain(i, facts, &P[i], θ[i], c[i]))
+            .collect()
+    }
+
+    fn comparison(
+        &self,
+        facts: &Facts,
+        P: &[Table],
+        μ: &[f64],
+        θ: &[f64],
+        c: &[f64],
+    ) -> Comparison {
+        let slopes: Vec<Slope> = facts.terms.iter().map(|t| t.at(θ)).collect();
+        Comparison::new(&self.chains(facts, P, θ, c), μ, &slopes)
+    }
+
+    /// σ with the chains it was proved for.
+    fn second_inequality(
+        &self,
+        facts: &Facts,
+        P: &[Table],
+        μ: &[f64],
+        checks: &mut Vec<Check>,
+        constants: &mut Vec<Constant>,
+    ) -> Option<(f64, Vec<Chain>)> {
+        // θ_i = θ^ν_i: along this curve through the study's θ
+        let ν: Vec<f64> = self.θ.iter().map(|θ| θ.ln() / self.θ[0].ln()).collect();
+        let curve = |θ: f64| ν.iter().map(|ν| θ.powf(*ν)).collect::<Vec<f64>>();
+        let falls = self.θ[0] > 1.0 && self.falls(facts, &ν);
+        let at = |c: &[f64]| {
+            let holds = |θ: f64| self.comparison(facts, P, μ, &curve(θ), c).holds();
+            if falls {
+                first(self.θ[0], holds)
+            } else {
+                None
+            }
+        };
+        let (c, θ0) = lightest(P.len(), at);
+        let σ = self.comparison(facts, P, μ, &self.θ, &c).rate();
+        for (i, c) in c.iter().enumerate().skip(1) {
+            constants.push(Constant::new(
+                &format!("c{}", i + 1),
+                *c,
+                "weight of V_i in V, the paper has 1",
+            ));
+        }
+        if let Some(θ0) = θ0 {
+            let exponents: Vec<String> = ν.iter().map(|&ν| shown(ν)).collect();
+            let meaning = format!(
+                "the decay is proved for θ_i = θ^ν_i, ν = ({}), and every θ from here on",
+                exponents.join(", ")
+            );
+            constants.push(Constant::new("θ0", θ0, meaning));
+        }
+        let name = format!(
+            "θ = ({}) is large enough",
+            self.θ
+                .iter()
+                .map(|&θ| shown(θ))
+                .collect::<Vec<_>>()
+                .join(", ")
+        );
+        checks.push(match (σ, θ0) {
+            (Some(_), _) => proved(name, "the comparison matrix is negative definite"),
+            (None, Some(θ0)) => undecided(name, format!("proved from θ1 = θ0 = {} on (the others in proportion of their logarithms); the theorem is sufficient, not necessary", shown(θ0))),
+            (None, None) => undecided(name, "no θ0 was found: in this box the bound of Ṁ or of the couplings grows as fast as the decay. The theorem is sufficient, not necessary"),
+        });
+        σ.map(|σ| (σ, self.chains(facts, P, &self.θ, &c)))
+    }
+
+    /// Whether no entry of the comparison matrix, divided by the speeds, grows along
+    /// the curve: then what holds at θ0 holds beyond.
+    fn falls(&self, facts: &Facts, ν: &[f64]) -> bool {
+        let place = |state: usize| {
+            let mut chains = self.blocks().order.iter().enumerate();
+            chains.find_map(|(i, (_, c))| Some((i, c.states.iter().position(|s| *s == state)? + 1)))
+        };
+        facts.terms.iter().all(|term| {
+            let (Some((i, l)), Some((k, m))) = (place(term.row), place(term.column)) else {
+                return false;
+            };
+            let steady = ν[k] * m as f64 - ν[i] * l as f64 - 0.5 * (ν[i] + ν[k]);
+            let powers = term.powers.iter().map(|&(c, power, _)| ν[c] * power as f64);
+            let largest = powers.fold(0.0, f64::max);
+            let there = term.size > 0.0 || !term.powers.is_empty();
+            !there || steady + largest <= 0.0
+        })
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let mut notes = vec![box_note(self.tuning.clamp)];
+        notes.extend(self.rule.clone());
+        if !self.classical {
+            notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());
+        }
+        notes
+    }
+}
+
+fn steady(slope: Slope) -> Term {
+    Term {
+        row: slope.row,
+        column: slope.column,
+        size: slope.size,
+        powers: vec![],
+    }
+}

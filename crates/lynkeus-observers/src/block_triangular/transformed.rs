@@ -1,0 +1,286 @@
+//! Bounds of what the proof of Theorem 1 meets, in the coordinates ē = M(x̂) e.
+//!
+//! ē_i' = (A − Δ⁻¹K C) ē_i + (M R M⁻¹ + Ṁ M⁻¹) ē_i + Σ_{j<i} M_i G_ij M_j⁻¹ ē_j,
+//!
+//! R = F(η) − F(x̂) with both arguments in the box, so |R_ab| is at most the width of
+//! the range of F_ab. Matrices are bounded entry by entry, products by products of
+//! the bounds.
+//!
+//! Ṁ is where the print has a gap. M depends on the estimate, whose derivative
+//! contains the correction M⁻¹(L + Δ⁻¹K)(y − x̂_1): it grows with θ and with the
+//! error, and Assumption 1 does not make it bounded independently of θ (Lemma 2 ii).
+//! On the box |y − x̂_1| is at most the width of the range of x_1, so Ṁ has a bound
+//! with powers of θ, and the terms here carry them.
+
+use lynkeus_expr::{Interval, Node, jacobian};
+use lynkeus_structure::{Blocks, Chain, Extended, Matrix, range};
+
+use super::lee::{Sparse, own_jacobian, transformation};
+use crate::DesignError;
+use crate::proof::slopes::{Slope, magnitude};
+use crate::{Assumptions, proof};
+
+/// A table of upper bounds, row by row.
+pub(super) type Table = Vec<Vec<f64>>;
+
+/// |∂ē_row'/∂ē_column| ≤ size + Σ coefficient·θ_chain^power.
+pub(super) struct Term {
+    pub row: usize,
+    pub column: usize,
+    pub size: f64,
+    /// (place of the chain, power, coefficient)
+    pub powers: Vec<(usize, usize, f64)>,
+}
+
+impl Term {
+    pub fn at(&self, θ: &[f64]) -> Slope {
+        let grown = self.powers.iter().map(|&(c, k, coefficient)| {
+            Interval::point(coefficient) * Interval::point(θ[c]).powi(k as i32)
+        });
+        let size = (Interval::point(self.size) + proof::sum(grown)).hi();
+        Slope {
+            row: self.row,
+            column: self.column,
+            size,
+        }
+    }
+}
+
+/// M, M⁻¹ and L of a chain as upper bounds of their entries.
+pub(super) struct Similar {
+    pub M: Table,
+    pub inverse: Table,
+    pub L: Vec<f64>,
+    nodes: Vec<Vec<Sparse>>,
+}
+
+/// What the bounds are taken of.
+pub(super) struct Plant<'a> {
+    pub extended: &'a Extended<'a>,
+    pub blocks: &'a Blocks,
+    pub assumptions: &'a Assumptions,
+    /// K, in the order of the blocks
+    pub K: Vec<Vec<f64>>,
+    /// bounds of the errors of the measured states, in the order of the blocks
+    pub noise: Vec<f64>,
+}
+
+pub(super) fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Table {
+    let columns = B.first().map_or(0, Vec::len);
+    let entry = |row: &Vec<f64>, j: usize| {
+        // zero times unbounded is zero: the entry is not there
+        let terms = row.iter().zip(B).filter(|(a, b)| **a != 0.0 && b[j] != 0.0);
+        proof::sum(terms.map(|(&a, b)| Interval::point(a) * Interval::point(b[j]))).hi()
+    };
+    A.iter()
+        .map(|row| (0..columns).map(|j| entry(row, j)).collect())
+        .collect()
+}
+
+impl Plant<'_> {
+    fn size(&self, node: Sparse) -> Result<f64, DesignError> {
+        match node {
+            None => Ok(0.0),
+            Some(node) => magnitude(self.extended.graph(), node, &self.assumptions.region),
+        }
+    }
+
+    fn table(&self, nodes: &[Vec<Sparse>]) -> Result<Table, DesignError> {
+        let row = |row: &Vec<Sparse>| row.iter().map(|&x| self.size(x)).collect();
+        nodes.iter().map(row).collect()
+    }
+
+    fn chain(&self, place: usize) -> &Chain {
+        &self.blocks.order[place].1
+    }
+
+    pub fn similar(&self, place: usize) -> Result<Similar, DesignError> {
+        let found = transformation(self.extended, self.chain(place));
+        let L = found
+            .L
+            .iter()
+            .map(|&l| self.size(l))
+            .collect::<Result<_, _>>()?;
+        Ok(Similar {
+            M: self.table(&found.M)?,
+            inverse: self.table(&found.inverse)?,
+            L,
+            nodes: found.M,
+        })
+    }
+
+    /// Every term of every chain for observer (7).
+    pub fn terms(&self, similar: &[Similar]) -> Result<Vec<Term>, DesignError> {
+        let mut terms = vec![];
+        for (i, own) in similar.iter().enumerate() {
+            let rest = product(&product(&own.M, &self.widths(i)?), &own.inverse);
+            let mut found = self.entries(i, i, &rest);
+            self.moving(i, similar, &mut found)?;
+            terms.extend(found);
+            for (j, before) in similar.iter().enumerate().take(i) {
+                let coupled = product(&product(&own.M, &self.coupling(i, j)?), &before.inverse);
+                terms.extend(self.entries(i, j, &coupled));
+            }
+        }
+        Ok(terms)
+    }
+
+    fn entries(&self, i: usize, j: usize, table: &Table) -> Vec<Term> {
+        let (rows, columns) = (&self.chain(i).states, &self.chain(j).states);
+        let pairs = table.iter().zip(rows).flat_map(|(entries, &row)| {
+            let columns = entries.iter().zip(columns);
+            columns.map(move |(&size, &column)| Term {
+                row,
+                column,
+                size,
+                powers: vec![],
+            })
+        });
+        pairs.collect()
+    }
+
+    /// Widths of the ranges of the entries of F_i.
+    fn widths(&self, i: usize) -> Result<Table, DesignError> {
+        let (graph, region) = (self.extended.graph(), &self.assumptions.region);
+        let width = |node: &Sparse| -> Result<f64, DesignError> {
+            let Some(node) = *node else { return Ok(0.0) };
+            let found = range(graph, node, region)?;
+            let span =
+                Interval::point(found.enclosure.hi()) - Interval::point(found.enclosure.lo());
+            let fine = found.defined && span.hi().is_finite();
+            Ok(match (graph.constant_value(node), fine) {
+                (Some(_), _) => 0.0,
+                (None, true) => span.hi(),
+                (None, false) => f64::INFINITY,
+            })
+        };
+        let row = |row: &Vec<Sparse>| row.iter().map(width).collect();
+        own_jacobian(self.extended, self.chain(i))
+            .iter()
+            .map(row)
+            .collect()
+    }
+
+    /// |∂f_i/∂x_j|
+    fn coupling(&self, i: usize, j: usize) -> Result<Table, DesignError> {
+        self.jacobian(&self.chain(i).states, &self.chain(j).states)
+    }
+
+    /// |∂f/∂x| for the equations of `rows` and the states `columns`.
+    pub fn jacobian(&self, rows: &[usize], columns: &[usize]) -> Result<Table, DesignError> {
+        let f: Vec<Node> = rows.iter().map(|&a| self.extended.derivatives[a]).collect();
+        let x: Vec<Node> = columns
+            .iter()
+            .map(|&b| self.extended.states[b].node)
+            .collect();
+        let found = jacobian::forward(self.extended.graph(), &f, &x);
+        let row = |a: usize| (0..x.len()).map(|b| found.get(a, b)).collect();
+        let nodes: Vec<Vec<Sparse>> = (0..f.len()).map(row).collect();
+        self.table(&nodes)
+    }
+
+    /// Adds Ṁ M⁻¹ to the terms of chain i.
+    fn moving(&self, i: usize, similar: &[Similar], terms: &mut [Term]) -> Result<(), DesignError> {
+        let n = self.chain(i).states.len();
+        for (c, (_, chain)) in self.blocks.order.iter().enumerate() {
+            for (place, &state) in chain.states.iter().enumerate() {
+                let slope = self.slope_of_M(&similar[i], self.extended.states[state].node)?;
+                let product = product(&slope, &similar[i].inverse);
+                if product.iter().flatten().all(|x| *x == 0.0) {
+                    continue;
+                }
+                let (steady, powers) = self.speed(c, place, i, similar)?;
+                for (p, &factor) in product.iter().flatten().enumerate() {
+                    let term = &mut terms[p / n * n + p % n];
+                    let times = |x: f64| match factor == 0.0 || x == 0.0 {
+                        true => 0.0,
+                        false => (Interval::point(factor) * Interval::point(x)).hi(),
+                    };
+                    term.size += times(steady).next_up();
+                    let grown = powers.iter().map(|&(k, x)| (c, k, times(x)));
+                    term.powers.extend(grown.filter(|g| g.2 != 0.0));
+                }
+            }
+        }
+        let other = self.extended.inputs.iter().map(|u| u.node);
+        for symbol in other.chain([self.extended.plant.time]) {
+            let slope = self.slope_of_M(&similar[i], symbol)?;
+            let product = product(&slope, &similar[i].inverse);
+            for (p, &size) in product.iter().flatten().enumerate() {
+                // time itself has slope one; an input's derivative has no declared bound
+                let known = symbol == self.extended.plant.time;
+                terms[p].size += match (size == 0.0, known) {
+                    (true, _) => 0.0,
+                    (false, true) => size.next_up(),
+                    (false, false) => f64::INFINITY,
+                };
+            }
+        }
+        Ok(())
+    }
+
+    /// |∂M/∂symbol|; `Matrix` drops what cancels, as the inputs in M often do.
+    fn slope_of_M(&self, similar: &Similar, symbol: Node) -> Result<Table, DesignError> {
+        let graph = self.extended.graph();
+        let n = similar.nodes.len();
+        let slope = |i: usize, j: usize| {
+            let entry = similar.nodes[i][j]?;
+            jacobian::forward(graph, &[entry], &[symbol]).get(0, 0)
+        };
+        let slopes = Matrix::from_fn(graph, (n, n), slope);
+        let row = |i: usize| (0..n).map(|j| slopes.get(i, j)).collect();
+        self.table(&(0..n).map(row).collect::<Vec<Vec<Sparse>>>())
+    }
+
+    /// |x̂'| of the state at `place` in chain c ≤ i, as (steady part, powers of θ_c);
+    /// of a later chain only the measured head occurs in M_i, with its own x'.
+    fn speed(
+        &self,
+        c: usize,
+        place: usize,
+        i: usize,
+        similar: &[Similar],
+    ) -> Result<(f64, Vec<(usize, f64)>), DesignError> {
+        let state = self.chain(c).states[place];
+        let f = self.size(Some(self.extended.derivatives[state]))?;
+        if c > i {
+            let drift = self
+                .assumptions
+                .drift
+                .get(state)
+                .copied()
+                .unwrap_or(f64::INFINITY);
+            // a noisy signal has no derivative
+            let noisy = if self.noise[c] == 0.0 {
+                0.0
+            } else {
+                f64::INFINITY
+            };
+            return Ok((
+                (Interval::point(f) + Interval::point(drift)).hi() + noisy,
+                vec![],
+            ));
+        }
+        let head = &self.extended.states[self.chain(c).states[0]];
+        let side = self
+            .assumptions
+            .region
+            .dimensions
+            .iter()
+            .find(|d| d.symbol == head.node);
+        let width = side.map_or(f64::INFINITY, |d| d.max - d.min);
+        let innovation = (width + self.noise[c]).next_up();
+        let row = &similar[c].inverse[place];
+        let column = |x: &[f64]| x.iter().map(|&x| vec![x]).collect::<Table>();
+        let steady = product(
+            &product(std::slice::from_ref(row), &column(&similar[c].L)),
+            &[vec![innovation]],
+        );
+        let power = |(k, &m): (usize, &f64)| {
+            let gain = product(&[vec![m]], &[vec![self.K[c][k].abs()]]);
+            (k + 1, product(&gain, &[vec![innovation]])[0][0])
+        };
+        let powers = row.iter().enumerate().map(power).collect();
+        Ok(((f + steady[0][0]).next_up(), powers))
+    }
+}
