@@ -7,6 +7,7 @@
 //! and counts only if the inequality holds in interval arithmetic.
 
 use lynkeus_expr::Interval;
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::definite::is_positive_definite;
@@ -16,7 +17,8 @@ const STEPS: usize = 40;
 /// Halvings of the interval in which the largest rate or bound is sought.
 const HALVINGS: usize = 40;
 /// The inequality is solved with a little more, so that rounding does not decide.
-const SLACK: f64 = 1e-7;
+const SLACK: f64 = 1e-12;
+const SHARE: f64 = 1e-10;
 
 /// A matrix row by row.
 type Rows = [Vec<f64>];
@@ -48,27 +50,34 @@ impl Riccati {
     /// assert!(Riccati::solve(&one(-3.0), &one(1.0), 3.0, 2.0).is_none());
     /// ```
     pub fn solve(A: &Rows, E: &Rows, α: f64, γ: f64) -> Option<Self> {
-        let (A, E) = (matrix(A), matrix(E));
+        // e = D e', D of powers of two, so that fast poles leave nothing of very
+        // different size; scaling back is exact
+        let mut A = matrix(A);
+        let D = balance_parlett_reinsch(&mut A);
         let n = A.nrows();
-        let scale = E.norm_squared().max(f64::MIN_POSITIVE);
-        let W = &E * E.transpose() + DMatrix::identity(n, n) * (SLACK * scale);
-        let P = newton(&(&A + DMatrix::identity(n, n) * α), &W, γ)?;
-        if !holds(&A, &E, α, γ, &P) {
+        let E = matrix(E);
+        let E = DMatrix::from_fn(n, E.ncols(), |i, j| E[(i, j)] / D[i]);
+        let M = DMatrix::from_diagonal(&D.map(|d| (d * γ) * (d * γ)));
+        let shifted = &A + DMatrix::identity(n, n) * α;
+        let P = newton(&shifted, &raised(&shifted, &E)?, &M)?;
+        if !holds(&A, &E, α, (γ, &D), &P) {
             return None;
         }
-        let values = SymmetricEigen::new(P.clone()).eigenvalues;
+        let P = DMatrix::from_fn(n, n, |i, j| D[i] * P[(i, j)] * D[j]);
+        let inverse = P.clone().cholesky()?.inverse();
+        let top = |P: &DMatrix<f64>| SymmetricEigen::new(P.clone()).eigenvalues.max();
         let bound = |s: f64, sign: f64| {
             let shifted = |i: usize, j: usize| {
                 let entry = Interval::point(P[(i, j)]);
                 let shifted = entry - Interval::point(if i == j { s } else { 0.0 });
                 shifted * Interval::point(sign)
             };
-            is_positive_definite(&rows(n, shifted)).then_some(s)
+            (s > 0.0 && is_positive_definite(&rows(n, shifted))).then_some(s)
         };
         Some(Self {
             α,
-            largest: bound(values.max() * (1.0 + 1e-6), -1.0)?,
-            smallest: bound(values.min() * (1.0 - 1e-3), 1.0)?,
+            largest: bound(top(&P) * (1.0 + 1e-6), -1.0)?,
+            smallest: bound((1.0 - 1e-3) / top(&inverse), 1.0)?,
             P: (0..n).map(|i| P.row(i).iter().copied().collect()).collect(),
         })
     }
@@ -122,11 +131,22 @@ fn rows(n: usize, entry: impl Fn(usize, usize) -> Interval) -> Vec<Vec<Interval>
     (0..n).map(row).collect()
 }
 
-/// The smallest P with A P + P Aᵀ + W + γ²P² = 0.
-fn newton(A: &DMatrix<f64>, W: &DMatrix<f64>, γ: f64) -> Option<DMatrix<f64>> {
+/// E Eᵀ with a little more in each direction, on the scale that P has there.
+fn raised(A: &DMatrix<f64>, E: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = A.nrows();
+    let W = E * E.transpose();
+    let size = W.trace();
+    let scale = if size > 0.0 { size } else { 1.0 };
+    let W = W + DMatrix::identity(n, n) * (SLACK * scale);
+    let P = lyapunov(A, &W)?;
+    Some(W + DMatrix::from_diagonal(&P.diagonal()) * (SHARE * A.amax()))
+}
+
+/// The smallest P with A P + P Aᵀ + W + P M P = 0.
+fn newton(A: &DMatrix<f64>, W: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut P = lyapunov(A, W)?;
     for _ in 0..STEPS {
-        let next = lyapunov(&(A + &P * (γ * γ)), &(W - &P * &P * (γ * γ)))?;
+        let next = lyapunov(&(A + &P * M), &(W - &P * M * &P))?;
         let change = (&next - &P).norm();
         P = next;
         if change <= 1e-13 * P.norm() {
@@ -147,17 +167,24 @@ fn lyapunov(A: &DMatrix<f64>, W: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     P.clone().cholesky().map(|_| P)
 }
 
-/// The inequality, in interval arithmetic.
-fn holds(A: &DMatrix<f64>, E: &DMatrix<f64>, α: f64, γ: f64, P: &DMatrix<f64>) -> bool {
+/// The inequality with γ²P D²P for its last term, in interval arithmetic.
+fn holds(
+    A: &DMatrix<f64>,
+    E: &DMatrix<f64>,
+    α: f64,
+    (γ, D): (f64, &DVector<f64>),
+    P: &DMatrix<f64>,
+) -> bool {
     let n = P.nrows();
     let product = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
         // row i of a times column j of bᵀ
         let terms = (0..a.ncols()).map(|k| Interval::point(a[(i, k)]) * Interval::point(b[(j, k)]));
         terms.fold(Interval::point(0.0), |sum, term| sum + term)
     };
+    let scaled = DMatrix::from_fn(n, n, |i, j| P[(i, j)] * D[j]);
     let entry = |i: usize, j: usize| {
         let linear = product(A, i, P, j) + product(P, i, A, j);
-        let square = product(P, i, P, j) * Interval::point(γ).powi(2);
+        let square = product(&scaled, i, &scaled, j) * Interval::point(γ).powi(2);
         let rate = Interval::point(2.0 * α) * Interval::point(P[(i, j)]);
         Interval::point(0.0) - (linear + product(E, i, E, j) + rate + square)
     };
@@ -169,9 +196,8 @@ mod tests {
     use super::*;
 
     fn companion(K: &[f64]) -> Vec<Vec<f64>> {
-        let entry = |i: usize, j: usize| {
-            f64::from(u8::from(j == i + 1)) - if j == 0 { K[i] } else { 0.0 }
-        };
+        let entry =
+            |i: usize, j: usize| f64::from(u8::from(j == i + 1)) - if j == 0 { K[i] } else { 0.0 };
         let row = |i| (0..K.len()).map(|j| entry(i, j)).collect();
         (0..K.len()).map(row).collect()
     }

@@ -163,10 +163,10 @@ impl<'g> Enclosure<'g> {
         Ok(norm(&self.magnitudes(A)?))
     }
 
-    /// Bounds of the entries of Ã⁻¹ for every Ã whose entries lie in the ranges of
-    /// those of the square matrix A, such as a mean of A along a line; none where
-    /// none could be found.
-    pub fn inverse(&self, A: &Matrix<'_>) -> Result<Option<Vec<Vec<f64>>>, MissingInput> {
+    /// What is known of Ã⁻¹ for every Ã whose entries lie in the ranges of those of
+    /// the square matrix A, such as a mean of A along a line; none where none could
+    /// be found.
+    pub fn inverse(&self, A: &Matrix<'_>) -> Result<Option<Inverse>, MissingInput> {
         if A.rows != A.columns {
             return Ok(None);
         }
@@ -176,10 +176,34 @@ impl<'g> Enclosure<'g> {
         Ok(inverse_of_ranges(&ranges))
     }
 
+    /// Bounds of the entries of B̃ Ã⁻¹ for means of B and A along the same line.
+    pub fn divided(&self, B: &Matrix<'_>, A: &Inverse) -> Result<Vec<Vec<f64>>, MissingInput> {
+        let n = A.R.len();
+        let R = Matrix::from_fn(self.graph, (n, n), |i, j| {
+            Some(self.graph.constant(A.R[i][j]).node())
+        });
+        Ok(product(&self.magnitudes(&B.times(&R))?, &A.N))
+    }
+
     /// A bound of ‖Ã⁻¹‖, infinite where none could be found.
     pub fn inverse_norm(&self, A: &Matrix<'_>) -> Result<f64, MissingInput> {
         let found = self.inverse(A)?;
-        Ok(found.map_or(f64::INFINITY, |bounds| norm(&bounds)))
+        Ok(found.map_or(f64::INFINITY, |inverse| norm(&inverse.bounds())))
+    }
+}
+
+/// Ã = (I + E)R⁻¹ with |E| so small that |(I + E)⁻¹| ≤ N.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Inverse {
+    R: Vec<Vec<f64>>,
+    N: Vec<Vec<f64>>,
+}
+
+impl Inverse {
+    /// Bounds of the entries of Ã⁻¹ = R(I + E)⁻¹.
+    pub fn bounds(&self) -> Vec<Vec<f64>> {
+        let row = |row: &Vec<f64>| row.iter().map(|x| x.abs()).collect();
+        product(&self.R.iter().map(row).collect::<Vec<_>>(), &self.N)
     }
 }
 
@@ -232,11 +256,11 @@ pub(crate) fn norm(A: &[Vec<f64>]) -> f64 {
     frobenius.min(up(mixed.sqrt()))
 }
 
-/// Bounds of the entries of A⁻¹ for every A with entries in the ranges: with
+/// What is known of A⁻¹ for every A with entries in the ranges: with
 /// R ≈ A_c⁻¹, A_c the middle, and |A R − I| ≤ E of spectral radius below one,
 /// |A⁻¹| ≤ |R| (I − E)⁻¹. The inverses are only guessed; that the spectral radius
 /// is below one and that the bound is one are checked.
-fn inverse_of_ranges(ranges: &[Vec<(f64, f64)>]) -> Option<Vec<Vec<f64>>> {
+fn inverse_of_ranges(ranges: &[Vec<(f64, f64)>]) -> Option<Inverse> {
     let n = ranges.len();
     let matrix = |entry: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
         let row = |i| (0..n).map(|j| entry(i, j)).collect();
@@ -266,7 +290,7 @@ fn inverse_of_ranges(ranges: &[Vec<(f64, f64)>]) -> Option<Vec<Vec<f64>>> {
     };
     let shrinks = |i: usize| v[i] > up((0..n).map(|k| E[i][k] * v[k]).sum());
     let sure = positive && (0..n).all(|i| shrinks(i) && (0..n).all(|j| covers(i, j)));
-    sure.then(|| product(&size, &raised))
+    sure.then_some(Inverse { R, N: raised })
 }
 
 /// Gauss and Jordan's inverse, without any guarantee.
@@ -309,7 +333,7 @@ mod tests {
     fn inverses_of_triangular_ranges() {
         let ranges = [[(1.0, 1.0), (0.0, 0.0)], [(-4.5, 4.5), (-3.25, -1.0)]];
         let ranges = ranges.map(|row| row.to_vec());
-        let found = inverse_of_ranges(&ranges).unwrap();
+        let found = inverse_of_ranges(&ranges).unwrap().bounds();
         assert!((found[0][0] - 1.0).abs() < 1e-6 && found[0][1] < 1e-6);
         assert!((found[1][0] - 4.5).abs() < 1e-6 && (found[1][1] - 1.0).abs() < 1e-6);
     }
@@ -328,7 +352,7 @@ mod tests {
             vec![(1.0, 1.5), (-0.3, 0.2)],
             vec![(0.1, 0.4), (-2.0, -1.0)],
         ];
-        let found = inverse_of_ranges(&ranges).unwrap();
+        let found = inverse_of_ranges(&ranges).unwrap().bounds();
         for corner in 0..16 {
             let pick = |k: usize, (low, high): (f64, f64)| match corner >> k & 1 {
                 0 => low,

@@ -33,6 +33,7 @@ pub(super) struct Form {
 pub(super) fn form(
     extended: &Extended<'_>,
     tuning: &Tuning,
+    region: &Region,
 ) -> Result<Result<Form, Examination>, DesignError> {
     let graph = extended.graph();
     let n = extended.states.len();
@@ -68,16 +69,15 @@ pub(super) fn form(
     let Q: Rows = rows.iter().map(|&(i, k)| gradients[i][k].clone()).collect();
     let U = input_symbols(extended, &indices, &degrees);
     let variant = asked.unwrap_or_else(|| Variant::suited(&U));
-    let region = extended.region();
     let mut checks = vec![
         degree_check(extended, &indices, &degrees),
         regular(
             extended,
             "Q(x) is regular on the box (drift-observable)",
             &Q,
-            &region,
+            region,
         )?,
-        lipschitz(extended, &region)?,
+        lipschitz(extended, region)?,
     ];
     let mut fit = fit(&checks);
     let (Q, Q_a) = match variant {
@@ -85,7 +85,7 @@ pub(super) fn form(
         _ => with_inputs(extended, &rows, &U)?,
     };
     if U.iter().any(|jet| !jet.is_empty()) {
-        let check = input_check(extended, variant, &U, &Q)?;
+        let check = input_check(extended, variant, &U, &Q, region)?;
         // Theorem 2.4: Q̄ is regular for small enough inputs whatever the box says,
         // and the observer watches it
         if fit == Fit::Fits && check.verdict != Condition::Proved {
@@ -153,13 +153,16 @@ fn input_symbols(
             .map(|(μ, d)| μ.saturating_sub(d[j].r));
         let symbol = |k: usize| match k {
             0 => input.node,
-            _ => graph
-                .symbol(&format!("derivative {k} of {}", input.name))
-                .node(),
+            _ => graph.symbol(&slope_symbol(&input.name, k)).node(),
         };
         (0..needed.max().unwrap_or(0)).map(symbol).collect()
     };
     extended.inputs.iter().enumerate().map(jet).collect()
+}
+
+/// The symbol of the k-th derivative of an input.
+pub(super) fn slope_symbol(input: &str, k: usize) -> String {
+    format!("derivative {k} of {input}")
 }
 
 /// Q̄ and Q̄_a of (4.20).
@@ -204,7 +207,7 @@ fn degree_check(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<Degre
 }
 
 /// det Q keeps its sign, for as many states as it is expanded.
-fn regular(
+pub(super) fn regular(
     extended: &Extended<'_>,
     name: &str,
     Q: &Rows,
@@ -244,6 +247,7 @@ fn input_check(
     variant: Variant,
     U: &[Vec<Node>],
     Q̄: &Rows,
+    region: &Region,
 ) -> Result<Check, DesignError> {
     if variant == Variant::Bounded {
         return Ok(Check {
@@ -263,9 +267,9 @@ fn input_check(
         row.iter().map(entry).collect()
     };
     let at_rest: Rows = Q̄.iter().map(constant).collect();
-    let mut check = regular(extended, name, &at_rest, &extended.region())?;
+    let mut check = regular(extended, name, &at_rest, region)?;
     if !matches!(check.verdict, Condition::Refuted(_)) && !still.is_empty() {
-        check = regular(extended, name, Q̄, &with_slopes(extended, U))?;
+        check = regular(extended, name, Q̄, &with_slopes(extended, U, region))?;
     }
     if check.verdict != Condition::Proved {
         check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
@@ -274,8 +278,8 @@ fn input_check(
 }
 
 /// The box with u', u'', … free.
-fn with_slopes(extended: &Extended<'_>, U: &[Vec<Node>]) -> Region {
-    let mut region = extended.region();
+fn with_slopes(extended: &Extended<'_>, U: &[Vec<Node>], region: &Region) -> Region {
+    let mut region = region.clone();
     for (input, jet) in extended.inputs.iter().zip(U) {
         let further = jet
             .iter()

@@ -14,6 +14,28 @@ use crate::{Tuning, TuningError, Value};
 const FILTER_SPEED: f64 = 10.0;
 const FILTER_RATIO: f64 = 1.2;
 
+/// The key of [`slopes`].
+pub(super) const SLOPES: &str = "input_derivatives";
+
+/// `input_derivatives`: per input bounds of |u'|, |u''|, …, one more than the observer
+/// reads; for guarantees only. None where they are left out.
+pub(super) fn slopes(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: &Form,
+) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+    let names: Vec<&str> = extended.inputs.iter().map(|i| i.name.as_str()).collect();
+    let orders: Vec<usize> = match form.variant {
+        Variant::Bounded => vec![0; names.len()],
+        _ => form.U.iter().map(Vec::len).collect(),
+    };
+    let found = per_input(tuning, SLOPES, &names, &orders)?;
+    match found.iter().flatten().flatten().find(|x| **x < 0.0) {
+        Some(x) => Err(TuningError::new(SLOPES, "bounds, no negative numbers", x)),
+        None => Ok(found),
+    }
+}
+
 /// Which of the three observers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Variant {
@@ -239,9 +261,13 @@ fn per_input(
         return Ok(lists);
     };
     let needed: Vec<usize> = (0..names.len()).filter(|&j| orders[j] > 0).collect();
+    let what = match key {
+        SLOPES => "bounds of the derivatives of",
+        _ => "numbers for the filter of",
+    };
     let expected = match needed[..] {
-        [] => "no such key: this observer has no filter".to_owned(),
-        [j] => format!("{} numbers for the filter of {}", orders[j], names[j]),
+        [] => "no such key: this observer has no filter and reads no derivative".to_owned(),
+        [j] => format!("{} {what} {}", orders[j], names[j]),
         _ => {
             let one = |&j: &usize| format!("{} = {} numbers", names[j], orders[j]);
             let all: Vec<String> = needed.iter().map(one).collect();

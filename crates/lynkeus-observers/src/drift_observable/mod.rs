@@ -17,11 +17,14 @@
 
 mod assembly;
 mod conditions;
+mod guarantee;
 mod keys;
+mod lipschitz;
+mod theorem;
 
 use lynkeus_structure::Extended;
 
-use crate::{Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
 
 const NAME: &str = "drift-observable";
 
@@ -48,6 +51,7 @@ impl Family for DriftObservable {
             "filter_poles",
             "filter_initial",
             "indices",
+            "input_derivatives",
         ]
     }
 
@@ -56,17 +60,40 @@ impl Family for DriftObservable {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        Ok(match conditions::form(extended, tuning)? {
-            Ok(form) => form.examination,
-            Err(examination) => examination,
-        })
+        Ok(
+            match conditions::form(extended, tuning, &extended.region())? {
+                Ok(form) => form.examination,
+                Err(examination) => examination,
+            },
+        )
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match conditions::form(extended, tuning)? {
+        match conditions::form(extended, tuning, &extended.region())? {
             Ok(form) if form.examination.fit != Fit::DoesNotFit => {
                 let gains = keys::Gains::new(extended, tuning, &form)?;
                 assembly::design(extended, tuning, form, gains)
+            }
+            Ok(conditions::Form { examination, .. }) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        match conditions::form(extended, tuning, &assumptions.region)? {
+            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
+                theorem::certificate(extended, tuning, form, assumptions)
+            }
+            Ok(conditions::Form { examination, .. }) | Err(examination)
+                if examination.refuted().is_some() =>
+            {
+                let (basis, checks) = (self.paper(), examination.checks);
+                Ok(Certificate::new(basis, &assumptions.region, checks))
             }
             Ok(conditions::Form { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))

@@ -98,6 +98,9 @@ impl Proof<'_, '_, '_> {
                 shown.join(", "),
                 if further { ", and so on" } else { "" }
             ),
+            (false, true) if self.square().verdict != Condition::Proved => {
+                "Λ₂ has no inverse but a left one".to_owned()
+            }
             (false, true) => "Λ₂ has no bounded inverse as far as interval arithmetic can tell on a box this large: declare a smaller one".to_owned(),
         };
         check("c1, c2, c4 and c5 are finite on the box", finite, detail)
@@ -127,6 +130,10 @@ impl Proof<'_, '_, '_> {
             };
             return vec![check("θ1 ≥ θ1*", false, detail)];
         };
+        if !self.c.c4.is_finite() {
+            let name = "θ2 ≥ θ2* = max(1, c4)";
+            return vec![check(name, false, "c4 has no bound")];
+        }
         let second = self.c.c4.max(1.0) * CLEAR;
         let first = self.first(θ2) * CLEAR;
         let against = |found: f64, least: f64| {

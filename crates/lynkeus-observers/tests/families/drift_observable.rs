@@ -1,5 +1,7 @@
 //! The family `drift-observable` against the formulas of Germani and Manes.
 
+mod theorem;
+
 use std::collections::BTreeMap;
 
 use crate::common::{assert_follows, design_with, plant, reference, refused, run, slope};

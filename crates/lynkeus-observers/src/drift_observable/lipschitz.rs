@@ -1,0 +1,166 @@
+//! The Lipschitz constants of the theorems, for plant and estimate inside the box.
+//!
+//! In the coordinates z = Φ̄(x, x_a) of the output's derivatives (Φ(x) for (3.1)) plant and
+//! observer are chains of integrators with a remainder in some rows, z' = A z + r. Along
+//! the line from estimate to truth
+//!
+//! e_z = Q̃ e_x + Q̃_a e_a,   r(x, x_a) − r(x̂, x̂_a) = ã e_x + b̃ e_a
+//!
+//! with means of the Jacobians, so that e_x = Q̃⁻¹(e_z − Q̃_a e_a) and the remainder
+//! is ãQ̃⁻¹ e_z + (b̃ − ãQ̃⁻¹Q̃_a) e_a. The box has to be convex in x, not in z.
+
+use lynkeus_expr::{MissingInput, Node};
+use lynkeus_structure::{Check, Extended, Matrix, Region, output_map};
+
+use super::conditions::{Form, regular, slope_symbol};
+use super::derivative_name;
+use super::keys::Variant;
+use crate::DesignError;
+use crate::enclosure::{Enclosure, length, norm, product};
+
+/// Bounds on the box.
+pub(super) struct Lipschitz {
+    /// γ_Φ̄ and γ_Φ̄⁻¹ in both arguments
+    pub map: f64,
+    pub inverse: f64,
+    /// per row of z: of what the input has no part in, in (e_z, e_a)
+    pub drift: Vec<f64>,
+    /// per row of z: of what multiplies an input, summed over the inputs; (3.1) only
+    pub input: Vec<f64>,
+    /// |Q̄| entry by entry
+    pub Q: Vec<Vec<f64>>,
+    /// |Q̃⁻¹| and |Q̃⁻¹Q̃_a| row by row: of the error of each state
+    pub states: Vec<(f64, f64)>,
+    /// det Q̄ keeps its sign for inputs and slopes within bounds
+    pub regular: Check,
+    /// what has no bound
+    pub open: Vec<String>,
+}
+
+pub(super) fn bounds(
+    extended: &Extended<'_>,
+    form: &Form,
+    slopes: &[Option<Vec<f64>>],
+    region: &Region,
+) -> Result<Lipschitz, DesignError> {
+    let graph = extended.graph();
+    let mut box_ = Enclosure::new(graph, region);
+    let U = further(extended, form, slopes, &mut box_);
+    let n = form.rows.len();
+    let of_rows = |rows: &output_map::Rows, columns: usize| {
+        Matrix::from_fn(graph, (n, columns), |i, j| {
+            rows.get(i).and_then(|row| *row.get(j)?)
+        })
+    };
+    let columns = form.Q_a.first().map_or(0, Vec::len);
+    let (Q, Q_a) = (of_rows(&form.Q, n), of_rows(&form.Q_a, columns));
+    let x_a: Vec<Node> = match form.variant {
+        Variant::Practical => form.U.concat(),
+        _ => vec![],
+    };
+    let Q_a = if x_a.is_empty() {
+        of_rows(&vec![], 0)
+    } else {
+        Q_a
+    };
+    let (drift, input) = remainders(extended, form, &U)?;
+    let found = box_.inverse(&Q)?;
+    let unknown = || vec![vec![f64::INFINITY; n]; n];
+    let size = found.as_ref().map_or_else(unknown, |found| found.bounds());
+    let (Q_size, Q_a_size) = (box_.magnitudes(&Q)?, box_.magnitudes(&Q_a)?);
+    let mixed = |left: &[Vec<f64>]| product(left, &Q_a_size);
+    let of_remainder = |r: &[Node]| -> Result<Vec<f64>, MissingInput> {
+        let x = Matrix::jacobian(graph, r, &extended.symbols());
+        let a = box_.magnitudes(&Matrix::jacobian(graph, r, &x_a))?;
+        let z = match &found {
+            Some(inverse) => box_.divided(&x, inverse)?,
+            None => product(&box_.magnitudes(&x)?, &size),
+        };
+        let through = mixed(&z);
+        let row = |i: usize| {
+            let a = a[i].iter().zip(&through[i]).map(|(a, t)| a + t);
+            length(&z[i].iter().copied().chain(a).collect::<Vec<_>>())
+        };
+        Ok((0..r.len()).map(row).collect())
+    };
+    let mut input_rows = vec![0.0; n];
+    for column in &input {
+        for (sum, γ) in input_rows.iter_mut().zip(of_remainder(column)?) {
+            *sum += γ;
+        }
+    }
+    let beside = |A: &[Vec<f64>], B: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        A.iter().zip(B).map(|(a, b)| [&a[..], b].concat()).collect()
+    };
+    let size_a = mixed(&size);
+    let states = size.iter().zip(&size_a);
+    let name = "Q̄(x, U) is regular on the box for U within its bounds";
+    Ok(Lipschitz {
+        map: norm(&beside(&Q_size, &Q_a_size)),
+        inverse: norm(&beside(&size, &size_a)),
+        drift: of_remainder(&drift)?,
+        input: input_rows,
+        states: states.map(|(z, a)| (length(z), length(a))).collect(),
+        Q: Q_size,
+        regular: regular(extended, name, &form.Q, box_.region())?,
+        open: box_.open(),
+    })
+}
+
+/// u, u', …, one order further than the observer reads, each with its bounds.
+fn further(
+    extended: &Extended<'_>,
+    form: &Form,
+    slopes: &[Option<Vec<f64>>],
+    box_: &mut Enclosure<'_>,
+) -> Vec<Vec<Node>> {
+    let graph = extended.graph();
+    let mut U = vec![];
+    for ((input, jet), given) in extended.inputs.iter().zip(&form.U).zip(slopes) {
+        let mut symbols = vec![input.node];
+        for k in 1..=jet.len() {
+            let symbol = graph.symbol(&slope_symbol(&input.name, k)).node();
+            let bound = given.as_ref().and_then(|b| b.get(k - 1).copied());
+            let bound = bound.unwrap_or(f64::INFINITY);
+            box_.add(derivative_name(&input.name, k), symbol, -bound, bound);
+            symbols.push(symbol);
+        }
+        U.push(symbols);
+    }
+    U
+}
+
+/// Row by row of z what z' holds beside the next row: without the inputs, and for
+/// (3.1) the factor of each input.
+fn remainders(
+    extended: &Extended<'_>,
+    form: &Form,
+    U: &[Vec<Node>],
+) -> Result<(Vec<Node>, Vec<Vec<Node>>), MissingInput> {
+    let graph = extended.graph();
+    let zero = graph.constant(0.0).node();
+    let order = form.indices.iter().copied().max().unwrap_or(0);
+    let bounded = match form.variant {
+        Variant::Bounded => output_map::affine_form(extended)?.ok(),
+        _ => None,
+    };
+    let y = match &bounded {
+        Some(affine) => output_map::lie_derivatives(extended, affine, order)?,
+        None => output_map::output_derivatives(extended, U, order)?,
+    };
+    let last = |&(i, k): &(usize, usize)| match k + 1 == form.indices[i] {
+        true => y[i][k + 1],
+        false => zero,
+    };
+    let drift = form.rows.iter().map(last).collect();
+    let Some(affine) = bounded else {
+        return Ok((drift, vec![]));
+    };
+    let along = |row: &Vec<Option<Node>>, g: &Vec<Option<Node>>| {
+        let pairs = row.iter().zip(g);
+        let terms = pairs.filter_map(|(q, g)| Some(graph.expr((*q)?) * graph.expr((*g)?)));
+        terms.reduce(|a, b| a + b).map_or(zero, |sum| sum.node())
+    };
+    let column = |g: &Vec<Option<Node>>| form.Q.iter().map(|row| along(row, g)).collect();
+    Ok((drift, affine.input_columns.iter().map(column).collect()))
+}

@@ -1,0 +1,268 @@
+//! Theorems 3.1, 4.1 and 4.5 with their constants: against independent computations,
+//! and against simulations of plants for which they are proved.
+
+use crate::common::{plant, run};
+use lynkeus_model::Plant;
+use lynkeus_observers::{
+    Assumptions, Certificate, Design, Family, Tuning, Value, Verdict,
+    drift_observable::DriftObservable,
+};
+use lynkeus_structure::{Check, Extended, Sensors};
+
+use super::{PLANT, list};
+
+/// Numbers in [0, 1) that are the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        // Knuth's constants for MMIX
+        let (a, c) = (6364136223846793005, 1442695040888963407);
+        self.0 = self.0.wrapping_mul(a).wrapping_add(c);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+fn tuning(variant: &str, lists: &[(&str, &[f64])]) -> Tuning {
+    let mut tuning = Tuning::default();
+    let variant = Value::Text(variant.to_owned());
+    tuning.values.insert("variant".into(), variant);
+    for (key, numbers) in lists {
+        tuning.values.insert((*key).to_owned(), list(numbers));
+    }
+    tuning
+}
+
+fn sensors(plant: &Plant) -> Sensors {
+    let disturbed = plant.inputs.iter().filter(|i| i.name == "d");
+    Sensors {
+        disturbances: disturbed.map(|i| i.name.clone()).collect(),
+        ..Sensors::default()
+    }
+}
+
+fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> Certificate {
+    let extended = Extended::new(plant, &sensors(plant)).unwrap();
+    let assumptions = Assumptions {
+        region: extended.region(),
+        drift: drift.to_vec(),
+        noise: noise.to_vec(),
+    };
+    let found = DriftObservable.theorem(&extended, tuning, &assumptions);
+    found.unwrap()
+}
+
+fn design(plant: &Plant, tuning: &Tuning) -> Design {
+    let extended = Extended::new(plant, &sensors(plant)).unwrap();
+    DriftObservable.design(&extended, tuning).unwrap()
+}
+
+fn value(found: &Certificate, name: &str) -> f64 {
+    let constant = found.constants.iter().find(|c| c.name == name);
+    let constant = constant.unwrap_or_else(|| panic!("{name} in {:#?}", found.constants));
+    constant.value
+}
+
+fn hypothesis<'c>(found: &'c Certificate, name: &str) -> &'c Check {
+    let mut all = found.hypotheses.iter();
+    all.find(|h| h.name.contains(name))
+        .unwrap_or_else(|| panic!("{name} in {:#?}", found.hypotheses))
+}
+
+const PENDULUM: &str = "model Pendulum input Real u(min = -1, max = 1);
+  Real a(min = -3, max = 3); Real b(min = -3, max = 3); output Real y = a;
+  equation der(a) = b; der(b) = -0.5*sin(a) - b + u; end Pendulum;";
+
+/// γ = √(0.5² + 1²) by hand; γ* and α from the H∞ norm of (sI − A − αI + KC)⁻¹B on a grid
+/// of frequencies, with NumPy.
+#[test]
+fn the_rate_is_that_of_the_bounded_real_lemma() {
+    let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
+    let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    let near = |name: &str, expected: f64, tolerance: f64| {
+        let value = value(&found, name);
+        assert!(
+            (value / expected - 1.0).abs() < tolerance,
+            "{name}: {value}"
+        );
+    };
+    near("γ", 1.25f64.sqrt(), 1e-6);
+    near("γ_Φ⁻¹", 1.0, 1e-6);
+    near("γ*", 3.419858, 0.02);
+    near("α", 3.40925, 0.01);
+    assert_eq!((value(&found, "K1"), value(&found, "K2")), (14.0, 48.0));
+    let μ = (value(&found, "‖P‖") / value(&found, "λmin(P)")).sqrt() * value(&found, "γ_Φ");
+    near("μ", μ, 1e-6);
+    assert_eq!(found.ultimate_bound, Some(0.0));
+    let noisy = certificate(&plant(PENDULUM), &poles, &[0.0, 0.1], &[1e-3]);
+    assert!(noisy.ultimate_bound.unwrap() > 0.0 && noisy.ultimate.len() == 2);
+}
+
+#[test]
+fn slow_poles_are_undecided_with_both_numbers() {
+    let poles = tuning("bounded", &[("poles", &[-1.0, -1.2])]);
+    let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    let open = found.weakest().unwrap();
+    assert!(open.name.starts_with("γ ≤ γ*"), "{open:?}");
+    assert!(open.detail.starts_with("1.118 > 0."), "{}", open.detail);
+    // and what would do: checked with a hundredth more
+    let s = 1.01 * value(&found, "s0");
+    let poles = tuning("bounded", &[("poles", &[-s, -1.2 * s])]);
+    let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Proved);
+    // Lemma 3.2's own poles, the stricter way
+    let σ = 1.01 * value(&found, "σ0");
+    let poles = tuning("bounded", &[("poles", &[-σ, -σ * σ])]);
+    let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Proved);
+}
+
+#[test]
+fn the_papers_plant_is_undecided_and_says_where() {
+    let plant = plant(PLANT);
+    let poles: &[f64] = &[-4.0, -4.8, -5.76];
+    let found = certificate(
+        &plant,
+        &tuning("theoretical", &[("poles", poles)]),
+        &[0.0; 3],
+        &[0.0],
+    );
+    assert_eq!(found.verdict, Verdict::Undecided);
+    let open = hypothesis(&found, "derivatives of the inputs");
+    assert!(
+        open.detail
+            .contains("derivatives of u: give the key 'input_derivatives'")
+    );
+    let given = tuning(
+        "theoretical",
+        &[("poles", poles), ("input_derivatives", &[12.6, 79.0])],
+    );
+    let found = certificate(&plant, &given, &[0.0; 3], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    let open = hypothesis(&found, "Q̄(x, U) is regular");
+    assert!(open.detail.contains("x3 = "), "{}", open.detail);
+    assert_eq!((found.rate, found.ultimate_bound), (None, None));
+}
+
+#[test]
+fn a_variable_without_bounds_is_named() {
+    let text = PENDULUM
+        .replace("Real b(min = -3, max = 3)", "Real b")
+        .replace("- b +", "- b^2 +");
+    let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
+    let found = certificate(&plant(&text), &poles, &[0.0; 2], &[0.0]);
+    let open = hypothesis(&found, "Lipschitz in these coordinates");
+    assert!(
+        open.detail.contains("no bound of b: declare min and max"),
+        "{}",
+        open.detail
+    );
+    assert!((value(&found, "γ_Φ") - 1.0).abs() < 1e-9);
+}
+
+/// b' = …, a' = b + 0.5 a u: the input shows before the last derivative.
+const EARLY: &str =
+    "model Early input Real u(min = -UM, max = UM); input Real d(min = -0.1, max = 0.1);
+  Real a(min = -2, max = 2); Real b(min = -2, max = 2); output Real y = a;
+  equation der(a) = b + 0.5*a*u; der(b) = -C*sin(a) - b + d; end Early;";
+
+fn early(u_M: f64, c: f64) -> Plant {
+    plant(
+        &EARLY
+            .replace("UM", &u_M.to_string())
+            .replace('C', &c.to_string()),
+    )
+}
+
+#[test]
+fn the_bounded_observer_needs_a_small_input() {
+    let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
+    let found = certificate(&early(1.0, 0.5), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    let limit = value(&found, "u_M");
+    let found = certificate(&early(1.1 * limit, 0.5), &poles, &[0.0; 2], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.weakest().unwrap().name, "|u| ≤ u_M");
+}
+
+/// Errors at every row against c e^(−αt)|e(0)| + bound, from a random start.
+fn kept(plant: &Plant, mut tuning: Tuning, peak: &str, start: [f64; 2]) {
+    let names = ["a", "b"].map(str::to_owned);
+    tuning.initial.values = names.into_iter().zip(start).collect();
+    let found = certificate(plant, &tuning, &[0.0, 0.1], &[0.0]);
+    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    let design = design(plant, &tuning);
+    let times: Vec<f64> = (0..=60).map(|i| 0.05 * f64::from(i)).collect();
+    let inputs = [("u", "0.5*sin(2*time)"), ("d", "0.1*sin(5*time)")];
+    let rows = run(plant, &design, &inputs, &[0.3, -0.2], &times, 1e-3).rows;
+    let error = |row: &[f64]| (row[1] - row[3]).hypot(row[2] - row[4]);
+    let (rate, bound) = (found.rate.unwrap(), found.ultimate_bound.unwrap());
+    for row in &rows {
+        let transient = value(&found, peak) * (-rate * row[0]).exp() * error(&rows[0]);
+        assert!(
+            error(row) <= transient + bound,
+            "t = {}: {}",
+            row[0],
+            error(row)
+        );
+        for (i, (name, bound)) in found.ultimate.iter().enumerate() {
+            let e = (row[1 + i] - row[3 + i]).abs();
+            assert!(
+                e <= transient + bound,
+                "{name} at {}: {e} > {bound}",
+                row[0]
+            );
+        }
+    }
+}
+
+#[test]
+fn what_the_three_theorems_promise_is_kept() {
+    let mut random = Random(11);
+    for _ in 0..5 {
+        let c = 0.2 + random.next();
+        let s = 1.0 + random.next();
+        let start = [0.6 * random.next() - 0.3, 0.6 * random.next() - 0.3];
+        let poles: &[f64] = &[-6.0 * s, -9.0 * s];
+        kept(
+            &early(0.5, c),
+            tuning("bounded", &[("poles", poles)]),
+            "μ",
+            start,
+        );
+        let slopes: (&str, &[f64]) = ("input_derivatives", &[1.0]);
+        let lists = [("poles", poles), slopes];
+        kept(&early(0.5, c), tuning("theoretical", &lists), "μ", start);
+        let filter: &[f64] = &[-80.0 * s];
+        let lists = [("poles", poles), slopes, ("filter_poles", filter)];
+        // the filter starts at u(0)
+        kept(&early(0.5, c), tuning("practical", &lists), "c1", start);
+    }
+}
+
+/// A filter of one state: P_a = w²/(2(λ − α₂)), α₂ = λ/2, leaves w/λ.
+#[test]
+fn what_the_filter_leaves() {
+    let lists: [(&str, &[f64]); 3] = [
+        ("poles", &[-6.0, -9.0]),
+        ("input_derivatives", &[1.0]),
+        ("filter_poles", &[-80.0]),
+    ];
+    let found = certificate(
+        &early(0.5, 0.5),
+        &tuning("practical", &lists),
+        &[0.0; 2],
+        &[0.0],
+    );
+    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    let share = (value(&found, "‖P‖") / (2.0 * value(&found, "α")) + 1.0).sqrt();
+    let expected = value(&found, "γ_Φ⁻¹") / 80.0 * share;
+    assert!(
+        (value(&found, "c3") / expected - 1.0).abs() < 1e-3,
+        "{}",
+        value(&found, "c3")
+    );
+    assert!((found.ultimate_bound.unwrap() / expected - 1.0).abs() < 1e-3);
+}
