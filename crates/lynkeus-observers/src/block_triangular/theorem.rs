@@ -41,6 +41,9 @@ pub(super) fn certificate(
             ));
         }
     };
+    if let Some(check) = foreign(tuning) {
+        return Ok(Certificate::new(BASIS, &assumptions.region, vec![check]));
+    }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
     let by_output = theta(tuning, order.len())?;
     let K = coefficients(tuning, &blocks)?;
@@ -61,6 +64,18 @@ pub(super) fn certificate(
         tuning,
     };
     study.certificate()
+}
+
+/// Keys that another file of the family gives a meaning to.
+fn foreign(tuning: &Tuning) -> Option<Check> {
+    let mut keys = tuning.values.keys();
+    let key = keys.find(|key| !COVERED.contains(&key.as_str()))?;
+    let detail =
+        format!("the key '{key}' makes another observer, which the theorem does not cover");
+    Some(undecided(
+        "the observer is (7) or (3) with a constant θ",
+        detail,
+    ))
 }
 
 pub(super) struct Study<'a> {
@@ -131,7 +146,6 @@ impl Study<'_> {
         }
         let (plain, check) = slopes(extended, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
-        checks.extend(self.foreign());
         let similar: Vec<Similar> = match self.classical {
             true => vec![],
             false => (0..order.len())
@@ -162,17 +176,6 @@ impl Study<'_> {
             .iter()
             .any(|(_, c)| c.states.windows(2).any(|p| p == [row, column]));
         along || place(column) > place(row)
-    }
-
-    fn foreign(&self) -> Option<Check> {
-        let mut keys = self.tuning.values.keys();
-        let key = keys.find(|key| !COVERED.contains(&key.as_str()))?;
-        let detail =
-            format!("the key '{key}' makes another observer, which the theorem does not cover");
-        Some(undecided(
-            "the observer is (7) or (3) with a constant θ",
-            detail,
-        ))
     }
 
     fn unbounded(&self) -> Check {

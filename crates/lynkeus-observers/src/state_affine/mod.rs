@@ -17,7 +17,9 @@
 //! Beyond the print: C(u) need not be square, and y = C(u)x + d(u) is understood.
 
 mod excitation;
+mod gramian;
 mod lyapunov;
+mod theorem;
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
@@ -26,7 +28,8 @@ use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal
 use crate::conditions::{fit, lipschitz, names};
 use crate::estimate::Copy;
 use crate::{
-    Design, DesignError, Examination, Family, Fit, Monitor, Observer, Tuning, TuningError, Value,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
+    Tuning, TuningError, Value,
 };
 use excitation::least_eigenvalue;
 use lyapunov::{Factor, Sparse};
@@ -62,6 +65,15 @@ impl Family for StateAffine {
         Ok(match form(extended)? {
             Ok((_, examination)) | Err(examination) => examination,
         })
+    }
+
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        theorem::certificate(extended, tuning, assumptions)
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {

@@ -7,6 +7,7 @@ mod drift_observable;
 mod peaking;
 mod state_affine;
 mod theorem_block_triangular;
+mod theorem_state_affine;
 mod theorem_triangular;
 mod triangular;
 mod unknown_input;

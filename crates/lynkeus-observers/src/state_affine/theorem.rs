@@ -1,0 +1,382 @@
+//! Theorem 1: what it guarantees for a plant and a tuning.
+//!
+//! With x̄ = Δ_θ e, V = x̄ᵀSx̄ and f(x̂) − f(x) = F(u, x̂)e + δf, |δf_p| ≤ Σ_q L_pq|e_q| over the
+//! blocks up to p's own (mean value theorem),
+//!
+//! V' = −θV − θ|Cx̄|² + 2x̄ᵀSΔδf + 2x̄ᵀSΔd + 2θ(Cx̄)ᵀw ≤ −2θμ_θ V + 2√(λ_M V)|Δd| + θ|w|²,
+//!
+//! μ_θ = ½ − √(λ_M/λ_m) ‖G(θ)‖/θ,  G_pq = L_pq θ^{−(k_p − k_q)},
+//!
+//! where λ_m ≤ λ(S(t)) ≤ λ_M. The noise costs nothing but θ|w|², for −θ|Cx̄|² pays for its
+//! cross term. λ_M follows from the box and S(0); λ_m is assumption A4, δ_0 = e α(θ) λ_m.
+//! No box decides A4 where F moves with the inputs, but the observer watches it: while
+//! the monitor `excitation` is above its alarm, λ_m is at least that.
+
+use lynkeus_expr::{Interval, Node};
+use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
+
+use super::gramian::{TAU, above, below, largest_eigenvalue};
+use super::{ALARM, Keys, form, least_reach};
+use crate::proof::metzler::spectral_radius;
+use crate::proof::slopes::{Slope, magnitude, slopes, undeclared};
+use crate::proof::sum;
+use crate::proof::threshold::first;
+use crate::proof::words::{box_note, proved, shown, undecided};
+use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, Verdict};
+
+const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
+
+pub(super) fn certificate(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let (form, examination) = match form(extended)? {
+        Ok(found) => found,
+        Err(examination) => return Err(DesignError::Refused(Box::new(examination))),
+    };
+    let order: Vec<usize> = form.blocks().flatten().copied().collect();
+    let keys = Keys::new(tuning, &order)?;
+    let block: Vec<usize> = form
+        .blocks()
+        .enumerate()
+        .flat_map(|(k, b)| b.iter().map(move |_| k))
+        .collect();
+    let alarm = match keys.alarm {
+        Some(alarm) => alarm,
+        None => ALARM * least_reach(extended, &form)?,
+    };
+    let study = Study {
+        extended,
+        assumptions,
+        form: &form,
+        order,
+        block,
+        keys,
+        alarm,
+    };
+    // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
+    let hidden = examination.checks.into_iter();
+    let hidden = hidden.filter(|c| matches!(c.verdict, Condition::Refuted(_)));
+    study.certificate(hidden.collect(), tuning.clamp)
+}
+
+struct Study<'a> {
+    extended: &'a Extended<'a>,
+    assumptions: &'a Assumptions,
+    form: &'a Superdiagonal,
+    /// the states in the order of the blocks
+    order: Vec<usize>,
+    /// the block of each place
+    block: Vec<usize>,
+    keys: Keys,
+    alarm: f64,
+}
+
+/// Entries row by row.
+type Table = Vec<Vec<f64>>;
+
+/// |C| and |F| in the order of the blocks, and whether all entries are numbers.
+struct Sizes {
+    C: Table,
+    F: Table,
+    numbers: Option<(Table, Table)>,
+    check: Check,
+}
+
+/// λ_m and λ_M.
+struct Spectrum {
+    smallest: f64,
+    largest: f64,
+}
+
+impl Study<'_> {
+    fn region(&self) -> &Region {
+        &self.assumptions.region
+    }
+
+    fn place(&self, state: usize) -> Option<usize> {
+        self.order.iter().position(|s| *s == state)
+    }
+
+    fn certificate(&self, mut checks: Vec<Check>, clamp: bool) -> Result<Certificate, DesignError> {
+        let next = |row: usize, column: usize| match (self.place(row), self.place(column)) {
+            (Some(p), Some(q)) => self.block[q] > self.block[p],
+            _ => false,
+        };
+        let (slopes, lipschitz) = slopes(self.extended, self.region(), next)?;
+        let sizes = self.sizes()?;
+        let bounded = [&lipschitz, &sizes.check]
+            .iter()
+            .all(|c| c.verdict == Condition::Proved);
+        checks.extend([lipschitz, sizes.check.clone(), self.uncertainty()]);
+        let mut constants = vec![];
+        let excitation = self.excitation(&sizes);
+        let mut found = None;
+        if bounded {
+            let spectrum = self.spectrum(&sizes, excitation, &mut constants);
+            found = self.decay(&slopes, &spectrum, &mut checks, &mut constants);
+        }
+        let everything_else = Verdict::of(&checks) == Verdict::Proved;
+        checks.push(self.a4(excitation));
+        let mut certificate = Certificate::new(BASIS, self.region(), checks);
+        certificate.constants = constants;
+        certificate.notes.push(box_note(clamp));
+        if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
+            self.conclude(&mut certificate, rate, &spectrum);
+        }
+        Ok(certificate)
+    }
+
+    /// A1: bounds of C and F.
+    fn sizes(&self) -> Result<Sizes, DesignError> {
+        let graph = self.extended.graph();
+        let n = self.order.len();
+        let mut C = vec![vec![0.0; n]; self.extended.outputs.len()];
+        let mut F = vec![vec![0.0; n]; n];
+        let (mut values, mut open): (Option<(Table, Table)>, Vec<Node>) =
+            (Some((C.clone(), F.clone())), vec![]);
+        for (k, factor) in self.form.factors.iter().enumerate() {
+            for &(i, j, node) in &factor.entries {
+                let size = magnitude(graph, node, self.region())?;
+                let value = graph.constant_value(node);
+                if size.is_infinite() {
+                    open.push(node);
+                }
+                let row = if k == 0 {
+                    Some(factor.rows[i])
+                } else {
+                    self.place(factor.rows[i])
+                };
+                let (Some(row), Some(column)) = (row, self.place(factor.columns[j])) else {
+                    continue;
+                };
+                let table = if k == 0 { &mut C } else { &mut F };
+                table[row][column] = size;
+                values = values.and_then(|(mut c, mut f): (Table, Table)| {
+                    let table = if k == 0 { &mut c } else { &mut f };
+                    table[row][column] = value?;
+                    Some((c, f))
+                });
+            }
+        }
+        let name = "C(u) and F(u, x) are bounded on the box (A1)";
+        let check = match open.first() {
+            None => proved(name, "every entry enclosed"),
+            Some(&node) => {
+                let missing = undeclared(graph, &open, self.region());
+                let advice = match missing.is_empty() {
+                    true => "mind divisions and roots at the edges of the box".to_owned(),
+                    false => format!("declare min and max of {}", missing.join(", ")),
+                };
+                undecided(
+                    name,
+                    format!("{} has no bound: {advice}", graph.render(node, 60)),
+                )
+            }
+        };
+        Ok(Sizes {
+            C,
+            F,
+            numbers: values,
+            check,
+        })
+    }
+
+    /// A3: the uncertainty is bounded.
+    fn uncertainty(&self) -> Check {
+        let name = "what acts on the plant unknown to the observer is bounded (A3)";
+        let drift = &self.assumptions.drift;
+        let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
+        match self.order.iter().find(|state| !known(state)) {
+            None => proved(name, "by the assumed drift"),
+            Some(&state) => {
+                let name_of = &self.extended.states[state].name;
+                undecided(
+                    name,
+                    format!("no bound is assumed for the drift of {name_of}"),
+                )
+            }
+        }
+    }
+
+    /// λ_m where F and C are numbers.
+    fn excitation(&self, sizes: &Sizes) -> Option<f64> {
+        let (C, F) = sizes.numbers.as_ref()?;
+        below(C, F, self.form.factors.len())
+    }
+
+    fn a4(&self, excitation: Option<f64>) -> Check {
+        let name = "persistent excitation (A4): S(t) ≥ λ_m I";
+        match excitation {
+            Some(λ) => proved(
+                name,
+                format!("C and F are numbers: λ_m = {} for t ≥ {TAU}/θ", shown(λ)),
+            ),
+            None => undecided(
+                name,
+                format!(
+                    "it depends on the inputs and the estimate, which no box decides. While the monitor 'excitation' is above its alarm {}, λ_m is at least that, δ_0/α(θ) = e·λ_m, and the constants hold; the key 'alarm' sets it. What is missing for a proof is a lower bound of the excitation for all time",
+                    shown(self.alarm)
+                ),
+            ),
+        }
+    }
+
+    fn spectrum(
+        &self,
+        sizes: &Sizes,
+        excitation: Option<f64>,
+        constants: &mut Vec<Constant>,
+    ) -> Spectrum {
+        let largest = largest_eigenvalue(&above(&self.keys.S0, &sizes.C, &sizes.F, &self.block));
+        let smallest = excitation.unwrap_or(self.alarm);
+        let source = match excitation {
+            Some(_) => "lower bound of the eigenvalues of S(t), t ≥ 10/θ",
+            None => {
+                "lower bound of the eigenvalues of S(t) while the monitor raises no flag: the alarm"
+            }
+        };
+        let mut add = |name: &str, value: f64, meaning: &str| {
+            constants.push(Constant::new(name, value, meaning));
+        };
+        add(
+            "λ_M",
+            largest,
+            "upper bound of the eigenvalues of S(t), all t, any θ",
+        );
+        add("λ_m", smallest, source);
+        let δ0 = std::f64::consts::E * smallest;
+        add(
+            "δ0/α(θ)",
+            δ0,
+            "e·λ_m: what (11) has to provide for it, by (16)",
+        );
+        Spectrum { smallest, largest }
+    }
+
+    /// ‖G(θ)‖ ≤ √ρ(GᵀG)
+    fn coupling(&self, slopes: &[Slope], θ: f64) -> f64 {
+        let n = self.order.len();
+        let mut G = vec![vec![0.0; n]; n];
+        for slope in slopes {
+            if let (Some(p), Some(q)) = (self.place(slope.row), self.place(slope.column)) {
+                let power = Interval::point(θ).powi((self.block[p] - self.block[q]) as i32);
+                G[p][q] = (Interval::point(slope.size) / power).hi();
+            }
+        }
+        let square: Vec<Vec<f64>> = (0..n)
+            .map(|i| {
+                let entry = |j: usize| {
+                    sum(G
+                        .iter()
+                        .map(|row| Interval::point(row[i]) * Interval::point(row[j])))
+                    .hi()
+                };
+                (0..n).map(entry).collect()
+            })
+            .collect();
+        Interval::point(spectral_radius(&square)).sqrt().hi()
+    }
+
+    /// θμ_θ with the hypothesis μ_θ > 0.
+    fn decay(
+        &self,
+        slopes: &[Slope],
+        spectrum: &Spectrum,
+        checks: &mut Vec<Check>,
+        constants: &mut Vec<Constant>,
+    ) -> Option<(f64, Spectrum)> {
+        let ratio = (Interval::point(spectrum.largest) / Interval::point(spectrum.smallest)).sqrt();
+        let μ = |θ: f64| {
+            let loss = ratio * Interval::point(self.coupling(slopes, θ)) / Interval::point(θ);
+            (Interval::point(0.5) - loss).lo()
+        };
+        let θ = self.keys.θ;
+        let θ0 = first(θ, |θ| μ(θ) > 0.0);
+        let mut add = |name: &str, value: f64, meaning: &str| {
+            constants.push(Constant::new(name, value, meaning));
+        };
+        add(
+            "η√α(θ)",
+            ratio.hi(),
+            "√(λ_M/λ_m), the paper's σ_s and η·√α(θ)",
+        );
+        add(
+            "L",
+            self.coupling(slopes, θ),
+            "‖G(θ)‖: Lipschitz constant of Fx + φ in the scaled coordinates at the study's θ",
+        );
+        add("μ_θ", μ(θ), "½ − σ_s L/θ, tends to ½ as θ grows");
+        if let Some(θ0) = θ0 {
+            add("θ0", θ0, "μ_θ > 0 from here on, for this λ_m");
+        }
+        let name = format!("θ = {} is large enough: μ_θ > 0", shown(θ));
+        let from = θ0.map_or_else(
+            || "no θ0 was found".to_owned(),
+            |θ0| format!("θ0 = {}", shown(θ0)),
+        );
+        let rate = (Interval::point(θ) * Interval::point(μ(θ))).lo();
+        checks.push(match rate > 0.0 {
+            true => proved(name, format!("μ_θ = {}, {from}", shown(μ(θ)))),
+            false => undecided(
+                name,
+                format!("μ_θ = {}, {from}; sufficient, not necessary", shown(μ(θ))),
+            ),
+        });
+        let Spectrum { smallest, largest } = *spectrum;
+        (rate > 0.0).then_some((rate, Spectrum { smallest, largest }))
+    }
+
+    /// Rate and ultimate bounds: of the certificate where A4 is proved, else as
+    /// constants that hold while the monitor raises no flag.
+    fn conclude(&self, certificate: &mut Certificate, rate: f64, spectrum: &Spectrum) {
+        let θ = Interval::point(self.keys.θ);
+        let scale = |p: usize| θ.powi(self.block[p] as i32);
+        let drift = self.order.iter().enumerate().map(|(p, &state)| {
+            let d = Interval::point(self.assumptions.drift[state]) / scale(p);
+            d * d
+        });
+        let b = (Interval::point(spectrum.largest) * sum(drift)).sqrt();
+        let count = self.extended.outputs.len();
+        let noise = |i: usize| {
+            self.assumptions
+                .noise
+                .get(i)
+                .copied()
+                .unwrap_or(f64::INFINITY)
+        };
+        let w2 = sum((0..count).map(|i| Interval::point(noise(i)) * Interval::point(noise(i))));
+        // 2θμ v² − 2b v − θw² = 0 for v = √V
+        let twice = Interval::point(2.0) * Interval::point(rate);
+        let v = (b + (b * b + twice * θ * w2).sqrt()) / twice;
+        let radius = v / Interval::point(spectrum.smallest).sqrt();
+        let bound = |p: usize| (scale(p) * radius).hi();
+        let last = self.block.iter().copied().max().unwrap_or(0);
+        let norm = (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
+        if certificate.verdict == Verdict::Proved {
+            certificate.rate = Some(rate);
+            if norm.is_finite() {
+                certificate.ultimate_bound = Some(norm);
+                let name = |p: usize| self.extended.states[self.order[p]].name.clone();
+                certificate.ultimate = (0..self.order.len()).map(|p| (name(p), bound(p))).collect();
+            }
+            return;
+        }
+        let mut add = |name: &str, value: f64, meaning: &str| {
+            certificate
+                .constants
+                .push(Constant::new(name, value, meaning));
+        };
+        add(
+            "θμ_θ",
+            rate,
+            "decay rate while the monitor raises no flag, 1/time unit",
+        );
+        add(
+            "ultimate bound",
+            norm,
+            "of |e| under the assumed drift and noise, while the monitor raises no flag",
+        );
+    }
+}
