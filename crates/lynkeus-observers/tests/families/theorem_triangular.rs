@@ -140,6 +140,22 @@ fn linear_chains_need_no_box() {
     );
 }
 
+/// Other gains of the family are other observers: nothing is claimed for them.
+#[test]
+fn other_gains_are_not_covered() {
+    let plant = plant(PENDULUM);
+    let mut tuning = Tuning::default();
+    let gain = Value::Text("lmi".into());
+    tuning.values.insert("gain".into(), gain);
+    let found = study(&plant, tuning).certificate();
+    assert_eq!((found.verdict, found.rate), (Verdict::Undecided, None));
+    assert!(
+        hypothesis(&found, "constant gain")
+            .detail
+            .contains("'gain'")
+    );
+}
+
 /// What lacks a bound is named, what is known is said.
 #[test]
 fn a_missing_box_is_named() {
@@ -227,10 +243,14 @@ fn the_column_of_the_paper() {
             _ => None,
         })
         .collect();
-    assert!(
-        broken.len() == 2 && broken.iter().all(|x| *x > 8.0),
-        "{broken:?}"
-    );
+    // NumPy over the 2⁶ and 2⁴ vertices; the enclosures of the partials are a little wider
+    for (found, exact) in broken
+        .iter()
+        .zip([252.023_823_373_142_82, 59.405_290_827_014_504])
+    {
+        assert!((found / exact - 1.0).abs() < 1e-3, "{broken:?}");
+    }
+    assert_eq!(broken.len(), 2);
     let window = [
         constant(&found, "(2n1−1)/(2n2−1)"),
         constant(&found, "δ2/δ1"),
