@@ -1,32 +1,13 @@
-//! Definiteness that rounding cannot fake: S = LDLᵀ in interval arithmetic.
+//! Definiteness that rounding cannot fake, and inverses of which the same is true.
 
 use lynkeus_expr::Interval;
 
 /// A symmetric matrix of enclosures, row by row.
 pub(crate) type Matrix = Vec<Vec<Interval>>;
 
-/// Whether every symmetric matrix inside the enclosures is positive definite: each
-/// pivot of the elimination is positive for sure.
+/// Whether every symmetric matrix inside the enclosures is positive definite.
 pub(crate) fn positive(matrix: &Matrix) -> bool {
-    let mut left = matrix.clone();
-    let n = left.len();
-    for k in 0..n {
-        let pivot = left[k][k];
-        if !pivot.is_positive() {
-            return false;
-        }
-        for i in k + 1..n {
-            if left[i][k] == Interval::ZERO {
-                continue;
-            }
-            let factor = left[i][k] / pivot;
-            let column: Vec<Interval> = left[k + 1..=i].iter().map(|row| row[k]).collect();
-            for (entry, below) in left[i][k + 1..=i].iter_mut().zip(column) {
-                *entry = *entry - factor * below;
-            }
-        }
-    }
-    true
+    lynkeus_gain::definite::is_positive_definite(matrix)
 }
 
 /// Upper bounds of (S⁻¹)_jj, or none where the enclosure of S⁻¹ is not finite.

@@ -2,7 +2,7 @@
 //!
 //! With ε_j = x̃_j/s_j, s_j = τ^j/|T_j|, the error of a chain obeys
 //!
-//! ε' = τ (A(a) − g C) ε + Δ⁻¹δf + Δ⁻¹d + τ-free noise g w,
+//! ε' = τ (A(a) − g C) ε + Δ⁻¹δf + Δ⁻¹d + g w, w the error of the measured state,
 //!
 //! A(a) with the partials a_j above its diagonal, g the gain in these coordinates, and
 //! |(Δ⁻¹δf)_a| ≤ Σ_b L_ab (s_b/s_a) |ε_b| with L_ab ≥ |∂f_a/∂x_b| on the box (mean
