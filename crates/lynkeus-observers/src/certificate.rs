@@ -1,6 +1,7 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_structure::{Check, Condition, Region};
+use nalgebra::DMatrix;
 
 use crate::Fit;
 
@@ -91,6 +92,9 @@ pub struct Certificate {
     pub hypotheses: Vec<Check>,
     /// the numbers of the proof
     pub constants: Vec<Constant>,
+    /// P of the Lyapunov function V = eᵀPe, V' ≤ −2·rate·V, in the order of the
+    /// extended states; only where the proof has one
+    pub lyapunov: Option<DMatrix<f64>>,
     /// what the reader should know, in words
     pub notes: Vec<String>,
 }
@@ -109,6 +113,7 @@ impl Certificate {
             region: sides.map(|d| (d.name.clone(), d.min, d.max)).collect(),
             hypotheses,
             constants: vec![],
+            lyapunov: None,
             notes: vec![],
         }
     }

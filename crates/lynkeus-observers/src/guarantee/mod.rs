@@ -127,6 +127,7 @@ fn fill(
         return;
     }
     certificate.rate = Some(proof.rate);
+    certificate.lyapunov = Some(proof.P.clone());
     let eigenvalues = proof.P.symmetric_eigenvalues();
     let spread = (eigenvalues.max() / eigenvalues.min()).sqrt();
     certificate.constants = vec![

@@ -1,6 +1,7 @@
 //! The command as a user types it.
 #![allow(clippy::unwrap_used)]
 
+mod certify;
 mod families;
 mod messages;
 mod references;
