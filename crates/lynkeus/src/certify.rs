@@ -3,7 +3,7 @@
 use std::fmt;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::{Certificate, Design, Tuning, Value, Verdict};
+use lynkeus_observers::{Certificate, Claim, Design, Tuning, Verdict};
 use lynkeus_structure::Extended;
 
 use crate::{Error, Study, prepare, words};
@@ -27,72 +27,165 @@ pub struct CertifyReport {
     pub theorem: Option<Certificate>,
 }
 
-/// Proves, refutes or leaves undecided that the study's observer converges, first on
-/// the declared box, then on the box of the inputs that the study simulates.
+/// Proves, refutes or leaves undecided that the study's observer converges: on the
+/// declared box, or else on the box of the inputs that the study simulates, and then
+/// says how much wider the inputs may range.
 ///
 /// # Errors
 /// As [`crate::design()`]; names in `[box]` and `[certify]` that the plant does not have.
 pub fn certify(study: &Study) -> Result<CertifyReport, Error> {
-    let plant = prepare::plant(study)?;
-    let mut extended = prepare::extended(study, &plant)?;
-    assumptions::tube(study, &mut extended)?;
-    let inputs = assumptions::simulated_inputs(study, &plant, &extended)?;
-    let declared = report(study, &plant, &extended);
-    if inputs.is_empty() || matches!(&declared, Ok(found) if found.is_proved()) {
-        return declared;
-    }
-    let mut narrowed = prepare::extended(study, &plant)?;
-    assumptions::tube(study, &mut narrowed)?;
-    for (name, low, high) in &inputs {
-        let narrow = narrowed.narrow(name, *low, *high);
-        narrow.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
-    }
-    let mut found = match (report(study, &plant, &narrowed), &declared) {
-        (Ok(found), _) => found,
-        (Err(_), Ok(_)) => return declared,
-        (Err(error), Err(_)) => return Err(error),
-    };
-    let wider = match declared {
-        Ok(report) => report.verdict().word().to_owned(),
-        Err(error) => format!("no observer ({error})"),
-    };
-    let sides: Vec<String> = inputs
-        .iter()
-        .map(|(n, low, high)| words::side(n, *low, *high))
-        .collect();
-    found.certificate.notes.push(format!(
-        "for the inputs of [simulate], {}; on the declared ranges of the inputs: {wider}",
-        sides.join(", ")
-    ));
-    Ok(found)
+    certified(study, true)
 }
 
-fn report(study: &Study, plant: &Plant, extended: &Extended<'_>) -> Result<CertifyReport, Error> {
-    // inside the box, where the guarantee holds, the limits of `clamp` do nothing
-    let tuning = Tuning {
-        clamp: false,
-        ..study.observer.tuning.clone()
+/// The same; the search for wider ranges of the inputs only on request.
+pub(crate) fn certified(study: &Study, explore: bool) -> Result<CertifyReport, Error> {
+    let plant = prepare::plant(study)?;
+    let inputs = {
+        let extended = prepare::extended(study, &plant)?;
+        prepare::simulated_inputs(study, &extended)?
     };
-    let design = prepare::design_with(study, extended, &tuning)?;
-    let assumptions = assumptions::of(study, plant, extended)?;
-    let refusal = |error| prepare::refusal(study, &error);
-    let certificate =
-        lynkeus_observers::certify(extended, &design.observer, &assumptions).map_err(refusal)?;
-    let published = tuning.values.get("gain") != Some(&Value::Text("lmi".into()));
-    let theorem = match lynkeus_observers::find(design.observer.family) {
-        Some(family) if published => Some(
-            family
-                .theorem(extended, &tuning, &assumptions)
-                .map_err(refusal)?,
-        ),
-        _ => None,
+    let task = Task {
+        study,
+        plant: &plant,
+        inputs,
+        explore,
+        // inside the box, where the guarantee holds, the limits of `clamp` do nothing
+        tuning: Tuning {
+            clamp: false,
+            ..study.observer.tuning.clone()
+        },
     };
-    Ok(CertifyReport {
-        plant: plant.name.clone(),
-        design,
-        certificate,
-        theorem,
-    })
+    task.report()
+}
+
+struct Task<'a> {
+    study: &'a Study,
+    plant: &'a Plant,
+    /// ranges of the simulated inputs where these are narrower than the declared
+    inputs: Vec<(String, f64, f64)>,
+    explore: bool,
+    tuning: Tuning,
+}
+
+/// Steps of the search for the widest ranges of the inputs.
+const HALVINGS: usize = 5;
+
+impl Task<'_> {
+    fn report(&self) -> Result<CertifyReport, Error> {
+        let declared = self.on(1.0)?;
+        let simulated = match self.inputs.is_empty() {
+            true => None,
+            false => Some(self.on(0.0)?),
+        };
+        let whole = prepare::extended(self.study, self.plant)?;
+        let design = prepare::design_with(self.study, &whole, &self.tuning)?;
+        let lmi = prepare::is_certified_gain(&self.tuning);
+        let claim = match self.tuning.numbers("rate") {
+            Ok(Some(rate)) if lmi => Claim::At(rate[0]),
+            _ => Claim::Fastest,
+        };
+        let mut place = &declared;
+        let mut certificate = self.certificate(&declared, &design, claim)?;
+        if let Some(simulated) = &simulated
+            && certificate.verdict != Verdict::Proved
+        {
+            let wide = certificate.verdict;
+            certificate = self.certificate(simulated, &design, claim)?;
+            let note = self.reach(&design, &certificate, wide)?;
+            certificate.notes.push(note);
+            place = simulated;
+        }
+        let family = lynkeus_observers::find(design.observer.family);
+        let theorem = match family.filter(|_| !lmi) {
+            Some(family) => {
+                let assumptions = assumptions::of(self.study, self.plant, place)?;
+                let theorem = family.theorem(place, &self.tuning, &assumptions);
+                Some(theorem.map_err(|error| prepare::refusal(self.study, &error))?)
+            }
+            None => None,
+        };
+        Ok(CertifyReport {
+            plant: self.plant.name.clone(),
+            design,
+            certificate,
+            theorem,
+        })
+    }
+
+    /// The box with the inputs' ranges between the simulated (0) and the declared (1).
+    fn on(&self, share: f64) -> Result<Extended<'_>, Error> {
+        let mut extended = prepare::extended(self.study, self.plant)?;
+        for (name, low, high) in self.ranges(&extended, share) {
+            let narrowed = extended.narrow(&name, low, high);
+            narrowed.map_err(|error| Error::input(error.to_string()).at(&self.study.file))?;
+        }
+        Ok(extended)
+    }
+
+    fn ranges(&self, extended: &Extended<'_>, share: f64) -> Vec<(String, f64, f64)> {
+        let wider = |(name, low, high): &(String, f64, f64)| {
+            let declared = extended.inputs.iter().find(|i| i.name == *name)?;
+            let towards = |from: f64, to: f64| match share {
+                0.0 => from,
+                1.0 => to,
+                _ if to.is_finite() => from + share * (to - from),
+                _ => from,
+            };
+            Some((
+                name.clone(),
+                towards(*low, declared.min),
+                towards(*high, declared.max),
+            ))
+        };
+        self.inputs.iter().filter_map(wider).collect()
+    }
+
+    fn certificate(
+        &self,
+        extended: &Extended<'_>,
+        design: &Design,
+        claim: Claim,
+    ) -> Result<Certificate, Error> {
+        let assumptions = assumptions::of(self.study, self.plant, extended)?;
+        lynkeus_observers::certify(extended, &design.observer, &assumptions, claim)
+            .map_err(|error| prepare::refusal(self.study, &error))
+    }
+
+    /// How far the inputs may leave the study's, in words.
+    fn reach(&self, design: &Design, proved: &Certificate, wide: Verdict) -> Result<String, Error> {
+        let words = |ranges: &[(String, f64, f64)]| {
+            let sides = ranges
+                .iter()
+                .map(|(n, low, high)| words::side(n, *low, *high));
+            sides.collect::<Vec<_>>().join(", ")
+        };
+        let simulated = format!(
+            "for the inputs of [simulate], {}; on their declared ranges: {}",
+            words(&self.inputs),
+            wide.word()
+        );
+        let Some(rate) = proved.rate.filter(|_| self.explore) else {
+            return Ok(simulated);
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let share = f64::midpoint(low, high);
+            // a tenth of the rate may go
+            let certificate = self.certificate(&self.on(share)?, design, Claim::At(0.9 * rate))?;
+            match certificate.verdict {
+                Verdict::Proved => low = share,
+                _ => high = share,
+            }
+        }
+        let reached = self.ranges(&self.on(1.0)?, low);
+        Ok(match low > 0.0 {
+            true => format!(
+                "{simulated}; at nine tenths of the rate also proved for {}",
+                words(&reached)
+            ),
+            false => simulated,
+        })
+    }
 }
 
 impl CertifyReport {

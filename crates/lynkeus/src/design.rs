@@ -5,7 +5,7 @@ use std::fmt;
 use lynkeus_observers::{Design, Fit};
 use serde_json::{Map, Value, json};
 
-use crate::certify::certificate_json;
+use crate::certify::{self, certificate_json};
 
 use crate::{CertifyReport, Error, Study};
 
@@ -23,7 +23,7 @@ pub struct DesignReport {
 /// # Errors
 /// A study that does not fit its plant, or no family that does.
 pub fn design(study: &Study) -> Result<DesignReport, Error> {
-    let certified = crate::certify(study)?;
+    let certified = certify::certified(study, false)?;
     Ok(DesignReport {
         plant: certified.plant.clone(),
         certified,

@@ -1,11 +1,11 @@
 //! From a study to its plant and its observer.
 
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Fit, Tuning};
-use lynkeus_structure::{Extended, Sensors, SensorsError};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Fit, Tuning, Value};
+use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
 use crate::study::Name;
-use crate::{Error, Study};
+use crate::{Error, Study, systems};
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -42,7 +42,27 @@ pub fn extended<'p>(study: &Study, plant: &'p Plant) -> Result<Extended<'p>, Err
             .narrow(&name.text, *low, *high)
             .map_err(|error| name.blame(Error::input(error.to_string())))?;
     }
+    tube(study, &mut extended)?;
     Ok(extended)
+}
+
+/// Limits the states to a tube around their start values.
+fn tube(study: &Study, extended: &mut Extended<'_>) -> Result<(), Error> {
+    let Some(radius) = study.certify.tube else {
+        return Ok(());
+    };
+    for state in extended.states.clone() {
+        let Some(start) = state.start else {
+            let message = format!(
+                "`tube` of [certify]: the state '{}' has no start value",
+                state.name
+            );
+            return Err(Error::input(message).at(&study.file));
+        };
+        let narrowed = extended.narrow(&state.name, start - radius, start + radius);
+        narrowed.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+    }
+    Ok(())
 }
 
 /// The place in the study of a name that does not fit.
@@ -94,6 +114,58 @@ pub fn design(study: &Study, extended: &Extended<'_>) -> Result<Design, Error> {
     design_with(study, extended, &study.observer.tuning)
 }
 
+/// Ranges of the known inputs over the simulated time where these are narrower than
+/// the declared ones; a range in `[box]` is the user's own choice and stays.
+pub(crate) fn simulated_inputs(
+    study: &Study,
+    extended: &Extended<'_>,
+) -> Result<Vec<(String, f64, f64)>, Error> {
+    let Some(settings) = &study.simulate else {
+        return Ok(vec![]);
+    };
+    let plant = extended.plant;
+    let time = Dimension {
+        name: "time".into(),
+        symbol: plant.time,
+        min: settings.start,
+        max: settings.until,
+        integer: false,
+    };
+    let region = Region {
+        dimensions: vec![time],
+    };
+    let mut narrower = vec![];
+    let chosen = |name: &str| study.narrower.iter().any(|(side, ..)| side.text == name);
+    for input in extended.inputs.iter().filter(|input| !chosen(&input.name)) {
+        let node = systems::input_expression(study, plant, settings, input)?;
+        let values =
+            range(&plant.graph, node, &region).map_err(|error| Error::input(error.to_string()))?;
+        let (low, high) = (
+            values.enclosure.lo().max(input.min),
+            values.enclosure.hi().min(input.max),
+        );
+        if low <= high && (low > input.min || high < input.max) {
+            narrower.push((input.name.clone(), low, high));
+        }
+    }
+    Ok(narrower)
+}
+
+/// The box of a certified gain: the known inputs as the study simulates them.
+fn simulated_box<'p>(study: &Study, extended: &Extended<'p>) -> Result<Extended<'p>, Error> {
+    let mut narrowed = self::extended(study, extended.plant)?;
+    for (name, low, high) in simulated_inputs(study, extended)? {
+        let narrow = narrowed.narrow(&name, low, high);
+        narrow.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+    }
+    Ok(narrowed)
+}
+
+/// Whether the study asks for a certified gain.
+pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
+    tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
+}
+
 /// The same with another tuning.
 pub(crate) fn design_with(
     study: &Study,
@@ -106,8 +178,12 @@ pub(crate) fn design_with(
     };
     let family = lynkeus_observers::find(chosen.family)
         .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
+    let simulated = match is_certified_gain(tuning) {
+        true => Some(simulated_box(study, extended)?),
+        false => None,
+    };
     family
-        .design(extended, tuning)
+        .design(simulated.as_ref().unwrap_or(extended), tuning)
         .map_err(|error| refusal(study, &error))
 }
 

@@ -23,7 +23,7 @@ mod synthesis;
 pub use analysis::{fastest, prove};
 pub use check::{holds, is_below};
 pub use model::{ErrorModel, Sector, expanded};
-pub use synthesis::{Aim, Gain, NoGain, Request, design};
+pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
 
 use nalgebra::{DMatrix, DVector};
 

@@ -9,7 +9,7 @@ use crate::lmi::{Affine, Failure, Problem, Solution};
 /// Rounds of the alternation between K and P.
 const ROUNDS: usize = 6;
 /// A share of the noise where the peak is the objective: it keeps the gain finite.
-const SHARE: f64 = 1e-4;
+const SHARE: f64 = 0.1;
 /// Bound of P relative to the first point's.
 const CEILING: f64 = 10.0;
 /// Bounds of Y in the first phase, where P ≤ I: the larger is tried where the smaller
@@ -106,6 +106,23 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
     Ok(Gain { K, proof })
 }
 
+/// Whether some gain is proved to reach the rate, whatever its size: cheaper than the
+/// gain itself.
+pub fn is_reachable(models: &[ErrorModel], request: &Request) -> bool {
+    if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
+        return false;
+    }
+    let scale = Scale::of(models, &request.scale);
+    let scaled = Scaled {
+        models: models.iter().map(|m| scale.model(m)).collect(),
+        rate: request.rate * scale.unit * (1.0 + RESERVE),
+        request,
+        scale: &scale,
+    };
+    let (problem, P, Y) = scaled.inequalities();
+    normalised(&problem, &P, &Y).is_ok()
+}
+
 struct Scaled<'a> {
     models: Vec<ErrorModel>,
     rate: f64,
@@ -137,18 +154,24 @@ impl Scaled<'_> {
         DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * self.unit(i, j))
     }
 
-    /// The convex problem in P and Y = PK.
-    fn direct(&self) -> Result<DMatrix<f64>, Failure> {
-        let (n, p) = (self.size(), self.request.measured.len());
+    /// P > 0 and the inequality of every model in P and Y = PK.
+    fn inequalities(&self) -> (Problem, Affine, Affine) {
         let mut problem = Problem::new();
-        let P = problem.symmetric(n);
-        let Y = problem.matrix(n, p);
+        let P = problem.symmetric(self.size());
+        let Y = problem.matrix(self.size(), self.request.measured.len());
         problem.positive(P.clone());
         let YC = Y.times(&self.selector());
         for model in &self.models {
             let PA = P.times(&model.nominal()).minus(&YC);
             inequality(&mut problem, model, &P, &PA, self.rate);
         }
+        (problem, P, Y)
+    }
+
+    /// The convex problem in P and Y = PK.
+    fn direct(&self) -> Result<DMatrix<f64>, Failure> {
+        let (n, p) = (self.size(), self.request.measured.len());
+        let (mut problem, P, Y) = self.inequalities();
         let first = normalised(&problem, &P, &Y)?;
         // Z ≥ YᵀP⁻¹Y = KᵀPK and β ≥ |P|
         let (Z, β) = (problem.symmetric(p), problem.matrix(1, 1));

@@ -8,6 +8,9 @@ use super::Affine;
 const GROWTH: f64 = 12.0;
 /// A point counts as central when Newton's decrement is below this.
 const CENTRAL: f64 = 0.1;
+/// Near enough to the central path to move on along it. Steps far from the centre
+/// lower the merit by a constant each, and centring every time would take many.
+const NEAR: f64 = 1.0;
 /// Newton steps altogether.
 const STEPS: usize = 400;
 
@@ -15,8 +18,71 @@ const STEPS: usize = 400;
 pub(super) struct Block {
     size: usize,
     constant: DMatrix<f64>,
-    /// per unknown that occurs: entries (i, j, value) with i ≤ j
-    terms: Vec<(usize, Vec<(usize, usize, f64)>)>,
+    terms: Vec<Term>,
+}
+
+/// F_k of one unknown that occurs.
+struct Term {
+    unknown: usize,
+    /// entries (i, j, value) with i ≤ j
+    entries: Vec<(usize, usize, f64)>,
+    /// F_k = Σ e_i vᵀ + v e_iᵀ over few rows i
+    rows: Vec<(usize, DVector<f64>)>,
+}
+
+impl Term {
+    fn new(unknown: usize, entries: Vec<(usize, usize, f64)>, n: usize) -> Self {
+        let mut rows: Vec<(usize, DVector<f64>)> = vec![];
+        let mut left = entries.clone();
+        while !left.is_empty() {
+            let mut counts = vec![0; n];
+            for &(i, j, _) in &left {
+                counts[i] += 1;
+                counts[j] += 1;
+            }
+            let fullest = (0..n).max_by_key(|&i| counts[i]).unwrap_or(0);
+            let mut v = DVector::zeros(n);
+            left.retain(|&(i, j, value)| {
+                match (i == fullest, j == fullest) {
+                    (true, true) => v[i] += 0.5 * value,
+                    (true, false) => v[j] += value,
+                    (false, true) => v[i] += value,
+                    (false, false) => return true,
+                }
+                false
+            });
+            rows.push((fullest, v));
+        }
+        Self {
+            unknown,
+            entries,
+            rows,
+        }
+    }
+
+    /// tr(F G) for symmetric G.
+    fn inner(&self, G: &DMatrix<f64>) -> f64 {
+        let entry = |&(i, j, value): &(usize, usize, f64)| {
+            value * G[(i, j)] * if i == j { 1.0 } else { 2.0 }
+        };
+        self.entries.iter().map(entry).sum()
+    }
+
+    /// The upper triangle of W F W.
+    fn sandwiched(&self, W: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = W.ncols();
+        let mut G = DMatrix::zeros(n, n);
+        for (i, v) in &self.rows {
+            let (a, b) = (W.column(*i), W * v);
+            for column in 0..n {
+                let (x, y) = (a[column], b[column]);
+                for row in 0..=column {
+                    G[(row, column)] += a[row] * y + b[row] * x;
+                }
+            }
+        }
+        G
+    }
 }
 
 impl Block {
@@ -31,20 +97,21 @@ impl Block {
                 }
             }
         }
+        let terms = terms.into_iter();
         Self {
             size: n,
             constant: DMatrix::from_fn(n, n, |i, j| F.constant_at(i.min(j), i.max(j))),
-            terms: terms.into_iter().collect(),
+            terms: terms.map(|(k, entries)| Term::new(k, entries, n)).collect(),
         }
     }
 
     fn value(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let mut F = self.constant.clone();
-        for (unknown, entries) in &self.terms {
-            for &(i, j, value) in entries {
-                F[(i, j)] += x[*unknown] * value;
+        for term in &self.terms {
+            for &(i, j, value) in &term.entries {
+                F[(i, j)] += x[term.unknown] * value;
                 if i != j {
-                    F[(j, i)] += x[*unknown] * value;
+                    F[(j, i)] += x[term.unknown] * value;
                 }
             }
         }
@@ -54,50 +121,20 @@ impl Block {
     /// Adds −∇ log det and its Hessian: with W = F⁻¹, g_k = −tr(W F_k) and
     /// H_kl = tr(W F_k W F_l).
     fn derivatives(&self, W: &DMatrix<f64>, g: &mut DVector<f64>, H: &mut DMatrix<f64>) {
-        for (a, (k, entries)) in self.terms.iter().enumerate() {
-            g[*k] -= inner(entries, W);
-            let G = sandwiched(entries, W, self.size);
-            for (l, others) in &self.terms[a..] {
-                let h = inner(others, &G);
-                H[(*k, *l)] += h;
+        for (a, term) in self.terms.iter().enumerate() {
+            let k = term.unknown;
+            g[k] -= term.inner(W);
+            let G = term.sandwiched(W);
+            for other in &self.terms[a..] {
+                let l = other.unknown;
+                let h = other.inner(&G);
+                H[(k, l)] += h;
                 if k != l {
-                    H[(*l, *k)] += h;
+                    H[(l, k)] += h;
                 }
             }
         }
     }
-}
-
-/// tr(F G) for symmetric G.
-fn inner(F: &[(usize, usize, f64)], G: &DMatrix<f64>) -> f64 {
-    let entry =
-        |&(i, j, value): &(usize, usize, f64)| value * G[(i, j)] * if i == j { 1.0 } else { 2.0 };
-    F.iter().map(entry).sum()
-}
-
-/// W F W
-fn sandwiched(F: &[(usize, usize, f64)], W: &DMatrix<f64>, n: usize) -> DMatrix<f64> {
-    // many entries: (W F) W costs n³; few: one rank-two update per entry
-    if F.len() < n / 2 {
-        let mut G = DMatrix::zeros(n, n);
-        for &(i, j, value) in F {
-            if i == j {
-                G.ger(value, &W.column(i), &W.column(i), 1.0);
-            } else {
-                G.ger(value, &W.column(i), &W.column(j), 1.0);
-                G.ger(value, &W.column(j), &W.column(i), 1.0);
-            }
-        }
-        return G;
-    }
-    let mut WF = DMatrix::zeros(n, n);
-    for &(i, j, value) in F {
-        WF.column_mut(j).axpy(value, &W.column(i), 1.0);
-        if i != j {
-            WF.column_mut(i).axpy(value, &W.column(j), 1.0);
-        }
-    }
-    WF * W
 }
 
 /// A barrier problem.
@@ -126,8 +163,9 @@ impl Barrier<'_> {
                 return Some(x);
             };
             let decrement = -g.dot(&step);
-            if decrement < CENTRAL {
-                if good(&x, order / t) {
+            let done = good(&x, order / t);
+            if decrement < if done { CENTRAL } else { NEAR } {
+                if done {
                     return Some(x);
                 }
                 t *= GROWTH;

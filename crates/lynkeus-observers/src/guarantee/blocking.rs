@@ -43,7 +43,7 @@ pub(super) fn provable_share(system: &ErrorSystem) -> Option<f64> {
 /// In words: what keeps every gain from a proof of the requested rate.
 pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
     let slopes = &system.slopes;
-    let works = |models: &[ErrorModel]| decay::design(models, request).is_ok();
+    let works = |models: &[ErrorModel]| decay::is_reachable(models, request);
     let Some(share) = share(slopes, works) else {
         return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
     };

@@ -28,8 +28,17 @@ const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";
 /// Vertices up to which slopes are taken by their ends instead of by multipliers.
 const VERTICES: usize = 32;
 
-/// The fastest decay of the observer's error that can be proved on the box, a point of
-/// the box that refutes any, or neither.
+/// What to prove.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Claim {
+    /// decay at the fastest rate that can be proved
+    Fastest,
+    /// decay at this rate
+    At(f64),
+}
+
+/// Whether decay of the observer's error is proved on the box, refuted by a point of the
+/// box, or neither.
 ///
 /// # Errors
 /// Parameters without value.
@@ -37,6 +46,7 @@ pub fn certify(
     extended: &Extended<'_>,
     observer: &Observer,
     assumptions: &Assumptions,
+    claim: Claim,
 ) -> Result<Certificate, DesignError> {
     let system = match ErrorSystem::new(extended, observer, assumptions)? {
         Ok(system) => system,
@@ -53,17 +63,20 @@ pub fn certify(
         hypotheses.push(check);
         return Ok(Certificate::new(BASIS, &assumptions.region, hypotheses));
     }
-    let found = match system.is_bounded() {
-        true => decay::fastest(&system.models, &system.scale, sample.slowest),
-        false => None,
+    let found = match (system.is_bounded(), claim) {
+        (false, _) => None,
+        (true, Claim::Fastest) => decay::fastest(&system.models, &system.scale, sample.slowest),
+        (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate),
     };
     hypotheses.push(inequality(&system, found.as_ref()));
     let mut certificate = Certificate::new(BASIS, &assumptions.region, hypotheses);
     match found {
         Some(proof) => fill(&mut certificate, extended, &system, &proof, assumptions),
-        None => certificate
-            .notes
-            .extend(still_said(&system, sample.slowest)),
+        None if claim == Claim::Fastest => {
+            let said = still_said(&system, sample.slowest);
+            certificate.notes.extend(said);
+        }
+        None => {}
     }
     Ok(certificate)
 }

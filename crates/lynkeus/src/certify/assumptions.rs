@@ -5,65 +5,10 @@ use lynkeus_observers::Assumptions;
 use lynkeus_structure::{Dimension, Extended, Region, range};
 
 use crate::study::{Name, Noise};
-use crate::{Error, Study, systems};
+use crate::{Error, Study};
 
 /// Measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
-
-/// Limits the states to a tube around their start values.
-pub(super) fn tube(study: &Study, extended: &mut Extended<'_>) -> Result<(), Error> {
-    let Some(radius) = study.certify.tube else {
-        return Ok(());
-    };
-    for state in extended.states.clone() {
-        let Some(start) = state.start else {
-            let message = format!(
-                "`tube` of [certify]: the state '{}' has no start value",
-                state.name
-            );
-            return Err(Error::input(message).at(&study.file));
-        };
-        let narrowed = extended.narrow(&state.name, start - radius, start + radius);
-        narrowed.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
-    }
-    Ok(())
-}
-
-/// Ranges of the known inputs over the simulated time where these are narrower than
-/// the declared ones.
-pub(super) fn simulated_inputs(
-    study: &Study,
-    plant: &Plant,
-    extended: &Extended<'_>,
-) -> Result<Vec<(String, f64, f64)>, Error> {
-    let Some(settings) = &study.simulate else {
-        return Ok(vec![]);
-    };
-    let time = Dimension {
-        name: "time".into(),
-        symbol: plant.time,
-        min: settings.start,
-        max: settings.until,
-        integer: false,
-    };
-    let region = Region {
-        dimensions: vec![time],
-    };
-    let mut narrower = vec![];
-    for input in &extended.inputs {
-        let node = systems::input_expression(study, plant, settings, input)?;
-        let values =
-            range(&plant.graph, node, &region).map_err(|error| Error::input(error.to_string()))?;
-        let (low, high) = (
-            values.enclosure.lo().max(input.min),
-            values.enclosure.hi().min(input.max),
-        );
-        if low <= high && (low > input.min || high < input.max) {
-            narrower.push((input.name.clone(), low, high));
-        }
-    }
-    Ok(narrower)
-}
 
 /// What the guarantee takes for granted.
 pub(super) fn of(
