@@ -30,14 +30,8 @@ pub fn estimate(
     let observer = systems::observer(&plant, &design.observer)?;
     refuse_stray_columns(&plant, settings)?;
     let log = log(table, settings, &observer)?;
-    let between = match settings.between_samples {
-        BetweenSamples::Hold => lynkeus_run::BetweenSamples::Hold,
-        BetweenSamples::Linear => lynkeus_run::BetweenSamples::Linear,
-    };
-    let run = EstimatorSettings {
-        between,
-        method: method(&settings.method),
-    };
+    let run = run_settings(settings);
+    let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
         .map_err(|error| interrupted(&error, table.file()))?;
     let mut notes = design.notes.clone();
@@ -73,8 +67,19 @@ pub fn estimate(
     })
 }
 
+/// The study's settings as the runner has them.
+pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
+    EstimatorSettings {
+        between: match settings.between_samples {
+            BetweenSamples::Hold => lynkeus_run::BetweenSamples::Hold,
+            BetweenSamples::Linear => lynkeus_run::BetweenSamples::Linear,
+        },
+        method: method(&settings.method),
+    }
+}
+
 /// A log has no derivatives of the inputs.
-fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
+pub(crate) fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
     let Some(needed) = design.observer.input_derivatives.first() else {
         return Ok(());
     };
@@ -87,7 +92,7 @@ fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
 }
 
 /// The header under which the log has a signal of the plant.
-fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
+pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
     let given = settings
         .columns
         .iter()
@@ -95,7 +100,10 @@ fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
     given.map_or(name, |(_, header)| header)
 }
 
-fn refuse_stray_columns(plant: &Plant, settings: &EstimateSettings) -> Result<(), Error> {
+pub(crate) fn refuse_stray_columns(
+    plant: &Plant,
+    settings: &EstimateSettings,
+) -> Result<(), Error> {
     let names = || {
         plant
             .outputs

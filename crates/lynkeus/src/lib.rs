@@ -65,6 +65,7 @@ mod simulate;
 pub mod study;
 mod systems;
 pub mod table;
+pub mod tune;
 mod words;
 
 pub use certify::{CertifyReport, certify};
@@ -78,6 +79,7 @@ pub use simulate::simulate;
 pub use study::Study;
 pub use systems::observer as observer_system;
 pub use table::Table;
+pub use tune::tune;
 
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;

@@ -24,31 +24,49 @@ pub fn simulate(
     study: &Study,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let Some(settings) = &study.simulate else {
-        return Err(Error::input("the study has no [simulate] section")
-            .at(&study.file)
-            .hint("add [simulate] with `until` and `inputs`"));
-    };
+    let settings = settings(study)?;
     let plant = prepare::plant(study)?;
     let extended = prepare::extended(study, &plant)?;
     let design = prepare::design(study, &extended)?;
-    let observer = systems::observer(&plant, &design.observer)?;
-    let span = settings.until - settings.start;
     let simulation = Simulation {
-        plant: systems::plant(&plant, settings)?,
+        observer: Some(systems::observer(&plant, &design.observer)?),
         inputs: systems::inputs(study, &plant, settings, &design.observer)?,
-        observer: Some(observer),
-        start: settings.start,
-        until: settings.until,
-        output_step: settings.output_step.unwrap_or(span / ROWS),
-        method: method(&settings.method),
-        noise: noise(study, settings, &plant)?,
-        record_outputs: true,
+        ..open_loop(study, settings, &plant)?
     };
     let trajectory = simulation
         .run_watched(watch)
         .map_err(|error| interrupted(&error, &study.file))?;
     Ok(outcome(&plant, design, &trajectory))
+}
+
+/// The study's `[simulate]`.
+pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
+    study.simulate.as_ref().ok_or_else(|| {
+        Error::input("the study has no [simulate] section")
+            .at(&study.file)
+            .hint("add [simulate] with `until` and `inputs`")
+    })
+}
+
+/// The study's plant under its inputs and with its noise, without an observer.
+pub(crate) fn open_loop(
+    study: &Study,
+    settings: &SimulateSettings,
+    plant: &Plant,
+) -> Result<Simulation, Error> {
+    let span = settings.until - settings.start;
+    let inputs = systems::input_expressions(study, plant, settings)?;
+    Ok(Simulation {
+        plant: systems::plant(plant, settings)?,
+        inputs: systems::of_time(plant, &inputs)?,
+        observer: None,
+        start: settings.start,
+        until: settings.until,
+        output_step: settings.output_step.unwrap_or(span / ROWS),
+        method: method(&settings.method),
+        noise: noise(study, settings, plant)?,
+        record_outputs: true,
+    })
 }
 
 fn noise(

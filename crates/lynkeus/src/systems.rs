@@ -5,7 +5,7 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::Observer;
 use lynkeus_run::System;
 
-use crate::study::{Name, SimulateSettings};
+use crate::study::{Expression, Name, SimulateSettings};
 use crate::{Error, Study};
 
 /// The column of an estimate.
@@ -50,6 +50,15 @@ pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
 
 /// The plant with the study's start values; its outputs are those of the model.
 pub(crate) fn plant(plant: &Plant, settings: &SimulateSettings) -> Result<System, Error> {
+    plant_reading(plant, settings, &named(&plant.inputs))
+}
+
+/// As [`plant`], with its inputs under these names.
+pub(crate) fn plant_reading(
+    plant: &Plant,
+    settings: &SimulateSettings,
+    signals: &[(String, Node)],
+) -> Result<System, Error> {
     for (name, _) in &settings.initial {
         if !plant.states.iter().any(|s| s.name == name.text) {
             return Err(name.blame(unknown(plant, "state", &plant.states, name)));
@@ -68,21 +77,24 @@ pub(crate) fn plant(plant: &Plant, settings: &SimulateSettings) -> Result<System
         .iter()
         .map(|s| (s.name.clone(), s.node, start(s)))
         .collect();
-    let named = |variables: &[Variable]| -> Vec<(String, Node)> {
-        variables.iter().map(|v| (v.name.clone(), v.node)).collect()
-    };
     System::new(
         &plant.graph,
         plant.time,
         &states,
-        &named(&plant.inputs),
+        signals,
         &plant.derivatives,
         &named(&plant.outputs),
     )
     .map_err(|error| Error::input(error.to_string()))
 }
 
-fn unknown(plant: &Plant, kind: &str, variables: &[Variable], name: &Name) -> Error {
+/// Variables with the nodes that stand for them.
+pub(crate) fn named(variables: &[Variable]) -> Vec<(String, Node)> {
+    variables.iter().map(|v| (v.name.clone(), v.node)).collect()
+}
+
+/// The refusal of a name that no variable of a kind has.
+pub(crate) fn unknown(plant: &Plant, kind: &str, variables: &[Variable], name: &Name) -> Error {
     let names = variables.iter().map(|v| v.name.as_str());
     let message = format!("the plant '{}' has no {kind} named \"{name}\"", plant.name);
     Error::input(message).hint(crate::near::suggest(&name.text, names))
@@ -96,12 +108,32 @@ pub(crate) fn inputs(
     settings: &SimulateSettings,
     observer: &Observer,
 ) -> Result<System, Error> {
+    let mut outputs = input_expressions(study, plant, settings)?;
+    let derivatives = observer
+        .input_derivative_expressions(&plant.graph, &outputs)
+        .map_err(|error| Error::input(error.to_string()))?;
+    outputs.extend(derivatives);
+    of_time(plant, &outputs)
+}
+
+/// Expressions of time as a system.
+pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<System, Error> {
+    System::new(&plant.graph, plant.time, &[], &[], &[], outputs)
+        .map_err(|error| Error::input(error.to_string()))
+}
+
+/// The plant's inputs by name.
+pub(crate) fn input_expressions(
+    study: &Study,
+    plant: &Plant,
+    settings: &SimulateSettings,
+) -> Result<Vec<(String, Node)>, Error> {
     for (name, _) in &settings.inputs {
         if !plant.inputs.iter().any(|i| i.name == name.text) {
             return Err(name.blame(unknown(plant, "input", &plant.inputs, name)));
         }
     }
-    let mut outputs = plant
+    plant
         .inputs
         .iter()
         .map(|input| {
@@ -110,13 +142,15 @@ pub(crate) fn inputs(
                 input_expression(study, plant, settings, input)?,
             ))
         })
-        .collect::<Result<Vec<_>, Error>>()?;
-    let derivatives = observer
-        .input_derivative_expressions(&plant.graph, &outputs)
-        .map_err(|error| Error::input(error.to_string()))?;
-    outputs.extend(derivatives);
-    System::new(&plant.graph, plant.time, &[], &[], &[], &outputs)
-        .map_err(|error| Error::input(error.to_string()))
+        .collect()
+}
+
+/// An expression of time as it is written in a study.
+pub(crate) fn expression(plant: &Plant, expression: &Expression) -> Result<Node, Error> {
+    let source = &expression.source;
+    let names = |name: &str| (name == "time").then_some(plant.time);
+    parse_expression(&source.text, &plant.graph, &names)
+        .map_err(|error| source.blame(Error::input(error.one_line())))
 }
 
 /// The study's expression, else the input's start value; a disturbance is zero
@@ -132,11 +166,8 @@ pub(crate) fn input_expression(
         .inputs
         .iter()
         .find(|(name, _)| name.text == input.name);
-    if let Some((_, expression)) = given {
-        let source = &expression.source;
-        let names = |name: &str| (name == "time").then_some(plant.time);
-        return parse_expression(&source.text, graph, &names)
-            .map_err(|error| source.blame(Error::input(error.one_line())));
+    if let Some((_, given)) = given {
+        return expression(plant, given);
     }
     let disturbance = study
         .sensors

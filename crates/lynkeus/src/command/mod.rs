@@ -3,6 +3,7 @@
 mod output;
 mod progress;
 mod run;
+mod tune;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -26,6 +27,7 @@ Examples:
   lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
+  lynkeus tune study.toml --plot tune.svg
 
 Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence), 2 bad input.";
 
@@ -82,6 +84,13 @@ enum Command {
         log: PathBuf,
         #[command(flatten)]
         output: Output,
+    },
+    /// Sweep the tuning, in simulation or on a log, and find the knee of the trade-off
+    Tune {
+        /// The study (TOML)
+        study: PathBuf,
+        #[command(flatten)]
+        options: tune::Options,
     },
 }
 
@@ -145,5 +154,6 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
         Command::Estimate { study, log, output } => {
             run::estimate(&Study::load(study)?, &log, &output)
         }
+        Command::Tune { study, options } => tune::tune(&study, &options),
     }
 }

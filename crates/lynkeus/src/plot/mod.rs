@@ -1,16 +1,22 @@
-//! Time series as SVG pictures: panels one above the other that share the time axis.
+//! SVG pictures: time series, and figures over a parameter ([`Chart`]).
 //!
+//! A [`Figure`] has panels one above the other that share the time axis.
 //! Each panel shows one quantity: what is true as a broad grey line, what is estimated as a blue
 //! line over it, what is measured as orange dots (Okabe and Ito's colours, safe for the
 //! colour-blind). An estimate that peaks far beyond everything else would flatten the rest of its
 //! panel; the axis is then cut and the panel's caption says how far the peak goes
 //! ([`Panel::limits`] has the rule).
 
+mod axis;
+mod chart;
 mod decimate;
+mod grid;
 mod limits;
 mod render;
 
 use std::ops::Range;
+
+pub use chart::{Chart, Line, Look, Plot, Upright};
 
 /// A picture: panels that share the time axis.
 #[derive(Clone, Debug, Default)]

@@ -13,25 +13,26 @@ use super::limits::Limits;
 use super::{Curve, Figure, Kind, Panel};
 use crate::Error;
 
-const WIDTH: u32 = 900;
+pub(super) const WIDTH: u32 = 900;
 const HEAD: u32 = 52;
 const CAPTION: u32 = 24;
 const TIME_AXIS: u32 = 50;
 const LEFT: u32 = 78;
 const RIGHT: u32 = 22;
-const FONT: &str = "sans-serif";
+pub(super) const FONT: &str = "sans-serif";
 
-const INK: RGBColor = RGBColor(38, 38, 38);
-const FAINT: RGBColor = RGBColor(226, 226, 226);
-const FRAME: RGBColor = RGBColor(150, 150, 150);
-const GREY: RGBColor = RGBColor(140, 140, 140);
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const ORANGE: RGBColor = RGBColor(230, 159, 0);
-const VERMILION: RGBColor = RGBColor(213, 94, 0);
+pub(super) const INK: RGBColor = RGBColor(38, 38, 38);
+pub(super) const FAINT: RGBColor = RGBColor(226, 226, 226);
+pub(super) const FRAME: RGBColor = RGBColor(150, 150, 150);
+pub(super) const GREY: RGBColor = RGBColor(140, 140, 140);
+pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
+pub(super) const VERMILION: RGBColor = RGBColor(213, 94, 0);
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Chart<'a> =
+    ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// The whole figure as SVG text.
 pub(super) fn svg(figure: &Figure) -> Result<String, Error> {
@@ -201,7 +202,7 @@ fn draw_curve(chart: &mut Chart<'_>, curve: &Curve, shown: &Range<f64>) -> Drawn
 }
 
 /// A tick's number without the dust of binary fractions.
-fn tick(value: &f64) -> String {
+pub(super) fn tick(value: &f64) -> String {
     let value = rounded(*value, 9);
     if value == 0.0 {
         return "0".to_owned();
@@ -227,7 +228,7 @@ fn rounded(value: f64, digits: usize) -> f64 {
 }
 
 /// Names the picture for screen readers and hovering.
-fn titled(svg: String, title: &str) -> String {
+pub(super) fn titled(svg: String, title: &str) -> String {
     let Some(end) = svg
         .find("<svg")
         .and_then(|at| Some(at + svg.get(at..)?.find('>')? + 1))

@@ -26,6 +26,7 @@ mod section;
 mod sensors;
 mod simulate;
 mod source;
+mod tune;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,7 @@ pub use observer::ObserverSettings;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
+pub use tune::{Scale, TuneSettings, Values};
 
 use crate::Error;
 use section::Section;
@@ -54,6 +56,7 @@ const KEYS: &[&str] = &[
     "certify",
     "simulate",
     "estimate",
+    "tune",
     "plot",
 ];
 
@@ -80,6 +83,8 @@ pub struct Study {
     pub simulate: Option<SimulateSettings>,
     /// How to replay a log.
     pub estimate: EstimateSettings,
+    /// Which tuning to sweep and how to judge it.
+    pub tune: TuneSettings,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
@@ -135,6 +140,7 @@ impl Study {
             estimate: top
                 .optional("estimate", estimate::read)?
                 .unwrap_or_default(),
+            tune: top.optional("tune", tune::read)?.unwrap_or_default(),
             show,
             time_unit,
         })

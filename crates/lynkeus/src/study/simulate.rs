@@ -157,7 +157,7 @@ pub(super) fn method(section: &mut Section<'_>) -> Result<Method, Error> {
     Ok(chosen.unwrap_or_else(|| adaptive(Solver::Auto)))
 }
 
-fn expression(entry: Entry<'_>) -> Result<Expression, Error> {
+pub(super) fn expression(entry: Entry<'_>) -> Result<Expression, Error> {
     if entry.as_text().is_some() {
         return Ok(Expression {
             source: entry.name()?,
@@ -171,7 +171,7 @@ fn expression(entry: Entry<'_>) -> Result<Expression, Error> {
     Ok(expression)
 }
 
-fn pairs<'a, T>(
+pub(super) fn pairs<'a, T>(
     entry: Option<Entry<'a>>,
     read: impl Fn(Entry<'a>) -> Result<T, Error>,
 ) -> Result<Vec<(Name, T)>, Error> {

@@ -1,0 +1,355 @@
+//! The keys that are swept and the values that they take.
+
+use std::collections::BTreeSet;
+
+use lynkeus_observers::{FAMILIES, Value};
+
+use crate::near::suggest;
+use crate::study::{Name, Scale, Values};
+use crate::table::significant;
+use crate::{Error, Study};
+
+/// The keys that speed belongs to; the first that a study sets is swept where it does not say which.
+const SPEED: &[&str] = &["theta", "poles", "alpha"];
+
+/// A default range reaches from the study's value divided by this to its multiple.
+const REACH: f64 = 4.0;
+
+/// Most combinations of values.
+const MOST_VALUES: usize = 100_000;
+
+/// Digits of a value that a range makes.
+const DIGITS: usize = 4;
+
+/// One key of `[observer]` and the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// The key as the study writes it: `theta`, `theta[1]`.
+    pub key: String,
+    /// The key is a list and the values are factors on all of its numbers.
+    pub is_factor: bool,
+    /// The values, in the order of the study.
+    pub values: Vec<f64>,
+    /// The value that the study has now (1 for a factor), if it has the key.
+    pub present: Option<f64>,
+    /// The key without indices.
+    base: String,
+    /// Its indices, from 0.
+    path: Vec<usize>,
+}
+
+impl Axis {
+    /// The key with what its values mean: `theta`, `theta ×`.
+    pub fn label(&self) -> String {
+        match self.is_factor {
+            true => format!("{} \u{d7}", self.key),
+            false => self.key.clone(),
+        }
+    }
+
+    /// What stands at the key where `value` is chosen, from what stands there now.
+    pub(crate) fn chosen(&self, present: f64, value: f64) -> f64 {
+        match self.is_factor {
+            true => rounded(present * value, 2 + DIGITS),
+            false => value,
+        }
+    }
+
+    /// The key without indices, and its indices from 0.
+    pub(crate) fn path(&self) -> (&str, &[usize]) {
+        (&self.base, &self.path)
+    }
+
+    /// A study with `value` at the key.
+    fn set(&self, study: &mut Study, value: f64) {
+        let values = &mut study.observer.tuning.values;
+        let mut slot = values
+            .entry(self.base.clone())
+            .or_insert(Value::Number(value));
+        for &index in &self.path {
+            let Value::List(entries) = slot else { return };
+            let Some(entry) = entries.get_mut(index) else {
+                return;
+            };
+            slot = entry;
+        }
+        self.scale(slot, value);
+    }
+
+    fn scale(&self, slot: &mut Value, value: f64) {
+        match slot {
+            Value::Number(x) => *x = self.chosen(*x, value),
+            Value::List(entries) => entries.iter_mut().for_each(|e| self.scale(e, value)),
+            _ => {}
+        }
+    }
+}
+
+/// The keys that a study sweeps.
+///
+/// # Errors
+/// A key that no family in question has, that is no number or list of numbers, or a range without ends.
+pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
+    let given = &study.tune.keys;
+    if !given.is_empty() {
+        return given
+            .iter()
+            .map(|(name, values)| axis(study, name, values))
+            .collect();
+    }
+    let tuning = &study.observer.tuning.values;
+    match SPEED.iter().find(|key| tuning.contains_key(**key)) {
+        Some(key) => Ok(vec![axis(study, &Name::from(*key), &Values::default())?]),
+        None => Err(Error::input(format!(
+            "nothing to sweep: [observer] sets none of {}",
+            SPEED.join(", ")
+        ))
+        .at(&study.file)
+        .hint("add [tune] with keys = { KEY = { from = …, to = … } }")),
+    }
+}
+
+/// Every combination of values, the last key's fastest, each with its study.
+///
+/// # Errors
+/// Too many.
+pub(super) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)>, Error> {
+    let count = axes.iter().map(|a| a.values.len()).product::<usize>();
+    if count > MOST_VALUES {
+        return Err(Error::input(format!(
+            "`keys` of [tune]: expected at most {MOST_VALUES} combinations of values, found {count}"
+        ))
+        .at(&study.file)
+        .hint("sweep fewer keys or values at a time"));
+    }
+    let mut grid = vec![(vec![], study.clone())];
+    for axis in axes {
+        let with = |(values, study): &(Vec<f64>, Study), value: f64| {
+            let (mut values, mut study) = (values.clone(), study.clone());
+            values.push(value);
+            axis.set(&mut study, value);
+            (values, study)
+        };
+        grid = grid
+            .iter()
+            .flat_map(|point| axis.values.iter().map(move |value| with(point, *value)))
+            .collect();
+    }
+    Ok(grid)
+}
+
+fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
+    let refuse = |why: String| {
+        let refusal = Error::input(format!("`keys` of [tune]: {why}")).at(&study.file);
+        name.blame(refusal)
+    };
+    let (base, path) = parsed(&name.text).ok_or_else(|| {
+        refuse(format!(
+            "expected a key or an entry of one such as \"theta[1]\", found \"{name}\""
+        ))
+    })?;
+    known(study, base).map_err(|(why, hint)| refuse(why).hint(hint))?;
+    let present = present(study, base, &path).map_err(&refuse)?;
+    let is_factor = matches!(present, Some(Value::List(_)));
+    let present = match present {
+        Some(Value::Number(x)) => Some(*x),
+        Some(_) => Some(1.0),
+        None => None,
+    };
+    let values = spread(values, present).ok_or_else(|| {
+        refuse(format!("\"{name}\" needs the ends of its range")).hint(format!(
+            "write {name} = {{ from = …, to = … }}; without them a range reaches from a quarter of the study's value, which has to be positive, to four times of it"
+        ))
+    })?;
+    Ok(Axis {
+        key: name.text.clone(),
+        is_factor,
+        values,
+        present,
+        base: base.to_owned(),
+        path,
+    })
+}
+
+/// `theta[1]` is the key `theta` and the index 0.
+fn parsed(key: &str) -> Option<(&str, Vec<usize>)> {
+    let Some((base, rest)) = key.split_once('[') else {
+        return Some((key, vec![]));
+    };
+    let indices = rest.strip_suffix(']')?.split("][");
+    let index = |text: &str| text.trim().parse::<usize>().ok()?.checked_sub(1);
+    Some((base.trim(), indices.map(index).collect::<Option<_>>()?))
+}
+
+/// The key belongs to a family that the study allows, or why not and what to do.
+fn known(study: &Study, base: &str) -> Result<(), (String, String)> {
+    let allowed: BTreeSet<&str> = study
+        .observer
+        .families()
+        .flat_map(|family| family.keys().iter().copied())
+        .collect();
+    if allowed.contains(base) {
+        return Ok(());
+    }
+    let elsewhere = FAMILIES.iter().any(|family| family.keys().contains(&base));
+    let why = match elsewhere {
+        true => format!("\"{base}\" belongs to another family than the study's"),
+        false => format!("no family has a key \"{base}\""),
+    };
+    Err((why, suggest(base, allowed)))
+}
+
+/// What stands at the key: a number, or a list in which all entries are numbers in the end.
+fn present<'s>(study: &'s Study, base: &str, path: &[usize]) -> Result<Option<&'s Value>, String> {
+    let Some(mut value) = study.observer.tuning.values.get(base) else {
+        return match path {
+            [] => Ok(None),
+            _ => Err(format!("[observer] has no `{base}` to take an entry of")),
+        };
+    };
+    for index in path {
+        let entry = match value {
+            Value::List(entries) => entries.get(*index),
+            _ => None,
+        };
+        value =
+            entry.ok_or_else(|| format!("`{base}` has no entry {}: it is {value}", index + 1))?;
+    }
+    match numeric(value) {
+        true => Ok(Some(value)),
+        false => Err(format!(
+            "`{base}` must be a number or a list of numbers to be swept, found {value}"
+        )),
+    }
+}
+
+fn numeric(value: &Value) -> bool {
+    match value {
+        Value::Number(_) => true,
+        Value::List(entries) => !entries.is_empty() && entries.iter().all(numeric),
+        _ => false,
+    }
+}
+
+/// The values of a range; none where an end is missing and does not follow from `present`.
+fn spread(values: &Values, present: Option<f64>) -> Option<Vec<f64>> {
+    let (from, to, points, scale) = match values {
+        Values::Listed(values) => return Some(values.clone()),
+        Values::Spread {
+            from,
+            to,
+            points,
+            scale,
+        } => (*from, *to, *points, *scale),
+    };
+    let centre = present.filter(|x| *x > 0.0);
+    let from = from.or(centre.map(|x| x / REACH))?;
+    let to = to.or(centre.map(|x| x * REACH))?;
+    let ordered = from < to && (scale == Scale::Linear || from > 0.0);
+    if !ordered || points < 2 {
+        return None;
+    }
+    let place = |i: usize| i as f64 / (points - 1) as f64;
+    let value = |share: f64| match scale {
+        Scale::Linear => from + share * (to - from),
+        Scale::Log => from * (to / from).powf(share),
+    };
+    let mut all: Vec<f64> = (0..points)
+        .map(|i| rounded(value(place(i)), DIGITS))
+        .collect();
+    all.dedup();
+    Some(all)
+}
+
+/// With so many significant digits.
+fn rounded(x: f64, digits: usize) -> f64 {
+    let text = format!("{x:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(x)
+}
+
+/// A value as tables and messages show it.
+pub(crate) fn shown(x: f64) -> String {
+    significant(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn study(text: &str) -> Study {
+        Study::parse(text, "s.toml").unwrap()
+    }
+
+    fn refusal(text: &str) -> String {
+        axes(&study(text)).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn without_keys_speed_is_swept_around_the_study() {
+        let s = study("observer = { theta = 3.5 }");
+        let [theta] = &axes(&s).unwrap()[..] else {
+            panic!()
+        };
+        assert_eq!((theta.key.as_str(), theta.is_factor), ("theta", false));
+        assert_eq!((theta.values.len(), theta.present), (21, Some(3.5)));
+        assert_eq!(
+            [theta.values[0], theta.values[10], theta.values[20]],
+            [0.875, 3.5, 14.0]
+        );
+
+        let s = study("observer = { poles = [-2, -3] }");
+        let [poles] = &axes(&s).unwrap()[..] else {
+            panic!()
+        };
+        assert!(poles.is_factor && poles.label() == "poles \u{d7}");
+        let grid = grid(&s, &axes(&s).unwrap()).unwrap();
+        let fastest = &grid[20].1.observer.tuning.values["poles"];
+        assert_eq!(
+            *fastest,
+            Value::List(vec![Value::Number(-8.0), Value::Number(-12.0)])
+        );
+    }
+
+    #[test]
+    fn several_keys_make_a_grid() {
+        let s = study(
+            "observer = { theta = [1, 2], r = 1 }\ntune = { keys = { \"theta[2]\" = [3, 4], r = { from = 1, to = 3, points = 3, scale = \"linear\" } } }",
+        );
+        let grid = grid(&s, &axes(&s).unwrap()).unwrap();
+        let values: Vec<&[f64]> = grid.iter().map(|(v, _)| &v[..]).collect();
+        assert_eq!(
+            values[..4],
+            [[3.0, 1.0], [3.0, 2.0], [3.0, 3.0], [4.0, 1.0]]
+        );
+        let tuning = &grid[5].1.observer.tuning.values;
+        assert_eq!(tuning["theta"].to_string(), "[1, 4]");
+        assert_eq!(tuning["r"], Value::Number(3.0));
+    }
+
+    #[test]
+    fn what_cannot_be_swept_is_refused_with_its_place() {
+        let e = refusal("observer = { theta = 1 }\ntune = { keys = { tehta = [1] } }");
+        assert!(e.starts_with("s.toml:2:19: "), "{e}");
+        assert!(
+            e.contains("no family has a key \"tehta\"; did you mean \"theta\"?"),
+            "{e}"
+        );
+        let e = refusal(
+            "observer = { family = \"triangular\", theta = 1 }\ntune = { keys = { S0 = [1] } }",
+        );
+        assert!(e.contains("belongs to another family"), "{e}");
+        let e = refusal("observer = { theta = [1, 2] }\ntune = { keys = { \"theta[3]\" = [1] } }");
+        assert!(e.contains("`theta` has no entry 3: it is [1, 2]"), "{e}");
+        let e = refusal(
+            "observer = { theta = 1, partials = true }\ntune = { keys = { partials = [1] } }",
+        );
+        assert!(e.contains("must be a number or a list of numbers"), "{e}");
+        let e = refusal("observer = { theta = 1 }\ntune = { keys = { delta = {} } }");
+        assert!(e.contains("needs the ends of its range"), "{e}");
+        assert!(refusal("").contains("nothing to sweep"));
+        assert!(
+            refusal("observer = { theta = 1 }\ntune = { keys = { \"theta[x]\" = [1] } }")
+                .contains("an entry of one such as")
+        );
+    }
+}

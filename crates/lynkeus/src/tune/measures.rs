@@ -1,0 +1,63 @@
+//! What a value is judged by.
+
+/// One figure of every row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Measure {
+    /// Its name in tables and JSON.
+    pub name: &'static str,
+    /// What it is, for people.
+    pub title: &'static str,
+    /// It is a time.
+    pub is_time: bool,
+}
+
+const fn measure(name: &'static str, title: &'static str) -> Measure {
+    Measure {
+        name,
+        title,
+        is_time: false,
+    }
+}
+
+/// The figures of a sweep in simulation.
+pub(super) const SIMULATED: &[Measure] = &[
+    measure("mean_error", "mean error, noise included"),
+    measure("mean_error_exact", "mean error without noise"),
+    measure("mean_error_noise", "mean error that the noise makes"),
+    Measure {
+        name: "settling_time",
+        title: "settling time",
+        is_time: true,
+    },
+    measure("peak_error", "peak error"),
+    measure("noise_gain", "noise gain"),
+    measure("ultimate_bound", "ultimate bound"),
+    measure("sampling_margin", "longest stable step / sampling step"),
+];
+
+pub(super) const TOTAL_ERROR: usize = 0;
+pub(super) const EXACT_ERROR: usize = 1;
+pub(super) const NOISE_ERROR: usize = 2;
+pub(super) const SETTLING_TIME: usize = 3;
+pub(super) const PEAK_ERROR: usize = 4;
+pub(super) const NOISE_GAIN: usize = 5;
+pub(super) const ULTIMATE_BOUND: usize = 6;
+pub(super) const SAMPLING_MARGIN: usize = 7;
+
+/// The figures of a sweep on a log.
+pub(super) const LOGGED: &[Measure] = &[
+    measure("held_out_error", "error on held-out samples"),
+    measure("innovation", "innovation, root mean square"),
+    measure("ljung_box", "Ljung–Box statistic per lag (white: 1)"),
+    measure("outside_band", "autocorrelations outside the 95 % band"),
+    measure("sampling_margin", "longest stable step / step of the log"),
+];
+
+pub(super) const HELD_OUT_ERROR: usize = 0;
+pub(super) const INNOVATION: usize = 1;
+pub(super) const LJUNG_BOX: usize = 2;
+pub(super) const OUTSIDE_BAND: usize = 3;
+pub(super) const LOG_MARGIN: usize = 4;
+
+/// The figure that is made least: the first of either list.
+pub(super) const OBJECTIVE: usize = 0;

@@ -1,0 +1,224 @@
+//! Which tuning is best: a sweep in simulation or on a log.
+//!
+//! Every value of the swept keys is a row of figures ([`Measure`]); the knee is the row whose
+//! first figure is least: the mean error with noise in simulation, the prediction error of
+//! held-out samples on a log. `docs/tune.md` defines them all.
+
+mod axis;
+mod crew;
+mod errors;
+mod holdout;
+mod measures;
+mod picture;
+mod reference;
+mod replay;
+mod report;
+mod rewrite;
+mod speed;
+mod trial;
+mod whiteness;
+
+use std::ops::ControlFlow;
+
+pub use axis::Axis;
+pub use measures::Measure;
+pub use rewrite::Change;
+
+use crate::{Error, Study, Table, prepare};
+use reference::Reference;
+
+/// Rows whose first figure is at most this many times the least are nearly as good as the knee.
+const NEARLY: f64 = 1.1;
+
+/// One combination of values and what came of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The values, one per axis.
+    pub values: Vec<f64>,
+    /// The figures, one per measure; none where a run failed or the figure does not exist.
+    pub figures: Vec<Option<f64>>,
+    /// Where the largest error of the exact run is; only in simulation.
+    pub peak: Option<Peak>,
+    /// Why figures are missing, if a run failed.
+    pub failure: Option<String>,
+}
+
+/// The largest error of a run after its start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Peak {
+    /// The quantity.
+    pub name: String,
+    /// Its estimate there, in its unit.
+    pub estimate: f64,
+    /// When, in the plant's unit of time.
+    pub time: f64,
+}
+
+impl Row {
+    fn empty(values: &[f64], measures: usize) -> Self {
+        Self {
+            values: values.to_vec(),
+            figures: vec![None; measures],
+            peak: None,
+            failure: None,
+        }
+    }
+
+    fn set(&mut self, measure: usize, figure: Option<f64>) {
+        if let Some(slot) = self.figures.get_mut(measure) {
+            *slot = figure.filter(|x| x.is_finite());
+        }
+    }
+
+    fn failed(mut self, reason: impl ToString) -> Self {
+        self.failure = Some(reason.to_string());
+        self
+    }
+
+    /// A figure by its place among the measures.
+    pub fn figure(&self, measure: usize) -> Option<f64> {
+        self.figures.get(measure).copied().flatten()
+    }
+}
+
+/// What a sweep gives.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    /// Name of the plant.
+    pub plant: String,
+    /// The log it ran on; none in simulation.
+    pub log: Option<String>,
+    /// The keys with their values.
+    pub axes: Vec<Axis>,
+    /// What the figures of a row are.
+    pub measures: &'static [Measure],
+    /// A row for every combination of values, the last key's fastest.
+    pub rows: Vec<Row>,
+    /// The row whose first figure is least; none where every row failed.
+    pub knee: Option<usize>,
+    /// The unit of time, if the study states it.
+    pub time_unit: Option<String>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Sweeps the tuning of a study, in simulation or on a log, on all processors; `watch` is told
+/// the fraction done and may stop it. A value whose estimate diverges is a row with the reason.
+///
+/// # Errors
+/// A key that cannot be swept; a study that can be neither simulated nor replayed.
+pub fn tune(
+    study: &Study,
+    log: Option<&Table>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Sweep, Error> {
+    let axes = axis::axes(study)?;
+    let grid = axis::grid(study, &axes)?;
+    let plant = prepare::plant(study)?;
+    let mut notes = vec![];
+    let rows = match log {
+        Some(table) => crew::every(
+            grid.len(),
+            &|i, watch| match grid.get(i) {
+                Some((values, study)) => replay::logged(study, values, table, watch),
+                None => Err(Error::input("no such value")),
+            },
+            watch,
+        )?,
+        None => {
+            let measured = prepare::extended(study, &plant)?;
+            let names = measured.outputs.iter().map(|o| o.variable.name.clone());
+            let reference = Reference::new(study, &names.collect::<Vec<_>>())?;
+            notes.extend(reference.notes.iter().cloned());
+            crew::every(
+                grid.len(),
+                &|i, watch| match grid.get(i) {
+                    Some((values, study)) => trial::simulated(study, values, &reference, watch),
+                    None => Err(Error::input("no such value")),
+                },
+                watch,
+            )?
+        }
+    };
+    let knee = least(&rows);
+    notes.extend(knee.and_then(|knee| at_an_end(&axes, rows.get(knee)?)));
+    Ok(Sweep {
+        plant: plant.name.clone(),
+        log: log.map(|table| table.file().to_owned()),
+        measures: match log {
+            Some(_) => measures::LOGGED,
+            None => measures::SIMULATED,
+        },
+        axes,
+        rows,
+        knee,
+        time_unit: study.time_unit.clone(),
+        notes,
+    })
+}
+
+fn least(rows: &[Row]) -> Option<usize> {
+    let objective = |row: &Row| row.figure(measures::OBJECTIVE);
+    let judged = rows.iter().enumerate();
+    judged
+        .filter_map(|(i, row)| Some((i, objective(row)?)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(i, _)| i)
+}
+
+/// Advice where the best value may lie beyond the range.
+fn at_an_end(axes: &[Axis], knee: &Row) -> Option<String> {
+    let ends = |(axis, value): &(&Axis, &f64)| {
+        let beyond =
+            |x: &f64| axis.values.iter().all(|v| v <= x) || axis.values.iter().all(|v| v >= x);
+        axis.values.len() > 1 && beyond(value)
+    };
+    let (axis, value) = axes.iter().zip(&knee.values).find(ends)?;
+    Some(format!(
+        "the knee, {} = {}, is at an end of what was swept: the best value may lie beyond; widen `keys` of [tune]",
+        axis.label(),
+        axis::shown(*value)
+    ))
+}
+
+impl Sweep {
+    /// The row of the knee.
+    pub fn chosen(&self) -> Option<&Row> {
+        self.rows.get(self.knee?)
+    }
+
+    /// The range of the first key's values that are nearly as good as the knee, the other keys
+    /// being those of the knee: the first figure is within 10 % of the least.
+    pub fn good(&self) -> Option<std::ops::RangeInclusive<f64>> {
+        let knee = self.chosen()?;
+        let limit = NEARLY * knee.figure(measures::OBJECTIVE)?;
+        let beside = self.rows.iter().filter(|row| self.beside_knee(row));
+        let beside =
+            beside.filter(|row| row.figure(measures::OBJECTIVE).is_some_and(|x| x <= limit));
+        let values: Vec<f64> = beside
+            .filter_map(|row| row.values.first().copied())
+            .collect();
+        let low = values.iter().copied().min_by(f64::total_cmp)?;
+        let high = values.iter().copied().max_by(f64::total_cmp)?;
+        Some(low..=high)
+    }
+
+    /// True where no value gave an estimate; the command's exit code is then 1.
+    pub fn is_empty_handed(&self) -> bool {
+        self.knee.is_none()
+    }
+
+    /// The refusal that says so, with the reason of the first row.
+    pub fn refusal(&self) -> Error {
+        let reason = self.rows.iter().find_map(|row| row.failure.clone());
+        Error::refused(format!(
+            "no value of {} gives an estimate: {}",
+            self.axes
+                .iter()
+                .map(|a| a.key.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
+            reason.unwrap_or_else(|| "there is no error to judge by".to_owned())
+        ))
+    }
+}

@@ -1,0 +1,137 @@
+//! What every value of a sweep in simulation is judged against: scales, jumps, and the noise.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use lynkeus_expr::Node;
+use lynkeus_model::{Plant, Variable};
+use lynkeus_run::{Dynamics, Level, Noise, Trajectory};
+
+use crate::simulate::{open_loop, settings};
+use crate::systems;
+use crate::{Error, Study, prepare};
+
+/// Noise where the study states none, as a share of what the output spans in the run.
+const DEFAULT_NOISE: f64 = 0.01;
+
+/// The same for every value of the sweep.
+#[derive(Clone, Debug)]
+pub(super) struct Reference {
+    /// by state, input and output: what an error of 1 is, in the quantity's unit
+    pub scales: BTreeMap<String, f64>,
+    /// the start, and every instant at which an input that the observer does not read jumps
+    pub starts: Vec<f64>,
+    /// from here on, nothing of a start or a jump should be left
+    pub tail: f64,
+    /// the noise of the noisy run
+    pub noise: Noise,
+    /// time between two samples of the sensor
+    pub sample_step: f64,
+    /// what the user should know
+    pub notes: Vec<String>,
+}
+
+impl Reference {
+    /// Runs the plant alone.
+    ///
+    /// # Errors
+    /// A study that cannot be simulated.
+    pub fn new(study: &Study, measured: &[String]) -> Result<Self, Error> {
+        let settings = settings(study)?;
+        let plant = prepare::plant(study)?;
+        let mut alone = open_loop(study, settings, &plant)?;
+        let stated = std::mem::take(&mut alone.noise);
+        let truth = alone
+            .run_watched(&mut |_| ControlFlow::Continue(()))
+            .map_err(|error| crate::outcome::interrupted(&error, &study.file))?;
+        let scales = scales(&plant, &truth);
+        let starts = starts(study, &plant)?;
+        let last = starts.last().copied().unwrap_or(settings.start);
+        let mut notes = vec![];
+        let noise = noise(stated, measured, &truth, &mut notes);
+        Ok(Self {
+            tail: (last + settings.until) / 2.0,
+            sample_step: noise.sample_step.unwrap_or(alone.output_step),
+            scales,
+            starts,
+            noise,
+            notes,
+        })
+    }
+
+    /// What an error of 1 is.
+    pub fn scale(&self, name: &str) -> f64 {
+        self.scales.get(name).copied().unwrap_or(1.0)
+    }
+}
+
+/// The declared range, else the largest magnitude in the run, else 1. An output that shows a
+/// state takes that state's.
+fn scales(plant: &Plant, truth: &Trajectory) -> BTreeMap<String, f64> {
+    let scale = |variable: &Variable, name: &str| {
+        let range = variable.max - variable.min;
+        if range.is_finite() && range > 0.0 {
+            return range;
+        }
+        let values = truth.column(name).unwrap_or_default();
+        let largest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        if largest > 0.0 { largest } else { 1.0 }
+    };
+    let shown = |output: &Variable| {
+        let state = plant.states.iter().find(|s| s.node == output.node);
+        scale(state.unwrap_or(output), &output.name)
+    };
+    let own = plant.states.iter().chain(&plant.inputs);
+    let own = own.map(|v| (v.name.clone(), scale(v, &v.name)));
+    let outputs = plant.outputs.iter().map(|o| (o.name.clone(), shown(o)));
+    // a state and the output that shows it may share a name
+    outputs.chain(own).collect()
+}
+
+/// The start, and where unknown inputs and disturbances jump or have a kink.
+fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
+    let settings = settings(study)?;
+    let sensors = &study.sensors;
+    let unread = |name: &str| {
+        let mut names = sensors.unknown.iter().chain(&sensors.disturbances);
+        names.any(|n| n.text == name)
+    };
+    let inputs = systems::input_expressions(study, plant, settings)?;
+    let inputs: Vec<(String, Node)> = inputs.into_iter().filter(|(n, _)| unread(n)).collect();
+    let mut instants = vec![settings.start];
+    systems::of_time(plant, &inputs)?
+        .evaluation()
+        .switches(settings.start, settings.until, &mut instants)
+        .map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+    instants.sort_by(f64::total_cmp);
+    instants.dedup();
+    Ok(instants)
+}
+
+/// The study's noise, or 1 % of what each measured output spans.
+fn noise(stated: Noise, measured: &[String], truth: &Trajectory, notes: &mut Vec<String>) -> Noise {
+    let is_noisy = |name: &String| {
+        let level = stated.levels.get(name);
+        level.is_some_and(|(Level::Absolute(x) | Level::Relative(x))| *x > 0.0)
+    };
+    if measured.iter().any(is_noisy) {
+        return stated;
+    }
+    let level = |name: &String| {
+        let values = truth.column(name).unwrap_or_default();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let span = if high > low { high - low } else { high.abs() };
+        (name.clone(), Level::Absolute(DEFAULT_NOISE * span))
+    };
+    let levels: BTreeMap<String, Level> = measured.iter().map(level).collect();
+    let words: Vec<String> = levels
+        .iter()
+        .map(|(name, Level::Absolute(x) | Level::Relative(x))| format!("{name} {x:.2e}"))
+        .collect();
+    notes.push(format!(
+        "the study states no noise: 1 % of what each output spans in the run is taken ({}); set `noise` in [sensors] to state yours",
+        words.join(", ")
+    ));
+    Noise { levels, ..stated }
+}

@@ -1,0 +1,200 @@
+//! One value on a log: how well held-out samples are predicted, and how white the innovation is.
+
+use std::ops::ControlFlow;
+
+use lynkeus_model::Plant;
+use lynkeus_observers::Design;
+use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, System, Trajectory, estimate_watched};
+
+use super::crew::{Watch, part};
+use super::errors::rms;
+use super::holdout::{HELD_OUT, Plan, predicted, switchable};
+use super::speed::longest_step;
+use super::trial::{is_answer, thrifty};
+use super::whiteness::{Whiteness, whiteness};
+use super::{Row, measures};
+use crate::estimate::{header, refuse_derivatives, refuse_stray_columns, run_settings};
+use crate::outcome::interrupted;
+use crate::{Error, ErrorKind, Study, Table, prepare, systems};
+
+/// Judges the tuning of `study` on a log; an estimate that diverges, or an observer that is
+/// refused, is a row without figures.
+///
+/// # Errors
+/// A study or a log that cannot be used.
+pub(super) fn logged(
+    study: &Study,
+    values: &[f64],
+    table: &Table,
+    watch: &mut Watch<'_>,
+) -> Result<Row, Error> {
+    let mut row = Row::empty(values, measures::LOGGED.len());
+    let plant = prepare::plant(study)?;
+    let extended = prepare::extended(study, &plant)?;
+    let design = match prepare::design(study, &extended) {
+        Ok(design) => design,
+        Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
+        Err(error) => return Err(error),
+    };
+    let replay = Replay::new(study, &plant, &design, table)?;
+    match replay.judge(&mut row, watch)? {
+        None => Ok(row),
+        Some(reason) => Ok(row.failed(reason)),
+    }
+}
+
+/// One value on a log.
+struct Replay<'a> {
+    observer: System,
+    time: &'a [f64],
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+    /// measured outputs: name and values
+    measured: Vec<(String, Vec<f64>)>,
+    plan: Plan,
+    settings: EstimatorSettings,
+    file: &'a str,
+}
+
+/// A replay, or why its estimate is none.
+type Ran = Result<Trajectory, String>;
+
+impl<'a> Replay<'a> {
+    fn new(study: &Study, plant: &Plant, design: &Design, table: &'a Table) -> Result<Self, Error> {
+        let settings = &study.estimate;
+        let run = run_settings(settings);
+        refuse_derivatives(study, design)?;
+        refuse_stray_columns(plant, settings)?;
+        let time = table.time(&settings.time)?;
+        let column = |name: &str| Ok(table.column(header(settings, name))?.to_vec());
+        let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
+            signals.iter().map(|s| s.name.clone()).collect()
+        };
+        let measured = names(&design.observer.measured);
+        let mut read = names(&design.observer.inputs);
+        read.extend(measured.iter().cloned());
+        let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
+        let measured = measured.into_iter();
+        let measured = measured.map(|name| Ok((column(&name)?, name)));
+        let measured: Result<Vec<_>, Error> = measured.collect();
+        Ok(Self {
+            observer: systems::observer(plant, &switchable(plant, &design.observer))?,
+            plan: Plan::new(study, time.len())?,
+            time,
+            names: read,
+            columns: columns?,
+            measured: measured?.into_iter().map(|(v, n)| (n, v)).collect(),
+            settings: EstimatorSettings {
+                method: thrifty(run.method, time.len() as f64),
+                ..run
+            },
+            file: table.file(),
+        })
+    }
+
+    /// Fills the row in; the reason where a replay failed.
+    fn judge(&self, row: &mut Row, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
+        let causal = EstimatorSettings {
+            between: BetweenSamples::Hold,
+            ..self.settings
+        };
+        let nothing = vec![0.0; self.time.len()];
+        match self.run(nothing, causal, &mut part(watch, 0, 2))? {
+            Ok(run) => {
+                self.judge_innovation(row, &run);
+                row.set(measures::LOG_MARGIN, self.margin(&run));
+            }
+            Err(reason) => return Ok(Some(reason)),
+        }
+        let held_out = self.plan.held_out.clone();
+        match self.run(held_out, self.settings, &mut part(watch, 1, 2))? {
+            Ok(run) => {
+                row.set(measures::HELD_OUT_ERROR, self.held_out_error(&run));
+                Ok(None)
+            }
+            Err(reason) => Ok(Some(format!("with samples held out: {reason}"))),
+        }
+    }
+
+    fn run(
+        &self,
+        held_out: Vec<f64>,
+        settings: EstimatorSettings,
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Ran, Error> {
+        let mut names = self.names.clone();
+        names.push(HELD_OUT.to_owned());
+        let mut columns = self.columns.clone();
+        columns.push(held_out);
+        let log = Log::new(names, self.time.to_vec(), columns)
+            .map_err(|error| Error::input(error.to_string()).at(self.file))?;
+        match estimate_watched(&self.observer, &log, settings, watch) {
+            Ok(estimates) => Ok(Ok(estimates.trajectory)),
+            Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
+            Err(error) => Err(interrupted(&error, self.file)),
+        }
+    }
+
+    /// The root mean square over outputs of each one's error on the scored rows, over the span
+    /// of its values on the whole log.
+    fn held_out_error(&self, run: &Trajectory) -> Option<f64> {
+        let error = |(name, values): &(String, Vec<f64>)| {
+            let prediction = run.column(&predicted(name))?;
+            let rows = self.plan.scored();
+            let errors: Option<Vec<f64>> = rows
+                .map(|row| Some(values.get(row)? - prediction.get(row)?))
+                .collect();
+            Some(rms(&errors?) / span(values))
+        };
+        let errors: Option<Vec<f64>> = self.measured.iter().map(error).collect();
+        Some(rms(&errors?))
+    }
+
+    /// The innovation of a replay that looks at no later sample, past the first block.
+    fn judge_innovation(&self, row: &mut Row, run: &Trajectory) {
+        let innovation = |(name, values): &(String, Vec<f64>)| -> Option<Vec<f64>> {
+            let prediction = run.column(&predicted(name))?;
+            let pairs = values.iter().zip(&prediction).skip(self.plan.first);
+            Some(pairs.map(|(y, hat)| (y - hat) / span(values)).collect())
+        };
+        let all: Vec<Vec<f64>> = self.measured.iter().filter_map(innovation).collect();
+        let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
+        row.set(measures::INNOVATION, Some(rms(&sizes)));
+        let white: Vec<Whiteness> = all.iter().filter_map(|series| whiteness(series)).collect();
+        let mean = |of: fn(&Whiteness) -> f64| {
+            let sum: f64 = white.iter().map(of).sum();
+            (!white.is_empty()).then(|| sum / white.len() as f64)
+        };
+        row.set(measures::LJUNG_BOX, mean(|w| w.ljung_box));
+        row.set(measures::OUTSIDE_BAND, mean(|w| w.outside));
+    }
+
+    /// The longest stable step over the longest step of the log.
+    fn margin(&self, run: &Trajectory) -> Option<f64> {
+        let names = self.observer.signals().to_vec();
+        let place = |name: &String| self.names.iter().position(|n| n == name);
+        let places: Vec<Option<usize>> = names.iter().map(place).collect();
+        let step = longest_step(&self.observer, run, &mut |row, _, signals| {
+            for (signal, place) in signals.iter_mut().zip(&places) {
+                let column = place.and_then(|place| self.columns.get(place));
+                // the one signal that is no column is the switch, which is off
+                *signal = column.and_then(|c| c.get(row).copied()).unwrap_or(0.0);
+            }
+            ControlFlow::Continue(())
+        })?;
+        let steps = self.time.windows(2).map(|pair| pair[1] - pair[0]);
+        let longest = steps.fold(0.0, f64::max);
+        (longest > 0.0).then(|| step / longest)
+    }
+}
+
+/// From the least to the greatest, or the magnitude of a constant, or 1.
+fn span(values: &[f64]) -> f64 {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match high - low {
+        span if span > 0.0 => span,
+        _ if high.abs() > 0.0 => high.abs(),
+        _ => 1.0,
+    }
+}

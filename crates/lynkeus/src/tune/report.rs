@@ -1,0 +1,168 @@
+//! A sweep in words, as a table and for machines.
+
+use std::fmt;
+
+use serde_json::{Map, Value, json};
+
+use super::axis::shown;
+use super::{Row, Sweep};
+use crate::Error;
+use crate::table::significant;
+
+impl Sweep {
+    /// The rows as CSV: the keys, the figures (empty where there is none), 1 at the knee, and
+    /// why a run failed.
+    ///
+    /// # Errors
+    /// What the CSV writer reports.
+    pub fn to_csv(&self) -> Result<String, Error> {
+        let failed = |e: &dyn fmt::Display| Error::input(format!("cannot write CSV: {e}"));
+        let mut writer = csv::Writer::from_writer(vec![]);
+        let mut header: Vec<String> = self.axes.iter().map(|a| a.label()).collect();
+        header.extend(self.measures.iter().map(|m| m.name.to_owned()));
+        header.extend(["knee", "failure"].map(str::to_owned));
+        writer.write_record(&header).map_err(|e| failed(&e))?;
+        for (i, row) in self.rows.iter().enumerate() {
+            let number = |x: Option<f64>| x.map_or(String::new(), significant);
+            let mut cells: Vec<String> = row.values.iter().copied().map(shown).collect();
+            cells.extend(row.figures.iter().map(|x| number(*x)));
+            cells.push(u8::from(self.knee == Some(i)).to_string());
+            cells.push(row.failure.clone().unwrap_or_default());
+            writer.write_record(&cells).map_err(|e| failed(&e))?;
+        }
+        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// The sweep for machines.
+    pub fn to_json(&self) -> Value {
+        let good = self.good().map(|range| [*range.start(), *range.end()]);
+        let present = self.axes.iter().map(|a| (a.key.clone(), json!(a.present)));
+        json!({
+            "plant": self.plant,
+            "log": self.log,
+            "keys": self.axes.iter().map(|a| json!({ "key": a.key, "factor": a.is_factor })).collect::<Vec<_>>(),
+            "present": present.collect::<Map<_, _>>(),
+            "knee": self.chosen().map(|row| self.row_to_json(row)),
+            "nearly_as_good": good,
+            "rows": self.rows.iter().map(|row| self.row_to_json(row)).collect::<Vec<_>>(),
+            "notes": self.notes,
+        })
+    }
+
+    fn row_to_json(&self, row: &Row) -> Value {
+        let keys = self.axes.iter().zip(&row.values);
+        let keys: Map<_, _> = keys.map(|(a, x)| (a.key.clone(), json!(x))).collect();
+        let figures = self.measures.iter().zip(&row.figures);
+        let mut object: Map<String, Value> = Map::new();
+        object.insert("keys".to_owned(), keys.into());
+        object.extend(figures.map(|(m, x)| (m.name.to_owned(), json!(x))));
+        if let Some(peak) = &row.peak {
+            let peak = json!({ "name": peak.name, "estimate": peak.estimate, "time": peak.time });
+            object.insert("peak".to_owned(), peak);
+        }
+        if let Some(failure) = &row.failure {
+            object.insert("failure".to_owned(), json!(failure));
+        }
+        object.into()
+    }
+
+    /// The knee in a sentence.
+    pub fn verdict(&self) -> Option<String> {
+        let row = self.chosen()?;
+        let pairs = self.axes.iter().zip(&row.values);
+        let at: Vec<String> = pairs
+            .map(|(axis, x)| format!("{} = {}", axis.label(), shown(*x)))
+            .collect();
+        let first = self.measures.first()?;
+        let least = row.figure(0).map_or(String::new(), brief);
+        let mut text = format!("knee: {} ({} {least})", at.join(", "), first.title);
+        let good = self.good().filter(|g| g.start() < g.end());
+        if let (Some(good), Some(axis)) = (good, self.axes.first()) {
+            let (low, high) = (shown(*good.start()), shown(*good.end()));
+            text += &format!(
+                "; within 10 % of it from {} = {low} to {high}",
+                axis.label()
+            );
+        }
+        if let Some(peak) = &row.peak {
+            text += &format!(
+                "; its largest error is at t = {}, where {} is estimated at {}",
+                brief(peak.time),
+                peak.name,
+                brief(peak.estimate)
+            );
+        }
+        Some(text)
+    }
+
+    /// The header of a figure.
+    fn heading(&self, index: usize) -> String {
+        let name = self.measures.get(index).map_or("", |m| m.name);
+        name.replace('_', " ")
+    }
+}
+
+/// Three significant digits.
+pub(super) fn brief(x: f64) -> String {
+    let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
+    match rounded.abs() {
+        1e5.. => format!("{rounded:e}"),
+        y if y > 0.0 && y < 1e-4 => format!("{rounded:e}"),
+        _ => format!("{rounded}"),
+    }
+}
+
+impl fmt::Display for Sweep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let on = self
+            .log
+            .as_deref()
+            .map_or("in simulation".to_owned(), |log| format!("on {log}"));
+        writeln!(f, "{}: {} values {on}\n", self.plant, self.rows.len())?;
+        let headings = (0..self.measures.len()).map(|i| self.heading(i));
+        let header: Vec<String> = self
+            .axes
+            .iter()
+            .map(|a| a.label())
+            .chain(headings)
+            .collect();
+        let width = |text: &String| text.chars().count().max(8);
+        let widths: Vec<usize> = header.iter().map(width).collect();
+        let line = |f: &mut fmt::Formatter<'_>, cells: &[String]| {
+            for (cell, width) in cells.iter().zip(&widths) {
+                write!(f, "  {cell:>width$}")?;
+            }
+            Ok(())
+        };
+        line(f, &header)?;
+        writeln!(f)?;
+        for (i, row) in self.rows.iter().enumerate() {
+            let values = row.values.iter().map(|x| shown(*x));
+            let figures = row.figures.iter();
+            let figures = figures.map(|x| x.map_or("\u{2013}".to_owned(), brief));
+            line(f, &values.chain(figures).collect::<Vec<_>>())?;
+            if self.knee == Some(i) {
+                f.write_str("  \u{2190} knee")?;
+            }
+            if let Some(failure) = &row.failure {
+                write!(f, "  {}", shortened(failure))?;
+            }
+            writeln!(f)?;
+        }
+        match self.verdict() {
+            Some(verdict) => writeln!(f, "\n{verdict}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The beginning of a reason, for a line of a table.
+fn shortened(reason: &str) -> String {
+    const MOST: usize = 72;
+    let line = reason.lines().next().unwrap_or_default();
+    match line.chars().count() > MOST {
+        true => line.chars().take(MOST).chain(['\u{2026}']).collect(),
+        false => line.to_owned(),
+    }
+}

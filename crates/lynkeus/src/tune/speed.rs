@@ -1,0 +1,63 @@
+//! How fast an observer is along a run, and the steps that this allows.
+
+use std::ops::ControlFlow;
+
+use lynkeus_observers::{Monitor, Observer};
+use lynkeus_run::{Dynamics, System, Trajectory, spectral_radius};
+
+/// |λ|·h up to which the classical Runge–Kutta method is stable, with a little air.
+const STABLE: f64 = 2.7;
+
+/// Rows at which the Jacobian is looked at.
+const LOOKS: usize = 64;
+
+/// The observer with its states among its outputs, so that a run can be looked into afterwards.
+pub(super) fn transparent(observer: &Observer) -> Observer {
+    let mut observer = observer.clone();
+    let states = observer.states.iter().enumerate();
+    observer.monitors = states
+        .map(|(i, (signal, _))| Monitor {
+            name: state(i),
+            node: signal.symbol,
+            alarm_below: f64::NEG_INFINITY,
+            meaning: String::new(),
+        })
+        .collect();
+    observer
+}
+
+/// The column of a state of a transparent observer.
+fn state(index: usize) -> String {
+    // no name of a plant has a blank
+    format!("observer state {index}")
+}
+
+/// The longest step at which the classical Runge–Kutta method runs the observer stably at every
+/// row looked at: 2.7 over the largest spectral radius of its Jacobian. `signals` writes the
+/// observer's signals at a row's time. None where the Jacobian is not defined.
+pub(super) fn longest_step(
+    observer: &System,
+    run: &Trajectory,
+    signals: &mut dyn FnMut(usize, f64, &mut [f64]) -> ControlFlow<()>,
+) -> Option<f64> {
+    let count = observer.states().len();
+    let columns: Option<Vec<Vec<f64>>> = (0..count).map(|i| run.column(&state(i))).collect();
+    let columns = columns?;
+    let mut evaluation = observer.evaluation();
+    let mut fastest: f64 = 0.0;
+    for look in 0..LOOKS.min(run.len()) {
+        let row = look * run.len() / LOOKS.min(run.len());
+        let t = *run.times().get(row)?;
+        let x: Option<Vec<f64>> = columns.iter().map(|c| c.get(row).copied()).collect();
+        if signals(row, t, evaluation.signals_mut()).is_break() {
+            return None;
+        }
+        evaluation.enter(t);
+        let radius = spectral_radius(&mut evaluation, t, &x?);
+        if !radius.is_finite() {
+            return None;
+        }
+        fastest = fastest.max(radius);
+    }
+    (fastest > 0.0).then(|| STABLE / fastest)
+}

@@ -1,0 +1,304 @@
+//! One value in simulation: an exact run, a noisy one, and one under the stated disturbance.
+
+use std::ops::ControlFlow;
+
+use lynkeus_expr::Node;
+use lynkeus_model::Plant;
+use lynkeus_observers::{Design, Observer};
+use lynkeus_run::{Dynamics, Error as RunError, Method, Noise, Simulation, Tolerances, Trajectory};
+
+use super::crew::{Watch, part};
+use super::errors::{Errors, rms};
+use super::reference::Reference;
+use super::speed::{longest_step, transparent};
+use super::{Peak, Row, measures};
+use crate::outcome::interrupted;
+use crate::simulate::{open_loop, settings};
+use crate::systems::{self, hat, named};
+use crate::{Error, ErrorKind, Study, prepare};
+
+/// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
+/// parts, but never fewer than the second number.
+const STEPS: f64 = 5e5;
+const STEPS_PER_ROW: f64 = 500.0;
+
+/// Judges the tuning of `study`; an estimate that diverges, or an observer that is refused, is
+/// a row without figures.
+///
+/// # Errors
+/// A study that cannot be simulated.
+pub(super) fn simulated(
+    study: &Study,
+    values: &[f64],
+    reference: &Reference,
+    watch: &mut Watch<'_>,
+) -> Result<Row, Error> {
+    let mut row = Row::empty(values, measures::SIMULATED.len());
+    let plant = prepare::plant(study)?;
+    let extended = prepare::extended(study, &plant)?;
+    let design = match prepare::design(study, &extended) {
+        Ok(design) => design,
+        Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
+        Err(error) => return Err(error),
+    };
+    let trial = Trial {
+        study,
+        plant: &plant,
+        observer: transparent(&design.observer),
+        reference,
+    };
+    match trial.judge(&design, &mut row, watch)? {
+        None => Ok(row),
+        Some(reason) => Ok(row.failed(reason)),
+    }
+}
+
+/// One value of the sweep.
+struct Trial<'a> {
+    study: &'a Study,
+    plant: &'a Plant,
+    observer: Observer,
+    reference: &'a Reference,
+}
+
+/// A run, or why its estimate is none.
+type Ran = Result<Trajectory, String>;
+
+impl Trial<'_> {
+    /// Fills the row in; the reason where a run failed.
+    fn judge(
+        &self,
+        design: &Design,
+        row: &mut Row,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<String>, Error> {
+        let disturbed = !self.study.tune.disturbance.is_empty();
+        let runs = if disturbed { 3 } else { 2 };
+        let simulation = self.simulation()?;
+        let exact_run = match self.run(&simulation, &mut part(watch, 0, runs))? {
+            Ok(run) => run,
+            Err(reason) => return Ok(Some(reason)),
+        };
+        let exact = self.errors(design, &exact_run, &exact_run);
+        self.judge_exact(design, row, &exact, &exact_run);
+        row.set(
+            measures::SAMPLING_MARGIN,
+            self.margin(&simulation, &exact_run),
+        );
+
+        let noisy = Simulation {
+            noise: self.reference.noise.clone(),
+            ..simulation
+        };
+        let mut failure = None;
+        match self.run(&noisy, &mut part(watch, 1, runs))? {
+            Ok(run) => self.judge_noisy(row, &exact, &self.errors(design, &run, &run), &run),
+            Err(reason) => failure = Some(format!("with noise: {reason}")),
+        }
+        if disturbed {
+            match self.run(&self.disturbed(noisy)?, &mut part(watch, 2, runs))? {
+                Ok(run) => {
+                    let bound = self.errors(design, &run, &run).from(self.reference.tail);
+                    row.set(measures::ULTIMATE_BOUND, largest(&bound));
+                }
+                Err(reason) => {
+                    row.set(measures::ULTIMATE_BOUND, None);
+                    failure = failure.or(Some(format!("under the disturbance: {reason}")));
+                }
+            }
+        }
+        Ok(failure)
+    }
+
+    /// The exact run.
+    fn simulation(&self) -> Result<Simulation, Error> {
+        let (study, plant, settings) = (self.study, self.plant, settings(self.study)?);
+        let plain = open_loop(study, settings, plant)?;
+        let rows = (plain.until - plain.start) / plain.output_step;
+        Ok(Simulation {
+            observer: Some(systems::observer(plant, &self.observer)?),
+            inputs: systems::inputs(study, plant, settings, &self.observer)?,
+            noise: Noise::default(),
+            method: thrifty(plain.method, rows),
+            ..plain
+        })
+    }
+
+    /// The exact run with the stated disturbance on the plant's inputs; what the observer reads
+    /// of them stays as it was.
+    fn disturbed(&self, run: Simulation) -> Result<Simulation, Error> {
+        let (study, plant, settings) = (self.study, self.plant, settings(self.study)?);
+        let graph = &plant.graph;
+        let mut inputs = systems::input_expressions(study, plant, settings)?;
+        let derivatives = self
+            .observer
+            .input_derivative_expressions(graph, &inputs)
+            .map_err(|error| Error::input(error.to_string()))?;
+        let mut signals: Vec<(String, Node)> = named(&plant.inputs);
+        for (name, expression) in &study.tune.disturbance {
+            let signal = signals.iter_mut().find(|(n, _)| *n == name.text);
+            let input = inputs.iter().find(|(n, _)| *n == name.text);
+            let (Some(signal), Some((_, input))) = (signal, input) else {
+                return Err(name.blame(systems::unknown(plant, "input", &plant.inputs, name)));
+            };
+            let added = systems::expression(plant, expression)?;
+            let sum = graph.expr(*input) + graph.expr(added);
+            signal.0 = disturbed(&name.text);
+            inputs.push((disturbed(&name.text), sum.node()));
+        }
+        inputs.extend(derivatives);
+        Ok(Simulation {
+            plant: systems::plant_reading(plant, settings, &signals)?,
+            inputs: systems::of_time(plant, &inputs)?,
+            noise: Noise::default(),
+            ..run
+        })
+    }
+
+    fn run(
+        &self,
+        simulation: &Simulation,
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Ran, Error> {
+        match simulation.run_watched(watch) {
+            Ok(run) => Ok(Ok(run)),
+            Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
+            Err(error) => Err(interrupted(&error, &self.study.file)),
+        }
+    }
+
+    /// Scaled errors of what `design` estimates.
+    fn errors(&self, design: &Design, run: &Trajectory, truth: &Trajectory) -> Errors {
+        let error = |name: &str| {
+            let estimate = run.column(&hat(name))?;
+            let truth = truth
+                .column(&disturbed(name))
+                .or_else(|| truth.column(name))?;
+            let scale = self.reference.scale(name);
+            let pairs = estimate.iter().zip(&truth);
+            Some(pairs.map(|(hat, x)| (hat - x) / scale).collect())
+        };
+        let estimates = design.observer.estimates.iter();
+        Errors {
+            time: run.times().to_vec(),
+            scaled: estimates.filter_map(|e| error(&e.variable.name)).collect(),
+        }
+    }
+
+    fn judge_exact(&self, design: &Design, row: &mut Row, exact: &Errors, run: &Trajectory) {
+        let Reference { starts, tail, .. } = self.reference;
+        let settling = exact.settling(starts, self.study.tune.tolerance);
+        row.set(measures::SETTLING_TIME, settling);
+        row.set(measures::ULTIMATE_BOUND, largest(&exact.from(*tail)));
+        row.set(measures::EXACT_ERROR, Some(exact.mean()));
+        let Some((at, quantity, size)) = exact.peak() else {
+            return;
+        };
+        row.set(measures::PEAK_ERROR, Some(size));
+        let name = design.observer.estimates.get(quantity);
+        row.peak = name.and_then(|e| {
+            let name = e.variable.name.clone();
+            let estimate = *run.column(&hat(&name))?.get(at)?;
+            let time = *run.times().get(at)?;
+            Some(Peak {
+                name,
+                estimate,
+                time,
+            })
+        });
+    }
+
+    fn judge_noisy(&self, row: &mut Row, exact: &Errors, noisy: &Errors, run: &Trajectory) {
+        let caused = noisy.minus(exact);
+        let level = self.noise_level(run);
+        let tail = caused.from(self.reference.tail);
+        let gain = (level > 0.0).then(|| tail.worst_rms() / level);
+        row.set(measures::NOISE_GAIN, gain);
+        row.set(measures::NOISE_ERROR, Some(caused.mean()));
+        row.set(measures::TOTAL_ERROR, Some(noisy.mean()));
+    }
+
+    /// The root mean square of the scaled noise of the measured outputs, as drawn, in the tail.
+    fn noise_level(&self, run: &Trajectory) -> f64 {
+        let drawn = |name: &String| {
+            let (exact, measured) = (run.column(name)?, run.column(&format!("{name}_measured"))?);
+            let scale = self.reference.scale(name);
+            let pairs = exact.iter().zip(&measured);
+            Some(pairs.map(|(y, m)| (m - y) / scale).collect::<Vec<f64>>())
+        };
+        let measured = self.observer.measured.iter();
+        let noise = Errors {
+            time: run.times().to_vec(),
+            scaled: measured.filter_map(|s| drawn(&s.name)).collect(),
+        };
+        let squares: Vec<f64> = noise
+            .from(self.reference.tail)
+            .scaled
+            .iter()
+            .map(|e| rms(e))
+            .collect();
+        rms(&squares)
+    }
+
+    /// The longest stable step over the step of the sensor.
+    fn margin(&self, simulation: &Simulation, run: &Trajectory) -> Option<f64> {
+        let observer = simulation.observer.as_ref()?;
+        let mut inputs = simulation.inputs.evaluation();
+        let mut u = vec![0.0; simulation.inputs.outputs().len()];
+        let names = observer.signals().to_vec();
+        let columns: Vec<Option<Vec<f64>>> = names.iter().map(|n| run.column(n)).collect();
+        let step = longest_step(observer, run, &mut |row, t, signals| {
+            inputs.enter(t);
+            inputs.outputs(t, &[], &mut u);
+            for ((signal, name), column) in signals.iter_mut().zip(&names).zip(&columns) {
+                let place = simulation.inputs.outputs().iter().position(|n| n == name);
+                let input = place.and_then(|i| u.get(i).copied());
+                let logged = column.as_ref().and_then(|c| c.get(row).copied());
+                match input.or(logged) {
+                    Some(value) => *signal = value,
+                    None => return ControlFlow::Break(()),
+                }
+            }
+            ControlFlow::Continue(())
+        })?;
+        Some(step / self.reference.sample_step)
+    }
+}
+
+/// The name of an input as the plant has it while the observer reads the undisturbed one.
+fn disturbed(name: &str) -> String {
+    // no name of a plant has a blank
+    format!("{name} disturbed")
+}
+
+fn largest(errors: &Errors) -> Option<f64> {
+    errors.worst().into_iter().max_by(f64::total_cmp)
+}
+
+/// The method with fewer steps than it would take: an estimate on its way to infinity is then
+/// given up in time. What is left is enough for any observer worth having.
+pub(super) fn thrifty(method: Method, rows: f64) -> Method {
+    let most = (STEPS / rows.max(1.0)).max(STEPS_PER_ROW) as usize;
+    let fewer = |t: Tolerances| Tolerances {
+        budget: t.budget.min(most),
+        ..t
+    };
+    match method {
+        Method::Adaptive(t) => Method::Adaptive(fewer(t)),
+        Method::Explicit(t) => Method::Explicit(fewer(t)),
+        Method::Stiff(t) => Method::Stiff(fewer(t)),
+        fixed => fixed,
+    }
+}
+
+/// Whether a run that ended early says something of the tuning.
+pub(super) fn is_answer(error: &RunError) -> bool {
+    matches!(
+        error,
+        RunError::Diverged { .. }
+            | RunError::NotFinite { .. }
+            | RunError::StepUnderflow { .. }
+            | RunError::StepBudget { .. }
+            | RunError::TooStiff { .. }
+    )
+}
