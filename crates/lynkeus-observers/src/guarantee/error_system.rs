@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
+use lynkeus_expr::{Binary, Evaluator, Graph, MissingInput, Node, Op, Tape, Unary, jacobian};
 use lynkeus_gain::decay::ErrorModel;
 use lynkeus_structure::{
     Check, Condition, Dimension, Extended, Region, Slopes, range, range_within,
@@ -30,7 +30,7 @@ pub(super) struct ErrorSystem {
     right: Tape,
     /// A as an expression, row by row
     entries: Vec<Node>,
-    /// estimate (here also the state), known inputs and time
+    /// estimate (here also the state), known inputs, and time if A depends on it
     pub sides: Region,
 }
 
@@ -128,6 +128,27 @@ impl ErrorSystem {
         self.right.evaluator()
     }
 
+    /// Whether an entry of A has kinks, jumps or singular ends: |x|, min, √, conditions.
+    pub fn is_rough(&self, graph: &Graph) -> bool {
+        let rough = |node: Node| match graph.op(node) {
+            Op::Select(..) => true,
+            Op::Unary(op, _) => {
+                use Unary::{Abs, Floor, Sign, Sqrt};
+                matches!(op, Abs | Sign | Floor | Sqrt)
+            }
+            Op::Binary(Binary::Pow, _, power) => {
+                let power = graph.constant_value(power);
+                power.is_none_or(|power| power < 0.0 || power.fract() != 0.0)
+            }
+            Op::Binary(op, ..) => {
+                use Binary::{Equal, Less, LessEq, Max, Min};
+                matches!(op, Min | Max | Less | LessEq | Equal)
+            }
+            _ => false,
+        };
+        graph.reachable(&self.entries).into_iter().any(rough)
+    }
+
     /// A at x̂ = x, at a point of `sides`.
     pub fn at(&self, evaluator: &mut Evaluator, point: &[f64]) -> DMatrix<f64> {
         let n = self.scale.len();
@@ -158,9 +179,12 @@ fn right(
         .collect();
     let entries = graph.substitute(&system.entries, &measured);
     let mut sides = system.region.clone();
+    let read = graph.symbols_of(&entries);
+    // a witness tells the time only where time matters
+    let counts = |d: &Dimension| read.contains(&d.symbol) || d.symbol != observer.time;
     sides
         .dimensions
-        .retain(|d| !measured.contains_key(&d.symbol));
+        .retain(|d| !measured.contains_key(&d.symbol) && counts(d));
     Ok((Tape::new(graph, &sides.symbols(), &entries)?, sides))
 }
 

@@ -53,7 +53,7 @@ pub fn certify(
         Err(reason) => return Ok(not_covered(assumptions, reason)),
     };
     let mut hypotheses = vec![system.bounded()];
-    let sample = refute::worst(&system)?;
+    let sample = refute::worst(extended.graph(), &system)?;
     if let Some(witness) = sample.witness {
         let check = Check {
             name: STABLE.to_owned(),

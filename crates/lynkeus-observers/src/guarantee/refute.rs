@@ -1,7 +1,7 @@
 //! The search for a point of the box at which the error's Jacobian is not stable: a
 //! right estimate does not stay right there.
 
-use lynkeus_expr::Evaluator;
+use lynkeus_expr::{Evaluator, Graph};
 use lynkeus_structure::{Dimension, Point, Witness};
 
 use super::error_system::ErrorSystem;
@@ -14,6 +14,9 @@ const HALVINGS: usize = 12;
 /// An eigenvalue this far from the imaginary axis, relative to the matrix, is not a
 /// matter of rounding.
 const CLEAR: f64 = 1e-9;
+/// Distance from the ends, relative to a side, where slopes may have kinks there.
+const INSET: f64 = 1e-4;
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What the search found.
 pub(super) struct Sample {
@@ -24,11 +27,15 @@ pub(super) struct Sample {
 }
 
 /// The worst point that a deterministic search finds.
-pub(super) fn worst(system: &ErrorSystem) -> Result<Sample, DesignError> {
+pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Result<Sample, DesignError> {
+    let sides = system.sides.dimensions.iter().map(finite);
     let mut search = Search {
         system,
         evaluator: system.evaluator(),
-        sides: system.sides.dimensions.iter().map(finite).collect(),
+        sides: match system.is_rough(graph) {
+            true => sides.enumerate().map(inner).collect(),
+            false => sides.collect(),
+        },
     };
     let (mut best, mut highest) = (search.point(0), f64::NEG_INFINITY);
     for index in 0..POINTS {
@@ -46,9 +53,8 @@ pub(super) fn worst(system: &ErrorSystem) -> Result<Sample, DesignError> {
     let refuted = highest > CLEAR * A.amax();
     let coordinates = system.sides.dimensions.iter().zip(&best);
     let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
-    let named = named.filter(|(name, _)| name != "time").collect();
     let point = Point {
-        coordinates: named,
+        coordinates: named.collect(),
         value: highest,
     };
     Ok(Sample {
@@ -80,17 +86,24 @@ fn finite(side: &Dimension) -> (f64, f64, bool) {
     (low, high.max(low), side.integer)
 }
 
+/// The side without its ends and with another middle: a kink there, as of |x| at 0, has
+/// no slope, and that of one side need not be met in the box.
+fn inner((i, (low, high, whole)): (usize, (f64, f64, bool))) -> (f64, f64, bool) {
+    if whole {
+        return (low, high, whole);
+    }
+    let cut = INSET * (1.0 + (i as f64 * GOLDEN).fract()) * (high - low);
+    (low + cut, high - 0.5 * cut, whole)
+}
+
 impl Search<'_> {
     /// The middle, corners and points between, spread by irrational steps.
     fn point(&self, index: usize) -> Vec<f64> {
         let place = |i: usize| match index {
             0 => 0.5,
-            _ if index % 2 == 1 => {
-                let golden = 0.618_033_988_749_894_9;
-                ((index * (i + 1)) as f64 * golden + i as f64 * 0.37)
-                    .fract()
-                    .round()
-            }
+            _ if index % 2 == 1 => ((index * (i + 1)) as f64 * GOLDEN + i as f64 * 0.37)
+                .fract()
+                .round(),
             _ => {
                 let step = ((i + 2) as f64).sqrt().fract();
                 (index as f64 * step + 0.5 * i as f64).fract()
@@ -99,7 +112,8 @@ impl Search<'_> {
         let sides = self.sides.iter().enumerate();
         sides
             .map(|(i, &(low, high, whole))| {
-                let x = low + place(i) * (high - low);
+                // low + (high − low) may be above high by rounding
+                let x = (low + place(i) * (high - low)).min(high);
                 if whole { x.round() } else { x }
             })
             .collect()

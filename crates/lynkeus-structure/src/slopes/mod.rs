@@ -65,7 +65,7 @@ impl Slopes {
         states: &[Node],
         region: &Region,
     ) -> Result<Self, MissingInput> {
-        let inputs = vertex_inputs(graph, derivatives, states, region);
+        let inputs = vertex_inputs(graph, derivatives, states, region)?;
         let mut found: Option<Self> = None;
         for vertex in 0..1_usize << inputs.len() {
             let fixed = at_vertex(region, &inputs, vertex);
@@ -123,22 +123,43 @@ fn vertex_inputs(
     derivatives: &[Node],
     states: &[Node],
     region: &Region,
-) -> Vec<usize> {
-    let affine = |symbol: Node| {
-        let partials = jacobian::forward(graph, derivatives, &[symbol]);
-        let partials: Vec<Node> = partials.entries.iter().map(|e| e.2).collect();
-        // a step has no derivative and yet no slope either
-        let direct = jacobian::pattern(graph, derivatives, &[symbol]);
-        let rows = direct.iter().filter(|row| !row.is_empty()).count();
-        rows > 0 && rows == partials.len() && !graph.symbols_of(&partials).contains(&symbol)
-    };
-    let sides = region.dimensions.iter().enumerate();
-    sides
-        .filter(|(_, d)| d.min < d.max && d.min.is_finite() && d.max.is_finite())
-        .filter(|(_, d)| !states.contains(&d.symbol) && affine(d.symbol))
-        .map(|(i, _)| i)
-        .take(VERTEX_INPUTS)
-        .collect()
+) -> Result<Vec<usize>, MissingInput> {
+    let mut found = vec![];
+    for (i, side) in region.dimensions.iter().enumerate() {
+        let wide = side.min < side.max && side.min.is_finite() && side.max.is_finite();
+        if found.len() < VERTEX_INPUTS
+            && wide
+            && !states.contains(&side.symbol)
+            && moves_slopes_affinely(graph, derivatives, states, side.symbol, region)?
+        {
+            found.push(i);
+        }
+    }
+    Ok(found)
+}
+
+/// What is only added, as a measurement is to a copy of the plant, moves no slope: its
+/// vertices would all be the same.
+fn moves_slopes_affinely(
+    graph: &Graph,
+    derivatives: &[Node],
+    states: &[Node],
+    symbol: Node,
+    region: &Region,
+) -> Result<bool, MissingInput> {
+    let partials = jacobian::forward(graph, derivatives, &[symbol]);
+    let partials: Vec<Node> = partials.entries.iter().map(|e| e.2).collect();
+    let read = graph.symbols_of(&partials);
+    if read.contains(&symbol) || !states.iter().any(|state| read.contains(state)) {
+        return Ok(false);
+    }
+    // a step has no derivative, and what it does between the ends they do not tell
+    for &f in derivatives {
+        if jumps_in(graph, f, symbol, region)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// The region with each of the inputs at one end of its range.
@@ -294,10 +315,15 @@ fn slope(
     Ok(Some((range, names)))
 }
 
-/// Whether the term may jump as the state moves: a condition, a sign, a rounding or the
+/// Whether the term may jump as the symbol moves: a condition, a sign, a rounding or the
 /// cut of an angle stands between them. |x|, min and max do not jump.
-fn jumps_in(graph: &Graph, term: Node, state: Node, region: &Region) -> Result<bool, MissingInput> {
-    let depends = |node: Node| graph.symbols_of(&[node]).contains(&state);
+fn jumps_in(
+    graph: &Graph,
+    term: Node,
+    symbol: Node,
+    region: &Region,
+) -> Result<bool, MissingInput> {
+    let depends = |node: Node| graph.symbols_of(&[node]).contains(&symbol);
     for node in graph.reachable(&[term]) {
         let jumps = match graph.op(node) {
             Op::Select(condition, ..) => depends(condition),

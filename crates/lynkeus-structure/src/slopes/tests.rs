@@ -61,6 +61,31 @@ fn inputs_that_enter_affinely_become_vertices() {
     assert_eq!(corner, [1.0, 2.0]);
 }
 
+/// Between its ends a step does what they do not show; what is only added does nothing.
+#[test]
+fn steps_and_added_inputs_are_no_vertices() {
+    for (equation, inputs) in [
+        ("u*a + (if u > 1 and u < 1.1 then 9 else 0)*a", 0),
+        ("u*a + floor(u)*a", 0),
+        ("u*a + sign(u - 1)", 0),
+        ("-a^3 + 2*u + u*w", 0),
+        ("u*a + 2*w", 1),
+    ] {
+        let plant = plant(&format!(
+            "model P
+              input Real u(min = 0, max = 3); input Real w(min = 0, max = 1);
+              Real a(min = 0, max = 1);
+              output Real y = a;
+            equation
+              der(a) = {equation};
+            end P;"
+        ));
+        let (found, _) = slopes(&plant);
+        assert_eq!(found.inputs.len(), inputs, "{equation}");
+        assert_eq!(found.models.len(), 1 << inputs, "{equation}");
+    }
+}
+
 #[test]
 fn a_variable_without_bound_is_named() {
     let plant = plant(

@@ -1,0 +1,100 @@
+//! Gains that come with a promise: `gain = "lmi"` on random chains.
+
+use lynkeus_observers::{
+    Design, DesignError, Family, Tuning, Value, Verdict, block_triangular::BlockTriangular,
+    triangular::Triangular,
+};
+use lynkeus_structure::Extended;
+
+use crate::judge::{self, Claim, Sides};
+use crate::numbers::Numbers;
+use crate::pair::{self, Pair};
+use crate::plants::{Random, sides};
+use crate::{Context, simulate};
+
+const CHAINS: u64 = 80;
+
+/// x_i' = a(x_{i+1}) + terms in x_1 … x_i and u, a increasing or decreasing.
+fn chain(numbers: &mut Numbers) -> Random {
+    let count = 2 + numbers.below(3);
+    let states = sides(numbers, count);
+    let inputs = vec![(-1.0, 1.0)];
+    let mut equations = vec![];
+    for i in 1..=count {
+        let next = i + 1;
+        let a = numbers.signed(0.5, 2.0);
+        let link = match numbers.below(4) {
+            _ if i == count => "u1".to_owned(),
+            0 => format!("x{next} + 0.1*x{next}^3"),
+            1 => format!("tanh(0.7*x{next})"),
+            2 => format!("(2 + u1)*x{next}"),
+            _ => format!("x{next}"),
+        };
+        let j = 1 + numbers.below(i);
+        let term = match numbers.below(6) {
+            0 => format!("sin(x{j})"),
+            1 => format!("x{j}*x{i}"),
+            2 => format!("u1*x{j}"),
+            3 => format!("abs(x{j})"),
+            4 => format!("cos(time)*x{j}"),
+            _ => format!("x{j}/(1 + x{j}^2)"),
+        };
+        let b = numbers.signed(0.05, 0.8);
+        equations.push(format!("({a:.4})*({link}) + ({b:.4})*({term})"));
+    }
+    let outputs = vec![["x1", "2*x1 + 1", "-0.5*x1"][numbers.below(3)].to_owned()];
+    Random {
+        states,
+        inputs,
+        outputs,
+        equations,
+        jumps: false,
+    }
+}
+
+fn design(extended: &Extended<'_>, tuning: &Tuning, family: usize) -> Result<Design, DesignError> {
+    let family: &dyn Family = [&Triangular as &dyn Family, &BlockTriangular][family];
+    family.design(extended, tuning)
+}
+
+/// Whether there was a gain; what it promises is judged.
+fn kept(seed: u64) -> bool {
+    let mut numbers = Numbers(seed.wrapping_mul(0x2545_F491_4F6C_DD1D));
+    let random = chain(&mut numbers).at_rest();
+    let rate = numbers.size(0.1, 4.0);
+    let mut tuning = Tuning::from([("rate", rate)]);
+    let text = |text: &str| Value::Text(text.to_owned());
+    tuning.values.insert("gain".into(), text("lmi"));
+    let aim = ["noise", "peak", "gain"][numbers.below(3)];
+    tuning.values.insert("minimise".into(), text(aim));
+    let context = Context(format!(
+        "chain {seed}, rate {rate}, {aim}\n{}",
+        random.text()
+    ));
+    let plant = pair::plant(&random.text());
+    let extended = pair::extended(&plant);
+    let design = match design(&extended, &tuning, numbers.below(2)) {
+        Ok(design) => design,
+        Err(DesignError::NoGain { .. }) => return false,
+        Err(other) => panic!("{other}"),
+    };
+    let observer = &design.observer;
+    let certificate = crate::certificate(&extended, observer, [&[], &[]]);
+    assert_eq!(certificate.verdict, Verdict::Proved);
+    let mut claim = Claim::new(&certificate);
+    assert!(claim.rate >= rate, "{} against {rate}", claim.rate);
+    claim.rate = rate;
+    let sides = Sides::new(&certificate, random.states.len());
+    let mut pair = Pair::new(&extended, observer);
+    judge::secants(&mut pair, &claim, &sides, &mut numbers);
+    judge::points(&mut pair, &claim, &sides, &mut numbers);
+    simulate::decay(&mut pair, &claim, &sides, &mut numbers);
+    drop(context);
+    true
+}
+
+#[test]
+fn every_designed_gain_is_proved_at_the_rate_asked_for() {
+    let designed = (1..=CHAINS).filter(|&seed| kept(seed)).count();
+    assert!(4 * designed >= 3 * CHAINS as usize, "{designed}");
+}

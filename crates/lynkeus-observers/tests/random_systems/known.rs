@@ -1,0 +1,94 @@
+//! Small systems that once were judged wrongly, or well might be.
+
+use lynkeus_observers::{Certificate, Verdict};
+use nalgebra::DMatrix;
+
+use crate::judge::{self, Sides};
+use crate::pair::{self, Pair};
+
+/// The certificate of a copy of the plant with gains −K on the outputs' errors.
+fn certified(text: &str, K: &[f64], look: impl Fn(&mut Pair, &Certificate)) -> Verdict {
+    let plant = pair::plant(text);
+    let extended = pair::extended(&plant);
+    let K = DMatrix::from_row_slice(plant.states.len(), plant.outputs.len(), K);
+    let observer = pair::observer(&extended, &K);
+    let certificate = crate::certificate(&extended, &observer, [&[], &[]]);
+    look(&mut Pair::new(&extended, &observer), &certificate);
+    certificate.verdict
+}
+
+/// The equation has the same slope −5 + u at both ends of the input, but 4 + u between.
+#[test]
+fn a_step_of_an_input_is_not_covered_by_the_ends_of_its_range() {
+    for step in [
+        "if u > 1 and u < 1.001 then 9 else 0",
+        "9*floor(max(0, min(u, 2 - u)))",
+    ] {
+        let text = format!(
+            "model P input Real u(min = 0, max = 3); Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = -5*x + u*x + ({step})*x; end P;"
+        );
+        let verdict = certified(&text, &[0.0], |_, _| ());
+        assert_ne!(verdict, Verdict::Proved, "{step}");
+    }
+}
+
+/// On [0, 1] the equation is x' = −x/2; at 0 itself |x| has no slope.
+#[test]
+fn a_kink_at_the_edge_of_the_box_refutes_nothing() {
+    for term in ["abs(x)", "max(x, -x)"] {
+        let text = format!(
+            "model P Real x(min = 0, max = 1); output Real y = x;
+             equation der(x) = 0.5*x - {term}; end P;"
+        );
+        let verdict = certified(&text, &[0.0], |_, _| ());
+        assert_ne!(verdict, Verdict::Refuted, "{term}");
+    }
+}
+
+/// A kink inside the box has a range of slopes like any other term.
+#[test]
+fn a_kink_inside_the_box_is_no_obstacle() {
+    let text = "model P Real x(min = -1, max = 1); Real z(min = -1, max = 1); output Real y = x;
+         equation der(x) = -x + z; der(z) = -2*z - abs(z); end P;";
+    let verdict = certified(text, &[0.0, 0.0], |_, _| ());
+    assert_eq!(verdict, Verdict::Proved);
+}
+
+/// Without the time, the point would show nothing.
+#[test]
+fn a_witness_tells_the_time_where_it_matters() {
+    let text = "model P Real x(min = -1, max = 1); output Real y = x;
+         equation der(x) = -x + 3*sin(time)*x; end P;";
+    let verdict = certified(text, &[0.0], |pair, certificate| {
+        judge::witness(pair, certificate, &Sides::new(certificate, 1));
+    });
+    assert_eq!(verdict, Verdict::Refuted);
+    let text = "model P Real x(min = -1, max = 1); output Real y = x;
+         equation der(x) = x + time; end P;";
+    certified(text, &[0.0], |_, certificate| {
+        let text = format!("{:?}", certificate.hypotheses);
+        assert!(text.contains("Refuted") && !text.contains("time"), "{text}");
+    });
+}
+
+/// A jump that a state makes has no slope, whichever way it jumps.
+#[test]
+fn jumps_are_never_proved() {
+    for jump in [
+        "-sign(x)",
+        "(if x > 0.3 then -1 else 0)",
+        "-floor(3*x)",
+        "atan2(x, -0.1)",
+        "-atan(1/x)",
+        "-x/abs(x)",
+        "-tanh(1/(x - 0.2))",
+    ] {
+        let text = format!(
+            "model P Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = -4*x + {jump}; end P;"
+        );
+        let verdict = certified(&text, &[1.0], |_, _| ());
+        assert_ne!(verdict, Verdict::Proved, "{jump}");
+    }
+}

@@ -1,0 +1,117 @@
+//! Certificates of random small systems against their equations: every proof is
+//! confirmed, every refutation reproduced. One false proof fails the build.
+#![allow(clippy::unwrap_used)]
+
+mod designed;
+mod disturbed;
+mod gains;
+mod judge;
+mod known;
+mod numbers;
+mod pair;
+mod plants;
+mod simulate;
+mod terms;
+
+use lynkeus_observers::{Assumptions, Certificate, Claim as Sought, Observer, Verdict};
+use lynkeus_structure::Extended;
+use nalgebra::DMatrix;
+
+use judge::{Claim, Sides};
+use numbers::Numbers;
+use pair::Pair;
+
+const SYSTEMS: u64 = 1000;
+
+/// How often each verdict was reached, and how much of it was looked at.
+#[derive(Debug, Default)]
+struct Tally {
+    proved: usize,
+    refuted: usize,
+    undecided: usize,
+    /// proved systems whose trajectories stayed in the box for a while
+    seen: usize,
+}
+
+/// With bounds of what acts on the plant and of the measurement errors.
+fn certificate(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    [drift, noise]: [&[f64]; 2],
+) -> Certificate {
+    let assumptions = Assumptions {
+        region: extended.region(),
+        drift: drift.to_vec(),
+        noise: noise.to_vec(),
+    };
+    lynkeus_observers::certify(extended, observer, &assumptions, Sought::Fastest).unwrap()
+}
+
+/// The system with that number, judged.
+fn judged(seed: u64, tally: &mut Tally) {
+    let mut numbers = Numbers(seed.wrapping_mul(0x5851_F42D_4C95_7F2D));
+    let mut random = plants::random(&mut numbers);
+    if numbers.chance(0.8) {
+        random = random.at_rest();
+    }
+    let plant = pair::plant(&random.text());
+    let extended = pair::extended(&plant);
+    let none = DMatrix::zeros(plant.states.len(), plant.outputs.len());
+    let copy = pair::observer(&extended, &none);
+    let (states, inputs) = (&random.states, &random.inputs);
+    let middle = gains::Middle::new(&mut Pair::new(&extended, &copy), states, inputs);
+    let K = gains::random(&mut numbers, &middle);
+    let observer = pair::observer(&extended, &K);
+    let certificate = certificate(&extended, &observer, [&[], &[]]);
+    let sides = Sides::new(&certificate, states.len());
+    let mut pair = Pair::new(&extended, &observer);
+    let context = Context(format!("system {seed}\n{}K ={K}", random.text()));
+    match certificate.verdict {
+        Verdict::Proved => {
+            assert!(!random.jumps, "a right-hand side that jumps");
+            let claim = Claim::new(&certificate);
+            judge::secants(&mut pair, &claim, &sides, &mut numbers);
+            judge::points(&mut pair, &claim, &sides, &mut numbers);
+            let steps = simulate::decay(&mut pair, &claim, &sides, &mut numbers);
+            tally.proved += 1;
+            tally.seen += usize::from(steps >= 60);
+        }
+        Verdict::Refuted => {
+            judge::witness(&mut pair, &certificate, &sides);
+            tally.refuted += 1;
+        }
+        Verdict::Undecided => tally.undecided += 1,
+    }
+    drop(context);
+}
+
+/// Printed where a judgement fails inside.
+struct Context(String);
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("{}", self.0);
+        }
+    }
+}
+
+#[test]
+fn every_verdict_on_a_random_system_stands() {
+    let mut tally = Tally::default();
+    let mut failed = vec![];
+    for seed in 1..=SYSTEMS {
+        let judgement = std::panic::AssertUnwindSafe(|| judged(seed, &mut tally));
+        if std::panic::catch_unwind(judgement).is_err() {
+            failed.push(seed);
+        }
+    }
+    assert!(
+        failed.is_empty(),
+        "{} systems: {failed:?}; {tally:?}",
+        failed.len()
+    );
+    assert!(tally.proved >= 150 && tally.refuted >= 150, "{tally:?}");
+    assert!(tally.undecided >= 50, "{tally:?}");
+    assert!(2 * tally.seen >= tally.proved, "{tally:?}");
+}

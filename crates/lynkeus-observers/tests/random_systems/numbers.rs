@@ -1,0 +1,50 @@
+//! Random numbers that are the same in every run.
+
+/// SplitMix64.
+#[derive(Clone)]
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    /// In [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + self.unit() * (high - low)
+    }
+
+    /// Positive, its logarithm evenly spread.
+    pub fn size(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    /// [`Numbers::size`] with a random sign.
+    pub fn signed(&mut self, low: f64, high: f64) -> f64 {
+        let size = self.size(low, high);
+        if self.chance(0.5) { size } else { -size }
+    }
+
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.unit() * count as f64) as usize
+    }
+
+    pub fn chance(&mut self, probability: f64) -> bool {
+        self.unit() < probability
+    }
+
+    /// One number in each range, at times at its ends.
+    pub fn inside(&mut self, sides: &[(f64, f64)]) -> Vec<f64> {
+        let ends = self.chance(0.2);
+        let mut place = |&(low, high): &(f64, f64)| match (ends, self.unit()) {
+            (true, x) if x < 0.5 => low,
+            (true, _) => high,
+            (false, x) => low + x * (high - low),
+        };
+        sides.iter().map(&mut place).collect()
+    }
+}
