@@ -57,14 +57,7 @@ pub trait Family: Sync {
         extended: &Extended<'_>,
         tuning: &Tuning,
         assumptions: &Assumptions,
-    ) -> Result<Certificate, DesignError> {
-        let examination = self.examine(extended, tuning)?;
-        Ok(Certificate::new(
-            self.paper(),
-            &assumptions.region,
-            examination.checks,
-        ))
-    }
+    ) -> Result<Certificate, DesignError>;
 }
 
 /// Whether a family fits a plant.

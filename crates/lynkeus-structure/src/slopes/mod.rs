@@ -224,7 +224,7 @@ fn model(
             });
             slopes.push(Slope {
                 state,
-                term: written(graph, &group),
+                term: written(graph, &group, symbol),
                 range,
                 variables,
             });
@@ -345,12 +345,13 @@ fn jumps_in(
     Ok(false)
 }
 
-fn written(graph: &Graph, group: &Group) -> String {
-    let mut texts = group.terms.iter().map(|(term, _)| graph.render(*term, 40));
-    match (texts.next(), group.terms.len()) {
-        (Some(text), 1) => text,
-        (Some(text), more) => format!("{text} and {} more terms", more - 1),
-        (None, _) => String::new(),
+fn written(graph: &Graph, group: &Group, state: Node) -> String {
+    let depends = |term: &Node| graph.symbols_of(&[*term]).contains(&state);
+    let terms = group.terms.iter().map(|(term, _)| *term).filter(depends);
+    let texts: Vec<String> = terms.map(|term| graph.render(term, 40)).collect();
+    match &texts[..] {
+        [first, .., _] => format!("{first} and {} more", texts.len() - 1),
+        _ => texts.concat(),
     }
 }
 
