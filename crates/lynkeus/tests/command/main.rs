@@ -6,6 +6,7 @@ mod families;
 mod messages;
 mod references;
 mod runs;
+mod tune;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
