@@ -48,7 +48,7 @@ impl Errors {
             let Some((last, _)) = rows().next_back() else {
                 continue;
             };
-            let outside = rows().filter(|(_, e)| **e > tolerance).next_back();
+            let outside = rows().rfind(|(_, e)| **e > tolerance);
             match outside {
                 Some((t, _)) if t == last => return None,
                 Some((t, _)) => longest = longest.max(self.after(*t) - start),

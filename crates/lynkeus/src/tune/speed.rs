@@ -32,13 +32,16 @@ fn state(index: usize) -> String {
     format!("observer state {index}")
 }
 
+/// Writes the observer's signals at a row and its time; breaks off where there are none.
+type Signals<'a> = dyn FnMut(usize, f64, &mut [f64]) -> ControlFlow<()> + 'a;
+
 /// The longest step at which the classical Runge–Kutta method runs the observer stably at every
 /// row looked at: 2.7 over the largest spectral radius of its Jacobian. `signals` writes the
 /// observer's signals at a row's time. None where the Jacobian is not defined.
 pub(super) fn longest_step(
     observer: &System,
     run: &Trajectory,
-    signals: &mut dyn FnMut(usize, f64, &mut [f64]) -> ControlFlow<()>,
+    signals: &mut Signals<'_>,
 ) -> Option<f64> {
     let count = observer.states().len();
     let columns: Option<Vec<Vec<f64>>> = (0..count).map(|i| run.column(&state(i))).collect();
