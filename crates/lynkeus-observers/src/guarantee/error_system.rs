@@ -149,12 +149,14 @@ impl ErrorSystem {
         graph.reachable(&self.entries).into_iter().any(rough)
     }
 
-    /// A at x̂ = x, at a point of `sides`.
+    /// A at x̂ = x, at a point of `sides`, for states in units of `scale`: in other units
+    /// rounding may leave no digit of the eigenvalues.
     pub fn at(&self, evaluator: &mut Evaluator, point: &[f64]) -> DMatrix<f64> {
         let n = self.scale.len();
         let mut entries = vec![0.0; n * n];
         evaluator.eval(point, &mut entries);
-        DMatrix::from_row_slice(n, n, &entries)
+        let relative = |i: usize, j: usize| self.scale[j] / self.scale[i];
+        DMatrix::from_fn(n, n, |i, j| entries[i * n + j] * relative(i, j))
     }
 }
 

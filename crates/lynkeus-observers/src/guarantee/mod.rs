@@ -141,16 +141,18 @@ fn fill(
     }
     certificate.rate = Some(proof.rate);
     certificate.lyapunov = Some(proof.P.clone());
-    let eigenvalues = proof.P.symmetric_eigenvalues();
-    let spread = (eigenvalues.max() / eigenvalues.min()).sqrt();
-    certificate.constants = vec![
-        Constant::new("rate", proof.rate, "V' ≤ −2·rate·V for V = eᵀPe"),
-        Constant::new(
+    certificate.constants = vec![Constant::new(
+        "rate",
+        proof.rate,
+        "V' ≤ −2·rate·V for V = eᵀPe",
+    )];
+    if let Some(spread) = ultimate::spread(&proof.P) {
+        certificate.constants.push(Constant::new(
             "√cond(P)",
             spread,
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
-        ),
-    ];
+        ));
+    }
     if let Some(bounds) = ultimate::bounds(extended, system, proof, assumptions) {
         certificate.ultimate_bound = Some(bounds.norm);
         certificate.ultimate = bounds.states;

@@ -63,6 +63,14 @@ pub(super) fn bounds(
     })
 }
 
+/// √cond(P), not below it: computed eigenvalues of a matrix in units of very different
+/// size may have no correct digit at the lower end.
+pub(super) fn spread(P: &DMatrix<f64>) -> Option<f64> {
+    let n = P.nrows();
+    let largest = P.symmetric_eigenvalues().max().sqrt() * GUARD;
+    Some(largest * width(P, &DMatrix::identity(n, n))?)
+}
+
 /// The smallest β, to six digits, that is proved to satisfy |Q^½ e| ≤ β·√(eᵀPe) for a
 /// projection Q.
 fn width(P: &DMatrix<f64>, Q: &DMatrix<f64>) -> Option<f64> {

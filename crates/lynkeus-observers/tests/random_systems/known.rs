@@ -92,3 +92,40 @@ fn jumps_are_never_proved() {
         assert_ne!(verdict, Verdict::Proved, "{jump}");
     }
 }
+
+/// States in units of very different size, in any order: the decay is proved, and the
+/// constant is finite and no smaller than what the diagonal of P shows.
+#[test]
+fn a_proof_stands_in_any_units() {
+    let states = ["c", "d", "a", "b"];
+    let of = |name| match name {
+        "a" => 1e9,
+        "b" => 1e-8,
+        "c" => 1.0,
+        _ => 1e3,
+    };
+    for first in 0..4 {
+        let order = |i: usize| states[(first + i) % 4];
+        let side = |i: usize| format!("Real {}(min = 0, max = {:e});", order(i), of(order(i)));
+        let text = format!(
+            "model P {} output Real y = a;
+             equation der(a) = -2*a + 1e17*b; der(b) = -2*b + 1e-8*sin(c);
+             der(c) = -2*c + 1e-3*d; der(d) = -3*d + 1e-5*sin(1e-9*a); end P;",
+            (0..4).map(side).collect::<String>()
+        );
+        let K: Vec<f64> = (0..4).map(|i| f64::from(order(i) == "a")).collect();
+        let verdict = certified(&text, &K, |_, certificate| {
+            let Some(P) = &certificate.lyapunov else {
+                return;
+            };
+            let least = (P.diagonal().max() / P.diagonal().min()).sqrt();
+            let constant = certificate.constants.iter().find(|c| c.name == "√cond(P)");
+            let constant = constant.unwrap().value;
+            assert!(
+                least <= constant && constant < 100.0 * least,
+                "{constant} {least}"
+            );
+        });
+        assert_eq!(verdict, Verdict::Proved, "first {}", order(0));
+    }
+}
