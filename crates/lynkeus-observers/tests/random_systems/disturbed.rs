@@ -1,7 +1,7 @@
 //! Ultimate bounds: what acts on the plant, and measurement errors, within their bounds
 //! and always in the worst direction.
 
-use lynkeus_observers::{Certificate, Verdict};
+use lynkeus_observers::{Certificate, Claim as Sought, Verdict};
 use nalgebra::{DMatrix, DVector};
 
 use crate::gains::{self, Middle};
@@ -82,7 +82,7 @@ fn followed(seed: u64) -> Option<bool> {
     let drift: Vec<f64> = drift.iter().map(|w| w * numbers.size(1e-5, 1e-2)).collect();
     let noise: Vec<f64> = (0..p).map(|_| numbers.size(1e-6, 1e-3)).collect();
     let observer = pair::observer(&extended, &K);
-    let certificate = certificate(&extended, &observer, [&drift, &noise]);
+    let certificate = certificate(&extended, &observer, [&drift, &noise], Sought::Fastest);
     if certificate.verdict != Verdict::Proved {
         return None;
     }

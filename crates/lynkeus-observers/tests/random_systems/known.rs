@@ -1,6 +1,6 @@
 //! Small systems that once were judged wrongly, or well might be.
 
-use lynkeus_observers::{Certificate, Verdict};
+use lynkeus_observers::{Certificate, Claim as Sought, Verdict};
 use nalgebra::DMatrix;
 
 use crate::judge::{self, Sides};
@@ -12,7 +12,7 @@ fn certified(text: &str, K: &[f64], look: impl Fn(&mut Pair, &Certificate)) -> V
     let extended = pair::extended(&plant);
     let K = DMatrix::from_row_slice(plant.states.len(), plant.outputs.len(), K);
     let observer = pair::observer(&extended, &K);
-    let certificate = crate::certificate(&extended, &observer, [&[], &[]]);
+    let certificate = crate::certificate(&extended, &observer, [&[], &[]], Sought::Fastest);
     look(&mut Pair::new(&extended, &observer), &certificate);
     certificate.verdict
 }

@@ -38,13 +38,14 @@ fn certificate(
     extended: &Extended<'_>,
     observer: &Observer,
     [drift, noise]: [&[f64]; 2],
+    sought: Sought,
 ) -> Certificate {
     let assumptions = Assumptions {
         region: extended.region(),
         drift: drift.to_vec(),
         noise: noise.to_vec(),
     };
-    lynkeus_observers::certify(extended, observer, &assumptions, Sought::Fastest).unwrap()
+    lynkeus_observers::certify(extended, observer, &assumptions, sought).unwrap()
 }
 
 /// The system with that number, judged.
@@ -62,7 +63,7 @@ fn judged(seed: u64, tally: &mut Tally) {
     let middle = gains::Middle::new(&mut Pair::new(&extended, &copy), states, inputs);
     let K = gains::random(&mut numbers, &middle);
     let observer = pair::observer(&extended, &K);
-    let certificate = certificate(&extended, &observer, [&[], &[]]);
+    let certificate = certificate(&extended, &observer, [&[], &[]], Sought::Fastest);
     let sides = Sides::new(&certificate, states.len());
     let mut pair = Pair::new(&extended, &observer);
     let context = Context(format!("system {seed}\n{}K ={K}", random.text()));
