@@ -1,0 +1,90 @@
+//! The answer to a question of observability.
+
+/// Whether a quantity can be known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// locally: near a generic point no other value gives the same outputs
+    Observable,
+    /// other values give the same outputs
+    Unobservable,
+    /// a limit struck, or the model has no series here
+    Undecided,
+}
+
+impl Verdict {
+    /// One word: `observable`, `unobservable` or `undecided`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Observable => "observable",
+            Verdict::Unobservable => "unobservable",
+            Verdict::Undecided => "undecided",
+        }
+    }
+}
+
+/// What a quantity is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// the state at the start
+    State,
+    /// a constant of the model
+    Parameter,
+    /// an input that nobody measures, at the start
+    UnknownInput,
+}
+
+/// Quantities that can change together without a trace in the outputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Symmetry {
+    /// names of the quantities that it moves
+    pub moves: Vec<String>,
+    /// in words: what it does, and which combinations it leaves alone
+    pub words: String,
+    /// combinations that are known nevertheless, as Modelica expressions
+    pub invariants: Vec<String>,
+}
+
+/// A quantity or an expression that was asked about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// its name, or the expression as written
+    pub name: String,
+    /// the verdict
+    pub verdict: Verdict,
+}
+
+/// What can be known.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// every quantity with what it is and the verdict
+    pub quantities: Vec<(Asked, Quantity)>,
+    /// the expressions asked about
+    pub about: Vec<Asked>,
+    /// what hides the unobservable quantities
+    pub symmetries: Vec<Symmetry>,
+    /// derivatives of the outputs that were used
+    pub order: usize,
+    /// rank of the sensitivities, of as many as there are unknowns
+    pub rank: usize,
+    /// number of unknowns, derivatives of unknown inputs included
+    pub unknowns: usize,
+    /// how it was decided, and what limits it
+    pub notes: Vec<String>,
+}
+
+impl Answer {
+    /// The verdict on a quantity.
+    pub fn verdict(&self, name: &str) -> Option<Verdict> {
+        let mut quantities = self.quantities.iter();
+        quantities
+            .find(|(q, _)| q.name == name)
+            .map(|(q, _)| q.verdict)
+    }
+
+    /// Whether every quantity is observable.
+    pub fn is_complete(&self) -> bool {
+        self.quantities
+            .iter()
+            .all(|(q, _)| q.verdict == Verdict::Observable)
+    }
+}

@@ -1,0 +1,302 @@
+//! Coefficients and sensitivities, order by order.
+
+use std::time::Instant;
+
+use super::Program;
+use super::program::Step;
+use crate::field::{Modular, Random};
+
+/// Why a run ended early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// a division by zero, or a root that does not exist, at this random point
+    Point,
+    /// the time is up
+    Time,
+    /// the memory is used up
+    Memory,
+}
+
+/// Coefficients of one slot with their sensitivities.
+#[derive(Clone, Debug, Default)]
+struct Series {
+    values: Vec<Modular>,
+    /// per order one row of sensitivities; empty for what no unknown moves
+    tangents: Vec<Vec<Modular>>,
+}
+
+/// A program under evaluation.
+pub(crate) struct Run<'a> {
+    program: &'a Program,
+    width: usize,
+    slots: Vec<Series>,
+    random: Random,
+    deadline: Instant,
+    /// numbers that may still be stored
+    room: usize,
+}
+
+impl<'a> Run<'a> {
+    pub fn new(
+        program: &'a Program,
+        width: usize,
+        random: Random,
+        deadline: Instant,
+        room: usize,
+    ) -> Self {
+        Self {
+            program,
+            width,
+            slots: vec![Series::default(); program.steps.len()],
+            random,
+            deadline,
+            room,
+        }
+    }
+
+    /// Computes the next coefficient of every slot. `symbol(place)` gives the symbols'
+    /// coefficient of that order and its sensitivities (empty: none).
+    pub fn advance(
+        &mut self,
+        symbol: &dyn Fn(usize) -> (Modular, Vec<Modular>),
+    ) -> Result<(), Stop> {
+        let k = self.slots.first().map_or(0, |s| s.values.len());
+        let program = self.program;
+        for (slot, step) in program.steps.iter().enumerate() {
+            if slot % 64 == 0 && Instant::now() > self.deadline {
+                return Err(Stop::Time);
+            }
+            // the second of a pair is computed with the first
+            if matches!(step, Step::Cos | Step::Cosh) {
+                continue;
+            }
+            let (value, tangent) = match *step {
+                Step::Constant(c) => (if k == 0 { c } else { Modular::ZERO }, vec![]),
+                Step::Symbol(place) => symbol(place),
+                Step::Sin(a) => {
+                    self.pair(slot, a, k, -Modular::ONE)?;
+                    continue;
+                }
+                Step::Sinh(a) => {
+                    self.pair(slot, a, k, Modular::ONE)?;
+                    continue;
+                }
+                _ => self.rational(slot, *step, k)?,
+            };
+            self.store(slot, value, tangent)?;
+        }
+        Ok(())
+    }
+
+    /// The latest coefficient of a root.
+    pub fn root(&self, i: usize) -> (Modular, &[Modular]) {
+        let series = &self.slots[self.program.roots[i]];
+        let last = series.values.len().saturating_sub(1);
+        let tangent = series.tangents.get(last).map_or(&[][..], Vec::as_slice);
+        (
+            series.values.get(last).copied().unwrap_or_default(),
+            tangent,
+        )
+    }
+
+    fn store(&mut self, slot: usize, value: Modular, tangent: Vec<Modular>) -> Result<(), Stop> {
+        let size = 1 + tangent.len();
+        self.room = self.room.checked_sub(size).ok_or(Stop::Memory)?;
+        let series = &mut self.slots[slot];
+        series.values.push(value);
+        // rows before the first that moves stay empty
+        series.tangents.push(tangent);
+        Ok(())
+    }
+
+    fn value(&self, slot: usize, k: usize) -> Modular {
+        self.slots[slot].values[k]
+    }
+
+    /// sum += factor·(sensitivities of coefficient k)
+    fn add(&self, sum: &mut Vec<Modular>, factor: Modular, slot: usize, k: usize) {
+        let row = &self.slots[slot].tangents[k];
+        if row.is_empty() || factor.is_zero() {
+            return;
+        }
+        if sum.is_empty() {
+            sum.resize(self.width, Modular::ZERO);
+        }
+        for (s, r) in sum.iter_mut().zip(row) {
+            *s = *s + factor * *r;
+        }
+    }
+
+    fn rational(
+        &mut self,
+        slot: usize,
+        step: Step,
+        k: usize,
+    ) -> Result<(Modular, Vec<Modular>), Stop> {
+        let one = Modular::ONE;
+        let mut tangent = vec![];
+        let value = match step {
+            Step::Neg(a) => {
+                self.add(&mut tangent, -one, a, k);
+                -self.value(a, k)
+            }
+            Step::Add(a, b) => {
+                self.add(&mut tangent, one, a, k);
+                self.add(&mut tangent, one, b, k);
+                self.value(a, k) + self.value(b, k)
+            }
+            Step::Sub(a, b) => {
+                self.add(&mut tangent, one, a, k);
+                self.add(&mut tangent, -one, b, k);
+                self.value(a, k) - self.value(b, k)
+            }
+            Step::Mul(a, b) => self.product(&mut tangent, a, b, k),
+            Step::Div(a, b) => self.quotient(&mut tangent, slot, a, b, k)?,
+            Step::Sqrt(a) => self.root_of(&mut tangent, slot, a, k)?,
+            Step::Exp(a) => self.exponential(&mut tangent, slot, a, k)?,
+            Step::Integral { a, h } => self.integral(&mut tangent, a, h, k)?,
+            _ => Modular::ZERO,
+        };
+        Ok((value, tangent))
+    }
+
+    fn product(&self, tangent: &mut Vec<Modular>, a: usize, b: usize, k: usize) -> Modular {
+        let mut value = Modular::ZERO;
+        for j in 0..=k {
+            let (x, y) = (self.value(a, j), self.value(b, k - j));
+            value = value + x * y;
+            self.add(tangent, y, a, j);
+            self.add(tangent, x, b, k - j);
+        }
+        value
+    }
+
+    /// c = a/b from a = c·b.
+    fn quotient(
+        &self,
+        tangent: &mut Vec<Modular>,
+        c: usize,
+        a: usize,
+        b: usize,
+        k: usize,
+    ) -> Result<Modular, Stop> {
+        let inverse = self.value(b, 0).inverse().ok_or(Stop::Point)?;
+        let mut value = self.value(a, k);
+        self.add(tangent, Modular::ONE, a, k);
+        for j in 0..k {
+            value = value - self.value(c, j) * self.value(b, k - j);
+            self.add(tangent, -self.value(b, k - j), c, j);
+            self.add(tangent, -self.value(c, j), b, k - j);
+        }
+        let value = value * inverse;
+        self.add(tangent, -value, b, 0);
+        tangent.iter_mut().for_each(|t| *t = *t * inverse);
+        Ok(value)
+    }
+
+    /// c = √a from a = c².
+    fn root_of(
+        &self,
+        tangent: &mut Vec<Modular>,
+        c: usize,
+        a: usize,
+        k: usize,
+    ) -> Result<Modular, Stop> {
+        let mut value = self.value(a, k);
+        self.add(tangent, Modular::ONE, a, k);
+        let two = Modular::new(2);
+        if k == 0 {
+            let root = value.root().ok_or(Stop::Point)?;
+            let inverse = (two * root).inverse().ok_or(Stop::Point)?;
+            tangent.iter_mut().for_each(|t| *t = *t * inverse);
+            return Ok(root);
+        }
+        for j in 1..k {
+            value = value - self.value(c, j) * self.value(c, k - j);
+        }
+        let inverse = (two * self.value(c, 0)).inverse().ok_or(Stop::Point)?;
+        let value = value * inverse;
+        for j in 0..k {
+            let other = if j == 0 { value } else { self.value(c, k - j) };
+            self.add(tangent, -two * other, c, j);
+        }
+        tangent.iter_mut().for_each(|t| *t = *t * inverse);
+        Ok(value)
+    }
+
+    /// y_k from y' = h·a', with the coefficients of h below k: Σ j·a_j·h_{k−j}/k.
+    fn integrated(&self, a: usize, h: usize, k: usize) -> Result<Modular, Stop> {
+        let mut value = Modular::ZERO;
+        for j in 1..=k {
+            value = value + Modular::new(j as u64) * self.value(a, j) * self.value(h, k - j);
+        }
+        Ok(value * Modular::new(k as u64).inverse().ok_or(Stop::Point)?)
+    }
+
+    /// dy = h·da
+    fn chained(
+        &self,
+        tangent: &mut Vec<Modular>,
+        a: usize,
+        h: &dyn Fn(usize) -> Modular,
+        k: usize,
+    ) {
+        for j in 0..=k {
+            self.add(tangent, h(k - j), a, j);
+        }
+    }
+
+    fn exponential(
+        &mut self,
+        tangent: &mut Vec<Modular>,
+        y: usize,
+        a: usize,
+        k: usize,
+    ) -> Result<Modular, Stop> {
+        let value = match k {
+            0 => self.random.element(),
+            _ => self.integrated(a, y, k)?,
+        };
+        let h = |j: usize| if j == k { value } else { self.value(y, j) };
+        self.chained(tangent, a, &h, k);
+        Ok(value)
+    }
+
+    fn integral(
+        &mut self,
+        tangent: &mut Vec<Modular>,
+        a: usize,
+        h: usize,
+        k: usize,
+    ) -> Result<Modular, Stop> {
+        let value = match k {
+            0 => self.random.element(),
+            _ => self.integrated(a, h, k)?,
+        };
+        self.chained(tangent, a, &|j| self.value(h, j), k);
+        Ok(value)
+    }
+
+    /// s' = c·a', c' = sign·s·a' with c² − sign·s² = 1: circular for −1, hyperbolic for +1.
+    fn pair(&mut self, s: usize, a: usize, k: usize, sign: Modular) -> Result<(), Stop> {
+        let c = s + 1;
+        let (x, y) = match k {
+            0 => {
+                let t = self.random.element();
+                let scale = (Modular::ONE - sign * t * t).inverse().ok_or(Stop::Point)?;
+                (
+                    Modular::new(2) * t * scale,
+                    (Modular::ONE + sign * t * t) * scale,
+                )
+            }
+            _ => (self.integrated(a, c, k)?, sign * self.integrated(a, s, k)?),
+        };
+        let (mut dx, mut dy) = (vec![], vec![]);
+        let cosine = |j: usize| if j == k { y } else { self.value(c, j) };
+        let sine = |j: usize| sign * if j == k { x } else { self.value(s, j) };
+        self.chained(&mut dx, a, &cosine, k);
+        self.chained(&mut dy, a, &sine, k);
+        self.store(s, x, dx)?;
+        self.store(c, y, dy)
+    }
+}
