@@ -15,7 +15,7 @@ use crate::{Context, simulate};
 const CHAINS: u64 = 80;
 
 /// x_i' = a(x_{i+1}) + terms in x_1 … x_i and u, a increasing or decreasing.
-fn chain(numbers: &mut Numbers) -> Random {
+pub fn chain(numbers: &mut Numbers) -> Random {
     let count = 2 + numbers.below(3);
     let states = sides(numbers, count);
     let inputs = vec![(-1.0, 1.0)];

@@ -10,6 +10,7 @@ mod known;
 mod numbers;
 mod pair;
 mod plants;
+mod published;
 mod simulate;
 mod terms;
 
