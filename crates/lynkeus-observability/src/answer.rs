@@ -38,6 +38,8 @@ pub enum Quantity {
 pub struct Symmetry {
     /// names of the quantities that it moves
     pub moves: Vec<String>,
+    /// in how many independent ways they can change
+    pub directions: usize,
     /// in words: what it does, and which combinations it leaves alone
     pub words: String,
     /// combinations that are known nevertheless, as Modelica expressions

@@ -49,8 +49,8 @@ impl Echelon {
         self.reduced(row).iter().all(|x| x.is_zero())
     }
 
-    /// A basis of the directions that no row sees: one vector per column without pivot.
-    pub fn kernel(&self) -> Vec<Vec<Modular>> {
+    /// The rows in reduced form: each pivot column is zero in all rows but its own.
+    pub fn reduced_rows(&self) -> Vec<(usize, Vec<Modular>)> {
         let mut rows = self.rows.clone();
         for k in (0..rows.len()).rev() {
             let (pivot, row) = rows[k].clone();
@@ -58,6 +58,12 @@ impl Echelon {
                 eliminate(above, pivot, &row);
             }
         }
+        rows
+    }
+
+    /// A basis of the directions that no row sees: one vector per column without pivot.
+    pub fn kernel(&self) -> Vec<Vec<Modular>> {
+        let rows = self.reduced_rows();
         let free = (0..self.width).filter(|j| rows.iter().all(|(pivot, _)| pivot != j));
         let direction = |j: usize| {
             let mut direction = vec![Modular::ZERO; self.width];

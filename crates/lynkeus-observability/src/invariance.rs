@@ -1,6 +1,7 @@
-//! What hides the unobservable: directions of the kernel as scalings or shifts, in the
-//! user's names.
+//! What hides the unobservable: groups of quantities that scale or shift together, and
+//! what of them is known nevertheless, in the user's names.
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use crate::field::Modular;
@@ -13,8 +14,17 @@ const SMALL: i64 = 24;
 /// Seed of the second point, which confirms what the first suggests.
 const SECOND: u64 = 4711;
 
-/// One direction of the kernel: fractions by column.
-type Weights = Vec<(usize, i64)>;
+/// A direction of the kernel with the column that moves in no other.
+type Direction = (usize, Vec<Modular>);
+/// n/d by column, relative to the own column of the direction.
+type Weights = Vec<(usize, i64, i64)>;
+
+/// How a group acts on its quantities.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Scaling,
+    Shift,
+}
 
 pub(crate) fn symmetries(
     model: &Model,
@@ -29,69 +39,140 @@ pub(crate) fn symmetries(
     let mut second = Search::new(model, question, SECOND, deadline);
     let confirmed = second.run().is_ok();
     let (others, elsewhere) = second.hidden();
-    let describe = |direction: &Vec<Modular>| {
-        let other = others
-            .iter()
-            .find(|other| leading(other) == leading(direction));
-        let name = |column: usize| model.named[column].0.clone();
-        let moves: Vec<String> = (0..direction.len())
-            .filter(|&c| !direction[c].is_zero())
-            .map(name)
-            .collect();
-        let scaling = weights(direction, Some(point));
-        let shift = weights(direction, None);
-        let same = |found: &Option<Weights>, at: Option<&[Modular]>| {
-            confirmed && found.is_some() && other.is_some_and(|o| weights(o, at) == *found)
+    let described = |group: Vec<&Direction>| {
+        let names: Vec<&str> = model.named.iter().map(|(name, _)| name.as_str()).collect();
+        let of = |kind: Kind| {
+            let here = weights_of(&group, kind, point)?;
+            let twins = group
+                .iter()
+                .map(|(own, _)| others.iter().find(|(o, _)| o == own));
+            let twins: Vec<&Direction> = twins.collect::<Option<_>>()?;
+            let there = weights_of(&twins, kind, elsewhere)?;
+            (confirmed && here == there).then_some(here)
         };
-        let names: Vec<String> = (0..direction.len()).map(name).collect();
-        match (scaling, shift) {
-            (found, _) if same(&found, Some(elsewhere)) => {
-                scaled(found.unwrap_or_default(), moves, &names)
-            }
-            (_, found) if same(&found, None) => shifted(found.unwrap_or_default(), moves, &names),
-            _ => Symmetry {
-                words: format!(
-                    "{} can change together without a trace in the outputs",
-                    moves.join(", ")
-                ),
-                invariants: vec![],
-                moves,
-            },
+        let kinds = [Kind::Scaling, Kind::Shift];
+        match kinds.into_iter().find_map(|kind| Some((kind, of(kind)?))) {
+            Some((kind, weights)) => named(kind, &group, &weights, &names),
+            None => unnamed(&group, &names),
         }
     };
-    directions.iter().map(describe).collect()
+    groups(&directions).into_iter().map(described).collect()
 }
 
-/// The last column that moves: what makes a basis vector that of its free column.
-fn leading(direction: &[Modular]) -> Option<usize> {
-    direction.iter().rposition(|x| !x.is_zero())
+fn columns(direction: &Direction) -> impl Iterator<Item = usize> + '_ {
+    let moving = |&c: &usize| !direction.1[c].is_zero();
+    (0..direction.1.len()).filter(moving)
 }
 
-/// The direction as small whole numbers, relative to the values where these are given;
-/// none where it is not of that kind.
-fn weights(direction: &[Modular], point: Option<&[Modular]>) -> Option<Weights> {
-    let relative = |column: usize| match point {
-        Some(point) => point[column]
-            .inverse()
-            .map(|inverse| direction[column] * inverse),
-        None => Some(direction[column]),
-    };
-    let columns: Vec<usize> = (0..direction.len())
-        .filter(|&c| !direction[c].is_zero())
-        .collect();
-    let first = relative(*columns.first()?)?.inverse()?;
-    let mut fractions = vec![];
-    for column in columns {
-        let (n, d) = (relative(column)? * first).as_fraction(SMALL)?;
-        fractions.push((column, n, d));
-    }
-    let common = fractions.iter().fold(1, |l, (_, _, d)| l / gcd(l, *d) * d);
-    Some(
-        fractions
+/// Directions that share quantities, directly or by others.
+fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
+    let mut groups: Vec<(BTreeSet<usize>, Vec<&Direction>)> = vec![];
+    for direction in directions {
+        let mut joined: (BTreeSet<usize>, Vec<&Direction>) = (columns(direction).collect(), vec![]);
+        let (touching, apart): (Vec<_>, Vec<_>) = groups
             .into_iter()
-            .map(|(c, n, d)| (c, n * (common / d)))
-            .collect(),
-    )
+            .partition(|(columns, _)| !columns.is_disjoint(&joined.0));
+        groups = apart;
+        for (columns, members) in touching {
+            joined.0.extend(columns);
+            joined.1.extend(members);
+        }
+        joined.1.push(direction);
+        groups.push(joined);
+    }
+    groups.into_iter().map(|(_, members)| members).collect()
+}
+
+fn weights_of(group: &[&Direction], kind: Kind, point: &[Modular]) -> Option<Vec<Weights>> {
+    group
+        .iter()
+        .map(|direction| weights(direction, kind, point))
+        .collect()
+}
+
+/// The direction as small fractions, relative to the values for a scaling; none where it
+/// is not of that kind.
+fn weights(direction: &Direction, kind: Kind, point: &[Modular]) -> Option<Weights> {
+    let relative = |column: usize| match kind {
+        Kind::Scaling => point[column]
+            .inverse()
+            .map(|inverse| direction.1[column] * inverse),
+        Kind::Shift => Some(direction.1[column]),
+    };
+    let own = relative(direction.0)?.inverse()?;
+    let fraction = |column: usize| {
+        let (n, d) = (relative(column)? * own).as_fraction(SMALL)?;
+        Some((column, n, d))
+    };
+    columns(direction).map(fraction).collect()
+}
+
+fn moved(group: &[&Direction], names: &[&str]) -> Vec<String> {
+    let all: BTreeSet<usize> = group.iter().flat_map(|d| columns(d)).collect();
+    all.into_iter()
+        .map(|column| names[column].to_owned())
+        .collect()
+}
+
+fn unnamed(group: &[&Direction], names: &[&str]) -> Symmetry {
+    let moves = moved(group, names);
+    let known = moves.len() - group.len().min(moves.len());
+    Symmetry {
+        words: format!(
+            "{} can change together without a trace in the outputs: of these {}, {known} combinations can be known",
+            moves.join(", "),
+            moves.len()
+        ),
+        invariants: vec![],
+        directions: group.len(),
+        moves,
+    }
+}
+
+/// A scaling x_i → s^{w_i}·x_i leaves products of powers with Σ m_i w_i = 0 alone, a shift
+/// x_i → x_i + s·w_i sums. Own columns move in one direction each, so that every other
+/// column c gives one: x_c with what its weights take back from the own columns.
+fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) -> Symmetry {
+    let moves = moved(group, names);
+    let own: BTreeSet<usize> = group.iter().map(|d| d.0).collect();
+    let all: BTreeSet<usize> = weights.iter().flatten().map(|w| w.0).collect();
+    let invariants: Vec<String> = all
+        .difference(&own)
+        .map(|&column| {
+            let of = |w: &Weights| w.iter().find(|w| w.0 == column).map(|w| (w.1, w.2));
+            let taken: Vec<(usize, i64, i64)> = group
+                .iter()
+                .zip(weights)
+                .filter_map(|(direction, w)| of(w).map(|(n, d)| (direction.0, n, d)))
+                .collect();
+            let common = taken.iter().fold(1, |l, (.., d)| l / gcd(l, *d) * d);
+            let mut factors = vec![(names[column], common)];
+            factors.extend(
+                taken
+                    .into_iter()
+                    .map(|(own, n, d)| (names[own], -n * (common / d))),
+            );
+            written(kind, &factors)
+        })
+        .collect();
+    let how = match kind {
+        Kind::Scaling => "scaled",
+        Kind::Shift => "shifted",
+    };
+    Symmetry {
+        words: match (invariants.is_empty(), &moves[..]) {
+            (true, [only]) => format!("{only} can have any value: the outputs do not feel it"),
+            (true, _) => format!("{} can have any values", moves.join(", ")),
+            (false, _) => format!(
+                "of {}, which can be {how} together, only {} can be known",
+                moves.join(", "),
+                invariants.join(", ")
+            ),
+        },
+        invariants,
+        directions: group.len(),
+        moves,
+    }
 }
 
 fn gcd(a: i64, b: i64) -> i64 {
@@ -102,69 +183,29 @@ fn gcd(a: i64, b: i64) -> i64 {
     }
 }
 
-/// x_i → s^{w_i}·x_i: products of powers with Σ m_i w_i = 0 stay.
-fn scaled(weights: Weights, moves: Vec<String>, names: &[String]) -> Symmetry {
-    let power = |column: usize, exponent: i64| match exponent {
-        1 => names[column].clone(),
-        _ => format!("{}^{exponent}", names[column]),
+/// `a*b^2/c`, or `a + 2*b - c`.
+fn written(kind: Kind, factors: &[(&str, i64)]) -> String {
+    let one = |name: &str, size: i64| match (kind, size) {
+        (_, 1) => name.to_owned(),
+        (Kind::Scaling, _) => format!("{name}^{size}"),
+        (Kind::Shift, _) => format!("{size}*{name}"),
     };
-    let invariants = pairs(&weights).map(|((a, p), (b, q))| {
-        let g = gcd(p, q);
-        // a^(q/g)·b^(−p/g)
-        let (m, k) = (q / g, -p / g);
-        let (m, k) = if m < 0 { (-m, -k) } else { (m, k) };
-        match k > 0 {
-            true => format!("{}*{}", power(a, m), power(b, k)),
-            false => format!("{}/{}", power(a, m), power(b, -k)),
-        }
-    });
-    let invariants: Vec<String> = invariants.collect();
-    Symmetry {
-        words: match invariants.is_empty() {
-            true => format!("any {} gives the same outputs", moves.join(", ")),
-            false => format!(
-                "only {} can be known: {} can be scaled together",
-                invariants.join(", "),
-                moves.join(", ")
-            ),
+    let side = |positive: bool| -> Vec<String> {
+        let of_sign = factors
+            .iter()
+            .filter(|(_, m)| (*m > 0) == positive && *m != 0);
+        of_sign.map(|(name, m)| one(name, m.abs())).collect()
+    };
+    let (up, down) = (side(true), side(false));
+    match kind {
+        Kind::Scaling => match down.len() {
+            0 => up.join("*"),
+            1 => format!("{}/{}", up.join("*"), down[0]),
+            _ => format!("{}/({})", up.join("*"), down.join("*")),
         },
-        invariants,
-        moves,
-    }
-}
-
-/// x_i → x_i + s·w_i: combinations with Σ m_i w_i = 0 stay.
-fn shifted(weights: Weights, moves: Vec<String>, names: &[String]) -> Symmetry {
-    let multiple = |column: usize, factor: i64| match factor {
-        1 => names[column].clone(),
-        _ => format!("{factor}*{}", names[column]),
-    };
-    let invariants = pairs(&weights).map(|((a, p), (b, q))| {
-        let g = gcd(p, q);
-        let (m, k) = (q / g, -p / g);
-        let (m, k) = if m < 0 { (-m, -k) } else { (m, k) };
-        match k > 0 {
-            true => format!("{} + {}", multiple(a, m), multiple(b, k)),
-            false => format!("{} - {}", multiple(a, m), multiple(b, -k)),
+        Kind::Shift => {
+            let down: String = down.iter().map(|term| format!(" - {term}")).collect();
+            up.join(" + ") + &down
         }
-    });
-    let invariants: Vec<String> = invariants.collect();
-    Symmetry {
-        words: format!(
-            "only {} can be known: {} can be shifted together",
-            invariants.join(", "),
-            moves.join(", ")
-        ),
-        invariants,
-        moves,
     }
-}
-
-/// The first quantity with each of the others.
-fn pairs(weights: &Weights) -> impl Iterator<Item = ((usize, i64), (usize, i64))> + '_ {
-    let first = weights.first().copied();
-    weights
-        .iter()
-        .skip(1)
-        .filter_map(move |&other| Some((first?, other)))
 }

@@ -149,14 +149,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Directions of the named quantities that the outputs do not see, with the point.
-    pub fn hidden(&self) -> (Vec<Vec<Modular>>, &[Modular]) {
+    /// Directions of the named quantities that the outputs do not see, each with the
+    /// column that moves in no other of them, and the point.
+    pub fn hidden(&self) -> (Vec<(usize, Vec<Modular>)>, &[Modular]) {
         let named = self.model.named.len();
-        let mut seen = Echelon::new(named);
-        let kernel = self.rows.kernel().into_iter();
-        let parts = kernel.map(|direction| direction[..named].to_vec());
-        let independent: Vec<_> = parts.filter(|part| seen.add(part)).collect();
-        (independent, &self.point)
+        let mut hidden = Echelon::new(named);
+        for direction in self.rows.kernel() {
+            hidden.add(&direction[..named]);
+        }
+        (hidden.reduced_rows(), &self.point)
     }
 
     /// The verdicts.

@@ -1,12 +1,24 @@
 //! What can be estimated from these sensors, by which observer, and what fails where.
 
+mod observability;
+
 use std::fmt;
 
+use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, Fit};
-use lynkeus_structure::{Condition, Extended, Point, visibility};
+use lynkeus_structure::{Condition, Point};
 use serde_json::{Value, json};
 
 use crate::{Error, Study, prepare};
+
+/// What to ask beside "which states, by which observer".
+#[derive(Clone, Debug, Default)]
+pub struct CheckOptions {
+    /// take the parameters as unknown constants, and ask for them too
+    pub parameters: bool,
+    /// expressions in states, parameters and inputs to decide on
+    pub about: Vec<String>,
+}
 
 /// The answer of `lynkeus check`.
 #[derive(Clone, Debug)]
@@ -19,77 +31,79 @@ pub struct Report {
     pub measured: Vec<String>,
     /// inputs that nobody measures
     pub unknown: Vec<String>,
-    /// what each family finds
+    /// what each family finds; none where parameters are unknown
     pub examinations: Vec<Examination>,
     /// the family to use
     pub recommended: Option<&'static str>,
-    /// for each state and unknown input: does it leave a trace in the outputs?
-    pub visible: Vec<(String, bool)>,
+    /// what can be known at all
+    pub answer: Answer,
+    /// parameters are unknown constants
+    pub parameters: bool,
 }
 
-/// Examines the study's plant with every family that the study allows.
+/// Examines the study's plant: what can be known, and by which of the families that the
+/// study allows.
 ///
 /// # Errors
-/// A study that does not fit its plant.
-pub fn check(study: &Study) -> Result<Report, Error> {
-    let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let examinations = prepare::examinations(study, &extended)?;
-    let names =
-        |of: std::ops::Range<usize>| extended.states[of].iter().map(|s| s.name.clone()).collect();
-    let split = extended.plant_states();
-    Ok(Report {
-        plant: plant.name.clone(),
-        states: names(0..split),
-        unknown: names(split..extended.states.len()),
-        measured: extended
-            .outputs
-            .iter()
-            .map(|o| o.variable.name.clone())
-            .collect(),
-        recommended: prepare::recommended(&examinations).map(|e| e.family),
-        visible: visible(&extended, &examinations)?,
-        examinations,
-    })
-}
-
-/// A family whose conditions are all proved makes everything visible; otherwise
-/// the rank of the outputs' derivatives is looked at.
-fn visible(
-    extended: &Extended<'_>,
-    examinations: &[Examination],
-) -> Result<Vec<(String, bool)>, Error> {
-    let names = extended.states.iter().map(|s| s.name.clone());
-    if examinations.iter().any(|e| e.fit == Fit::Fits) {
-        return Ok(names.map(|name| (name, true)).collect());
+/// A study that does not fit its plant; an expression of `about` that cannot be read.
+pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
+    let symbolic = prepare::symbolic_plant(study)?;
+    let answer = observability::answer(study, &symbolic, options)?;
+    let names = |of: &[lynkeus_model::Variable]| -> Vec<String> {
+        of.iter().map(|v| v.name.clone()).collect()
+    };
+    let asked = |names: &[crate::study::Name]| -> Vec<String> {
+        names.iter().map(|n| n.text.clone()).collect()
+    };
+    let mut report = Report {
+        plant: symbolic.name.clone(),
+        states: names(&symbolic.states),
+        measured: match &study.sensors.measured {
+            Some(measured) => asked(measured),
+            None => names(&symbolic.outputs),
+        },
+        unknown: asked(&study.sensors.unknown),
+        examinations: vec![],
+        recommended: None,
+        answer,
+        parameters: options.parameters,
+    };
+    let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
+    if valued && !options.parameters {
+        let plant = prepare::plant(study)?;
+        let extended = prepare::extended(study, &plant)?;
+        report.examinations = prepare::examinations(study, &extended)?;
+        report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
-    let visible = visibility::visible(extended).map_err(|error| Error::input(error.to_string()))?;
-    Ok(names.zip(visible).collect())
+    Ok(report)
 }
 
 impl Report {
-    /// True if an observer exists.
+    /// True if an observer exists, or where none was asked for.
     pub fn is_positive(&self) -> bool {
-        self.recommended.is_some()
+        self.examinations.is_empty() || self.recommended.is_some()
     }
 
     /// The report for machines.
     pub fn to_json(&self) -> Value {
         let families: Vec<Value> = self.examinations.iter().map(family).collect();
-        let visible: serde_json::Map<String, Value> = self
-            .visible
-            .iter()
-            .map(|(name, seen)| (name.clone(), json!(seen)))
-            .collect();
-        json!({
+        let visible = self.answer.quantities.iter().map(|(asked, _)| {
+            (
+                asked.name.clone(),
+                json!(asked.verdict == Verdict::Observable),
+            )
+        });
+        let mut report = json!({
             "plant": self.plant,
             "states": self.states,
             "measured": self.measured,
             "unknown": self.unknown,
             "recommended": self.recommended,
             "families": families,
-            "visible": visible,
-        })
+            "visible": visible.collect::<serde_json::Map<_, _>>(),
+        });
+        observability::add_json(&self.answer, &mut report);
+        report
     }
 }
 
@@ -148,10 +162,15 @@ impl fmt::Display for Report {
             list(&self.measured),
             list(&self.unknown)
         )?;
+        writeln!(f)?;
+        observability::print(f, self)?;
         for examination in &self.examinations {
             writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
             writeln!(f, "  {}", examination.summary)?;
             conditions(f, examination)?;
+        }
+        if self.examinations.is_empty() {
+            return Ok(());
         }
         writeln!(f)?;
         self.conclusion(f)
@@ -211,38 +230,16 @@ impl Report {
     }
 
     fn conclusion(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = |seen: bool| -> Vec<&str> {
-            self.visible
-                .iter()
-                .filter(|(_, v)| *v == seen)
-                .map(|(name, _)| name.as_str())
-                .collect()
+        let Some(family) = self.recommended else {
+            return writeln!(f, "no observer of this version fits these sensors");
         };
-        let (visible, hidden) = (named(true), named(false));
-        match self.recommended {
-            Some(family) => {
-                let all: Vec<&str> = self.visible.iter().map(|(name, _)| name.as_str()).collect();
-                writeln!(f, "can be estimated: {} (by {family})", all.join(", "))?;
-                writeln!(f, "{}", self.reason())
-            }
-            None => {
-                writeln!(f, "no observer of this version fits these sensors")?;
-                if !visible.is_empty() {
-                    writeln!(
-                        f,
-                        "leave a trace in the outputs (numerically, at generic points): {}",
-                        visible.join(", ")
-                    )?;
-                }
-                if !hidden.is_empty() {
-                    writeln!(
-                        f,
-                        "leave no trace in the outputs: {}; measure something that they act on",
-                        hidden.join(", ")
-                    )?;
-                }
-                Ok(())
-            }
-        }
+        let all = self
+            .answer
+            .quantities
+            .iter()
+            .map(|(asked, _)| asked.name.as_str());
+        let all: Vec<&str> = all.collect();
+        writeln!(f, "can be estimated: {} (by {family})", all.join(", "))?;
+        writeln!(f, "{}", self.reason())
     }
 }

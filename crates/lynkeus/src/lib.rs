@@ -69,7 +69,7 @@ pub mod tune;
 mod words;
 
 pub use certify::{CertifyReport, certify};
-pub use check::{Report, check};
+pub use check::{CheckOptions, Report, check};
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
@@ -84,6 +84,7 @@ pub use tune::tune;
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;
 pub use lynkeus_model as model;
+pub use lynkeus_observability as observability;
 pub use lynkeus_observers as observers;
 pub use lynkeus_run as run;
 pub use lynkeus_structure as structure;

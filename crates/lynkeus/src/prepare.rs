@@ -12,6 +12,18 @@ use crate::{Error, Study, systems};
 /// # Errors
 /// No plant, a file that cannot be read, or a model that is refused.
 pub fn plant(study: &Study) -> Result<Plant, Error> {
+    load(study, false)
+}
+
+/// The plant with its parameters as symbols, also those without value.
+///
+/// # Errors
+/// As [`plant`].
+pub(crate) fn symbolic_plant(study: &Study) -> Result<Plant, Error> {
+    load(study, true)
+}
+
+fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
     let Some(path) = &study.plant else {
         let message = "the study names no plant: expected `plant = \"FILE.mo\"`";
         return Err(Error::input(message).at(&study.file));
@@ -20,7 +32,7 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
     let options = LoadOptions {
         model: study.model.clone(),
         parameters: study.parameters.clone(),
-        symbolic_parameters: false,
+        symbolic_parameters,
     };
     Plant::load(path, &options).map_err(|error| Error::input(error.to_string()))
 }

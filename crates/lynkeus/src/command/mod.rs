@@ -10,7 +10,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use lynkeus::{Error, ErrorKind, Study};
+use lynkeus::{CheckOptions, Error, ErrorKind, Study};
 
 /// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.
 #[derive(Debug, Parser)]
@@ -23,6 +23,7 @@ struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   lynkeus check study.toml
+  lynkeus check model.mo --parameters --about 'k1*k2'
   lynkeus design study.toml
   lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
@@ -35,8 +36,17 @@ Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence), 2 ba
 enum Command {
     /// What can be estimated from these sensors, by which observer, and what fails where
     Check {
-        /// The study (TOML)
+        /// The study (TOML), or a model (.mo, .jl): then every output is measured and every input known
         study: PathBuf,
+        /// Which model, where a bare file holds several
+        #[arg(long, value_name = "NAME")]
+        model: Option<String>,
+        /// Take the parameters as unknown constants and ask for them too
+        #[arg(long)]
+        parameters: bool,
+        /// Decide on an expression as well, e.g. "k1*k2" (may be given several times)
+        #[arg(long, value_name = "EXPRESSION")]
+        about: Vec<String>,
         /// Print one JSON object
         #[arg(long)]
         json: bool,
@@ -128,7 +138,16 @@ pub fn main() -> ExitCode {
 
 fn execute(command: Command) -> Result<ExitCode, Error> {
     match command {
-        Command::Check { study, json } => run::check(&Study::load(study)?, json),
+        Command::Check {
+            study,
+            model,
+            parameters,
+            about,
+            json,
+        } => {
+            let study = Study::load_or_bare(study, model)?;
+            run::check(&study, &CheckOptions { parameters, about }, json)
+        }
         Command::Design {
             study,
             output,

@@ -3,14 +3,14 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{Error, Outcome, Study, Table};
+use lynkeus::{CheckOptions, Error, Outcome, Study, Table};
 use serde_json::{Value, json};
 
 use super::output::{self, print};
 use super::{Output, progress::Progress};
 
-pub(super) fn check(study: &Study, json: bool) -> Result<ExitCode, Error> {
-    let report = lynkeus::check(study)?;
+pub(super) fn check(study: &Study, options: &CheckOptions, json: bool) -> Result<ExitCode, Error> {
+    let report = lynkeus::check(study, options)?;
     match json {
         true => print(&format!("{:#}\n", report.to_json()))?,
         false => print(&report.to_string())?,

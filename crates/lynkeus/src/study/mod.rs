@@ -108,6 +108,27 @@ impl Study {
         Ok(study)
     }
 
+    /// Reads a study; a model file (`.mo`, `.jl`) stands for the study in which every output
+    /// is measured and every input known. `model` chooses among several in such a file.
+    ///
+    /// # Errors
+    /// As [`Study::load`].
+    pub fn load_or_bare(path: impl AsRef<Path>, model: Option<String>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let kind = path.extension().and_then(|e| e.to_str());
+        let bare = matches!(kind, Some("mo" | "jl"));
+        let mut study = match bare {
+            true => Self {
+                file: path.display().to_string(),
+                plant: Some(path.to_owned()),
+                ..Self::default()
+            },
+            false => Self::load(path)?,
+        };
+        study.model = model.or(study.model);
+        Ok(study)
+    }
+
     /// Reads a study from text; `file` names it in messages.
     ///
     /// # Errors

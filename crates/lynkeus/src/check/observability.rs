@@ -1,0 +1,146 @@
+//! What can be known at all, in words and for machines.
+
+use std::fmt;
+
+use lynkeus_model::Plant;
+use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
+use serde_json::{Map, Value, json};
+
+use super::{CheckOptions, Report};
+use crate::study::Name;
+use crate::{Error, Study};
+
+/// Names listed before the rest becomes a count.
+const LISTED: usize = 24;
+/// Symmetries told before the rest becomes a count.
+const TOLD: usize = 8;
+
+pub(super) fn answer(
+    study: &Study,
+    plant: &Plant,
+    options: &CheckOptions,
+) -> Result<Answer, Error> {
+    let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
+    let sensors = &study.sensors;
+    let question = Question {
+        measured: texts(sensors.measured.as_deref().unwrap_or_default()),
+        unknown: texts(&sensors.unknown),
+        disturbances: texts(&sensors.disturbances),
+        parameters: options.parameters,
+        about: options.about.clone(),
+        ..Question::default()
+    };
+    analyse(plant, &question).map_err(|error| blame(study, &error))
+}
+
+/// The place in the study of a name that does not fit.
+fn blame(study: &Study, error: &QuestionError) -> Error {
+    let refusal = Error::input(error.to_string());
+    let QuestionError::NoSuchName { name, .. } = error else {
+        return match error {
+            QuestionError::Expression(_) => refusal,
+            _ => refusal.at(&study.file),
+        };
+    };
+    let sensors = &study.sensors;
+    let measured = sensors.measured.as_deref().unwrap_or_default();
+    let mut names = measured
+        .iter()
+        .chain(&sensors.unknown)
+        .chain(&sensors.disturbances);
+    match names.find(|n| n.text == *name) {
+        Some(found) => found.blame(refusal),
+        None => refusal.at(&study.file),
+    }
+}
+
+/// `observability`, `about` and what explains them.
+pub(super) fn add_json(answer: &Answer, report: &mut Value) {
+    let verdict =
+        |asked: &lynkeus_observability::Asked| (asked.name.clone(), json!(asked.verdict.word()));
+    let quantities = answer.quantities.iter().map(|(asked, _)| verdict(asked));
+    report["observability"] = Value::Object(quantities.collect::<Map<_, _>>());
+    report["about"] = Value::Object(answer.about.iter().map(verdict).collect::<Map<_, _>>());
+    let symmetries = answer.symmetries.iter().map(|symmetry| {
+        json!({
+            "moves": symmetry.moves,
+            "words": symmetry.words,
+            "invariants": symmetry.invariants,
+        })
+    });
+    report["symmetries"] = symmetries.collect();
+    report["derivatives"] = json!(answer.order);
+    report["rank"] = json!(answer.rank);
+    report["unknowns"] = json!(answer.unknowns);
+    report["observability_notes"] = json!(answer.notes);
+}
+
+pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
+    let answer = &report.answer;
+    for (kind, plural) in [
+        (Quantity::State, "states"),
+        (Quantity::Parameter, "parameters"),
+        (Quantity::UnknownInput, "unknown inputs"),
+    ] {
+        for (verdict, words) in [
+            (Verdict::Observable, "observable"),
+            (Verdict::Unobservable, "not observable"),
+            (Verdict::Undecided, "undecided"),
+        ] {
+            let names = answer
+                .quantities
+                .iter()
+                .filter(|(asked, k)| *k == kind && asked.verdict == verdict);
+            let names: Vec<&str> = names.map(|(asked, _)| asked.name.as_str()).collect();
+            if !names.is_empty() {
+                writeln!(f, "{plural} {words}: {}", listed(&names))?;
+            }
+        }
+    }
+    for symmetry in answer.symmetries.iter().take(TOLD) {
+        writeln!(f, "  {}", symmetry.words)?;
+    }
+    if answer.symmetries.len() > TOLD {
+        writeln!(
+            f,
+            "  and {} more such directions",
+            answer.symmetries.len() - TOLD
+        )?;
+    }
+    for asked in &answer.about {
+        writeln!(f, "about {}: {}", asked.name, asked.verdict.word())?;
+    }
+    hint(f, report)?;
+    answer
+        .notes
+        .iter()
+        .try_for_each(|note| writeln!(f, "  ({note})"))
+}
+
+fn listed(names: &[&str]) -> String {
+    match names.len() > LISTED {
+        true => format!("{}, … ({} in all)", names[..LISTED].join(", "), names.len()),
+        false => names.join(", "),
+    }
+}
+
+/// What to do about it.
+fn hint(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
+    let answer = &report.answer;
+    let hidden = |kind: Quantity| {
+        let mut quantities = answer.quantities.iter();
+        quantities.any(|(asked, k)| *k == kind && asked.verdict == Verdict::Unobservable)
+    };
+    if hidden(Quantity::State) || hidden(Quantity::UnknownInput) {
+        writeln!(
+            f,
+            "  they leave no trace of their own in the outputs: measure something that they act on, or a quantity of each group above"
+        )?;
+    } else if hidden(Quantity::Parameter) {
+        writeln!(
+            f,
+            "  fix one parameter of each group above, or measure something that tells them apart"
+        )?;
+    }
+    Ok(())
+}
