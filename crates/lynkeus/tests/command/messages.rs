@@ -213,5 +213,5 @@ fn a_state_that_nothing_shows_is_named() {
     );
     let ended = folder.run(&["check", "blind.toml"]);
     assert_eq!(ended.code, 1, "{}", ended.err);
-    says(&ended.out, &["leave no trace in the outputs: b", "measure"]);
+    says(&ended.out, &["states not observable: b", "measure"]);
 }
