@@ -19,12 +19,11 @@ pub type IntervalMatrix = Vec<Vec<Interval>>;
 /// assert!(!is_positive_definite(&[vec![near(1.0), near(1.0)], vec![near(1.0), near(1.0)]]));
 /// ```
 pub fn is_positive_definite(matrix: &[Vec<Interval>]) -> bool {
-    let n = matrix.len();
     if matrix.iter().enumerate().any(|(i, row)| row.len() <= i) {
         return false;
     }
     let mut L: IntervalMatrix = vec![];
-    for i in 0..n {
+    for (i, given) in matrix.iter().enumerate() {
         let mut row: Vec<Interval> = vec![];
         for j in 0..=i {
             let above = if j == i { &row } else { &L[j] };
@@ -32,7 +31,7 @@ pub fn is_positive_definite(matrix: &[Vec<Interval>]) -> bool {
                 true => a.powi(2),
                 false => *a * *b,
             });
-            let rest = products.fold(matrix[i][j], |sum, product| sum - product);
+            let rest = products.fold(given[j], |sum, product| sum - product);
             if j < i {
                 row.push(rest / L[j][j]);
             } else if rest.is_positive() && rest.is_defined() {

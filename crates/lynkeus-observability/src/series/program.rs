@@ -320,14 +320,15 @@ impl Builder<'_> {
                 return Err(Unsupported("a singular linear system".into()));
             };
             rows.swap(k, pivot);
-            for i in 0..n {
-                if i == k || zero(self, rows[i][k]) {
+            let chosen = rows[k].clone();
+            for (_, row) in rows.iter_mut().enumerate().filter(|(i, _)| *i != k) {
+                if zero(self, row[k]) {
                     continue;
                 }
-                let factor = self.push(Step::Div(rows[i][k], rows[k][k]));
-                for j in k + 1..=n {
-                    let product = self.push(Step::Mul(factor, rows[k][j]));
-                    rows[i][j] = self.push(Step::Sub(rows[i][j], product));
+                let factor = self.push(Step::Div(row[k], chosen[k]));
+                for (entry, &above) in row.iter_mut().zip(&chosen).skip(k + 1) {
+                    let product = self.push(Step::Mul(factor, above));
+                    *entry = self.push(Step::Sub(*entry, product));
                 }
             }
         }

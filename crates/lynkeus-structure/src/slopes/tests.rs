@@ -211,8 +211,8 @@ fn hull(found: &Slopes, region: &Region, inputs: &[f64]) -> Vec<Vec<Interval>> {
             .product();
         let mut A = model.constant.clone();
         for sector in &model.sectors {
-            for i in 0..n {
-                A[i][sector.column] = A[i][sector.column] + sector.direction[i] * sector.range;
+            for (row, weight) in A.iter_mut().zip(&sector.direction) {
+                row[sector.column] = row[sector.column] + *weight * sector.range;
             }
         }
         for i in 0..n {
