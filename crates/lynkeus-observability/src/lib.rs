@@ -36,6 +36,7 @@ mod field;
 mod invariance;
 mod local;
 mod point;
+pub mod precision;
 mod search;
 mod series;
 

@@ -1,0 +1,285 @@
+//! How well states can be known: standard errors along a trajectory, for given noise and sampling.
+//!
+//! A small error δz of the state at the start of a window, unknown inputs appended as
+//! constants, changes the sample of sensor c at t_k by ∂h_c/∂z·S(t_k)·δz, where the
+//! sensitivity S solves S' = (∂f/∂z)·S, S(0) = I. With independent noise of standard deviation r the
+//! samples up to the horizon T carry the information
+//!
+//! F(T) = Σ_k Σ_c (∂h_c/∂z S(t_k))ᵀ (∂h_c/∂z S(t_k)) / r_c²,
+//!
+//! and no unbiased estimator is more precise than F⁻¹ at the start of the window and
+//! S(T)·F⁻¹·S(T)ᵀ at its end, the present (Cramér and Rao's bound; least squares reaches it where
+//! the noise is small). F itself is never formed: its square-root factor is, by orthogonal
+//! transformations of the weighted rows, so that the condition of the rows and not its square counts.
+//!
+//! ```
+//! use lynkeus_expr::Graph;
+//! use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
+//!
+//! // a cart: its place is measured ten times, 1 s apart, each time to ±0.1 m
+//! let g = Graph::new();
+//! let [time, place, speed] = ["time", "place", "speed"].map(|name| g.symbol(name));
+//! let state = |name: &str, node, start, scale| Quantity { name: name.into(), node, start, scale };
+//! let cart = Experiment {
+//!     states: vec![
+//!         state("place", place.node(), 0.0, 10.0),
+//!         state("speed", speed.node(), 1.0, 2.0),
+//!     ],
+//!     derivatives: vec![speed.node(), g.constant(0.0).node()],
+//!     sensors: vec![Sensor { name: "y".into(), node: place.node(), noise: Deviation::Absolute(0.1) }],
+//!     ..Experiment::new(&g, time.node(), Window { start: 0.0, step: 1.0, horizons: vec![9] })
+//! };
+//! let found = cart.run()?;
+//! let σ = found.deviations(0, &[0]);
+//! // the slope of a straight line through ten points
+//! let expected = 0.1 * (12.0 / (10.0 * 99.0_f64)).sqrt();
+//! assert!((σ.present[1] - expected).abs() < 1e-9);
+//! # Ok::<(), lynkeus_run::Error>(())
+//! ```
+
+mod deviations;
+mod information;
+mod orthogonal;
+mod sets;
+mod tangent;
+
+use lynkeus_expr::{Graph, Node};
+use lynkeus_run::{Error, Method};
+
+pub use deviations::{Deviations, Rank};
+pub use sets::{Advice, SensorSet};
+
+use information::Information;
+use nalgebra::DMatrix;
+
+/// Most cells (8 bytes each) of the information that is kept.
+const MOST_CELLS: usize = 60_000_000;
+
+/// Something to be estimated: a state, or an unknown input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// its name
+    pub name: String,
+    /// its symbol in the graph
+    pub node: Node,
+    /// its value at the start of the window, in its unit; not used for unknown inputs, whose
+    /// course is among [`Experiment::inputs`]
+    pub start: f64,
+    /// its range or magnitude, in its unit, above 0: what errors are compared with
+    pub scale: f64,
+}
+
+/// The standard deviation of one sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deviation {
+    /// in the unit of the sensor
+    Absolute(f64),
+    /// a share of the present value
+    Relative {
+        /// 0.05 is 5 %
+        share: f64,
+        /// in the unit of the sensor, above 0: what it does not fall below where the value is near zero
+        least: f64,
+    },
+}
+
+impl Deviation {
+    /// The standard deviation of a sample of this value.
+    pub fn at(self, value: f64) -> f64 {
+        match self {
+            Self::Absolute(deviation) => deviation,
+            Self::Relative { share, least } => (share * value.abs()).max(least),
+        }
+    }
+
+    fn is_usable(self) -> bool {
+        let (Self::Absolute(least) | Self::Relative { least, .. }) = self;
+        least > 0.0 && least.is_finite()
+    }
+}
+
+/// A sensor that is there or could be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// its name
+    pub name: String,
+    /// what it shows: an expression in time, states and inputs
+    pub node: Node,
+    /// how noisy its samples are; independent of each other and of other sensors
+    pub noise: Deviation,
+}
+
+/// When samples are taken and when the question is asked.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Window {
+    /// instant of the first sample, in the plant's unit of time
+    pub start: f64,
+    /// time between samples
+    pub step: f64,
+    /// horizons in steps, increasing: one of 9 holds the samples 0 to 9
+    pub horizons: Vec<usize>,
+}
+
+impl Window {
+    /// At most `points` horizons, spaced by equal ratios, from a few samples up to `span` (in the plant's
+    /// unit of time).
+    pub fn log_spaced(start: f64, span: f64, step: f64, points: usize) -> Self {
+        let last = (span / step * (1.0 + 1e-12)).floor().max(1.0);
+        let ratio = |i: usize| i as f64 / points.saturating_sub(1).max(1) as f64;
+        let mut horizons: Vec<usize> = (0..points.max(1))
+            .map(|i| last.powf(ratio(i)).round() as usize)
+            .chain([last as usize])
+            .collect();
+        horizons.dedup();
+        Self {
+            start,
+            step,
+            horizons,
+        }
+    }
+
+    /// The instant of sample `k`.
+    pub fn instant(&self, k: usize) -> f64 {
+        self.start + k as f64 * self.step
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let is_increasing = self.horizons.windows(2).all(|pair| pair[0] < pair[1]);
+        if self.horizons.is_empty() || !is_increasing {
+            let found = format!("{:?}", self.horizons);
+            return Err(setting("horizons", "one or more, increasing", found));
+        }
+        if !(self.step > 0.0 && self.step.is_finite() && self.start.is_finite()) {
+            let found = format!("{} from {}", self.step, self.start);
+            return Err(setting("sampling", "a finite step above 0", found));
+        }
+        Ok(())
+    }
+}
+
+/// A plant on a trajectory, and everything that could measure it.
+#[derive(Clone, Debug)]
+pub struct Experiment<'g> {
+    /// holds all expressions
+    pub graph: &'g Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// the states
+    pub states: Vec<Quantity>,
+    /// their derivatives, expressions in time, states and inputs
+    pub derivatives: Vec<Node>,
+    /// inputs that are to be estimated: the error of each is a constant over the window
+    pub unknown: Vec<Quantity>,
+    /// every input, the unknown ones included, with its course as an expression of time
+    pub inputs: Vec<(Node, Node)>,
+    /// present and possible sensors
+    pub sensors: Vec<Sensor>,
+    /// sampling and horizons
+    pub window: Window,
+    /// the integrator
+    pub method: Method,
+}
+
+impl<'g> Experiment<'g> {
+    /// Nothing to estimate and no sensors yet.
+    pub fn new(graph: &'g Graph, time: Node, window: Window) -> Self {
+        Self {
+            graph,
+            time,
+            states: vec![],
+            derivatives: vec![],
+            unknown: vec![],
+            inputs: vec![],
+            sensors: vec![],
+            window,
+            method: Method::default(),
+        }
+    }
+
+    /// Integrates plant and sensitivities once, in parallel, and gathers what every sensor tells.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for numbers that are impossible; whatever ends the integration.
+    pub fn run(&self) -> Result<Precision, Error> {
+        self.check()?;
+        tangent::run(self)
+    }
+
+    /// States, then unknown inputs.
+    fn quantities(&self) -> impl Iterator<Item = &Quantity> {
+        self.states.iter().chain(&self.unknown)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        self.window.check()?;
+        if let Some(bad) = self
+            .quantities()
+            .find(|q| !(q.scale > 0.0 && q.scale.is_finite()))
+        {
+            let what = format!("scale of '{}'", bad.name);
+            return Err(setting(what, "a finite number above 0", bad.scale));
+        }
+        if let Some(bad) = self.sensors.iter().find(|s| !s.noise.is_usable()) {
+            let what = format!("noise of '{}'", bad.name);
+            let found = format!("{:?}", bad.noise);
+            return Err(setting(what, "a standard deviation above 0", found));
+        }
+        let wide = self.quantities().count();
+        let cells = self.window.horizons.len() * (self.sensors.len() + 1) * wide * wide;
+        if cells > MOST_CELLS {
+            let what = "horizons × sensors × states²";
+            let expected = format!("at most {MOST_CELLS} (fewer horizons or candidates)");
+            return Err(setting(what, expected, cells));
+        }
+        Ok(())
+    }
+}
+
+/// What every sensor tells up to every horizon.
+#[derive(Clone, Debug)]
+pub struct Precision {
+    /// names of states and unknown inputs
+    pub names: Vec<String>,
+    /// their scales, in their units
+    pub scales: Vec<f64>,
+    /// names of the sensors
+    pub sensors: Vec<String>,
+    /// ends of the horizons, measured from the start of the window, in the plant's unit of time
+    pub horizons: Vec<f64>,
+    /// relative accuracy of the sensitivities
+    accuracy: f64,
+    checkpoints: Vec<Checkpoint>,
+}
+
+/// The end of a horizon.
+#[derive(Clone, Debug)]
+struct Checkpoint {
+    /// ∂z(T)/∂z(0)·diag(scales)
+    transition: DMatrix<f64>,
+    /// of each sensor
+    information: Vec<Information>,
+}
+
+impl Precision {
+    /// Standard errors from the samples of the sensors `set` (indices) up to horizon number
+    /// `horizon`; everything is unseen where there is no such horizon or sensor.
+    pub fn deviations(&self, horizon: usize, set: &[usize]) -> Deviations {
+        let Some(checkpoint) = self.checkpoints.get(horizon) else {
+            return Deviations::blind(self.names.len());
+        };
+        let parts = set.iter().filter_map(|&s| checkpoint.information.get(s));
+        let joined = Information::joined(self.names.len(), parts);
+        deviations::of(&joined, &checkpoint.transition, &self.scales, self.accuracy)
+    }
+}
+
+fn setting(what: impl Into<String>, expected: impl Into<String>, found: impl ToString) -> Error {
+    Error::Setting {
+        what: what.into(),
+        expected: expected.into(),
+        found: found.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,214 @@
+//! The plant with its sensitivities, integrated once for all sensors.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Node, jacobian};
+use lynkeus_run::{Error, Method, System};
+use nalgebra::DMatrix;
+
+use super::information::Information;
+use super::{Checkpoint, Experiment, Precision};
+use batch::{Batch, Piece};
+
+mod batch;
+
+/// Samples gathered before they are worked into the information.
+const CHUNK: usize = 256;
+
+/// States and sensitivities of one batch: implicit steps cost the cube of this.
+const BATCH: usize = 64;
+
+/// Sensitivities are trusted to this multiple of the integrator's tolerance.
+const TRUST: f64 = 30.0;
+
+/// The compiled plant: x' with ∂f/∂z, and the sensors with ∂h/∂z.
+#[derive(Debug)]
+struct Tangent {
+    /// number of states
+    states: usize,
+    /// derivatives as they are; outputs: the entries of ∂f/∂z
+    flow: System,
+    /// (state, quantity) of these entries
+    slopes: Vec<(usize, usize)>,
+    /// outputs: the sensors, then the entries of ∂h/∂z
+    sight: System,
+    /// (sensor, quantity) of these entries
+    views: Vec<(usize, usize)>,
+    /// of states and unknown inputs
+    scales: Vec<f64>,
+    /// sensitivities below this share of a range are rounding
+    floor: f64,
+}
+
+impl Tangent {
+    fn new(experiment: &Experiment<'_>) -> Result<Self, Error> {
+        let symbols: Vec<Node> = experiment.quantities().map(|q| q.node).collect();
+        let seen: Vec<Node> = experiment.sensors.iter().map(|s| s.node).collect();
+        let graph = experiment.graph;
+        let f = jacobian::forward(graph, &experiment.derivatives, &symbols).entries;
+        let h = jacobian::forward(graph, &seen, &symbols).entries;
+        let (relative, absolute) = tolerances(experiment.method);
+        Ok(Self {
+            states: experiment.states.len(),
+            flow: system(experiment, &experiment.derivatives, nodes(&f))?,
+            slopes: f.iter().map(|&(i, j, _)| (i, j)).collect(),
+            sight: system(
+                experiment,
+                &experiment.derivatives,
+                seen.into_iter().chain(nodes(&h)),
+            )?,
+            views: h.iter().map(|&(i, j, _)| (i, j)).collect(),
+            scales: experiment.quantities().map(|q| q.scale).collect(),
+            floor: absolute / relative,
+        })
+    }
+
+    /// Batches of sensitivities, by the quantities that they belong to.
+    fn batches(&self, experiment: &Experiment<'_>) -> Result<Vec<Batch<'_>>, Error> {
+        let wide = (BATCH / self.states.max(1)).saturating_sub(1).max(1);
+        let all: Vec<usize> = (0..self.scales.len()).collect();
+        all.chunks(wide)
+            .map(|columns| Batch::new(self, columns.to_vec(), experiment))
+            .collect()
+    }
+}
+
+fn nodes(entries: &[(usize, usize, Node)]) -> impl Iterator<Item = Node> + '_ {
+    entries.iter().map(|&(.., node)| node)
+}
+
+/// The plant under its inputs, with these outputs.
+fn system(
+    experiment: &Experiment<'_>,
+    derivatives: &[Node],
+    outputs: impl Iterator<Item = Node>,
+) -> Result<System, Error> {
+    let courses: HashMap<Node, Node> = experiment.inputs.iter().copied().collect();
+    let graph = experiment.graph;
+    let outputs: Vec<Node> = outputs.collect();
+    let outputs = graph.substitute(&outputs, &courses).into_iter();
+    let states: Vec<(String, Node, f64)> = experiment
+        .states
+        .iter()
+        .map(|q| (q.name.clone(), q.node, q.start))
+        .collect();
+    System::new(
+        graph,
+        experiment.time,
+        &states,
+        &[],
+        &graph.substitute(derivatives, &courses),
+        &outputs
+            .enumerate()
+            .map(|(i, node)| (format!("o{}", i + 1), node))
+            .collect::<Vec<_>>(),
+    )
+}
+
+/// (relative, absolute) errors per step. Fixed steps differentiate to the exact
+/// sensitivities of the stepping rule, so only rounding counts.
+fn tolerances(method: Method) -> (f64, f64) {
+    match method {
+        Method::Adaptive(t) | Method::Explicit(t) | Method::Stiff(t) => {
+            (t.relative.max(1e-14), t.absolute)
+        }
+        Method::Rk4(_) => (1e-14, 0.0),
+    }
+}
+
+/// Integrates and gathers.
+pub(super) fn run(experiment: &Experiment<'_>) -> Result<Precision, Error> {
+    let tangent = Tangent::new(experiment)?;
+    let mut batches = tangent.batches(experiment)?;
+    let window = &experiment.window;
+    let wide = tangent.scales.len();
+    let mut gathered = vec![Information::new(wide); experiment.sensors.len()];
+    let mut checkpoints = vec![];
+    let mut next = 0;
+    for &horizon in &window.horizons {
+        while next <= horizon {
+            let until = (next + CHUNK).min(horizon + 1);
+            let instants: Vec<f64> = (next..until).map(|k| window.instant(k)).collect();
+            let pieces = advance(&mut batches, &instants)?;
+            gather(experiment, &pieces, instants.len(), &mut gathered);
+            next = until;
+        }
+        gathered.iter_mut().for_each(Information::settle);
+        checkpoints.push(Checkpoint {
+            transition: transition(&tangent, &batches),
+            information: gathered.clone(),
+        });
+    }
+    let (relative, _) = tolerances(experiment.method);
+    let length = |k: &usize| *k as f64 * window.step;
+    Ok(Precision {
+        names: experiment.quantities().map(|q| q.name.clone()).collect(),
+        scales: tangent.scales.clone(),
+        sensors: experiment.sensors.iter().map(|s| s.name.clone()).collect(),
+        horizons: window.horizons.iter().map(length).collect(),
+        accuracy: TRUST * relative,
+        checkpoints,
+    })
+}
+
+/// Takes all batches over the instants, side by side.
+fn advance(batches: &mut [Batch<'_>], instants: &[f64]) -> Result<Vec<Piece>, Error> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let share = batches.len().div_ceil(threads).max(1);
+    let work = |some: &mut [Batch<'_>]| -> Result<Vec<Piece>, Error> {
+        some.iter_mut().map(|batch| batch.run(instants)).collect()
+    };
+    let work = &work;
+    std::thread::scope(|scope| {
+        let crew: Vec<_> = batches
+            .chunks_mut(share)
+            .map(|some| scope.spawn(move || work(some)))
+            .collect();
+        let mut pieces = vec![];
+        for worker in crew {
+            match worker.join() {
+                Ok(done) => pieces.extend(done?),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        Ok(pieces)
+    })
+}
+
+/// Puts the columns of the batches together, sample by sample and sensor by sensor.
+fn gather(
+    experiment: &Experiment<'_>,
+    pieces: &[Piece],
+    samples: usize,
+    gathered: &mut [Information],
+) {
+    let sensors = experiment.sensors.len();
+    for k in 0..samples {
+        for (c, sensor) in experiment.sensors.iter().enumerate() {
+            let row = k * sensors + c;
+            let value = pieces.first().map_or(0.0, |piece| piece.values[row]);
+            let weight = sensor.noise.at(value).recip();
+            let entries = pieces.iter().flat_map(|p| p.row(&p.slopes, row));
+            let gross = pieces.iter().flat_map(|p| p.row(&p.gross, row));
+            gathered[c].push(entries.map(|x| weight * x), gross.map(|x| weight * x));
+        }
+    }
+}
+
+/// ∂z/∂z(0)·diag(scales) where the batches stand; unknown inputs stay what they are.
+fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
+    let wide = tangent.scales.len();
+    let mut matrix = DMatrix::zeros(wide, wide);
+    for batch in batches {
+        for (place, &j) in batch.columns.iter().enumerate() {
+            let column = batch.column(place);
+            for (i, value) in column.iter().enumerate() {
+                matrix[(i, j)] = *value;
+            }
+        }
+    }
+    for j in tangent.states..wide {
+        matrix[(j, j)] = tangent.scales[j];
+    }
+    matrix
+}
