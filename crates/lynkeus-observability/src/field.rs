@@ -63,6 +63,20 @@ impl Modular {
         Some(if value < 0.0 { -magnitude } else { magnitude })
     }
 
+    /// A stream of random numbers that belongs to this element.
+    pub fn random(self, seed: u64) -> Random {
+        Random::new(self.0.rotate_left(29) ^ seed)
+    }
+
+    /// The integer of at most that size that this element is, if it is one.
+    pub fn as_integer(self, largest: u64) -> Option<i64> {
+        match (self.0 <= largest, PRIME - self.0 <= largest) {
+            (true, _) => Some(self.0 as i64),
+            (_, true) => Some(-((PRIME - self.0) as i64)),
+            _ => None,
+        }
+    }
+
     /// n/d with |n|, d ≤ `bound` that is this element, if there is one (Wang's rational
     /// reconstruction; it is unique as long as 2·bound² < 2⁶¹).
     pub fn as_fraction(self, bound: i64) -> Option<(i64, i64)> {
@@ -139,6 +153,11 @@ impl Random {
                 return found;
             }
         }
+    }
+
+    /// A number below `count`; 0 for none.
+    pub fn below(&mut self, count: usize) -> usize {
+        (self.bits() % count.max(1) as u64) as usize
     }
 
     /// A number in [0, 1).

@@ -7,6 +7,7 @@ use std::time::Instant;
 use crate::field::Modular;
 use crate::local::Model;
 use crate::search::Search;
+use crate::start::{self, Start};
 use crate::{Question, Symmetry};
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.
@@ -36,7 +37,10 @@ pub(crate) fn symmetries(
     if directions.is_empty() {
         return vec![];
     }
-    let mut second = Search::new(model, question, SECOND, deadline);
+    let start = start::find(model, question.limits, Start::new(model, SECOND), deadline)
+        .unwrap_or_else(|_| Start::new(model, SECOND));
+    let mut second = Search::new(model, question.limits, &start, deadline);
+    second.expect(Some(search.rank()));
     let confirmed = second.run().is_ok();
     let (others, elsewhere) = second.hidden();
     let described = |group: Vec<&Direction>| {

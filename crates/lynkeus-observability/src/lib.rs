@@ -39,6 +39,7 @@ mod point;
 pub mod precision;
 mod search;
 mod series;
+mod start;
 
 pub use answer::{Answer, Asked, Quantity, Symmetry, Verdict};
 pub use local::{Limits, Question, QuestionError, analyse};

@@ -8,10 +8,12 @@ use lynkeus_model::{Plant, Variable, parse_expression};
 use crate::field::{Modular, Random};
 use crate::search::Search;
 use crate::series::{Program, Stop, Unsupported};
+use crate::start::{self, Start};
 use crate::{Answer, Asked, Quantity, Verdict, point};
 
-/// Random points tried before the model counts as singular everywhere.
-const POINTS: u64 = 64;
+/// Seed of the first point.
+const FIRST: u64 = 1;
+const SINGULAR: &str = "its series is not defined at any of the random points tried: a division by zero, or roots of negative numbers";
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,6 +112,8 @@ pub(crate) struct Model {
     pub unknown_inputs: usize,
     /// every start is a generic point: the rank that does not grow once never grows
     pub generic: bool,
+    /// orders that are enough at a generic point
+    pub depth: usize,
 }
 
 /// Decides what can be known.
@@ -129,22 +133,35 @@ pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionErr
             ));
         }
     };
-    let mut last = None;
-    for seed in 0..POINTS {
-        let mut search = Search::new(&model, question, seed, deadline);
-        match search.run() {
-            Err(Stop::Point) => continue,
-            stop => {
-                last = Some((search, stop.err()));
-                break;
-            }
+    let start = match start::find(&model, question.limits, Start::new(&model, FIRST), deadline) {
+        Ok(start) => start,
+        Err(Stop::Point(_)) => return Ok(undecided(&model.named, question, SINGULAR)),
+        Err(stop) => {
+            return Ok(undecided(
+                &model.named,
+                question,
+                &format!("the limit of {} struck at once", stop.word()),
+            ));
         }
-    }
-    let Some((search, stop)) = last else {
-        let reason = "its series is not defined at any of the random points tried: a division by zero, or roots of negative numbers";
-        return Ok(undecided(&model.named, question, reason));
     };
+    let mut search = Search::new(&model, question.limits, &start, deadline);
+    search.expect(generic_rank(&model, question, deadline));
+    let stop = search.run().err();
     Ok(search.answer(question, stop, deadline))
+}
+
+/// The rank with random numbers for the known starts: never smaller than with the given
+/// ones, so that a search from those may stop there.
+fn generic_rank(model: &Model, question: &Question, deadline: Instant) -> Option<usize> {
+    if model.generic || model.unknown_inputs > 0 {
+        return None;
+    }
+    let mut anywhere = Start::new(model, FIRST);
+    anywhere.anywhere = true;
+    let anywhere = start::find(model, question.limits, anywhere, deadline).ok()?;
+    let mut search = Search::new(model, question.limits, &anywhere, deadline);
+    search.run().ok()?;
+    Some(search.rank())
 }
 
 fn undecided(named: &[(String, Quantity)], question: &Question, reason: &str) -> Answer {
@@ -234,12 +251,12 @@ impl Model {
             Ok(program) => program,
             Err(unsupported) => return Ok(Err((named, unsupported))),
         };
+        let of_kind = |kind: Quantity| named.iter().filter(|(_, k)| *k == kind).count();
+        let unknown_constants = of_kind(Quantity::Parameter);
         Ok(Ok(Self {
             generic: question.known_starts.is_empty(),
-            unknown_inputs: named
-                .iter()
-                .filter(|(_, kind)| *kind == Quantity::UnknownInput)
-                .count(),
+            unknown_inputs: of_kind(Quantity::UnknownInput),
+            depth: plant.states.len() + unknown_constants + 1,
             states: plant.states.len(),
             outputs: outputs.len(),
             about: about.len(),

@@ -6,83 +6,123 @@ use crate::echelon::Echelon;
 use crate::field::{Modular, Random};
 use crate::invariance::symmetries;
 use crate::local::{Model, Role, Symbol};
-use crate::series::{Run, Stop};
-use crate::{Answer, Asked, Question, Verdict};
+use crate::series::{Functions, Run, Stop};
+use crate::start::Start;
+use crate::{Answer, Asked, Limits, Question, Verdict};
 
 /// A point, the series there and the rank so far.
 pub(crate) struct Search<'a> {
     model: &'a Model,
     run: Run<'a>,
+    /// coefficients of signals
     random: Random,
+    start: &'a Start,
     width: usize,
     highest: usize,
+    /// the rank at which nothing more can come, where that is known
+    enough: Option<usize>,
     /// per symbol: its latest coefficient with sensitivities
     coefficients: Vec<(Modular, Vec<Modular>)>,
     rows: Echelon,
+    /// the rows' part in the columns of unknown inputs
+    signals: Echelon,
     /// gradients of the expressions asked about, at the start
     about: Vec<Vec<Modular>>,
     /// values of the named quantities at the start
     point: Vec<Modular>,
     order: usize,
+    /// no later derivative can change the answer
+    closed: bool,
 }
 
 impl<'a> Search<'a> {
-    pub fn new(model: &'a Model, question: &Question, seed: u64, deadline: Instant) -> Self {
+    pub fn new(model: &'a Model, limits: Limits, start: &'a Start, deadline: Instant) -> Self {
         let named = model.named.len();
-        // as many derivatives as unknowns decide; each brings a further unknown
-        // coefficient of every unknown input
-        let highest = named.max(1);
+        let highest = start.highest(model);
         let width = named + model.unknown_inputs * highest;
-        let random = Random::new(seed.wrapping_mul(0x1000_0000_01b3) + 7);
-        let room = question.limits.memory / size_of::<Modular>();
+        let room = limits.memory / size_of::<Modular>();
+        let functions = Functions::new(start.seed, &start.turned);
         Self {
-            run: Run::new(
-                &model.program,
-                width,
-                Random::new(seed + 0x9e37),
-                deadline,
-                room,
-            ),
+            run: Run::new(&model.program, width, functions, deadline, room),
             coefficients: vec![(Modular::ZERO, vec![]); model.symbols.len()],
             rows: Echelon::new(width),
+            signals: Echelon::new(width),
             about: vec![],
             point: vec![Modular::ZERO; named],
             order: 0,
+            closed: false,
+            enough: None,
+            random: Random::new(start.seed.wrapping_mul(0x1000_0000_01b3) + 7),
+            start,
             model,
-            random,
             width,
             highest,
         }
     }
 
-    /// Adds orders until the answer no longer changes.
+    /// The rank at which nothing more can come.
+    pub fn expect(&mut self, rank: Option<usize>) {
+        self.enough = rank;
+    }
+
+    pub fn rank(&self) -> usize {
+        self.rows.rank()
+    }
+
+    /// Adds orders until the answer can no longer change, or there are no more.
     pub fn run(&mut self) -> Result<(), Stop> {
-        let targets = self.model.named.len();
         for k in 0..=self.highest {
-            self.next_coefficients(k)?;
+            self.next_coefficients(k);
             let coefficients = std::mem::take(&mut self.coefficients);
             let advanced = self.run.advance(&|place| coefficients[place].clone());
             self.coefficients = coefficients;
             advanced?;
             self.order = k;
-            let before = self.rows.rank();
-            for output in 0..self.model.outputs {
-                let (_, row) = self.run.root(self.model.states + output);
-                let row = row.to_vec();
-                self.rows.add(&row);
-            }
+            let before = self.settled();
+            self.add_outputs();
             if k == 0 {
                 let first = self.model.states + self.model.outputs;
                 let gradient = |i: usize| self.run.root(first + i).1.to_vec();
                 self.about = (0..self.model.about).map(gradient).collect();
             }
-            let settled = self.model.generic && self.model.unknown_inputs == 0;
-            let complete = self.rows.rank() >= targets && self.sees_all();
-            if complete || settled && self.rows.rank() == before {
-                break;
+            self.closed = self.complete()
+                || self.enough.is_some_and(|enough| self.rows.rank() >= enough)
+                || self.start.is_generic(self.model) && k > 0 && self.settled() == before;
+            if self.closed {
+                return Ok(());
             }
         }
+        // at a generic point the states' and parameters' number of orders is enough
+        self.closed = self.start.is_generic(self.model);
         Ok(())
+    }
+
+    /// The rank of what is seen of states and parameters whatever the unknown inputs do.
+    /// Derivatives of it, with those of the outputs, give all of the next order's: at a
+    /// generic point, what did not grow once never grows.
+    fn settled(&self) -> usize {
+        self.rows.rank() - self.signals.rank()
+    }
+
+    fn add_outputs(&mut self) {
+        let named = self.model.named.len();
+        let first = named - self.model.unknown_inputs;
+        for output in 0..self.model.outputs {
+            let mut row = self.run.root(self.model.states + output).1.to_vec();
+            self.rows.add(&row);
+            if self.model.unknown_inputs > 0 {
+                row.iter_mut().take(first).for_each(|x| *x = Modular::ZERO);
+                self.signals.add(&row);
+            }
+        }
+    }
+
+    /// Whether everything is observable: then nothing more can be learnt.
+    fn complete(&self) -> bool {
+        let named = self.model.named.len();
+        self.rows.rank() >= named
+            && (self.model.unknown_inputs == 0
+                || (0..named).all(|column| self.rows.contains(&self.unit(column))))
     }
 
     fn unit(&self, column: usize) -> Vec<Modular> {
@@ -91,55 +131,42 @@ impl<'a> Search<'a> {
         unit
     }
 
-    fn sees_all(&self) -> bool {
-        (0..self.model.named.len()).all(|column| self.rows.contains(&self.unit(column)))
+    /// The first coefficients alone: whether the point is a good one.
+    pub fn first(&mut self) -> Result<(), Stop> {
+        self.next_coefficients(0);
+        let coefficients = std::mem::take(&mut self.coefficients);
+        self.run.advance(&|place| (coefficients[place].0, vec![]))
     }
 
     /// Coefficient k of every symbol: of states from the derivative's last one.
-    fn next_coefficients(&mut self, k: usize) -> Result<(), Stop> {
+    fn next_coefficients(&mut self, k: usize) {
         let model = self.model;
-        let named = model.named.len();
         let mut unknown_input = 0;
         for (place, symbol) in model.symbols.iter().enumerate() {
             self.coefficients[place] = match symbol.role {
-                Role::State(i) if k > 0 => {
-                    let inverse = Modular::new(k as u64).inverse().ok_or(Stop::Point)?;
+                _ if k == 0 => self.start(place, symbol),
+                Role::State(i) => {
+                    let inverse = Modular::new(k as u64).inverse().unwrap_or_default();
                     let (value, row) = self.run.root(i);
                     (value * inverse, row.iter().map(|x| *x * inverse).collect())
                 }
-                Role::State(_) | Role::Constant => self.start(symbol, k),
                 Role::Known => (self.random.element(), vec![]),
-                Role::Zero => (Modular::ZERO, vec![]),
+                Role::Time if k == 1 => (Modular::ONE, vec![]),
+                Role::Constant | Role::Zero | Role::Time => (Modular::ZERO, vec![]),
                 Role::Unknown => {
-                    let later = named + unknown_input * self.highest + k.saturating_sub(1);
+                    let column = model.named.len() + unknown_input * self.highest + k - 1;
                     unknown_input += 1;
-                    let column = if k == 0 { symbol.column } else { Some(later) };
-                    let value = self.random.element();
-                    match column.filter(|c| *c < self.width) {
-                        Some(column) => {
-                            if k == 0 {
-                                self.point[column] = value;
-                            }
-                            (value, self.unit(column))
-                        }
-                        None => (value, vec![]),
-                    }
+                    (self.random.element(), self.unit(column))
                 }
-                Role::Time => match k {
-                    0 => (self.random.element(), vec![]),
-                    1 => (Modular::ONE, vec![]),
-                    _ => (Modular::ZERO, vec![]),
-                },
             };
         }
-        Ok(())
     }
 
-    fn start(&mut self, symbol: &Symbol, k: usize) -> (Modular, Vec<Modular>) {
-        if k > 0 {
-            return (Modular::ZERO, vec![]);
-        }
-        let value = symbol.start.unwrap_or_else(|| self.random.element());
+    fn start(&mut self, place: usize, symbol: &Symbol) -> (Modular, Vec<Modular>) {
+        let value = match symbol.role {
+            Role::Zero => Modular::ZERO,
+            _ => self.start.value(place, symbol),
+        };
         match symbol.column {
             Some(column) => {
                 self.point[column] = value;
@@ -206,21 +233,24 @@ impl<'a> Search<'a> {
     }
 
     fn notes(&self, stop: Option<Stop>) -> Vec<String> {
+        let mut notes = vec![self.method()];
+        if let Some(stop) = stop {
+            let what = stop.word();
+            notes.push(format!("the limit of {what} struck after {} derivatives of the outputs: what is called observable is so, the rest is undecided", self.order));
+        } else if !self.closed {
+            notes.push(format!("start values are given: {} derivatives of the outputs were taken, and what would first show in a later one is missed", self.order));
+        }
+        notes
+    }
+
+    fn method(&self) -> String {
         let functions = &self.model.program.functions;
-        let method = match functions.is_empty() {
+        match functions.is_empty() {
             true => "exact arithmetic in a prime field at a random point: \"observable\" is certain, \"unobservable\" is wrong with a probability below 1e-12".to_owned(),
             false => format!(
-                "exact arithmetic in a prime field at a random point; {} enter through their differential equations, as quantities without algebraic relations to the rest",
+                "exact arithmetic in a prime field at a random point; {} enter through their differential equations, with values drawn at random that keep the usual identities",
                 functions.join(", ")
             ),
-        };
-        let limit = stop.map(|stop| {
-            let what = match stop {
-                Stop::Memory => "memory",
-                _ => "time",
-            };
-            format!("the limit of {what} struck after {} derivatives of the outputs: what is called observable is so, the rest is undecided", self.order)
-        });
-        std::iter::once(method).chain(limit).collect()
+        }
     }
 }

@@ -2,19 +2,30 @@
 
 use std::time::Instant;
 
-use super::Program;
-use super::program::Step;
-use crate::field::{Modular, Random};
+use super::program::{Inverse, Step};
+use super::{Functions, Program};
+use crate::field::Modular;
 
 /// Why a run ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stop {
-    /// a division by zero, or a root that does not exist, at this random point
-    Point,
+    /// a division by zero, or a root that does not exist, at this random point: the slot
+    Point(usize),
     /// the time is up
     Time,
     /// the memory is used up
     Memory,
+}
+
+impl Stop {
+    /// `time`, `memory` or `the point`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Stop::Time => "time",
+            Stop::Memory => "memory",
+            Stop::Point(_) => "the point",
+        }
+    }
 }
 
 /// Coefficients of one slot with their sensitivities.
@@ -30,7 +41,7 @@ pub(crate) struct Run<'a> {
     program: &'a Program,
     width: usize,
     slots: Vec<Series>,
-    random: Random,
+    functions: Functions,
     deadline: Instant,
     /// numbers that may still be stored
     room: usize,
@@ -40,7 +51,7 @@ impl<'a> Run<'a> {
     pub fn new(
         program: &'a Program,
         width: usize,
-        random: Random,
+        functions: Functions,
         deadline: Instant,
         room: usize,
     ) -> Self {
@@ -48,7 +59,7 @@ impl<'a> Run<'a> {
             program,
             width,
             slots: vec![Series::default(); program.steps.len()],
-            random,
+            functions,
             deadline,
             room,
         }
@@ -67,18 +78,14 @@ impl<'a> Run<'a> {
                 return Err(Stop::Time);
             }
             // the second of a pair is computed with the first
-            if matches!(step, Step::Cos | Step::Cosh) {
+            if matches!(step, Step::Cos) {
                 continue;
             }
             let (value, tangent) = match *step {
                 Step::Constant(c) => (if k == 0 { c } else { Modular::ZERO }, vec![]),
                 Step::Symbol(place) => symbol(place),
                 Step::Sin(a) => {
-                    self.pair(slot, a, k, -Modular::ONE)?;
-                    continue;
-                }
-                Step::Sinh(a) => {
-                    self.pair(slot, a, k, Modular::ONE)?;
+                    self.pair(slot, a, k)?;
                     continue;
                 }
                 _ => self.rational(slot, *step, k)?,
@@ -153,8 +160,8 @@ impl<'a> Run<'a> {
             Step::Mul(a, b) => self.product(&mut tangent, a, b, k),
             Step::Div(a, b) => self.quotient(&mut tangent, slot, a, b, k)?,
             Step::Sqrt(a) => self.root_of(&mut tangent, slot, a, k)?,
-            Step::Exp(a) => self.exponential(&mut tangent, slot, a, k)?,
-            Step::Integral { a, h } => self.integral(&mut tangent, a, h, k)?,
+            Step::Exp(a) => self.exponential(&mut tangent, slot, a, k),
+            Step::Integral { a, h, of } => self.integral(&mut tangent, (a, h), of, k),
             _ => Modular::ZERO,
         };
         Ok((value, tangent))
@@ -180,7 +187,7 @@ impl<'a> Run<'a> {
         b: usize,
         k: usize,
     ) -> Result<Modular, Stop> {
-        let inverse = self.value(b, 0).inverse().ok_or(Stop::Point)?;
+        let inverse = self.value(b, 0).inverse().ok_or(Stop::Point(c))?;
         let mut value = self.value(a, k);
         self.add(tangent, Modular::ONE, a, k);
         for j in 0..k {
@@ -202,19 +209,24 @@ impl<'a> Run<'a> {
         a: usize,
         k: usize,
     ) -> Result<Modular, Stop> {
-        let mut value = self.value(a, k);
-        self.add(tangent, Modular::ONE, a, k);
+        let sign = match self.functions.is_turned(c) {
+            true => -Modular::ONE,
+            false => Modular::ONE,
+        };
+        let mut value = sign * self.value(a, k);
+        self.add(tangent, sign, a, k);
         let two = Modular::new(2);
+        let missing = Stop::Point(c);
         if k == 0 {
-            let root = value.root().ok_or(Stop::Point)?;
-            let inverse = (two * root).inverse().ok_or(Stop::Point)?;
+            let root = value.root().ok_or(missing)?;
+            let inverse = (two * root).inverse().ok_or(missing)?;
             tangent.iter_mut().for_each(|t| *t = *t * inverse);
             return Ok(root);
         }
         for j in 1..k {
             value = value - self.value(c, j) * self.value(c, k - j);
         }
-        let inverse = (two * self.value(c, 0)).inverse().ok_or(Stop::Point)?;
+        let inverse = (two * self.value(c, 0)).inverse().ok_or(missing)?;
         let value = value * inverse;
         for j in 0..k {
             let other = if j == 0 { value } else { self.value(c, k - j) };
@@ -225,12 +237,13 @@ impl<'a> Run<'a> {
     }
 
     /// y_k from y' = h·a', with the coefficients of h below k: Σ j·a_j·h_{k−j}/k.
-    fn integrated(&self, a: usize, h: usize, k: usize) -> Result<Modular, Stop> {
+    fn integrated(&self, a: usize, h: usize, k: usize) -> Modular {
         let mut value = Modular::ZERO;
         for j in 1..=k {
             value = value + Modular::new(j as u64) * self.value(a, j) * self.value(h, k - j);
         }
-        Ok(value * Modular::new(k as u64).inverse().ok_or(Stop::Point)?)
+        // there are fewer orders than elements of the field
+        value * Modular::new(k as u64).inverse().unwrap_or_default()
     }
 
     /// dy = h·da
@@ -246,54 +259,43 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn exponential(
-        &mut self,
-        tangent: &mut Vec<Modular>,
-        y: usize,
-        a: usize,
-        k: usize,
-    ) -> Result<Modular, Stop> {
+    fn exponential(&mut self, tangent: &mut Vec<Modular>, y: usize, a: usize, k: usize) -> Modular {
         let value = match k {
-            0 => self.random.element(),
-            _ => self.integrated(a, y, k)?,
+            0 => self.functions.exponential(self.value(a, 0)),
+            _ => self.integrated(a, y, k),
         };
         let h = |j: usize| if j == k { value } else { self.value(y, j) };
         self.chained(tangent, a, &h, k);
-        Ok(value)
+        value
     }
 
     fn integral(
         &mut self,
         tangent: &mut Vec<Modular>,
-        a: usize,
-        h: usize,
+        (a, h): (usize, usize),
+        of: Inverse,
         k: usize,
-    ) -> Result<Modular, Stop> {
-        let value = match k {
-            0 => self.random.element(),
-            _ => self.integrated(a, h, k)?,
+    ) -> Modular {
+        let argument = self.value(a, 0);
+        let value = match (k, of) {
+            (0, Inverse::Logarithm) => self.functions.logarithm(argument),
+            (0, Inverse::Odd(of)) => self.functions.odd(of, argument),
+            _ => self.integrated(a, h, k),
         };
         self.chained(tangent, a, &|j| self.value(h, j), k);
-        Ok(value)
+        value
     }
 
-    /// s' = c·a', c' = sign·s·a' with c² − sign·s² = 1: circular for −1, hyperbolic for +1.
-    fn pair(&mut self, s: usize, a: usize, k: usize, sign: Modular) -> Result<(), Stop> {
+    /// s' = c·a', c' = −s·a'
+    fn pair(&mut self, s: usize, a: usize, k: usize) -> Result<(), Stop> {
         let c = s + 1;
         let (x, y) = match k {
-            0 => {
-                let t = self.random.element();
-                let scale = (Modular::ONE - sign * t * t).inverse().ok_or(Stop::Point)?;
-                (
-                    Modular::new(2) * t * scale,
-                    (Modular::ONE + sign * t * t) * scale,
-                )
-            }
-            _ => (self.integrated(a, c, k)?, sign * self.integrated(a, s, k)?),
+            0 => self.functions.angle(self.value(a, 0)),
+            _ => (self.integrated(a, c, k), -self.integrated(a, s, k)),
         };
         let (mut dx, mut dy) = (vec![], vec![]);
         let cosine = |j: usize| if j == k { y } else { self.value(c, j) };
-        let sine = |j: usize| sign * if j == k { x } else { self.value(s, j) };
+        let sine = |j: usize| -(if j == k { x } else { self.value(s, j) });
         self.chained(&mut dx, a, &cosine, k);
         self.chained(&mut dy, a, &sine, k);
         self.store(s, x, dx)?;
