@@ -33,6 +33,6 @@ pub use layers::Layers;
 pub use matrix::Matrix;
 pub use range::{Range, range, range_within};
 pub use region::{Dimension, Region};
-pub use slopes::Slopes;
+pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use vanish::{Vanishing, vanishes};

@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{ErrorModel, Proof, check::holds, scale::Scale};
+use super::frame::{Frame, Seen};
+use super::{ErrorModel, Proof, check::holds};
 use crate::lmi::{Affine, Problem};
 
 /// The rate is found to this relative accuracy: finer than the reserve with which gains
@@ -18,32 +19,50 @@ pub fn prove(models: &[ErrorModel], scale: &[f64], rate: f64) -> Option<Proof> {
     if !models.iter().all(|m| m.size() == n && m.is_bounded()) {
         return None;
     }
-    let scale = Scale::of(models, scale);
-    let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
+    let frames = Frame::natural(models, scale).into_iter();
+    let mut frames = frames.chain([Frame::plain(models, scale)]);
+    frames.find_map(|frame| prove_in(&frame, models, rate))
+}
 
-    let proof = scale.restored(models, &candidate(&scaled, rate * scale.unit)?);
+fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64) -> Option<Proof> {
+    let scale = &frame.scale;
+    let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
+    let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
+    let mut proof = candidate(&seen, rate * scale.unit)?;
+    proof.P = symmetric(&frame.restored(&proof.P));
+    let proof = scale.restored(models, &proof);
     let proof = Proof { rate, ..proof };
     holds(models, &proof).then_some(proof)
 }
 
-/// What the solver says, unchecked.
-fn candidate(models: &[ErrorModel], rate: f64) -> Option<Proof> {
-    let n = models.first()?.size();
+/// What the solver says, unchecked: P in the frame's axes, the multipliers in the
+/// models' units.
+fn candidate(models: &[Seen], rate: f64) -> Option<Proof> {
+    let n = models.first()?.A.nrows();
     let mut problem = Problem::new();
     let P = problem.symmetric(n);
     problem.positive(P.clone());
     problem.positive(Affine::identity(n).minus(&P));
     let mut multipliers = vec![];
     for model in models {
-        let PA = P.times(&model.nominal());
-        multipliers.push(inequality(&mut problem, model, &P, &PA, rate));
+        let PA = P.times(&model.A);
+        multipliers.push(inequality(
+            &mut problem,
+            &P,
+            &PA,
+            (&model.B, &model.C),
+            rate,
+        ));
     }
     let solution = problem.inside().ok()?;
-    let diagonal = |T: &Affine| solution.value(T).diagonal();
+    let restored = |(T, model): (&Affine, &Seen)| {
+        let diagonal = solution.value(T).diagonal();
+        diagonal.component_div(&model.weights)
+    };
     Some(Proof {
         rate,
         P: symmetric(&solution.value(&P)),
-        multipliers: multipliers.iter().map(diagonal).collect(),
+        multipliers: multipliers.iter().zip(models).map(restored).collect(),
     })
 }
 
@@ -70,24 +89,20 @@ pub fn fastest(models: &[ErrorModel], scale: &[f64], limit: f64) -> Option<Proof
     Some(best)
 }
 
-/// Adds the inequality of [`super`] for one model, PA given; returns T.
+/// Adds the inequality of [`super`] for one model, PA given, with B and C of its
+/// uncertain part B δ C; returns T.
 pub(super) fn inequality(
     problem: &mut Problem,
-    model: &ErrorModel,
     P: &Affine,
     PA: &Affine,
+    (B, C): (&DMatrix<f64>, &DMatrix<f64>),
     rate: f64,
 ) -> Affine {
-    let q = model.sectors.len();
     let decay = PA.he().plus(&P.scaled(2.0 * rate));
-    let T = problem.diagonal(q);
-    let mut selector = DMatrix::zeros(model.size(), q);
-    for (k, sector) in model.sectors.iter().enumerate() {
-        selector[(sector.column, k)] = 1.0;
-    }
-    let paid = T.after(&selector).times(&selector.transpose());
+    let T = problem.diagonal(C.nrows());
+    let paid = T.after(&C.transpose()).times(C);
     let corner = decay.plus(&paid);
-    let PB = P.times(&model.spread());
+    let PB = P.times(B);
     let block = Affine::symmetric_blocks(&corner, &PB, &T.scaled(-1.0));
     problem.positive(block.scaled(-1.0));
     T

@@ -16,6 +16,7 @@
 
 mod analysis;
 mod check;
+mod frame;
 mod model;
 mod scale;
 mod synthesis;

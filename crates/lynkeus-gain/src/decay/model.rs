@@ -102,6 +102,13 @@ impl ErrorModel {
         })
     }
 
+    /// The rows e_{s_k}ᵀ: which state each uncertain term reads.
+    pub(super) fn reads(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.sectors.len(), self.size(), |k, i| {
+            f64::from(u8::from(self.sectors[k].column == i))
+        })
+    }
+
     /// Whether every number is finite.
     pub fn is_bounded(&self) -> bool {
         let finite = |x: &Interval| x.magnitude().is_finite() && x.is_defined();

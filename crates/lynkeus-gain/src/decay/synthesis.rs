@@ -163,7 +163,13 @@ impl Scaled<'_> {
         let YC = Y.times(&self.selector());
         for model in &self.models {
             let PA = P.times(&model.nominal()).minus(&YC);
-            inequality(&mut problem, model, &P, &PA, self.rate);
+            inequality(
+                &mut problem,
+                &P,
+                &PA,
+                (&model.spread(), &model.reads()),
+                self.rate,
+            );
         }
         (problem, P, Y)
     }
@@ -239,7 +245,13 @@ impl Scaled<'_> {
         problem.positive(Affine::identity(n).minus(&P));
         for model in &self.models {
             let PA = P.times(&(model.nominal() - &KC));
-            inequality(&mut problem, model, &P, &PA, self.rate);
+            inequality(
+                &mut problem,
+                &P,
+                &PA,
+                (&model.spread(), &model.reads()),
+                self.rate,
+            );
         }
         let solution = problem.inside().ok()?;
         Some(symmetric(&solution.value(&P)))
@@ -262,7 +274,13 @@ impl Scaled<'_> {
         let constant = Affine::constant(P);
         for model in &self.models {
             let PA = constant.times(&model.nominal()).minus(&PKC);
-            inequality(&mut problem, model, &constant, &PA, self.rate);
+            inequality(
+                &mut problem,
+                &constant,
+                &PA,
+                (&model.spread(), &model.reads()),
+                self.rate,
+            );
         }
         problem.minimise(&g);
         let solution = problem.solve().ok()?;

@@ -9,7 +9,7 @@ use lynkeus_structure::{
 };
 use nalgebra::DMatrix;
 
-use super::expanded;
+use super::{expanded, innovation};
 use crate::{Assumptions, Observer};
 
 /// Cells examined per end of the range of an injection.
@@ -54,6 +54,7 @@ impl ErrorSystem {
         let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let region = seen_by(extended, observer, assumptions)?;
         let mut system = Self::of(extended, &observer.derivatives, &symbols, region)?;
+        system.around_innovations(extended, observer, &symbols)?;
         system.injection = injection(extended, observer, &system.region)?;
         (system.right, system.sides) = right(extended, observer, &system)?;
         Ok(Ok(system))
@@ -88,6 +89,28 @@ impl ErrorSystem {
             slopes,
             region,
         })
+    }
+
+    /// The slopes again, with the innovations apart: an observer is right where they
+    /// vanish, whatever its gain is there.
+    fn around_innovations(
+        &mut self,
+        extended: &Extended<'_>,
+        observer: &Observer,
+        symbols: &[Node],
+    ) -> Result<(), MissingInput> {
+        let found = innovation::of(extended, observer, &self.region)?;
+        let graph = extended.graph();
+        let derivatives = graph.substitute(&observer.derivatives, &found.images);
+        self.slopes = Slopes::around(
+            graph,
+            &derivatives,
+            symbols,
+            &found.innovations,
+            &found.region,
+        )?;
+        self.models = expanded(&self.slopes.models);
+        Ok(())
     }
 
     pub fn is_bounded(&self) -> bool {
@@ -207,6 +230,15 @@ fn seen_by(
     for side in &mut seen.dimensions {
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
     }
+    // no key of every family bounds them
+    let unbounded = observer.input_derivatives.iter().map(|d| Dimension {
+        name: d.signal.name.clone(),
+        symbol: d.signal.symbol,
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+        integer: false,
+    });
+    seen.dimensions.extend(unbounded);
     for (j, (signal, output)) in observer.measured.iter().zip(&extended.outputs).enumerate() {
         let values = range(extended.graph(), output.variable.node, region)?.enclosure;
         let values = values.inflate(assumptions.noise.get(j).copied().unwrap_or(0.0));

@@ -13,6 +13,7 @@
 
 mod blocking;
 mod error_system;
+mod innovation;
 mod lmi;
 mod refute;
 mod ultimate;

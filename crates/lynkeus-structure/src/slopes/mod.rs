@@ -10,25 +10,27 @@
 //! partial derivative over the segment from x to x̂, so it lies in the range of that
 //! derivative over the box.
 //!
+//! An observer also reads *innovations* ε = x̂_s − x_s, which vanish where it is right. They
+//! are not taken through the mean value theorem along with x̂: F(x̂, ε) − F(x, 0) is
+//! F(x̂, ε) − F(x̂, 0), whose slope in ε counts for the state s, plus F(x̂, 0) − F(x, 0). A
+//! gain g(x̂) times ε then costs the range of g, not that of ε·∂g/∂x̂.
+//!
 //! Inputs in which every equation is affine make the error system multi-affine: one
 //! model per vertex of their ranges covers all values between.
 
+mod kinks;
 mod linear;
+mod model;
 
-use std::collections::BTreeMap;
+use lynkeus_expr::{Graph, Interval, MissingInput, Node, jacobian};
+use lynkeus_gain::decay::ErrorModel;
 
-use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary, jacobian};
-use lynkeus_gain::decay::{ErrorModel, Sector};
-
-use crate::{Region, range_within};
-use linear::Splitter;
+use crate::Region;
+use kinks::{jumps_in, without_removable_jumps};
+use model::model;
 
 /// Inputs whose ranges become vertices: 2⁴ models at most.
 const VERTEX_INPUTS: usize = 4;
-/// Cells examined per end of a slope's range.
-const BUDGET: usize = 1500;
-/// Cells examined to see whether a slope has a bound at all.
-const GLANCE: usize = 50;
 
 /// The error system of a right-hand side on a box.
 #[derive(Clone, Debug)]
@@ -54,6 +56,15 @@ pub struct Slope {
     pub variables: Vec<String>,
 }
 
+/// The error of a state as the observer reads it, x̂_s − x_s.
+#[derive(Clone, Debug)]
+pub struct Innovation {
+    /// what stands for it in the equations
+    pub symbol: Node,
+    /// s
+    pub state: usize,
+}
+
 impl Slopes {
     /// The error system of x' = `derivatives` in `states`.
     ///
@@ -65,11 +76,32 @@ impl Slopes {
         states: &[Node],
         region: &Region,
     ) -> Result<Self, MissingInput> {
-        let inputs = vertex_inputs(graph, derivatives, states, region)?;
+        Self::around(graph, derivatives, states, &[], region)
+    }
+
+    /// The error system of an observer x̂' = F(x̂, ε), with the innovations ε among the
+    /// sides of the region, their ranges around 0.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an expression reads a symbol outside the region.
+    pub fn around(
+        graph: &Graph,
+        derivatives: &[Node],
+        states: &[Node],
+        innovations: &[Innovation],
+        region: &Region,
+    ) -> Result<Self, MissingInput> {
+        let derivatives = &without_removable_jumps(graph, derivatives)[..];
+        let moving: Vec<Node> = states
+            .iter()
+            .copied()
+            .chain(innovations.iter().map(|i| i.symbol))
+            .collect();
+        let inputs = vertex_inputs(graph, derivatives, &moving, region)?;
         let mut found: Option<Self> = None;
         for vertex in 0..1_usize << inputs.len() {
             let fixed = at_vertex(region, &inputs, vertex);
-            let (model, slopes) = model(graph, derivatives, states, &fixed)?;
+            let (model, slopes) = model(graph, derivatives, states, innovations, &fixed)?;
             match &mut found {
                 None => {
                     found = Some(Self {
@@ -181,178 +213,6 @@ fn named(region: &Region, inputs: &[usize]) -> Vec<(String, f64, f64)> {
         (d.name.clone(), d.min, d.max)
     };
     inputs.iter().map(side).collect()
-}
-
-/// Nonlinear terms that share one slope per state: Σ node·coefficient.
-struct Group {
-    /// weight in each equation
-    direction: Vec<Interval>,
-    terms: Vec<(Node, Interval)>,
-}
-
-fn model(
-    graph: &Graph,
-    derivatives: &[Node],
-    states: &[Node],
-    region: &Region,
-) -> Result<(ErrorModel, Vec<Slope>), MissingInput> {
-    let n = derivatives.len();
-    let mut splitter = Splitter::new(graph, region);
-    let mut constant = vec![vec![Interval::ZERO; states.len()]; n];
-    let mut weights: BTreeMap<Node, Vec<Interval>> = BTreeMap::new();
-    for (row, &f) in derivatives.iter().enumerate() {
-        for (term, coefficient) in splitter.split(f)?.terms {
-            match states.iter().position(|&s| s == term) {
-                Some(state) => constant[row][state] = coefficient,
-                None => {
-                    let weight = weights.entry(term);
-                    weight.or_insert_with(|| vec![Interval::ZERO; n])[row] = coefficient;
-                }
-            }
-        }
-    }
-    let (mut sectors, mut slopes) = (vec![], vec![]);
-    for group in groups(weights) {
-        for (state, &symbol) in states.iter().enumerate() {
-            let Some((range, variables)) = slope(graph, &group, symbol, region)? else {
-                continue;
-            };
-            sectors.push(Sector {
-                column: state,
-                direction: group.direction.clone(),
-                range,
-            });
-            slopes.push(Slope {
-                state,
-                term: written(graph, &group, symbol),
-                range,
-                variables,
-            });
-        }
-    }
-    Ok((ErrorModel { constant, sectors }, slopes))
-}
-
-/// Terms of one equation only are taken together.
-fn groups(weights: BTreeMap<Node, Vec<Interval>>) -> Vec<Group> {
-    let (mut shared, mut alone) = (vec![], BTreeMap::<usize, Group>::new());
-    for (term, direction) in weights {
-        let used = |(_, w): &(usize, &Interval)| **w != Interval::ZERO;
-        let rows: Vec<usize> = direction
-            .iter()
-            .enumerate()
-            .filter(used)
-            .map(|r| r.0)
-            .collect();
-        if let [row] = rows[..] {
-            let group = alone.entry(row).or_insert_with(|| {
-                let mut unit = vec![Interval::ZERO; direction.len()];
-                unit[row] = Interval::ONE;
-                Group {
-                    direction: unit,
-                    terms: vec![],
-                }
-            });
-            group.terms.push((term, direction[row]));
-        } else {
-            let terms = vec![(term, Interval::ONE)];
-            shared.push(Group { direction, terms });
-        }
-    }
-    shared.extend(alone.into_values());
-    shared
-}
-
-/// Range of Σ coefficient·∂term/∂state and the names of what it depends on; none where
-/// it is zero everywhere.
-fn slope(
-    graph: &Graph,
-    group: &Group,
-    state: Node,
-    region: &Region,
-) -> Result<Option<(Interval, Vec<String>)>, MissingInput> {
-    let mut sum: Option<Node> = None;
-    let mut rest = Interval::ZERO;
-    let mut jumps = false;
-    for &(term, coefficient) in &group.terms {
-        if jacobian::pattern(graph, &[term], &[state])[0].is_empty() {
-            continue;
-        }
-        jumps |= jumps_in(graph, term, state, region)?;
-        let jacobian = jacobian::forward(graph, &[term], &[state]);
-        let Some(partial) = jacobian.get(0, 0) else {
-            continue;
-        };
-        // the coefficient's middle enters the sum, what rounding left of it the rest
-        let middle = coefficient.midpoint();
-        let weighted = graph.binary(Binary::Mul, graph.constant(middle).node(), partial);
-        sum = Some(match sum {
-            Some(sum) => graph.binary(Binary::Add, sum, weighted),
-            None => weighted,
-        });
-        let left = coefficient - Interval::point(middle);
-        if left != Interval::ZERO {
-            rest = rest + left * range_within(graph, partial, region, 0)?.enclosure;
-        }
-    }
-    let Some(sum) = sum else {
-        let entire = (Interval::ENTIRE, vec![]);
-        return Ok(jumps.then_some(entire));
-    };
-    let symbols = graph.symbols_of(&[sum]);
-    let variables = region.restricted(&symbols).dimensions;
-    let names = variables.into_iter().map(|d| d.name).collect();
-    // where a few cells leave no bound, more hardly ever do
-    let first = range_within(graph, sum, region, GLANCE)?;
-    let found = match first.enclosure.magnitude().is_finite() {
-        true => range_within(graph, sum, region, BUDGET)?,
-        false => first,
-    };
-    let range = match found.defined && !jumps {
-        true => found.enclosure + rest,
-        false => Interval::ENTIRE,
-    };
-    Ok(Some((range, names)))
-}
-
-/// Whether the term may jump as the symbol moves: a condition, a sign, a rounding or the
-/// cut of an angle stands between them. |x|, min and max do not jump.
-fn jumps_in(
-    graph: &Graph,
-    term: Node,
-    symbol: Node,
-    region: &Region,
-) -> Result<bool, MissingInput> {
-    let depends = |node: Node| graph.symbols_of(&[node]).contains(&symbol);
-    for node in graph.reachable(&[term]) {
-        let jumps = match graph.op(node) {
-            Op::Select(condition, ..) => depends(condition),
-            Op::Unary(Unary::Sign | Unary::Floor, a) => depends(a),
-            Op::Binary(Binary::Less | Binary::LessEq | Binary::Equal, a, b) => {
-                depends(a) || depends(b)
-            }
-            Op::Binary(Binary::Atan2, _, x) if depends(node) => {
-                !range_within(graph, x, region, BUDGET)?
-                    .enclosure
-                    .is_positive()
-            }
-            _ => false,
-        };
-        if jumps {
-            return Ok(true);
-        }
-    }
-    Ok(false)
-}
-
-fn written(graph: &Graph, group: &Group, state: Node) -> String {
-    let depends = |term: &Node| graph.symbols_of(&[*term]).contains(&state);
-    let terms = group.terms.iter().map(|(term, _)| *term).filter(depends);
-    let texts: Vec<String> = terms.map(|term| graph.render(term, 40)).collect();
-    match &texts[..] {
-        [first, .., _] => format!("{first} and {} more", texts.len() - 1),
-        _ => texts.concat(),
-    }
 }
 
 #[cfg(test)]

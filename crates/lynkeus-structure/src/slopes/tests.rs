@@ -114,7 +114,7 @@ fn what_jumps_has_no_slope_and_what_bends_has() {
     };
     for f in [
         "if a > 0 then 1 else 0",
-        "a*sign(a)",
+        "(a + 1)*sign(a)",
         "floor(a)",
         "atan2(0.5, a)",
         "sqrt(a)",
@@ -131,6 +131,10 @@ fn what_jumps_has_no_slope_and_what_bends_has() {
     for (f, low, high) in [
         ("abs(a)", -1.0, 1.0),
         ("max(a, 0)", 0.0, 1.0),
+        ("a*sign(a)", -1.0, 1.0),
+        ("-(2*sign(-a))*(3*a)", -6.0, 6.0),
+        ("1/(1 + a*(0.5*sign(a)))", -0.5, 0.5),
+        ("a*abs(a)", 0.0, 2.0),
         ("atan2(a, 2)", 0.4, 0.5),
     ] {
         let plant = plant(&text(f));
@@ -142,6 +146,100 @@ fn what_jumps_has_no_slope_and_what_bends_has() {
             "{f} {range:?}"
         );
     }
+}
+
+/// g(x̂)·ε costs the range of g; through the mean value theorem it would cost ε·∂g/∂x̂ too.
+#[test]
+fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
+    let plant = plant(
+        "model P
+          Real a(min = 0, max = 4); Real b(min = 1, max = 2);
+          output Real y = a;
+        equation
+          der(a) = b^3; der(b) = -b;
+        end P;",
+    );
+    let graph = &plant.graph;
+    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let mut region = extended.region();
+    let [a, b] = extended.symbols()[..] else {
+        panic!("two states")
+    };
+    let error = graph.symbol("error of a");
+    region.dimensions.push(crate::Dimension {
+        name: "error of a".into(),
+        symbol: error.node(),
+        min: -4.0,
+        max: 4.0,
+        integer: false,
+    });
+    let correction = (error * 5.0) / graph.expr(b).powi(2);
+    let corrected = vec![
+        (graph.expr(extended.derivatives[0]) - error * 7.0).node(),
+        (graph.expr(extended.derivatives[1]) - correction).node(),
+    ];
+    let innovations = [Innovation {
+        symbol: error.node(),
+        state: 0,
+    }];
+    let found = Slopes::around(graph, &corrected, &[a, b], &innovations, &region).unwrap();
+    let model = &found.models[0];
+    assert_eq!(model.constant[0][0], Interval::point(-7.0));
+    let of = |column: usize| model.sectors.iter().filter(move |s| s.column == column);
+    let gains: Vec<_> = of(0).collect();
+    assert_eq!(gains.len(), 1, "{:?}", found.slopes);
+    let ends = gains[0].direction[1] * gains[0].range;
+    assert!(
+        (ends.lo() + 5.0).abs() < 1e-2 && (ends.hi() + 1.25).abs() < 1e-2,
+        "{ends:?}"
+    );
+    // only b³ is left for b
+    assert_eq!(of(1).count(), 1, "{:?}", found.slopes);
+    let slope = of(1).next().unwrap().range;
+    assert!((slope.lo() - 3.0).abs() < 1e-2 && (slope.hi() - 12.0).abs() < 1e-1);
+}
+
+/// Two slopes of one state in one equation are one uncertain number.
+#[test]
+fn slopes_of_the_same_state_and_equation_are_added() {
+    let plant = plant(
+        "model P
+          Real a(min = 0, max = 4); Real b(min = 1, max = 2);
+          output Real y = a;
+        equation
+          der(a) = b; der(b) = -a^2;
+        end P;",
+    );
+    let graph = &plant.graph;
+    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let mut region = extended.region();
+    let symbols = extended.symbols();
+    let error = graph.symbol("error of a");
+    region.dimensions.push(crate::Dimension {
+        name: "error of a".into(),
+        symbol: error.node(),
+        min: -4.0,
+        max: 4.0,
+        integer: false,
+    });
+    let correction = error * graph.expr(symbols[1]);
+    let corrected = vec![
+        extended.derivatives[0],
+        (graph.expr(extended.derivatives[1]) - correction).node(),
+    ];
+    let innovations = [Innovation {
+        symbol: error.node(),
+        state: 0,
+    }];
+    let found = Slopes::around(graph, &corrected, &symbols, &innovations, &region).unwrap();
+    // −2a in [−8, 0] and −b in [−2, −1]
+    assert_eq!(found.slopes.len(), 1, "{:?}", found.slopes);
+    let sector = &found.models[0].sectors[0];
+    let range = sector.direction[1] * sector.range;
+    assert!(
+        (range.lo() + 10.0).abs() < 0.05 && (range.hi() + 1.0).abs() < 0.05,
+        "{range:?}"
+    );
 }
 
 const SYSTEM: &str = "model P

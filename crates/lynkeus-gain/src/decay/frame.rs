@@ -1,0 +1,209 @@
+//! Coordinates in which a Lyapunov function is easy to find.
+//!
+//! High gain makes the sizes of P's entries differ by powers of the gain: in the units of
+//! the plant a solver runs out of digits where a proof exists. In the coordinates in which
+//! the middle matrix is balanced and the Lyapunov function of that matrix is the unit
+//! sphere, the P sought is near the identity. The choice decides what is found, not what
+//! is accepted: the check sees the plant's own units.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{ErrorModel, scale::Scale};
+
+/// Sweeps of the balancing.
+const SWEEPS: usize = 20;
+/// States up to which the axes are turned.
+const STATES: usize = 10;
+
+/// e = D T e′, time in units.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    /// D and the unit of time
+    pub scale: Scale,
+    /// T
+    axes: DMatrix<f64>,
+    inverse: DMatrix<f64>,
+}
+
+impl Frame {
+    /// The given sizes, and no more.
+    pub fn plain(models: &[ErrorModel], sizes: &[f64]) -> Self {
+        let n = sizes.len();
+        Self {
+            scale: Scale::of(models, sizes),
+            axes: DMatrix::identity(n, n),
+            inverse: DMatrix::identity(n, n),
+        }
+    }
+
+    /// Balanced, with the middle matrix's Lyapunov function as unit sphere; none where
+    /// that matrix is not stable.
+    pub fn natural(models: &[ErrorModel], sizes: &[f64]) -> Option<Self> {
+        let sizes = balanced(&middle(models, sizes), sizes);
+        // other axes fill the matrices, which takes longer than it helps where they are large
+        if sizes.len() > STATES {
+            return Some(Self::plain(models, &sizes));
+        }
+        let scale = Scale::of(models, &sizes);
+        let P = lyapunov(&(middle(models, &sizes) * scale.unit))?;
+        let upper = P.cholesky()?.l().transpose();
+        Some(Self {
+            axes: upper.clone().try_inverse()?,
+            inverse: upper,
+            scale,
+        })
+    }
+
+    /// A, B and C of a scaled model e' = (A + B δ C) e in these axes.
+    pub fn seen(&self, model: &ErrorModel) -> Seen {
+        let q = model.sectors.len();
+        let mut B = &self.inverse * model.spread();
+        let mut C = model.reads() * &self.axes;
+        let mut weights = DVector::repeat(q, 1.0);
+        for k in 0..q {
+            // b δ cᵀ = (b w) δ (c/w)ᵀ: the same size on both sides
+            let w = (C.row(k).norm() / B.column(k).norm()).sqrt();
+            if w.is_finite() && w > 0.0 {
+                B.column_mut(k).scale_mut(w);
+                C.row_mut(k).scale_mut(1.0 / w);
+                weights[k] = w * w;
+            }
+        }
+        Seen {
+            A: &self.inverse * model.nominal() * &self.axes,
+            B,
+            C,
+            weights,
+        }
+    }
+
+    /// P in the scaled units from P in these axes.
+    pub fn restored(&self, P: &DMatrix<f64>) -> DMatrix<f64> {
+        self.inverse.transpose() * P * &self.inverse
+    }
+}
+
+/// A model in the axes of a frame.
+pub(super) struct Seen {
+    pub A: DMatrix<f64>,
+    pub B: DMatrix<f64>,
+    pub C: DMatrix<f64>,
+    /// a multiplier here is this times that of the model
+    pub weights: DVector<f64>,
+}
+
+/// The mean of the models' middle matrices, in units of the sizes.
+fn middle(models: &[ErrorModel], sizes: &[f64]) -> DMatrix<f64> {
+    let n = sizes.len();
+    let sum = models.iter().fold(DMatrix::zeros(n, n), |sum, m| {
+        sum + m.scaled(sizes, 1.0).nominal()
+    });
+    sum / models.len().max(1) as f64
+}
+
+/// Sizes for which rows and columns of the matrix have equal sums beside the diagonal
+/// (Osborne 1960).
+fn balanced(A: &DMatrix<f64>, sizes: &[f64]) -> Vec<f64> {
+    let n = sizes.len();
+    let mut d = vec![1.0_f64; n];
+    for _ in 0..SWEEPS {
+        for i in 0..n {
+            let others = (0..n).filter(|&j| j != i);
+            let (row, column) = others.fold((0.0, 0.0), |(row, column), j| {
+                (
+                    row + A[(i, j)].abs() * d[j] / d[i],
+                    column + A[(j, i)].abs() * d[i] / d[j],
+                )
+            });
+            let factor = (row / column).sqrt();
+            if factor.is_finite() && factor > 0.0 {
+                d[i] *= factor;
+            }
+        }
+    }
+    let pairs = sizes.iter().zip(&d);
+    pairs.map(|(size, d)| size * d).collect()
+}
+
+/// P > 0 with AᵀP + PA = −I; none where A is not stable.
+fn lyapunov(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = A.nrows();
+    let unit = DMatrix::<f64>::identity(n, n);
+    let system = unit.kronecker(&A.transpose()) + A.transpose().kronecker(&unit);
+    let right = DVector::from_column_slice((-unit).as_slice());
+    let solution = system.lu().solve(&right)?;
+    let P = DMatrix::from_column_slice(n, n, solution.as_slice());
+    let P = (&P + P.transpose()) * 0.5;
+    (P.iter().all(|x| x.is_finite()) && P.clone().cholesky().is_some()).then_some(P)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn balancing_undoes_the_powers_of_a_high_gain() {
+        let θ: f64 = 1e3;
+        let A = DMatrix::from_row_slice(
+            3,
+            3,
+            &[
+                -3.0 * θ,
+                1.0,
+                0.0,
+                -3.0 * θ * θ,
+                0.0,
+                1.0,
+                -θ.powi(3),
+                0.0,
+                0.0,
+            ],
+        );
+        let d = balanced(&A, &[1.0; 3]);
+        let step = |i: usize| d[i + 1] / d[i] / θ;
+        assert!(
+            (0.2..5.0).contains(&step(0)) && (0.2..5.0).contains(&step(1)),
+            "{d:?}"
+        );
+    }
+
+    /// A chain of four with gains up to θ⁴ = 10¹²: in the units of the plant no solver
+    /// finds the Lyapunov function that exists.
+    #[test]
+    fn a_very_high_gain_is_proved() {
+        use crate::decay::Sector;
+        use lynkeus_expr::Interval;
+        let θ: f64 = 1e3;
+        let mut constant = vec![vec![Interval::ZERO; 4]; 4];
+        for (i, k) in [4.0, 6.0, 4.0, 1.0].into_iter().enumerate() {
+            constant[i][0] = Interval::point(-k * θ.powi(i as i32 + 1));
+            if i < 3 {
+                constant[i][i + 1] = Interval::ONE;
+            }
+        }
+        let unit = |row: usize| {
+            let mut direction = vec![Interval::ZERO; 4];
+            direction[row] = Interval::ONE;
+            direction
+        };
+        let sectors = (1..4).map(|row| Sector {
+            column: row,
+            direction: unit(row),
+            range: Interval::new(-30.0, 30.0).unwrap_or(Interval::ENTIRE),
+        });
+        let model = ErrorModel {
+            constant,
+            sectors: sectors.collect(),
+        };
+        let proof = super::super::prove(&[model], &[1.0; 4], 100.0);
+        assert!(proof.is_some());
+    }
+
+    #[test]
+    fn the_lyapunov_equation_is_solved_or_refused() {
+        let A = DMatrix::from_row_slice(2, 2, &[-2.0, 1.0, -1.0, 0.0]);
+        let P = lyapunov(&A).unwrap();
+        assert!((A.transpose() * &P + &P * &A + DMatrix::identity(2, 2)).amax() < 1e-12);
+        assert!(lyapunov(&-A).is_none());
+    }
+}
