@@ -18,6 +18,8 @@ pub struct Attributes {
     pub max: f64,
     /// typical size
     pub nominal: Option<f64>,
+    /// the value at the start is known
+    pub fixed: bool,
     /// physical unit
     pub unit: Option<String>,
     /// one line about it
@@ -31,6 +33,7 @@ impl Default for Attributes {
             min: f64::NEG_INFINITY,
             max: f64::INFINITY,
             nominal: None,
+            fixed: false,
             unit: None,
             description: None,
         }
@@ -259,6 +262,7 @@ fn variable(name: &str, node: Node, attributes: Attributes) -> Variable {
         max: attributes.max,
         nominal: attributes.nominal,
         integer: false,
+        fixed: attributes.fixed,
     }
 }
 

@@ -1,7 +1,9 @@
-//! A Modelica subset read into plants; every diagnostic points at the source line.
+//! Plants read from a Modelica subset or from `@ODEmodel` texts; every diagnostic points at the
+//! source line.
 //!
 //! A [`Plant`] is a system x′ = f(t, x, u), y = h(t, x, u) over one expression graph. It is
-//! written in Modelica, or in Rust as functions over expressions; both give the same plant:
+//! written in Modelica, or in Rust as functions over expressions; both give the same plant. A
+//! third way is the notation of StructuralIdentifiability.jl: [`Plant::from_ode_model`].
 //!
 //! ```
 //! use lynkeus_expr::Tape;
@@ -44,8 +46,8 @@
 //! # The subset
 //!
 //! One or more `model`s in a file, with `Real` and `Integer` declarations (`parameter`,
-//! `constant`, `input`, `output`, arrays of any rank, the attributes `start`, `min`, `max`,
-//! `nominal` and `unit`), declaration equations, and an `equation` section of scalar and array
+//! `constant`, `input`, `output`, arrays of any rank, the attributes `start`, `fixed`, `min`,
+//! `max`, `nominal` and `unit`), declaration equations, and an `equation` section of scalar and array
 //! equations, `for` loops, and `if` equations with the same number of equations in every
 //! branch. Expressions have the operators of Modelica, `if` expressions, array constructors,
 //! comprehensions, slices, `time`, and the functions of [`parse_expression`].
@@ -58,16 +60,20 @@
 
 mod balance;
 mod builder;
+mod choose;
 mod diagnostic;
 mod elaborate;
+mod language;
 mod limits;
 mod names;
+mod ode_model;
 mod plant;
 mod study;
 mod syntax;
 
 pub use builder::{Attributes, Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError};
+pub use language::model_names;
 pub use plant::{LoadOptions, Parameter, Plant, Variable};
 pub use study::parse_expression;
 pub use syntax::Span;

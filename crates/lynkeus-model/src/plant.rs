@@ -5,8 +5,9 @@ use std::path::Path;
 
 use lynkeus_expr::{Graph, Node};
 
+use crate::language::Language;
 use crate::limits::MAX_SOURCE_BYTES;
-use crate::{Diagnostic, LoadError, elaborate};
+use crate::{Diagnostic, LoadError, elaborate, ode_model};
 
 /// A plant x′ = f(t, x, u), y = h(t, x, u).
 ///
@@ -56,6 +57,8 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// declared as `Integer`
     pub integer: bool,
+    /// declared with `fixed = true`: the value at the start is known, 0 where `start` is absent
+    pub fixed: bool,
 }
 
 /// A parameter and its value; `None` where the model gives none.
@@ -108,7 +111,36 @@ impl Plant {
             .map_err(|problem| Diagnostic::new(problem, file_name, source))
     }
 
-    /// Reads a Modelica file.
+    /// Reads a text in the notation of `@ODEmodel`, as StructuralIdentifiability.jl has it.
+    /// `file_name` is what diagnostics call it; its stem is the name of a model without one.
+    ///
+    /// # Errors
+    /// The first thing in the model that is wrong or not supported.
+    ///
+    /// ```
+    /// use lynkeus_model::{LoadOptions, Plant};
+    ///
+    /// let text = "decay = @ODEmodel(
+    ///     x'(t) = -k*x(t) + u(t),
+    ///     y(t) = x(t)/2
+    /// )";
+    /// let symbolic = LoadOptions { symbolic_parameters: true, ..LoadOptions::default() };
+    /// let plant = Plant::from_ode_model(text, "decay.jl", &symbolic)?;
+    /// assert_eq!(plant.name, "decay");
+    /// assert_eq!((plant.states[0].name.as_str(), plant.inputs[0].name.as_str()), ("x", "u"));
+    /// assert_eq!(plant.parameters[0].variable.name, "k");
+    /// # Ok::<(), lynkeus_model::Diagnostic>(())
+    /// ```
+    pub fn from_ode_model(
+        source: &str,
+        file_name: &str,
+        options: &LoadOptions,
+    ) -> Result<Self, Diagnostic> {
+        ode_model::plant(source, file_name, options)
+            .map_err(|problem| Diagnostic::new(problem, file_name, source))
+    }
+
+    /// Reads a file: the notation of `@ODEmodel` where its name ends in `.jl`, else Modelica.
     ///
     /// # Errors
     /// The file cannot be read, is not UTF-8, is larger than 64 MiB, or its text is refused.
@@ -140,10 +172,10 @@ impl Plant {
                 offset,
             }
         })?;
-        Ok(Self::from_modelica(
-            source,
-            &path.display().to_string(),
-            options,
-        )?)
+        let name = path.display().to_string();
+        Ok(match Language::of(&name) {
+            Language::Modelica => Self::from_modelica(source, &name, options)?,
+            Language::OdeModel => Self::from_ode_model(source, &name, options)?,
+        })
     }
 }

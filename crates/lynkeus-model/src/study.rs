@@ -9,7 +9,8 @@ use crate::syntax::{Problem, parse_single_expression};
 /// Reads one Modelica expression, such as `if time < 20 then 0.75 else 0.38`.
 ///
 /// `names` gives the meaning of names, also of subscripted ones such as `x[3]`. Where it does
-/// not know them, `time` is the symbol `time` of the graph and `pi` is the number.
+/// not know them, `time` is the symbol `time` of the graph and `pi` is the number. Names with
+/// other characters than ASCII letters, digits and `_` stand in single quotes: `2*'β'`.
 ///
 /// The operators are those of Modelica. The functions are `sqrt exp log log10 sin cos tan asin
 /// acos atan atan2 sinh cosh tanh abs sign min max floor ceil integer mod rem div noEvent
@@ -66,7 +67,9 @@ struct StudyScope<'a> {
 
 impl Scope for StudyScope<'_> {
     fn named(&self, name: &str, mode: Mode) -> Named<'_> {
-        let node = (self.names)(name).or_else(|| {
+        let unquoted = || name.strip_prefix('\'')?.strip_suffix('\'');
+        let node = (self.names)(name).or_else(|| (self.names)(unquoted()?));
+        let node = node.or_else(|| {
             let pi = || self.graph.constant(std::f64::consts::PI).node();
             (name == "pi").then(pi)
         });

@@ -44,7 +44,8 @@ pub struct Question {
     pub disturbances: Vec<String>,
     /// parameters are unknown constants
     pub parameters: bool,
-    /// names of the states whose start values are known
+    /// names of the states whose start values are known, beside those declared with
+    /// `fixed = true`
     pub known_starts: Vec<String>,
     /// expressions to decide on, in states, parameters and inputs
     pub about: Vec<String>,
@@ -254,7 +255,7 @@ impl Model {
         let of_kind = |kind: Quantity| named.iter().filter(|(_, k)| *k == kind).count();
         let unknown_constants = of_kind(Quantity::Parameter);
         Ok(Ok(Self {
-            generic: question.known_starts.is_empty(),
+            generic: !plant.states.iter().any(|s| starts_known(s, question)),
             unknown_inputs: of_kind(Quantity::UnknownInput),
             depth: plant.states.len() + unknown_constants + 1,
             states: plant.states.len(),
@@ -280,12 +281,17 @@ fn measured(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionErr
         .collect()
 }
 
+/// Whether the start value of a state is known, by its declaration or by the question.
+fn starts_known(state: &Variable, question: &Question) -> bool {
+    state.fixed || question.known_starts.contains(&state.name)
+}
+
 /// Every symbol with its role, and the quantities that have a column of their own.
 fn symbols(plant: &Plant, question: &Question) -> (Vec<Symbol>, Vec<(String, Quantity)>) {
     let mut named = vec![];
     let mut symbols = vec![];
     for (i, state) in plant.states.iter().enumerate() {
-        let known = question.known_starts.contains(&state.name);
+        let known = starts_known(state, question);
         let start = Modular::from_f64(state.start.unwrap_or(0.0));
         let column = (!known).then(|| {
             named.push((state.name.clone(), Quantity::State));

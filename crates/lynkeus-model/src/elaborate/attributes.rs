@@ -1,10 +1,10 @@
-//! `start`, `min`, `max`, `nominal` and `unit` of declarations.
+//! `start`, `min`, `max`, `nominal`, `fixed` and `unit` of declarations.
 
 use super::scope::Mode;
 use super::symbols::{Component, Context, Symbols};
 use super::value::{Scalar, Value, describe_dims, element_name};
 use crate::Variable;
-use crate::syntax::ast::{Attribute, Declaration, ExprId, Kind};
+use crate::syntax::ast::{Attribute, Declaration, Kind};
 use crate::syntax::{Problem, Result, unquoted};
 
 /// What a declaration says of all its elements.
@@ -13,6 +13,8 @@ pub(super) struct Attributes {
     min: Option<Numbers>,
     max: Option<Numbers>,
     nominal: Option<Numbers>,
+    /// 1 for true
+    fixed: Option<Numbers>,
     unit: Option<String>,
 }
 
@@ -48,6 +50,7 @@ impl Attributes {
             min: None,
             max: None,
             nominal: None,
+            fixed: None,
             unit: None,
         };
         for attribute in &declaration.attributes {
@@ -56,6 +59,7 @@ impl Attributes {
                 "min" => &mut attributes.min,
                 "max" => &mut attributes.max,
                 "nominal" => &mut attributes.nominal,
+                "fixed" => &mut attributes.fixed,
                 "unit" => {
                     attributes.unit = Some(reader.text(attribute)?);
                     continue;
@@ -68,7 +72,12 @@ impl Attributes {
                     "this attribute is given twice",
                 ));
             }
-            *slot = reader.numbers(attribute.value)?;
+            *slot = reader.numbers(attribute)?;
+        }
+        // A start that is a parameter without value is not known, however fixed.
+        let is_start = |attribute: &Attribute| attribute.name.text(context.source) == "start";
+        if attributes.start.is_none() && declaration.attributes.iter().any(is_start) {
+            attributes.fixed = None;
         }
         attributes.check_range(context, declaration, component)?;
         Ok(attributes)
@@ -114,6 +123,7 @@ impl Attributes {
             max: at(&self.max).unwrap_or(f64::INFINITY),
             nominal: at(&self.nominal),
             integer: declaration.prefix.integer,
+            fixed: at(&self.fixed) == Some(1.0),
         }
     }
 }
@@ -135,7 +145,9 @@ impl Reader<'_, '_> {
     }
 
     /// `None` where the value needs a parameter that has none.
-    fn numbers(&self, id: ExprId) -> Result<Option<Numbers>> {
+    fn numbers(&self, attribute: &Attribute) -> Result<Option<Numbers>> {
+        let id = attribute.value;
+        let is_truth = attribute.name.text(self.context.source) == "fixed";
         let mut evaluator = self.symbols.evaluator(self.context, Mode::Structural);
         let span = self.context.ast.expression(id).span;
         let value = match evaluator.value(id) {
@@ -145,11 +157,14 @@ impl Reader<'_, '_> {
             }
             Err(problem) => return Err(problem),
         };
+        let graph = self.context.graph;
         let number = |scalar: Scalar| {
-            let message = "expected a finite number";
-            scalar
-                .number(self.context.graph)
-                .ok_or_else(|| Problem::new(span, message))
+            let (value, expected) = match (scalar, is_truth) {
+                (Scalar::Boolean(node), true) => (graph.constant_value(node), ""),
+                (_, true) => (None, "expected `true` or `false`"),
+                _ => (scalar.number(graph), "expected a finite number"),
+            };
+            value.ok_or_else(|| Problem::new(span, expected))
         };
         match value {
             Value::Scalar(scalar) => Ok(Some(Numbers::Same(number(scalar)?))),

@@ -23,8 +23,8 @@ pub(crate) use evaluate::Evaluator;
 pub(crate) use scope::{Mode, Named, Scope};
 pub(crate) use value::{Scalar, Value};
 
+use crate::choose::choose;
 use crate::limits::{Budget, MAX_ELABORATED};
-use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, ModelSyntax};
 use crate::syntax::{Problem, Result, Span, parse_file};
 use crate::{LoadOptions, Plant};
@@ -41,7 +41,7 @@ pub(crate) fn budget() -> Budget {
 /// The plant of a Modelica text.
 pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
     let ast = parse_file(source)?;
-    let model = choose(source, &ast, options)?;
+    let model = choose_model(source, &ast, options)?;
     let graph = Graph::new();
     let budget = budget();
     let context = Context {
@@ -58,42 +58,22 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
 }
 
 /// The model that is asked for, or the only one.
-fn choose<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a ModelSyntax> {
+fn choose_model<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a ModelSyntax> {
+    let none = || {
+        Problem::new(Span::default(), "the text holds no model")
+            .hint("a model reads `model Name … equation … end Name;`")
+    };
+    let name = |model: &ModelSyntax| (model.name.text(source), model.name);
+    let models: Vec<(&str, Span)> = ast.models.iter().map(name).collect();
+    let place = choose(&models, options.model.as_deref(), none)?;
+    ast.models.get(place).ok_or_else(none)
+}
+
+/// The names of the models of a Modelica text.
+pub(crate) fn names(source: &str) -> Result<Vec<String>> {
+    let models = parse_file(source)?.models;
     let name = |model: &ModelSyntax| model.name.text(source).to_owned();
-    let names: Vec<String> = ast.models.iter().map(name).collect();
-    let listed = || {
-        let shown: Vec<&str> = names.iter().take(12).map(String::as_str).collect();
-        let more = if names.len() > 12 { ", …" } else { "" };
-        format!("its models are {}{more}", shown.join(", "))
-    };
-    let Some(wanted) = &options.model else {
-        return match ast.models.as_slice() {
-            [model] => Ok(model),
-            [] => Err(Problem::new(Span::default(), "the text holds no model")
-                .hint("a model reads `model Name … equation … end Name;`")),
-            [_, second, ..] => Err(Problem::new(
-                second.name,
-                format!(
-                    "the text holds {} models; say which one to take",
-                    names.len()
-                ),
-            )
-            .hint(listed())),
-        };
-    };
-    let found = ast
-        .models
-        .iter()
-        .find(|model| model.name.text(source) == wanted);
-    found.ok_or_else(|| {
-        let place = ast
-            .models
-            .first()
-            .map(|model| model.name)
-            .unwrap_or_default();
-        let hint = did_you_mean(wanted, names.iter().map(String::as_str)).unwrap_or_else(listed);
-        Problem::new(place, format!("the text holds no model `{wanted}`")).hint(hint)
-    })
+    Ok(models.iter().map(name).collect())
 }
 
 /// Line of a span, from 1.

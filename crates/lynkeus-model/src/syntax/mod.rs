@@ -10,7 +10,7 @@ mod span;
 mod token;
 
 pub(crate) use expressions::too_many_dimensions;
-pub(crate) use parser::{parse_file, parse_single_expression, unquoted};
+pub(crate) use parser::{check_length, parse_file, parse_single_expression, unquoted};
 pub use span::Span;
 pub(crate) use span::{Problem, Result};
 pub(crate) use token::shortened;

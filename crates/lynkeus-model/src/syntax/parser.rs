@@ -19,6 +19,16 @@ pub(super) struct Parser<'s> {
     pub(super) ast: Ast,
 }
 
+/// Refuses texts whose positions would not fit a [`Span`].
+pub(crate) fn check_length(source: &str) -> Result<()> {
+    if source.len() > MAX_SOURCE_BYTES {
+        let limit = grouped(MAX_SOURCE_BYTES as u64);
+        let message = format!("the text is longer than {limit} bytes");
+        return Err(Problem::new(Span::new(0, 0), message));
+    }
+    Ok(())
+}
+
 /// Parses a whole file.
 pub(crate) fn parse_file(source: &str) -> Result<Ast> {
     let mut parser = Parser::new(source)?;
@@ -42,11 +52,7 @@ pub(crate) fn parse_single_expression(source: &str) -> Result<(Ast, ExprId)> {
 
 impl<'s> Parser<'s> {
     fn new(source: &'s str) -> Result<Self> {
-        if source.len() > MAX_SOURCE_BYTES {
-            let limit = grouped(MAX_SOURCE_BYTES as u64);
-            let message = format!("the text is longer than {limit} bytes");
-            return Err(Problem::new(Span::new(0, 0), message));
-        }
+        check_length(source)?;
         let mut parser = Self {
             source,
             lexer: Lexer::new(source),

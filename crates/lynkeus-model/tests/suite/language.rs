@@ -1,5 +1,5 @@
 //! Constructs of the language mean what Modelica says.
-use crate::support::{plant, slopes, values};
+use crate::support::{plant, refused, slopes, values};
 use lynkeus_model::{LoadOptions, Plant, parse_expression};
 
 /// A state whose derivative is the expression, evaluated with x = 2, u = 3, time = 5.
@@ -246,6 +246,7 @@ fn everything_that_is_kept_and_ignored() {
          end M;",
     );
     assert_eq!(plant.states[0].nominal, Some(10.0));
+    assert!(plant.states[0].fixed);
     assert_eq!(plant.parameters[0].variable.unit.as_deref(), Some("1/s"));
     assert_eq!(plant.parameters.len(), 1);
 }
@@ -321,4 +322,41 @@ fn study_expressions() {
             expected
         );
     }
+}
+
+#[test]
+fn known_starts() {
+    let plant = plant(
+        "model M
+           parameter Integer n = 2;
+           Real x[n](start = {1, 2}, fixed = {true, false});
+           Real v[n](each fixed = n > 1);
+           Real w;
+         equation
+           der(x) = -x;
+           der(v) = x;
+           der(w) = 1;
+         end M;",
+    );
+    let fixed: Vec<bool> = plant.states.iter().map(|state| state.fixed).collect();
+    assert_eq!(fixed, [true, false, true, true, false]);
+    let text = "model M parameter Real x0; Real x(start = x0, fixed = true);
+                equation der(x) = 1; end M;";
+    let options = LoadOptions {
+        symbolic_parameters: true,
+        ..LoadOptions::default()
+    };
+    let unvalued = Plant::from_modelica(text, "m.mo", &options).unwrap();
+    assert!(!unvalued.states[0].fixed);
+    let refused = refused("model M Real x(fixed = 1); equation der(x) = 1; end M;");
+    assert_eq!(refused.message, "expected `true` or `false`");
+}
+
+#[test]
+fn quoted_names_in_expressions() {
+    let graph = lynkeus_expr::Graph::new();
+    let names = |name: &str| (name == "β").then(|| graph.symbol("β").node());
+    let node = parse_expression("2*'β'", &graph, &names).unwrap();
+    assert_eq!(graph.symbols_of(&[node]).len(), 1);
+    assert!(parse_expression("'γ'", &graph, &names).is_err());
 }

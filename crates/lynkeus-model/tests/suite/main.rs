@@ -5,6 +5,7 @@ mod balance;
 mod examples;
 mod hostile;
 mod language;
+mod ode_model;
 mod parameters;
 mod refusals;
 mod soup;
