@@ -1,6 +1,6 @@
 //! The random point at which the series starts, and how a good one is found.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
 use crate::Limits;
@@ -11,6 +11,9 @@ use crate::series::Stop;
 
 /// Points tried before the model counts as singular everywhere.
 const POINTS: u64 = 4096;
+
+/// Failures in a row after which an operation counts as impossible at every point.
+const STUBBORN: usize = 40;
 
 /// Where the series starts: one random number per symbol.
 #[derive(Clone, Debug)]
@@ -75,6 +78,7 @@ pub(crate) fn find(
     deadline: Instant,
 ) -> Result<Start, Stop> {
     let mut random = Random::new(start.seed ^ 0x5eed);
+    let mut failures: BTreeMap<usize, usize> = BTreeMap::new();
     for _ in 0..POINTS {
         let mut search = Search::new(model, limits, &start, deadline);
         let failed = match search.first() {
@@ -82,31 +86,47 @@ pub(crate) fn find(
             Err(Stop::Point(slot)) => slot,
             Err(stop) => return Err(stop),
         };
+        // those before it had a value
+        failures.retain(|slot, _| *slot >= failed);
+        let count = failures.entry(failed).or_insert(0);
+        *count += 1;
+        match start.fresh(model, failed, &mut random) {
+            Some(place) if *count <= STUBBORN => start.draws[place] += 1,
+            // √x and √(3x), where 3 has no root: one of the two is taken of −3x
+            _ => {
+                let root = model.program.partial().any(|slot| slot == failed);
+                if !root || !start.turned.insert(failed) {
+                    return Err(Stop::Point(failed));
+                }
+                failures.remove(&failed);
+            }
+        }
+    }
+    Err(Stop::Point(0))
+}
+
+impl Start {
+    /// A symbol to draw anew for a slot: one that no earlier root depends on, if possible.
+    fn fresh(&self, model: &Model, failed: usize, random: &mut Random) -> Option<usize> {
         let free = |slot: usize| -> BTreeSet<usize> {
             let support = model.program.support(slot);
-            let drawn = |&place: &usize| start.is_drawn(&model.symbols[place]);
+            let drawn = |&place: &usize| self.is_drawn(&model.symbols[place]);
             support.into_iter().filter(drawn).collect()
         };
         let of = free(failed);
-        let mut earlier = BTreeSet::new();
-        for slot in model.program.partial().filter(|slot| *slot < failed) {
-            earlier.extend(free(slot));
-        }
+        let earlier: BTreeSet<usize> = model
+            .program
+            .partial()
+            .filter(|slot| *slot < failed)
+            .flat_map(free)
+            .collect();
         let fresh: Vec<usize> = of.difference(&earlier).copied().collect();
         let among: Vec<usize> = match fresh.is_empty() {
             true => of.into_iter().collect(),
             false => fresh,
         };
-        let Some(&place) = among.get(random.below(among.len())) else {
-            // of a number: −a has a root where a has none
-            if model.program.partial().any(|slot| slot == failed) && start.turned.insert(failed) {
-                continue;
-            }
-            return Err(Stop::Point(failed));
-        };
-        start.draws[place] += 1;
+        among.get(random.below(among.len())).copied()
     }
-    Err(Stop::Point(0))
 }
 
 impl Start {

@@ -204,6 +204,9 @@ impl Functions {
         if let Some(known) = self.known_logarithm(a) {
             return known;
         }
+        if let Some(value) = self.logarithm_of_root(a) {
+            return self.learn_logarithm(a, value);
+        }
         // a number times an earlier argument
         let of_number = self.logarithms.iter().find_map(|&(known, value)| {
             let ratio = a * known.inverse()?;
@@ -220,10 +223,25 @@ impl Functions {
     }
 
     fn draw_logarithm(&mut self, a: Modular) -> Modular {
-        let value = self.random(a).element();
+        self.learn_logarithm(a, self.random(a).element())
+    }
+
+    fn learn_logarithm(&mut self, a: Modular, value: Modular) -> Modular {
         self.logarithms.push((a, value));
         self.exponentials.learn(value, a);
         value
+    }
+
+    /// Of what an earlier argument, or its inverse, is a power.
+    fn logarithm_of_root(&self, a: Modular) -> Option<Modular> {
+        (2..=POWERS).find_map(|n| {
+            let (power, part) = (a.power(n), Modular::new(n).inverse()?);
+            self.logarithms.iter().find_map(|&(known, value)| match () {
+                () if power == known => Some(value * part),
+                () if power * known == Modular::ONE => Some(-value * part),
+                () => None,
+            })
+        })
     }
 
     /// Powers, products and quotients of earlier arguments.

@@ -1,6 +1,9 @@
 //! Verdicts judged against answers from elsewhere: by hand, planted, or from another method.
 #![allow(clippy::unwrap_used)]
 
+mod independent;
+mod limits;
+mod nonrational;
 mod planted;
 mod traps;
 
