@@ -1,6 +1,7 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
 mod gallery;
+mod gap;
 mod process;
 mod python;
 
@@ -13,18 +14,22 @@ usage: cargo xtask <task>
 
   test      every test of the workspace, with the Python cross-checks
   ci        format check, lints, documentation, then `test`
-  gallery   draw the pictures of docs/pictures again from the shipped studies";
+  gallery   draw the pictures of docs/pictures again from the shipped studies
+  gap       compute the table of docs/gap.md again from the shipped studies;
+            `gap NAME` only the rows of that example";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let task = match arguments.as_slice() {
-        [task] => task.as_str(),
-        _ => "",
+    let (task, name) = match arguments.as_slice() {
+        [task] => (task.as_str(), None),
+        [task, name] if task == "gap" => ("gap", Some(name.as_str())),
+        _ => ("", None),
     };
     let outcome = match task {
         "test" => test(),
         "ci" => ci(),
         "gallery" => gallery::draw(),
+        "gap" => gap::tabulate(name),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

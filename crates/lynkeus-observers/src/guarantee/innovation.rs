@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, MissingInput, Node, Unary};
+use lynkeus_expr::{Binary, Interval, MissingInput, Node, Unary};
 use lynkeus_structure::{Dimension, Extended, Innovation, Region, range};
 
 use crate::Observer;
@@ -65,8 +65,8 @@ pub(super) fn of(
             symbol: symbol.node(),
             state,
         });
-        let width = range(graph, hat, region)?.enclosure;
-        let size = (width - width).magnitude();
+        let values = range(graph, hat, region)?.enclosure;
+        let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
         let size = if size.is_finite() {
             size
         } else {

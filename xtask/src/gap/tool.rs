@@ -1,0 +1,105 @@
+//! The built command, run on temporary studies.
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::process::root;
+
+/// The answer of `lynkeus certify --json`.
+pub struct Certificate(Value);
+
+impl Certificate {
+    fn entries(&self, of: &str) -> &[Value] {
+        let list = self.0["certificate"][of].as_array();
+        list.map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// The rate proved by the inequality.
+    pub fn rate_by_inequality(&self) -> Option<f64> {
+        let inequality = |h: &&Value| {
+            let name = h["name"].as_str().unwrap_or_default();
+            name.starts_with("one Lyapunov function") && h["verdict"] == "proved"
+        };
+        let proof = self.entries("hypotheses").iter().find(inequality)?;
+        // the theorem may promise more, but this is about the inequality
+        let detail = proof["detail"].as_str()?;
+        let (_, rest) = detail.split_once("2·")?;
+        rest.split_once('·')?.0.parse().ok()
+    }
+
+    /// A constant of the theorem.
+    pub fn constant(&self, name: &str) -> Option<f64> {
+        let theorem = self.0["certificate"]["theorem"]["constants"].as_array()?;
+        let found = theorem.iter().find(|c| c["name"] == name)?;
+        found["value"].as_f64()
+    }
+
+    /// The largest entry of the gain.
+    pub fn largest_gain(&self) -> f64 {
+        let rows = self.0["gain"].as_object();
+        let entries = rows.into_iter().flat_map(|rows| rows.values());
+        let entries = entries
+            .filter_map(Value::as_object)
+            .flat_map(|row| row.values());
+        let sizes = entries.filter_map(Value::as_f64).map(f64::abs);
+        sizes.fold(0.0, f64::max)
+    }
+
+    /// The range of a quantity on the box.
+    pub fn range(&self, name: &str) -> Option<(f64, f64)> {
+        let side = &self.0["certificate"]["box"][name];
+        Some((side[0].as_f64()?, side[1].as_f64()?))
+    }
+}
+
+/// Exit codes of an answer: yes, and no.
+const ANSWERS: [i32; 2] = [0, 1];
+
+/// Certifies a study given as text.
+pub fn certify(study: &str) -> Result<Certificate, String> {
+    let output = lynkeus("certify", study, &["--json"])?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    match (output.status.code(), serde_json::from_str(&text)) {
+        (Some(code), Ok(answer)) if ANSWERS.contains(&code) => Ok(Certificate(answer)),
+        _ => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
+}
+
+/// The columns of a simulation by name; none where it failed.
+pub fn simulate(study: &str) -> Option<Vec<(String, Vec<f64>)>> {
+    let output = lynkeus("simulate", study, &["-o", "-", "--quiet"]).ok()?;
+    if !output.status.success() {
+        return None;
+    }
+    let text = String::from_utf8_lossy(&output.stdout);
+    let mut lines = text.lines();
+    let names = lines.next()?.split(',').map(str::to_owned);
+    let mut columns: Vec<(String, Vec<f64>)> = names.map(|name| (name, vec![])).collect();
+    for line in lines {
+        for ((_, column), cell) in columns.iter_mut().zip(line.split(',')) {
+            column.push(cell.parse().ok()?);
+        }
+    }
+    Some(columns)
+}
+
+fn lynkeus(command: &str, study: &str, arguments: &[&str]) -> Result<Output, String> {
+    let path = std::env::temp_dir().join(format!("lynkeus-gap-{}.toml", std::process::id()));
+    fs::write(&path, study).map_err(|e| format!("{}: {e}", path.display()))?;
+    let output = Command::new(program())
+        .arg(command)
+        .arg(&path)
+        .args(arguments)
+        .output();
+    output.map_err(|e| format!("{}: {e}", program().display()))
+}
+
+fn program() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR");
+    let target = target.map_or_else(|| root().join("target"), PathBuf::from);
+    let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
+    root().join(target).join("release").join(name)
+}
