@@ -1,5 +1,6 @@
 //! The `lynkeus` command.
 
+mod how_well;
 mod output;
 mod progress;
 mod run;
@@ -24,6 +25,7 @@ const EXAMPLES: &str = "\
 Examples:
   lynkeus check study.toml
   lynkeus check model.mo --parameters --about 'k1*k2'
+  lynkeus check study.toml --how-well --sensors --plot errors.svg
   lynkeus design study.toml
   lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
@@ -50,6 +52,8 @@ enum Command {
         /// Print one JSON object
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        how_well: how_well::Options,
     },
     /// Gains, matrices and parameters of the observer
     Design {
@@ -144,8 +148,12 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             parameters,
             about,
             json,
+            how_well,
         } => {
             let study = Study::load_or_bare(study, model)?;
+            if how_well.is_asked() {
+                return how_well::how_well(&study, &how_well, json);
+            }
             run::check(&study, &CheckOptions { parameters, about }, json)
         }
         Command::Design {

@@ -18,6 +18,7 @@ const SMALL: u32 = 150;
 const CAPTION: u32 = 26;
 const TICKS: u32 = 26;
 const FOOT: u32 = 30;
+const LEGEND: u32 = 34;
 const LEFT: u32 = 66;
 const RIGHT: u32 = 24;
 const BAND: RGBColor = RGBColor(222, 239, 231);
@@ -56,11 +57,50 @@ fn draw(chart: &Chart, x: &Axis, plots: &[(&Plot, Axis)], text: &mut String) -> 
         };
         panel(&area, chart, plot, x, y, i == 0)?;
     }
+    foot(&root, chart, height)?;
+    root.present()
+}
+
+/// The first panel of a chart with its legend, at the foot of another picture.
+pub(super) struct FootPanel<'c> {
+    chart: &'c Chart,
+    plot: &'c Plot,
+    x: Axis,
+    y: Axis,
+}
+
+/// None where there is nothing finite to draw.
+pub(super) fn foot_panel(chart: &Chart) -> Option<FootPanel<'_>> {
+    let plot = chart.plots.first()?;
+    Some(FootPanel {
+        chart,
+        plot,
+        x: chart.axis()?,
+        y: plot.axis(None)?,
+    })
+}
+
+impl FootPanel<'_> {
+    pub(super) fn height(&self) -> u32 {
+        LEGEND + CAPTION + BROAD + TICKS + FOOT
+    }
+
+    pub(super) fn draw(&self, area: &Area<'_>) -> Drawn {
+        legend(area, &self.plot.lines, LEGEND as i32 / 2)?;
+        let inner = area
+            .clone()
+            .shrink((0, LEGEND), (WIDTH, CAPTION + BROAD + TICKS));
+        panel(&inner, self.chart, self.plot, &self.x, &self.y, true)?;
+        foot(area, self.chart, self.height())
+    }
+}
+
+/// The label of the parameter's axis.
+fn foot(root: &Area<'_>, chart: &Chart, height: u32) -> Drawn {
     let label = (FONT, 15).into_font().color(&INK);
     let label = label.pos(Pos::new(HPos::Center, VPos::Center));
     let foot = (WIDTH as i32 / 2, (height - FOOT / 2) as i32);
-    root.draw(&Text::new(chart.label.clone(), foot, label))?;
-    root.present()
+    root.draw(&Text::new(chart.label.clone(), foot, label))
 }
 
 /// The title, and under it the legend of the first panel.
@@ -68,9 +108,13 @@ fn head(root: &Area<'_>, chart: &Chart, plots: &[(&Plot, Axis)]) -> Drawn {
     let title = (FONT, 18).into_font().style(FontStyle::Bold).color(&INK);
     root.draw(&Text::new(chart.title.clone(), (LEFT as i32, 14), title))?;
     let lines = plots.first().map_or(&[][..], |(plot, _)| &plot.lines);
+    legend(root, lines, 48)
+}
+
+/// The curves that have names, at this height.
+fn legend(root: &Area<'_>, lines: &[Line], at: i32) -> Drawn {
     let mut left = LEFT as i32;
     for line in lines.iter().filter(|l| !l.name.is_empty()) {
-        let at = 48;
         root.draw(&PathElement::new(
             [(left, at), (left + 26, at)],
             stroke(line.look),

@@ -8,6 +8,7 @@
 //! ([`Panel::limits`] has the rule).
 
 mod axis;
+mod bars;
 mod chart;
 mod decimate;
 mod grid;
@@ -16,6 +17,7 @@ mod render;
 
 use std::ops::Range;
 
+pub use bars::{Bar, Bars};
 pub use chart::{Chart, Line, Look, Plot, Upright};
 
 /// A picture: panels that share the time axis.

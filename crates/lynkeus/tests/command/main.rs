@@ -3,6 +3,7 @@
 
 mod certify;
 mod families;
+mod how_well;
 mod messages;
 mod references;
 mod runs;

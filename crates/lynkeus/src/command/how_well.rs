@@ -1,0 +1,82 @@
+//! `lynkeus check --how-well`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+
+use lynkeus::precision::{self, Candidates};
+use lynkeus::{Error, Study};
+
+use super::output::{self, print};
+
+/// How well, where the answer goes, and which sensors to try.
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// How well: standard errors along the simulated run, for its noise and sampling
+    #[arg(long)]
+    how_well: bool,
+    /// Which sensors help most: tries every output of the model, or with `all` every state as well
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, default_missing_value = "outputs")]
+    sensors: Option<Which>,
+    /// Longest horizon, in the plant's unit of time, instead of the whole run
+    #[arg(long, value_name = "TIME")]
+    horizon: Option<f64>,
+    /// Draw a bar for every state and the errors over the horizon
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the standard errors over the horizon as CSV ("-": standard output)
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Which {
+    /// Every output of the model
+    Outputs,
+    /// Every output and every state
+    All,
+}
+
+impl Options {
+    /// Whether the question is how well; what only makes sense with it asks for it.
+    pub(super) fn is_asked(&self) -> bool {
+        let has_file = self.plot.is_some() || self.output.is_some();
+        self.how_well || self.sensors.is_some() || self.horizon.is_some() || has_file
+    }
+}
+
+/// Everything is computed before the first file is written.
+pub(super) fn how_well(study: &Study, options: &Options, json: bool) -> Result<ExitCode, Error> {
+    let asked = precision::Options {
+        horizon: options.horizon,
+        sensors: options.sensors.map(|which| match which {
+            Which::Outputs => Candidates::Outputs,
+            Which::All => Candidates::All,
+        }),
+    };
+    let report = lynkeus::precision(study, &asked)?;
+    let columns = report.columns();
+    let columns: Vec<(String, &[f64])> = columns
+        .iter()
+        .map(|(name, values)| (name.clone(), &values[..]))
+        .collect();
+    if let Some(path) = &options.plot {
+        output::write(path, report.to_svg()?.as_bytes())?;
+    }
+    let to_stdout = options.output.as_deref() == Some(Path::new("-"));
+    match &options.output {
+        Some(_) if to_stdout => print(&output::csv(&columns)?)?,
+        Some(path) => output::write_table(path, &columns)?,
+        None => {}
+    }
+    match json {
+        _ if to_stdout => {}
+        true => print(&format!("{:#}\n", report.to_json()))?,
+        false => print(&report.to_string())?,
+    }
+    Ok(match report.is_positive() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(1),
+    })
+}

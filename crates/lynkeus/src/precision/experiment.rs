@@ -1,0 +1,245 @@
+//! From a study to the experiment that is judged.
+
+use lynkeus_expr::Node;
+use lynkeus_model::{Plant, Variable};
+use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
+use lynkeus_run::Trajectory;
+use lynkeus_structure::Extended;
+
+use super::{Assumed, Candidates, Options, POINTS};
+use crate::outcome::interrupted;
+use crate::study::{Noise, SimulateSettings};
+use crate::words::number;
+use crate::{Error, Study, simulate, systems};
+
+/// Noise where the study states none, as a share of the range.
+const SHARE: f64 = 0.01;
+
+/// A noise relative to the value does not fall below this share of what it is at the greatest value.
+const LEAST: f64 = 1e-3;
+
+/// The experiment, with what was assumed for it.
+pub(super) struct Setup<'p> {
+    pub experiment: Experiment<'p>,
+    /// of every sensor
+    pub assumed: Vec<Assumed>,
+    /// how many of the sensors are the study's; they come first
+    pub measured: usize,
+}
+
+impl<'p> Setup<'p> {
+    pub fn new(
+        study: &Study,
+        settings: &SimulateSettings,
+        extended: &Extended<'p>,
+        options: &Options,
+    ) -> Result<Self, Error> {
+        let plant = extended.plant;
+        let mut run = simulate::open_loop(study, settings, plant)?;
+        let step = settings.sample_step.unwrap_or(run.output_step);
+        let span = horizon(study, settings, options, step)?;
+        run.until = run.start + span;
+        run.noise = lynkeus_run::Noise::default();
+        let trajectory = run
+            .run()
+            .map_err(|error| interrupted(&error, &study.file))?;
+        let reach = Reach { trajectory };
+        let measured: Vec<Variable> = extended
+            .outputs
+            .iter()
+            .filter_map(|o| plant.outputs.iter().find(|p| p.name == o.variable.name))
+            .cloned()
+            .collect();
+        let sensors = Sensors::new(study, extended, &measured, &reach);
+        let others = candidates(plant, &measured, options.sensors);
+        let all = measured.iter().chain(&others).map(|v| sensors.sensor(v));
+        let (judged, assumed): (Vec<Sensor>, Vec<Assumed>) = all.unzip();
+        let start = |name: &str| {
+            let place = run.plant.states().iter().position(|s| s == name);
+            place.map_or(0.0, |i| run.plant.start()[i])
+        };
+        let quantity = |v: &Variable| Quantity {
+            name: v.name.clone(),
+            node: v.node,
+            start: start(&v.name),
+            scale: reach.scale(v),
+        };
+        let inputs: Vec<Node> = plant.inputs.iter().map(|i| i.node).collect();
+        let courses = systems::input_expressions(study, plant, settings)?;
+        let (states, unknown) = extended.states.split_at(extended.plant_states());
+        let window = Window::log_spaced(run.start, span, step, POINTS);
+        Ok(Self {
+            experiment: Experiment {
+                states: states.iter().map(quantity).collect(),
+                derivatives: plant.derivatives.clone(),
+                unknown: unknown.iter().map(quantity).collect(),
+                inputs: inputs
+                    .into_iter()
+                    .zip(courses.into_iter().map(|c| c.1))
+                    .collect(),
+                sensors: judged,
+                method: run.method,
+                ..Experiment::new(&plant.graph, plant.time, window)
+            },
+            assumed,
+            measured: measured.len(),
+        })
+    }
+}
+
+/// The longest horizon.
+fn horizon(
+    study: &Study,
+    settings: &SimulateSettings,
+    options: &Options,
+    step: f64,
+) -> Result<f64, Error> {
+    let span = settings.until - settings.start;
+    let asked = options.horizon.unwrap_or(span);
+    // a horizon that is the whole run up to rounding is the whole run
+    if asked >= step && asked <= span * (1.0 + 1e-9) {
+        return Ok(asked.min(span));
+    }
+    let message = format!(
+        "the horizon: expected a time from one sample step, {}, to the length of the run, {}, found {asked}",
+        number(step),
+        number(span)
+    );
+    Err(Error::input(message)
+        .at(&study.file)
+        .hint("choose another --horizon, or `until` and `sample_step` of [simulate]"))
+}
+
+/// The model's outputs that the study does not measure, and its states that no output shows.
+fn candidates(plant: &Plant, measured: &[Variable], asked: Option<Candidates>) -> Vec<Variable> {
+    let outputs = plant.outputs.iter().filter(|o| !measured.contains(o));
+    let shown = |s: &&Variable| plant.outputs.iter().any(|o| o.node == s.node);
+    let states = plant.states.iter().filter(|s| !shown(s));
+    match asked {
+        None => vec![],
+        Some(Candidates::Outputs) => outputs.cloned().collect(),
+        Some(Candidates::All) => outputs.chain(states).cloned().collect(),
+    }
+}
+
+/// How far values go along the run.
+struct Reach {
+    trajectory: Trajectory,
+}
+
+impl Reach {
+    /// The greatest magnitude.
+    fn magnitude(&self, name: &str) -> f64 {
+        let values = self.trajectory.column(name).unwrap_or_default();
+        values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+    }
+
+    /// The declared range, else the greatest magnitude, else 1.
+    fn scale(&self, variable: &Variable) -> f64 {
+        let range = variable.max - variable.min;
+        if range.is_finite() && range > 0.0 {
+            return range;
+        }
+        match self.magnitude(&variable.name) {
+            0.0 => 1.0,
+            magnitude => magnitude,
+        }
+    }
+}
+
+/// How noisy sensors are.
+struct Sensors<'a> {
+    study: &'a Study,
+    states: &'a [Variable],
+    reach: &'a Reach,
+    /// of a sensor that the study says nothing of
+    usual: Noise,
+}
+
+impl<'a> Sensors<'a> {
+    /// A sensor of unknown noise is as noisy as the measured ones are on average (geometric mean):
+    /// relative to its value where all of these are, else to its range.
+    fn new(
+        study: &'a Study,
+        extended: &'a Extended<'_>,
+        measured: &[Variable],
+        reach: &'a Reach,
+    ) -> Self {
+        let mut sensors = Self {
+            study,
+            states: &extended.states,
+            reach,
+            usual: Noise::Absolute(SHARE),
+        };
+        let stated: Vec<Option<Noise>> = measured.iter().map(|v| sensors.stated(v)).collect();
+        let share = |(v, noise): (&Variable, &Option<Noise>)| match noise {
+            Some(Noise::Relative(share)) => *share,
+            Some(Noise::Absolute(deviation)) => deviation / sensors.scale(v),
+            None => SHARE,
+        };
+        let logs: f64 = measured.iter().zip(&stated).map(share).map(f64::ln).sum();
+        let mean = (logs / measured.len().max(1) as f64).exp();
+        let is_relative = |noise: &Option<Noise>| matches!(noise, Some(Noise::Relative(_)));
+        sensors.usual = match stated.iter().all(is_relative) {
+            true => Noise::Relative(mean),
+            false if stated.iter().all(Option::is_none) => Noise::Absolute(SHARE),
+            false => Noise::Absolute(mean),
+        };
+        sensors
+    }
+
+    /// The noise in the study; one of zero would tell everything and counts as not stated.
+    fn stated(&self, variable: &Variable) -> Option<Noise> {
+        let noise = &self.study.sensors.noise;
+        let found = noise.iter().find(|(name, _)| name.text == variable.name);
+        found.map(|(_, noise)| *noise).filter(|noise| {
+            let (Noise::Absolute(value) | Noise::Relative(value)) = *noise;
+            value > 0.0
+        })
+    }
+
+    /// The range of an output, else that of the state that it shows.
+    fn scale(&self, variable: &Variable) -> f64 {
+        let state = self.states.iter().find(|s| s.node == variable.node);
+        let is_bounded = (variable.max - variable.min).is_finite();
+        match state {
+            Some(state) if !is_bounded => self.reach.scale(state),
+            _ => self.reach.scale(variable),
+        }
+    }
+
+    fn sensor(&self, variable: &Variable) -> (Sensor, Assumed) {
+        let stated = self.stated(variable);
+        let noise = match (stated, self.usual) {
+            (Some(noise), _) => noise,
+            (None, Noise::Absolute(share)) => Noise::Absolute(share * self.scale(variable)),
+            (None, relative) => relative,
+        };
+        let (deviation, words) = match noise {
+            Noise::Absolute(deviation) => (
+                Deviation::Absolute(deviation),
+                format!("±{}", number(deviation)),
+            ),
+            Noise::Relative(share) => {
+                let greatest = match self.reach.magnitude(&variable.name) {
+                    0.0 => self.scale(variable),
+                    magnitude => magnitude,
+                };
+                let least = LEAST * share * greatest;
+                let words = format!("±{} % of its value", number(100.0 * share));
+                (Deviation::Relative { share, least }, words)
+            }
+        };
+        let sensor = Sensor {
+            name: variable.name.clone(),
+            node: variable.node,
+            noise: deviation,
+        };
+        let assumed = Assumed {
+            name: variable.name.clone(),
+            noise: words,
+            is_stated: stated.is_some(),
+        };
+        (sensor, assumed)
+    }
+}

@@ -1,0 +1,162 @@
+//! How well: the standard error of every state and unknown input along the study's run, for its noise
+//! and sampling; how it falls with the horizon; which sensors help most.
+//!
+//! The definitions are in [`lynkeus_observability::precision`].
+
+mod experiment;
+mod picture;
+mod report;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
+
+use crate::{Error, Study, prepare, simulate};
+use experiment::Setup;
+
+/// Horizons at which the errors are computed.
+const POINTS: usize = 25;
+
+/// What else is asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Length of the longest horizon in the plant's unit of time; the whole run where left out.
+    pub horizon: Option<f64>,
+    /// Which sensors to try beside the study's.
+    pub sensors: Option<Candidates>,
+}
+
+/// Sensors that could be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Candidates {
+    /// Every output of the model.
+    Outputs,
+    /// Every output and every state of the model.
+    All,
+}
+
+/// A sensor as it was assumed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assumed {
+    /// Its name.
+    pub name: String,
+    /// Its noise in words.
+    pub noise: String,
+    /// Whether the study states the noise.
+    pub is_stated: bool,
+}
+
+/// The answer of `lynkeus check --how-well`.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Name of the plant.
+    pub plant: String,
+    /// The unit of time, where the study has one.
+    pub time_unit: Option<String>,
+    /// States and unknown inputs.
+    pub names: Vec<String>,
+    /// What errors are compared with: range or magnitude, in the unit of each.
+    pub scales: Vec<f64>,
+    /// Number of entries of `names` that are states.
+    pub states: usize,
+    /// First instant of the window.
+    pub start: f64,
+    /// Time between samples.
+    pub step: f64,
+    /// Horizons, in the plant's unit of time.
+    pub horizons: Vec<f64>,
+    /// Standard errors at each horizon, in the units of the quantities.
+    pub deviations: Vec<Deviations>,
+    /// All sensors considered, the study's first.
+    pub sensors: Vec<Assumed>,
+    /// How many of them are the study's.
+    pub measured: usize,
+    /// Which sensors help most, where it was asked.
+    pub advice: Option<Advice>,
+}
+
+/// Computes standard errors along the study's run.
+///
+/// # Errors
+/// A study that does not fit its plant or has no `[simulate]`; an impossible horizon; a run that
+/// breaks down.
+pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
+    let settings = simulate::settings(study)?;
+    let plant = prepare::plant(study)?;
+    let extended = prepare::extended(study, &plant)?;
+    let setup = Setup::new(study, settings, &extended, options)?;
+    let found = setup
+        .experiment
+        .run()
+        .map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+    let measured: Vec<usize> = (0..setup.measured).collect();
+    let at = |horizon: usize| found.deviations(horizon, &measured);
+    let candidates: Vec<usize> = (0..found.sensors.len()).collect();
+    Ok(Report {
+        plant: plant.name.clone(),
+        time_unit: study.time_unit.clone(),
+        states: plant.states.len(),
+        start: setup.experiment.window.start,
+        step: setup.experiment.window.step,
+        deviations: (0..found.horizons.len()).map(at).collect(),
+        advice: options
+            .sensors
+            .map(|_| found.advise(&measured, &candidates)),
+        measured: setup.measured,
+        sensors: setup.assumed,
+        names: found.names,
+        scales: found.scales,
+        horizons: found.horizons,
+    })
+}
+
+impl Report {
+    /// True where every state and unknown input is seen at the longest horizon.
+    pub fn is_positive(&self) -> bool {
+        self.last()
+            .is_some_and(|d| d.present.iter().all(|σ| σ.is_finite()))
+    }
+
+    /// Standard errors at the longest horizon.
+    pub fn last(&self) -> Option<&Deviations> {
+        self.deviations.last()
+    }
+
+    /// Present standard error as a share of the scale; infinite where unseen.
+    fn share(&self, deviations: &Deviations, quantity: usize) -> f64 {
+        deviations.present[quantity] / self.scales[quantity]
+    }
+
+    /// Geometric mean over the quantities that are seen, as a share of the scale, and how many are not.
+    fn mean(&self, deviations: &Deviations) -> (f64, usize) {
+        let all = 0..self.names.len();
+        let shares: Vec<f64> = all.map(|i| self.share(deviations, i)).collect();
+        let seen = || shares.iter().filter(|s| s.is_finite());
+        let logs: f64 = seen().map(|s| s.max(1e-12).ln()).sum();
+        let count = seen().count();
+        let mean = (logs / count.max(1) as f64).exp();
+        match count {
+            0 => (f64::INFINITY, shares.len()),
+            _ => (mean, shares.len() - count),
+        }
+    }
+
+    /// Quantities at the longest horizon, the least certain first.
+    fn ranked(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.names.len()).collect();
+        if let Some(last) = self.last() {
+            order.sort_by(|&i, &j| self.share(last, j).total_cmp(&self.share(last, i)));
+        }
+        order
+    }
+
+    /// Names of the sensors of a set.
+    fn set(&self, set: &SensorSet) -> String {
+        let names = set.sensors.iter().filter_map(|&s| self.sensors.get(s));
+        names
+            .map(|s| s.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+}
