@@ -22,6 +22,7 @@ mod region;
 pub mod sign;
 pub mod slopes;
 pub mod superdiagonal;
+pub mod uniform;
 mod vanish;
 pub mod visibility;
 
@@ -35,4 +36,5 @@ pub use range::{Range, range, range_within};
 pub use region::{Dimension, Region};
 pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
+pub use uniform::{Blind, Uniformity, uniformity};
 pub use vanish::{Vanishing, vanishes};

@@ -1,12 +1,13 @@
 //! What can be estimated from these sensors, by which observer, and what fails where.
 
 mod observability;
+mod uniform;
 
 use std::fmt;
 
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, Fit};
-use lynkeus_structure::{Condition, Point};
+use lynkeus_structure::{Condition, Point, Uniformity, uniformity};
 use serde_json::{Value, json};
 
 use crate::{Error, Study, prepare};
@@ -37,6 +38,9 @@ pub struct Report {
     pub recommended: Option<&'static str>,
     /// what can be known at all
     pub answer: Answer,
+    /// for what inputs and where states can be told apart; none for many states, or where
+    /// they cannot at all
+    pub uniformity: Option<Uniformity>,
     /// parameters are unknown constants
     pub parameters: bool,
 }
@@ -66,12 +70,15 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         examinations: vec![],
         recommended: None,
         answer,
+        uniformity: None,
         parameters: options.parameters,
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
         let plant = prepare::plant(study)?;
         let extended = prepare::extended(study, &plant)?;
+        report.uniformity =
+            uniformity(&extended).map_err(|error| Error::input(error.to_string()))?;
         report.examinations = prepare::examinations(study, &extended)?;
         report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
@@ -103,6 +110,7 @@ impl Report {
             "visible": visible.collect::<serde_json::Map<_, _>>(),
         });
         observability::add_json(&self.answer, &mut report);
+        report["uniform"] = json!(self.uniformity.as_ref().map(uniform::json));
         report
     }
 }
@@ -164,6 +172,9 @@ impl fmt::Display for Report {
         )?;
         writeln!(f)?;
         observability::print(f, self)?;
+        if let Some(uniformity) = &self.uniformity {
+            uniform::print(f, uniformity)?;
+        }
         for examination in &self.examinations {
             writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
             writeln!(f, "  {}", examination.summary)?;

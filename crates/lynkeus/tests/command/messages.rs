@@ -215,3 +215,26 @@ fn a_state_that_nothing_shows_is_named() {
     assert_eq!(ended.code, 1, "{}", ended.err);
     says(&ended.out, &["states not observable: b", "measure"]);
 }
+
+#[test]
+fn an_input_that_blinds_the_sensor_is_named() {
+    let folder = Folder::empty();
+    folder.write(
+        "blind.mo",
+        "model Blind\n  input Real u(min = -1, max = 1);\n  Real a(min = -1, max = 1);\n  Real b(min = -1, max = 1);\n  output Real y = a;\nequation\n  der(a) = u*b;\n  der(b) = -b;\nend Blind;\n",
+    );
+    let ended = folder.run(&["check", "blind.mo"]);
+    says(
+        &ended.out,
+        &[
+            "states observable: a, b",
+            "constant input u = 0",
+            "differ only in b",
+        ],
+    );
+    let ended = folder.run(&["check", "blind.mo", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!(json["uniform"]["verdict"], "refuted");
+    assert_eq!(json["uniform"]["blind"][0]["hidden"][0], "b");
+    assert_eq!(json["observability"]["b"], "observable");
+}

@@ -1,0 +1,281 @@
+//! For what inputs, and where: whether the outputs tell neighbouring states apart at
+//! every point of the box for every constant input, and where they do not.
+//!
+//! The outputs with their first derivatives along the flow, for inputs that stay
+//! constant, are a map of the state; of its rows n independent ones are chosen
+//! ([`output_map::observability_indices`]). Where their determinant is not zero the state is
+//! seen, at once and for any small error. Where it is zero, that many derivatives do
+//! not show it.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Graph, MissingInput, Node, Tape};
+
+use crate::output_map::{determinant, jacobian_rows, observability_indices, output_derivatives};
+use crate::region::Cell;
+use crate::{Check, Condition, Extended, Region, Vanishing, sign, vanishes};
+
+/// A determinant of more states has too many terms.
+const STATES: usize = 6;
+/// Cells of the subdivision that is told.
+const CELLS: usize = 256;
+
+/// A part of the box: (name, smallest, largest).
+pub type Part = Vec<(String, f64, f64)>;
+
+/// What constant inputs and which states do to observability.
+#[derive(Clone, Debug)]
+pub struct Uniformity {
+    /// the determinant keeps away from zero on the whole box
+    pub regular: Check,
+    /// where it may be zero: cells of a subdivision, and their share of the box's volume
+    pub singular: Vec<Part>,
+    /// the share
+    pub share: f64,
+    /// constant inputs for which the determinant is zero for every state
+    pub blind: Vec<Blind>,
+    /// the determinant, an expression in states and inputs
+    pub determinant: Node,
+}
+
+/// A constant input that blinds the outputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blind {
+    /// name of the input
+    pub input: String,
+    /// its value
+    pub value: f64,
+    /// states that then act on no output, not even through others: two states of the
+    /// plant that differ only in these cannot be told apart
+    pub hidden: Vec<String>,
+}
+
+/// Examines the box; none where the model has too many states, or where its outputs
+/// do not determine the state at any point.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, MissingInput> {
+    let n = extended.states.len();
+    if n > STATES {
+        return Ok(None);
+    }
+    let graph = extended.graph();
+    let Some(node) = map_determinant(extended)? else {
+        return Ok(None);
+    };
+    let region = extended.region();
+    if vanishes(graph, node, &region)? == Vanishing::Everywhere {
+        return Ok(None);
+    }
+    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input".to_owned();
+    let regular = sign::keeps_sign(graph, name, node, &region)?.check;
+    let (singular, share) = match regular.verdict {
+        Condition::Proved => (vec![], 0.0),
+        _ => cells(graph, node, &region)?,
+    };
+    Ok(Some(Uniformity {
+        blind: match regular.verdict {
+            Condition::Proved => vec![],
+            _ => blind(extended, node, &region)?,
+        },
+        regular,
+        singular,
+        share,
+        determinant: node,
+    }))
+}
+
+/// det ∂(y, y', …)/∂x for constant inputs, rows chosen at generic points.
+fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput> {
+    let n = extended.states.len();
+    let graph = extended.graph();
+    let zero = graph.constant(0.0).node();
+    let constant: Vec<Vec<Node>> = extended
+        .inputs
+        .iter()
+        .map(|input| {
+            std::iter::once(input.node)
+                .chain((0..n).map(|_| zero))
+                .collect()
+        })
+        .collect();
+    let derivatives = output_derivatives(extended, &constant, n.saturating_sub(1))?;
+    let symbols = extended.symbols();
+    let rows: Vec<_> = derivatives
+        .iter()
+        .map(|y| jacobian_rows(graph, y, &symbols))
+        .collect();
+    let indices = observability_indices(extended, &rows)?;
+    if indices.iter().sum::<usize>() < n {
+        return Ok(None);
+    }
+    let chosen: Vec<Vec<Option<Node>>> = rows
+        .into_iter()
+        .zip(&indices)
+        .flat_map(|(rows, &count)| rows.into_iter().take(count))
+        .collect();
+    Ok(determinant(graph, &chosen))
+}
+
+/// Cells in which the determinant may be zero, and their share of the volume.
+fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Part>, f64), MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let may_vanish = |cell: &Cell| {
+        let value = tape.eval_in(&Intervals, cell)[0];
+        value.contains_zero() || !value.is_defined()
+    };
+    let mut open = vec![(region.cell(), 1.0_f64)];
+    // the largest cell is halved next, so that the parts are of one size
+    while open.len() < CELLS {
+        let Some(place) = (0..open.len()).max_by(|&i, &j| open[i].1.total_cmp(&open[j].1)) else {
+            break;
+        };
+        let (cell, share) = open.swap_remove(place);
+        let Some((first, second)) = region.split(&cell) else {
+            open.push((cell, share));
+            break;
+        };
+        for half in [first, second] {
+            if may_vanish(&half) {
+                open.push((half, 0.5 * share));
+            }
+        }
+        if share < 1e-6 {
+            break;
+        }
+    }
+    let share = open.iter().map(|(_, share)| share).sum();
+    Ok((
+        open.iter().map(|(cell, _)| region.named(cell)).collect(),
+        share,
+    ))
+}
+
+/// Constant inputs, of zero and the ends and middles of their ranges, for which the
+/// determinant is zero whatever the state.
+fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Blind>, MissingInput> {
+    let graph = extended.graph();
+    let mut found = vec![];
+    for input in &extended.inputs {
+        let ends = [
+            0.0,
+            input.min,
+            input.max,
+            f64::midpoint(input.min, input.max),
+        ];
+        let inside = |x: &f64| x.is_finite() && *x >= input.min && *x <= input.max;
+        let mut tried: Vec<f64> = vec![];
+        for value in ends.into_iter().filter(inside) {
+            if tried.contains(&value) {
+                continue;
+            }
+            tried.push(value);
+            let fixed = HashMap::from([(input.node, graph.constant(value).node())]);
+            let there = graph.substitute(&[node], &fixed)[0];
+            if vanishes(graph, there, region)? == Vanishing::Everywhere {
+                found.push(Blind {
+                    input: input.name.clone(),
+                    value,
+                    hidden: hidden(extended, &fixed, region)?,
+                });
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// States from which no path of dependencies leads to an output.
+fn hidden(
+    extended: &Extended<'_>,
+    fixed: &HashMap<Node, Node>,
+    region: &Region,
+) -> Result<Vec<String>, MissingInput> {
+    let graph = extended.graph();
+    let symbols = extended.symbols();
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = outputs
+        .chain(extended.derivatives.iter().copied())
+        .collect();
+    let partials = jacobian_rows(graph, &functions, &symbols);
+    let first = extended.outputs.len();
+    let mut seen = vec![false; symbols.len()];
+    let mut open: Vec<usize> = (0..first).collect();
+    while let Some(row) = open.pop() {
+        for (state, partial) in partials[row].iter().enumerate() {
+            let Some(partial) = partial.filter(|_| !seen[state]) else {
+                continue;
+            };
+            let there = graph.substitute(&[partial], fixed)[0];
+            if vanishes(graph, there, region)? != Vanishing::Everywhere {
+                seen[state] = true;
+                open.push(first + state);
+            }
+        }
+    }
+    let names = extended.states.iter().zip(&seen);
+    Ok(names
+        .filter(|(_, seen)| !**seen)
+        .map(|(s, _)| s.name.clone())
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Sensors;
+    use lynkeus_model::{LoadOptions, Plant};
+
+    fn examined(equations: &str) -> Option<Uniformity> {
+        let text = format!(
+            "model P
+              input Real u(min = -1, max = 1);
+              Real a(min = -1, max = 1); Real b(min = -1, max = 2);
+              output Real y = a;
+            equation
+              {equations}
+            end P;"
+        );
+        let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
+        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+        uniformity(&extended).unwrap()
+    }
+
+    #[test]
+    fn a_chain_is_seen_for_every_input() {
+        let found = examined("der(a) = b + u; der(b) = -sin(a);").unwrap();
+        assert_eq!(found.regular.verdict, Condition::Proved);
+        assert!(found.singular.is_empty() && found.blind.is_empty());
+    }
+
+    #[test]
+    fn an_input_that_blinds_is_named() {
+        let found = examined("der(a) = u*b; der(b) = -b;").unwrap();
+        assert!(matches!(found.regular.verdict, Condition::Refuted(_)));
+        let blind = Blind {
+            input: "u".into(),
+            value: 0.0,
+            hidden: vec!["b".into()],
+        };
+        assert_eq!(found.blind, [blind]);
+    }
+
+    /// d/db b² = 2b: zero at b = 0, a third up the side from −1 to 2.
+    #[test]
+    fn the_singular_set_is_enclosed() {
+        let found = examined("der(a) = b^2; der(b) = -b;").unwrap();
+        assert!(found.blind.is_empty());
+        assert!(found.share < 0.05, "{}", found.share);
+        for part in &found.singular {
+            let (_, low, high) = part.iter().find(|(name, ..)| name == "b").unwrap();
+            assert!(*low <= 0.0 && *high >= 0.0 && high - low < 0.1, "{part:?}");
+        }
+    }
+
+    #[test]
+    fn what_no_output_shows_has_no_map() {
+        assert!(examined("der(a) = -a; der(b) = -b;").is_none());
+    }
+}
