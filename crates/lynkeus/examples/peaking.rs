@@ -3,6 +3,8 @@
 //! `cargo run --release --package lynkeus --example peaking -- docs/pictures/peaking.svg`, from the root
 //! of the repository.
 
+#![allow(clippy::print_stdout)]
+
 use std::ops::ControlFlow;
 use std::path::Path;
 

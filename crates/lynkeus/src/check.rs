@@ -10,6 +10,7 @@ use lynkeus_observers::{Examination, Fit};
 use lynkeus_structure::{Condition, Point, Uniformity, uniformity};
 use serde_json::{Value, json};
 
+use crate::words::conditions;
 use crate::{Error, Study, prepare};
 
 /// What to ask beside "which states, by which observer".
@@ -178,7 +179,7 @@ impl fmt::Display for Report {
         for examination in &self.examinations {
             writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
             writeln!(f, "  {}", examination.summary)?;
-            conditions(f, examination)?;
+            conditions(f, &examination.checks, "conditions on the whole box")?;
         }
         if self.examinations.is_empty() {
             return Ok(());
@@ -186,31 +187,6 @@ impl fmt::Display for Report {
         writeln!(f)?;
         self.conclusion(f)
     }
-}
-
-/// Conditions listed one by one: more proved ones than this become a count.
-const LISTED: usize = 12;
-
-fn conditions(f: &mut fmt::Formatter<'_>, examination: &Examination) -> fmt::Result {
-    let proved = |check: &&lynkeus_structure::Check| check.verdict == Condition::Proved;
-    let count = examination.checks.iter().filter(proved).count();
-    let brief = count > LISTED;
-    if brief {
-        writeln!(f, "  proved     {count} conditions on the whole box")?;
-    }
-    for check in examination.checks.iter().filter(|c| !(brief && proved(c))) {
-        writeln!(
-            f,
-            "  {:<10} {}: {}",
-            check.verdict.word(),
-            check.name,
-            check.detail
-        )?;
-        if let Condition::Refuted(_) = check.verdict {
-            writeln!(f, "             {}", check.verdict)?;
-        }
-    }
-    Ok(())
 }
 
 impl Report {

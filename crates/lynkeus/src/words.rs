@@ -1,4 +1,8 @@
-//! Numbers and ranges as people read them.
+//! Numbers, ranges and verdicts as people read them.
+
+use std::fmt;
+
+use lynkeus_structure::{Check, Condition};
 
 /// Four significant digits.
 pub(crate) fn number(value: f64) -> String {
@@ -25,6 +29,27 @@ pub(crate) fn side(name: &str, low: f64, high: f64) -> String {
         true => format!("{name} = {}", number(low)),
         false => format!("{name} in [{}, {}]", number(low), number(high)),
     }
+}
+
+/// Conditions listed one by one: more proved ones than this become a count.
+const LISTED: usize = 12;
+
+/// One condition a line, the proved ones counted where they are many.
+pub(crate) fn conditions(f: &mut fmt::Formatter<'_>, checks: &[Check], what: &str) -> fmt::Result {
+    let proved = |check: &&Check| check.verdict == Condition::Proved;
+    let count = checks.iter().filter(proved).count();
+    let brief = count > LISTED;
+    if brief {
+        writeln!(f, "  proved     {count} {what}")?;
+    }
+    for check in checks.iter().filter(|c| !(brief && proved(c))) {
+        let word = check.verdict.word();
+        writeln!(f, "  {word:<10} {}: {}", check.name, check.detail)?;
+        if let Condition::Refuted(_) = check.verdict {
+            writeln!(f, "             {}", check.verdict)?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

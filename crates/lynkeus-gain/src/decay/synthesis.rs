@@ -83,13 +83,7 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
     if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
         return Err(NoGain::Unbounded);
     }
-    let scale = Scale::of(models, &request.scale);
-    let scaled = Scaled {
-        models: models.iter().map(|m| scale.model(m)).collect(),
-        rate: request.rate * scale.unit * (1.0 + RESERVE),
-        request,
-        scale: &scale,
-    };
+    let scaled = Scaled::new(models, request);
     let mut K = scaled.direct().map_err(NoGain::Rate)?;
     let over = |K: &DMatrix<f64>| request.limit.is_some_and(|limit| K.amax() > limit);
     if request.aim == Aim::Gain || over(&K) {
@@ -112,13 +106,7 @@ pub fn is_reachable(models: &[ErrorModel], request: &Request) -> bool {
     if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
         return false;
     }
-    let scale = Scale::of(models, &request.scale);
-    let scaled = Scaled {
-        models: models.iter().map(|m| scale.model(m)).collect(),
-        rate: request.rate * scale.unit * (1.0 + RESERVE),
-        request,
-        scale: &scale,
-    };
+    let scaled = Scaled::new(models, request);
     let (problem, P, Y) = scaled.inequalities();
     normalised(&problem, &P, &Y).is_ok()
 }
@@ -127,10 +115,20 @@ struct Scaled<'a> {
     models: Vec<ErrorModel>,
     rate: f64,
     request: &'a Request,
-    scale: &'a Scale,
+    scale: Scale,
 }
 
-impl Scaled<'_> {
+impl<'a> Scaled<'a> {
+    fn new(models: &[ErrorModel], request: &'a Request) -> Self {
+        let scale = Scale::of(models, &request.scale);
+        Self {
+            models: models.iter().map(|m| scale.model(m)).collect(),
+            rate: request.rate * scale.unit * (1.0 + RESERVE),
+            request,
+            scale,
+        }
+    }
+
     fn size(&self) -> usize {
         self.scale.states.len()
     }

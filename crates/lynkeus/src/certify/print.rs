@@ -3,10 +3,9 @@
 use std::fmt;
 
 use lynkeus_observers::{Certificate, Verdict};
-use lynkeus_structure::Condition;
 
 use super::CertifyReport;
-use crate::words::{number, side};
+use crate::words::{conditions, number, side};
 
 pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
     let observer = &report.design.observer;
@@ -73,30 +72,7 @@ fn abbreviated(sides: &[String]) -> String {
 
 fn certificate(f: &mut fmt::Formatter<'_>, certificate: &Certificate) -> fmt::Result {
     writeln!(f, "{}: {}", certificate.basis, certificate.verdict.word())?;
-    let proved = certificate
-        .hypotheses
-        .iter()
-        .filter(|c| c.verdict == Condition::Proved)
-        .count();
-    let brief = certificate.hypotheses.len() > 12;
-    if brief {
-        writeln!(f, "  proved     {proved} hypotheses")?;
-    }
-    for check in &certificate.hypotheses {
-        if brief && check.verdict == Condition::Proved {
-            continue;
-        }
-        writeln!(
-            f,
-            "  {:<10} {}: {}",
-            check.verdict.word(),
-            check.name,
-            check.detail
-        )?;
-        if let Condition::Refuted(_) = check.verdict {
-            writeln!(f, "             {}", check.verdict)?;
-        }
-    }
+    conditions(f, &certificate.hypotheses, "hypotheses")?;
     for constant in &certificate.constants {
         writeln!(
             f,

@@ -111,6 +111,10 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
         writeln!(f, "about {}: {}", asked.name, asked.verdict.word())?;
     }
     hint(f, report)?;
+    if answer.is_complete() && !report.parameters {
+        return Ok(());
+    }
+    // how it was decided matters once something is not as hoped
     answer
         .notes
         .iter()

@@ -23,31 +23,34 @@ pub(super) fn check(study: &Study, options: &CheckOptions, json: bool) -> Result
 
 pub(super) fn design(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
     let report = lynkeus::design(study)?;
-    let text = match json {
-        true => format!("{:#}\n", report.to_json()),
-        false => report.to_string(),
-    };
-    match file {
-        Some(path) => output::write(path, text.as_bytes())?,
-        None => print(&text)?,
-    }
+    tell(file, json, &report, || report.to_json())?;
     Ok(ExitCode::SUCCESS)
 }
 
 pub(super) fn certify(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
     let report = lynkeus::certify(study)?;
-    let text = match json {
-        true => format!("{:#}\n", report.to_json()),
-        false => report.to_string(),
-    };
-    match file {
-        Some(path) => output::write(path, text.as_bytes())?,
-        None => print(&text)?,
-    }
+    tell(file, json, &report, || report.to_json())?;
     Ok(match report.is_refuted() {
         true => ExitCode::from(1),
         false => ExitCode::SUCCESS,
     })
+}
+
+/// A report as text or as JSON, to a file or to standard output.
+fn tell(
+    file: Option<&Path>,
+    json: bool,
+    report: &impl std::fmt::Display,
+    to_json: impl Fn() -> Value,
+) -> Result<(), Error> {
+    let text = match json {
+        true => format!("{:#}\n", to_json()),
+        false => report.to_string(),
+    };
+    match file {
+        Some(path) => output::write(path, text.as_bytes()),
+        None => print(&text),
+    }
 }
 
 pub(super) fn simulate(
