@@ -41,15 +41,12 @@ pub struct Rank {
     pub threshold: f64,
 }
 
-impl Rank {
-    /// True where a factor of ten in the accuracy could change the answer.
-    pub fn is_close(&self) -> bool {
-        let near = |value: f64| value > 0.1 * self.threshold && value < 10.0 * self.threshold;
-        near(self.weakest_seen) || near(self.strongest_unseen)
-    }
-}
-
 impl Deviations {
+    /// Which present values are seen.
+    pub(super) fn pattern(&self) -> Vec<bool> {
+        self.present.iter().map(|σ| σ.is_finite()).collect()
+    }
+
     /// No samples at all.
     pub(super) fn blind(count: usize) -> Self {
         Self {

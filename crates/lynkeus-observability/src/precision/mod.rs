@@ -264,12 +264,29 @@ impl Precision {
     /// Standard errors from the samples of the sensors `set` (indices) up to horizon number
     /// `horizon`; everything is unseen where there is no such horizon or sensor.
     pub fn deviations(&self, horizon: usize, set: &[usize]) -> Deviations {
+        self.deviations_at(horizon, set, self.accuracy)
+    }
+
+    /// True where sensitivities ten times more or less accurate would change which present values
+    /// count as seen.
+    pub fn is_doubtful(&self, horizon: usize, set: &[usize]) -> bool {
+        let pattern = |factor: f64| {
+            let accuracy = factor * self.accuracy;
+            self.deviations_at(horizon, set, accuracy).pattern()
+        };
+        let present = pattern(1.0);
+        [0.1, 10.0]
+            .into_iter()
+            .any(|factor| pattern(factor) != present)
+    }
+
+    fn deviations_at(&self, horizon: usize, set: &[usize], accuracy: f64) -> Deviations {
         let Some(checkpoint) = self.checkpoints.get(horizon) else {
             return Deviations::blind(self.names.len());
         };
         let parts = set.iter().filter_map(|&s| checkpoint.information.get(s));
         let joined = Information::joined(self.names.len(), parts);
-        deviations::of(&joined, &checkpoint.transition, &self.scales, self.accuracy)
+        deviations::of(&joined, &checkpoint.transition, &self.scales, accuracy)
     }
 }
 

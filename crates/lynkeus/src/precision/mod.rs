@@ -72,6 +72,8 @@ pub struct Report {
     pub sensors: Vec<Assumed>,
     /// How many of them are the study's.
     pub measured: usize,
+    /// Whether which quantities are seen at the longest horizon hangs on the integrator's accuracy.
+    pub is_doubtful: bool,
     /// Which sensors help most, where it was asked.
     pub advice: Option<Advice>,
 }
@@ -103,6 +105,7 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
         advice: options
             .sensors
             .map(|_| found.advise(&measured, &candidates)),
+        is_doubtful: found.is_doubtful(found.horizons.len().saturating_sub(1), &measured),
         measured: setup.measured,
         sensors: setup.assumed,
         names: found.names,

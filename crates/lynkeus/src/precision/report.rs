@@ -42,6 +42,7 @@ impl Report {
                 "weakest_seen": finite(rank.weakest_seen),
                 "strongest_unseen": rank.strongest_unseen,
                 "threshold": rank.threshold,
+                "doubtful": self.is_doubtful,
             },
             "over_horizon": self.over_horizon(),
             "advice": self.advice.as_ref().map(|advice| self.advice_json(advice)),

@@ -207,13 +207,12 @@ impl Report {
 
     /// Where the rank decision is near its border.
     fn doubts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.last().map(|last| last.rank) {
-            Some(rank) if rank.is_close() => writeln!(
+        match self.is_doubtful {
+            true => writeln!(
                 f,
-                "\n{} of {} directions are seen at the start of the window; the weakest is near what the integrator's tolerances can tell from nothing: tighten rtol to be sure",
-                rank.seen, rank.of
+                "\nwhat is seen and what is not is near the border of the integrator's accuracy: tighten rtol of [simulate] to be sure"
             ),
-            _ => Ok(()),
+            false => Ok(()),
         }
     }
 
