@@ -101,7 +101,7 @@ fn rate(row: &Row, rate: Option<f64>) -> String {
 /// What the family's theorem asks for.
 fn theorem(row: &Row) -> Result<String, String> {
     let Some((constant, name)) = row.theorem else {
-        return Ok("none".to_owned());
+        return Ok("not covered".to_owned());
     };
     let text = Text::for_theorem(row)?;
     let value = tool::certify(&text.scaled(1.0))?.constant(constant);
