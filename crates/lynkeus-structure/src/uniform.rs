@@ -14,6 +14,7 @@ use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
 use crate::output_map::{determinant, jacobian_rows, observability_indices, output_derivatives};
 use crate::region::Cell;
+use crate::visibility::inside;
 use crate::{Check, Condition, Extended, Region, Vanishing, sign, vanishes};
 
 /// A determinant of more states has too many terms.
@@ -49,6 +50,8 @@ pub struct Blind {
     /// states that then act on no output, not even through others: two states of the
     /// plant that differ only in these cannot be told apart
     pub hidden: Vec<String>,
+    /// two such states, where there is a hidden one: by name, in the box
+    pub alike: Option<[Vec<(String, f64)>; 2]>,
 }
 
 /// Examines the box; none where the model has too many states, or where its outputs
@@ -176,15 +179,29 @@ fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Bli
             let fixed = HashMap::from([(input.node, graph.constant(value).node())]);
             let there = graph.substitute(&[node], &fixed)[0];
             if vanishes(graph, there, region)? == Vanishing::Everywhere {
+                let hidden = hidden(extended, &fixed, region)?;
                 found.push(Blind {
                     input: input.name.clone(),
                     value,
-                    hidden: hidden(extended, &fixed, region)?,
+                    alike: (!hidden.is_empty()).then(|| alike(extended, &hidden)),
+                    hidden,
                 });
             }
         }
     }
     Ok(found)
+}
+
+/// Two states that differ in the hidden ones only: a quarter and three quarters up
+/// their ranges, the others in the middle.
+fn alike(extended: &Extended<'_>, hidden: &[String]) -> [Vec<(String, f64)>; 2] {
+    [0.25, 0.75].map(|share| {
+        let value = |v: &lynkeus_model::Variable| {
+            let share = if hidden.contains(&v.name) { share } else { 0.5 };
+            (v.name.clone(), inside(v.min, v.max, share))
+        };
+        extended.states.iter().map(value).collect()
+    })
 }
 
 /// States from which no path of dependencies leads to an output.
@@ -254,12 +271,13 @@ mod tests {
     fn an_input_that_blinds_is_named() {
         let found = examined("der(a) = u*b; der(b) = -b;").unwrap();
         assert!(matches!(found.regular.verdict, Condition::Refuted(_)));
-        let blind = Blind {
-            input: "u".into(),
-            value: 0.0,
-            hidden: vec!["b".into()],
+        let [blind] = &found.blind[..] else {
+            panic!("{:?}", found.blind)
         };
-        assert_eq!(found.blind, [blind]);
+        assert_eq!((blind.input.as_str(), blind.value), ("u", 0.0));
+        assert_eq!(blind.hidden, ["b"]);
+        let at = |a: f64, b: f64| vec![("a".to_owned(), a), ("b".to_owned(), b)];
+        assert_eq!(blind.alike, Some([at(0.0, -0.25), at(0.0, 1.25)]));
     }
 
     /// d/db b² = 2b: zero at b = 0, a third up the side from −1 to 2.

@@ -58,15 +58,19 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniformity: &Uniformity) -> fmt:
 
 fn told(blind: &Blind) -> String {
     let input = side(&blind.input, blind.value, blind.value);
-    match blind.hidden.is_empty() {
-        true => format!(
+    let Some(states) = &blind.alike else {
+        return format!(
             "with the constant input {input} neighbouring states look alike everywhere: excite it"
-        ),
-        false => format!(
-            "with the constant input {input} two states that differ only in {} give the same outputs: excite it",
-            blind.hidden.join(", ")
-        ),
-    }
+        );
+    };
+    let [one, other] = states.each_ref().map(|state| {
+        let sides = state.iter().map(|(name, x)| side(name, *x, *x));
+        sides.collect::<Vec<_>>().join(", ")
+    });
+    format!(
+        "with the constant input {input} states that differ only in {} give the same outputs, e.g. ({one}) and ({other}): excite it",
+        blind.hidden.join(", ")
+    )
 }
 
 /// The smallest box around the parts.
