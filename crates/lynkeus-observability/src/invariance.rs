@@ -12,6 +12,8 @@ use crate::{Question, Symmetry};
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.
 const SMALL: i64 = 24;
+/// Names in words before the rest becomes a count.
+const LISTED: usize = 8;
 /// Seed of the second point, which confirms what the first suggests.
 const SECOND: u64 = 4711;
 
@@ -123,8 +125,8 @@ fn unnamed(group: &[&Direction], names: &[&str]) -> Symmetry {
     let known = moves.len() - group.len().min(moves.len());
     Symmetry {
         words: format!(
-            "{} can change together without a trace in the outputs: of these {}, {known} combinations can be known",
-            moves.join(", "),
+            "{} can change together without a trace in the outputs: {known} combinations of these {} can be known",
+            listed(&moves),
             moves.len()
         ),
         invariants: vec![],
@@ -166,16 +168,27 @@ fn named(kind: Kind, group: &[&Direction], weights: &[Weights], names: &[&str]) 
     Symmetry {
         words: match (invariants.is_empty(), &moves[..]) {
             (true, [only]) => format!("{only} can have any value: the outputs do not feel it"),
-            (true, _) => format!("{} can have any values", moves.join(", ")),
+            (true, _) => format!(
+                "{} can have any values: the outputs do not feel them",
+                listed(&moves)
+            ),
             (false, _) => format!(
                 "of {}, which can be {how} together, only {} can be known",
-                moves.join(", "),
-                invariants.join(", ")
+                listed(&moves),
+                listed(&invariants)
             ),
         },
         invariants,
         directions: group.len(),
         moves,
+    }
+}
+
+/// The first few, and how many there are.
+fn listed(names: &[String]) -> String {
+    match names.len() > LISTED {
+        true => format!("{}, … ({} in all)", names[..LISTED].join(", "), names.len()),
+        false => names.join(", "),
     }
 }
 

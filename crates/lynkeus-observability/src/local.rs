@@ -123,7 +123,11 @@ pub(crate) struct Model {
 /// [`QuestionError`].
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
     let about = expressions(plant, question)?;
-    let deadline = Instant::now() + question.limits.time;
+    let now = Instant::now();
+    // a limit beyond what a clock can tell is none
+    let deadline = now
+        .checked_add(question.limits.time)
+        .unwrap_or(now + Duration::from_secs(1 << 30));
     let model = match Model::new(plant, question, &about)? {
         Ok(model) => model,
         Err((named, Unsupported(reason))) => {

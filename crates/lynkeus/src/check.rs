@@ -5,7 +5,7 @@ mod uniform;
 
 use std::fmt;
 
-use lynkeus_observability::{Answer, Verdict};
+use lynkeus_observability::{Answer, Limits, Verdict};
 use lynkeus_observers::{Examination, Fit};
 use lynkeus_structure::{Condition, Point, Uniformity, uniformity};
 use serde_json::{Value, json};
@@ -20,6 +20,8 @@ pub struct CheckOptions {
     pub parameters: bool,
     /// expressions in states, parameters and inputs to decide on
     pub about: Vec<String>,
+    /// when to stop looking
+    pub limits: Limits,
 }
 
 /// The answer of `lynkeus check`.

@@ -172,6 +172,11 @@ impl<'a> Run<'a> {
         for j in 0..=k {
             let (x, y) = (self.value(a, j), self.value(b, k - j));
             value = value + x * y;
+            // of a square both halves are the same
+            if a == b {
+                self.add(tangent, y + y, a, j);
+                continue;
+            }
             self.add(tangent, y, a, j);
             self.add(tangent, x, b, k - j);
         }

@@ -28,6 +28,7 @@ pub(super) fn answer(
         disturbances: texts(&sensors.disturbances),
         parameters: options.parameters,
         about: options.about.clone(),
+        limits: options.limits,
         ..Question::default()
     };
     analyse(plant, &question).map_err(|error| blame(study, &error))
@@ -64,6 +65,7 @@ pub(super) fn add_json(answer: &Answer, report: &mut Value) {
     let symmetries = answer.symmetries.iter().map(|symmetry| {
         json!({
             "moves": symmetry.moves,
+            "directions": symmetry.directions,
             "words": symmetry.words,
             "invariants": symmetry.invariants,
         })
@@ -103,7 +105,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
     if answer.symmetries.len() > TOLD {
         writeln!(
             f,
-            "  and {} more such directions",
+            "  and {} more such groups",
             answer.symmetries.len() - TOLD
         )?;
     }

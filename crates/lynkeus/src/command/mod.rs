@@ -8,6 +8,7 @@ mod tune;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
@@ -52,6 +53,8 @@ enum Command {
         /// Print one JSON object
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        limits: Limits,
         #[command(flatten)]
         how_well: how_well::Options,
     },
@@ -108,6 +111,31 @@ enum Command {
     },
 }
 
+/// When `check` stops looking: what is decided by then is told.
+#[derive(Debug, Args)]
+struct Limits {
+    /// Stop deciding what is observable after this time
+    #[arg(long, value_name = "SECONDS", default_value = "20", value_parser = seconds)]
+    time_limit: Duration,
+    /// Stop deciding what is observable at this size
+    #[arg(long, value_name = "MIB", default_value_t = 1024)]
+    memory_limit: usize,
+}
+
+impl Limits {
+    fn limits(&self) -> lynkeus::observability::Limits {
+        lynkeus::observability::Limits {
+            time: self.time_limit,
+            memory: self.memory_limit.saturating_mul(1 << 20),
+        }
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    Duration::try_from_secs_f64(seconds).map_err(|_| "not a time".to_owned())
+}
+
 /// Where results go.
 #[derive(Debug, Args)]
 struct Output {
@@ -148,13 +176,20 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             parameters,
             about,
             json,
+            limits,
             how_well,
         } => {
             let study = Study::load_or_bare(study, model)?;
             if how_well.is_asked() {
                 return how_well::how_well(&study, &how_well, json);
             }
-            run::check(&study, &CheckOptions { parameters, about }, json)
+            let limits = limits.limits();
+            let options = CheckOptions {
+                parameters,
+                about,
+                limits,
+            };
+            run::check(&study, &options, json)
         }
         Command::Design {
             study,

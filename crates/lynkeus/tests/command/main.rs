@@ -5,6 +5,7 @@ mod certify;
 mod families;
 mod how_well;
 mod messages;
+mod observability;
 mod references;
 mod runs;
 mod tune;

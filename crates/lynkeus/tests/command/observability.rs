@@ -1,0 +1,158 @@
+//! What `check` says of a bare model.
+
+use super::Folder;
+use serde_json::Value;
+
+const MODELS: &str = "model Decay
+  parameter Real k;
+  parameter Real c;
+  Real x;
+  output Real y = c*x;
+equation
+  der(x) = -k*x;
+end Decay;
+
+model Silent
+  Real x;
+equation
+  der(x) = -x;
+end Silent;";
+
+fn folder() -> Folder {
+    let folder = Folder::empty();
+    folder.write("models.mo", MODELS);
+    folder
+}
+
+/// Exit code, standard output and standard error of `check models.mo …`.
+fn check(folder: &Folder, arguments: &[&str]) -> (i32, String, String) {
+    let ended = folder.run(&[&["check", "models.mo"], arguments].concat());
+    (ended.code, ended.out, ended.err)
+}
+
+#[test]
+fn parameters_and_expressions_in_words() {
+    let arguments = [
+        "--model",
+        "Decay",
+        "--parameters",
+        "--about",
+        "c*x",
+        "--about",
+        "c",
+    ];
+    let (code, text, complaint) = check(&folder(), &arguments);
+    assert_eq!(code, 0, "{complaint}");
+    for line in [
+        "states not observable: x\n",
+        "parameters observable: k\n",
+        "parameters not observable: c\n",
+        "of x, c, which can be scaled together, only c*x can be known",
+        "about c*x: observable\n",
+        "about c: unobservable\n",
+    ] {
+        assert!(text.contains(line), "{line:?} is missing:\n{text}");
+    }
+}
+
+#[test]
+fn one_object_for_machines() {
+    let arguments = [
+        "--model",
+        "Decay",
+        "--parameters",
+        "--about",
+        "c*x",
+        "--json",
+    ];
+    let (_, text, _) = check(&folder(), &arguments);
+    let report: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(report["observability"]["k"], "observable");
+    assert_eq!(report["observability"]["c"], "unobservable");
+    assert_eq!(report["about"]["c*x"], "observable");
+    let symmetry = &report["symmetries"][0];
+    assert_eq!(symmetry["moves"], serde_json::json!(["x", "c"]));
+    assert_eq!(symmetry["invariants"], serde_json::json!(["c*x"]));
+    assert_eq!(symmetry["directions"], 1);
+    assert!(
+        report["observability_notes"][0]
+            .as_str()
+            .unwrap()
+            .contains("prime field")
+    );
+}
+
+/// Parameters without values are known numbers, whichever, unless they are asked for.
+#[test]
+fn a_parameter_without_value_is_known() {
+    let (code, text, complaint) = check(&folder(), &["--model", "Decay"]);
+    assert_eq!(code, 0, "{complaint}");
+    assert!(text.contains("states observable: x\n"), "{text}");
+    assert!(!text.contains("parameters"), "{text}");
+}
+
+#[test]
+fn several_models_and_a_missing_output_are_told() {
+    let (code, _, complaint) = check(&folder(), &[]);
+    assert_eq!(code, 2);
+    assert!(
+        complaint.contains("Decay") && complaint.contains("Silent"),
+        "{complaint}"
+    );
+    let (code, _, complaint) = check(&folder(), &["--model", "Silent"]);
+    assert_eq!(code, 2);
+    assert!(complaint.contains("has no output"), "{complaint}");
+    let (code, _, complaint) = check(&folder(), &["--model", "Decay", "--about", "q + 1"]);
+    assert_eq!(code, 2);
+    assert!(complaint.contains('q'), "{complaint}");
+}
+
+#[test]
+fn a_limit_leaves_the_rest_undecided() {
+    let arguments = ["--model", "Decay", "--parameters", "--memory-limit", "0"];
+    let (_, text, complaint) = check(&folder(), &arguments);
+    assert!(
+        text.contains("parameters undecided: k, c\n"),
+        "{text}{complaint}"
+    );
+    assert!(text.contains("the limit of memory struck"), "{text}");
+    let (code, _, complaint) = check(&folder(), &["--model", "Decay", "--time-limit", "-1"]);
+    assert_eq!(code, 2, "{complaint}");
+}
+
+/// A hundred states with two hundred unknown parameters.
+#[test]
+fn a_large_model_stays_within_a_screen() {
+    let folder = Folder::empty();
+    folder.write(
+        "models.mo",
+        "model Chain
+  parameter Real a[100]; parameter Real b[100]; Real x[100]; output Real y = x[1];
+equation
+  for i in 1:99 loop der(x[i]) = a[i]*x[i+1] - b[i]*x[i]; end for;
+  der(x[100]) = -a[100]*x[100] - b[100]*x[1];
+end Chain;",
+    );
+    let (_, text, _) = check(&folder, &["--parameters", "--time-limit", "3"]);
+    assert!(text.lines().count() < 40 && text.len() < 4000, "{text}");
+}
+
+/// Each of the papers' examples has an observer, so that everything in it can be known.
+#[test]
+fn the_papers_examples_are_observable() {
+    for (folder, study) in [
+        ("farza", "study.toml"),
+        ("germani-manes", "theoretical.toml"),
+        ("lee", "study.toml"),
+        ("ltaief", "study.toml"),
+        ("column", "study.toml"),
+    ] {
+        let path = super::examples().join(folder);
+        let report = super::run(&path, &["check", study, "--json"]).json();
+        let verdicts = report["observability"].as_object().unwrap();
+        assert!(!verdicts.is_empty());
+        for (name, verdict) in verdicts {
+            assert_eq!(verdict, "observable", "{folder}: {name}");
+        }
+    }
+}
