@@ -48,7 +48,7 @@ fn states(bencher: Bencher, n: usize) {
 }
 
 /// n unknown states and 2·n unknown parameters.
-#[divan::bench(args = [5, 10, 20, 50], sample_count = 5)]
+#[divan::bench(args = [5, 10, 20, 50, 100], sample_count = 3)]
 fn states_and_parameters(bencher: Bencher, n: usize) {
     let plant = chain(n);
     bencher.bench_local(|| analyse(black_box(&plant), &asking(true)).unwrap());

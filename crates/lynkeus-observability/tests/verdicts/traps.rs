@@ -127,6 +127,46 @@ fn growth_after_the_unknown_input_took_its_share() {
     expect(&plant, &unknown(&["w"]), "a b c w", "");
 }
 
+/// Both at once: w is seen at once, p in the sixth derivative.
+#[test]
+fn a_known_start_beside_an_unknown_input() {
+    let plant = plant(
+        "input Real w; parameter Real p; Real s(start = 0, fixed = true); Real x; output Real y = x + w; output Real z = x - w;",
+        "der(s) = 1; der(x) = p*s^5;",
+    );
+    let both = Question {
+        parameters: true,
+        ..unknown(&["w"])
+    };
+    let answer = expect(&plant, &both, "x p w", "");
+    assert_eq!(answer.order, 6);
+}
+
+/// Known inputs are known at every moment: what they hide at one they show at another.
+#[test]
+fn a_known_input_that_stirs() {
+    let plant = plant(
+        "input Real u; parameter Real a; parameter Real b; Real x; output Real y = x;",
+        "der(x) = a*u + b*u^2 - x;",
+    );
+    expect(&plant, &question(), "x a b", "");
+    let unmeasured = Question {
+        parameters: true,
+        ..unknown(&["u"])
+    };
+    expect(&plant, &unmeasured, "x", "a b u");
+}
+
+/// Time is known, and so is what depends on it alone.
+#[test]
+fn explicit_time_tells_parameters_apart() {
+    let plant = plant(
+        "parameter Real a; parameter Real b; Real x; output Real y = x;",
+        "der(x) = a*sin(time) + b*exp(-time);",
+    );
+    expect(&plant, &question(), "x a b", "");
+}
+
 /// Interchangeable states: two answers far apart, but near each nothing else fits.
 #[test]
 fn symmetric_states_are_observable_locally() {
