@@ -82,7 +82,7 @@ impl<'a> Search<'a> {
             self.add_outputs();
             if k == 0 {
                 let first = self.model.states + self.model.outputs;
-                let gradient = |i: usize| self.run.root(first + i).1.to_vec();
+                let gradient = |i: usize| self.run.root(first + i).1;
                 self.about = (0..self.model.about).map(gradient).collect();
             }
             self.closed = self.complete()
@@ -108,7 +108,7 @@ impl<'a> Search<'a> {
         let named = self.model.named.len();
         let first = named - self.model.unknown_inputs;
         for output in 0..self.model.outputs {
-            let mut row = self.run.root(self.model.states + output).1.to_vec();
+            let mut row = self.run.root(self.model.states + output).1;
             self.rows.add(&row);
             if self.model.unknown_inputs > 0 {
                 row.iter_mut().take(first).for_each(|x| *x = Modular::ZERO);

@@ -33,7 +33,59 @@ impl Stop {
 struct Series {
     values: Vec<Modular>,
     /// per order one row of sensitivities; empty for what no unknown moves
-    tangents: Vec<Vec<Modular>>,
+    tangents: Vec<Row>,
+}
+
+/// A row of sensitivities; most quantities of a large model feel few of its unknowns.
+#[derive(Clone, Debug)]
+enum Row {
+    Dense(Vec<Modular>),
+    /// (column, what is not zero there)
+    Sparse(Vec<(usize, Modular)>),
+}
+
+impl Row {
+    fn new(row: Vec<Modular>) -> Self {
+        let filled = row.iter().filter(|x| !x.is_zero()).count();
+        if 3 * filled > row.len() {
+            return Row::Dense(row);
+        }
+        let entries = row.into_iter().enumerate();
+        // collected anew: a list filtered in place would keep the row's memory
+        let mut sparse = Vec::with_capacity(filled);
+        sparse.extend(entries.filter(|(_, x)| !x.is_zero()));
+        Row::Sparse(sparse)
+    }
+
+    /// In numbers of the field.
+    fn size(&self) -> usize {
+        match self {
+            Row::Dense(row) => row.len(),
+            Row::Sparse(row) => 2 * row.len(),
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.size() == 0
+    }
+
+    /// sum += factor·row
+    fn add_to(&self, sum: &mut [Modular], factor: Modular) {
+        match self {
+            Row::Dense(row) => {
+                for (s, r) in sum.iter_mut().zip(row) {
+                    *s = *s + factor * *r;
+                }
+            }
+            Row::Sparse(row) => {
+                for &(column, r) in row {
+                    if let Some(s) = sum.get_mut(column) {
+                        *s = *s + factor * r;
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// A program under evaluation.
@@ -95,11 +147,15 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The latest coefficient of a root.
-    pub fn root(&self, i: usize) -> (Modular, &[Modular]) {
-        let series = &self.slots[self.program.roots[i]];
+    /// The latest coefficient of a root with its sensitivities, none if nothing moves it.
+    pub fn root(&self, i: usize) -> (Modular, Vec<Modular>) {
+        let slot = self.program.roots[i];
+        let series = &self.slots[slot];
         let last = series.values.len().saturating_sub(1);
-        let tangent = series.tangents.get(last).map_or(&[][..], Vec::as_slice);
+        let mut tangent = vec![];
+        if last < series.tangents.len() {
+            self.add(&mut tangent, Modular::ONE, slot, last);
+        }
         (
             series.values.get(last).copied().unwrap_or_default(),
             tangent,
@@ -107,11 +163,11 @@ impl<'a> Run<'a> {
     }
 
     fn store(&mut self, slot: usize, value: Modular, tangent: Vec<Modular>) -> Result<(), Stop> {
-        let size = 1 + tangent.len();
+        let tangent = Row::new(tangent);
+        let size = 1 + size_of::<Row>() / size_of::<Modular>() + tangent.size();
         self.room = self.room.checked_sub(size).ok_or(Stop::Memory)?;
         let series = &mut self.slots[slot];
         series.values.push(value);
-        // rows before the first that moves stay empty
         series.tangents.push(tangent);
         Ok(())
     }
@@ -129,9 +185,7 @@ impl<'a> Run<'a> {
         if sum.is_empty() {
             sum.resize(self.width, Modular::ZERO);
         }
-        for (s, r) in sum.iter_mut().zip(row) {
-            *s = *s + factor * *r;
-        }
+        row.add_to(sum, factor);
     }
 
     fn rational(
