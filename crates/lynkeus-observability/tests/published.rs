@@ -78,3 +78,31 @@ fn functions_of_them_have_theirs() {
         }
     }
 }
+
+/// What the lines about symmetries say is known has to be, for all the groups there.
+#[test]
+fn the_combinations_told_are_observable() {
+    let Some(folder) = folder() else { return };
+    let mut told = 0;
+    for (model, _) in read(&folder, "truth.json").as_object().unwrap() {
+        let plant = plant(&folder, model);
+        let question = Question {
+            parameters: true,
+            ..Question::default()
+        };
+        let answer = analyse(&plant, &question).unwrap();
+        let symmetries = answer.symmetries.iter();
+        let about: Vec<String> = symmetries.flat_map(|s| s.invariants.clone()).collect();
+        told += about.len();
+        let asking = Question { about, ..question };
+        for asked in analyse(&plant, &asking).unwrap().about {
+            assert_eq!(
+                asked.verdict,
+                Verdict::Observable,
+                "{model}: {}",
+                asked.name
+            );
+        }
+    }
+    assert!(told > 20, "{told}");
+}
