@@ -8,6 +8,8 @@ use super::expanded;
 
 /// Bisections of the share of the ranges.
 const HALVINGS: usize = 6;
+/// Slopes up to which each is tried alone.
+const SINGLES: usize = 12;
 
 /// The models with every slope's range cut by a factor that may depend on the slope.
 fn cut(slopes: &Slopes, factor: impl Fn(usize) -> f64 + Copy) -> Vec<ErrorModel> {
@@ -60,8 +62,13 @@ pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
             }
         )
     };
-    let mut blocking = (0..slopes.slopes.len())
-        .filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
+    // one inequality per slope is affordable only for few
+    let tried = match slopes.slopes.len() {
+        few if few <= SINGLES => few,
+        _ => 0,
+    };
+    let mut blocking =
+        (0..tried).filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
     let blocked = match blocking.next() {
         Some(k) => format!("{} alone blocks it; ", range(k)),
         None => String::new(),

@@ -2,6 +2,8 @@
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -49,6 +51,43 @@ impl Progress {
     pub(super) fn finish(self) {
         if let Some(bar) = self.bar {
             bar.finish_and_clear();
+        }
+    }
+}
+
+/// A sign of life, while something without known fractions takes longer than a second.
+pub(super) struct Alive {
+    done: Sender<()>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Alive {
+    pub(super) fn new(what: &'static str) -> Self {
+        let (done, wait) = channel();
+        let watch = move || {
+            let over = |wait: &Receiver<()>| wait.recv_timeout(Duration::from_secs(1)).is_ok();
+            if !std::io::stderr().is_terminal() || over(&wait) {
+                return;
+            }
+            let bar = ProgressBar::new_spinner().with_message(what);
+            bar.enable_steady_tick(Duration::from_millis(120));
+            // until the sender says so or is gone
+            let _ = wait.recv();
+            bar.finish_and_clear();
+        };
+        Self {
+            done,
+            thread: Some(std::thread::spawn(watch)),
+        }
+    }
+}
+
+impl Drop for Alive {
+    fn drop(&mut self) {
+        // the thread may have ended by itself
+        let _ = self.done.send(());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
         }
     }
 }

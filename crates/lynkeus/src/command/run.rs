@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use lynkeus::{CheckOptions, Error, Outcome, Study, Table};
 use serde_json::{Value, json};
 
+use super::Output;
 use super::output::{self, print};
-use super::{Output, progress::Progress};
+use super::progress::{Alive, Progress};
 
 pub(super) fn check(study: &Study, options: &CheckOptions, json: bool) -> Result<ExitCode, Error> {
     let report = lynkeus::check(study, options)?;
@@ -22,13 +23,19 @@ pub(super) fn check(study: &Study, options: &CheckOptions, json: bool) -> Result
 }
 
 pub(super) fn design(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
-    let report = lynkeus::design(study)?;
+    let alive = Alive::new("designing");
+    let report = lynkeus::design(study);
+    drop(alive);
+    let report = report?;
     tell(file, json, &report, || report.to_json())?;
     Ok(ExitCode::SUCCESS)
 }
 
 pub(super) fn certify(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
-    let report = lynkeus::certify(study)?;
+    let alive = Alive::new("certifying");
+    let report = lynkeus::certify(study);
+    drop(alive);
+    let report = report?;
     tell(file, json, &report, || report.to_json())?;
     Ok(match report.is_refuted() {
         true => ExitCode::from(1),
