@@ -79,6 +79,12 @@ pub(super) fn add_json(answer: &Answer, report: &mut Value) {
 
 pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result {
     let answer = &report.answer;
+    let asked = |name: &&str| answer.quantities.iter().any(|(q, _)| q.name == *name);
+    let names = report.states.iter().map(String::as_str);
+    let given: Vec<&str> = names.filter(|name| !asked(name)).collect();
+    if !given.is_empty() {
+        writeln!(f, "states with a known start: {}", listed(&given))?;
+    }
     for (kind, plural) in [
         (Quantity::State, "states"),
         (Quantity::Parameter, "parameters"),

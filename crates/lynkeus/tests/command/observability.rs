@@ -156,3 +156,20 @@ fn the_papers_examples_are_observable() {
         }
     }
 }
+
+#[test]
+fn a_known_start_is_listed_as_such() {
+    let folder = folder();
+    folder.change(
+        "models.mo",
+        "Real x;\n  output",
+        "Real x(start = 2, fixed = true);\n  output",
+    );
+    let (_, text, _) = check(&folder, &["--model", "Decay", "--parameters"]);
+    for line in [
+        "states with a known start: x\n",
+        "parameters observable: k, c\n",
+    ] {
+        assert!(text.contains(line), "{line:?} is missing:\n{text}");
+    }
+}
