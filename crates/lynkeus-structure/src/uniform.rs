@@ -36,8 +36,8 @@ pub struct Uniformity {
     pub share: f64,
     /// constant inputs for which the determinant is zero for every state
     pub blind: Vec<Blind>,
-    /// the determinant, an expression in states and inputs
-    pub determinant: Node,
+    /// ranges of the states
+    pub sides: Part,
 }
 
 /// A constant input that blinds the outputs.
@@ -86,7 +86,11 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         regular,
         singular,
         share,
-        determinant: node,
+        sides: extended
+            .states
+            .iter()
+            .map(|s| (s.name.clone(), s.min, s.max))
+            .collect(),
     }))
 }
 

@@ -94,6 +94,20 @@ impl Report {
         self.examinations.is_empty() || self.recommended.is_some()
     }
 
+    /// The singular set inside the box, for a plant with two states.
+    ///
+    /// # Errors
+    /// Another number of states, or a state without range.
+    pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
+        match &self.uniformity {
+            Some(uniformity) => uniform::picture(&self.plant, uniformity),
+            None => Err(Error::input(format!(
+                "{}: the singular set was not examined: it needs values for all parameters, at most six states, and outputs that show them",
+                self.plant
+            ))),
+        }
+    }
+
     /// The report for machines.
     pub fn to_json(&self) -> Value {
         let families: Vec<Value> = self.examinations.iter().map(family).collect();

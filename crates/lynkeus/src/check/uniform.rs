@@ -6,6 +6,8 @@ use lynkeus_structure::uniform::Part;
 use lynkeus_structure::{Blind, Condition, Uniformity};
 use serde_json::{Map, Value, json};
 
+use crate::Error;
+use crate::plot::Plane;
 use crate::words::{number, side};
 
 /// Parts of the singular set listed for machines.
@@ -107,5 +109,34 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
         "share": uniformity.share,
         "singular": uniformity.singular.iter().take(LISTED).map(part).collect::<Vec<_>>(),
         "blind": blind.collect::<Vec<_>>(),
+    })
+}
+
+/// The singular set of a plant with two states.
+pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
+    let [(x, x_low, x_high), (y, y_low, y_high)] = &uniformity.sides[..] else {
+        let message = format!(
+            "{plant} has {} states and unknown inputs: a picture of the singular set needs two; --json lists its parts",
+            uniformity.sides.len()
+        );
+        return Err(Error::input(message));
+    };
+    let side = |part: &Part, name: &str, all: std::ops::Range<f64>| {
+        let found = part.iter().find(|(n, ..)| n == name);
+        found.map_or(all, |(_, low, high)| *low..*high)
+    };
+    let parts = uniformity.singular.iter().map(|part| {
+        (
+            side(part, x, *x_low..*x_high),
+            side(part, y, *y_low..*y_high),
+        )
+    });
+    Ok(Plane {
+        title: format!(
+            "{plant}: where the outputs' derivatives may not tell neighbouring states apart"
+        ),
+        across: (x.clone(), *x_low..*x_high),
+        upwards: (y.clone(), *y_low..*y_high),
+        parts: parts.collect(),
     })
 }

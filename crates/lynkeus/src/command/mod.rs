@@ -50,6 +50,9 @@ enum Command {
         /// Decide on an expression as well, e.g. "k1*k2" (may be given several times)
         #[arg(long, value_name = "EXPRESSION")]
         about: Vec<String>,
+        /// Draw where in the box of two states the outputs' derivatives do not tell states apart
+        #[arg(long, value_name = "FILE.svg")]
+        singular: Option<PathBuf>,
         /// Print one JSON object
         #[arg(long)]
         json: bool,
@@ -175,6 +178,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             model,
             parameters,
             about,
+            singular,
             json,
             limits,
             how_well,
@@ -189,7 +193,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
                 about,
                 limits,
             };
-            run::check(&study, &options, json)
+            run::check(&study, &options, singular.as_deref(), json)
         }
         Command::Design {
             study,

@@ -10,8 +10,16 @@ use super::Output;
 use super::output::{self, print};
 use super::progress::{Alive, Progress};
 
-pub(super) fn check(study: &Study, options: &CheckOptions, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn check(
+    study: &Study,
+    options: &CheckOptions,
+    singular: Option<&Path>,
+    json: bool,
+) -> Result<ExitCode, Error> {
     let report = lynkeus::check(study, options)?;
+    if let Some(path) = singular {
+        output::write(path, report.picture()?.to_svg()?.as_bytes())?;
+    }
     match json {
         true => print(&format!("{:#}\n", report.to_json()))?,
         false => print(&report.to_string())?,

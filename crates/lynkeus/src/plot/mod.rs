@@ -13,12 +13,14 @@ mod chart;
 mod decimate;
 mod grid;
 mod limits;
+mod plane;
 mod render;
 
 use std::ops::Range;
 
 pub use bars::{Bar, Bars};
 pub use chart::{Chart, Line, Look, Plot, Upright};
+pub use plane::Plane;
 
 /// A picture: panels that share the time axis.
 #[derive(Clone, Debug, Default)]

@@ -173,3 +173,50 @@ fn a_known_start_is_listed_as_such() {
         assert!(text.contains(line), "{line:?} is missing:\n{text}");
     }
 }
+
+const CIRCLE: &str = "model Circle
+  Real a(min = -2, max = 2);
+  Real b(min = -2, max = 2);
+  output Real y = a;
+equation
+  der(a) = b^3/3 + b*(a^2 - 1);
+  der(b) = -a;
+end Circle;";
+
+/// The map (y, y') is singular where a² + b² = 1.
+#[test]
+fn the_singular_set_is_enclosed_and_drawn() {
+    let folder = Folder::empty();
+    folder.write("circle.mo", CIRCLE);
+    let ended = folder.run(&["check", "circle.mo", "--json", "--singular", "s.svg"]);
+    let json: Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!(json["uniform"]["verdict"], "refuted");
+    assert!(json["uniform"]["share"].as_f64().unwrap() < 0.03);
+    let square = |side: &Value| {
+        let (low, high) = (side[0].as_f64().unwrap(), side[1].as_f64().unwrap());
+        let nearest = if low <= 0.0 && high >= 0.0 {
+            0.0
+        } else {
+            low.abs().min(high.abs())
+        };
+        (nearest.powi(2), low.abs().max(high.abs()).powi(2))
+    };
+    for part in json["uniform"]["singular"].as_array().unwrap() {
+        let ((a, A), (b, B)) = (square(&part["a"]), square(&part["b"]));
+        assert!(a + b < 1.3 && A + B > 0.7, "{part}");
+    }
+    assert!(folder.read("s.svg").contains("<svg"));
+}
+
+#[test]
+fn a_picture_of_the_singular_set_needs_two_states() {
+    let folder = Folder::empty();
+    let three = CIRCLE
+        .replace("Real b(", "Real c(start = 1); Real b(")
+        .replace("equation", "equation der(c) = b;")
+        .replace("= a;\n", "= a; output Real z = c;\n");
+    folder.write("three.mo", &three);
+    let ended = folder.run(&["check", "three.mo", "--singular", "s.svg"]);
+    assert_eq!(ended.code, 2, "{}", ended.out);
+    assert!(ended.err.contains("needs two"), "{}", ended.err);
+}
