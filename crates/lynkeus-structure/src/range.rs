@@ -11,6 +11,8 @@ use crate::{Dimension, Point};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
+/// Sides up to which every face of every cell is looked at.
+const FACES: usize = 3;
 /// Refinement stops when the outer bound is this close to a value attained.
 const TOLERANCE: f64 = 1e-3;
 
@@ -112,7 +114,7 @@ impl Search<'_> {
     fn minimum(&mut self, sign: f64) -> Minimum {
         let whole = self.region.cell();
         let (bound, defined) = self.bound(&whole, sign);
-        let mut best = self.sample(&whole, sign, None);
+        let mut best = self.sample(&whole, sign, None, true);
         let mut open = BinaryHeap::from([Open { bound, cell: whole }]);
         for _ in 0..self.budget {
             let Some(weakest) = open.peek() else { break };
@@ -124,7 +126,7 @@ impl Search<'_> {
             };
             open.pop();
             for cell in [first, second] {
-                best = self.sample(&cell, sign, best);
+                best = self.sample(&cell, sign, best, false);
                 let bound = self.bound(&cell, sign).0;
                 open.push(Open { bound, cell });
             }
@@ -151,8 +153,20 @@ impl Search<'_> {
         (bound, value.is_defined())
     }
 
-    fn sample(&mut self, cell: &Cell, sign: f64, mut best: Option<Point>) -> Option<Point> {
-        for point in self.region.samples(cell) {
+    /// The best point so far, with those of a cell. Its faces are looked at only where they
+    /// are few, or `all` is asked for: they cost more than the cell's bound.
+    fn sample(
+        &mut self,
+        cell: &Cell,
+        sign: f64,
+        mut best: Option<Point>,
+        all: bool,
+    ) -> Option<Point> {
+        let points = match all || cell.len() <= FACES {
+            true => self.region.samples(cell),
+            false => self.region.corners(cell),
+        };
+        for point in points {
             let mut out = [0.0];
             self.evaluator.eval(&point, &mut out);
             let value = sign * out[0];

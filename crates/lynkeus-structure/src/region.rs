@@ -113,7 +113,7 @@ impl Region {
     /// two extreme corners; only finite ones.
     pub(crate) fn samples(&self, cell: &Cell) -> Vec<Vec<f64>> {
         let middle = self.middle_point(cell);
-        let mut points = vec![middle.clone()];
+        let mut points = self.corners(cell);
         for (i, side) in cell.iter().enumerate() {
             for end in [side.lo(), side.hi()] {
                 let mut point = middle.clone();
@@ -121,6 +121,13 @@ impl Region {
                 points.push(point);
             }
         }
+        points.retain(|p| p.iter().all(|x| x.is_finite()));
+        points
+    }
+
+    /// The middle and the two extreme corners; only finite ones.
+    pub(crate) fn corners(&self, cell: &Cell) -> Vec<Vec<f64>> {
+        let mut points = vec![self.middle_point(cell)];
         points.push(cell.iter().map(|side| side.lo()).collect());
         points.push(cell.iter().map(|side| side.hi()).collect());
         points.retain(|p| p.iter().all(|x| x.is_finite()));

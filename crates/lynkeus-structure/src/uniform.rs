@@ -3,7 +3,7 @@
 //!
 //! The outputs with their first derivatives along the flow, for inputs that stay
 //! constant, are a map of the state; of its rows n independent ones are chosen
-//! ([`output_map::observability_indices`]). Where their determinant is not zero the state is
+//! ([`crate::output_map::observability_indices`]). Where their determinant is not zero the state is
 //! seen, at once and for any small error. Where it is zero, that many derivatives do
 //! not show it.
 
