@@ -1,6 +1,7 @@
 //! What can be guaranteed about an observer, and why.
 
-use lynkeus_structure::{Check, Condition, Region};
+use lynkeus_expr::MissingInput;
+use lynkeus_structure::{Check, Condition, Extended, Region};
 use nalgebra::DMatrix;
 
 use crate::Fit;
@@ -15,6 +16,39 @@ pub struct Assumptions {
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
+    /// f and h have values on that box and do not jump
+    regularity: Check,
+}
+
+impl Assumptions {
+    /// That plant and estimate stay in the box, and nothing else acts: neither drift nor
+    /// noise. The plant is examined there: what has no value or jumps is covered by no
+    /// proof.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where the plant has parameters without value.
+    pub fn new(extended: &Extended<'_>, region: Region) -> Result<Self, MissingInput> {
+        Ok(Self {
+            drift: vec![0.0; extended.states.len()],
+            noise: vec![0.0; extended.outputs.len()],
+            regularity: extended.regularity(&region)?,
+            region,
+        })
+    }
+
+    /// With bounds of what acts on the plant, one per extended state.
+    #[must_use]
+    pub fn with_drift(mut self, drift: Vec<f64>) -> Self {
+        self.drift = drift;
+        self
+    }
+
+    /// With bounds of the measurement errors, one per measured output.
+    #[must_use]
+    pub fn with_noise(mut self, noise: Vec<f64>) -> Self {
+        self.noise = noise;
+        self
+    }
 }
 
 /// The verdict on a guarantee.
@@ -97,13 +131,23 @@ pub struct Certificate {
     pub lyapunov: Option<DMatrix<f64>>,
     /// what the reader should know, in words
     pub notes: Vec<String>,
+    /// made by [`Certificate::new`] only, which asks whether the plant is regular
+    _examined: (),
 }
 
 impl Certificate {
     /// A certificate without rate, bounds, constants and notes; its verdict is
-    /// that of the hypotheses.
-    pub fn new(basis: impl Into<String>, region: &Region, hypotheses: Vec<Check>) -> Self {
-        let sides = region.dimensions.iter().filter(|d| d.name != "time");
+    /// that of the hypotheses, of which the first is always that the plant has values on
+    /// the box of the assumptions and does not jump there.
+    pub fn new(
+        basis: impl Into<String>,
+        assumptions: &Assumptions,
+        hypotheses: Vec<Check>,
+    ) -> Self {
+        let sides = &assumptions.region.dimensions;
+        let sides = sides.iter().filter(|d| d.name != "time");
+        let first = std::iter::once(assumptions.regularity.clone());
+        let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
             basis: basis.into(),
             verdict: Verdict::of(&hypotheses),
@@ -115,6 +159,7 @@ impl Certificate {
             constants: vec![],
             lyapunov: None,
             notes: vec![],
+            _examined: (),
         }
     }
 

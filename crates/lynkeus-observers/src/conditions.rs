@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Node;
 use lynkeus_structure::sign::{self, Sign};
-use lynkeus_structure::{ChainRequest, Check, Condition, Dimension, Extended, Region};
+use lynkeus_structure::{ChainRequest, Check, Condition, Dimension, Extended, Region, Regularity};
 
 use crate::{DesignError, Fit, Tuning, TuningError};
 
@@ -64,8 +64,11 @@ pub(crate) fn on_output(
     names(extended, states).into_iter().zip(gains).collect()
 }
 
-pub(crate) fn fit(checks: &[Check]) -> Fit {
-    let any = |test: fn(&Condition) -> bool| checks.iter().any(|check| test(&check.verdict));
+pub(crate) fn fit<'a>(checks: impl IntoIterator<Item = &'a Check> + Clone) -> Fit {
+    let any = |test: fn(&Condition) -> bool| {
+        let mut checks = checks.clone().into_iter();
+        checks.any(|check| test(&check.verdict))
+    };
     if any(|v| matches!(v, Condition::Refuted(_))) {
         Fit::DoesNotFit
     } else if any(|v| matches!(v, Condition::Undecided(_))) {
@@ -79,9 +82,17 @@ pub(crate) fn fit(checks: &[Check]) -> Fit {
 /// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
 pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
     let graph = extended.graph();
-    let jacobian =
-        lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &extended.symbols());
+    let symbols = extended.symbols();
+    let jacobian = lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &symbols);
     let name = "∂f/∂x is bounded on the box".to_owned();
+    let regularity = Regularity::of(graph, &extended.derivatives, &symbols, region)?;
+    if let Some(trouble) = regularity.trouble() {
+        return Ok(Check {
+            name,
+            verdict: regularity.verdict(),
+            detail: trouble.to_string(),
+        });
+    }
     for &(row, column, node) in &jacobian.entries {
         if sign::bounded(graph, node, region)? {
             continue;

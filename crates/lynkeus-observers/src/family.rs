@@ -1,8 +1,9 @@
 //! What a family is, and the list of them.
 
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Extended};
+use lynkeus_structure::{Check, Condition, Extended, Region};
 
+use crate::conditions::fit;
 use crate::{
     Assumptions, Certificate, Observer, Tuning, TuningError, block_triangular::BlockTriangular,
     drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
@@ -93,17 +94,65 @@ pub struct Examination {
     pub summary: String,
     /// names of the states of each chain, where the form was found
     pub chains: Vec<Vec<String>>,
-    /// every condition with its verdict
+    /// every condition of the family with its verdict
     pub checks: Vec<Check>,
+    /// f and h have values and do not jump; none where the form is another anyway
+    regularity: Option<Check>,
 }
 
 impl Examination {
+    /// What a family finds in a plant that has its form. The fit is that of the
+    /// conditions, of which the first is always that the plant is [regular](
+    /// Extended::regularity) on the box.
+    pub(crate) fn new(
+        extended: &Extended<'_>,
+        region: &Region,
+        family: &'static str,
+        form: Form,
+        checks: Vec<Check>,
+    ) -> Result<Self, MissingInput> {
+        let regularity = extended.regularity(region)?;
+        let fit = fit(checks.iter().chain([&regularity]));
+        Ok(Self {
+            family,
+            fit,
+            summary: form.summary,
+            chains: form.chains,
+            checks,
+            regularity: Some(regularity),
+        })
+    }
+
+    /// The plant does not have the form, or a condition ends the search for one.
+    pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
+        Self {
+            family,
+            fit: Fit::DoesNotFit,
+            summary,
+            chains: vec![],
+            checks,
+            regularity: None,
+        }
+    }
+
+    /// Every condition: that the plant is regular on the box, then those of the family.
+    pub fn conditions(&self) -> impl Iterator<Item = &Check> {
+        self.regularity.iter().chain(&self.checks)
+    }
+
     /// The first condition that is refuted.
     pub fn refuted(&self) -> Option<&Check> {
-        self.checks
-            .iter()
+        self.conditions()
             .find(|check| matches!(check.verdict, Condition::Refuted(_)))
     }
+}
+
+/// The form that a family found.
+pub(crate) struct Form {
+    /// the chains, in one or two sentences
+    pub summary: String,
+    /// names of the states of each chain
+    pub chains: Vec<Vec<String>>,
 }
 
 /// The constant gain on the error ŷ − y of one output: x̂' = f(x̂, u) − K (ŷ − y).

@@ -2,10 +2,10 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 
-use crate::{Dimension, Region};
+use crate::{Check, Dimension, Region, Regularity, steps};
 
 /// Who measures what.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -228,6 +228,25 @@ impl<'p> Extended<'p> {
         jacobian.get(0, 0)
     }
 
+    /// Whether f and h have values on the whole of a box and jump nowhere as the states
+    /// move: what every condition and every proof on that box takes for granted.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where the plant has parameters without value.
+    pub fn regularity(&self, region: &Region) -> Result<Check, MissingInput> {
+        let outputs = self.outputs.iter().map(|o| o.variable.node);
+        let all: Vec<Node> = self.derivatives.iter().copied().chain(outputs).collect();
+        let found = Regularity::of(self.graph(), &all, &self.symbols(), region)?;
+        Ok(Check {
+            name: "f and h have values everywhere on the box and do not jump".into(),
+            verdict: found.verdict(),
+            detail: match found.trouble() {
+                None => format!("{} expressions examined", all.len()),
+                Some(trouble) => trouble.to_string(),
+            },
+        })
+    }
+
     /// The box: declared ranges of the states, unknown and known inputs; time is free.
     pub fn region(&self) -> Region {
         let side = |v: &Variable| Dimension {
@@ -330,6 +349,10 @@ fn affine_state(graph: &Graph, output: Node, states: &[Node]) -> Option<(usize, 
     };
     let depends = |node: Node| !jacobian::pattern(graph, &[node], states)[0].is_empty();
     if depends(slope) || jacobian::pattern(graph, &[output], states)[0] != [state] {
+        return None;
+    }
+    // y = 2x − sign(x) has a constant derivative, too
+    if steps(graph, output, states) {
         return None;
     }
     let zero = graph.constant(0.0).node();

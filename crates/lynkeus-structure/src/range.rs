@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Region};
-use crate::{Dimension, Point};
+use crate::{Dimension, Point, Regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -19,10 +19,10 @@ const TOLERANCE: f64 = 1e-3;
 /// What is known of the values of an expression on a box.
 #[derive(Clone, Debug)]
 pub struct Range {
-    /// rigorous: every value lies inside
+    /// rigorous: the expression has a value everywhere on the box, and all lie inside; the
+    /// whole line, not [defined](Interval::is_defined), where it may lack one (√ of a
+    /// negative, 1/0)
     pub enclosure: Interval,
-    /// the expression is defined everywhere on the box (no √ of a negative, no 1/0)
-    pub defined: bool,
     /// the smallest value found at a point
     pub lowest: Option<Point>,
     /// the largest value found at a point
@@ -59,10 +59,11 @@ pub fn range_within(
     };
     let lower = search.minimum(1.0);
     let upper = search.minimum(-1.0);
-    let (low, high) = (lower.bound, -upper.bound);
+    let defined =
+        (lower.defined && upper.defined) || Regularity::of(graph, &[node], &[], &region)?.holds();
+    let values = Interval::new(lower.bound, -upper.bound).ok();
     Ok(Range {
-        enclosure: Interval::new(low, high).unwrap_or(Interval::ENTIRE),
-        defined: lower.defined && upper.defined,
+        enclosure: values.filter(|_| defined).unwrap_or(Interval::UNKNOWN),
         lowest: lower.best,
         highest: upper.best.map(|p| Point {
             value: -p.value,

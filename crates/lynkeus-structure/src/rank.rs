@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Tape, jacobian};
 
-use crate::{Check, Condition, Dimension, Matrix, Point, Region, Witness, sign};
+use crate::{Check, Condition, Dimension, Matrix, Point, Region, Regularity, Witness, sign, steps};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -89,7 +89,16 @@ pub fn one_to_one(
     let entries = local.nonzero();
     let affine = jacobian::pattern(graph, &entries, variables)
         .iter()
-        .all(Vec::is_empty);
+        .all(Vec::is_empty)
+        && !functions.iter().any(|&f| steps(graph, f, variables));
+    let regularity = Regularity::of(graph, functions, variables, region)?;
+    if let Some(trouble) = regularity.trouble() {
+        return Ok(Check {
+            name,
+            verdict: regularity.verdict(),
+            detail: format!("the mean value theorem does not apply: {trouble}"),
+        });
+    }
     if affine {
         return full_column_rank(name, &local, region);
     }

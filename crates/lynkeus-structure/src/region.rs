@@ -60,8 +60,29 @@ impl Region {
 
     /// Halves the relatively widest side; none if every side is a point.
     pub(crate) fn split(&self, cell: &Cell) -> Option<(Cell, Cell)> {
+        self.split_one_of(cell, (0..cell.len()).collect())
+    }
+
+    /// Halves the relatively widest of the sides of some symbols; none where these are all
+    /// narrower than the share `finest` of the region's.
+    pub(crate) fn split_among(
+        &self,
+        cell: &Cell,
+        symbols: &[Node],
+        finest: f64,
+    ) -> Option<(Cell, Cell)> {
+        let meant = |&i: &usize| {
+            let side = &self.dimensions[i];
+            symbols.contains(&side.symbol) && self.relative_width(i, &cell[i]) > finest
+        };
+        self.split_one_of(cell, (0..cell.len()).filter(meant).collect())
+    }
+
+    fn split_one_of(&self, cell: &Cell, sides: Vec<usize>) -> Option<(Cell, Cell)> {
         let width = |i: usize| self.relative_width(i, &cell[i]);
-        let widest = (0..cell.len()).max_by(|&i, &j| width(i).total_cmp(&width(j)))?;
+        let widest = sides
+            .into_iter()
+            .max_by(|&i, &j| width(i).total_cmp(&width(j)))?;
         let (low, high) = (cell[widest].lo(), cell[widest].hi());
         let (left, right) = if self.dimensions[widest].integer {
             let middle = self.middle(widest, &cell[widest]);

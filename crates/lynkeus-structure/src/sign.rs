@@ -4,7 +4,10 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::condition::short;
-use crate::{Check, Condition, Point, Range, Region, Witness, range};
+use crate::{Check, Condition, Point, Range, Region, Regularity, Witness, range, range_within};
+
+/// Cells examined per end to see whether there is a bound.
+const GLANCE: usize = 20;
 
 /// The verdict on a sign, with the bounds that go with it.
 #[derive(Clone, Debug)]
@@ -41,6 +44,9 @@ pub fn keeps_sign(
             Condition::Refuted(witness),
             format!("{expression} can vanish or change its sign"),
         )
+    } else if let Some(trouble) = Regularity::of(graph, &[node], &[], region)?.trouble() {
+        let place = trouble.place().to_vec();
+        (Condition::Undecided(place), trouble.to_string())
     } else {
         let detail = format!(
             "{expression} lies in [{}, {}] as far as can be proved{}",
@@ -74,15 +80,14 @@ pub fn keeps_sign(
     })
 }
 
-/// Whether one interval evaluation over the whole region bounds the expression.
+/// Whether the expression has a value everywhere on the region and a bound, by one interval
+/// evaluation or a few.
 ///
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
 pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let tape = Tape::new(graph, &region.symbols(), &[node])?;
-    let value = tape.eval_in(&Intervals, &region.cell())[0];
-    Ok(value.lo().is_finite() && value.hi().is_finite())
+    let found = range_within(graph, node, region, GLANCE)?.enclosure;
+    Ok(found.is_defined() && found.lo().is_finite() && found.hi().is_finite())
 }
 
 /// A hint where the box has no declared end.

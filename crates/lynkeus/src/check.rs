@@ -158,7 +158,7 @@ fn family(examination: &Examination) -> Value {
         "fit": examination.fit.words(),
         "summary": examination.summary,
         "chains": examination.chains,
-        "checks": examination.checks.iter().map(check).collect::<Vec<_>>(),
+        "checks": examination.conditions().map(check).collect::<Vec<_>>(),
     })
 }
 
@@ -195,7 +195,7 @@ impl fmt::Display for Report {
         for examination in &self.examinations {
             writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
             writeln!(f, "  {}", examination.summary)?;
-            conditions(f, &examination.checks, "conditions on the whole box")?;
+            conditions(f, examination.conditions(), "conditions on the whole box")?;
         }
         if self.examinations.is_empty() {
             return Ok(());

@@ -35,8 +35,13 @@ pub(crate) fn side(name: &str, low: f64, high: f64) -> String {
 const LISTED: usize = 12;
 
 /// One condition a line, the proved ones counted where they are many.
-pub(crate) fn conditions(f: &mut fmt::Formatter<'_>, checks: &[Check], what: &str) -> fmt::Result {
-    let proved = |check: &&Check| check.verdict == Condition::Proved;
+pub(crate) fn conditions<'a>(
+    f: &mut fmt::Formatter<'_>,
+    checks: impl IntoIterator<Item = &'a Check>,
+    what: &str,
+) -> fmt::Result {
+    let checks: Vec<&Check> = checks.into_iter().collect();
+    let proved = |check: &&&Check| check.verdict == Condition::Proved;
     let count = checks.iter().filter(proved).count();
     let brief = count > LISTED;
     if brief {

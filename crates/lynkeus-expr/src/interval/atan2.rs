@@ -60,7 +60,7 @@ fn angle_down(y: f64, x: f64) -> f64 {
 
 /// The angle is monotone along the edges of a box off the branch cut and the origin, so corners bound it.
 fn angle_up(y: f64, x: f64) -> f64 {
-    let angle = y.atan2(x);
+    let angle = libm::atan2(y, x);
     if y == 0.0 && x > 0.0 {
         return 0.0;
     }

@@ -29,18 +29,18 @@ impl Interval {
     /// The angles in [−π/2, π/2] whose sine is a member.
     #[must_use]
     pub fn asin(self) -> Self {
-        self.within_one().odd(f64::asin, FRAC_PI_2.next_up())
+        self.within_one().odd(libm::asin, FRAC_PI_2.next_up())
     }
 
     /// The angles in [0, π] whose cosine is a member.
     #[must_use]
     pub fn acos(self) -> Self {
-        let down = |x: f64| library_down(x.acos()).max(0.0);
+        let down = |x: f64| library_down(libm::acos(x)).max(0.0);
         let up = |x: f64| {
             if x == 1.0 {
                 0.0
             } else {
-                library_up(x.acos()).min(Self::PI.hi)
+                library_up(libm::acos(x)).min(Self::PI.hi)
             }
         };
         self.within_one().monotone(|x| (down(x.hi), up(x.lo)))
@@ -49,22 +49,28 @@ impl Interval {
     /// The angles in [−π/2, π/2] whose tangent is a member.
     #[must_use]
     pub fn atan(self) -> Self {
-        self.odd(f64::atan, FRAC_PI_2.next_up())
+        self.odd(libm::atan, FRAC_PI_2.next_up())
     }
 
     /// The hyperbolic sines.
     #[must_use]
     pub fn sinh(self) -> Self {
-        self.odd(f64::sinh, f64::INFINITY)
+        self.odd(libm::sinh, f64::INFINITY)
     }
 
     /// The hyperbolic cosines.
     #[must_use]
     pub fn cosh(self) -> Self {
-        let up = |x: f64| if x == 0.0 { 1.0 } else { library_up(x.cosh()) };
+        let up = |x: f64| {
+            if x == 0.0 {
+                1.0
+            } else {
+                library_up(libm::cosh(x))
+            }
+        };
         self.monotone(|x| {
             (
-                library_down(x.mignitude().cosh()).max(1.0),
+                library_down(libm::cosh(x.mignitude())).max(1.0),
                 up(x.magnitude()),
             )
         })
@@ -73,7 +79,7 @@ impl Interval {
     /// The hyperbolic tangents.
     #[must_use]
     pub fn tanh(self) -> Self {
-        self.odd(f64::tanh, 1.0)
+        self.odd(libm::tanh, 1.0)
     }
 
     /// The members in [−1, 1], defined if these are all.
@@ -103,19 +109,19 @@ impl Interval {
 }
 
 fn exp_down(x: f64) -> f64 {
-    library_down(x.exp()).max(if x >= 0.0 { 1.0 } else { 0.0 })
+    library_down(libm::exp(x)).max(if x >= 0.0 { 1.0 } else { 0.0 })
 }
 
 fn exp_up(x: f64) -> f64 {
-    library_up(x.exp()).min(if x <= 0.0 { 1.0 } else { f64::INFINITY })
+    library_up(libm::exp(x)).min(if x <= 0.0 { 1.0 } else { f64::INFINITY })
 }
 
 fn ln_down(x: f64) -> f64 {
-    library_down(x.ln()).max(if x >= 1.0 { 0.0 } else { f64::NEG_INFINITY })
+    library_down(libm::log(x)).max(if x >= 1.0 { 0.0 } else { f64::NEG_INFINITY })
 }
 
 fn ln_up(x: f64) -> f64 {
-    library_up(x.ln()).min(if x <= 1.0 { 0.0 } else { f64::INFINITY })
+    library_up(libm::log(x)).min(if x <= 1.0 { 0.0 } else { f64::INFINITY })
 }
 
 #[cfg(test)]

@@ -68,6 +68,8 @@ impl Interval {
     };
     /// All real numbers.
     pub const ENTIRE: Self = Self::raw(f64::NEG_INFINITY, f64::INFINITY, true);
+    /// What is known of an expression that may have no value: nothing.
+    pub const UNKNOWN: Self = Self::raw(f64::NEG_INFINITY, f64::INFINITY, false);
     /// The number 0.
     pub const ZERO: Self = Self::raw(0.0, 0.0, true);
     /// The number 1.

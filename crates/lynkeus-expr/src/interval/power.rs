@@ -116,7 +116,7 @@ fn is_exact(x: f64, y: f64) -> bool {
 }
 
 fn pow_down(x: f64, y: f64) -> f64 {
-    let value = x.powf(y);
+    let value = libm::pow(x, y);
     if is_exact(x, y) {
         value
     } else {
@@ -125,7 +125,7 @@ fn pow_down(x: f64, y: f64) -> f64 {
 }
 
 fn pow_up(x: f64, y: f64) -> f64 {
-    let value = x.powf(y);
+    let value = libm::pow(x, y);
     if is_exact(x, y) {
         value
     } else {

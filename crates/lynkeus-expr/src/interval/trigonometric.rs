@@ -11,13 +11,13 @@ impl Interval {
         if self.is_zero() {
             return self;
         }
-        self.wave(f64::sin, quarter, -quarter)
+        self.wave(libm::sin, quarter, -quarter)
     }
 
     /// The cosines.
     #[must_use]
     pub fn cos(self) -> Self {
-        self.wave(f64::cos, Self::ZERO, Self::PI)
+        self.wave(libm::cos, Self::ZERO, Self::PI)
     }
 
     /// The tangents; not defined when an odd multiple of π/2 is a member, or may be one as far as the reduction by the
@@ -31,8 +31,8 @@ impl Interval {
             return Self::ENTIRE.and_defined(false);
         }
         Self::raw(
-            library_down(self.lo.tan()),
-            library_up(self.hi.tan()),
+            library_down(libm::tan(self.lo)),
+            library_up(libm::tan(self.hi)),
             self.defined,
         )
     }

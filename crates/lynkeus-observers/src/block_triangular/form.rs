@@ -4,7 +4,8 @@ use lynkeus_structure::{Blocks, Extended, blocks};
 
 use super::NAME;
 use super::gains::given;
-use crate::conditions::{chain_request, fit, lipschitz, output_slope, partial};
+use crate::conditions::{chain_request, lipschitz, output_slope, partial};
+use crate::family::Form;
 use crate::{DesignError, Examination, Fit, Tuning, TuningError};
 
 /// The first arrangement into blocks that no condition refutes.
@@ -18,14 +19,7 @@ pub(super) fn form(
     let arrangements = match blocks::find(extended, &request) {
         Ok(arrangements) => arrangements,
         Err(summary) => {
-            let (fit, chains, checks) = (Fit::DoesNotFit, vec![], vec![]);
-            return Ok(Err(Examination {
-                family: NAME,
-                fit,
-                summary,
-                chains,
-                checks,
-            }));
+            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
     for blocks in arrangements {
@@ -57,12 +51,7 @@ fn examined(extended: &Extended<'_>, blocks: &Blocks) -> Result<Examination, Des
     if !integrators {
         summary += "; not every ∂f/∂x along the chains is 1, so convergence is local (Remark 3)";
     }
-    let fit = fit(&checks);
-    Ok(Examination {
-        family: NAME,
-        fit,
-        summary,
-        chains: blocks.names(extended),
-        checks,
-    })
+    let chains = blocks.names(extended);
+    let form = Form { summary, chains };
+    Ok(Examination::new(extended, &region, NAME, form, checks)?)
 }

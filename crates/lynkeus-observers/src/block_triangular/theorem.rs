@@ -34,15 +34,11 @@ pub(super) fn certificate(
             return Err(DesignError::Refused(Box::new(examination)));
         }
         Err(examination) => {
-            return Ok(Certificate::new(
-                BASIS,
-                &assumptions.region,
-                examination.checks,
-            ));
+            return Ok(Certificate::new(BASIS, assumptions, examination.checks));
         }
     };
     if let Some(check) = foreign(tuning) {
-        return Ok(Certificate::new(BASIS, &assumptions.region, vec![check]));
+        return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
     let by_output = theta(tuning, order.len())?;
@@ -103,7 +99,6 @@ impl Study<'_> {
 
     fn certificate(&self) -> Result<Certificate, DesignError> {
         let extended = self.plant.extended;
-        let region = &self.plant.assumptions.region;
         let facts = self.facts()?;
         let mut checks = facts.checks.clone();
         let mut constants = vec![];
@@ -114,7 +109,7 @@ impl Study<'_> {
             self.paper_constants(&facts, &P, &mut constants);
             found = self.second_inequality(&facts, &P, &μ, &mut checks, &mut constants);
         }
-        let mut certificate = Certificate::new(BASIS, region, checks);
+        let mut certificate = Certificate::new(BASIS, self.plant.assumptions, checks);
         certificate.constants = constants;
         certificate.notes = self.notes();
         if let Some((σ, chains)) = found {

@@ -147,7 +147,7 @@ impl Plant<'_> {
             let found = range(graph, node, region)?;
             let span =
                 Interval::point(found.enclosure.hi()) - Interval::point(found.enclosure.lo());
-            let fine = found.defined && span.hi().is_finite();
+            let fine = found.enclosure.is_defined() && span.hi().is_finite();
             Ok(match (graph.constant_value(node), fine) {
                 (Some(_), _) => 0.0,
                 (None, true) => span.hi(),

@@ -8,7 +8,8 @@ use lynkeus_structure::{Check, Condition, Dimension, Extended, Region, sign, vis
 
 use super::keys::{self, Variant};
 use super::{NAME, derivative_name};
-use crate::conditions::{fit, lipschitz, names};
+use crate::conditions::{lipschitz, names};
+use crate::family;
 use crate::{DesignError, Examination, Fit, Tuning};
 
 /// Determinants are expanded for at most so many states.
@@ -69,7 +70,7 @@ pub(super) fn form(
     let Q: Rows = rows.iter().map(|&(i, k)| gradients[i][k].clone()).collect();
     let U = input_symbols(extended, &indices, &degrees);
     let variant = asked.unwrap_or_else(|| Variant::suited(&U));
-    let mut checks = vec![
+    let checks = vec![
         degree_check(extended, &indices, &degrees),
         regular(
             extended,
@@ -79,27 +80,24 @@ pub(super) fn form(
         )?,
         lipschitz(extended, region)?,
     ];
-    let mut fit = fit(&checks);
     let (Q, Q_a) = match variant {
         Variant::Bounded => (Q, vec![]),
         _ => with_inputs(extended, &rows, &U)?,
     };
+    let found = family::Form {
+        summary: summary(extended, variant, &rows, &U),
+        chains: vec![names(extended, &(0..n).collect::<Vec<_>>())],
+    };
+    let mut examination = Examination::new(extended, region, NAME, found, checks)?;
     if U.iter().any(|jet| !jet.is_empty()) {
         let check = input_check(extended, variant, &U, &Q, region)?;
         // Theorem 2.4: Q̄ is regular for small enough inputs whatever the box says,
         // and the observer watches it
-        if fit == Fit::Fits && check.verdict != Condition::Proved {
-            fit = Fit::Undecided;
+        if examination.fit == Fit::Fits && check.verdict != Condition::Proved {
+            examination.fit = Fit::Undecided;
         }
-        checks.push(check);
+        examination.checks.push(check);
     }
-    let examination = Examination {
-        family: NAME,
-        fit,
-        summary: summary(extended, variant, &rows, &U),
-        chains: vec![names(extended, &(0..n).collect::<Vec<_>>())],
-        checks,
-    };
     Ok(Ok(Form {
         variant,
         rows,
@@ -112,13 +110,7 @@ pub(super) fn form(
 }
 
 fn unfit(summary: String) -> Examination {
-    Examination {
-        family: NAME,
-        fit: Fit::DoesNotFit,
-        summary,
-        chains: vec![],
-        checks: vec![],
-    }
+    Examination::unfit(NAME, summary, vec![])
 }
 
 /// Why the derivatives of the outputs do not determine the state.

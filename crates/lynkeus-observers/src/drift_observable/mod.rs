@@ -93,7 +93,7 @@ impl Family for DriftObservable {
                 if examination.refuted().is_some() =>
             {
                 let (basis, checks) = (self.paper(), examination.checks);
-                Ok(Certificate::new(basis, &assumptions.region, checks))
+                Ok(Certificate::new(basis, assumptions, checks))
             }
             Ok(conditions::Form { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))

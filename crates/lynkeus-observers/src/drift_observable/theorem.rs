@@ -84,7 +84,7 @@ pub(super) fn certificate(
             "the study gives neither poles nor alpha and gamma",
         )),
     }
-    let mut certificate = Certificate::new(basis(form.variant), &assumptions.region, hypotheses);
+    let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
     certificate.notes = notes(&form);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {

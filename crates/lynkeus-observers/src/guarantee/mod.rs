@@ -62,7 +62,7 @@ pub fn certify(
             detail: "the real part of an eigenvalue of the error's Jacobian is not negative, so no Lyapunov function covers the box".into(),
         };
         hypotheses.push(check);
-        return Ok(Certificate::new(BASIS, &assumptions.region, hypotheses));
+        return Ok(Certificate::new(BASIS, assumptions, hypotheses));
     }
     let found = match (system.is_bounded(), claim) {
         (false, _) => None,
@@ -70,7 +70,7 @@ pub fn certify(
         (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate),
     };
     hypotheses.push(inequality(&system, found.as_ref()));
-    let mut certificate = Certificate::new(BASIS, &assumptions.region, hypotheses);
+    let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
     match found {
         Some(proof) => fill(&mut certificate, extended, &system, &proof, assumptions),
         None if claim == Claim::Fastest => {
@@ -90,7 +90,7 @@ fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
         verdict: Condition::Undecided(vec![]),
         detail: reason,
     };
-    Certificate::new(BASIS, &assumptions.region, vec![check])
+    Certificate::new(BASIS, assumptions, vec![check])
 }
 
 fn inequality(system: &ErrorSystem, proof: Option<&Proof>) -> Check {

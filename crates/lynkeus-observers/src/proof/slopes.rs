@@ -63,7 +63,7 @@ pub(crate) fn slopes(
 pub(crate) fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, DesignError> {
     let found = range(graph, node, region)?;
     let size = found.enclosure.hi().max(-found.enclosure.lo());
-    Ok(match found.defined && size.is_finite() {
+    Ok(match found.enclosure.is_defined() && size.is_finite() {
         true => size,
         false => f64::INFINITY,
     })

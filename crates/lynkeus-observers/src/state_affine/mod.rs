@@ -25,7 +25,7 @@ use lynkeus_expr::{Expr, Graph, Node, jacobian};
 use lynkeus_gain::UnitFactor;
 use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal};
 
-use crate::conditions::{fit, lipschitz, names};
+use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
@@ -95,14 +95,7 @@ fn form(
     let form = match superdiagonal::find(extended) {
         Ok(form) => form,
         Err(summary) => {
-            let (fit, chains, checks) = (Fit::DoesNotFit, vec![], vec![]);
-            return Ok(Err(Examination {
-                family: NAME,
-                fit,
-                summary,
-                chains,
-                checks,
-            }));
+            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
     let region = extended.region();
@@ -117,16 +110,12 @@ fn form(
     if excited {
         summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
     }
-    let examination = Examination {
-        family: NAME,
-        fit: fit(&checks),
+    let chains = form.declared().map(|block| names(extended, &block));
+    let found = crate::family::Form {
         summary,
-        chains: form
-            .declared()
-            .map(|block| names(extended, &block))
-            .collect(),
-        checks,
+        chains: chains.collect(),
     };
+    let examination = Examination::new(extended, &region, NAME, found, checks)?;
     Ok(Ok((form, examination)))
 }
 

@@ -119,7 +119,7 @@ impl Study<'_> {
         }
         let everything_else = Verdict::of(&checks) == Verdict::Proved;
         checks.push(self.a4(excitation));
-        let mut certificate = Certificate::new(BASIS, self.region(), checks);
+        let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
         certificate.notes.push(box_note(clamp));
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {

@@ -6,7 +6,8 @@ use lynkeus_structure::{Assignment, Extended, chains};
 
 use super::NAME;
 use super::gains::explicit;
-use crate::conditions::{chain_request, fit, lipschitz, names, output_slope, partial};
+use crate::conditions::{chain_request, lipschitz, names, output_slope, partial};
+use crate::family;
 use crate::{DesignError, Examination, Fit, Tuning, TuningError};
 
 /// The triangular form of a plant with the facts about its partials.
@@ -37,14 +38,7 @@ pub(super) fn form(
     let assignments = match chains::find(extended, &request) {
         Ok(assignments) => assignments,
         Err(summary) => {
-            let examination = Examination {
-                family: NAME,
-                fit: Fit::DoesNotFit,
-                summary,
-                chains: vec![],
-                checks: vec![],
-            };
-            return Ok(Err(examination));
+            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
     let choices = assignments.len();
@@ -85,7 +79,6 @@ fn examined(
         partials.push(row);
     }
     checks.push(lipschitz(extended, &region)?);
-    let fit = fit(&checks);
     let chains = assignment
         .chains
         .iter()
@@ -97,13 +90,8 @@ fn examined(
             ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
         );
     }
-    let examination = Examination {
-        family: NAME,
-        fit,
-        summary,
-        chains,
-        checks,
-    };
+    let found = family::Form { summary, chains };
+    let examination = Examination::new(extended, &region, NAME, found, checks)?;
     Ok(Form {
         assignment,
         partials,

@@ -43,7 +43,7 @@ pub(super) fn certificate(
     let mut checks = facts.checks.clone();
     if let Some(check) = foreign(tuning) {
         checks.push(check);
-        return Ok(Certificate::new(BASIS, region, checks));
+        return Ok(Certificate::new(BASIS, assumptions, checks));
     }
     let unbounded = facts
         .bounds
@@ -55,7 +55,7 @@ pub(super) fn certificate(
         checks.extend(without_bounds(extended, &form, &facts, region));
     }
     if fit(&checks) == Fit::DoesNotFit || (unbounded && !given) {
-        let mut certificate = Certificate::new(BASIS, region, checks);
+        let mut certificate = Certificate::new(BASIS, assumptions, checks);
         certificate.notes.push(remainder(&facts));
         return Ok(certificate);
     }
@@ -112,7 +112,7 @@ impl Study<'_> {
         } else {
             None
         };
-        let mut certificate = Certificate::new(BASIS, &self.assumptions.region, checks);
+        let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
         certificate.notes.push(box_note(self.tuning.clamp));
         self.explain(&mut certificate);

@@ -82,11 +82,7 @@ impl Family for UnknownInput {
             }
             Ok((_, examination)) | Err(examination) if examination.refuted().is_some() => {
                 let checks = examination.checks;
-                Ok(Certificate::new(
-                    theorem::BASIS,
-                    &assumptions.region,
-                    checks,
-                ))
+                Ok(Certificate::new(theorem::BASIS, assumptions, checks))
             }
             Ok((_, examination)) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))

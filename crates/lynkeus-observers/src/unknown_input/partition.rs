@@ -1,11 +1,12 @@
 //! The partition of the measured outputs, and every condition on the box.
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{MissingInput, Node};
 use lynkeus_structure::{Check, Condition, Extended, Layers, Region, layers, rank};
 
 use super::NAME;
 use super::form::Form;
 use crate::conditions::{fit, lipschitz, names, output_slope};
+use crate::family;
 use crate::{DesignError, Examination, Fit, Tuning, TuningError, Value};
 
 /// More partitions are not tried.
@@ -20,17 +21,10 @@ pub(super) fn search<'e, 'p>(
     tuning: &Tuning,
     region: &Region,
 ) -> Result<Found<'e, 'p>, DesignError> {
-    let (fit, chains, checks) = (Fit::DoesNotFit, vec![], vec![]);
     let layers = match layers::find(extended) {
         Ok(layers) => layers,
         Err(summary) => {
-            return Ok(Err(Examination {
-                family: NAME,
-                fit,
-                summary,
-                chains,
-                checks,
-            }));
+            return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
     let given = given(extended, &layers, tuning)?;
@@ -43,8 +37,8 @@ pub(super) fn search<'e, 'p>(
     for first in candidates {
         let form = form(extended, &layers, first);
         let own = conditions(&form, region)?;
-        match crate::conditions::fit(&own) {
-            Fit::Fits => return Ok(Ok(finish(form, shared, own))),
+        match fit(&own) {
+            Fit::Fits => return Ok(Ok(finish(form, region, shared, own)?)),
             Fit::Undecided => {
                 undecided.get_or_insert((form, own));
             }
@@ -52,7 +46,7 @@ pub(super) fn search<'e, 'p>(
         }
     }
     if let Some((form, own)) = undecided {
-        return Ok(Ok(finish(form, shared, own)));
+        return Ok(Ok(finish(form, region, shared, own)?));
     }
     Ok(Err(none(extended, &layers, shared, refuted)))
 }
@@ -208,9 +202,10 @@ fn conditions(form: &Form<'_, '_>, region: &Region) -> Result<Vec<Check>, Design
 
 fn finish<'e, 'p>(
     form: Form<'e, 'p>,
+    region: &Region,
     shared: Vec<Check>,
     own: Vec<Check>,
-) -> (Form<'e, 'p>, Examination) {
+) -> Result<(Form<'e, 'p>, Examination), MissingInput> {
     let extended = form.extended;
     let checks = [shared, own].concat();
     let mut chains = vec![names(extended, &form.x11())];
@@ -223,14 +218,9 @@ fn finish<'e, 'p>(
         chains[0].join(", "),
         chains[1].join(", ")
     );
-    let examination = Examination {
-        family: NAME,
-        fit: fit(&checks),
-        summary,
-        chains,
-        checks,
-    };
-    (form, examination)
+    let found = family::Form { summary, chains };
+    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    Ok((form, examination))
 }
 
 /// No partition: the conditions of the one that went furthest.
@@ -263,11 +253,5 @@ fn none(
             vec![]
         }
     };
-    Examination {
-        family: NAME,
-        fit: Fit::DoesNotFit,
-        summary,
-        chains: vec![],
-        checks: [shared, own].concat(),
-    }
+    Examination::unfit(NAME, summary, [shared, own].concat())
 }

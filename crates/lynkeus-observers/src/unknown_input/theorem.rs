@@ -41,7 +41,7 @@ pub(super) fn certificate(
     hypotheses.push(proof.finite());
     hypotheses.push(proof.slow(assumptions));
     hypotheses.extend(proof.gains(thetas.as_ref()));
-    let mut found = Certificate::new(BASIS, &assumptions.region, hypotheses);
+    let mut found = Certificate::new(BASIS, assumptions, hypotheses);
     proof.print_constants(thetas.as_ref(), &mut found.constants);
     found.notes = proof.notes();
     let proved = found.weakest().is_none();

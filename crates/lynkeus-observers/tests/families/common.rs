@@ -219,11 +219,10 @@ impl Guaranteed<'_> {
             ..Sensors::default()
         };
         let extended = Extended::new(self.plant, &sensors).unwrap();
-        let assumptions = Assumptions {
-            region: extended.region(),
-            drift: self.drift.clone(),
-            noise: self.noise.clone(),
-        };
+        let assumptions = Assumptions::new(&extended, extended.region())
+            .unwrap()
+            .with_drift(self.drift.clone())
+            .with_noise(self.noise.clone());
         self.family
             .theorem(&extended, &self.tuning, &assumptions)
             .unwrap()

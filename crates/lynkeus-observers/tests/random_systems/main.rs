@@ -41,11 +41,10 @@ fn certificate(
     [drift, noise]: [&[f64]; 2],
     sought: Sought,
 ) -> Certificate {
-    let assumptions = Assumptions {
-        region: extended.region(),
-        drift: drift.to_vec(),
-        noise: noise.to_vec(),
-    };
+    let assumptions = Assumptions::new(extended, extended.region())
+        .unwrap()
+        .with_drift(drift.to_vec())
+        .with_noise(noise.to_vec());
     lynkeus_observers::certify(extended, observer, &assumptions, sought).unwrap()
 }
 

@@ -1,18 +1,15 @@
-//! Where expressions jump, and where they only seem to.
+//! Where expressions only seem to jump.
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Unary};
-
-use super::model::BUDGET;
-use crate::{Region, range_within};
+use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
 /// Products of more factors are left as they are.
 const FACTORS: usize = 32;
 
 /// The expressions with sign(a)·a written as |a|, the factors of a product in any order:
 /// what the derivative of a·|a| has in it does not jump, though its factor sign(a) does.
-pub(super) fn without_removable_jumps(graph: &Graph, roots: &[Node]) -> Vec<Node> {
+pub(crate) fn without_removable_jumps(graph: &Graph, roots: &[Node]) -> Vec<Node> {
     let nodes = graph.reachable(roots);
     let has_sign = |&node: &Node| matches!(graph.op(node), Op::Unary(Unary::Sign, _));
     if !nodes.iter().any(has_sign) {
@@ -96,34 +93,4 @@ fn compared(graph: &Graph, a: Node, b: Node) -> Option<bool> {
         }
         _ => None,
     }
-}
-
-/// Whether the term may jump as the symbol moves: a condition, a sign, a rounding or the
-/// cut of an angle stands between them. |x|, min and max do not jump.
-pub(super) fn jumps_in(
-    graph: &Graph,
-    term: Node,
-    symbol: Node,
-    region: &Region,
-) -> Result<bool, MissingInput> {
-    let depends = |node: Node| graph.symbols_of(&[node]).contains(&symbol);
-    for node in graph.reachable(&[term]) {
-        let jumps = match graph.op(node) {
-            Op::Select(condition, ..) => depends(condition),
-            Op::Unary(Unary::Sign | Unary::Floor, a) => depends(a),
-            Op::Binary(Binary::Less | Binary::LessEq | Binary::Equal, a, b) => {
-                depends(a) || depends(b)
-            }
-            Op::Binary(Binary::Atan2, _, x) if depends(node) => {
-                !range_within(graph, x, region, BUDGET)?
-                    .enclosure
-                    .is_positive()
-            }
-            _ => false,
-        };
-        if jumps {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }

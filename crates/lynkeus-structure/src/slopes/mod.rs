@@ -25,8 +25,8 @@ mod model;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, jacobian};
 use lynkeus_gain::decay::ErrorModel;
 
-use crate::Region;
-use kinks::{jumps_in, without_removable_jumps};
+use crate::{Region, Regularity};
+pub(crate) use kinks::without_removable_jumps;
 use model::model;
 
 /// Inputs whose ranges become vertices: 2⁴ models at most.
@@ -186,12 +186,7 @@ fn moves_slopes_affinely(
         return Ok(false);
     }
     // a step has no derivative, and what it does between the ends they do not tell
-    for &f in derivatives {
-        if jumps_in(graph, f, symbol, region)? {
-            return Ok(false);
-        }
-    }
-    Ok(true)
+    Ok(Regularity::of(graph, derivatives, &[symbol], region)?.holds())
 }
 
 /// The region with each of the inputs at one end of its range.

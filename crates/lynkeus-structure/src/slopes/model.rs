@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, jacobian};
 use lynkeus_gain::decay::{ErrorModel, Sector};
 
-use super::kinks::jumps_in;
 use super::linear::Splitter;
 use super::{Innovation, Slope};
-use crate::{Region, range_within};
+use crate::{Region, Regularity, range_within};
 
 /// Cells examined per end of a slope's range.
 pub(super) const BUDGET: usize = 1500;
@@ -136,9 +135,13 @@ impl Part {
             }
         }
         weights.retain(|term, _| !idle.contains(term));
+        let moving: Vec<Node> = columns.iter().map(|c| c.0).collect();
         for group in groups(weights) {
+            let terms: Vec<Node> = group.terms.iter().map(|t| t.0).collect();
+            let regular = Regularity::of(graph, &terms, &moving, region)?.holds();
             for &column in columns {
-                part.sectors.extend(sector(graph, &group, column, region)?);
+                let found = sector(graph, &group, column, regular, region)?;
+                part.sectors.extend(found);
             }
         }
         Ok(part)
@@ -157,16 +160,17 @@ fn vanishes(
         return Ok(false);
     }
     let found = range_within(graph, term, region, 0)?;
-    Ok(found.defined && found.enclosure == Interval::ZERO)
+    Ok(found.enclosure.is_defined() && found.enclosure == Interval::ZERO)
 }
 
 fn sector(
     graph: &Graph,
     group: &Group,
     (symbol, state): Column,
+    regular: bool,
     region: &Region,
 ) -> Result<Option<(Sector, Slope)>, MissingInput> {
-    let Some((range, variables)) = slope(graph, group, symbol, region)? else {
+    let Some((range, variables)) = slope(graph, group, symbol, regular, region)? else {
         return Ok(None);
     };
     let sector = Sector {
@@ -214,21 +218,23 @@ fn groups(weights: BTreeMap<Node, Vec<Interval>>) -> Vec<Group> {
 }
 
 /// Range of Σ coefficient·∂term/∂state and the names of what it depends on; none where
-/// it is zero everywhere.
+/// it is zero everywhere. Terms that are not regular have no slope, whatever their
+/// derivative is where they have one.
 fn slope(
     graph: &Graph,
     group: &Group,
     state: Node,
+    regular: bool,
     region: &Region,
 ) -> Result<Option<(Interval, Vec<String>)>, MissingInput> {
     let mut sum: Option<Node> = None;
     let mut rest = Interval::ZERO;
-    let mut jumps = false;
+    let mut depends = false;
     for &(term, coefficient) in &group.terms {
         if jacobian::pattern(graph, &[term], &[state])[0].is_empty() {
             continue;
         }
-        jumps |= jumps_in(graph, term, state, region)?;
+        depends = true;
         let jacobian = jacobian::forward(graph, &[term], &[state]);
         let Some(partial) = jacobian.get(0, 0) else {
             continue;
@@ -247,7 +253,7 @@ fn slope(
     }
     let Some(sum) = sum else {
         let entire = (Interval::ENTIRE, vec![]);
-        return Ok(jumps.then_some(entire));
+        return Ok((depends && !regular).then_some(entire));
     };
     let symbols = graph.symbols_of(&[sum]);
     let variables = region.restricted(&symbols).dimensions;
@@ -258,7 +264,7 @@ fn slope(
         true => range_within(graph, sum, region, BUDGET)?,
         false => first,
     };
-    let range = match found.defined && !jumps {
+    let range = match found.enclosure.is_defined() && regular {
         true => found.enclosure + rest,
         false => Interval::ENTIRE,
     };

@@ -116,7 +116,8 @@ fn what_jumps_has_no_slope_and_what_bends_has() {
         "if a > 0 then 1 else 0",
         "(a + 1)*sign(a)",
         "floor(a)",
-        "atan2(0.5, a)",
+        "atan2(a, -0.5)",
+        "mod(a, 0.5)",
         "sqrt(a)",
         "1/a",
     ] {
@@ -136,6 +137,8 @@ fn what_jumps_has_no_slope_and_what_bends_has() {
         ("1/(1 + a*(0.5*sign(a)))", -0.5, 0.5),
         ("a*abs(a)", 0.0, 2.0),
         ("atan2(a, 2)", 0.4, 0.5),
+        ("atan2(0.5, a)", -2.0, -0.4),
+        ("if a > 0 then a else 0", 0.0, 1.0),
     ] {
         let plant = plant(&text(f));
         let (found, region) = slopes(&plant);

@@ -17,11 +17,11 @@ pub(super) fn of(
     extended: &Extended<'_>,
 ) -> Result<Assumptions, Error> {
     let region = extended.region();
-    Ok(Assumptions {
-        drift: drift(study, plant, extended, &region)?,
-        noise: noise(study, plant, extended, &region)?,
-        region,
-    })
+    let drift = drift(study, plant, extended, &region)?;
+    let noise = noise(study, plant, extended, &region)?;
+    let assumptions = Assumptions::new(extended, region);
+    let assumptions = assumptions.map_err(|error| Error::input(error.to_string()))?;
+    Ok(assumptions.with_drift(drift).with_noise(noise))
 }
 
 /// Per extended state: what disturbances within their declared ranges add to its

@@ -43,11 +43,10 @@ fn sensors(plant: &Plant) -> Sensors {
 
 fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> Certificate {
     let extended = Extended::new(plant, &sensors(plant)).unwrap();
-    let assumptions = Assumptions {
-        region: extended.region(),
-        drift: drift.to_vec(),
-        noise: noise.to_vec(),
-    };
+    let assumptions = Assumptions::new(&extended, extended.region())
+        .unwrap()
+        .with_drift(drift.to_vec())
+        .with_noise(noise.to_vec());
     let found = DriftObservable.theorem(&extended, tuning, &assumptions);
     found.unwrap()
 }

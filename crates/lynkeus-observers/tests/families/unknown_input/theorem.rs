@@ -27,11 +27,10 @@ fn theta(θ: [f64; 2]) -> Tuning {
 /// The certificate for drifts of the states and v, and noise of the outputs.
 fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> Certificate {
     let extended = Extended::new(plant, &sensors()).unwrap();
-    let assumptions = Assumptions {
-        region: extended.region(),
-        drift: drift.to_vec(),
-        noise: noise.to_vec(),
-    };
+    let assumptions = Assumptions::new(&extended, extended.region())
+        .unwrap()
+        .with_drift(drift.to_vec())
+        .with_noise(noise.to_vec());
     UnknownInput
         .theorem(&extended, tuning, &assumptions)
         .unwrap()

@@ -1,0 +1,207 @@
+//! Has an expression a value everywhere on the box, and does it jump?
+//!
+//! A function that is continuous on each of finitely many closed cells is continuous on
+//! their union, so the box is halved where a cell does not decide it. On a convex box a
+//! continuous expression is, along any line, absolutely continuous wherever its
+//! derivative is bounded: this is what the mean value theorem in every proof of this
+//! project rests on, kinks included. A jump ends such a proof, however small the
+//! derivative beside it is.
+
+mod glue;
+mod walk;
+
+use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
+
+use crate::condition::short;
+use crate::region::Cell;
+use crate::{Condition, Region};
+use walk::Walk;
+
+/// Cells looked at.
+const BUDGET: usize = 3000;
+/// A side halved so many times says where it is.
+const FINEST: f64 = 1e-4;
+
+/// What was found of some expressions on a box.
+#[derive(Clone, Debug)]
+pub struct Regularity {
+    trouble: Option<Trouble>,
+}
+
+/// Why an expression is not known to be regular.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Trouble {
+    /// the operation has no value there, or may have none
+    Undefined {
+        /// the operation as a person would write it
+        operation: String,
+        /// the part of the box
+        place: Vec<(String, f64, f64)>,
+        /// it certainly has none on that part
+        certain: bool,
+    },
+    /// the operation jumps there, or may jump
+    Jumps {
+        /// the operation as a person would write it
+        operation: String,
+        /// the part of the box
+        place: Vec<(String, f64, f64)>,
+    },
+}
+
+impl Regularity {
+    /// Examines `nodes` on the region; a jump counts where one of the `moving` symbols
+    /// causes it, what time or inputs switch does not.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an expression reads a symbol outside the region.
+    pub fn of(
+        graph: &Graph,
+        nodes: &[Node],
+        moving: &[Node],
+        region: &Region,
+    ) -> Result<Self, MissingInput> {
+        for &node in nodes {
+            let node = crate::slopes::without_removable_jumps(graph, &[node])[0];
+            if let Some(trouble) = search(graph, node, moving, region)? {
+                return Ok(Self {
+                    trouble: Some(trouble),
+                });
+            }
+        }
+        Ok(Self { trouble: None })
+    }
+
+    /// Every expression has a value everywhere on the box and jumps nowhere.
+    pub fn holds(&self) -> bool {
+        self.trouble.is_none()
+    }
+
+    /// What stands against it.
+    pub fn trouble(&self) -> Option<&Trouble> {
+        self.trouble.as_ref()
+    }
+
+    /// Proved, or undecided with the place. Never refuted: a jump or a missing value in a
+    /// part of an expression need not be one of the whole, and the plant need not go there.
+    pub fn verdict(&self) -> Condition {
+        match &self.trouble {
+            None => Condition::Proved,
+            Some(trouble) => Condition::Undecided(trouble.place().to_vec()),
+        }
+    }
+}
+
+impl Trouble {
+    /// The part of the box in question.
+    pub fn place(&self) -> &[(String, f64, f64)] {
+        match self {
+            Trouble::Undefined { place, .. } | Trouble::Jumps { place, .. } => place,
+        }
+    }
+}
+
+impl std::fmt::Display for Trouble {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (operation, word) = match self {
+            Trouble::Undefined {
+                operation,
+                certain: true,
+                ..
+            } => (operation, "has no value"),
+            Trouble::Undefined { operation, .. } => (operation, "may have no value"),
+            Trouble::Jumps { operation, .. } => (operation, "jumps"),
+        };
+        write!(f, "{operation} {word}")?;
+        for (i, (name, low, high)) in self.place().iter().enumerate() {
+            let joint = if i == 0 { " at" } else { "," };
+            let narrow = (high - low).abs() <= 1e-3 * low.abs().max(high.abs()).max(1.0);
+            match narrow {
+                true => write!(f, "{joint} {name} = {}", short(nearest(*low, *high)))?,
+                false => write!(f, "{joint} {name} in [{}, {}]", short(*low), short(*high))?,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The roundest number of a narrow range: zero or one of its ends.
+fn nearest(low: f64, high: f64) -> f64 {
+    if low <= 0.0 && high >= 0.0 {
+        return 0.0;
+    }
+    let length = |x: f64| format!("{x}").len();
+    match length(low) <= length(high) {
+        true => low,
+        false => high,
+    }
+}
+
+/// The first place where it is not decided, depth first: a true jump is found after a few
+/// dozen cells, an overestimated range goes on until every cell is decided.
+fn search(
+    graph: &Graph,
+    node: Node,
+    moving: &[Node],
+    region: &Region,
+) -> Result<Option<Trouble>, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let mut walk = Walk::new(graph, &[node], moving, &region)?;
+    let mut open: Vec<Cell> = vec![region.cell()];
+    let mut seen = 0;
+    while let Some(cell) = open.pop() {
+        seen += 1;
+        let Some((culprit, known)) = walk.trouble(&[node], &cell) else {
+            continue;
+        };
+        let used = graph.symbols_of(&[culprit]);
+        let decidable = seen < BUDGET && !known.values.is_empty();
+        let halves = decidable
+            .then(|| region.split_among(&cell, &used, FINEST))
+            .flatten();
+        match halves {
+            Some((first, second)) => open.extend([second, first]),
+            None => return Ok(Some(told(graph, &region, &cell, culprit, known.values))),
+        }
+    }
+    Ok(None)
+}
+
+fn told(graph: &Graph, region: &Region, cell: &Cell, culprit: Node, values: Interval) -> Trouble {
+    let used = graph.symbols_of(&[culprit]);
+    let named = region.named(cell).into_iter().zip(&region.dimensions);
+    let place = named
+        .filter(|(_, d)| used.contains(&d.symbol))
+        .map(|(side, _)| side)
+        .collect();
+    let operation = graph.render(culprit, 60);
+    match values.is_defined() {
+        true => Trouble::Jumps { operation, place },
+        false => Trouble::Undefined {
+            operation,
+            place,
+            certain: values.is_empty(),
+        },
+    }
+}
+
+/// Whether an operation that steps stands between a node and one of the symbols, wherever
+/// in the box: what has no derivative in a symbol may still depend on it.
+pub fn steps(graph: &Graph, node: Node, symbols: &[Node]) -> bool {
+    let depends = |n: Node| graph.symbols_of(&[n]).iter().any(|s| symbols.contains(s));
+    graph
+        .reachable(&[node])
+        .into_iter()
+        .any(|n| match graph.op(n) {
+            Op::Unary(Unary::Sign | Unary::Floor | Unary::Not, a) => depends(a),
+            Op::Binary(
+                Binary::Less | Binary::LessEq | Binary::Equal | Binary::And | Binary::Or,
+                ..,
+            ) => depends(n),
+            Op::Select(condition, ..) => depends(condition),
+            _ => false,
+        })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+use super::*;
+use crate::Dimension;
+use lynkeus_expr::Expr;
+
+fn side(x: Expr<'_>, min: f64, max: f64) -> Dimension {
+    Dimension {
+        name: x.graph().symbol_name(x.node()).unwrap(),
+        symbol: x.node(),
+        min,
+        max,
+        integer: false,
+    }
+}
+
+/// Examines f(x, y) for x in [−1, 2] and y in [0.5, 3], both moving.
+fn examined(build: impl for<'g> Fn(Expr<'g>, Expr<'g>) -> Expr<'g>) -> Regularity {
+    let g = Graph::new();
+    let (x, y) = (g.symbol("x"), g.symbol("y"));
+    let region = Region {
+        dimensions: vec![side(x, -1.0, 2.0), side(y, 0.5, 3.0)],
+    };
+    let node = build(x, y).node();
+    Regularity::of(&g, &[node], &[x.node(), y.node()], &region).unwrap()
+}
+
+fn jumps(found: &Regularity) -> bool {
+    matches!(found.trouble(), Some(Trouble::Jumps { .. }))
+}
+
+fn undefined(found: &Regularity) -> bool {
+    matches!(found.trouble(), Some(Trouble::Undefined { .. }))
+}
+
+#[test]
+fn smooth_and_kinked_expressions_are_regular() {
+    assert!(examined(|x, y| x.sin() * y.ln() + x.abs() / y).holds());
+    assert!(examined(|x, y| x.min(y).max(x * y)).holds());
+    assert!(examined(|x, _| (x - x.powi(2) / 4.0 + 1.25 + 1e-3).sqrt()).holds());
+    assert!(examined(|x, _| x * x.sign()).holds(), "it is |x|");
+}
+
+#[test]
+fn every_step_is_a_jump() {
+    assert!(jumps(&examined(|x, _| x.sign())));
+    assert!(jumps(&examined(|x, _| x.floor())));
+    assert!(jumps(&examined(|x, y| y - 2.0 * (x / 2.0).floor())));
+    assert!(jumps(&examined(|x, y| x.less(y))));
+    assert!(jumps(&examined(|x, y| (x - y).less_eq(x * 0.0) * y)));
+    // through the negative half of the x axis
+    assert!(jumps(&examined(|x, y| x.atan2(-y))));
+    assert!(examined(|x, y| x.atan2(y)).holds());
+}
+
+/// The last point of a side is one of it, and so is a jump there.
+#[test]
+fn a_jump_at_the_edge_counts() {
+    assert!(jumps(&examined(|_, y| (y / 3.0).floor())));
+    assert!(examined(|_, y| (y / 3.1).floor()).holds());
+    assert!(jumps(&examined(|_, y| (y - 0.5).sign())));
+}
+
+#[test]
+fn what_has_no_value_somewhere_is_named() {
+    assert!(undefined(&examined(|x, _| x.ln())));
+    assert!(undefined(&examined(|x, _| x.sqrt())));
+    assert!(undefined(&examined(|x, _| 1.0 / (x - 1.0))));
+    assert!(undefined(&examined(|x, _| x.pow(x.graph().constant(1.5)))));
+    assert!(undefined(&examined(|x, _| x.acos())));
+    assert!(undefined(&examined(|_, y| y.tan())));
+    assert!(undefined(&examined(|x, _| (x - 1.5) / (x - 1.5))));
+    let text = examined(|x, _| x.ln()).trouble().unwrap().to_string();
+    assert!(text.contains("ln(x)") || text.contains("log(x)"), "{text}");
+    assert!(
+        text.contains("no value at x in [-1, ") || text.contains("x = "),
+        "{text}"
+    );
+}
+
+#[test]
+fn branches_that_meet_do_not_jump() {
+    let zero = |x: Expr<'_>| x.graph().constant(0.0).node();
+    let select = |c: Expr<'_>, a: Node, b: Node| c.graph().select(c.node(), a, b);
+    let met = examined(|x, y| {
+        let g = x.graph();
+        g.expr(select(
+            x.less(g.constant(0.0)),
+            zero(x),
+            (x.powi(2) * y).node(),
+        ))
+    });
+    assert!(met.holds(), "{:?}", met.trouble());
+    // by a difference: if x − y < 0 then −(x − y)² else (x − y)²
+    let met = examined(|x, y| {
+        let g = x.graph();
+        let d = x - y;
+        g.expr(select(
+            d.less(g.constant(0.0)),
+            (-(d.powi(2))).node(),
+            d.powi(2).node(),
+        ))
+    });
+    assert!(met.holds(), "{:?}", met.trouble());
+    let apart = examined(|x, y| {
+        let g = x.graph();
+        g.expr(select(
+            x.less(g.constant(0.0)),
+            zero(x),
+            (x.powi(2) + y * 1e-9).node(),
+        ))
+    });
+    assert!(jumps(&apart));
+}
+
+/// What the other branch would do does not matter.
+#[test]
+fn a_branch_that_is_not_taken_counts_for_nothing() {
+    let found = examined(|x, y| {
+        let g = x.graph();
+        let c = y.less(g.constant(0.0));
+        g.expr(g.select(c.node(), x.ln().node(), x.node()))
+    });
+    assert!(found.holds(), "{:?}", found.trouble());
+}
+
+/// Time and inputs may switch: the state does not.
+#[test]
+fn jumps_of_what_does_not_move_are_allowed() {
+    let g = Graph::new();
+    let (x, u) = (g.symbol("x"), g.symbol("u"));
+    let region = Region {
+        dimensions: vec![side(x, -1.0, 2.0), side(u, -1.0, 1.0)],
+    };
+    let node = (x * u.sign()).node();
+    let of = |moving: &[Node]| Regularity::of(&g, &[node], moving, &region).unwrap();
+    assert!(of(&[x.node()]).holds());
+    assert!(!of(&[x.node(), u.node()]).holds());
+}
+
+/// 0⁰ = 1, yet 0^y = 0 for y > 0.
+#[test]
+fn powers_jump_at_the_origin() {
+    let g = Graph::new();
+    let (x, y) = (g.symbol("x"), g.symbol("y"));
+    let region = Region {
+        dimensions: vec![side(x, 0.0, 1.0), side(y, 0.0, 1.0)],
+    };
+    let node = x.pow(y).node();
+    let found = Regularity::of(&g, &[node], &[x.node(), y.node()], &region).unwrap();
+    assert!(jumps(&found));
+}
+
+#[test]
+fn a_step_hides_from_derivatives_only() {
+    let g = Graph::new();
+    let (x, y) = (g.symbol("x"), g.symbol("y"));
+    let node = (2.0 * x - x.sign() + y).node();
+    assert!(steps(&g, node, &[x.node()]) && !steps(&g, node, &[y.node()]));
+}
