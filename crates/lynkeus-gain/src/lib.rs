@@ -14,6 +14,7 @@
 
 pub mod decay;
 pub mod definite;
+pub mod hurwitz;
 pub mod integrators;
 pub mod lemma1;
 pub mod lmi;

@@ -7,7 +7,7 @@ use lynkeus_structure::{ChainRequest, Check, Condition, Dimension, Extended, Reg
 use crate::{DesignError, Fit, Tuning, TuningError};
 
 /// ∂f_row/∂x_column with the verdict on its sign.
-pub(crate) fn partial(
+fn partial(
     extended: &Extended<'_>,
     row: usize,
     column: usize,
@@ -21,6 +21,46 @@ pub(crate) fn partial(
     let (f, x) = (&extended.states[row].name, &extended.states[column].name);
     let name = format!("∂f({f})/∂{x} keeps its sign");
     Ok((node, sign::keeps_sign(graph, name, node, region)?))
+}
+
+/// ∂f_j/∂x_{j+1} along a chain.
+#[derive(Clone, Debug)]
+pub(crate) struct Partial {
+    pub node: Node,
+    pub sign: f64,
+    /// (α₁, α₂) of its size; α₁ = 0 where no sign is proved
+    pub bounds: (f64, f64),
+}
+
+impl Partial {
+    /// The range, sign included.
+    pub fn range(&self) -> (f64, f64) {
+        let (low, high) = self.bounds;
+        match (low > 0.0, self.sign < 0.0) {
+            (true, false) => (low, high),
+            (true, true) => (-high, -low),
+            (false, _) => (-high, high),
+        }
+    }
+}
+
+/// The partials along a chain with the verdicts on their signs.
+pub(crate) fn partials(
+    extended: &Extended<'_>,
+    states: &[usize],
+    region: &Region,
+) -> Result<(Vec<Partial>, Vec<Check>), DesignError> {
+    let (mut found, mut checks) = (vec![], vec![]);
+    for pair in states.windows(2) {
+        let (node, verdict) = partial(extended, pair[0], pair[1], region)?;
+        found.push(Partial {
+            node,
+            sign: verdict.sign,
+            bounds: verdict.bounds,
+        });
+        checks.push(verdict.check);
+    }
+    Ok((found, checks))
 }
 
 /// The slope of an output in its state must not vanish; nothing to check where

@@ -6,7 +6,7 @@ use lynkeus_expr::{Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_structure::Extended;
 
-use crate::{Estimate, Observer, Signal, Tuning, TuningError};
+use crate::{Estimate, Observer, Signal, Tuning, TuningError, prolongation};
 
 /// The plant's expressions over the estimate.
 pub(crate) struct Copy<'e, 'p> {
@@ -30,7 +30,7 @@ impl<'e, 'p> Copy<'e, 'p> {
             extended,
             hats,
             seen: HashMap::new(),
-            clamp: tuning.clamp,
+            clamp: tuning.clamp || prolongation::asked_for(tuning),
         };
         let seen =
             |(i, hat): (usize, &Signal)| (extended.states[i].node, copy.seen_as(i, hat.symbol));

@@ -187,6 +187,25 @@ impl Tuning {
         }
     }
 
+    /// A list of names.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn names(&self, key: &str) -> Result<Option<Vec<String>>, TuningError> {
+        let Some(value) = self.values.get(key) else {
+            return Ok(None);
+        };
+        let wrong = || TuningError::new(key, "a list of names", value);
+        let Value::List(names) = value else {
+            return Err(wrong());
+        };
+        let name = |name: &Value| match name {
+            Value::Text(name) => Ok(name.clone()),
+            _ => Err(wrong()),
+        };
+        names.iter().map(name).collect::<Result<_, _>>().map(Some)
+    }
+
     /// A list of tables, each with lists of numbers under exactly the given keys.
     ///
     /// # Errors

@@ -7,6 +7,8 @@
 //! grows by the one new state of its last equation, as in [`chains`](crate::chains);
 //! what is searched is the order.
 
+use std::collections::HashSet;
+
 use crate::chains::{ChainRequest, describe_chains, heads, names};
 use crate::{Chain, Extended};
 
@@ -44,25 +46,28 @@ impl Blocks {
     }
 }
 
-/// More outputs than this are refused rather than permuted.
-const MAX_OUTPUTS: usize = 7;
+/// Chains that are grown in search of arrangements: enough for every order of seven outputs.
+const STEPS: usize = 20_000;
 
 /// Every arrangement into blocks, the most balanced first; of equally balanced
-/// ones that which follows the order of the measured outputs.
+/// ones that which follows the order of the measured outputs. With many outputs, those of
+/// the first 20,000 steps of the search. `order`: places of the measured outputs, if the
+/// order of their chains is given.
 ///
 /// # Errors
 /// Where there is none: which equation breaks the form.
-pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Blocks>, String> {
+pub fn find(
+    extended: &Extended<'_>,
+    request: &ChainRequest,
+    order: Option<&[usize]>,
+) -> Result<Vec<Blocks>, String> {
     let heads = heads(extended)?;
-    if heads.len() > MAX_OUTPUTS {
-        return Err(format!(
-            "{} outputs are measured; at most {MAX_OUTPUTS} are arranged into blocks",
-            heads.len()
-        ));
-    }
     let mut search = Search {
         extended,
         heads: &heads,
+        order,
+        steps: 0,
+        dead: HashSet::new(),
         found: vec![],
         furthest: None,
     };
@@ -70,31 +75,34 @@ pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Block
     let Search {
         mut found,
         furthest,
+        steps,
         ..
     } = search;
     if found.is_empty() {
-        return Err(furthest.map_or_else(
+        let why = furthest.map_or_else(
             || "no chain starts at a measured state".into(),
             |(_, why)| why,
-        ));
+        );
+        return Err(match steps < STEPS {
+            true => why,
+            false => format!("{why}; not every order of the outputs was tried: give it"),
+        });
     }
-    let all: Vec<String> = found.iter().map(|b| b.describe(extended)).collect();
-    found.retain(|blocks| {
-        request
-            .lengths
-            .as_ref()
-            .is_none_or(|l| *l == blocks.lengths())
-            && request
-                .names
-                .as_ref()
-                .is_none_or(|n| *n == blocks.names(extended))
-    });
-    if found.is_empty() {
+    let fits = |blocks: &Blocks| {
+        let lengths = request.lengths.as_ref();
+        let names = request.names.as_ref();
+        lengths.is_none_or(|l| *l == blocks.lengths())
+            && names.is_none_or(|n| *n == blocks.names(extended))
+    };
+    if !found.iter().any(fits) {
+        let mut all: Vec<String> = found.iter().map(|b| b.describe(extended)).collect();
+        all.truncate(SHOWN);
         return Err(format!(
             "no arrangement has the chains asked for; the equations allow {}",
             all.join(" or ")
         ));
     }
+    found.retain(fits);
     found.sort_by_key(|blocks| {
         let lengths = blocks.lengths();
         lengths.iter().max().copied().unwrap_or(0) - lengths.iter().min().copied().unwrap_or(0)
@@ -102,9 +110,16 @@ pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Block
     Ok(found)
 }
 
+/// Arrangements that an error message shows.
+const SHOWN: usize = 12;
+
 struct Search<'e, 'p> {
     extended: &'e Extended<'p>,
     heads: &'e [usize],
+    order: Option<&'e [usize]>,
+    steps: usize,
+    /// states taken, and by which chains, from where nothing can be completed
+    dead: HashSet<(Vec<bool>, Vec<usize>)>,
     found: Vec<Blocks>,
     /// states covered by the best attempt, and why it stopped
     furthest: Option<(usize, String)>,
@@ -115,10 +130,18 @@ impl Search<'_, '_> {
         if order.len() == self.heads.len() {
             return self.complete(order, taken);
         }
-        for output in 0..self.heads.len() {
-            if order.iter().any(|(used, _)| *used == output) {
-                continue;
+        let mut used: Vec<usize> = order.iter().map(|(output, _)| *output).collect();
+        used.sort_unstable();
+        let here = (taken.clone(), used);
+        if self.dead.contains(&here) {
+            return;
+        }
+        let before = self.found.len();
+        for output in self.next(order) {
+            if self.steps == STEPS {
+                return;
             }
+            self.steps += 1;
             match self.grow(self.heads[output], taken) {
                 Ok(chain) => {
                     chain.states.iter().for_each(|&i| taken[i] = true);
@@ -130,6 +153,18 @@ impl Search<'_, '_> {
                 }
                 Err(why) => self.stopped(taken, why),
             }
+        }
+        if self.found.len() == before {
+            self.dead.insert(here);
+        }
+    }
+
+    /// The outputs that may come next.
+    fn next(&self, order: &[(usize, Chain)]) -> Vec<usize> {
+        let free = |output: &usize| order.iter().all(|(used, _)| used != output);
+        match self.order {
+            Some(given) => given.get(order.len()).copied().into_iter().collect(),
+            None => (0..self.heads.len()).filter(free).collect(),
         }
     }
 

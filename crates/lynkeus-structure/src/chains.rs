@@ -28,6 +28,8 @@ pub struct Assignment {
     pub chains: Vec<Chain>,
     /// which chain plays the part of the paper's first one (n₁ rows, n₁−1 strict)
     pub leading: usize,
+    /// the other one can play it as well
+    pub either: bool,
 }
 
 impl Assignment {
@@ -180,6 +182,7 @@ fn single(extended: &Extended<'_>, head: usize) -> Result<Assignment, String> {
         return Ok(Assignment {
             chains: vec![Chain { states: path }],
             leading: 0,
+            either: false,
         });
     }
     Err(stuck(extended, &path, &new))
@@ -195,6 +198,7 @@ fn stuck(extended: &Extended<'_>, path: &[usize], new: &[usize]) -> String {
                 states: path.to_vec(),
             }],
             leading: 0,
+            either: false,
         },
     );
     if new.is_empty() {
@@ -223,9 +227,13 @@ fn pairs(extended: &Extended<'_>, heads: [usize; 2]) -> Result<Vec<Assignment>, 
                 };
                 let mut chains = vec![leader, Chain { states: following }];
                 chains.rotate_left(leading);
-                let known = found.iter().any(|a| a.chains == chains);
-                if !known {
-                    found.push(Assignment { chains, leading });
+                match found.iter_mut().find(|a| a.chains == chains) {
+                    Some(known) => known.either = true,
+                    None => found.push(Assignment {
+                        chains,
+                        leading,
+                        either: false,
+                    }),
                 }
             }
         }

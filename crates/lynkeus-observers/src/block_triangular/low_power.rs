@@ -2,29 +2,30 @@
 //! at most θ².
 
 use lynkeus_expr::Node;
-use lynkeus_structure::{Blocks, Extended};
+use lynkeus_structure::Extended;
 
+use super::form::Form;
+use super::settings::{Correction, Settings};
 use super::{NAME, chain_rule, injected, theta};
-use crate::conditions::partial;
+use crate::conditions::Partial;
 use crate::estimate::Copy;
-use crate::peaking::{InnovationLimit, LowPower, Part, Run, Transient, nominal};
-use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
+use crate::peaking::{
+    InnovationLimit, LowPower, Part, Run, Transient, factor_rows, nominal, variation,
+};
+use crate::{Design, DesignError, Tuning, TuningError, prolongation};
 
 pub(super) fn assemble(
     extended: &Extended<'_>,
     tuning: &Tuning,
-    blocks: &Blocks,
-    examination: Examination,
+    form: Form,
 ) -> Result<Design, DesignError> {
-    if tuning
-        .choice("correction", &["lee", "classical"])?
-        .as_deref()
-        != Some("classical")
-    {
+    if Settings::read(tuning)?.correction == Correction::Lee {
         let expected =
             "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
         return Err(TuningError::new("correction", expected, "lee").into());
     }
+    prolongation::refuse(tuning, "form = \"low-power\"")?;
+    let blocks = &form.blocks;
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
     let count = blocks.order.len();
@@ -33,51 +34,57 @@ pub(super) fn assemble(
     let transient = Transient::read(tuning, count)?;
     let coefficients = LowPower::read(tuning, &blocks.lengths())?;
     let mut run = Run::new(&copy, tuning, transient.as_ref())?;
-    let mut gains = vec![];
+    let (mut notes, mut factors) = (vec![], vec![]);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
         let Some(innovation) = limit.innovation(&copy, *output) else {
             continue;
         };
         let derivative = |&state: &usize| extended.derivatives[state];
         let f: Vec<Node> = chain.states.iter().map(derivative).collect();
-        let entries = run.add(&Part {
+        let output_name = &extended.outputs[*output].variable.name;
+        let found = &form.partials[place];
+        notes.extend(variation(output_name, &bounds(found), &coefficients.K[*output]));
+        let added = run.add(&Part {
             states: &chain.states,
             f: &graph.substitute(&f, &injected(&copy, blocks, place)),
-            divisors: &divisors(extended, &chain.states)?,
+            divisors: &divisors(extended, found)?,
             innovation,
             K: &coefficients.K[*output],
             θ: θ[*output],
             δ: 1.0,
             number: *output,
         });
-        let output = extended.outputs[*output].variable.name.clone();
-        gains.push(ChainGain { output, entries });
+        factors.extend(factor_rows(output_name, added));
     }
     let text: Vec<String> = θ.iter().map(f64::to_string).collect();
     let mut parameters = vec![("θ".to_owned(), text.join(", "))];
     parameters.extend(transient.as_ref().map(Transient::parameter));
     parameters.extend(coefficients.parameters());
+    parameters.extend(factors);
+    notes.extend(chain_rule(blocks, &θ));
     Ok(Design {
         observer: run.finish(NAME, tuning)?,
-        notes: chain_rule(blocks, &θ).into_iter().collect(),
-        examination,
-        gains,
+        notes,
+        examination: form.examination,
+        gains: vec![],
         parameters,
     })
 }
 
 /// The constant that stands for each partial along a chain; 1 in the paper's form (2).
-fn divisors(extended: &Extended<'_>, states: &[usize]) -> Result<Vec<Node>, DesignError> {
-    let region = extended.region();
+fn divisors(extended: &Extended<'_>, partials: &[Partial]) -> Result<Vec<Node>, DesignError> {
     let mut found = vec![];
-    for pair in states.windows(2) {
-        let (_, sign) = partial(extended, pair[0], pair[1], &region)?;
-        let Some(middle) = nominal(sign.sign, sign.bounds) else {
+    for partial in partials {
+        let Some(middle) = nominal(partial.sign, partial.bounds) else {
             let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model";
-            let bounds = format!("bounds {} and {}", sign.bounds.0, sign.bounds.1);
+            let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
             return Err(TuningError::new("form", expected, bounds).into());
         };
         found.push(extended.graph().constant(middle).node());
     }
     Ok(found)
+}
+
+fn bounds(partials: &[Partial]) -> Vec<(f64, f64)> {
+    partials.iter().map(|partial| partial.bounds).collect()
 }

@@ -19,6 +19,8 @@ mod form;
 mod gains;
 mod lee;
 mod low_power;
+mod settings;
+mod stable;
 mod theorem;
 mod transformed;
 
@@ -27,17 +29,18 @@ use std::collections::HashMap;
 use lynkeus_expr::Node;
 use lynkeus_structure::{Blocks, Extended};
 
-use crate::conditions::on_output;
+use crate::correction::{self, Start};
 use crate::estimate::Copy;
-use crate::guarantee;
-use crate::peaking::{self, InnovationLimit, Transient, transient};
+use crate::peaking::{InnovationLimit, LowPower, Transient, transient};
+use crate::prolongation::{self, Continued, prolong};
 use crate::{
-    Assumptions, Certificate, ChainGain, Design, DesignError, Examination, Family, Fit, Tuning,
-    TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    guarantee,
 };
-use form::form;
+use form::{Form, form};
 use gains::{given, placed};
-use lee::lee;
+use lee::{lee, transformation};
+use settings::{Correction, Settings};
 
 const NAME: &str = "block-triangular";
 
@@ -61,6 +64,8 @@ impl Family for BlockTriangular {
             "k_poles",
             "correction",
             "chains",
+            "order",
+            "prolong",
             "gain",
             "rate",
             "gain_limit",
@@ -78,8 +83,9 @@ impl Family for BlockTriangular {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
+        LowPower::refuse_unstable(tuning)?;
         Ok(match form(extended, tuning)? {
-            Ok((_, examination)) | Err(examination) => examination,
+            Ok(Form { examination, .. }) | Err(examination) => examination,
         })
     }
 
@@ -94,19 +100,17 @@ impl Family for BlockTriangular {
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended, tuning)? {
-            Ok((blocks, examination)) if examination.fit != Fit::DoesNotFit => {
+            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
                 if guarantee::asked_for(tuning, &[])? {
-                    return guarantee::design_lmi(extended, tuning, NAME, examination);
+                    prolongation::refuse(tuning, "gain = \"lmi\"")?;
+                    return guarantee::design_lmi(extended, tuning, NAME, form.examination);
                 }
-                let low_power = peaking::asked_for(tuning, &["k", "k_poles"])?;
-                let assemble = if low_power {
-                    low_power::assemble
-                } else {
-                    assemble
-                };
-                Ok(assemble(extended, tuning, &blocks, examination)?)
+                match Settings::read(tuning)?.low_power {
+                    true => low_power::assemble(extended, tuning, form),
+                    false => assemble(extended, tuning, form),
+                }
             }
-            Ok((_, examination)) | Err(examination) => {
+            Ok(Form { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
             }
         }
@@ -114,19 +118,21 @@ impl Family for BlockTriangular {
 }
 
 /// Observer (7) or (3).
-fn assemble(
-    extended: &Extended<'_>,
-    tuning: &Tuning,
-    blocks: &Blocks,
-    examination: Examination,
-) -> Result<Design, DesignError> {
+fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Design, DesignError> {
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
+    let blocks = &form.blocks;
     let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
     let transient = Transient::read(tuning, blocks.order.len())?;
     let θ = theta(tuning, blocks.order.len())?;
     let K = coefficients(tuning, blocks)?;
-    let classical = classical(tuning)?;
+    let correction = Settings::read(tuning)?.correction;
+    let start = Start::new(&copy, tuning)?;
+    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let mut parameters = vec![("θ".to_owned(), text(&θ))];
+    parameters.extend(transient.as_ref().map(Transient::parameter));
+    let coefficients = K.iter().enumerate();
+    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let mut gains = vec![];
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
@@ -134,17 +140,12 @@ fn assemble(
         let Some(innovation) = limit.innovation(&copy, *output) else {
             continue;
         };
-        let constants: Vec<f64> = K[*output]
-            .iter()
-            .enumerate()
-            .map(|(j, k)| θ[*output].powi(j as i32 + 1) * k)
-            .collect();
-        let powers = constants.iter().enumerate();
-        let steady: Vec<(f64, f64)> = powers.map(|(j, k)| (*k, (j + 1) as f64)).collect();
+        let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
+        let steady: Vec<(f64, f64)> = K[*output].iter().enumerate().map(power).collect();
         let timed = transient::gains(transient.as_ref(), &copy, *output, θ[*output], &steady);
-        let gain = match classical {
-            true => timed,
-            false => lee(extended, chain, &timed),
+        let gain = match correction {
+            Correction::Classical => timed,
+            Correction::Lee => lee(extended, chain, &timed),
         };
         let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
         let f: Vec<Node> = chain
@@ -153,29 +154,43 @@ fn assemble(
             .map(|&i| extended.derivatives[i])
             .collect();
         let f = copy.at_estimate(&graph.substitute(&f, &injected));
-        for ((&state, f), gain) in chain.states.iter().zip(f).zip(gain) {
-            derivatives[state] = (graph.expr(f) - graph.expr(gain) * graph.expr(innovation)).node();
+        for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
+            derivatives[state] =
+                (graph.expr(f) - graph.expr(*gain) * graph.expr(innovation)).node();
         }
-        gains.push(ChainGain {
-            output: extended.outputs[*output].variable.name.clone(),
-            entries: on_output(extended, *output, &chain.states, &constants),
-        });
+        let printed = correction::Correction {
+            output: *output,
+            states: &chain.states,
+            factors: &gain,
+            limited: limit.is_set(),
+        };
+        match printed.constant(extended) {
+            Some(constant) => gains.push(constant),
+            None => {
+                if correction == Correction::Lee {
+                    let found = transformation(extended, chain);
+                    let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
+                    parameters.push((format!("M{}", output + 1), start.table(&found.M)));
+                    parameters.push((format!("L{}", output + 1), start.table(&L)));
+                }
+                parameters.extend(printed.expressions(&start));
+            }
+        }
     }
-    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    let mut parameters = vec![("θ".to_owned(), text(&θ))];
-    parameters.extend(transient.as_ref().map(Transient::parameter));
-    parameters.extend(
-        K.iter()
-            .enumerate()
-            .map(|(i, k)| (format!("K{}", i + 1), text(k))),
-    );
+    prolong(&copy, tuning, continued(&form), &mut derivatives)?;
     Ok(Design {
         observer: copy.observer(NAME, tuning, derivatives)?,
         notes: chain_rule(blocks, &θ).into_iter().collect(),
-        examination,
+        examination: form.examination,
         gains,
         parameters,
     })
+}
+
+/// The equations of the chains, for their prolongation.
+fn continued(form: &Form) -> impl Iterator<Item = Continued> {
+    let blocks = form.blocks.order.iter().zip(&form.partials);
+    blocks.flat_map(|((_, chain), partials)| Continued::along(&chain.states, partials))
 }
 
 /// K, every eigenvalue of A − KC at −1 by default.
@@ -184,12 +199,6 @@ fn coefficients(tuning: &Tuning, blocks: &Blocks) -> Result<Vec<Vec<f64>>, Tunin
         let all_at_one = |n: usize| placed(&vec![-1.0; n]);
         blocks.lengths().into_iter().map(all_at_one).collect()
     }))
-}
-
-/// Observer (3) instead of (7).
-fn classical(tuning: &Tuning) -> Result<bool, TuningError> {
-    let choice = tuning.choice("correction", &["lee", "classical"])?;
-    Ok(choice.as_deref() == Some("classical"))
 }
 
 /// θ, which has no default.

@@ -10,18 +10,18 @@ use lynkeus_structure::{Blocks, Check, Extended};
 
 use super::form::form;
 use super::transformed::{Plant, Similar, Table, Term};
-use super::{chain_rule, classical, coefficients, theta};
-use crate::conditions::{fit, names, output_slope, partial};
+use super::settings::{Correction, Settings};
+use super::{chain_rule, coefficients, theta};
+use crate::conditions::{Partial, fit, names, output_slope, partials};
+use crate::peaking::Departure;
+use crate::stability::GainedChain;
 use crate::proof::slopes::{Slope, slopes};
 use crate::proof::threshold::{first, lightest};
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
 use crate::proof::{Chain, Comparison, lyapunov};
-use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning};
+use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning, prolongation};
 
 const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
-
-/// Keys that this proof knows; others change the observer.
-const COVERED: &[&str] = &["theta", "k", "k_poles", "correction", "chains"];
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -29,7 +29,7 @@ pub(super) fn certificate(
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let blocks = match form(extended, tuning)? {
-        Ok((blocks, _)) => blocks,
+        Ok(form) => form.blocks,
         Err(examination) if examination.checks.is_empty() => {
             return Err(DesignError::Refused(Box::new(examination)));
         }
@@ -37,7 +37,8 @@ pub(super) fn certificate(
             return Ok(Certificate::new(BASIS, assumptions, examination.checks));
         }
     };
-    if let Some(check) = foreign(tuning) {
+    if let Some(departure) = Departure::of(tuning, &[])? {
+        let check = departure.check("the observer is (7) or (3) with a constant θ");
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
@@ -53,25 +54,13 @@ pub(super) fn certificate(
         noise: pick(&noise),
     };
     let study = Study {
-        classical: classical(tuning)?,
+        classical: Settings::read(tuning)?.correction == Correction::Classical,
         θ: pick(&by_output),
         rule: chain_rule(&blocks, &by_output),
         plant: &plant,
         tuning,
     };
     study.certificate()
-}
-
-/// Keys that another file of the family gives a meaning to.
-fn foreign(tuning: &Tuning) -> Option<Check> {
-    let mut keys = tuning.values.keys();
-    let key = keys.find(|key| !COVERED.contains(&key.as_str()))?;
-    let detail =
-        format!("the key '{key}' makes another observer, which the theorem does not cover");
-    Some(undecided(
-        "the observer is (7) or (3) with a constant θ",
-        detail,
-    ))
 }
 
 pub(super) struct Study<'a> {
@@ -123,21 +112,16 @@ impl Study<'_> {
         let extended = self.plant.extended;
         let region = &self.plant.assumptions.region;
         let order = &self.blocks().order;
-        let (mut checks, mut partials) = (vec![], vec![]);
+        let (mut checks, mut ranges): (Vec<Check>, Vec<Vec<(f64, f64)>>) = (vec![], vec![]);
         for (output, chain) in order {
             checks.extend(output_slope(extended, *output, region)?);
-            let mut row = vec![];
-            for pair in chain.states.windows(2) {
-                let (_, found) = partial(extended, pair[0], pair[1], region)?;
-                checks.push(found.check);
-                row.push(match (self.classical, found.sign < 0.0) {
-                    // M takes the partials out: a chain of integrators is left
-                    (false, _) => (1.0, 1.0),
-                    (true, false) => found.bounds,
-                    (true, true) => (-found.bounds.1, -found.bounds.0),
-                });
-            }
-            partials.push(row);
+            let (found, signs) = partials(extended, &chain.states, region)?;
+            checks.extend(signs);
+            ranges.push(match self.classical {
+                // M takes the partials out: a chain of integrators is left
+                false => vec![(1.0, 1.0); found.len()],
+                true => found.iter().map(Partial::range).collect(),
+            });
         }
         let (plain, check) = slopes(extended, region, |a, b| self.skipped(a, b))?;
         checks.push(check);
@@ -157,7 +141,7 @@ impl Study<'_> {
         }
         Ok(Facts {
             checks,
-            partials,
+            partials: ranges,
             similar,
             terms,
         })
@@ -190,7 +174,12 @@ impl Study<'_> {
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
             let states = names(self.plant.extended, &chain.states).join(" → ");
             let name = format!("(A − KC)ᵀP + P(A − KC) < 0 for ({states})");
-            let found = lyapunov::chain(&self.plant.K[i]).and_then(|P| {
+            let gained = GainedChain {
+                K: &self.plant.K[i],
+                partials: &facts.partials[i],
+            };
+            let middle = gained.middle().and_then(|a| lyapunov::chain(gained.K, &a));
+            let found = middle.and_then(|P| {
                 let μ = self.chain(i, facts, &P, self.θ[i], 1.0).decay()?;
                 Some((P, μ))
             });
@@ -203,7 +192,7 @@ impl Study<'_> {
                 }
                 None => checks.push(undecided(
                     name,
-                    "not with the P of partials that are 1: K does not stabilise the chain, or (classical observer) the partials vary too much or are negative",
+                    "not with the P of the middle of the partials' bounds: K does not stabilise the chain, or (classical observer) the partials vary too much",
                 )),
             }
         }
@@ -323,8 +312,16 @@ impl Study<'_> {
         })
     }
 
+    /// Where the estimate may be: M of observer (7) moves with it, so the box bounds it.
+    fn place(&self) -> String {
+        match self.classical {
+            true => prolongation::note(self.tuning),
+            false => box_note(self.tuning.clamp),
+        }
+    }
+
     fn notes(&self) -> Vec<String> {
-        let mut notes = vec![box_note(self.tuning.clamp)];
+        let mut notes = vec![self.place()];
         notes.extend(self.rule.clone());
         if !self.classical {
             notes.push("Observer (7): M(x̂) moves with the correction, so its derivative grows with θ and with the error (the paper's Lemma 2 ii takes it as bounded independently of θ). The bound used here is that of the declared box, |y − x̂_1| at most the width of the range of x_1: a proof for that box, not a global one. Narrow ranges make it sharper; correction = \"classical\" does without.".into());

@@ -20,6 +20,11 @@ impl InnovationLimit {
         Ok(Self(tuning.positive_per_chain(KEY, outputs)?))
     }
 
+    /// Whether there is a limit.
+    pub fn is_set(&self) -> bool {
+        self.0.is_some()
+    }
+
     /// x̂ − x as measured for the state that output `i` shows, limited; in the unit of the state,
     /// y = slope·x + offset. None where the output shows no single state.
     pub fn innovation(&self, copy: &Copy<'_, '_>, i: usize) -> Option<Node> {

@@ -74,6 +74,19 @@ impl LowPower {
         Ok(Self { K })
     }
 
+    /// Refuses given coefficients or poles that no chain could have.
+    pub fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
+        if let Some(poles) = tuning.values.get(POLES) {
+            let chains = chains(POLES, poles)?;
+            chains.iter().try_for_each(|chain| negative(chain, poles).map(drop))?;
+        }
+        if let Some(given) = tuning.values.get(GIVEN) {
+            let chains = chains(GIVEN, given)?;
+            chains.iter().try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
+        }
+        Ok(())
+    }
+
     /// For the reader.
     pub fn parameters(&self) -> Vec<(String, String)> {
         let pair = |k: &[f64; 2]| format!("({}, {})", k[0], k[1]);
@@ -85,52 +98,98 @@ impl LowPower {
     }
 }
 
+/// What the lists under the two keys hold, in words.
+const PAIRS: &str = "one list per chain of a pair [k1, k2] per state but the last";
+const NUMBERS: &str = "one list per chain of 2n − 2 negative numbers, n being its states";
+
 /// Lists of pairs (k_i1, k_i2), one list per chain.
 fn explicit(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
-    let expected = "one list per chain of a pair [k1, k2] per state but the last";
-    let chains = rows(GIVEN, given, lengths.len(), expected)?;
+    let chains = rows(GIVEN, given, lengths.len(), PAIRS)?;
     let mut found = vec![];
     for (chain, n) in chains.iter().zip(lengths) {
-        let pairs = rows(GIVEN, chain, n - 1, expected)?;
-        let pair = |pair: &Value| match pair {
-            Value::List(pair) => match pair[..] {
-                [Value::Number(a), Value::Number(b)] => Ok([a, b]),
-                _ => Err(TuningError::new(GIVEN, expected, given)),
-            },
-            _ => Err(TuningError::new(GIVEN, expected, given)),
-        };
-        let coefficients: Coefficients = pairs.iter().map(pair).collect::<Result<_, _>>()?;
-        let abscissa = low_power::abscissa(&coefficients);
-        // a chain of one state has no block, hence no eigenvalue
-        let stable = coefficients.is_empty() || abscissa < 0.0;
-        if !stable {
-            let expected =
-                "coefficients that make M stable, every eigenvalue with a negative real part";
-            let found = format!("{chain}, with an eigenvalue of real part {abscissa:.4}");
-            return Err(TuningError::new(GIVEN, expected, found));
-        }
-        found.push(coefficients);
+        rows(GIVEN, chain, n - 1, PAIRS)?;
+        found.push(stable_pairs(chain, given)?);
     }
     Ok(found)
 }
 
+/// The pairs of a chain, if M is stable with them.
+fn stable_pairs(chain: &Value, given: &Value) -> Result<Coefficients, TuningError> {
+    let wrong = || TuningError::new(GIVEN, PAIRS, given);
+    let Value::List(pairs) = chain else {
+        return Err(wrong());
+    };
+    let pair = |pair: &Value| match pair {
+        Value::List(pair) => match pair[..] {
+            [Value::Number(a), Value::Number(b)] => Ok([a, b]),
+            _ => Err(wrong()),
+        },
+        _ => Err(wrong()),
+    };
+    let coefficients: Coefficients = pairs.iter().map(pair).collect::<Result<_, _>>()?;
+    let abscissa = low_power::abscissa(&coefficients);
+    // a chain of one state has no block, hence no eigenvalue
+    if coefficients.is_empty() || abscissa < 0.0 {
+        return Ok(coefficients);
+    }
+    let expected = "coefficients that make M stable, every eigenvalue with a negative real part";
+    let found = format!("{chain}, with an eigenvalue of real part {abscissa:.4}");
+    Err(TuningError::new(GIVEN, expected, found))
+}
+
 /// Lists of 2n − 2 negative numbers, one list per chain.
 fn placed(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
-    let expected = "one list per chain of 2n − 2 negative numbers, n being its states";
-    let chains = rows(POLES, given, lengths.len(), expected)?;
+    let chains = rows(POLES, given, lengths.len(), NUMBERS)?;
     let mut found = vec![];
     for (chain, n) in chains.iter().zip(lengths) {
-        let number = |pole: &Value| match pole {
-            Value::Number(pole) if *pole < 0.0 => Ok(*pole),
-            _ => Err(TuningError::new(POLES, expected, given)),
-        };
-        let poles = rows(POLES, chain, 2 * (n - 1), expected)?;
-        let poles: Vec<f64> = poles.iter().map(number).collect::<Result<_, _>>()?;
+        rows(POLES, chain, 2 * (n - 1), NUMBERS)?;
+        let poles = negative(chain, given)?;
         let beyond = "poles whose coefficients stay in the range of numbers";
         let K = low_power::place(&poles).ok_or_else(|| TuningError::new(POLES, beyond, chain))?;
         found.push(K);
     }
     Ok(found)
+}
+
+/// The poles of a chain.
+fn negative(chain: &Value, given: &Value) -> Result<Vec<f64>, TuningError> {
+    let wrong = || TuningError::new(POLES, NUMBERS, given);
+    let Value::List(poles) = chain else {
+        return Err(wrong());
+    };
+    let number = |pole: &Value| match pole {
+        Value::Number(pole) if *pole < 0.0 => Ok(*pole),
+        _ => Err(wrong()),
+    };
+    poles.iter().map(number).collect()
+}
+
+fn chains<'v>(key: &str, value: &'v Value) -> Result<&'v [Value], TuningError> {
+    match value {
+        Value::List(chains) => Ok(chains),
+        _ => Err(TuningError::new(key, "one list per chain", value)),
+    }
+}
+
+/// The factors of a chain as parameters: each acts on the innovation of its block, not on
+/// ŷ − y, so they are no gain K.
+pub(crate) fn factor_rows(output: &str, factors: Vec<(String, f64)>) -> Vec<(String, String)> {
+    let row = |(state, factor): (String, f64)| (format!("{output}: on {state}"), factor.to_string());
+    factors.into_iter().map(row).collect()
+}
+
+/// What the reader should know where the partials, with sizes in `bounds`, move and the
+/// gain does not.
+pub(crate) fn variation(output: &str, bounds: &[(f64, f64)], K: &[[f64; 2]]) -> Option<String> {
+    // to the geometric mean, which the gain is made for
+    let ratio = |&(low, high): &(f64, f64)| {
+        let half = (high / low).sqrt();
+        (1.0 / half, half)
+    };
+    let ratios: Vec<(f64, f64)> = bounds.iter().map(ratio).collect();
+    (!bounds.is_empty() && !low_power::tolerates(K, &ratios)).then(|| {
+        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; narrower min and max help, and for the family triangular partials = true, which makes M constant")
+    })
 }
 
 fn rows<'v>(

@@ -1,10 +1,12 @@
 //! Remedies against peaking and noise that families share: a limit on the
 //! innovation, another θ in the transient, the low-power form.
 
+mod departure;
 mod innovation;
 mod low_power;
 pub(crate) mod transient;
 
+pub(crate) use departure::Departure;
 pub(crate) use innovation::InnovationLimit;
-pub(crate) use low_power::{LowPower, Part, Run, asked_for, nominal};
+pub(crate) use low_power::{LowPower, Part, Run, asked_for, factor_rows, nominal, variation};
 pub(crate) use transient::Transient;

@@ -2,13 +2,18 @@
 
 use lynkeus_expr::{Interval, interval};
 
-/// The symmetric P of A − gC with ones above the diagonal of A, in floating point;
-/// none where the equation has no unique solution. A proof has to check it.
-pub(crate) fn chain(g: &[f64]) -> Option<Vec<Vec<f64>>> {
+/// The symmetric P of A(a) − gC with the n − 1 partials a above the diagonal of A, in
+/// floating point; none where the equation has no unique solution. A proof has to check it.
+pub(crate) fn chain(g: &[f64], a: &[f64]) -> Option<Vec<Vec<f64>>> {
     let n = g.len();
-    let A = |i: usize, j: usize| -> f64 {
-        f64::from(u8::from(j == i + 1)) - if j == 0 { g[i] } else { 0.0 }
+    let above = |i: usize, j: usize| {
+        if j == i + 1 {
+            a.get(i).copied().unwrap_or(f64::NAN)
+        } else {
+            0.0
+        }
     };
+    let A = |i: usize, j: usize| above(i, j) - if j == 0 { g[i] } else { 0.0 };
     let place = |i: usize, j: usize| i * n + j;
     let mut system = vec![vec![0.0; n * n]; n * n];
     let mut right = vec![0.0; n * n];
@@ -41,10 +46,24 @@ mod tests {
     /// Both poles at −1: SciPy's solve_continuous_lyapunov.
     #[test]
     fn two_states() {
-        let P = chain(&[2.0, 1.0]).unwrap();
+        let P = chain(&[2.0, 1.0], &[1.0]).unwrap();
         let expected = [[0.5, -0.5], [-0.5, 1.5]];
         for (row, expected) in P.iter().flatten().zip(expected.iter().flatten()) {
             assert!((row - expected).abs() < 1e-12, "{P:?}");
+        }
+    }
+
+    /// x₂ in units of −2: P scales with T = diag(1, −2).
+    #[test]
+    fn a_partial_is_a_change_of_units() {
+        let P = chain(&[2.0, -0.5], &[-2.0]).unwrap();
+        let residual = |i: usize, j: usize| -> f64 {
+            let A = [[-2.0, -2.0], [0.5, 0.0]];
+            (0..2).map(|k| A[k][i] * P[k][j] + P[i][k] * A[k][j]).sum()
+        };
+        for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let expected = if i == j { -1.0 } else { 0.0 };
+            assert!((residual(i, j) - expected).abs() < 1e-12, "{P:?}");
         }
     }
 }

@@ -4,13 +4,10 @@ use lynkeus_expr::Graph;
 use lynkeus_structure::{Check, Extended, Region};
 
 use super::form::Form;
-use crate::conditions::{output_slope, partial};
+use crate::conditions::{output_slope, partials};
 use crate::proof::slopes::{Slope, slopes, undeclared};
 use crate::proof::words::undecided;
-use crate::{DesignError, Tuning, Value};
-
-/// Keys that this proof knows; others change the observer.
-const COVERED: &[&str] = &["theta", "delta", "r", "gain", "S", "partials", "chains"];
+use crate::DesignError;
 
 /// What is known of the plant on the box of the assumptions.
 pub(super) struct Facts {
@@ -26,13 +23,9 @@ impl Facts {
         let chains = &form.assignment.chains;
         for (i, chain) in chains.iter().enumerate() {
             checks.extend(output_slope(extended, i, region)?);
-            let mut row = vec![];
-            for pair in chain.states.windows(2) {
-                let (_, found) = partial(extended, pair[0], pair[1], region)?;
-                checks.push(found.check);
-                row.push(found.bounds);
-            }
-            bounds.push(row);
+            let (found, signs) = partials(extended, &chain.states, region)?;
+            checks.extend(signs);
+            bounds.push(found.iter().map(|partial| partial.bounds).collect::<Vec<_>>());
         }
         let along = |a: usize, b: usize| {
             chains
@@ -47,27 +40,6 @@ impl Facts {
             slopes,
         })
     }
-}
-
-/// Keys that another file of the family gives a meaning to.
-pub(super) fn foreign(tuning: &Tuning) -> Option<Check> {
-    let other = |key: &&String| !COVERED.contains(&key.as_str());
-    let gain = tuning.values.get("gain");
-    let gain = gain
-        .filter(|g| **g != Value::Text("lemma1".into()))
-        .map(|_| "gain");
-    let key = tuning
-        .values
-        .keys()
-        .find(other)
-        .map(String::as_str)
-        .or(gain)?;
-    let detail =
-        format!("the key '{key}' makes another observer, which the theorem does not cover");
-    Some(undecided(
-        "the observer is (9) with a constant gain from a tridiagonal S",
-        detail,
-    ))
 }
 
 /// Partials without bounds: Lemma 1 has nothing to start from.

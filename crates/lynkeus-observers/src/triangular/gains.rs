@@ -2,8 +2,10 @@
 
 use lynkeus_expr::Node;
 use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
+use lynkeus_structure::Assignment;
 
-use super::form::{Form, Partial};
+use super::form::Form;
+use crate::conditions::Partial;
 use crate::estimate::Copy;
 use crate::peaking::{Transient, transient};
 use crate::{Tuning, TuningError};
@@ -42,7 +44,8 @@ impl Gains {
             transient: Transient::read(tuning, count)?,
             notes: vec![],
         };
-        gains.notes.extend(window(form, &gains.δ));
+        let window = Window::of(&form.assignment, &gains.δ);
+        gains.notes.extend(window.and_then(|w| w.note()));
         Ok(gains)
     }
 
@@ -139,20 +142,39 @@ pub(super) fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, Tuning
 }
 
 /// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁.
-pub(super) fn window(form: &Form, δ: &[f64]) -> Option<String> {
-    let lengths = form.assignment.lengths();
-    let [_, _] = lengths[..] else { return None };
-    let lead = form.assignment.leading;
-    let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
-    let (low, high) = (
-        (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
-        (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
-    );
-    let ratio = δ[1 - lead] / δ[lead];
-    let inside = low < ratio && ratio < high;
-    (!inside).then(|| {
-        format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
-    })
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    pub low: f64,
+    pub high: f64,
+    /// δ₂/δ₁
+    pub ratio: f64,
+}
+
+impl Window {
+    /// None for one chain.
+    pub fn of(assignment: &Assignment, δ: &[f64]) -> Option<Self> {
+        let lengths = assignment.lengths();
+        let [_, _] = lengths[..] else { return None };
+        let lead = assignment.leading;
+        let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
+        Some(Self {
+            low: (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
+            high: (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
+            ratio: δ[1 - lead] / δ[lead],
+        })
+    }
+
+    pub fn holds(&self) -> bool {
+        self.low < self.ratio && self.ratio < self.high
+    }
+
+    /// What the reader should know of an observer outside of it.
+    pub fn note(&self) -> Option<String> {
+        let Self { low, high, ratio } = self;
+        (!self.holds()).then(|| {
+            format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
+        })
+    }
 }
 
 /// S as the study gives it.

@@ -14,6 +14,8 @@ pub(super) struct Verified {
     pub check: Check,
     /// AᵀS + SA − ρCᵀC ≤ −μ·diag(S) with ρ = 2r; none where it is not proved
     pub μ: Option<f64>,
+    /// S satisfies it for no ρ
+    pub broken: bool,
     pub constants: Vec<Constant>,
 }
 
@@ -34,13 +36,20 @@ pub(super) fn verify(
     let open = |check: Check| Verified {
         check,
         μ: None,
+        broken: false,
         constants: vec![],
     };
     let bounds = |&(lower, upper): &(f64, f64)| Bounds { lower, upper };
     let bounds: Vec<Bounds> = chain.partials.iter().map(bounds).collect();
     let least = match lemma1::kernel(S, &bounds) {
         Ok(Kernel::Holds { ρ }) => ρ,
-        Ok(Kernel::Breaks(found)) => return open(breaks(title, S, &found, names)),
+        Ok(Kernel::Breaks(found)) => {
+            let (check, broken) = breaks(title, S, &found, names);
+            return Verified {
+                broken,
+                ..open(check)
+            };
+        }
         Err(error) => return open(undecided(title, error.to_string())),
     };
     let Some(μ) = chain.decay() else {
@@ -67,6 +76,7 @@ pub(super) fn verify(
     Verified {
         check: proved(title, detail),
         μ: Some(μ),
+        broken: false,
         constants,
     }
 }
@@ -101,8 +111,8 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
     list
 }
 
-/// The refutation: at a vertex of the bounds, in a direction that C does not see.
-fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) -> Check {
+/// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
+fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
     let value = quotient(S, found);
     let direction: Vec<String> = names
         .iter()
@@ -116,10 +126,8 @@ fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) ->
         shown(found.eigenvalue)
     );
     if !value.is_positive() {
-        return undecided(
-            title,
-            format!("{detail}; rounding errors keep this from being a refutation"),
-        );
+        let detail = format!("{detail}; rounding errors keep this from being a refutation");
+        return (undecided(title, detail), false);
     }
     let name = |j: usize| format!("a{}", j + 1);
     let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
@@ -127,7 +135,7 @@ fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) ->
         coordinates: coordinates.collect(),
         value: found.eigenvalue,
     };
-    refuted(title, point, detail)
+    (refuted(title, point, detail), true)
 }
 
 /// vᵀ(AᵀS + SA)v, rounding included: a proof that the form is positive somewhere.

@@ -4,21 +4,24 @@
 //! exponents of Theorem 2 serve two chains here as well.
 
 use lynkeus_expr::Node;
-use lynkeus_gain::low_power::tolerates;
 use lynkeus_structure::Extended;
 
 use super::NAME;
-use super::form::{Form, Partial};
-use super::gains::{exponents, theta, window};
+use super::form::Form;
+use super::gains::{Window, exponents, theta};
+use crate::conditions::Partial;
 use crate::estimate::Copy;
-use crate::peaking::{InnovationLimit, LowPower, Part, Run, Transient, nominal};
-use crate::{ChainGain, Design, Tuning, TuningError};
+use crate::peaking::{
+    InnovationLimit, LowPower, Part, Run, Transient, factor_rows, nominal, variation,
+};
+use crate::{Design, Tuning, TuningError, prolongation};
 
 pub(super) fn assemble(
     extended: &Extended<'_>,
     tuning: &Tuning,
     form: Form,
 ) -> Result<Design, TuningError> {
+    prolongation::refuse(tuning, "form = \"low-power\"")?;
     let chains = &form.assignment.chains;
     let (θ, δ) = (theta(tuning, chains.len())?, exponents(&form, tuning)?);
     let transient = Transient::read(tuning, chains.len())?;
@@ -27,7 +30,7 @@ pub(super) fn assemble(
     let divided = tuning.flag("partials")?;
     let copy = Copy::new(extended, tuning);
     let mut run = Run::new(&copy, tuning, transient.as_ref())?;
-    let (mut gains, mut notes) = (vec![], vec![]);
+    let (mut factors, mut notes) = (vec![], vec![]);
     for (i, chain) in chains.iter().enumerate() {
         let Some(innovation) = limit.innovation(&copy, i) else {
             continue;
@@ -36,9 +39,10 @@ pub(super) fn assemble(
         let f: Vec<Node> = chain.states.iter().map(derivative).collect();
         let output = &extended.outputs[i].variable.name;
         if !divided {
-            notes.extend(variation(output, &form.partials[i], &coefficients.K[i]));
+            let bounds: Vec<(f64, f64)> = form.partials[i].iter().map(|p| p.bounds).collect();
+            notes.extend(variation(output, &bounds, &coefficients.K[i]));
         }
-        let entries = run.add(&Part {
+        let added = run.add(&Part {
             states: &chain.states,
             f: &f,
             divisors: &divisors(extended, &form.partials[i], divided)?,
@@ -48,10 +52,9 @@ pub(super) fn assemble(
             δ: δ[i],
             number: i,
         });
-        let output = output.clone();
-        gains.push(ChainGain { output, entries });
+        factors.extend(factor_rows(output, added));
     }
-    notes.extend(window(&form, &δ));
+    notes.extend(Window::of(&form.assignment, &δ).and_then(|w| w.note()));
     let list = |values: &[f64]| {
         values
             .iter()
@@ -62,10 +65,11 @@ pub(super) fn assemble(
     let mut parameters = vec![("θ".to_owned(), list(&θ)), ("δ".to_owned(), list(&δ))];
     parameters.extend(transient.as_ref().map(Transient::parameter));
     parameters.extend(coefficients.parameters());
+    parameters.extend(factors);
     Ok(Design {
         observer: run.finish(NAME, tuning)?,
         examination: form.examination,
-        gains,
+        gains: vec![],
         parameters,
         notes,
     })
@@ -87,17 +91,4 @@ fn divisors(
         }
     };
     partials.iter().map(divisor).collect()
-}
-
-/// What the reader should know where the partials move and the gain does not.
-fn variation(output: &str, partials: &[Partial], K: &[[f64; 2]]) -> Option<String> {
-    // to the geometric mean, which the gain is made for
-    let ratio = |p: &Partial| {
-        let half = (p.bounds.1 / p.bounds.0).sqrt();
-        (1.0 / half, half)
-    };
-    let ratios: Vec<(f64, f64)> = partials.iter().map(ratio).collect();
-    (!partials.is_empty() && !tolerates(K, &ratios)).then(|| {
-        format!("form: in the chain of {output} the partials vary more than the stability of M is proved for; partials = true makes M constant")
-    })
 }

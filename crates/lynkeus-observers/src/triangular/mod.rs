@@ -19,15 +19,16 @@ mod theorem;
 use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
 
-use crate::conditions::on_output;
+use crate::conditions::Partial;
+use crate::correction::{Correction, Start};
 use crate::estimate::Copy;
-use crate::guarantee;
-use crate::peaking::{self, InnovationLimit};
+use crate::peaking::{self, InnovationLimit, LowPower};
+use crate::prolongation::{self, Continued, prolong};
 use crate::{
-    Assumptions, Certificate, ChainGain, Design, DesignError, Examination, Family, Fit, Tuning,
-    TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    guarantee,
 };
-use form::{Form, Partial, form};
+use form::{Form, form};
 use gains::Gains;
 
 const NAME: &str = "triangular";
@@ -54,6 +55,8 @@ impl Family for Triangular {
             "S",
             "partials",
             "chains",
+            "leading",
+            "prolong",
             "rate",
             "gain_limit",
             "minimise",
@@ -70,6 +73,7 @@ impl Family for Triangular {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
+        LowPower::refuse_unstable(tuning)?;
         Ok(match form(extended, tuning)? {
             Ok(form) => form.examination,
             Err(examination) => examination,
@@ -84,6 +88,7 @@ impl Family for Triangular {
             }
         };
         if guarantee::asked_for(tuning, &["lemma1"])? {
+            prolongation::refuse(tuning, "gain = \"lmi\"")?;
             return guarantee::design_lmi(extended, tuning, NAME, form.examination);
         }
         if peaking::asked_for(tuning, &["S", "r", "gain"])? {
@@ -113,48 +118,44 @@ fn assemble(
     let graph = extended.graph();
     let copy = Copy::new(extended, tuning);
     let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
+    let start = Start::new(&copy, tuning)?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
-    let mut table = vec![];
+    let (mut table, mut parameters) = (vec![], gains.parameters());
     for (i, chain) in form.assignment.chains.iter().enumerate() {
         let Some(innovation) = limit.innovation(&copy, i) else {
             continue;
         };
-        let constants = gains.chain(i);
         let timed = gains.timed(&copy, i);
         let scaled = scaled(graph, &copy, &form.partials[i], &timed, gains.divided);
-        for (&state, gain) in chain.states.iter().zip(scaled) {
-            let correction = graph.expr(gain) * graph.expr(innovation);
+        for (&state, gain) in chain.states.iter().zip(&scaled) {
+            let correction = graph.expr(*gain) * graph.expr(innovation);
             derivatives[state] = (graph.expr(derivatives[state]) - correction).node();
         }
-        table.push(ChainGain {
-            output: extended.outputs[i].variable.name.clone(),
-            entries: on_output(
-                extended,
-                i,
-                &chain.states,
-                &signed(&form.partials[i], constants),
-            ),
-        });
+        let printed = Correction {
+            output: i,
+            states: &chain.states,
+            factors: &scaled,
+            limited: limit.is_set(),
+        };
+        match printed.constant(extended) {
+            Some(constant) => table.push(constant),
+            None => parameters.extend(printed.expressions(&start)),
+        }
     }
+    prolong(&copy, tuning, continued(&form), &mut derivatives)?;
     Ok(Design {
         observer: copy.observer(NAME, tuning, derivatives)?,
-        parameters: gains.parameters(),
+        parameters,
         notes: gains.notes.clone(),
         gains: table,
         examination: form.examination,
     })
 }
 
-/// The gains with the signs of Remark 2.
-fn signed(partials: &[Partial], gains: Vec<f64>) -> Vec<f64> {
-    let mut ε = 1.0;
-    let signed = gains.into_iter().enumerate().map(|(j, gain)| {
-        if j > 0 {
-            ε *= partials[j - 1].sign;
-        }
-        ε * gain
-    });
-    signed.collect()
+/// The equations of the chains, for their prolongation.
+fn continued(form: &Form) -> impl Iterator<Item = Continued> {
+    let chains = form.assignment.chains.iter().zip(&form.partials);
+    chains.flat_map(|(chain, partials)| Continued::along(&chain.states, partials))
 }
 
 /// The gains in the coordinates of the plant: with the signs of Remark 2, or

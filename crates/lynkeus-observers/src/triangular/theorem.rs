@@ -10,16 +10,18 @@
 //! first θ0 for which it is negative on the decay is proved, θ < 1 included.
 
 use lynkeus_expr::Interval;
-use lynkeus_structure::{Check, Condition, Extended};
+use lynkeus_structure::{Check, Extended};
 
 use super::Triangular;
-use super::facts::{Facts, foreign, remainder, without_bounds};
+use super::facts::{Facts, remainder, without_bounds};
 use super::form::{Form, form};
-use super::gains::Gains;
+use super::gains::{Gains, Window};
 use super::lemma::verify;
 use crate::conditions::{fit, names};
+use crate::peaking::Departure;
+use crate::prolongation;
 use crate::proof::threshold::{first, lightest, reached};
-use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
+use crate::proof::words::{conclude, proved, shown, state_noise, undecided};
 use crate::proof::{Chain, Comparison, Disturbance, ultimate};
 use crate::{Assumptions, Certificate, Constant, DesignError, Family, Fit, Tuning};
 
@@ -41,8 +43,8 @@ pub(super) fn certificate(
     let region = &assumptions.region;
     let facts = Facts::new(extended, &form, region)?;
     let mut checks = facts.checks.clone();
-    if let Some(check) = foreign(tuning) {
-        checks.push(check);
+    if let Some(departure) = Departure::of(tuning, &["lemma1"])? {
+        checks.push(departure.check("the observer is (9) with a constant gain from a tridiagonal S"));
         return Ok(Certificate::new(BASIS, assumptions, checks));
     }
     let unbounded = facts
@@ -84,7 +86,7 @@ struct Study<'a> {
 
 impl Study<'_> {
     fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
-        let (mut constants, mut μ) = (vec![], vec![]);
+        let (mut constants, mut μ, mut broken) = (vec![], vec![], false);
         checks.extend(self.constant_gain());
         let count = self.form.assignment.chains.len();
         for i in 0..count {
@@ -96,10 +98,12 @@ impl Study<'_> {
             let chain = self.chain(i, self.gains.θ[i], 1.0);
             let found = verify(&chain, &self.gains.S[i], self.gains.r[i], &states, &suffix);
             checks.push(found.check);
+            broken |= found.broken;
             constants.extend(found.constants);
             μ.extend(found.μ);
         }
-        checks.extend(self.window(&mut constants));
+        let window = Window::of(&self.form.assignment, &self.gains.δ);
+        checks.extend(window.map(|w| windowed(&w, &mut constants)));
         let (lipschitz, known) = self.steepest();
         constants.push(Constant::new(
             "c",
@@ -108,14 +112,14 @@ impl Study<'_> {
         ));
         let ready = known && μ.len() == count && fit(&checks) != Fit::DoesNotFit;
         let rate = if ready {
-            self.rate(&μ, &mut checks, &mut constants)
+            self.rate(&μ, window, &mut checks, &mut constants)
         } else {
             None
         };
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        certificate.notes.push(box_note(self.tuning.clamp));
-        self.explain(&mut certificate);
+        certificate.notes.push(prolongation::note(self.tuning));
+        certificate.notes.extend(broken.then(|| BROKEN.to_owned()));
         if let Some((σ, c)) = rate {
             self.conclude(&mut certificate, σ, c)?;
         }
@@ -193,40 +197,6 @@ impl Study<'_> {
         })
     }
 
-    /// Theorem 2's window for δ2/δ1.
-    fn window(&self, constants: &mut Vec<Constant>) -> Option<Check> {
-        let lengths = self.form.assignment.lengths();
-        let [_, _] = lengths[..] else { return None };
-        let lead = self.form.assignment.leading;
-        let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
-        let (low, high) = (
-            (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
-            (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
-        );
-        let ratio = self.gains.δ[1 - lead] / self.gains.δ[lead];
-        let mut add = |name: &str, value: f64, meaning: &str| {
-            constants.push(Constant::new(name, value, meaning))
-        };
-        add(
-            "(2n1−1)/(2n2−1)",
-            low,
-            "lower end of Theorem 2's window for δ2/δ1",
-        );
-        add("δ2/δ1", ratio, "ratio of the exponents");
-        add("(2n1+1)/(2n2−1)", high, "upper end of the window");
-        let name = "δ2/δ1 lies in the window of Theorem 2";
-        let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
-        Some(match low < ratio && ratio < high {
-            true => proved(name, text),
-            false => undecided(
-                name,
-                format!(
-                    "not {text}: no θ0 is known, the couplings between the chains grow faster than the decay"
-                ),
-            ),
-        })
-    }
-
     /// (largest |∂f/∂x| beside the chains, whether all are known)
     fn steepest(&self) -> (f64, bool) {
         let largest = self
@@ -241,15 +211,14 @@ impl Study<'_> {
     fn rate(
         &self,
         μ: &[f64],
+        window: Option<Window>,
         checks: &mut Vec<Check>,
         constants: &mut Vec<Constant>,
     ) -> Option<(f64, f64)> {
         let θ = &self.gains.θ;
         let alike = θ.iter().all(|x| *x == θ[0]);
-        let windowed = checks
-            .iter()
-            .all(|c| !c.name.contains("window") || c.verdict == Condition::Proved);
-        let (c, θ0) = match alike && windowed {
+        let inside = window.is_none_or(|w| w.holds());
+        let (c, θ0) = match alike && inside {
             true => self.least(μ, θ[0]),
             false => (1.0, None),
         };
@@ -296,14 +265,33 @@ impl Study<'_> {
         );
         Ok(())
     }
+}
 
-    fn explain(&self, certificate: &mut Certificate) {
-        let broken = |c: &&Check| {
-            matches!(c.verdict, Condition::Refuted(_)) && c.name.starts_with("Lemma 1")
-        };
-        if certificate.hypotheses.iter().any(|c| broken(&c)) {
-            certificate.notes.push("A refuted Lemma 1 ends this proof, whatever θ is. It does not say that the estimate diverges: a plant that is damped by itself may carry the observer. Lemma 1's own S (leave the key S out) satisfies it.".into());
-        }
+const BROKEN: &str = "A refuted Lemma 1 ends this proof, whatever θ is. It does not say that the estimate diverges: a plant that is damped by itself may carry the observer. Lemma 1's own S (leave the key S out) satisfies it.";
+
+/// Theorem 2's window for δ2/δ1.
+fn windowed(window: &Window, constants: &mut Vec<Constant>) -> Check {
+    let Window { low, high, ratio } = *window;
+    let mut add = |name: &str, value: f64, meaning: &str| {
+        constants.push(Constant::new(name, value, meaning))
+    };
+    add(
+        "(2n1−1)/(2n2−1)",
+        low,
+        "lower end of Theorem 2's window for δ2/δ1",
+    );
+    add("δ2/δ1", ratio, "ratio of the exponents");
+    add("(2n1+1)/(2n2−1)", high, "upper end of the window");
+    let name = "δ2/δ1 lies in the window of Theorem 2";
+    let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
+    match window.holds() {
+        true => proved(name, text),
+        false => undecided(
+            name,
+            format!(
+                "not {text}: no θ0 is known, the couplings between the chains grow faster than the decay"
+            ),
+        ),
     }
 }
 

@@ -1,0 +1,121 @@
+//! Whether every zero of a polynomial has a negative real part, by Routh's table in
+//! interval arithmetic: rounding fakes neither a yes nor a no.
+
+use lynkeus_expr::Interval;
+use nalgebra::DMatrix;
+
+/// What the table says of every polynomial within the enclosures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stability {
+    /// every zero of each of them lies in the open left half-plane
+    Stable,
+    /// each of them has a zero on or to the right of the imaginary axis
+    Unstable,
+    /// the enclosures are too wide to tell
+    Unknown,
+}
+
+/// Decides for sⁿ + c₁sⁿ⁻¹ + … + cₙ.
+///
+/// ```
+/// use lynkeus_expr::Interval;
+/// use lynkeus_gain::hurwitz::{Stability, decide};
+///
+/// let point = |c: [f64; 3]| c.map(Interval::point);
+/// assert_eq!(decide(&point([3.0, 3.0, 1.0])), Stability::Stable);
+/// assert_eq!(decide(&point([1.0, 1.0, 2.0])), Stability::Unstable);
+/// ```
+pub fn decide(coefficients: &[Interval]) -> Stability {
+    // positive coefficients are necessary
+    if coefficients.iter().any(|c| c.hi() <= 0.0) {
+        return Stability::Unstable;
+    }
+    let all: Vec<Interval> = [Interval::ONE].iter().chain(coefficients).copied().collect();
+    let every_other = |from: usize| all.iter().skip(from).step_by(2).copied().collect();
+    let (mut above, mut row): (Vec<Interval>, Vec<Interval>) = (every_other(0), every_other(1));
+    while let Some(&pivot) = row.first() {
+        if pivot.hi() <= 0.0 {
+            return Stability::Unstable;
+        }
+        if !(pivot.is_positive() && pivot.is_defined()) {
+            return Stability::Unknown;
+        }
+        let factor = above[0] / pivot;
+        let entry = |k: usize| {
+            let beside = row.get(k).copied().unwrap_or(Interval::ZERO);
+            above[k] - factor * beside
+        };
+        let next = (1..above.len()).map(entry).collect();
+        above = std::mem::replace(&mut row, next);
+    }
+    Stability::Stable
+}
+
+/// The zeros of sⁿ + c₁sⁿ⁻¹ + … + cₙ as (real, imaginary), the rightmost first, in
+/// floating point: for the reader, not for a proof. Empty where a coefficient is not
+/// finite.
+pub fn zeros(coefficients: &[f64]) -> Vec<(f64, f64)> {
+    if !coefficients.iter().all(|c| c.is_finite()) || coefficients.is_empty() {
+        return vec![];
+    }
+    let n = coefficients.len();
+    let companion = DMatrix::from_fn(n, n, |i, j| match (i, j) {
+        (_, 0) => -coefficients[i],
+        _ => f64::from(u8::from(j == i + 1)),
+    });
+    let eigenvalues = companion.complex_eigenvalues();
+    let mut found: Vec<(f64, f64)> = eigenvalues.iter().map(|λ| (λ.re, λ.im)).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn points(c: &[f64]) -> Vec<Interval> {
+        c.iter().map(|&c| Interval::point(c)).collect()
+    }
+
+    /// s³ + 3s² + 3a₁s + a₁a₂ is stable exactly for 9 > a₂.
+    #[test]
+    fn the_border_is_found_from_both_sides() {
+        let with = |a: f64| decide(&points(&[3.0, 3.0, a]));
+        assert_eq!(with(8.999), Stability::Stable);
+        assert_eq!(with(9.001), Stability::Unstable);
+        let wide = [Interval::point(3.0), Interval::point(3.0), Interval::new(8.0, 10.0).unwrap()];
+        assert_eq!(decide(&wide), Stability::Unknown);
+        // on the imaginary axis is not in the open half-plane
+        assert_eq!(decide(&points(&[0.0, 1.0])), Stability::Unstable);
+    }
+
+    proptest! {
+        /// The verdict is that of the zeros the polynomial was made of.
+        #[test]
+        fn it_agrees_with_the_zeros(
+            pairs in prop::collection::vec((-2.0..1.0f64, 0.0..3.0f64), 1..5)
+        ) {
+            let mut c = vec![1.0];
+            for &(re, im) in &pairs {
+                let square = [1.0, -2.0 * re, re * re + im * im];
+                let mut next = vec![0.0; c.len() + 2];
+                for (i, x) in c.iter().enumerate() {
+                    square.iter().enumerate().for_each(|(j, y)| next[i + j] += x * y);
+                }
+                c = next;
+            }
+            let rightmost = pairs.iter().map(|p| p.0).fold(f64::NEG_INFINITY, f64::max);
+            let verdict = decide(&points(&c[1..]));
+            if rightmost < -1e-6 {
+                prop_assert_eq!(verdict, Stability::Stable);
+            }
+            if rightmost > 1e-6 {
+                prop_assert_eq!(verdict, Stability::Unstable);
+            }
+            let found = zeros(&c[1..])[0].0;
+            // repeated zeros lose digits
+            prop_assert!((found - rightmost).abs() < 1e-2, "{} {}", found, rightmost);
+        }
+    }
+}

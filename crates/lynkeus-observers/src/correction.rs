@@ -1,0 +1,125 @@
+//! A correction as the reader sees it: numbers where the observer is
+//! x̂' = f(x̂, u) − K (ŷ − y) with a constant K, else expressions.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Graph, Node};
+use lynkeus_structure::Extended;
+
+use crate::estimate::Copy;
+use crate::{ChainGain, Observer, Tuning, TuningError};
+
+/// Longest expression that is printed, in characters.
+const LONGEST: usize = 120;
+
+/// What corrects the states of one chain.
+pub(crate) struct Correction<'a> {
+    /// place of the measured output
+    pub output: usize,
+    /// the states that are corrected
+    pub states: &'a [usize],
+    /// one factor per state of the error of the state that the output shows, over the
+    /// symbols of the observer
+    pub factors: &'a [Node],
+    /// the error is limited before it corrects
+    pub limited: bool,
+}
+
+impl Correction<'_> {
+    /// The factors of ŷ − y.
+    fn on_output(&self, extended: &Extended<'_>) -> Vec<Node> {
+        let graph = extended.graph();
+        let Some((_, slope, _)) = extended.outputs[self.output].state else {
+            return vec![];
+        };
+        let divided = |&factor: &Node| (graph.expr(factor) / graph.expr(slope)).node();
+        self.factors.iter().map(divided).collect()
+    }
+
+    /// K, where this is a constant gain on ŷ − y.
+    pub fn constant(&self, extended: &Extended<'_>) -> Option<ChainGain> {
+        if self.limited {
+            return None;
+        }
+        let gains = self.on_output(extended).into_iter();
+        let numbers: Vec<f64> = gains
+            .map(|gain| extended.graph().constant_value(gain))
+            .collect::<Option<_>>()?;
+        let names = self.states.iter().map(|&i| extended.states[i].name.clone());
+        Some(ChainGain {
+            output: extended.outputs[self.output].variable.name.clone(),
+            entries: names.zip(numbers).collect(),
+        })
+    }
+
+    /// The factors of ŷ − y as parameters: expressions, and their values at the start.
+    pub fn expressions(&self, start: &Start<'_>) -> Vec<(String, String)> {
+        let extended = start.extended;
+        let output = &extended.outputs[self.output].variable.name;
+        let named = self.states.iter().zip(self.on_output(extended));
+        let row = |(&state, gain): (&usize, Node)| {
+            let name = format!("gain of {output} on {}", extended.states[state].name);
+            let limited = if self.limited { ", on the limited error" } else { "" };
+            (name, format!("{}{limited}", start.shown(gain)))
+        };
+        named.map(row).collect()
+    }
+}
+
+/// Where the estimate starts, for the values of expressions there.
+pub(crate) struct Start<'a> {
+    extended: &'a Extended<'a>,
+    images: HashMap<Node, Node>,
+}
+
+impl<'a> Start<'a> {
+    /// Estimates at their starts, the outputs as they are there, inputs at their declared
+    /// starts, time 0.
+    pub fn new(copy: &Copy<'a, '_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        let extended = copy.extended;
+        let graph = extended.graph();
+        let mut images = HashMap::new();
+        images.insert(extended.plant.time, graph.constant(0.0).node());
+        for (state, (hat, start)) in extended.states.iter().zip(copy.states(tuning)?) {
+            let start = graph.constant(start).node();
+            images.insert(state.node, start);
+            images.insert(hat.symbol, start);
+        }
+        for input in &extended.inputs {
+            if let Some(start) = input.start {
+                images.insert(input.node, graph.constant(start).node());
+            }
+        }
+        for output in &extended.outputs {
+            let signal = Observer::measurement(graph, &output.variable.name);
+            let value = graph.substitute(&[output.variable.node], &images)[0];
+            images.insert(signal.symbol, value);
+        }
+        Ok(Self { extended, images })
+    }
+
+    /// A number, or an expression with its value at the start where all it reads has one.
+    pub fn shown(&self, node: Node) -> String {
+        let graph: &Graph = self.extended.graph();
+        let text = graph.render(node, LONGEST);
+        if graph.constant_value(node).is_some() {
+            return text;
+        }
+        let value = graph.substitute(&[node], &self.images)[0];
+        match graph.constant_value(value) {
+            Some(value) => format!("{text}; {value} at the start"),
+            None => text,
+        }
+    }
+
+    /// A matrix row by row, a missing entry being zero everywhere.
+    pub fn table(&self, rows: &[Vec<Option<Node>>]) -> String {
+        let entry = |x: &Option<Node>| x.map_or_else(|| "0".to_owned(), |x| self.shown(x));
+        let row = |row: &Vec<Option<Node>>| {
+            let entries: Vec<String> = row.iter().map(entry).collect();
+            format!("({})", entries.join(", "))
+        };
+        let rows: Vec<String> = rows.iter().map(row).collect();
+        rows.join(", ")
+    }
+}

@@ -1,0 +1,101 @@
+//! The papers' prolongation of f outside of the box (Remark 2 of Hammouri, Targui and
+//! Armanet; Remark 1 of Lee, Yee and Park).
+//!
+//! With P the projection on the box of the declared ranges and, for each row j of a chain, a
+//! number ā_j within the bounds [α₁, α₂] of its partial, sign included,
+//!
+//! f̃_j(x) = f_j(Px) + ā_j (x_{j+1} − Px_{j+1}).
+//!
+//! In x_{j+1} the slope of f̃_j is that of f_j at Px inside of the range and ā_j outside of
+//! it, hence in [α₁, α₂] everywhere; in every other variable it is that of f_j at Px or zero.
+//! So all bounds that hold on the box hold everywhere, and f̃ = f on the box. A slope that
+//! follows Px would not do: times a distance without bound, its own change has none.
+
+use lynkeus_expr::Node;
+
+use crate::conditions::Partial;
+use crate::estimate::{Copy, limited};
+use crate::peaking::nominal;
+use crate::proof::words::box_note;
+use crate::{Tuning, TuningError, Value};
+
+/// The study's key.
+pub(crate) const KEY: &str = "prolong";
+
+/// Whether the study asks for it.
+pub(crate) fn asked_for(tuning: &Tuning) -> bool {
+    tuning.values.get(KEY) == Some(&Value::Flag(true))
+}
+
+/// One equation of a chain.
+pub(crate) struct Continued {
+    /// j
+    pub row: usize,
+    /// j + 1
+    pub next: usize,
+    /// of the partial ∂f_row/∂x_next
+    pub sign: f64,
+    /// (α₁, α₂) of its size
+    pub bounds: (f64, f64),
+}
+
+impl Continued {
+    /// The equations of a chain.
+    pub fn along(states: &[usize], partials: &[Partial]) -> impl Iterator<Item = Self> {
+        let rows = states.windows(2).zip(partials);
+        rows.map(|(pair, partial)| Self {
+            row: pair[0],
+            next: pair[1],
+            sign: partial.sign,
+            bounds: partial.bounds,
+        })
+    }
+}
+
+/// Adds ā (x̂_next − Px̂_next) to the equations of the chains, if the study asks for it; `copy`
+/// then evaluates everything else at Px̂.
+///
+/// # Errors
+/// A partial without bounds.
+pub(crate) fn prolong(
+    copy: &Copy<'_, '_>,
+    tuning: &Tuning,
+    rows: impl IntoIterator<Item = Continued>,
+    derivatives: &mut [Node],
+) -> Result<(), TuningError> {
+    if !tuning.flag(KEY)? {
+        return Ok(());
+    }
+    let graph = copy.extended.graph();
+    for Continued { row, next, sign, bounds } in rows {
+        let variable = &copy.extended.states[next];
+        let Some(slope) = nominal(sign, bounds) else {
+            let expected = format!(
+                "∂f({})/∂{} with known bounds away from zero, to continue with; declare min and max",
+                copy.extended.states[row].name, variable.name
+            );
+            let found = format!("bounds {} and {}", bounds.0, bounds.1);
+            return Err(TuningError::new(KEY, expected, found));
+        };
+        let hat = copy.hats[next].symbol;
+        let outside = graph.expr(hat) - graph.expr(limited(graph, hat, variable));
+        derivatives[row] = (graph.expr(derivatives[row]) + slope * outside).node();
+    }
+    Ok(())
+}
+
+/// Refuses the key where an observer has no such form.
+pub(crate) fn refuse(tuning: &Tuning, observer: &str) -> Result<(), TuningError> {
+    match tuning.flag(KEY)? {
+        true => Err(TuningError::new(KEY, format!("no prolongation with {observer}"), "true")),
+        false => Ok(()),
+    }
+}
+
+/// Where the estimate may be for the guarantee to hold.
+pub(crate) fn note(tuning: &Tuning) -> String {
+    match asked_for(tuning) {
+        true => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with slopes along the chains between the same bounds ('prolong').".into(),
+        false => box_note(tuning.clamp),
+    }
+}

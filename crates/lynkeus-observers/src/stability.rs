@@ -1,0 +1,115 @@
+//! Whether a gain stabilises a chain.
+//!
+//! In the scaled error of a high-gain observer a large θ leaves A(a) − KC, with the partials
+//! a_1, a_2, … of the chain above the diagonal of A, whose characteristic polynomial is
+//! sⁿ + k₁sⁿ⁻¹ + a₁k₂sⁿ⁻² + a₁a₂k₃sⁿ⁻³ + …
+
+use lynkeus_expr::Interval;
+use lynkeus_gain::hurwitz::{self, Stability};
+use lynkeus_structure::Point;
+
+use crate::proof::words::shown;
+
+/// A chain with its gain.
+pub(crate) struct GainedChain<'a> {
+    /// K
+    pub K: &'a [f64],
+    /// bounds of a_1, a_2, …, signs included
+    pub partials: &'a [(f64, f64)],
+}
+
+impl GainedChain<'_> {
+    /// For every constant choice of the partials within their bounds.
+    pub fn frozen(&self) -> Stability {
+        let sides = self
+            .partials
+            .iter()
+            .map(|&(low, high)| Interval::new(low, high).unwrap_or(Interval::ENTIRE));
+        let mut product = Interval::ONE;
+        let products = std::iter::once(Interval::ONE).chain(sides.map(|a| {
+            product = product * a;
+            product
+        }));
+        let coefficients: Vec<Interval> = products
+            .zip(self.K)
+            .map(|(product, &k)| product * Interval::point(k))
+            .collect();
+        hurwitz::decide(&coefficients)
+    }
+
+    /// Partials in the middle of their bounds; none where these do not keep one sign or
+    /// are infinite.
+    pub fn middle(&self) -> Option<Vec<f64>> {
+        let middle = |&(low, high): &(f64, f64)| {
+            let size = (low * high).sqrt();
+            (low * high > 0.0 && size.is_finite()).then(|| size.copysign(low))
+        };
+        self.partials.iter().map(middle).collect()
+    }
+
+    /// The eigenvalues of A − KC for these partials, the rightmost first.
+    pub fn eigenvalues(&self, a: &[f64]) -> Vec<(f64, f64)> {
+        let mut product = 1.0;
+        let products = std::iter::once(1.0).chain(a.iter().map(|a| {
+            product *= a;
+            product
+        }));
+        let coefficients: Vec<f64> = products.zip(self.K).map(|(p, k)| p * k).collect();
+        hurwitz::zeros(&coefficients)
+    }
+
+    /// The partials `a` as a witness, its value the largest real part there.
+    pub fn witness(&self, a: &[f64]) -> Point {
+        let name = |j: usize| format!("a{}", j + 1);
+        let rightmost = self.eigenvalues(a).first().map_or(f64::NAN, |λ| λ.0);
+        Point {
+            coordinates: a.iter().enumerate().map(|(j, &a)| (name(j), a)).collect(),
+            value: rightmost,
+        }
+    }
+}
+
+/// Eigenvalues in words: conjugate pairs once.
+pub(crate) fn listed(eigenvalues: &[(f64, f64)]) -> String {
+    let upper = eigenvalues.iter().filter(|λ| λ.1 >= 0.0);
+    let one = |&(re, im): &(f64, f64)| match im == 0.0 {
+        true => shown(re),
+        false => format!("{} ± {}i", shown(re), shown(im)),
+    };
+    upper.map(one).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frozen(K: &[f64], partials: &[(f64, f64)]) -> Stability {
+        GainedChain { K, partials }.frozen()
+    }
+
+    /// s² + 2s + a: stable for a > 0, and with the sign of a in K for a < 0.
+    #[test]
+    fn two_states_by_hand() {
+        assert_eq!(frozen(&[2.0, 1.0], &[(0.1, 9.0)]), Stability::Stable);
+        assert_eq!(frozen(&[2.0, 1.0], &[(-2.0, -2.0)]), Stability::Unstable);
+        assert_eq!(frozen(&[2.0, -1.0], &[(-2.0, -2.0)]), Stability::Stable);
+        assert_eq!(frozen(&[-2.0, 1.0], &[(1.0, 1.0)]), Stability::Unstable);
+        assert_eq!(frozen(&[2.0, 1.0], &[(-1.0, 1.0)]), Stability::Unknown);
+    }
+
+    /// Positive partials are not enough for three states: (3, 3, 1) needs a₂ < 9.
+    #[test]
+    fn a_positive_partial_can_be_too_large() {
+        assert_eq!(frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (10.0, 10.0)]), Stability::Unstable);
+        assert_eq!(frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (8.0, 8.0)]), Stability::Stable);
+    }
+
+    #[test]
+    fn pairs_are_listed_once() {
+        let chain = GainedChain { K: &[-2.0, 5.0], partials: &[(1.0, 1.0)] };
+        assert_eq!(listed(&chain.eigenvalues(&[1.0])), "1 ± 2i");
+        assert_eq!(chain.middle(), Some(vec![1.0]));
+        let mixed = GainedChain { K: &[1.0, 1.0], partials: &[(-1.0, 1.0)] };
+        assert_eq!(mixed.middle(), None);
+    }
+}
