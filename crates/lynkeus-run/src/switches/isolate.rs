@@ -12,7 +12,7 @@ const SWITCHES: usize = 200_000;
 /// Stretches that may be looked at for them.
 const LOOKS: usize = 1_000_000;
 
-/// Part of a stretch that may be lost in rounding errors before it is refused.
+/// Part of the interval in which rounding errors may hide the mode.
 const DOUBTFUL: f64 = 1e-6;
 
 /// What following the switches over an interval may still cost.
@@ -22,6 +22,8 @@ pub(super) struct Effort {
     pub to: f64,
     switches: usize,
     looks: usize,
+    /// length of time on which rounding errors may still hide a mode
+    doubtful: f64,
 }
 
 impl Effort {
@@ -31,20 +33,48 @@ impl Effort {
             to,
             switches: SWITCHES,
             looks: LOOKS,
+            doubtful: DOUBTFUL * (to - from),
         }
     }
 
-    /// Pays for `count` switches of `expression`.
-    fn switches(&mut self, count: f64, expression: &str) -> Result<(), Error> {
-        if count > self.switches as f64 {
-            return Err(Error::TooManySwitches {
-                expression: expression.to_owned(),
-                from: self.from,
-                to: self.to,
-                limit: SWITCHES,
-            });
+    /// Pays for one look.
+    fn look(&mut self, at: f64, expression: &str) -> Result<(), Error> {
+        self.looks = self
+            .looks
+            .checked_sub(1)
+            .ok_or_else(|| unresolved(at, expression))?;
+        Ok(())
+    }
+
+    /// Pays for a stretch at `at` on which the mode is not certain.
+    fn doubt(&mut self, at: f64, width: f64, expression: &str) -> Result<(), Error> {
+        // around a simple zero some last bits are always in doubt
+        if width > 64.0 * apart(at) {
+            self.doubtful -= width;
         }
-        self.switches -= count as usize;
+        if self.doubtful < 0.0 {
+            return Err(unresolved(at, expression));
+        }
+        Ok(())
+    }
+
+    /// Refuses more than the switches that are left.
+    fn check(&self, count: f64, expression: &str) -> Result<(), Error> {
+        if count <= self.switches as f64 {
+            return Ok(());
+        }
+        Err(Error::TooManySwitches {
+            expression: expression.to_owned(),
+            from: self.from,
+            to: self.to,
+            limit: SWITCHES,
+        })
+    }
+
+    /// Pays for a switch.
+    fn switch(&mut self, expression: &str) -> Result<(), Error> {
+        self.check(1.0, expression)?;
+        self.switches -= 1;
         Ok(())
     }
 }
@@ -58,8 +88,6 @@ pub(super) struct Isolation<'a> {
     /// the last time at which the mode was certain, and the mode there
     certain: Option<(f64, f64)>,
     instants: Vec<f64>,
-    /// length of what rounding errors hide
-    doubtful: f64,
 }
 
 /// What is known of a cell.
@@ -85,7 +113,6 @@ impl<'a> Isolation<'a> {
             end,
             certain: None,
             instants: vec![],
-            doubtful: 0.0,
         }
     }
 
@@ -93,7 +120,7 @@ impl<'a> Isolation<'a> {
     pub(super) fn run(mut self) -> Result<Vec<f64>, Error> {
         let mut cells = vec![(self.start, self.end)];
         while let Some((a, b)) = cells.pop() {
-            self.look(a)?;
+            self.effort.look(a, self.indicator.expression())?;
             match self.cell(a, b) {
                 Cell::Constant => self.settle(a + 0.5 * (b - a), a)?,
                 Cell::Monotone(times) => {
@@ -115,27 +142,15 @@ impl<'a> Isolation<'a> {
         Ok(self.instants)
     }
 
-    fn look(&mut self, at: f64) -> Result<(), Error> {
-        if self.effort.looks == 0 {
-            return Err(self.unresolved(at));
-        }
-        self.effort.looks -= 1;
-        Ok(())
-    }
-
-    fn unresolved(&self, at: f64) -> Error {
-        Error::UnresolvedSwitches {
-            expression: self.indicator.expression().to_owned(),
-            time: at,
-        }
-    }
-
     fn cell(&self, a: f64, b: f64) -> Cell {
         let stretch = interval(a, b);
         if self.indicator.is_constant(stretch) {
             return Cell::Constant;
         }
         let slope = self.indicator.series::<2>(stretch)[1];
+        if slope == Interval::ZERO {
+            return Cell::Constant;
+        }
         if slope.is_defined() && keeps_sign(slope) {
             return Cell::Monotone(vec![a, b]);
         }
@@ -157,7 +172,7 @@ impl<'a> Isolation<'a> {
         self.indicator.decides(value + slope * offset)
     }
 
-    /// The ends and the extrema between them, where derivative `order` keeps its sign:
+    /// The ends and the extrema between them where derivative `order` keeps its sign:
     /// derivative k is monotone between the zeros of derivative k + 1.
     fn parts(&self, a: f64, b: f64, order: usize) -> Vec<f64> {
         debug_assert!(order <= ORDER);
@@ -207,24 +222,20 @@ impl<'a> Isolation<'a> {
     }
 
     /// Whether a cell that nothing is known of is not worth another cut: time does not
-    /// resolve it, or rounding errors hide the sign everywhere in it.
+    /// resolve it, or rounding errors hide the mode in it.
     fn is_hidden(&mut self, a: f64, b: f64) -> Result<bool, Error> {
         let width = b - a;
         if width <= apart(self.start.abs().max(self.end.abs())) {
             return Ok(true);
         }
-        let tolerated = DOUBTFUL * (self.end - self.start);
-        if width > tolerated {
-            return Ok(false);
-        }
         let middle = a + 0.5 * width;
-        if [a, middle, b].iter().any(|&t| self.is_certain(t)) {
+        if width > 0.5 * DOUBTFUL * (self.effort.to - self.effort.from)
+            || [a, middle, b].iter().any(|&t| self.is_certain(t))
+        {
             return Ok(false);
         }
-        self.doubtful += width;
-        if self.doubtful > 2.0 * tolerated {
-            return Err(self.unresolved(a));
-        }
+        let expression = self.indicator.expression();
+        self.effort.doubt(a, width, expression)?;
         Ok(true)
     }
 
@@ -235,11 +246,19 @@ impl<'a> Isolation<'a> {
 
     /// Finds the switches of a part on which the quantity is monotone.
     fn monotone(&mut self, a: f64, b: f64) -> Result<(), Error> {
+        if self.indicator.counts() {
+            let levels = (self.indicator.value(b) - self.indicator.value(a)).abs();
+            self.effort
+                .check(levels.max(0.0), self.indicator.expression())?;
+        }
+        let expression = self.indicator.expression();
         let (Some(first), Some(last)) = (self.probe(a, b), self.probe(b, a)) else {
-            return Ok(());
+            return self.effort.doubt(a, b - a, expression);
         };
-        if first <= last {
-            self.arrive(first)?;
+        self.effort.doubt(a, first - a, expression)?;
+        self.effort.doubt(b, b - last, expression)?;
+        self.arrive(first)?;
+        if first < last {
             self.arrive(last)?;
         }
         Ok(())
@@ -247,7 +266,7 @@ impl<'a> Isolation<'a> {
 
     /// The time nearest to `end` at which the mode is certain, on the way to `other`.
     fn probe(&self, end: f64, other: f64) -> Option<f64> {
-        let shares = (1..=7).rev().map(|k| 0.5_f64.powi(7 * k));
+        let shares = (1..=17).rev().map(|k| 0.5_f64.powi(3 * k));
         std::iter::once(0.0)
             .chain(shares)
             .chain([0.5])
@@ -271,13 +290,6 @@ impl<'a> Isolation<'a> {
 
     /// Finds every switch between the last certain time and `t`, where the mode is `value`.
     fn reach(&mut self, t: f64, value: f64) -> Result<(), Error> {
-        if let Some((_, last)) = self.certain
-            && self.indicator.counts()
-        {
-            let expression = self.indicator.expression();
-            let levels = (value - last).abs();
-            self.effort.switches(levels.max(0.0), expression)?;
-        }
         while let Some((left, current)) = self.certain
             && !same(current, value)
         {
@@ -299,10 +311,7 @@ impl<'a> Isolation<'a> {
         if switch - last <= apart(switch) || self.end - switch <= apart(self.end) {
             return Ok(());
         }
-        if !self.indicator.counts() {
-            let expression = self.indicator.expression();
-            self.effort.switches(1.0, expression)?;
-        }
+        self.effort.switch(self.indicator.expression())?;
         self.instants.push(switch);
         Ok(())
     }
@@ -320,6 +329,13 @@ impl<'a> Isolation<'a> {
                 right = middle;
             }
         }
+    }
+}
+
+fn unresolved(time: f64, expression: &str) -> Error {
+    Error::UnresolvedSwitches {
+        expression: expression.to_owned(),
+        time,
     }
 }
 
