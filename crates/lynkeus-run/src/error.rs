@@ -101,17 +101,30 @@ pub enum Error {
         hint: String,
     },
 
-    /// Too many instants at which an input jumps.
+    /// Too many instants at which an expression of time jumps or has a kink.
     #[error(
-        "an expression of time jumps more than {limit} times between t = {from} and t = {to}; make it smoother or the output step smaller"
+        "`{expression}` switches more than {limit} times between t = {from} and t = {to}; make it slower, give its mean where the detail does not matter, or make the output step smaller"
     )]
     TooManySwitches {
+        /// what switches
+        expression: String,
         /// start of the interval
         from: f64,
         /// its end
         to: f64,
         /// how many are allowed
         limit: usize,
+    },
+
+    /// Instants at which an expression of time switches that could not be located.
+    #[error(
+        "when `{expression}` switches cannot be told near t = {time}: rounding errors hide which side it is on, or it switches ever faster; give it a margin, or write it so that it does not cancel"
+    )]
+    UnresolvedSwitches {
+        /// what switches
+        expression: String,
+        /// about when
+        time: f64,
     },
 
     /// Times of a log do not increase.
