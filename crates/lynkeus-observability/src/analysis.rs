@@ -6,14 +6,14 @@ use lynkeus_model::Plant;
 
 use crate::expansion::Columns;
 use crate::field::Modular;
-use crate::hidden::{Hidden, beside, steady_from};
+use crate::hidden::{Hidden, beside, joined, steady_from};
 use crate::model::{Model, Refused};
 use crate::search::Search;
 use crate::series::Stop;
 use crate::start::{Affine, Start};
 use crate::symmetry::{Twin, symmetries};
 use crate::{Answer, Asked, Limits, Quantity, Question, QuestionError, Verdict};
-use crate::{hull, place};
+use crate::{hull, lie, place};
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
@@ -257,12 +257,35 @@ impl<'a> Analysis<'a> {
         };
         let mut generic = self.search(&elsewhere, Columns::new(self.model, depth));
         let bounded = generic.until(None, depth);
-        search.until(bounded.ok().map(|()| generic.rank()), last)?;
+        let most = bounded.is_ok().then(|| generic.rank());
+        // what usually is enough, then the symmetries, then as far as it is worth
+        search.until(most, last.min(3 * depth + 24))?;
         bounded?;
+        if search.rank() >= generic.rank() {
+            return Ok(vec![Hidden::all(search)]);
+        }
+        let fields = self.fields(ground, set)?;
+        let proved = joined(search, beside(search, &generic), &fields);
+        if search.is_complete() || proved.iter().any(|hidden| hidden.among.is_none()) {
+            return Ok(proved);
+        }
+        search.until(most, last)?;
         Ok(match search.rank() >= generic.rank() {
             true => vec![Hidden::all(search)],
-            false => beside(search, &generic),
+            false => joined(search, beside(search, &generic), &fields),
         })
+    }
+
+    /// Directions along which verified symmetries move the unknowns at the start.
+    fn fields(&self, ground: &Ground, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
+        let setting = lie::Setting {
+            model: self.model,
+            limits: self.limits,
+            set,
+            at_zero: ground.at_zero,
+            deadline: self.deadline,
+        };
+        lie::directions(&setting, &ground.start)
     }
 
     fn steady(
@@ -281,7 +304,7 @@ impl<'a> Analysis<'a> {
         let steady = steady_from(self.model, self.limits, starts, set, last, self.deadline)?;
         Ok(match steady {
             Some(_) => vec![Hidden::all(search)],
-            None => vec![],
+            None => joined(search, vec![], &self.fields(ground, set)?),
         })
     }
 

@@ -125,6 +125,16 @@ impl<'a> Expansion<'a> {
         self.run.advance(&|place| (coefficients[place].0, vec![]))
     }
 
+    /// The latest coefficient of a state's derivative with its sensitivities.
+    pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
+        self.run.root(state)
+    }
+
+    /// How far a first value is from the known start.
+    pub fn moved_by(&self, place: usize) -> Modular {
+        self.start.moved_by(self.model, place)
+    }
+
     /// The latest coefficient of a state's derivative.
     pub fn velocity(&self, state: usize) -> Modular {
         self.run.root(state).0

@@ -91,6 +91,41 @@ pub(crate) fn beside(special: &Search<'_>, generic: &Search<'_>) -> Vec<Hidden> 
     groups(&unseen).into_iter().flat_map(one_by_one).collect()
 }
 
+/// The directions of `found` beside those that `proved` spans already; all of them at once
+/// where these leave nothing else unseen.
+pub(crate) fn joined(
+    search: &Search<'_>,
+    mut proved: Vec<Hidden>,
+    found: &[Vec<Modular>],
+) -> Vec<Hidden> {
+    let mut span = Echelon::new(search.columns().named);
+    for (_, direction) in proved.iter().flat_map(|hidden| &hidden.directions) {
+        span.add(direction);
+    }
+    let mut fresh = Echelon::new(search.columns().named);
+    for direction in found {
+        if span.add(direction) {
+            fresh.add(direction);
+        }
+    }
+    let unseen = search.unseen();
+    if span.rank() == unseen.len() {
+        return vec![Hidden {
+            among: None,
+            directions: unseen,
+        }];
+    }
+    let fresh = fresh.reduced_rows();
+    for group in groups(&fresh) {
+        let among: BTreeSet<usize> = group.iter().flat_map(|d| columns(d)).collect();
+        proved.push(Hidden {
+            among: Some(among.into_iter().collect()),
+            directions: group.into_iter().cloned().collect(),
+        });
+    }
+    proved
+}
+
 /// Ranks after some order, by what the unknown inputs do to them.
 #[derive(Debug, PartialEq)]
 struct Ranks {

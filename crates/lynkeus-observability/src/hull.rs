@@ -78,7 +78,7 @@ fn velocity(
 }
 
 /// Every known start free: invariant, whatever the flow.
-fn everywhere(model: &Model, moving: &[usize]) -> Affine {
+pub(crate) fn everywhere(model: &Model, moving: &[usize]) -> Affine {
     let unit = |&place: &usize| {
         let mut unit = vec![Modular::ZERO; model.symbols.len()];
         unit[place] = Modular::ONE;

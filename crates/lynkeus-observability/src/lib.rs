@@ -37,6 +37,7 @@ mod expansion;
 mod field;
 mod hidden;
 mod hull;
+mod lie;
 mod model;
 mod place;
 mod point;

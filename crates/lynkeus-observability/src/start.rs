@@ -71,11 +71,16 @@ impl Start {
             (_, First::Computed(i)) => computed.get(i).copied().unwrap_or_default(),
             (_, First::Free) => self.drawn(place),
         };
+        base + self.moved_by(model, place)
+    }
+
+    /// How far the point of the set is from the known start.
+    pub fn moved_by(&self, model: &Model, place: usize) -> Modular {
         let directions = self.set.directions.iter().enumerate();
-        directions.fold(base, |value, (i, direction)| {
+        directions.fold(Modular::ZERO, |sum, (i, direction)| {
             match direction[place].is_zero() {
-                true => value,
-                false => value + direction[place] * self.drawn(model.symbols.len() + i),
+                true => sum,
+                false => sum + direction[place] * self.drawn(model.symbols.len() + i),
             }
         })
     }

@@ -57,13 +57,6 @@ fn traces_that_come_late_are_found() {
         assert_eq!(answer.order, order, "{factor}");
     }
     judge(
-        "parameter Real p; parameter Real c; Real s(start = 0.5, fixed = true); Real x(start = 1, fixed = true); output Real y = x;",
-        "der(s) = c; der(x) = p*(s - 0.5)^30;",
-        &[],
-        // p·c³⁰ alone
-        "!p !c",
-    );
-    judge(
         "parameter Real a; parameter Real b; Real s(start = 0, fixed = true); Real x(start = 0, fixed = true); output Real y = x;",
         "der(s) = 1; der(x) = a*s^10 + b*s^30;",
         &[],
@@ -92,8 +85,8 @@ fn time_starts_with_the_known_starts() {
         &[],
         "p",
     );
-    // s is time, so that p acts on nothing; without the start, it acts
-    for (fixed, expected) in [(", fixed = true", "!p"), ("", "s p")] {
+    // s is time, so that p acts on nothing; without the start, p·s(0) does
+    for (fixed, expected) in [(", fixed = true", "!p"), ("", "!s !p")] {
         judge(
             &format!(
                 "parameter Real p; Real s(start = 0{fixed}); output Real y = p*(s - time) + x; Real x(start = 1, fixed = true);"
@@ -176,6 +169,37 @@ fn what_an_invariant_set_hides_is_proved_hidden() {
         "der(s) = u*s; der(x) = u*x + b*s;",
         &[],
         "x !b",
+    );
+}
+
+/// No invariant set is small enough, but a symmetry fixes the start.
+#[test]
+fn what_a_symmetry_hides_is_proved_hidden() {
+    let scaled = |exponent: usize| {
+        let answer = judge(
+            "parameter Real p; parameter Real c; Real s(start = 0.5, fixed = true); Real x(start = 1, fixed = true); output Real y = x;",
+            &format!("der(s) = c; der(x) = p*(s - 0.5)^{exponent};"),
+            &[],
+            "!p !c",
+        );
+        answer.symmetries[0].clone()
+    };
+    assert_eq!(scaled(3).invariants, ["c^3*p"]);
+    assert_eq!(scaled(24).invariants, ["c^24*p"]);
+    // beyond the orders and exponents that are looked at
+    assert_eq!(scaled(4000).directions, 1);
+    // turned about the start
+    judge(
+        "parameter Real a; parameter Real b; Real s(start = 0, fixed = true); Real q(start = 0, fixed = true); output Real y = s^2 + q^2;",
+        "der(s) = a - q; der(q) = b + s;",
+        &[],
+        "!a !b",
+    );
+    judge(
+        "input Real w; parameter Real p; Real s(start = 0, fixed = true); Real x; output Real y = x;",
+        "der(s) = 1; der(x) = w*s^9 + p*s^9;",
+        &["w"],
+        "x !p !w",
     );
 }
 
