@@ -258,6 +258,7 @@ fn variable(name: &str, node: Node, attributes: Attributes) -> Variable {
         unit: attributes.unit,
         description: attributes.description,
         start: attributes.start,
+        start_node: None,
         min: attributes.min,
         max: attributes.max,
         nominal: attributes.nominal,

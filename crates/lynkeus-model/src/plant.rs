@@ -49,6 +49,8 @@ pub struct Variable {
     pub description: Option<String>,
     /// value at the start
     pub start: Option<f64>,
+    /// the same as an expression, where it depends on parameters that are symbols
+    pub start_node: Option<Node>,
     /// smallest value of its range; −∞ if not given
     pub min: f64,
     /// largest value of its range; +∞ if not given

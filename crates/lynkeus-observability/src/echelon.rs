@@ -20,6 +20,16 @@ impl Echelon {
         self.rows.len()
     }
 
+    /// The rows, each scaled to 1 at its pivot.
+    pub fn rows(&self) -> impl Iterator<Item = &[Modular]> {
+        self.rows.iter().map(|(_, row)| row.as_slice())
+    }
+
+    /// The pivot columns: the first that is not zero of each row of the echelon form.
+    pub fn pivots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rows.iter().map(|(pivot, _)| *pivot)
+    }
+
     /// What is left of a row after the known rows are taken out.
     fn reduced(&self, row: &[Modular]) -> Vec<Modular> {
         let mut row = row.to_vec();

@@ -30,16 +30,24 @@
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod analysis;
 mod answer;
 mod echelon;
+mod expansion;
 mod field;
-mod invariance;
-mod local;
+mod hidden;
+mod hull;
+mod lie;
+mod model;
+mod place;
 mod point;
 pub mod precision;
+mod question;
 mod search;
 mod series;
 mod start;
+mod symmetry;
 
+pub use analysis::analyse;
 pub use answer::{Answer, Asked, Quantity, Symmetry, Verdict};
-pub use local::{Limits, Question, QuestionError, analyse};
+pub use question::{Limits, Question, QuestionError};

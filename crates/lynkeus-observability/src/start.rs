@@ -1,122 +1,117 @@
-//! The random point at which the series starts, and how a good one is found.
+//! The first values of a series: given ones, and random ones for the rest.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::time::Instant;
+use std::collections::BTreeSet;
 
-use crate::Limits;
 use crate::field::{Modular, Random};
-use crate::local::{Model, Role, Symbol};
-use crate::search::Search;
-use crate::series::Stop;
+use crate::model::{First, Model, Role};
 
-/// Points tried before the model counts as singular everywhere.
-const POINTS: u64 = 4096;
+/// An affine set c + span(d₁, d₂, …) in the coordinates of the model's symbols, c being the known
+/// starts; what is free is free in it as well.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Affine {
+    /// per direction one number for each symbol
+    pub directions: Vec<Vec<Modular>>,
+}
 
-/// Failures in a row after which an operation counts as impossible at every point.
-const STUBBORN: usize = 40;
-
-/// Where the series starts: one random number per symbol.
+/// Where a series starts: random numbers, redrawn one by one where they do not suit.
 #[derive(Clone, Debug)]
 pub(crate) struct Start {
     pub seed: u64,
-    /// how often each symbol was drawn anew
+    /// how often each symbol, then each direction of the set, was drawn anew
     draws: Vec<u64>,
-    /// roots of numbers that have none in this field
+    /// roots and logarithms of numbers that have none in this field
     pub turned: BTreeSet<usize>,
-    /// known starts are random numbers as well instead of the given ones
-    pub anywhere: bool,
+    /// the known starts are those of a random point of this set
+    set: Affine,
+    /// time starts at zero, and not at any moment
+    at_zero: bool,
 }
 
 impl Start {
+    /// The known starts as given.
     pub fn new(model: &Model, seed: u64) -> Self {
-        let draws = vec![0; model.symbols.len()];
-        let anywhere = false;
         Self {
             seed,
-            draws,
+            draws: vec![0; model.symbols.len()],
             turned: BTreeSet::new(),
-            anywhere,
+            set: Affine::default(),
+            at_zero: false,
         }
     }
 
-    pub fn is_generic(&self, model: &Model) -> bool {
-        model.generic
+    /// Time starts at zero.
+    pub fn at_zero(self, at_zero: bool) -> Self {
+        Self { at_zero, ..self }
     }
 
-    /// Orders after which nothing more is looked for. At a generic point the number of
-    /// states and parameters, and one more for the unknown inputs, is enough; at a known start
-    /// a trace may come later than at any other point.
-    pub fn highest(&self, model: &Model) -> usize {
-        match (model.generic || self.anywhere, model.unknown_inputs) {
-            (true, _) => model.depth,
-            (false, 0) => 3 * model.depth + 24,
-            (false, _) => 2 * model.depth + 6,
+    /// The known starts anywhere in a set.
+    pub fn within(self, model: &Model, set: &Affine) -> Self {
+        Self {
+            draws: vec![0; model.symbols.len() + set.directions.len()],
+            set: set.clone(),
+            ..self
         }
     }
 
-    /// The first coefficient of a state or a constant.
-    pub fn value(&self, place: usize, symbol: &Symbol) -> Modular {
-        let given = match symbol.role {
-            Role::State(_) if self.anywhere => None,
-            _ => symbol.start,
+    /// The number that belongs to a draw.
+    fn drawn(&self, draw: usize) -> Modular {
+        let again = self.draws.get(draw).copied().unwrap_or_default();
+        let stream = self.seed.wrapping_mul(0x1000_0000_01b3) ^ (draw as u64) << 32;
+        Random::new(stream.wrapping_add(again)).element()
+    }
+
+    /// The first value of a symbol, `computed` being the values of starts that are
+    /// expressions.
+    pub fn value(&self, model: &Model, place: usize, computed: &[Modular]) -> Modular {
+        let symbol = &model.symbols[place];
+        let base = match (symbol.role, symbol.first) {
+            (Role::Zero, _) => Modular::ZERO,
+            (Role::Time, _) if self.at_zero => Modular::ZERO,
+            (_, First::Given(value)) => value,
+            (_, First::Computed(i)) => computed.get(i).copied().unwrap_or_default(),
+            (_, First::Free) => self.drawn(place),
         };
-        given.unwrap_or_else(|| {
-            let drawn = self.draws.get(place).copied().unwrap_or_default();
-            let stream = self.seed.wrapping_mul(0x1000_0000_01b3) ^ (place as u64) << 32;
-            Random::new(stream.wrapping_add(drawn)).element()
+        base + self.moved_by(model, place)
+    }
+
+    /// How far the point of the set is from the known start.
+    pub fn moved_by(&self, model: &Model, place: usize) -> Modular {
+        let directions = self.set.directions.iter().enumerate();
+        directions.fold(Modular::ZERO, |sum, (i, direction)| {
+            match direction[place].is_zero() {
+                true => sum,
+                false => sum + direction[place] * self.drawn(model.symbols.len() + i),
+            }
         })
     }
-}
 
-/// A start at which the first coefficients exist, starting the search at `seed`. Where an
-/// operation does not, one of the symbols that it depends on is drawn anew, if possible one
-/// that no earlier root depends on: so a hundred roots cost some hundred draws.
-pub(crate) fn find(
-    model: &Model,
-    limits: Limits,
-    mut start: Start,
-    deadline: Instant,
-) -> Result<Start, Stop> {
-    let mut random = Random::new(start.seed ^ 0x5eed);
-    let mut failures: BTreeMap<usize, usize> = BTreeMap::new();
-    for _ in 0..POINTS {
-        let mut search = Search::new(model, limits, &start, deadline);
-        let failed = match search.first() {
-            Ok(()) => return Ok(start),
-            Err(Stop::Point(slot)) => slot,
-            Err(stop) => return Err(stop),
+    /// The draws on which the first value of a symbol depends.
+    fn draws_of(&self, model: &Model, place: usize) -> Vec<usize> {
+        let symbol = &model.symbols[place];
+        let free = match symbol.role {
+            Role::Zero => false,
+            Role::Time => !self.at_zero,
+            _ => matches!(symbol.first, First::Free),
         };
-        // those before it had a value
-        failures.retain(|slot, _| *slot >= failed);
-        let count = failures.entry(failed).or_insert(0);
-        *count += 1;
-        match start.fresh(model, failed, &mut random) {
-            Some(place) if *count <= STUBBORN => start.draws[place] += 1,
-            // √x and √(3x), where 3 has no root: one of the two is taken of −3x
-            _ => {
-                let root = model.program.partial().any(|slot| slot == failed);
-                if !root || !start.turned.insert(failed) {
-                    return Err(Stop::Point(failed));
-                }
-                failures.remove(&failed);
-            }
-        }
+        let directions = self.set.directions.iter().enumerate();
+        let moving = directions.filter(|(_, direction)| !direction[place].is_zero());
+        let moving = moving.map(|(i, _)| model.symbols.len() + i);
+        free.then_some(place).into_iter().chain(moving).collect()
     }
-    Err(Stop::Point(0))
-}
 
-impl Start {
-    /// A symbol to draw anew for a slot: one that no earlier root depends on, if possible.
-    fn fresh(&self, model: &Model, failed: usize, random: &mut Random) -> Option<usize> {
+    /// Draws a number anew that a slot depends on, if possible one that no earlier
+    /// slot with a domain depends on; false if there is none.
+    pub fn redraw(&mut self, model: &Model, failed: usize, random: &mut Random) -> bool {
         let free = |slot: usize| -> BTreeSet<usize> {
             let support = model.program.support(slot);
-            let drawn = |&place: &usize| self.is_drawn(&model.symbols[place]);
-            support.into_iter().filter(drawn).collect()
+            let draws = support.into_iter();
+            draws
+                .flat_map(|place| self.draws_of(model, place))
+                .collect()
         };
         let of = free(failed);
-        let earlier: BTreeSet<usize> = model
-            .program
-            .partial()
+        let partial = model.program.partial();
+        let earlier: BTreeSet<usize> = partial
             .filter(|slot| *slot < failed)
             .flat_map(free)
             .collect();
@@ -125,17 +120,10 @@ impl Start {
             true => of.into_iter().collect(),
             false => fresh,
         };
-        among.get(random.below(among.len())).copied()
-    }
-}
-
-impl Start {
-    fn is_drawn(&self, symbol: &Symbol) -> bool {
-        match symbol.role {
-            Role::State(_) => self.anywhere || symbol.start.is_none(),
-            Role::Constant => symbol.start.is_none(),
-            Role::Known | Role::Unknown | Role::Time => true,
-            Role::Zero => false,
-        }
+        let Some(&draw) = among.get(random.below(among.len())) else {
+            return false;
+        };
+        self.draws[draw] += 1;
+        true
     }
 }

@@ -1,5 +1,7 @@
 //! `start`, `min`, `max`, `nominal`, `fixed` and `unit` of declarations.
 
+use lynkeus_expr::Node;
+
 use super::scope::Mode;
 use super::symbols::{Component, Context, Symbols};
 use super::value::{Scalar, Value, describe_dims, element_name};
@@ -10,6 +12,8 @@ use crate::syntax::{Problem, Result, unquoted};
 /// What a declaration says of all its elements.
 pub(super) struct Attributes {
     start: Option<Numbers>,
+    /// the start as expressions, one for all elements or one for each
+    start_nodes: Vec<Node>,
     min: Option<Numbers>,
     max: Option<Numbers>,
     nominal: Option<Numbers>,
@@ -47,6 +51,7 @@ impl Attributes {
         };
         let mut attributes = Self {
             start: None,
+            start_nodes: vec![],
             min: None,
             max: None,
             nominal: None,
@@ -73,10 +78,14 @@ impl Attributes {
                 ));
             }
             *slot = reader.numbers(attribute)?;
+            if attribute.name.text(context.source) == "start" {
+                attributes.start_nodes = reader.symbolic(attribute)?;
+            }
         }
-        // A start that is a parameter without value is not known, however fixed.
+        // A start that cannot be computed from parameters is not known, however fixed.
         let is_start = |attribute: &Attribute| attribute.name.text(context.source) == "start";
-        if attributes.start.is_none() && declaration.attributes.iter().any(is_start) {
+        let unknown = attributes.start.is_none() && attributes.start_nodes.is_empty();
+        if unknown && declaration.attributes.iter().any(is_start) {
             attributes.fixed = None;
         }
         attributes.check_range(context, declaration, component)?;
@@ -119,6 +128,10 @@ impl Attributes {
             unit: self.unit.clone(),
             description: declaration.description.clone(),
             start: at(&self.start),
+            start_node: match &self.start_nodes[..] {
+                [one] => Some(*one),
+                nodes => nodes.get(offset).copied(),
+            },
             min: at(&self.min).unwrap_or(f64::NEG_INFINITY),
             max: at(&self.max).unwrap_or(f64::INFINITY),
             nominal: at(&self.nominal),
@@ -141,6 +154,25 @@ impl Reader<'_, '_> {
             Kind::Text => Ok(unquoted(expression.span.text(self.context.source))),
             _ => Err(Problem::new(expression.span, "expected a string")
                 .hint("write units as in `unit = \"m/s\"`")),
+        }
+    }
+
+    /// The value as expressions, where it depends on parameters that are symbols.
+    fn symbolic(&self, attribute: &Attribute) -> Result<Vec<Node>> {
+        let graph = self.context.graph;
+        if !self.context.options.symbolic_parameters {
+            return Ok(vec![]);
+        }
+        let mut evaluator = self.symbols.evaluator(self.context, Mode::Parametric);
+        let elements = match evaluator.value(attribute.value)? {
+            Value::Scalar(scalar) => vec![scalar],
+            Value::Array(array) => array.elements,
+        };
+        let nodes = elements.into_iter().map(|scalar| scalar.real(graph));
+        let nodes: Vec<Node> = nodes.collect::<Option<_>>().unwrap_or_default();
+        match graph.symbols_of(&nodes).is_empty() {
+            true => Ok(vec![]),
+            false => Ok(nodes),
         }
     }
 

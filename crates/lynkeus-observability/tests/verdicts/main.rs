@@ -5,6 +5,7 @@ mod independent;
 mod limits;
 mod nonrational;
 mod planted;
+mod starts;
 mod traps;
 
 use lynkeus_model::{LoadOptions, Plant};

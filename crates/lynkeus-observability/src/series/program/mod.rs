@@ -46,6 +46,8 @@ pub(crate) struct Program {
     pub(super) roots: Vec<usize>,
     /// functions that are not rational, by name
     pub functions: Vec<&'static str>,
+    /// branches that were chosen at the reference point
+    pub choices: usize,
 }
 
 /// An expression that has no power series here.
@@ -82,6 +84,22 @@ impl Program {
 }
 
 impl Program {
+    /// Number of operations.
+    pub fn len(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Number of roots.
+    pub fn roots(&self) -> usize {
+        self.roots.len()
+    }
+
+    /// Whether an operation reads a symbol.
+    pub fn reads(&self, place: usize) -> bool {
+        let reads = |step: &Step| matches!(step, Step::Symbol(p) if *p == place);
+        self.steps.iter().any(reads)
+    }
+
     /// Slots of roots, which not every value has.
     pub fn partial(&self) -> impl Iterator<Item = usize> + '_ {
         let steps = self.steps.iter().enumerate();
@@ -179,7 +197,8 @@ impl Builder<'_> {
         }
     }
 
-    fn value_at_reference(&self, node: Node) -> Result<f64, Unsupported> {
+    fn value_at_reference(&mut self, node: Node) -> Result<f64, Unsupported> {
+        self.program.choices += usize::from(!self.graph.symbols_of(&[node]).is_empty());
         (self.branch)(node).ok_or_else(|| {
             let text = self.graph.render(node, 60);
             Unsupported(format!(

@@ -2,25 +2,38 @@
 //! what of them is known nevertheless, in the user's names.
 
 use std::collections::BTreeSet;
-use std::time::Instant;
 
+use crate::Symmetry;
 use crate::field::Modular;
-use crate::local::Model;
+use crate::hidden::{Direction, Hidden, columns, groups, kernel_among};
+use crate::model::Model;
 use crate::search::Search;
-use crate::start::{self, Start};
-use crate::{Question, Symmetry};
 
 /// Weights of a scaling, and steps of a shift, are fractions with parts up to this.
 const SMALL: i64 = 24;
 /// Names in words before the rest becomes a count.
 const LISTED: usize = 8;
-/// Seed of the second point, which confirms what the first suggests.
-const SECOND: u64 = 4711;
 
-/// A direction of the kernel with the column that moves in no other.
-type Direction = (usize, Vec<Modular>);
 /// n/d by column, relative to the own column of the direction.
 type Weights = Vec<(usize, i64, i64)>;
+
+/// A second start, which confirms what the first suggests.
+pub(crate) struct Twin<'a> {
+    pub search: &'a Search<'a>,
+}
+
+impl Twin<'_> {
+    /// What is hidden there among the same quantities.
+    fn hidden(&self, hidden: &Hidden) -> Vec<Direction> {
+        match &hidden.among {
+            None => self.search.unseen(),
+            Some(among) => {
+                let rows = self.search.restricted(among);
+                kernel_among(&rows, among, self.search.columns().named)
+            }
+        }
+    }
+}
 
 /// How a group acts on its quantities.
 #[derive(Clone, Copy, PartialEq)]
@@ -29,32 +42,25 @@ enum Kind {
     Shift,
 }
 
+/// The groups of quantities that the hidden directions move, in words.
 pub(crate) fn symmetries(
     model: &Model,
-    question: &Question,
-    search: &Search<'_>,
-    deadline: Instant,
+    hidden: &Hidden,
+    point: &[Modular],
+    twin: Option<&Twin<'_>>,
 ) -> Vec<Symmetry> {
-    let (directions, point) = search.hidden();
-    if directions.is_empty() {
-        return vec![];
-    }
-    let start = start::find(model, question.limits, Start::new(model, SECOND), deadline)
-        .unwrap_or_else(|_| Start::new(model, SECOND));
-    let mut second = Search::new(model, question.limits, &start, deadline);
-    second.expect(Some(search.rank()));
-    let confirmed = second.run().is_ok();
-    let (others, elsewhere) = second.hidden();
+    let names: Vec<&str> = model.named.iter().map(|(name, _)| name.as_str()).collect();
+    let others = twin.map(|twin| twin.hidden(hidden));
     let described = |group: Vec<&Direction>| {
-        let names: Vec<&str> = model.named.iter().map(|(name, _)| name.as_str()).collect();
         let of = |kind: Kind| {
             let here = weights_of(&group, kind, point)?;
+            let others = others.as_ref()?;
             let twins = group
                 .iter()
                 .map(|(own, _)| others.iter().find(|(o, _)| o == own));
             let twins: Vec<&Direction> = twins.collect::<Option<_>>()?;
-            let there = weights_of(&twins, kind, elsewhere)?;
-            (confirmed && here == there).then_some(here)
+            let there = weights_of(&twins, kind, twin?.search.point())?;
+            (here == there).then_some(here)
         };
         let kinds = [Kind::Scaling, Kind::Shift];
         match kinds.into_iter().find_map(|kind| Some((kind, of(kind)?))) {
@@ -62,31 +68,8 @@ pub(crate) fn symmetries(
             None => unnamed(&group, &names),
         }
     };
-    groups(&directions).into_iter().map(described).collect()
-}
-
-fn columns(direction: &Direction) -> impl Iterator<Item = usize> + '_ {
-    let moving = |&c: &usize| !direction.1[c].is_zero();
-    (0..direction.1.len()).filter(moving)
-}
-
-/// Directions that share quantities, directly or by others.
-fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
-    let mut groups: Vec<(BTreeSet<usize>, Vec<&Direction>)> = vec![];
-    for direction in directions {
-        let mut joined: (BTreeSet<usize>, Vec<&Direction>) = (columns(direction).collect(), vec![]);
-        let (touching, apart): (Vec<_>, Vec<_>) = groups
-            .into_iter()
-            .partition(|(columns, _)| !columns.is_disjoint(&joined.0));
-        groups = apart;
-        for (columns, members) in touching {
-            joined.0.extend(columns);
-            joined.1.extend(members);
-        }
-        joined.1.push(direction);
-        groups.push(joined);
-    }
-    groups.into_iter().map(|(_, members)| members).collect()
+    let groups = groups(&hidden.directions);
+    groups.into_iter().map(described).collect()
 }
 
 fn weights_of(group: &[&Direction], kind: Kind, point: &[Modular]) -> Option<Vec<Weights>> {

@@ -1,0 +1,369 @@
+//! The analysis.
+
+use std::time::{Duration, Instant};
+
+use lynkeus_model::Plant;
+
+use crate::expansion::Columns;
+use crate::field::Modular;
+use crate::hidden::{Hidden, beside, joined, steady_from};
+use crate::model::{Model, Refused};
+use crate::search::Search;
+use crate::series::Stop;
+use crate::start::{Affine, Start};
+use crate::symmetry::{Twin, symmetries};
+use crate::{Answer, Asked, Limits, Quantity, Question, QuestionError, Verdict};
+use crate::{hull, lie, place};
+
+/// Seed of the first point.
+const FIRST: u64 = 1;
+/// Seed of the second point, which confirms symmetries that the first suggests.
+const SECOND: u64 = 4711;
+const SINGULAR: &str = "its series is not defined at any of the random points tried: a division by zero, or roots of negative numbers";
+/// Products of coefficients, with a sensitivity each, that a search from a special start may
+/// cost; and the most orders it may have.
+const WORK: usize = 100_000_000;
+const ORDERS: usize = 1000;
+
+/// Decides what can be known.
+///
+/// # Errors
+/// [`QuestionError`].
+pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
+    let now = Instant::now();
+    // a limit beyond what a clock can tell is none
+    let deadline = now
+        .checked_add(question.limits.time)
+        .unwrap_or(now + Duration::from_secs(1 << 30));
+    let model = match Model::new(plant, question)? {
+        Ok(model) => model,
+        Err(Refused { named, reason }) => return Ok(undecided(&named, question, &reason)),
+    };
+    let limits = question.limits;
+    let analysis = Analysis {
+        model: &model,
+        limits,
+        deadline,
+    };
+    let reason = |stop: Stop| match stop {
+        Stop::Point(_) => SINGULAR.to_owned(),
+        stop => format!("the limit of {} struck at once", stop.word()),
+    };
+    Ok(match analysis.ground() {
+        Ok(ground) => analysis.answer(&ground, question),
+        Err(stop) => undecided(&model.named, question, &reason(stop)),
+    })
+}
+
+fn undecided(named: &[(String, Quantity)], question: &Question, reason: &str) -> Answer {
+    let asked = |name: &String| Asked {
+        name: name.clone(),
+        verdict: Verdict::Undecided,
+    };
+    Answer {
+        quantities: named
+            .iter()
+            .map(|(name, kind)| (asked(name), *kind))
+            .collect(),
+        about: question.about.iter().map(asked).collect(),
+        symmetries: vec![],
+        order: 0,
+        rank: 0,
+        unknowns: named.len(),
+        notes: vec![format!("undecided: {reason}")],
+    }
+}
+
+/// What surrounds the start.
+enum Surroundings {
+    /// the start is as good as any other in an invariant set: a rank that does not grow
+    /// once never grows
+    Generic,
+    /// known starts, and an invariant set around them in which other points may show more
+    Special(Affine),
+}
+
+/// A start, and what it is worth.
+struct Ground {
+    start: Start,
+    surroundings: Surroundings,
+    /// time starts at zero
+    at_zero: bool,
+}
+
+/// What the search has found.
+struct Found<'a> {
+    search: Search<'a>,
+    stop: Option<Stop>,
+    hidden: Vec<Hidden>,
+}
+
+impl Found<'_> {
+    fn verdict(&self, row: &[Modular]) -> Verdict {
+        match () {
+            () if self.search.sees(row) => Verdict::Observable,
+            () if self.hidden.iter().any(|hidden| hidden.moves(row)) => Verdict::Unobservable,
+            () => Verdict::Undecided,
+        }
+    }
+}
+
+struct Analysis<'a> {
+    model: &'a Model,
+    limits: Limits,
+    deadline: Instant,
+}
+
+impl<'a> Analysis<'a> {
+    fn find(&self, start: Start) -> Result<Start, Stop> {
+        place::find(self.model, self.limits, start, self.deadline)
+    }
+
+    fn search<'s>(&self, start: &'s Start, columns: Columns) -> Search<'s>
+    where
+        'a: 's,
+    {
+        Search::new(self.model, self.limits, start, columns, self.deadline)
+    }
+
+    /// A start, with the invariant set around it.
+    fn ground(&self) -> Result<Ground, Stop> {
+        let start = Start::new(self.model, FIRST);
+        let around = |at_zero| hull::invariant(self.model, self.limits, at_zero, self.deadline);
+        if self.model.known_starts().next().is_none() {
+            return Ok(Ground {
+                start: self.find(start)?,
+                surroundings: Surroundings::Generic,
+                at_zero: false,
+            });
+        }
+        let set = around(false)?;
+        if set.directions.is_empty() {
+            return Ok(Ground {
+                start: self.find(start)?,
+                surroundings: Surroundings::Generic,
+                at_zero: false,
+            });
+        }
+        if self.model.time().is_some() {
+            // known starts are those at time zero
+            match self.find(start.clone().at_zero(true)) {
+                Ok(start) => {
+                    return Ok(Ground {
+                        start,
+                        surroundings: Surroundings::Special(around(true)?),
+                        at_zero: true,
+                    });
+                }
+                Err(Stop::Point(_)) => {}
+                Err(stop) => return Err(stop),
+            }
+        }
+        Ok(Ground {
+            start: self.find(start)?,
+            surroundings: Surroundings::Special(set),
+            at_zero: false,
+        })
+    }
+
+    fn answer(&self, ground: &Ground, question: &Question) -> Answer {
+        let found = self.found(ground);
+        let quantities = self.model.named.iter().enumerate();
+        let quantities = quantities.map(|(column, (name, kind))| {
+            let verdict = found.verdict(&found.search.columns().unit(column));
+            let name = name.clone();
+            (Asked { name, verdict }, *kind)
+        });
+        let gradients = found.search.about();
+        let about = question.about.iter().enumerate().map(|(i, name)| Asked {
+            name: name.clone(),
+            verdict: match gradients.get(i) {
+                Some(row) => found.verdict(row),
+                None => Verdict::Undecided,
+            },
+        });
+        let (order, named) = (found.search.order(), self.model.named.len());
+        Answer {
+            quantities: quantities.collect(),
+            about: about.collect(),
+            symmetries: self.symmetries(ground, &found),
+            order,
+            rank: found.search.rank(),
+            unknowns: named + self.model.unknown_inputs * order,
+            notes: self.notes(&found),
+        }
+    }
+
+    fn found<'s>(&self, ground: &'s Ground) -> Found<'s>
+    where
+        'a: 's,
+    {
+        let columns = Columns::new(self.model, self.last_order(&ground.surroundings));
+        let mut search = self.search(&ground.start, columns);
+        let ended = match &ground.surroundings {
+            Surroundings::Generic => search.to_the_end().map(|()| vec![Hidden::all(&search)]),
+            Surroundings::Special(set) if self.model.unknown_inputs == 0 => {
+                self.beside(ground, set, &mut search)
+            }
+            Surroundings::Special(set) => self.steady(ground, set, &mut search),
+        };
+        let (stop, hidden) = match ended {
+            Ok(hidden) => (None, hidden),
+            Err(stop) => (Some(stop), vec![]),
+        };
+        Found {
+            search,
+            stop,
+            hidden,
+        }
+    }
+
+    /// Orders after which nothing more is looked for.
+    fn last_order(&self, surroundings: &Surroundings) -> usize {
+        let depth = self.model.depth;
+        match (surroundings, self.model.unknown_inputs) {
+            (Surroundings::Generic, _) => depth,
+            (Surroundings::Special(_), 0) => {
+                let width = self.model.named.len() + 1;
+                let affordable = (2 * WORK / (self.model.program.len() + 1) / width).isqrt();
+                affordable.min(ORDERS).max(3 * depth + 24)
+            }
+            (Surroundings::Special(_), _) => 2 * depth + 6,
+        }
+    }
+
+    /// A generic point of the set around the known starts.
+    fn elsewhere(&self, ground: &Ground, set: &Affine) -> Result<Option<Start>, Stop> {
+        let start = Start::new(self.model, FIRST).at_zero(ground.at_zero);
+        match self.find(start.within(self.model, set)) {
+            Ok(start) => Ok(Some(start)),
+            Err(Stop::Point(_)) => Ok(None),
+            Err(stop) => Err(stop),
+        }
+    }
+
+    fn beside(
+        &self,
+        ground: &Ground,
+        set: &Affine,
+        search: &mut Search<'_>,
+    ) -> Result<Vec<Hidden>, Stop> {
+        let last = self.last_order(&ground.surroundings);
+        let depth = self.model.depth;
+        let elsewhere = self.elsewhere(ground, set);
+        let Ok(Some(elsewhere)) = elsewhere else {
+            search.until(None, last)?;
+            return elsewhere.map(|_| vec![]);
+        };
+        let mut generic = self.search(&elsewhere, Columns::new(self.model, depth));
+        let bounded = generic.until(None, depth);
+        let most = bounded.is_ok().then(|| generic.rank());
+        // what usually is enough, then the symmetries, then as far as it is worth
+        search.until(most, last.min(3 * depth + 24))?;
+        bounded?;
+        if search.rank() >= generic.rank() {
+            return Ok(vec![Hidden::all(search)]);
+        }
+        let fields = self.fields(ground, set)?;
+        let proved = joined(search, beside(search, &generic), &fields);
+        if search.is_complete() || proved.iter().any(|hidden| hidden.among.is_none()) {
+            return Ok(proved);
+        }
+        search.until(most, last)?;
+        Ok(match search.rank() >= generic.rank() {
+            true => vec![Hidden::all(search)],
+            false => joined(search, beside(search, &generic), &fields),
+        })
+    }
+
+    /// Directions along which verified symmetries move the unknowns at the start.
+    fn fields(&self, ground: &Ground, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
+        let setting = lie::Setting {
+            model: self.model,
+            limits: self.limits,
+            set,
+            at_zero: ground.at_zero,
+            deadline: self.deadline,
+        };
+        lie::directions(&setting, &ground.start)
+    }
+
+    fn steady(
+        &self,
+        ground: &Ground,
+        set: &Affine,
+        search: &mut Search<'_>,
+    ) -> Result<Vec<Hidden>, Stop> {
+        let last = self.last_order(&ground.surroundings);
+        search.until(None, last)?;
+        let elsewhere = self.elsewhere(ground, set)?;
+        let Some(elsewhere) = elsewhere.filter(|_| !search.is_complete()) else {
+            return Ok(vec![]);
+        };
+        let starts = (&ground.start, &elsewhere);
+        let steady = steady_from(self.model, self.limits, starts, set, last, self.deadline)?;
+        Ok(match steady {
+            Some(_) => vec![Hidden::all(search)],
+            None => joined(search, vec![], &self.fields(ground, set)?),
+        })
+    }
+
+    /// What hides the unobservable, confirmed at a second start.
+    fn symmetries(&self, ground: &Ground, found: &Found<'_>) -> Vec<crate::Symmetry> {
+        let search = &found.search;
+        if found
+            .hidden
+            .iter()
+            .all(|hidden| hidden.directions.is_empty())
+        {
+            return vec![];
+        }
+        let start = Start::new(self.model, SECOND).at_zero(ground.at_zero);
+        let start = self.find(start);
+        let mut second = start.as_ref().ok().map(|start| {
+            let columns = Columns::new(self.model, search.order());
+            self.search(start, columns)
+        });
+        let reached = second.as_mut().is_some_and(|second| {
+            let ended = second.until(None, search.order());
+            ended.is_ok() && second.rank() == search.rank()
+        });
+        let twin = second.filter(|_| reached);
+        let twin = twin.as_ref().map(|twin| Twin { search: twin });
+        let hidden = found.hidden.iter();
+        hidden
+            .flat_map(|hidden| symmetries(self.model, hidden, search.point(), twin.as_ref()))
+            .collect()
+    }
+
+    fn notes(&self, found: &Found<'_>) -> Vec<String> {
+        let mut notes = vec![self.method()];
+        let choices = self.model.program.choices;
+        if choices > 0 {
+            let them = if choices == 1 { "a choice" } else { "choices" };
+            notes.push(format!("the model makes {them} (if, abs, min, max, sign, floor …): the branch at its own values is analysed, and what another branch or the moment of the change would show is not"));
+        }
+        let (order, named) = (found.search.order(), self.model.named.len());
+        let open = |column: usize| {
+            found.verdict(&found.search.columns().unit(column)) == Verdict::Undecided
+        };
+        if let Some(stop) = found.stop {
+            let what = stop.word();
+            notes.push(format!("the limit of {what} struck after {order} derivatives of the outputs: what is called observable is so, the rest is undecided"));
+        } else if (0..named).any(open) {
+            notes.push(format!("start values are given: {order} derivatives of the outputs were taken, and what is undecided may show in a later one, or never"));
+        }
+        notes
+    }
+
+    fn method(&self) -> String {
+        let functions = &self.model.program.functions;
+        match functions.is_empty() {
+            true => "exact arithmetic in a prime field at a random point: \"observable\" is certain, \"unobservable\" is wrong with a probability below 1e-12".to_owned(),
+            false => format!(
+                "exact arithmetic in a prime field at a random point; {} enter through their differential equations, with values drawn at random that keep the usual identities; beyond these, composed functions are taken as generic, and \"observable\" rests on that",
+                functions.join(", ")
+            ),
+        }
+    }
+}

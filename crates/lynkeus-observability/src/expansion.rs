@@ -1,0 +1,229 @@
+//! The power series of a model's solution from one point, order by order.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use crate::Limits;
+use crate::field::{Modular, Random};
+use crate::model::{First, Model, Role};
+use crate::series::{Functions, Run, Stop};
+use crate::start::{Affine, Start};
+
+/// The unknowns with respect to which a series is differentiated, as columns: the named
+/// quantities, the derivatives of unknown inputs, directions in which known starts move.
+#[derive(Clone, Debug)]
+pub(crate) struct Columns {
+    pub named: usize,
+    unknown_inputs: usize,
+    /// derivatives of the unknown inputs
+    orders: usize,
+    moving: Affine,
+}
+
+impl Columns {
+    /// For series of at most that order.
+    pub fn new(model: &Model, orders: usize) -> Self {
+        Self {
+            named: model.named.len(),
+            unknown_inputs: model.unknown_inputs,
+            orders: if model.unknown_inputs > 0 { orders } else { 0 },
+            moving: Affine::default(),
+        }
+    }
+
+    /// The same and one column for each direction of a set.
+    pub fn moving(self, set: &Affine) -> Self {
+        let moving = set.clone();
+        Self { moving, ..self }
+    }
+
+    pub fn width(&self) -> usize {
+        self.named + self.unknown_inputs * self.orders + self.moving.directions.len()
+    }
+
+    /// The columns of the unknown inputs' k-th derivatives.
+    pub fn of_inputs(&self, k: usize) -> Range<usize> {
+        let first = match k {
+            0 => self.named - self.unknown_inputs,
+            k => self.named + self.unknown_inputs * (k - 1),
+        };
+        first..first + self.unknown_inputs
+    }
+
+    /// All columns of unknown inputs and their derivatives.
+    pub fn inputs(&self) -> Range<usize> {
+        let first = self.named - self.unknown_inputs;
+        first..first + self.unknown_inputs * (self.orders + 1)
+    }
+
+    pub fn unit(&self, column: usize) -> Vec<Modular> {
+        let mut unit = vec![Modular::ZERO; self.width()];
+        unit[column] = Modular::ONE;
+        unit
+    }
+
+    fn first_of_moving(&self) -> usize {
+        self.width() - self.moving.directions.len()
+    }
+}
+
+/// The series at one start.
+pub(crate) struct Expansion<'a> {
+    model: &'a Model,
+    start: &'a Start,
+    pub columns: Columns,
+    run: Run<'a>,
+    /// coefficients of signals
+    random: Random,
+    /// starts that are expressions in the parameters
+    computed: Run<'a>,
+    /// per symbol: its latest coefficient with sensitivities
+    coefficients: Vec<(Modular, Vec<Modular>)>,
+    /// values of the named quantities at the start
+    pub point: Vec<Modular>,
+    next: usize,
+}
+
+impl<'a> Expansion<'a> {
+    pub fn new(
+        model: &'a Model,
+        limits: Limits,
+        start: &'a Start,
+        columns: Columns,
+        deadline: Instant,
+    ) -> Self {
+        let room = limits.memory / size_of::<Modular>();
+        let functions = Functions::new(start.seed, &start.turned);
+        let width = columns.width();
+        let none = Functions::new(start.seed, &Default::default());
+        Self {
+            run: Run::new(&model.program, width, functions, deadline, room),
+            computed: Run::new(&model.starts, width, none, deadline, room),
+            coefficients: vec![(Modular::ZERO, vec![]); model.symbols.len()],
+            point: vec![Modular::ZERO; columns.named],
+            random: Random::new(start.seed.wrapping_mul(0x1000_0000_01b3) + 7),
+            next: 0,
+            columns,
+            start,
+            model,
+        }
+    }
+
+    /// Computes the next coefficient of everything.
+    pub fn advance(&mut self) -> Result<(), Stop> {
+        self.next_coefficients()?;
+        let coefficients = std::mem::take(&mut self.coefficients);
+        let advanced = self.run.advance(&|place| coefficients[place].clone());
+        self.coefficients = coefficients;
+        advanced
+    }
+
+    /// The first coefficients without sensitivities: whether the start is a good one.
+    pub fn first(&mut self) -> Result<(), Stop> {
+        self.next_coefficients()?;
+        let coefficients = std::mem::take(&mut self.coefficients);
+        self.run.advance(&|place| (coefficients[place].0, vec![]))
+    }
+
+    /// The latest coefficient of a state's derivative with its sensitivities.
+    pub fn derivative(&self, state: usize) -> (Modular, Vec<Modular>) {
+        self.run.root(state)
+    }
+
+    /// How far a first value is from the known start.
+    pub fn moved_by(&self, place: usize) -> Modular {
+        self.start.moved_by(self.model, place)
+    }
+
+    /// The latest coefficient of a state's derivative.
+    pub fn velocity(&self, state: usize) -> Modular {
+        self.run.root(state).0
+    }
+
+    /// Sensitivities of the latest coefficient of an output.
+    pub fn output(&self, output: usize) -> Vec<Modular> {
+        self.run.root(self.model.states + output).1
+    }
+
+    /// Sensitivities of the latest coefficient of an expression asked about.
+    pub fn about(&self, expression: usize) -> Vec<Modular> {
+        let first = self.model.states + self.model.outputs;
+        self.run.root(first + expression).1
+    }
+
+    /// The next coefficient of every symbol: of states from the derivative's last one.
+    fn next_coefficients(&mut self) -> Result<(), Stop> {
+        let k = self.next;
+        self.next += 1;
+        if k == 0 {
+            return self.first_coefficients();
+        }
+        let mut unknown_input = 0;
+        for (place, symbol) in self.model.symbols.iter().enumerate() {
+            self.coefficients[place] = match symbol.role {
+                Role::State(i) => {
+                    let inverse = Modular::new(k as u64).inverse().unwrap_or_default();
+                    let (value, row) = self.run.root(i);
+                    (value * inverse, row.iter().map(|x| *x * inverse).collect())
+                }
+                Role::Known => (self.random.element(), vec![]),
+                Role::Time if k == 1 => (Modular::ONE, vec![]),
+                Role::Constant | Role::Zero | Role::Time => (Modular::ZERO, vec![]),
+                Role::Unknown => {
+                    let column = self.columns.of_inputs(k).start + unknown_input;
+                    unknown_input += 1;
+                    (self.random.element(), self.columns.unit(column))
+                }
+            };
+        }
+        Ok(())
+    }
+
+    fn first_coefficients(&mut self) -> Result<(), Stop> {
+        self.constants();
+        let coefficients = std::mem::take(&mut self.coefficients);
+        let computed = self.computed.advance(&|place| coefficients[place].clone());
+        self.coefficients = coefficients;
+        // no number of the search can mend a start that is not defined
+        computed.map_err(|stop| match stop {
+            Stop::Point(_) => Stop::Point(usize::MAX),
+            stop => stop,
+        })?;
+        let roots = 0..self.model.starts.roots();
+        let (values, rows): (Vec<_>, Vec<_>) = roots.map(|i| self.computed.root(i)).unzip();
+        for (place, symbol) in self.model.symbols.iter().enumerate() {
+            let value = self.start.value(self.model, place, &values);
+            let row = match (symbol.column, symbol.first) {
+                (Some(column), _) => self.columns.unit(column),
+                (None, First::Computed(i)) => self.moved(place, rows[i].clone()),
+                (None, _) => self.moved(place, vec![]),
+            };
+            if let Some(column) = symbol.column {
+                self.point[column] = value;
+            }
+            self.coefficients[place] = (value, row);
+        }
+        Ok(())
+    }
+
+    /// What starts are computed from.
+    fn constants(&mut self) {
+        for (place, symbol) in self.model.symbols.iter().enumerate() {
+            let row = symbol.column.map(|column| self.columns.unit(column));
+            let value = self.start.value(self.model, place, &[]);
+            self.coefficients[place] = (value, row.unwrap_or_default());
+        }
+    }
+
+    /// A row of sensitivities with those to the directions in which known starts move.
+    fn moved(&self, place: usize, mut row: Vec<Modular>) -> Vec<Modular> {
+        let first = self.columns.first_of_moving();
+        for (i, direction) in self.columns.moving.directions.iter().enumerate() {
+            if !direction[place].is_zero() {
+                row.resize(self.columns.width(), Modular::ZERO);
+                row[first + i] = direction[place];
+            }
+        }
+        row
+    }
+}

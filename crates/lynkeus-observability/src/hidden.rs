@@ -1,0 +1,208 @@
+//! Which of the directions that no derivative so far has seen no derivative will ever see.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use crate::Limits;
+use crate::echelon::Echelon;
+use crate::expansion::Columns;
+use crate::field::Modular;
+use crate::model::Model;
+use crate::search::Search;
+use crate::series::Stop;
+use crate::start::{Affine, Start};
+
+/// A direction of the named quantities, with the column that moves in no other one.
+pub(crate) type Direction = (usize, Vec<Modular>);
+
+/// Directions that are proved to leave no trace in the outputs.
+#[derive(Clone, Debug)]
+pub(crate) struct Hidden {
+    /// the quantities among which they are all there are; none for all quantities
+    pub among: Option<Vec<usize>>,
+    pub directions: Vec<Direction>,
+}
+
+impl Hidden {
+    /// All directions that the rows leave: no later row can bring anything.
+    pub fn all(search: &Search<'_>) -> Self {
+        Self {
+            among: None,
+            directions: search.unseen(),
+        }
+    }
+
+    /// Whether a combination of the unknowns changes along one of the directions.
+    pub fn moves(&self, row: &[Modular]) -> bool {
+        let change = |direction: &[Modular]| {
+            let terms = row.iter().zip(direction);
+            terms.fold(Modular::ZERO, |sum, (a, b)| sum + *a * *b)
+        };
+        self.directions.iter().any(|(_, d)| !change(d).is_zero())
+    }
+}
+
+/// The columns that a direction moves.
+pub(crate) fn columns(direction: &Direction) -> impl Iterator<Item = usize> + '_ {
+    let moving = |&c: &usize| !direction.1[c].is_zero();
+    (0..direction.1.len()).filter(moving)
+}
+
+/// Directions that share quantities, directly or by others.
+pub(crate) fn groups(directions: &[Direction]) -> Vec<Vec<&Direction>> {
+    let mut groups: Vec<(BTreeSet<usize>, Vec<&Direction>)> = vec![];
+    for direction in directions {
+        let mut joined: (BTreeSet<usize>, Vec<&Direction>) = (columns(direction).collect(), vec![]);
+        let (touching, apart): (Vec<_>, Vec<_>) = groups
+            .into_iter()
+            .partition(|(columns, _)| !columns.is_disjoint(&joined.0));
+        groups = apart;
+        for (columns, members) in touching {
+            joined.0.extend(columns);
+            joined.1.extend(members);
+        }
+        joined.1.push(direction);
+        groups.push(joined);
+    }
+    groups.into_iter().map(|(_, members)| members).collect()
+}
+
+/// What is proved hidden at a special start, from the rank at a generic point of an invariant
+/// set around it: of some quantities, that rank bounds the one at the start, all derivatives
+/// counted. Where the rows so far reach it, what they leave of these quantities stays.
+pub(crate) fn beside(special: &Search<'_>, generic: &Search<'_>) -> Vec<Hidden> {
+    let closed =
+        |among: &[usize]| special.restricted(among).rank() >= generic.restricted(among).rank();
+    let unseen = special.unseen();
+    let hidden = |directions: &[&Direction]| {
+        let among: BTreeSet<usize> = directions.iter().flat_map(|d| columns(d)).collect();
+        let among: Vec<usize> = among.into_iter().collect();
+        closed(&among).then(|| Hidden {
+            among: Some(among),
+            directions: directions.iter().map(|d| (*d).clone()).collect(),
+        })
+    };
+    let one_by_one = |group: Vec<&Direction>| -> Vec<Hidden> {
+        match hidden(&group) {
+            Some(found) => vec![found],
+            None => group.iter().filter_map(|d| hidden(&[d])).collect(),
+        }
+    };
+    groups(&unseen).into_iter().flat_map(one_by_one).collect()
+}
+
+/// The directions of `found` beside those that `proved` spans already; all of them at once
+/// where these leave nothing else unseen.
+pub(crate) fn joined(
+    search: &Search<'_>,
+    mut proved: Vec<Hidden>,
+    found: &[Vec<Modular>],
+) -> Vec<Hidden> {
+    let mut span = Echelon::new(search.columns().named);
+    for (_, direction) in proved.iter().flat_map(|hidden| &hidden.directions) {
+        span.add(direction);
+    }
+    let mut fresh = Echelon::new(search.columns().named);
+    for direction in found {
+        if span.add(direction) {
+            fresh.add(direction);
+        }
+    }
+    let unseen = search.unseen();
+    if span.rank() == unseen.len() {
+        return vec![Hidden {
+            among: None,
+            directions: unseen,
+        }];
+    }
+    let fresh = fresh.reduced_rows();
+    for group in groups(&fresh) {
+        let among: BTreeSet<usize> = group.iter().flat_map(|d| columns(d)).collect();
+        proved.push(Hidden {
+            among: Some(among.into_iter().collect()),
+            directions: group.into_iter().cloned().collect(),
+        });
+    }
+    proved
+}
+
+/// Ranks after some order, by what the unknown inputs do to them.
+#[derive(Debug, PartialEq)]
+struct Ranks {
+    /// for each k: rows whose highest derivative of an unknown input is the k-th
+    by_derivative: Vec<usize>,
+    /// rows without any
+    settled: usize,
+}
+
+impl Ranks {
+    fn of(search: &Search<'_>, order: usize) -> Self {
+        let columns = search.columns();
+        let inputs: Vec<usize> = (0..=order)
+            .rev()
+            .flat_map(|k| columns.of_inputs(k))
+            .collect();
+        let (m, reduced) = (columns.of_inputs(0).len(), search.restricted(&inputs));
+        let mut by_derivative = vec![0; order + 1];
+        // pivots stand in the first column that is not zero: the highest derivative's
+        for pivot in reduced.pivots() {
+            by_derivative[order - pivot / m] += 1;
+        }
+        Self {
+            settled: search.rank() - reduced.rank(),
+            by_derivative,
+        }
+    }
+
+    fn of_inputs(&self) -> usize {
+        self.by_derivative.iter().sum()
+    }
+}
+
+/// The order from which on the rows at a special start bring nothing new about states,
+/// parameters and present unknown inputs, with unknown inputs; none where that cannot be said.
+///
+/// At a generic point of the invariant set `settled` decides. Let the ranks at the start agree
+/// with those there after order k, sorted by the highest derivative of an unknown input
+/// in a row; and let order k + 1 add there as many rows as have only the inputs themselves in
+/// them. Then each row's derivative has the derivative of the same leading term, at the start as well, so
+/// that the ranks agree for all higher orders too: the settled part, which never shrinks, cannot grow.
+pub(crate) fn steady_from(
+    model: &Model,
+    limits: Limits,
+    (special, generic): (&Start, &Start),
+    set: &Affine,
+    last: usize,
+    deadline: Instant,
+) -> Result<Option<usize>, Stop> {
+    let columns = Columns::new(model, last).moving(set);
+    let begin = |start| Search::new(model, limits, start, columns.clone(), deadline);
+    let (mut here, mut there) = (begin(special), begin(generic));
+    let mut before: Option<(Ranks, Ranks)> = None;
+    for k in 0..=last {
+        here.advance()?;
+        there.advance()?;
+        let now = (Ranks::of(&here, k), Ranks::of(&there, k));
+        if let Some((here, there)) = before {
+            let added = now.1.of_inputs() - there.of_inputs();
+            if here == there && now.1.settled == there.settled && added == there.by_derivative[0] {
+                return Ok(Some(k - 1));
+            }
+        }
+        before = Some(now);
+    }
+    Ok(None)
+}
+
+/// A basis of the directions among some quantities that no row sees.
+pub(crate) fn kernel_among(rows: &Echelon, among: &[usize], named: usize) -> Vec<Direction> {
+    let mut unseen = Echelon::new(named);
+    for direction in rows.kernel() {
+        let mut whole = vec![Modular::ZERO; named];
+        for (&column, x) in among.iter().zip(direction) {
+            whole[column] = x;
+        }
+        unseen.add(&whole);
+    }
+    unseen.reduced_rows()
+}

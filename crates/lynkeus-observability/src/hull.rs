@@ -1,0 +1,90 @@
+//! The smallest affine set that holds the known starts and is invariant under the flow.
+//!
+//! A series from a known start can be poorer than from any other: x = p·t⁴¹ shows p in
+//! the 41st derivative. What is hidden in the first hundred may show in the next. But the rank of
+//! the outputs' sensitivities, all derivatives counted, is a lower semicontinuous function of the start, so
+//! that it is at most the rank at a generic point of any irreducible set which holds the
+//! start and which no solution leaves; and there a finite number of derivatives is enough. The
+//! tighter the set, the sharper the bound: an equilibrium stays in a point, s' = −s from s = 0
+//! in a plane.
+
+use std::time::Instant;
+
+use crate::Limits;
+use crate::echelon::Echelon;
+use crate::expansion::{Columns, Expansion};
+use crate::field::Modular;
+use crate::model::{Model, Role};
+use crate::place;
+use crate::series::Stop;
+use crate::start::{Affine, Start};
+
+/// Seed of the points at which the flow is looked at.
+const FIRST: u64 = 9001;
+/// Points that have to bring nothing new before the set counts as invariant.
+const CONFIRMED: usize = 2;
+
+/// The set, grown from the known starts by the flow at random points of it.
+pub(crate) fn invariant(
+    model: &Model,
+    limits: Limits,
+    at_zero: bool,
+    deadline: Instant,
+) -> Result<Affine, Stop> {
+    let mut moving: Vec<usize> = model.known_starts().collect();
+    moving.extend(model.time().filter(|_| at_zero));
+    let mut set = Affine::default();
+    let mut span = Echelon::new(model.symbols.len());
+    let (mut confirmed, mut seed) = (0, FIRST);
+    while confirmed < CONFIRMED {
+        seed += 1;
+        let start = Start::new(model, seed).at_zero(at_zero);
+        let start = start.within(model, &set);
+        let velocity = match velocity(model, limits, start, &moving, deadline) {
+            Ok(velocity) => velocity,
+            Err(Stop::Point(_)) => return Ok(everywhere(model, &moving)),
+            Err(stop) => return Err(stop),
+        };
+        if span.add(&velocity) {
+            set.directions.push(velocity);
+            confirmed = 0;
+        } else {
+            confirmed += 1;
+        }
+    }
+    Ok(set)
+}
+
+/// The derivatives of these symbols at a start.
+fn velocity(
+    model: &Model,
+    limits: Limits,
+    start: Start,
+    moving: &[usize],
+    deadline: Instant,
+) -> Result<Vec<Modular>, Stop> {
+    let start = place::find(model, limits, start, deadline)?;
+    let columns = Columns::new(model, 0);
+    let mut expansion = Expansion::new(model, limits, &start, columns, deadline);
+    expansion.first()?;
+    let mut velocity = vec![Modular::ZERO; model.symbols.len()];
+    for &place in moving {
+        velocity[place] = match model.symbols[place].role {
+            Role::State(i) => expansion.velocity(i),
+            _ => Modular::ONE,
+        };
+    }
+    Ok(velocity)
+}
+
+/// Every known start free: invariant, whatever the flow.
+pub(crate) fn everywhere(model: &Model, moving: &[usize]) -> Affine {
+    let unit = |&place: &usize| {
+        let mut unit = vec![Modular::ZERO; model.symbols.len()];
+        unit[place] = Modular::ONE;
+        unit
+    };
+    Affine {
+        directions: moving.iter().map(unit).collect(),
+    }
+}

@@ -1,0 +1,258 @@
+//! A plant with a question, ready to be expanded.
+
+use lynkeus_expr::Node;
+use lynkeus_model::{Plant, Variable, parse_expression};
+
+use crate::field::{Modular, Random};
+use crate::series::{Program, Unsupported};
+use crate::{Quantity, Question, QuestionError, point};
+
+/// What role a symbol plays in the series.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Role {
+    /// a state: coefficients from its derivative (root `usize`)
+    State(usize),
+    /// an unknown constant
+    Constant,
+    /// a known signal
+    Known,
+    /// a signal that is zero
+    Zero,
+    /// an unknown signal: every coefficient is an unknown
+    Unknown,
+    Time,
+}
+
+/// What is known of a symbol's first value.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum First {
+    /// nothing: any value is as good
+    Free,
+    Given(Modular),
+    /// an expression in the parameters: a root of [`Model::starts`]
+    Computed(usize),
+}
+
+/// One symbol with its first value and its column among the unknowns.
+pub(crate) struct Symbol {
+    node: Node,
+    pub role: Role,
+    pub column: Option<usize>,
+    pub first: First,
+}
+
+/// A plant with a question. The roots of the program are the states' derivatives, the
+/// outputs and the expressions asked about.
+pub(crate) struct Model {
+    pub symbols: Vec<Symbol>,
+    /// name and kind of each of the leading columns
+    pub named: Vec<(String, Quantity)>,
+    pub program: Program,
+    /// starts that are expressions in the parameters
+    pub starts: Program,
+    pub states: usize,
+    pub outputs: usize,
+    pub about: usize,
+    pub unknown_inputs: usize,
+    /// orders that are enough at a generic point
+    pub depth: usize,
+}
+
+/// Why a plant cannot be expanded, with the quantities that stay undecided.
+pub(crate) struct Refused {
+    pub named: Vec<(String, Quantity)>,
+    pub reason: String,
+}
+
+impl Model {
+    /// The model, or why it has no series.
+    pub fn new(plant: &Plant, question: &Question) -> Result<Result<Self, Refused>, QuestionError> {
+        let about = expressions(plant, question)?;
+        let outputs = measured(plant, question)?;
+        for name in question.unknown.iter().chain(&question.disturbances) {
+            find("input", &plant.inputs, name)?;
+        }
+        for name in &question.known_starts {
+            find("state", &plant.states, name)?;
+        }
+        let Symbols {
+            symbols,
+            named,
+            starts,
+        } = Symbols::new(plant, question);
+        let mut roots = plant.derivatives.clone();
+        roots.extend(&outputs);
+        roots.extend(&about);
+        let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
+        let reference = point::reference(plant, &mut Random::new(1));
+        let branch = |node: Node| point::value(&plant.graph, node, &reference);
+        let compiled = |roots: &[Node]| Program::new(&plant.graph, &nodes, roots, &branch);
+        let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
+        let (program, starts) = match programs {
+            Ok(programs) => programs,
+            Err(Unsupported(reason)) => {
+                let reason = format!("the model contains {reason}");
+                return Ok(Err(Refused { named, reason }));
+            }
+        };
+        let of_kind = |kind: Quantity| named.iter().filter(|(_, k)| *k == kind).count();
+        Ok(Ok(Self {
+            unknown_inputs: of_kind(Quantity::UnknownInput),
+            depth: plant.states.len() + of_kind(Quantity::Parameter) + 1,
+            states: plant.states.len(),
+            outputs: outputs.len(),
+            about: about.len(),
+            symbols,
+            named,
+            program,
+            starts,
+        }))
+    }
+
+    /// Places of the states whose start is known.
+    pub fn known_starts(&self) -> impl Iterator<Item = usize> + '_ {
+        let known =
+            |s: &Symbol| matches!(s.role, Role::State(_)) && !matches!(s.first, First::Free);
+        let symbols = self.symbols.iter().enumerate();
+        symbols.filter_map(move |(place, s)| known(s).then_some(place))
+    }
+
+    /// The place of time, where the model depends on it explicitly.
+    pub fn time(&self) -> Option<usize> {
+        let mut symbols = self.symbols.iter();
+        let place = symbols.position(|s| matches!(s.role, Role::Time))?;
+        self.program.reads(place).then_some(place)
+    }
+}
+
+/// The expressions asked about, over the plant's graph.
+fn expressions(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
+    let parameters = plant.parameters.iter().map(|p| &p.variable);
+    let variables: Vec<&Variable> = plant
+        .states
+        .iter()
+        .chain(&plant.inputs)
+        .chain(parameters)
+        .chain(&plant.algebraics)
+        .chain(&plant.outputs)
+        .collect();
+    let names = |name: &str| match variables.iter().find(|v| v.name == name) {
+        Some(variable) => Some(variable.node),
+        None => (name == "time").then_some(plant.time),
+    };
+    let parse = |text: &String| {
+        parse_expression(text, &plant.graph, &names)
+            .map_err(|error| QuestionError::Expression(error.one_line()))
+    };
+    question.about.iter().map(parse).collect()
+}
+
+fn find<'v>(
+    kind: &'static str,
+    variables: &'v [Variable],
+    name: &str,
+) -> Result<&'v Variable, QuestionError> {
+    variables.iter().find(|v| v.name == name).ok_or_else(|| {
+        let found: Vec<&str> = variables.iter().map(|v| v.name.as_str()).collect();
+        QuestionError::NoSuchName {
+            kind,
+            name: name.to_owned(),
+            found: if found.is_empty() {
+                "none".into()
+            } else {
+                found.join(", ")
+            },
+        }
+    })
+}
+
+fn measured(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
+    if plant.outputs.is_empty() {
+        return Err(QuestionError::NothingMeasured(plant.name.clone()));
+    }
+    if question.measured.is_empty() {
+        return Ok(plant.outputs.iter().map(|o| o.node).collect());
+    }
+    let names = question.measured.iter();
+    names
+        .map(|name| Ok(find("output", &plant.outputs, name)?.node))
+        .collect()
+}
+
+/// Every symbol with its role, and the quantities that have a column of their own.
+#[derive(Default)]
+struct Symbols {
+    symbols: Vec<Symbol>,
+    named: Vec<(String, Quantity)>,
+    /// start values that are expressions
+    starts: Vec<Node>,
+}
+
+impl Symbols {
+    fn new(plant: &Plant, question: &Question) -> Self {
+        let mut all = Self::default();
+        for (i, state) in plant.states.iter().enumerate() {
+            all.state(i, state, question);
+        }
+        for parameter in &plant.parameters {
+            let column = question
+                .parameters
+                .then(|| all.column(&parameter.variable, Quantity::Parameter));
+            let value = parameter.value.and_then(Modular::from_f64);
+            let first = match value {
+                Some(value) if !question.parameters => First::Given(value),
+                _ => First::Free,
+            };
+            all.push(parameter.variable.node, Role::Constant, column, first);
+        }
+        for input in &plant.inputs {
+            let among = |names: &[String]| names.contains(&input.name);
+            let role = if among(&question.unknown) {
+                Role::Unknown
+            } else if among(&question.disturbances) {
+                Role::Zero
+            } else {
+                Role::Known
+            };
+            let column =
+                matches!(role, Role::Unknown).then(|| all.column(input, Quantity::UnknownInput));
+            all.push(input.node, role, column, First::Free);
+        }
+        all.push(plant.time, Role::Time, None, First::Free);
+        all
+    }
+
+    /// The start value of a state is known by its declaration or by the question; what
+    /// the declaration says may be an expression in parameters that are unknown themselves.
+    fn state(&mut self, i: usize, state: &Variable, question: &Question) {
+        let known = state.fixed || question.known_starts.contains(&state.name);
+        let column = (!known).then(|| self.column(state, Quantity::State));
+        let computed = state.start_node.filter(|_| state.fixed);
+        let first = match (known, computed) {
+            (false, _) => First::Free,
+            (true, Some(node)) => {
+                self.starts.push(node);
+                First::Computed(self.starts.len() - 1)
+            }
+            (true, None) => {
+                let value = Modular::from_f64(state.start.unwrap_or(0.0));
+                value.map_or(First::Free, First::Given)
+            }
+        };
+        self.push(state.node, Role::State(i), column, first);
+    }
+
+    fn column(&mut self, of: &Variable, kind: Quantity) -> usize {
+        self.named.push((of.name.clone(), kind));
+        self.named.len() - 1
+    }
+
+    fn push(&mut self, node: Node, role: Role, column: Option<usize>, first: First) {
+        self.symbols.push(Symbol {
+            node,
+            role,
+            column,
+            first,
+        });
+    }
+}
