@@ -19,7 +19,8 @@ pub trait Dynamics {
     /// has a kink because of time, in any order.
     ///
     /// # Errors
-    /// [`Error::TooManySwitches`] where there is no bounded number of them.
+    /// [`Error::TooManySwitches`] where there is no bounded number of them,
+    /// [`Error::UnresolvedSwitches`] where rounding errors hide them.
     fn switches(&mut self, _from: f64, _to: f64, _times: &mut Vec<f64>) -> Result<(), Error> {
         Ok(())
     }

@@ -103,8 +103,8 @@ impl Integrator {
     /// # Errors
     /// [`Error::Setting`] for an interval that is empty or too short for the
     /// resolution of time; [`Error::NotFinite`], [`Error::StepUnderflow`], [`Error::StepBudget`],
-    /// [`Error::TooStiff`], [`Error::TooManySwitches`]; [`Error::Diverged`] where a
-    /// fixed step is too large.
+    /// [`Error::TooStiff`], [`Error::TooManySwitches`], [`Error::UnresolvedSwitches`];
+    /// [`Error::Diverged`] where a fixed step is too large.
     pub fn advance(
         &mut self,
         f: &mut impl Dynamics,
@@ -157,6 +157,9 @@ impl Integrator {
         x: &mut [f64],
     ) -> Result<(), Error> {
         instants.sort_unstable_by(f64::total_cmp);
+        if let Stepper::Adaptive(adaptive) = &mut self.stepper {
+            adaptive.grant(instants.len());
+        }
         instants.push(to);
         let whole = to - from;
         let mut start = from;

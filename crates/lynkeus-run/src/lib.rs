@@ -47,9 +47,11 @@
 //!
 //! - Integration stops at every row, at every noise sample, and at every instant
 //!   at which an expression *of time alone* jumps (relations, `floor`, `sign`) or
-//!   has a kink (`abs`, `min`, `max`). Instants affine in time are solved for, others
-//!   are sampled at 24 points between stops and bisected to the last bit. Jumps that
-//!   depend on states are left to the error control.
+//!   has a kink (`abs`, `min`, `max`). They are isolated by interval arithmetic and
+//!   bisected to the last bit, so that no pulse is too short to be seen; what rounding
+//!   errors hide for more than a millionth of the interval, and what switches more than
+//!   200,000 times in it, is refused by name. Jumps that depend on states are left to
+//!   the error control.
 //! - A value that is NaN or infinite never becomes an estimate: an adaptive step
 //!   into it is shortened, and if the solution really leads there the run ends with
 //!   the time, the state and the operation, keeping the rows before.

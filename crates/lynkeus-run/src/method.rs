@@ -41,8 +41,8 @@ pub struct Tolerances {
     pub relative: f64,
     /// above 0, in the unit of the states
     pub absolute: f64,
-    /// most steps (rejected ones included) between two stops: output points,
-    /// samples and switching instants
+    /// most steps (rejected ones included) from one output point or sample to the
+    /// next; each switching instant between them adds 20
     pub budget: usize,
 }
 

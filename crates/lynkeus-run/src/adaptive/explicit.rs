@@ -47,7 +47,7 @@ impl Adaptive {
             let proposed = method.h();
             let step = leg.step(proposed);
             leg.check_step(*watched.f.borrow_mut(), step, watched.bad.borrow().as_ref())?;
-            leg.spend(*watched.f.borrow_mut(), self.tolerances.budget)?;
+            leg.spend(*watched.f.borrow_mut())?;
             method.set_h(step);
             let failed = match method.step(&watched) {
                 Ok(_) => false,

@@ -34,7 +34,7 @@ impl Adaptive {
             let proposed = self.pace.next;
             let step = leg.step(proposed);
             leg.check_step(f, step, radau.bad.as_ref())?;
-            leg.spend(f, self.tolerances.budget)?;
+            leg.spend(f)?;
             let (accepted, next) = radau.attempt(f, leg, step, rejected, &self.tolerances);
             self.pace.next = next;
             if !accepted {

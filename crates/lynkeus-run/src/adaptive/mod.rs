@@ -30,6 +30,9 @@ const LOOKS: usize = 2;
 const STIFF_ABOVE: f64 = 3.0;
 const STIFF_BELOW: f64 = 1.0;
 
+/// Steps granted for each stop at a switch, beyond the budget of the interval.
+const STEPS_PER_STOP: usize = 20;
+
 /// Error-controlled integrator; remembers its step and method between calls.
 #[derive(Clone, Debug)]
 pub(crate) struct Adaptive {
@@ -38,6 +41,14 @@ pub(crate) struct Adaptive {
     implicit: bool,
     radau: Option<Radau>,
     pace: Pace,
+    purse: Purse,
+}
+
+/// Steps of the interval under way.
+#[derive(Clone, Copy, Debug, Default)]
+struct Purse {
+    granted: usize,
+    left: usize,
 }
 
 /// What is known about the steps that the solution wants.
@@ -68,7 +79,7 @@ struct Leg<'a> {
     t: f64,
     to: f64,
     x: &'a mut [f64],
-    steps_left: usize,
+    purse: Purse,
 }
 
 impl Adaptive {
@@ -79,11 +90,23 @@ impl Adaptive {
             implicit: choice == Choice::Stiff,
             radau: None,
             pace: Pace::default(),
+            purse: Purse::default(),
         }
     }
 
-    /// Takes `x` from `from` to `to`, over which `f` is smooth. Where an error
-    /// ends it early, `x` is the last state reached.
+    /// Grants the budget of an interval with `stops` switches in it.
+    pub(crate) fn grant(&mut self, stops: usize) {
+        let granted = stops
+            .saturating_mul(STEPS_PER_STOP)
+            .saturating_add(self.tolerances.budget);
+        self.purse = Purse {
+            granted,
+            left: granted,
+        };
+    }
+
+    /// Takes `x` from `from` to `to`, over which `f` is smooth, on what is left of
+    /// the budget. Where an error ends it early, `x` is the last state reached.
     pub(crate) fn advance(
         &mut self,
         f: &mut impl Dynamics,
@@ -95,7 +118,7 @@ impl Adaptive {
             t: from,
             to,
             x,
-            steps_left: self.tolerances.budget,
+            purse: self.purse,
         };
         loop {
             leg.check_start(f)?;
@@ -104,6 +127,7 @@ impl Adaptive {
             } else {
                 self.run_explicit(f, &mut leg)?
             };
+            self.purse = leg.purse;
             if ran == Ran::ToTheEnd {
                 return Ok(());
             }
@@ -166,16 +190,16 @@ impl Leg<'_> {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, f: &mut impl Dynamics, budget: usize) -> Result<(), Error> {
-        if self.steps_left == 0 {
+    fn spend(&mut self, f: &mut impl Dynamics) -> Result<(), Error> {
+        if self.purse.left == 0 {
             return Err(Error::StepBudget {
                 time: self.t,
                 until: self.to,
-                steps: budget,
+                steps: self.purse.granted,
                 state: state_text(&f.names(), self.x),
             });
         }
-        self.steps_left -= 1;
+        self.purse.left -= 1;
         Ok(())
     }
 

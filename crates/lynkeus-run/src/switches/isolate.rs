@@ -195,8 +195,8 @@ impl<'a> Isolation<'a> {
         let close = 1e-10 * (b - a);
         let mut at_a = self.indicator.coefficient(k, a);
         let mut at_b = self.indicator.coefficient(k, b);
-        // not for NaN either
-        if !(at_a * at_b < 0.0) {
+        let opposite = (at_a < 0.0 && at_b > 0.0) || (at_a > 0.0 && at_b < 0.0);
+        if !opposite {
             return None;
         }
         for round in 0..100 {

@@ -1,5 +1,7 @@
 //! What succeeds.
 
+use std::f64::consts::{PI, TAU};
+
 use crate::{Folder, csv, examples, run};
 
 #[test]
@@ -172,4 +174,51 @@ fn what_is_no_ordinary_file_is_never_replaced() {
     let ended = folder.run(&["estimate", "study.toml", "log.csv", "-o", "link.csv"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert!(link.is_symlink() && folder.read("real.csv").starts_with("t,upper_hat"));
+}
+
+/// Two rows far apart: the pulses between them are counted all the same.
+#[test]
+fn simulate_loses_no_pulse_of_an_input() {
+    let sine = {
+        let (rise, turns) = (0.9_f64.asin(), (7.0 * 3600.0 / TAU).floor());
+        let width = PI - 2.0 * rise;
+        let last = (7.0 * 3600.0 - turns * TAU).clamp(rise, PI - rise) - rise;
+        (turns * width + last) / 7.0
+    };
+    let cases = [
+        ("if mod(time, 10) < 1 then 1 else 0", 86_400.0, 8640.0),
+        ("if sin(7*time) > 0.9 then 1 else 0", 3600.0, sine),
+        (
+            "if time > 1000 and time < 1000.001 then 1000 else 0",
+            3000.0,
+            1.0,
+        ),
+    ];
+    let folder = Folder::empty();
+    folder.write(
+        "vessel.mo",
+        "model Vessel\n  input Real u;\n  output Real y;\n  Real x(start = 0);\n\
+         equation\n  der(x) = u;\n  y = x;\nend Vessel;\n",
+    );
+    for (input, until, expected) in cases {
+        folder.write("study.toml", &vessel(input, until));
+        let ended = folder.run(&["simulate", "study.toml"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let (header, rows) = csv(&ended.out);
+        assert_eq!((header[1].as_str(), rows.len()), ("x", 2));
+        let error = (rows[1][1] / expected - 1.0).abs();
+        assert!(error < 1e-6, "{input}: {} not {expected}", rows[1][1]);
+    }
+    folder.write("study.toml", &vessel("floor(1e15*time)", 10.0));
+    let ended = folder.run(&["simulate", "study.toml"]);
+    assert_ne!(ended.code, 0);
+    assert!(ended.err.contains("`floor(time*1"), "{}", ended.err);
+}
+
+fn vessel(input: &str, until: f64) -> String {
+    format!(
+        "plant = \"vessel.mo\"\n\n[sensors]\nmeasured = [\"y\"]\n\n\
+         [observer]\nfamily = \"triangular\"\ntheta = 1\nS = [{{ diag = [1], off = [] }}]\n\n\
+         [simulate]\nuntil = {until}\noutput_step = {until}\ninputs = {{ u = \"{input}\" }}\n"
+    )
 }
