@@ -1,6 +1,6 @@
 //! Row echelon form over the field, row by row.
 
-use crate::field::Modular;
+use crate::field::{Modular, Wide};
 
 /// The row space of the rows added so far.
 #[derive(Clone, Debug)]
@@ -32,12 +32,25 @@ impl Echelon {
 
     /// What is left of a row after the known rows are taken out.
     fn reduced(&self, row: &[Modular]) -> Vec<Modular> {
-        let mut row = row.to_vec();
-        row.resize(self.width, Modular::ZERO);
+        let mut wide: Vec<Wide> = row.iter().map(|&x| Wide::from(x)).collect();
+        wide.resize(self.width, Wide::default());
+        let mut products = 1;
         for (pivot, known) in &self.rows {
-            eliminate(&mut row, *pivot, known);
+            let factor = -wide[*pivot].value();
+            if factor.is_zero() {
+                continue;
+            }
+            products += 1;
+            if products >= Wide::PRODUCTS {
+                wide.iter_mut().for_each(|x| *x = x.folded());
+                products = 2;
+            }
+            // a row is zero before its pivot, and so is what is left there
+            for (x, y) in wide[*pivot..].iter_mut().zip(&known[*pivot..]) {
+                x.add_product(factor, *y);
+            }
         }
-        row
+        wide.into_iter().map(Wide::value).collect()
     }
 
     /// Adds a row; true if it was independent of the others.
@@ -89,12 +102,12 @@ impl Echelon {
 
 /// row −= row[pivot]·known
 fn eliminate(row: &mut [Modular], pivot: usize, known: &[Modular]) {
-    let factor = row[pivot];
+    let factor = -row[pivot];
     if factor.is_zero() {
         return;
     }
     for (x, y) in row.iter_mut().zip(known) {
-        *x = *x - factor * *y;
+        *x = *x + factor * *y;
     }
 }
 

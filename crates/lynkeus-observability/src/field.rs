@@ -1,9 +1,23 @@
-//! The integers modulo the prime 2⁶¹ − 1: exact arithmetic in which a wrong rank is as
+//! The integers modulo a prime of 61 bits: exact arithmetic in which a wrong rank is as
 //! unlikely as hitting a root of a polynomial with a random number of 61 bits.
+//!
+//! The prime is safe: half of it, rounded down, is a prime q too. So the squares are a group of
+//! prime order, in which every element has one n-th root for every n: they behave as positive numbers do, with
+//! −1 no square. Of such primes it is the largest for which 2, 3, 5, 7 and 11 are
+//! squares.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-const PRIME: u64 = (1 << 61) - 1;
+/// 2⁶¹ − GAP
+const PRIME: u64 = (1 << 61) - GAP;
+const GAP: u64 = 3153;
+const LOW: u64 = (1 << 61) - 1;
+/// Number of squares but 0, a prime.
+const SQUARES: u64 = (PRIME - 1) / 2;
+/// Decimals of at least that many digits may be rounded fractions.
+const LONG: usize = 15;
+/// Largest denominator of such.
+const DENOMINATOR: u32 = 1000;
 
 /// An element of the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,6 +47,11 @@ impl Modular {
         result
     }
 
+    /// 1/2
+    pub fn half() -> Self {
+        Self(PRIME.div_ceil(2))
+    }
+
     /// 1/x; none for zero.
     pub fn inverse(self) -> Option<Self> {
         (!self.is_zero()).then(|| self.power(PRIME - 2))
@@ -44,7 +63,34 @@ impl Modular {
         (root * root == self).then_some(root)
     }
 
-    /// The decimal fraction that a person wrote: 0.1 is 1/10, not the nearest double.
+    /// Whether it is a square other than 0, as positive numbers are.
+    pub fn is_positive(self) -> bool {
+        self.power(SQUARES) == Self::ONE
+    }
+
+    /// self^(n/d), d > 0, a square as self has to be; none where that is not.
+    pub fn rational_power(self, n: i64, d: i64) -> Option<Self> {
+        if d == 1 {
+            let power = self.power(n.unsigned_abs());
+            return if n < 0 { power.inverse() } else { Some(power) };
+        }
+        // the inverse modulo a prime, by Fermat's theorem
+        let (mut base, mut left, mut inverse) = (d.unsigned_abs(), SQUARES - 2, 1_u64);
+        let times = |a: u64, b: u64| (u128::from(a) * u128::from(b) % u128::from(SQUARES)) as u64;
+        while left > 0 {
+            if left & 1 == 1 {
+                inverse = times(inverse, base);
+            }
+            base = times(base, base);
+            left >>= 1;
+        }
+        let exponent = times(inverse, n.unsigned_abs() % SQUARES);
+        let power = self.is_positive().then(|| self.power(exponent))?;
+        if n < 0 { power.inverse() } else { Some(power) }
+    }
+
+    /// The number that a person meant: 0.1 is 1/10, not the nearest double, and
+    /// 0.3333333333333333 is 1/3.
     pub fn from_f64(value: f64) -> Option<Self> {
         if !value.is_finite() {
             return None;
@@ -55,11 +101,27 @@ impl Modular {
         let fraction = mantissa
             .split_once('.')
             .map_or(0, |(_, digits)| digits.len() as i64);
-        let digits: u64 = mantissa.replace('.', "").parse().ok()?;
+        let digits = mantissa.replace('.', "");
+        if digits.len() >= LONG
+            && let Some(fraction) = Self::rounded_fraction(value)
+        {
+            return Some(fraction);
+        }
+        let digits: u64 = digits.parse().ok()?;
         let shift = exponent - fraction;
         let scale = Self::new(10).power(shift.unsigned_abs());
         let scale = if shift < 0 { scale.inverse()? } else { scale };
         let magnitude = Self::new(digits) * scale;
+        Some(if value < 0.0 { -magnitude } else { magnitude })
+    }
+
+    /// n/d, where that is the nearest double for a small d.
+    fn rounded_fraction(value: f64) -> Option<Self> {
+        let denominators = (3..=DENOMINATOR).map(f64::from);
+        let numerator = |d: f64| (value.abs() * d).round();
+        let exact = |&d: &f64| numerator(d) < 1e9 && numerator(d) / d == value.abs();
+        let d = denominators.into_iter().find(exact)?;
+        let magnitude = Self::new(numerator(d) as u64) * Self::new(d as u64).inverse()?;
         Some(if value < 0.0 { -magnitude } else { magnitude })
     }
 
@@ -78,7 +140,7 @@ impl Modular {
     }
 
     /// n/d with |n|, d ≤ `bound` that is this element, if there is one (Wang's rational
-    /// reconstruction; it is unique as long as 2·bound² < 2⁶¹).
+    /// reconstruction; it is unique as long as 2·bound² < PRIME).
     pub fn as_fraction(self, bound: i64) -> Option<(i64, i64)> {
         let (mut r0, mut r1) = (PRIME as i64, self.0 as i64);
         let (mut s0, mut s1) = (0_i64, 1_i64);
@@ -117,9 +179,49 @@ impl Neg for Modular {
 impl Mul for Modular {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        let product = u128::from(self.0) * u128::from(other.0);
-        // 2⁶¹ ≡ 1
-        let folded = (product as u64 & PRIME) + (product >> 61) as u64;
+        Self::reduced(u128::from(self.0) * u128::from(other.0))
+    }
+}
+
+/// A sum of products that is reduced at the end: [`Wide::PRODUCTS`] of them fit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wide(u128);
+
+impl Wide {
+    /// Products that may be added between two calls of [`Wide::folded`].
+    pub const PRODUCTS: usize = 60;
+
+    #[inline]
+    pub fn add_product(&mut self, a: Modular, b: Modular) {
+        self.0 += u128::from(a.0) * u128::from(b.0);
+    }
+
+    /// The same residue below 2⁸⁰, less than one product.
+    #[inline]
+    pub fn folded(self) -> Self {
+        Self(u128::from(self.0 as u64 & LOW) + (self.0 >> 61) * u128::from(GAP))
+    }
+
+    #[inline]
+    pub fn value(self) -> Modular {
+        Modular::reduced(self.folded().0)
+    }
+}
+
+impl From<Modular> for Wide {
+    fn from(value: Modular) -> Self {
+        Self(u128::from(value.0))
+    }
+}
+
+impl Modular {
+    /// The residue of a number below 2¹²⁴.
+    #[inline]
+    fn reduced(number: u128) -> Self {
+        // 2⁶¹ ≡ GAP, twice
+        let high = (number >> 61) as u64;
+        let folded = u128::from(high) * u128::from(GAP) + u128::from(number as u64 & LOW);
+        let folded = (folded as u64 & LOW) + (folded >> 61) as u64 * GAP;
         Self(if folded >= PRIME {
             folded - PRIME
         } else {
@@ -186,6 +288,37 @@ mod tests {
             Modular::ONE
         );
         assert_eq!(Modular::from_f64(f64::NAN), None);
+        let third = Modular::from_f64(-1.0 / 3.0).unwrap();
+        assert_eq!(third * Modular::new(3), -Modular::ONE);
+    }
+
+    /// Against arithmetic in 128 bits, where the folding could go wrong.
+    #[test]
+    fn products_are_reduced() {
+        for a in [
+            1,
+            2,
+            GAP,
+            LOW - 1,
+            PRIME - 1,
+            PRIME - GAP,
+            PRIME / 2,
+            1 << 60,
+        ] {
+            for b in [1, GAP, PRIME - 1, PRIME - 2, PRIME / 3] {
+                let product = (u128::from(a) * u128::from(b) % u128::from(PRIME)) as u64;
+                assert_eq!(Modular::new(a) * Modular::new(b), Modular::new(product));
+            }
+        }
+        let largest = Modular::new(PRIME - 1);
+        let mut sum = Wide::from(largest);
+        (0..Wide::PRODUCTS).for_each(|_| sum.add_product(largest, largest));
+        let expected = Modular::new(Wide::PRODUCTS as u64) - Modular::ONE;
+        assert_eq!(sum.value(), expected);
+        assert_eq!(sum.folded().value(), expected);
+        for small in [2, 3, 5, 7, 11] {
+            assert!(Modular::new(small).is_positive());
+        }
     }
 
     proptest! {
@@ -198,6 +331,13 @@ mod tests {
                 prop_assert_eq!(a * inverse, Modular::ONE);
             }
             prop_assert_eq!((a * a).root().map(|r| r == a || r == -a), Some(true));
+            let square = a * a;
+            if !a.is_zero() {
+                prop_assert!(square.is_positive() && !(-square).is_positive());
+                prop_assert_eq!(square.rational_power(1, 2), square.root());
+                let part = square.rational_power(-3, 7).unwrap();
+                prop_assert_eq!(part.power(7) * square.power(3), Modular::ONE);
+            }
         }
 
         #[test]

@@ -39,6 +39,8 @@ pub(crate) struct Symbol {
     pub role: Role,
     pub column: Option<usize>,
     pub first: First,
+    /// below zero at the reference point
+    pub negative: bool,
 }
 
 /// A plant with a question. The roots of the program are the states' derivatives, the
@@ -76,7 +78,7 @@ impl Model {
             find("state", &plant.states, name)?;
         }
         let Symbols {
-            symbols,
+            mut symbols,
             named,
             starts,
         } = Symbols::new(plant, question);
@@ -85,6 +87,9 @@ impl Model {
         roots.extend(&about);
         let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
         let reference = point::reference(plant, &mut Random::new(1));
+        for symbol in &mut symbols {
+            symbol.negative = reference.get(&symbol.node).is_some_and(|x| *x < 0.0);
+        }
         let branch = |node: Node| point::value(&plant.graph, node, &reference);
         let compiled = |roots: &[Node]| Program::new(&plant.graph, &nodes, roots, &branch);
         let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
@@ -253,6 +258,7 @@ impl Symbols {
             role,
             column,
             first,
+            negative: false,
         });
     }
 }

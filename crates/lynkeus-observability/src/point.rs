@@ -7,6 +7,9 @@ use lynkeus_model::{Plant, Variable};
 
 use crate::field::Random;
 
+/// How far beside zero a known start is looked at.
+const BESIDE: f64 = 1e-6;
+
 /// Values of every symbol: the model's own where it gives them, else inside the range.
 pub(crate) fn reference(plant: &Plant, random: &mut Random) -> HashMap<Node, f64> {
     let mut values = HashMap::new();
@@ -24,7 +27,12 @@ pub(crate) fn reference(plant: &Plant, random: &mut Random) -> HashMap<Node, f64
 }
 
 fn inside(variable: &Variable, value: Option<f64>, random: &mut Random) -> f64 {
-    let given = value.or(variable.start.filter(|x| *x != 0.0));
+    // a known start at zero is no point of its own: beside it, so that thresholds are told apart
+    let start = match variable.fixed && variable.start.unwrap_or(0.0) == 0.0 {
+        true => Some(BESIDE),
+        false => variable.start.filter(|x| *x != 0.0),
+    };
+    let given = value.or(start);
     if let Some(given) = given {
         return given;
     }

@@ -60,6 +60,16 @@ impl Start {
         Random::new(stream.wrapping_add(again)).element()
     }
 
+    /// A square for what is positive at the reference point, the negative of one for what is
+    /// negative: with the signs of numbers, √(x²) is x where x is positive, and log x exists.
+    fn free(&self, place: usize, negative: bool) -> Modular {
+        let root = self.drawn(place);
+        match negative {
+            true => -(root * root),
+            false => root * root,
+        }
+    }
+
     /// The first value of a symbol, `computed` being the values of starts that are
     /// expressions.
     pub fn value(&self, model: &Model, place: usize, computed: &[Modular]) -> Modular {
@@ -69,7 +79,7 @@ impl Start {
             (Role::Time, _) if self.at_zero => Modular::ZERO,
             (_, First::Given(value)) => value,
             (_, First::Computed(i)) => computed.get(i).copied().unwrap_or_default(),
-            (_, First::Free) => self.drawn(place),
+            (_, First::Free) => self.free(place, symbol.negative),
         };
         base + self.moved_by(model, place)
     }

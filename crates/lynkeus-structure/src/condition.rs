@@ -14,8 +14,20 @@ pub struct Point {
 /// Points that refute a condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Witness {
-    /// one point (where the expression vanishes) or two (where its signs differ)
+    /// two points where the signs differ, behind the zero between them where there is one; or a
+    /// zero alone
     pub points: Vec<Point>,
+}
+
+impl Witness {
+    /// The point where the expression vanishes; none where it changes its sign by a jump, or
+    /// between the members of a set.
+    pub fn zero(&self) -> Option<&Point> {
+        match self.points.len() {
+            2 => None,
+            _ => self.points.first(),
+        }
+    }
 }
 
 /// The verdict on a condition over the whole box.
@@ -52,22 +64,25 @@ pub struct Check {
 }
 
 /// Six significant digits, as a person reads them.
-pub(crate) fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    let digits = 5 - value.abs().log10().floor() as i32;
-    let rounded = if (0..=15).contains(&digits) {
-        format!("{value:.*}", digits as usize)
-    } else {
-        return format!("{value:.5e}");
-    };
-    match rounded.contains('.') {
-        true => rounded
+    let trimmed = |digits: &str| match digits.contains('.') {
+        true => digits
             .trim_end_matches('0')
             .trim_end_matches('.')
             .to_owned(),
-        false => rounded,
+        false => digits.to_owned(),
+    };
+    let digits = 5 - value.abs().log10().floor() as i32;
+    if (0..=15).contains(&digits) {
+        return trimmed(&format!("{value:.*}", digits as usize));
+    }
+    let text = format!("{value:.5e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) => format!("{}e{exponent}", trimmed(digits)),
+        None => text,
     }
 }
 
@@ -131,5 +146,7 @@ mod tests {
         }
         assert_eq!(short(0.1 + 0.2), "0.3");
         assert_eq!(short(100.0), "100");
+        assert_eq!(short(-1e-12), "-1e-12");
+        assert_eq!(short(2.5e20), "2.5e20");
     }
 }

@@ -29,7 +29,7 @@ pub mod visibility;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
-pub use condition::{Check, Condition, Point, Witness};
+pub use condition::{Check, Condition, Point, Witness, short};
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;

@@ -168,6 +168,9 @@ impl Search<'_> {
             false => self.region.corners(cell),
         };
         for point in points {
+            if !self.region.reaches(&point) {
+                continue;
+            }
             let mut out = [0.0];
             self.evaluator.eval(&point, &mut out);
             let value = sign * out[0];

@@ -24,6 +24,10 @@ pub struct Region {
     pub dimensions: Vec<Dimension>,
 }
 
+/// How far points go where no end is declared: what only happens beyond says nothing about a
+/// plant, but that its ranges are missing.
+const REACH: f64 = 1e9;
+
 /// One box of a subdivision: an interval per dimension.
 pub(crate) type Cell = Vec<Interval>;
 
@@ -50,12 +54,38 @@ impl Region {
         self.dimensions.iter().map(side).collect()
     }
 
-    /// Names and ends of a cell.
+    /// Names and ends of a cell; beyond what points reach, an end that is not declared
+    /// stands for itself.
     pub(crate) fn named(&self, cell: &Cell) -> Vec<(String, f64, f64)> {
         let sides = self.dimensions.iter().zip(cell);
-        sides
-            .map(|(d, side)| (d.name.clone(), side.lo(), side.hi()))
-            .collect()
+        let ends = |(d, side): (&Dimension, &Interval)| {
+            let (mut low, mut high) = (side.lo(), side.hi());
+            if d.min == f64::NEG_INFINITY && low < d.max.min(0.0) - REACH {
+                (low, high) = (d.min, high.max(d.max.min(0.0) - REACH));
+            }
+            if d.max == f64::INFINITY && high > d.min.max(0.0) + REACH {
+                (low, high) = (low.min(d.min.max(0.0) + REACH), d.max);
+            }
+            (d.name.clone(), low, high)
+        };
+        sides.map(ends).collect()
+    }
+
+    /// Names of the dimensions without a declared end.
+    pub fn open(&self) -> Vec<&str> {
+        let open = |d: &&Dimension| d.min.is_infinite() || d.max.is_infinite();
+        let open = self.dimensions.iter().filter(open);
+        open.map(|d| d.name.as_str()).collect()
+    }
+
+    /// Whether a point is not absurdly far where no end is declared.
+    pub(crate) fn reaches(&self, point: &[f64]) -> bool {
+        let near = |(d, &x): (&Dimension, &f64)| {
+            let below = d.min.is_finite() || x >= d.max.min(0.0) - REACH;
+            let above = d.max.is_finite() || x <= d.min.max(0.0) + REACH;
+            below && above
+        };
+        self.dimensions.iter().zip(point).all(near)
     }
 
     /// Halves the relatively widest side; none if every side is a point.

@@ -4,6 +4,8 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::condition::short;
+use crate::region::Cell;
+use crate::regularity::is_regular;
 use crate::{Check, Condition, Point, Range, Region, Regularity, Witness, range, range_within};
 
 /// Cells examined per end to see whether there is a bound.
@@ -116,20 +118,25 @@ fn witness(
     };
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
-    let exact = |point: &&Point| {
+    for point in [lowest, highest] {
         let value = enclosure(&tape, point);
-        value.lo() == 0.0 && value.hi() == 0.0
-    };
-    if let Some(zero) = [lowest, highest].into_iter().find(exact) {
-        return Ok(Some(Witness {
-            points: vec![zero.clone()],
-        }));
+        // where it jumps, the value between is no zero
+        if value.lo() == 0.0
+            && value.hi() == 0.0
+            && is_regular(graph, node, &region, &around(point, &region))?
+        {
+            return Ok(Some(Witness {
+                points: vec![point.clone()],
+            }));
+        }
     }
     if !(enclosure(&tape, lowest).is_negative() && enclosure(&tape, highest).is_positive()) {
         return Ok(None);
     }
     let mut points = vec![lowest.clone(), highest.clone()];
-    if let Some(zero) = zero_between(tape, &region, lowest, highest) {
+    if let Some((bracket, zero)) = zero_between(&tape, &region, lowest, highest)
+        && is_regular(graph, node, &region, &bracket)?
+    {
         points.insert(0, zero);
     }
     Ok(Some(Witness { points }))
@@ -146,31 +153,58 @@ fn enclosure(tape: &Tape, point: &Point) -> Interval {
     tape.eval_in(&Intervals, &cell)[0]
 }
 
-/// Bisection along the straight line between two points of opposite sign.
-fn zero_between(tape: Tape, region: &Region, negative: &Point, positive: &Point) -> Option<Point> {
+/// A small cell of the region around a point.
+fn around(point: &Point, region: &Region) -> Cell {
+    let sides = point.coordinates.iter().zip(&region.dimensions);
+    let side = |((_, x), d): (&(String, f64), &crate::Dimension)| {
+        let (low, high) = (x.next_down().max(d.min), x.next_up().min(d.max));
+        Interval::new(low, high).unwrap_or(Interval::point(*x))
+    };
+    sides.map(side).collect()
+}
+
+/// Bisection along the straight line between two points of opposite sign, rounding errors
+/// included: a cell at whose ends the signs still differ, and the zero in it.
+fn zero_between(
+    tape: &Tape,
+    region: &Region,
+    negative: &Point,
+    positive: &Point,
+) -> Option<(Cell, Point)> {
     let values = |p: &Point| p.coordinates.iter().map(|c| c.1).collect::<Vec<f64>>();
     let (mut p, mut q) = (values(negative), values(positive));
     if !region.connected(&p, &q) {
         return None;
     }
-    let mut evaluator = tape.evaluator();
-    let mut value = [0.0];
+    let middle_of = |p: &[f64], q: &[f64]| -> Vec<f64> {
+        p.iter().zip(q).map(|(p, q)| p + (q - p) / 2.0).collect()
+    };
     for _ in 0..200 {
-        let middle: Vec<f64> = p.iter().zip(&q).map(|(p, q)| p + (q - p) / 2.0).collect();
-        evaluator.eval(&middle, &mut value);
-        if value[0] == 0.0 || middle == p || middle == q {
-            break;
-        }
-        *(if value[0] < 0.0 { &mut p } else { &mut q }) = middle;
+        let middle = middle_of(&p, &q);
+        let cell: Vec<Interval> = middle.iter().map(|&x| Interval::point(x)).collect();
+        let value = tape.eval_in(&Intervals, &cell)[0];
+        let side = match () {
+            () if middle == p || middle == q => break,
+            () if value.is_negative() => &mut p,
+            () if value.is_positive() => &mut q,
+            () => break,
+        };
+        *side = middle;
     }
-    let middle: Vec<f64> = p.iter().zip(&q).map(|(p, q)| p + (q - p) / 2.0).collect();
-    evaluator.eval(&middle, &mut value);
+    let middle = middle_of(&p, &q);
+    let mut value = [0.0];
+    tape.evaluator().eval(&middle, &mut value);
+    let ends = p.iter().zip(&q);
+    let bracket: Option<Cell> = ends
+        .map(|(&p, &q)| Interval::new(p.min(q), p.max(q)).ok())
+        .collect();
     let names = negative.coordinates.iter().map(|c| c.0.clone());
     let small = value[0].abs() <= 1e-9 * (positive.value - negative.value);
-    small.then(|| Point {
+    let zero = Point {
         coordinates: names.zip(middle).collect(),
         value: value[0],
-    })
+    };
+    Some((bracket?, zero)).filter(|_| small)
 }
 
 #[cfg(test)]
@@ -244,6 +278,51 @@ mod tests {
         };
         let values: Vec<f64> = witness.points.iter().map(|p| p.value).collect();
         assert_eq!(values, [-1.0, 1.0]);
+    }
+
+    /// The slope of |x| is never zero, though sign(0) is; nor does 1/x pass zero.
+    #[test]
+    fn a_jump_is_no_zero() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let sign = g.expr(g.unary(lynkeus_expr::Unary::Sign, x.node()));
+        for f in [sign, 2.0 * sign + x / 10.0, 1.0 / x] {
+            let sign = decide(f, vec![side(x, -1.0, 1.0, false)]);
+            if let Condition::Refuted(witness) = sign.check.verdict {
+                assert_eq!(witness.zero(), None);
+            }
+        }
+        let sign = decide(sign * x - 0.5, vec![side(x, -1.0, 1.0, false)]);
+        let Condition::Refuted(witness) = sign.check.verdict else {
+            panic!()
+        };
+        let zero = witness.zero().unwrap().coordinates[0].1;
+        assert!((zero.abs() - 0.5).abs() < 1e-9, "{zero}");
+    }
+
+    /// No witness at the end of the floating-point numbers.
+    #[test]
+    fn witnesses_are_within_reach() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let all = (f64::NEG_INFINITY, f64::INFINITY);
+        for f in [x, x * x * x - 7.0, x.exp() - 2.0, 1.0 - x * x] {
+            let sign = decide(f, vec![side(x, all.0, all.1, false)]);
+            let Condition::Refuted(witness) = &sign.check.verdict else {
+                panic!("{sign:?}")
+            };
+            let far = |p: &Point| p.coordinates[0].1.abs() > 1e10;
+            assert!(!witness.points.iter().any(far), "{witness}");
+        }
+        // of one sign as far as anyone looks
+        let sign = decide(x + 1e30, vec![side(x, all.0, all.1, false)]);
+        assert!(matches!(sign.check.verdict, Condition::Undecided(_)));
+        let text = format!("{} {}", sign.check.verdict, sign.check.detail);
+        assert!(
+            !text.contains("e30") || text.contains("declare min and max of x"),
+            "{text}"
+        );
+        assert!(!text.contains("e307"), "{text}");
     }
 
     #[test]

@@ -32,8 +32,10 @@ pub struct Uniformity {
     pub regular: Check,
     /// where it may be zero: cells of a subdivision, and their share of the box's volume
     pub singular: Vec<Part>,
-    /// the share
+    /// the share; without meaning where a range is missing
     pub share: f64,
+    /// variables of the determinant whose range is not declared
+    pub undeclared: Vec<String>,
     /// constant inputs for which the determinant is zero for every state
     pub blind: Vec<Blind>,
     /// ranges of the states
@@ -73,7 +75,7 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         return Ok(None);
     }
     let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input".to_owned();
-    let regular = sign::keeps_sign(graph, name, node, &region)?.check;
+    let regular = without_jumps(sign::keeps_sign(graph, name, node, &region)?.check, &region);
     let (singular, share) = match regular.verdict {
         Condition::Proved => (vec![], 0.0),
         _ => cells(graph, node, &region)?,
@@ -86,12 +88,31 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         regular,
         singular,
         share,
+        undeclared: region
+            .restricted(&graph.symbols_of(&[node]))
+            .open()
+            .into_iter()
+            .map(str::to_owned)
+            .collect(),
         sides: extended
             .states
             .iter()
             .map(|s| (s.name.clone(), s.min, s.max))
             .collect(),
     }))
+}
+
+/// Refuted only where the determinant is zero: where it changes its sign by a jump, as slopes
+/// do at a kink, or from one whole number to the next, no point is singular.
+fn without_jumps(check: Check, region: &Region) -> Check {
+    match &check.verdict {
+        Condition::Refuted(witness) if witness.zero().is_none() => Check {
+            verdict: Condition::Undecided(region.named(&region.cell())),
+            detail: format!("{}, but only by a jump", check.detail),
+            ..check
+        },
+        _ => check,
+    }
 }
 
 /// det ∂(y, y', …)/∂x for constant inputs, rows chosen at generic points.
@@ -171,9 +192,15 @@ fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Bli
             0.0,
             input.min,
             input.max,
-            f64::midpoint(input.min, input.max),
+            match input.integer {
+                true => f64::midpoint(input.min, input.max).floor(),
+                false => f64::midpoint(input.min, input.max),
+            },
         ];
-        let inside = |x: &f64| x.is_finite() && *x >= input.min && *x <= input.max;
+        let inside = |x: &f64| {
+            let whole = !input.integer || x.fract() == 0.0;
+            x.is_finite() && *x >= input.min && *x <= input.max && whole
+        };
         let mut tried: Vec<f64> = vec![];
         for value in ends.into_iter().filter(inside) {
             if tried.contains(&value) {
@@ -294,6 +321,44 @@ mod tests {
             let (_, low, high) = part.iter().find(|(name, ..)| name == "b").unwrap();
             assert!(*low <= 0.0 && *high >= 0.0 && high - low < 0.1, "{part:?}");
         }
+    }
+
+    /// The slope of |b| jumps from −1 to 1, that of b·|b| is zero at b = 0.
+    #[test]
+    fn a_jump_of_the_sensitivity_is_no_singular_point() {
+        let found = examined("der(a) = abs(b); der(b) = -b;").unwrap();
+        assert!(
+            matches!(found.regular.verdict, Condition::Undecided(_)),
+            "{:?}",
+            found.regular
+        );
+        let found = examined("der(a) = abs(b)*b; der(b) = -b;").unwrap();
+        assert!(
+            matches!(found.regular.verdict, Condition::Refuted(_)),
+            "{:?}",
+            found.regular
+        );
+    }
+
+    #[test]
+    fn a_whole_input_blinds_at_whole_values_only() {
+        let blind = |factor: &str| {
+            let text = format!(
+                "model P input Integer s(min = 0, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2); output Real y = a;
+                 equation der(a) = {factor}*b; der(b) = -b; end P;"
+            );
+            let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
+            let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+            uniformity(&extended).unwrap().unwrap()
+        };
+        let never = blind("(s - 0.5)");
+        assert!(never.blind.is_empty());
+        assert!(
+            !matches!(never.regular.verdict, Condition::Refuted(_)),
+            "{:?}",
+            never.regular
+        );
+        assert_eq!(blind("s").blind.len(), 1);
     }
 
     #[test]

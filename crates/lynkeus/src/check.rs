@@ -7,11 +7,12 @@ use std::fmt;
 
 use lynkeus_observability::{Answer, Limits, Verdict};
 use lynkeus_observers::{Examination, Fit};
-use lynkeus_structure::{Condition, Point, Uniformity, uniformity};
+use lynkeus_structure::{Condition, Point, uniformity};
 use serde_json::{Value, json};
 
 use crate::words::conditions;
 use crate::{Error, Study, prepare};
+pub use uniform::Uniform;
 
 /// What to ask beside "which states, by which observer".
 #[derive(Clone, Debug, Default)]
@@ -43,7 +44,7 @@ pub struct Report {
     pub answer: Answer,
     /// for what inputs and where states can be told apart; none for many states, or where
     /// they cannot at all
-    pub uniformity: Option<Uniformity>,
+    pub uniform: Option<Uniform>,
     /// parameters are unknown constants
     pub parameters: bool,
 }
@@ -73,15 +74,16 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         examinations: vec![],
         recommended: None,
         answer,
-        uniformity: None,
+        uniform: None,
         parameters: options.parameters,
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
         let plant = prepare::plant(study)?;
         let extended = prepare::extended(study, &plant)?;
-        report.uniformity =
-            uniformity(&extended).map_err(|error| Error::input(error.to_string()))?;
+        let examined = uniformity(&extended).map_err(|error| Error::input(error.to_string()))?;
+        report.uniform =
+            examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
         report.examinations = prepare::examinations(study, &extended)?;
         report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
@@ -99,8 +101,8 @@ impl Report {
     /// # Errors
     /// Another number of states, or a state without range.
     pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
-        match &self.uniformity {
-            Some(uniformity) => uniform::picture(&self.plant, uniformity),
+        match &self.uniform {
+            Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
             None => Err(Error::input(format!(
                 "{}: the singular set was not examined: it needs values for all parameters, at most six states, and outputs that show them",
                 self.plant
@@ -127,7 +129,12 @@ impl Report {
             "visible": visible.collect::<serde_json::Map<_, _>>(),
         });
         observability::add_json(&self.answer, &mut report);
-        report["uniform"] = json!(self.uniformity.as_ref().map(uniform::json));
+        report["uniform"] = json!(
+            self.uniform
+                .as_ref()
+                .and_then(Uniform::said)
+                .map(uniform::json)
+        );
         report
     }
 }
@@ -189,8 +196,8 @@ impl fmt::Display for Report {
         )?;
         writeln!(f)?;
         observability::print(f, self)?;
-        if let Some(uniformity) = &self.uniformity {
-            uniform::print(f, uniformity)?;
+        if let Some(uniform) = &self.uniform {
+            uniform::print(f, uniform)?;
         }
         for examination in &self.examinations {
             writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
@@ -236,13 +243,28 @@ impl Report {
         let Some(family) = self.recommended else {
             return writeln!(f, "no observer of this version fits these sensors");
         };
-        let all = self
-            .answer
-            .quantities
-            .iter()
-            .map(|(asked, _)| asked.name.as_str());
-        let all: Vec<&str> = all.collect();
-        writeln!(f, "can be estimated: {} (by {family})", all.join(", "))?;
+        let of = |hidden: bool| -> Vec<&str> {
+            let quantities = self.answer.quantities.iter();
+            let kept = quantities.filter(|(q, _)| (q.verdict == Verdict::Unobservable) == hidden);
+            kept.map(|(asked, _)| asked.name.as_str()).collect()
+        };
+        let (seen, hidden) = (of(false).join(", "), of(true).join(", "));
+        if !seen.is_empty() {
+            writeln!(f, "can be estimated: {seen} (by {family})")?;
+        }
+        // the outputs alone do not tell: something has to be taken for granted
+        match (hidden.is_empty(), self.unknown.is_empty()) {
+            (true, _) => {}
+            (false, false) => writeln!(
+                f,
+                "only if {} stays constant: {hidden} (by {family})",
+                self.unknown.join(", ")
+            )?,
+            (false, true) => writeln!(
+                f,
+                "not from the outputs: {hidden}; what {family} gives for them follows from the model alone"
+            )?,
+        }
         writeln!(f, "{}", self.reason())
     }
 }

@@ -9,6 +9,7 @@
 
 mod functions;
 mod program;
+mod rows;
 mod run;
 
 pub(crate) use functions::Functions;

@@ -1,8 +1,11 @@
 //! Coefficients and sensitivities, order by order.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
+use super::functions::Arc;
 use super::program::{Inverse, Step};
+use super::rows::{Row, Series, Sum};
 use super::{Functions, Program};
 use crate::field::Modular;
 
@@ -24,66 +27,6 @@ impl Stop {
             Stop::Time => "time",
             Stop::Memory => "memory",
             Stop::Point(_) => "the point",
-        }
-    }
-}
-
-/// Coefficients of one slot with their sensitivities.
-#[derive(Clone, Debug, Default)]
-struct Series {
-    values: Vec<Modular>,
-    /// per order one row of sensitivities; empty for what no unknown moves
-    tangents: Vec<Row>,
-}
-
-/// A row of sensitivities; most quantities of a large model feel few of its unknowns.
-#[derive(Clone, Debug)]
-enum Row {
-    Dense(Vec<Modular>),
-    /// (column, what is not zero there)
-    Sparse(Vec<(usize, Modular)>),
-}
-
-impl Row {
-    fn new(row: Vec<Modular>) -> Self {
-        let filled = row.iter().filter(|x| !x.is_zero()).count();
-        if 3 * filled > row.len() {
-            return Row::Dense(row);
-        }
-        let entries = row.into_iter().enumerate();
-        // collected anew: a list filtered in place would keep the row's memory
-        let mut sparse = Vec::with_capacity(filled);
-        sparse.extend(entries.filter(|(_, x)| !x.is_zero()));
-        Row::Sparse(sparse)
-    }
-
-    /// In numbers of the field.
-    fn size(&self) -> usize {
-        match self {
-            Row::Dense(row) => row.len(),
-            Row::Sparse(row) => 2 * row.len(),
-        }
-    }
-
-    fn is_empty(&self) -> bool {
-        self.size() == 0
-    }
-
-    /// sum += factor·row
-    fn add_to(&self, sum: &mut [Modular], factor: Modular) {
-        match self {
-            Row::Dense(row) => {
-                for (s, r) in sum.iter_mut().zip(row) {
-                    *s = *s + factor * *r;
-                }
-            }
-            Row::Sparse(row) => {
-                for &(column, r) in row {
-                    if let Some(s) = sum.get_mut(column) {
-                        *s = *s + factor * r;
-                    }
-                }
-            }
         }
     }
 }
@@ -152,13 +95,13 @@ impl<'a> Run<'a> {
         let slot = self.program.roots[i];
         let series = &self.slots[slot];
         let last = series.values.len().saturating_sub(1);
-        let mut tangent = vec![];
+        let mut tangent = Sum::default();
         if last < series.tangents.len() {
             self.add(&mut tangent, Modular::ONE, slot, last);
         }
         (
             series.values.get(last).copied().unwrap_or_default(),
-            tangent,
+            tangent.into_row(),
         )
     }
 
@@ -177,15 +120,8 @@ impl<'a> Run<'a> {
     }
 
     /// sum += factor·(sensitivities of coefficient k)
-    fn add(&self, sum: &mut Vec<Modular>, factor: Modular, slot: usize, k: usize) {
-        let row = &self.slots[slot].tangents[k];
-        if row.is_empty() || factor.is_zero() {
-            return;
-        }
-        if sum.is_empty() {
-            sum.resize(self.width, Modular::ZERO);
-        }
-        row.add_to(sum, factor);
+    fn add(&self, sum: &mut Sum, factor: Modular, slot: usize, k: usize) {
+        sum.add(factor, &self.slots[slot].tangents[k], self.width);
     }
 
     fn rational(
@@ -195,7 +131,7 @@ impl<'a> Run<'a> {
         k: usize,
     ) -> Result<(Modular, Vec<Modular>), Stop> {
         let one = Modular::ONE;
-        let mut tangent = vec![];
+        let mut tangent = Sum::default();
         let value = match step {
             Step::Neg(a) => {
                 self.add(&mut tangent, -one, a, k);
@@ -215,13 +151,13 @@ impl<'a> Run<'a> {
             Step::Div(a, b) => self.quotient(&mut tangent, slot, a, b, k)?,
             Step::Sqrt(a) => self.root_of(&mut tangent, slot, a, k)?,
             Step::Exp(a) => self.exponential(&mut tangent, slot, a, k),
-            Step::Integral { a, h, of } => self.integral(&mut tangent, (a, h), of, k),
+            Step::Integral { a, h, of } => self.integral(&mut tangent, slot, (a, h), of, k)?,
             _ => Modular::ZERO,
         };
-        Ok((value, tangent))
+        Ok((value, tangent.into_row()))
     }
 
-    fn product(&self, tangent: &mut Vec<Modular>, a: usize, b: usize, k: usize) -> Modular {
+    fn product(&self, tangent: &mut Sum, a: usize, b: usize, k: usize) -> Modular {
         let mut value = Modular::ZERO;
         for j in 0..=k {
             let (x, y) = (self.value(a, j), self.value(b, k - j));
@@ -240,7 +176,7 @@ impl<'a> Run<'a> {
     /// c = a/b from a = c·b.
     fn quotient(
         &self,
-        tangent: &mut Vec<Modular>,
+        tangent: &mut Sum,
         c: usize,
         a: usize,
         b: usize,
@@ -256,18 +192,12 @@ impl<'a> Run<'a> {
         }
         let value = value * inverse;
         self.add(tangent, -value, b, 0);
-        tangent.iter_mut().for_each(|t| *t = *t * inverse);
+        tangent.scale(inverse);
         Ok(value)
     }
 
     /// c = √a from a = c².
-    fn root_of(
-        &self,
-        tangent: &mut Vec<Modular>,
-        c: usize,
-        a: usize,
-        k: usize,
-    ) -> Result<Modular, Stop> {
+    fn root_of(&self, tangent: &mut Sum, c: usize, a: usize, k: usize) -> Result<Modular, Stop> {
         let sign = match self.functions.is_turned(c) {
             true => -Modular::ONE,
             false => Modular::ONE,
@@ -279,7 +209,7 @@ impl<'a> Run<'a> {
         if k == 0 {
             let root = value.root().ok_or(missing)?;
             let inverse = (two * root).inverse().ok_or(missing)?;
-            tangent.iter_mut().for_each(|t| *t = *t * inverse);
+            tangent.scale(inverse);
             return Ok(root);
         }
         for j in 1..k {
@@ -291,7 +221,7 @@ impl<'a> Run<'a> {
             let other = if j == 0 { value } else { self.value(c, k - j) };
             self.add(tangent, -two * other, c, j);
         }
-        tangent.iter_mut().for_each(|t| *t = *t * inverse);
+        tangent.scale(inverse);
         Ok(value)
     }
 
@@ -306,21 +236,48 @@ impl<'a> Run<'a> {
     }
 
     /// dy = h·da
-    fn chained(
-        &self,
-        tangent: &mut Vec<Modular>,
-        a: usize,
-        h: &dyn Fn(usize) -> Modular,
-        k: usize,
-    ) {
+    fn chained(&self, tangent: &mut Sum, a: usize, h: &dyn Fn(usize) -> Modular, k: usize) {
         for j in 0..=k {
             self.add(tangent, h(k - j), a, j);
         }
     }
 
-    fn exponential(&mut self, tangent: &mut Vec<Modular>, y: usize, a: usize, k: usize) -> Modular {
+    /// The first value of a slot as a sum: e^(x + y + z) is a product of three, however many
+    /// terms there are.
+    fn terms(&self, slot: usize) -> Vec<Modular> {
+        let mut open = BTreeMap::from([(slot, Modular::ONE)]);
+        let mut terms = vec![];
+        // operands come before what is made of them: each slot is opened once
+        while let Some((slot, factor)) = open.pop_last() {
+            let mut add = |slot: usize, factor: Modular| {
+                let sum = open.entry(slot).or_default();
+                *sum = *sum + factor;
+            };
+            match self.program.steps[slot] {
+                Step::Neg(a) => add(a, -factor),
+                Step::Add(a, b) => {
+                    add(a, factor);
+                    add(b, factor);
+                }
+                Step::Sub(a, b) => {
+                    add(a, factor);
+                    add(b, -factor);
+                }
+                Step::Mul(a, b) if self.is_constant(a) => add(b, factor * self.value(a, 0)),
+                Step::Mul(a, b) if self.is_constant(b) => add(a, factor * self.value(b, 0)),
+                _ => terms.push(factor * self.value(slot, 0)),
+            }
+        }
+        terms
+    }
+
+    fn is_constant(&self, slot: usize) -> bool {
+        matches!(self.program.steps[slot], Step::Constant(_))
+    }
+
+    fn exponential(&mut self, tangent: &mut Sum, y: usize, a: usize, k: usize) -> Modular {
         let value = match k {
-            0 => self.functions.exponential(self.value(a, 0)),
+            0 => self.functions.exponential(&self.terms(a)),
             _ => self.integrated(a, y, k),
         };
         let h = |j: usize| if j == k { value } else { self.value(y, j) };
@@ -330,34 +287,60 @@ impl<'a> Run<'a> {
 
     fn integral(
         &mut self,
-        tangent: &mut Vec<Modular>,
+        tangent: &mut Sum,
+        slot: usize,
         (a, h): (usize, usize),
         of: Inverse,
         k: usize,
-    ) -> Modular {
-        let argument = self.value(a, 0);
-        let value = match (k, of) {
-            (0, Inverse::Logarithm) => self.functions.logarithm(argument),
-            (0, Inverse::Odd(of)) => self.functions.odd(of, argument),
+    ) -> Result<Modular, Stop> {
+        let value = match k {
+            0 => self.first_of_inverse(slot, self.value(a, 0), self.value(h, 0), of)?,
             _ => self.integrated(a, h, k),
         };
         self.chained(tangent, a, &|j| self.value(h, j), k);
-        value
+        Ok(value)
+    }
+
+    /// The first value, from the argument and the derivative there.
+    fn first_of_inverse(
+        &mut self,
+        slot: usize,
+        argument: Modular,
+        derivative: Modular,
+        of: Inverse,
+    ) -> Result<Modular, Stop> {
+        match of {
+            Inverse::Logarithm if !self.functions.may_have_logarithm(slot, argument) => {
+                Err(Stop::Point(slot))
+            }
+            Inverse::Logarithm => Ok(self.functions.logarithm(argument)),
+            // 1/√(1 − a²) has the cosine below, 1/(1 + a²) is its square
+            Inverse::Arc(Arc::Sine) => {
+                let cosine = derivative.inverse();
+                let root = cosine.is_some_and(|c| c * c + argument * argument == Modular::ONE);
+                let cosine = cosine.filter(|_| root);
+                Ok(self.functions.arc(Arc::Sine, argument, cosine))
+            }
+            Inverse::Arc(Arc::Tangent) => {
+                let cosine = derivative.root();
+                Ok(self.functions.arc(Arc::Tangent, argument, cosine))
+            }
+        }
     }
 
     /// s' = c·a', c' = −s·a'
     fn pair(&mut self, s: usize, a: usize, k: usize) -> Result<(), Stop> {
         let c = s + 1;
         let (x, y) = match k {
-            0 => self.functions.angle(self.value(a, 0)),
+            0 => self.functions.angle(&self.terms(a)),
             _ => (self.integrated(a, c, k), -self.integrated(a, s, k)),
         };
-        let (mut dx, mut dy) = (vec![], vec![]);
+        let (mut dx, mut dy) = (Sum::default(), Sum::default());
         let cosine = |j: usize| if j == k { y } else { self.value(c, j) };
         let sine = |j: usize| -(if j == k { x } else { self.value(s, j) });
         self.chained(&mut dx, a, &cosine, k);
         self.chained(&mut dy, a, &sine, k);
-        self.store(s, x, dx)?;
-        self.store(c, y, dy)
+        self.store(s, x, dx.into_row())?;
+        self.store(c, y, dy.into_row())
     }
 }

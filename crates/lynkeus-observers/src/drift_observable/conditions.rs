@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, Degree, Rows};
-use lynkeus_structure::{Check, Condition, Dimension, Extended, Region, sign, visibility};
+use lynkeus_structure::{Check, Condition, Dimension, Extended, Region, short, sign, visibility};
 
 use super::keys::{self, Variant};
 use super::{NAME, derivative_name};
@@ -219,12 +219,12 @@ pub(super) fn regular(
     }
     let det = output_map::determinant(graph, Q).unwrap_or_else(|| graph.constant(0.0).node());
     let found = sign::keeps_sign(graph, name, det, region)?;
-    let (low, high) = found.bounds;
+    let (low, high) = (short(found.bounds.0), short(found.bounds.1));
     let detail = match found.check.verdict {
-        Condition::Proved => format!("|det| lies in [{low:.4}, {high:.4}]"),
+        Condition::Proved => format!("|det| lies in [{low}, {high}]"),
         Condition::Refuted(_) => "det vanishes or changes its sign".to_owned(),
         Condition::Undecided(_) => {
-            format!("|det| lies in [{low:.4}, {high:.4}] as far as can be proved")
+            format!("|det| lies in [{low}, {high}] as far as can be proved")
         }
     };
     Ok(Check {

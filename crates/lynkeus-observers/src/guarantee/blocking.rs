@@ -1,7 +1,7 @@
 //! Why there is no proof, or no gain: which range stands in the way.
 
 use lynkeus_gain::decay::{self, ErrorModel, Request};
-use lynkeus_structure::Slopes;
+use lynkeus_structure::{Slopes, short};
 
 use super::error_system::ErrorSystem;
 use super::expanded;
@@ -52,10 +52,10 @@ pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
     let range = |k: usize| {
         let slope = &slopes.slopes[k];
         format!(
-            "the slope of {} in [{:.4}, {:.4}]{}",
+            "the slope of {} in [{}, {}]{}",
             slope.term,
-            slope.range.lo(),
-            slope.range.hi(),
+            short(slope.range.lo()),
+            short(slope.range.hi()),
             match slope.variables.is_empty() {
                 true => String::new(),
                 false => format!(" (over the range of {})", slope.variables.join(", ")),

@@ -19,7 +19,7 @@ mod refute;
 mod ultimate;
 
 use lynkeus_gain::decay::{self, ErrorModel, Proof};
-use lynkeus_structure::{Check, Condition, Extended};
+use lynkeus_structure::{Check, Condition, Extended, short};
 
 use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};
 use error_system::ErrorSystem;
@@ -101,8 +101,8 @@ fn inequality(system: &ErrorSystem, proof: Option<&Proof>) -> Check {
             name,
             verdict: Condition::Proved,
             detail: format!(
-                "He(P J) + 2·{:.4}·P < 0 for all {count} slopes within their ranges, by interval Cholesky factorisation",
-                proof.rate
+                "He(P J) + 2·{}·P < 0 for all {count} slopes within their ranges, by interval Cholesky factorisation",
+                short(proof.rate)
             ),
         },
         None => Check {
@@ -116,7 +116,8 @@ fn inequality(system: &ErrorSystem, proof: Option<&Proof>) -> Check {
 /// What can be said without a proof on the whole box.
 fn still_said(system: &ErrorSystem, slowest: f64) -> Vec<String> {
     let mut notes = vec![format!(
-        "at every point examined the error's Jacobian is stable, the slowest mode decaying at {slowest:.4}"
+        "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
+        short(slowest)
     )];
     if system.is_bounded()
         && let Some(share) = blocking::provable_share(system)

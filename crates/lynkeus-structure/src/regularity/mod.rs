@@ -137,6 +137,18 @@ fn nearest(low: f64, high: f64) -> f64 {
     }
 }
 
+/// Whether an expression has values everywhere on one cell and does not jump there,
+/// whichever symbol moves: a change of its sign is then a zero.
+pub(crate) fn is_regular(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    cell: &Cell,
+) -> Result<bool, MissingInput> {
+    let mut walk = Walk::new(graph, &[node], &region.symbols(), region)?;
+    Ok(walk.trouble(&[node], cell).is_none())
+}
+
 /// The first place where it is not decided, depth first: a true jump is found after a few
 /// dozen cells, an overestimated range goes on until every cell is decided.
 fn search(

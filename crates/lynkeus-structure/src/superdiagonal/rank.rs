@@ -38,7 +38,7 @@ impl Factor {
                 points: vec![direction],
             };
             let detail = format!(
-                "{shape} and constant: no input ever tells these states apart; measure another output"
+                "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
             );
             return Ok(Check {
                 name,

@@ -9,39 +9,92 @@ use serde_json::{Map, Value, json};
 use crate::Error;
 use crate::plot::Plane;
 use crate::words::{number, side};
+use lynkeus_observability::{Answer, Quantity, Verdict};
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
 
-pub(super) fn print(f: &mut fmt::Formatter<'_>, uniformity: &Uniformity) -> fmt::Result {
+/// What was found on the box, and how far it may be said beside the verdicts on the
+/// quantities: the box is examined with unknown inputs that stay constant, the verdicts are on
+/// any. Made in one place, so that the two never contradict each other.
+#[derive(Clone, Debug)]
+pub struct Uniform {
+    examined: Uniformity,
+    /// states and unknown inputs that the outputs do not determine
+    hidden: Vec<String>,
+    /// unknown inputs
+    constant: Vec<String>,
+}
+
+impl Uniform {
+    pub(super) fn new(examined: Uniformity, answer: &Answer, unknown: &[String]) -> Self {
+        let asked = answer.quantities.iter();
+        let hidden = asked.filter(|(asked, kind)| {
+            *kind != Quantity::Parameter && asked.verdict == Verdict::Unobservable
+        });
+        Self {
+            hidden: hidden.map(|(asked, _)| asked.name.clone()).collect(),
+            constant: unknown.to_vec(),
+            examined,
+        }
+    }
+
+    /// The finding, unless something is not observable at all: then no map from states to
+    /// outputs tells all of them apart.
+    pub fn said(&self) -> Option<&Uniformity> {
+        self.hidden.is_empty().then_some(&self.examined)
+    }
+
+    /// What was examined, whatever may be said of it: the singular set for constant unknown inputs.
+    pub(super) fn examined(&self) -> &Uniformity {
+        &self.examined
+    }
+
+    /// The assumption in words.
+    fn assumption(&self) -> String {
+        match self.constant.is_empty() {
+            true => String::new(),
+            false => format!(" (while {} stays constant too)", self.constant.join(", ")),
+        }
+    }
+}
+
+pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Result {
+    let Some(uniformity) = uniform.said() else {
+        return Ok(());
+    };
+    let assumption = uniform.assumption();
     match &uniformity.regular.verdict {
         Condition::Proved => {
             return writeln!(
                 f,
-                "for every constant input and everywhere on the box: proved"
+                "for every constant input{assumption} and everywhere on the box: proved"
             );
         }
         Condition::Refuted(witness) => {
-            let first = witness
-                .points
-                .iter()
-                .min_by(|p, q| p.value.abs().total_cmp(&q.value.abs()));
-            let place = first.map(|p| {
+            let place = witness.zero().map(|p| {
                 let sides = p.coordinates.iter().map(|(n, x)| side(n, *x, *x));
                 sides.collect::<Vec<_>>().join(", ")
             });
             writeln!(
                 f,
-                "not everywhere on the box: the map from states to outputs and their derivatives is singular at {}",
+                "not everywhere on the box{assumption}: the map from states to outputs and their derivatives is singular at {}",
                 place.unwrap_or_default()
             )?;
         }
         Condition::Undecided(_) => {
-            writeln!(f, "not decided everywhere on the box")?;
+            writeln!(f, "not decided everywhere on the box{assumption}")?;
         }
     }
     for blind in &uniformity.blind {
         writeln!(f, "  {}", told(blind))?;
+    }
+    if !uniformity.undeclared.is_empty() {
+        let names = uniformity.undeclared.join(", ");
+        return writeln!(
+            f,
+            "  declare min and max of {names} to see where singular points lie"
+        );
     }
     if uniformity.blind.is_empty() && !uniformity.singular.is_empty() {
         writeln!(

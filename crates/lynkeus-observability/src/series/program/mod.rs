@@ -1,5 +1,6 @@
 //! Expressions as a list of operations on series.
 
+mod numbers;
 mod unary;
 
 use std::collections::{BTreeSet, HashMap};
@@ -33,10 +34,10 @@ pub(super) enum Step {
 }
 
 /// Which function an integral is.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Inverse {
     Logarithm,
-    Odd(crate::series::functions::Odd),
+    Arc(crate::series::functions::Arc),
 }
 
 /// Operations that compute some roots from symbols.
@@ -70,6 +71,7 @@ impl Program {
             program: Program::default(),
             slots: HashMap::new(),
             pairs: HashMap::new(),
+            rooted: BTreeSet::new(),
             solutions: HashMap::new(),
         };
         for node in graph.reachable(roots) {
@@ -100,34 +102,49 @@ impl Program {
         self.steps.iter().any(reads)
     }
 
-    /// Slots of roots, which not every value has.
+    /// Slots of roots and logarithms, which not every value has.
     pub fn partial(&self) -> impl Iterator<Item = usize> + '_ {
+        let partial = |step: &Step| {
+            let of = Inverse::Logarithm;
+            matches!(step, Step::Sqrt(_))
+                || matches!(step, Step::Integral { of: found, .. } if *found == of)
+        };
         let steps = self.steps.iter().enumerate();
-        steps.filter_map(|(slot, step)| matches!(step, Step::Sqrt(_)).then_some(slot))
+        steps.filter_map(move |(slot, step)| partial(step).then_some(slot))
     }
 
     /// Places of the symbols that a slot depends on.
     pub fn support(&self, slot: usize) -> BTreeSet<usize> {
-        let (mut places, mut seen) = (BTreeSet::new(), BTreeSet::new());
+        let place = |slot: usize| match self.steps[slot] {
+            Step::Symbol(place) => Some(place),
+            _ => None,
+        };
+        let below = self.below(slot);
+        below.into_iter().filter_map(place).collect()
+    }
+
+    /// The slots that a slot is computed from, itself included.
+    fn below(&self, slot: usize) -> BTreeSet<usize> {
+        let mut seen = BTreeSet::new();
         let mut open = vec![slot];
         while let Some(slot) = open.pop() {
             if !seen.insert(slot) {
                 continue;
             }
             match self.steps.get(slot).copied() {
-                Some(Step::Symbol(place)) => {
-                    places.insert(place);
-                }
                 Some(Step::Neg(a) | Step::Sqrt(a) | Step::Exp(a) | Step::Sin(a)) => open.push(a),
                 Some(Step::Add(a, b) | Step::Sub(a, b) | Step::Mul(a, b) | Step::Div(a, b)) => {
                     open.extend([a, b]);
                 }
                 Some(Step::Integral { a, h, .. }) => open.extend([a, h]),
                 Some(Step::Cos) => open.push(slot - 1),
-                Some(Step::Constant(_)) | None => {}
+                Some(Step::Constant(_) | Step::Symbol(_)) => {}
+                None => {
+                    seen.remove(&slot);
+                }
             }
         }
-        places
+        seen
     }
 }
 
@@ -139,6 +156,8 @@ struct Builder<'a> {
     slots: HashMap<Node, usize>,
     /// slots of sin by argument
     pairs: HashMap<usize, usize>,
+    /// slots whose root was asked for
+    rooted: BTreeSet<usize>,
     solutions: HashMap<Node, Vec<usize>>,
 }
 
@@ -146,11 +165,6 @@ impl Builder<'_> {
     fn push(&mut self, step: Step) -> usize {
         self.program.steps.push(step);
         self.program.steps.len() - 1
-    }
-
-    fn number(&mut self, x: f64) -> Result<usize, Unsupported> {
-        let value = Modular::from_f64(x).ok_or_else(|| Unsupported(format!("the number {x}")))?;
-        Ok(self.push(Step::Constant(value)))
     }
 
     fn function(&mut self, name: &'static str) {
@@ -252,11 +266,7 @@ impl Builder<'_> {
                 let exponent = self.push(Step::Mul(b, logarithm));
                 self.push(Step::Exp(exponent))
             }
-            Binary::Atan2 => {
-                self.function("atan2");
-                let ratio = self.push(Step::Div(a, b));
-                self.arc_tangent(ratio)?
-            }
+            Binary::Atan2 => self.angle_of(a, b, node)?,
             Binary::Min | Binary::Max => {
                 let [x, y] = self.graph.arguments(node)[..] else {
                     return Err(Unsupported("a choice without arguments".into()));
