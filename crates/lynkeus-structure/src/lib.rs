@@ -25,6 +25,7 @@ pub mod superdiagonal;
 pub mod uniform;
 mod vanish;
 pub mod visibility;
+mod words;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
@@ -38,3 +39,4 @@ pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, uniformity};
 pub use vanish::{Vanishing, vanishes};
+pub use words::{counted, figures, short};

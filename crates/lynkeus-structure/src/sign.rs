@@ -3,7 +3,7 @@
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
-use crate::condition::short;
+use crate::words::short;
 use crate::{Check, Condition, Point, Range, Region, Witness, range};
 
 /// The verdict on a sign, with the bounds that go with it.
