@@ -1,19 +1,21 @@
 //! Bounds over the box of expressions and of matrices of them, for the constants
 //! of proofs.
 //!
-//! Ranges are outward rounded. What is made of them by a few additions and
-//! multiplications of positive numbers is rounded up by [`up`].
+//! Everything here is outward rounded: bounds are the upper ends of intervals. What a
+//! theorem makes of them in plain operations it rounds up by [`up`].
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Unary};
+use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 use lynkeus_structure::{Dimension, Matrix, Region, range_within};
 
 /// Cells examined per end of the range of an entry.
 const CELLS: usize = 600;
 /// More than the rounding errors of a sum of some hundred positive numbers.
 const GUARD: f64 = 1e-12;
+/// Share by which a guessed bound is raised before it is checked.
+const RESERVE: f64 = 1e-9;
 
 /// A box with what was found to be unbounded on it.
 pub(crate) struct Enclosure<'g> {
@@ -92,14 +94,14 @@ impl<'g> Enclosure<'g> {
     /// Where the whole is too hard, its factors and terms one by one.
     fn of_parts(&self, node: Node) -> Result<f64, MissingInput> {
         let part = |node: Node| self.magnitude_of(node);
-        Ok(up(match self.graph.op(node) {
+        Ok(match self.graph.op(node) {
             Op::Unary(Unary::Neg, a) => part(a)?,
-            Op::Binary(Binary::Add | Binary::Sub, a, b) => part(a)? + part(b)?,
+            Op::Binary(Binary::Add | Binary::Sub, a, b) => plus(part(a)?, part(b)?),
             Op::Binary(Binary::Mul, a, b) => times(part(a)?, part(b)?),
-            Op::Powi(a, n) if n > 0 => part(a)?.powi(n),
+            Op::Powi(a, n) if n > 0 => size(part(a)?).powi(n).hi(),
             Op::Entry(system, i) => self.of_solution(node, system, i as usize)?,
             _ => f64::INFINITY,
-        }))
+        })
     }
 
     /// |x_i| ≤ Σ_j |(A⁻¹)_ij| |b_j| for an entry of the solution of A x = b.
@@ -122,7 +124,7 @@ impl<'g> Enclosure<'g> {
                 }
                 _ => f64::INFINITY,
             };
-            sum += size;
+            sum = plus(sum, size);
         }
         Ok(if n == 0 { f64::INFINITY } else { sum })
     }
@@ -207,38 +209,60 @@ impl Inverse {
     }
 }
 
-/// Rounded up by more than the operations before it may have lost.
+/// Raised by more than the rounding of a few dozen plain operations on positive numbers
+/// has cost.
 pub(crate) fn up(x: f64) -> f64 {
     x * (1.0 + GUARD)
 }
 
-/// a b for bounds, of which 0 · ∞ is 0.
+/// A bound as an interval: an infinite one bounds nothing.
+fn size(bound: f64) -> Interval {
+    match bound.is_finite() {
+        true => Interval::point(bound),
+        false => Interval::new(0.0, f64::INFINITY).unwrap_or(Interval::ENTIRE),
+    }
+}
+
+/// a + b for bounds, rounded up.
+pub(crate) fn plus(a: f64, b: f64) -> f64 {
+    (size(a) + size(b)).hi()
+}
+
+/// The sum of bounds, rounded up.
+fn total(bounds: impl Iterator<Item = f64>) -> f64 {
+    bounds.fold(0.0, plus)
+}
+
+/// a b for bounds, rounded up, of which 0 · ∞ is 0.
 pub(crate) fn times(a: f64, b: f64) -> f64 {
-    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
+    match a == 0.0 || b == 0.0 {
+        true => 0.0,
+        false => (size(a) * size(b)).hi(),
+    }
+}
+
+/// √a for a bound, rounded up.
+fn root(a: f64) -> f64 {
+    size(a).sqrt().hi()
 }
 
 /// The product of two matrices of bounds.
 pub(crate) fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let columns = B.first().map_or(0, Vec::len);
     let entry = |row: &Vec<f64>, j: usize| {
-        let terms = row.iter().zip(B).map(|(a, b)| times(*a, b[j]));
-        up(terms.sum())
+        let terms = row.iter().zip(B);
+        total(terms.map(|(a, b)| times(*a, b[j])))
     };
     let row = |row: &Vec<f64>| (0..columns).map(|j| entry(row, j)).collect();
     A.iter().map(row).collect()
 }
 
 /// A number for a sentence.
-pub(crate) fn figures(x: f64) -> String {
-    match x == 0.0 || (1e-3..1e5).contains(&x.abs()) {
-        true => format!("{}", (x * 1e4).round() / 1e4),
-        false => format!("{x:.3e}"),
-    }
-}
+pub(crate) use lynkeus_structure::short as figures;
 
 /// √(Σ x²)
 pub(crate) fn length(x: &[f64]) -> f64 {
-    up(x.iter().map(|x| x * x).sum::<f64>().sqrt())
+    root(total(x.iter().map(|x| times(x.abs(), x.abs()))))
 }
 
 /// A bound of the spectral norm of every matrix with entries up to these: the
@@ -246,14 +270,14 @@ pub(crate) fn length(x: &[f64]) -> f64 {
 pub(crate) fn norm(A: &[Vec<f64>]) -> f64 {
     let frobenius = length(&A.concat());
     let columns = A.first().map_or(0, Vec::len);
-    let rows = A.iter().map(|row| row.iter().sum::<f64>());
-    let column = |j: usize| A.iter().map(|row| row[j]).sum::<f64>();
+    let rows = A.iter().map(|row| total(row.iter().copied()));
+    let column = |j: usize| total(A.iter().map(|row| row[j]));
     let largest = |sums: &mut dyn Iterator<Item = f64>| sums.fold(0.0, f64::max);
     let mixed = times(
         largest(&mut rows.into_iter()),
         largest(&mut (0..columns).map(column)),
     );
-    frobenius.min(up(mixed.sqrt()))
+    frobenius.min(root(mixed))
 }
 
 /// What is known of A⁻¹ for every A with entries in the ranges: with
@@ -270,25 +294,26 @@ fn inverse_of_ranges(ranges: &[Vec<(f64, f64)>]) -> Option<Inverse> {
     let middle = matrix(&|i, j| ranges[i][j].0 / 2.0 + ranges[i][j].1 / 2.0);
     let radius = matrix(&|i, j| {
         let (low, high) = ranges[i][j];
-        up((high - middle[i][j]).max(middle[i][j] - low))
+        let about = Interval::point(middle[i][j]);
+        let (above, below) = (Interval::point(high) - about, about - Interval::point(low));
+        above.hi().max(below.hi())
     });
     let R = guessed_inverse(&middle)?;
-    let size = matrix(&|i, j| R[i][j].abs());
-    let spread = product(&radius, &size);
+    let spread = product(&radius, &matrix(&|i, j| R[i][j].abs()));
     let E = matrix(&|i, j| {
-        let terms = (0..n).map(|k| middle[i][k] * R[k][j]);
-        let scale: f64 = terms.clone().map(f64::abs).sum();
-        up((terms.sum::<f64>() - one(i, j)).abs() + GUARD * (scale + one(i, j)) + spread[i][j])
+        let terms = (0..n).map(|k| Interval::point(middle[i][k]) * Interval::point(R[k][j]));
+        let rest = terms.fold(Interval::point(-one(i, j)), |sum, x| sum + x);
+        plus(rest.magnitude(), spread[i][j])
     });
     let N = guessed_inverse(&matrix(&|i, j| one(i, j) - E[i][j]))?;
     let v: Vec<f64> = N.iter().map(|row| row.iter().sum()).collect();
-    let raised = matrix(&|i, j| N[i][j] + 1e-9 * v[i]);
+    let raised = matrix(&|i, j| N[i][j] + RESERVE * v[i]);
     let positive = v.iter().chain(raised.iter().flatten()).all(|x| *x >= 0.0);
     let covers = |i: usize, j: usize| {
-        let mapped: f64 = (0..n).map(|k| E[i][k] * raised[k][j]).sum();
-        raised[i][j] - up(mapped) >= one(i, j)
+        let mapped = total((0..n).map(|k| times(E[i][k], raised[k][j])));
+        (Interval::point(raised[i][j]) - size(mapped)).lo() >= one(i, j)
     };
-    let shrinks = |i: usize| v[i] > up((0..n).map(|k| E[i][k] * v[k]).sum());
+    let shrinks = |i: usize| v[i] > total((0..n).map(|k| times(E[i][k], v[k])));
     let sure = positive && (0..n).all(|i| shrinks(i) && (0..n).all(|j| covers(i, j)));
     sure.then_some(Inverse { R, N: raised })
 }

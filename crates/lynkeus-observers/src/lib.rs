@@ -31,6 +31,6 @@ pub mod unknown_input;
 
 pub use certificate::{Assumptions, Certificate, Constant, Verdict};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
-pub use guarantee::{Claim, certify};
+pub use guarantee::{Claim, Correction, Injection, certify};
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
 pub use tuning::{Initial, Tuning, TuningError, Value};

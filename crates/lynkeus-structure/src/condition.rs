@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::words::short;
+
 /// A point of the box and the value of the expression in question there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
@@ -63,29 +65,6 @@ pub struct Check {
     pub detail: String,
 }
 
-/// Six significant digits, as a person reads them.
-pub fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let trimmed = |digits: &str| match digits.contains('.') {
-        true => digits
-            .trim_end_matches('0')
-            .trim_end_matches('.')
-            .to_owned(),
-        false => digits.to_owned(),
-    };
-    let digits = 5 - value.abs().log10().floor() as i32;
-    if (0..=15).contains(&digits) {
-        return trimmed(&format!("{value:.*}", digits as usize));
-    }
-    let text = format!("{value:.5e}");
-    match text.split_once('e') {
-        Some((digits, exponent)) => format!("{}e{exponent}", trimmed(digits)),
-        None => text,
-    }
-}
-
 impl fmt::Display for Point {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", short(self.value))?;
@@ -122,31 +101,5 @@ impl fmt::Display for Condition {
                 }
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_read_well() {
-        for (value, text) in [
-            (0.0, "0"),
-            (0.5, "0.5"),
-            (-1.0, "-1"),
-            (1234567.8, "1.23457e6"),
-            (1e-9, "1e-9"),
-            (0.1 + 0.2, "0.3"),
-            (100.0, "100"),
-        ] {
-            let found = short(value);
-            let same = found.parse::<f64>().unwrap() == text.parse::<f64>().unwrap();
-            assert!(same, "{value} became {found}");
-        }
-        assert_eq!(short(0.1 + 0.2), "0.3");
-        assert_eq!(short(100.0), "100");
-        assert_eq!(short(-1e-12), "-1e-12");
-        assert_eq!(short(2.5e20), "2.5e20");
     }
 }

@@ -26,10 +26,11 @@ pub mod superdiagonal;
 pub mod uniform;
 mod vanish;
 pub mod visibility;
+mod words;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
-pub use condition::{Check, Condition, Point, Witness, short};
+pub use condition::{Check, Condition, Point, Witness};
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
@@ -40,3 +41,4 @@ pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, uniformity};
 pub use vanish::{Vanishing, vanishes};
+pub use words::{counted, figures, short};

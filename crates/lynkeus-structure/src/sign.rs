@@ -3,9 +3,9 @@
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
-use crate::condition::short;
 use crate::region::Cell;
 use crate::regularity::is_regular;
+use crate::words::short;
 use crate::{Check, Condition, Point, Range, Region, Regularity, Witness, range, range_within};
 
 /// Cells examined per end to see whether there is a bound.

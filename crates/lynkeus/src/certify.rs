@@ -6,7 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Certificate, Claim, Design, Tuning, Verdict};
 use lynkeus_structure::Extended;
 
-use crate::{Error, Study, prepare, words};
+use crate::{Correction, Error, Study, correction, prepare, words};
 
 mod assumptions;
 mod json;
@@ -25,6 +25,10 @@ pub struct CertifyReport {
     pub certificate: Certificate,
     /// by the family's own theorem; none for a gain that no paper gives
     pub theorem: Option<Certificate>,
+    /// how the measurements enter the observer that was certified
+    pub correction: Correction,
+    /// what both take for granted of disturbances and unknown inputs, in words
+    pub assumed: Vec<String>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -104,11 +108,14 @@ impl Task<'_> {
             }
             None => None,
         };
+        let correction = correction::of(self.study, self.plant, place, &design.observer)?;
         Ok(CertifyReport {
             plant: self.plant.name.clone(),
             design,
             certificate,
             theorem,
+            correction,
+            assumed: assumptions::notes(self.study, self.plant, place),
         })
     }
 
@@ -199,29 +206,39 @@ impl CertifyReport {
         print::conclusion(self)
     }
 
-    /// Whether a point of the box shows that there is no decay.
+    /// Whether it is shown that there is no decay.
     pub fn is_refuted(&self) -> bool {
         self.verdict() == Verdict::Refuted
     }
 
-    /// The report for machines: the gain by state, then by measured output, and the
-    /// certificate.
+    /// The report for machines: the gain by state, then by measured output, or what takes
+    /// its place, and the certificate.
     pub fn to_json(&self) -> serde_json::Value {
         serde_json::json!({
             "plant": self.plant,
             "family": self.design.observer.family,
-            "gain": crate::design::gain_json(&self.design),
+            "gain": self.correction.gain_json(),
+            "injection": self.correction.injection_json(),
             "certificate": certificate_json(self),
         })
     }
 
-    /// Proved by either way; refuted by a point of the box; else undecided. A theorem
-    /// whose hypothesis fails refutes nothing: it only does not apply.
+    /// Proved by either way; refuted where the error is shown not to decay; else undecided.
+    /// A theorem whose hypothesis fails refutes nothing: it only does not apply. A proof
+    /// and a refutation of the same leave neither.
     pub fn verdict(&self) -> Verdict {
-        match &self.theorem {
-            Some(theorem) if theorem.verdict == Verdict::Proved => Verdict::Proved,
-            _ => self.certificate.verdict,
+        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict);
+        match (self.certificate.verdict, theorem) {
+            _ if self.is_contradiction() => Verdict::Undecided,
+            (_, Some(Verdict::Proved)) => Verdict::Proved,
+            (verdict, _) => verdict,
         }
+    }
+
+    /// Whether one way proves what the other refutes: a defect of this program.
+    pub fn is_contradiction(&self) -> bool {
+        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict);
+        self.certificate.verdict == Verdict::Refuted && theorem == Some(Verdict::Proved)
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use lynkeus_observers::{Design, Fit};
+use lynkeus_structure::counted;
 use serde_json::{Map, Value, json};
 
 use crate::certify::{self, certificate_json};
@@ -31,7 +32,8 @@ pub fn design(study: &Study) -> Result<DesignReport, Error> {
 }
 
 impl DesignReport {
-    /// The report for machines; `gain` is by state, then by measured output.
+    /// The report for machines; `gain` is by state, then by measured output, and null for a
+    /// correction that is no constant gain: then `injection` has its derivatives.
     pub fn to_json(&self) -> Value {
         let Design {
             observer,
@@ -54,7 +56,8 @@ impl DesignReport {
             "family": observer.family,
             "fit": examination.fit.words(),
             "chains": examination.chains,
-            "gain": gain_json(&self.certified.design),
+            "gain": self.certified.correction.gain_json(),
+            "injection": self.certified.correction.injection_json(),
             "parameters": parameters,
             "initial": starts,
             "certificate": certificate_json(&self.certified),
@@ -63,33 +66,21 @@ impl DesignReport {
     }
 }
 
-/// The gain by state, then by measured output.
-pub(crate) fn gain_json(design: &Design) -> Value {
-    let mut gain: Map<String, Value> = Map::new();
-    for chain in &design.gains {
-        for (state, k) in &chain.entries {
-            let row = gain.entry(state.clone()).or_insert_with(|| json!({}));
-            row[&chain.output] = json!(k);
-        }
-    }
-    Value::Object(gain)
-}
-
 impl fmt::Display for DesignReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Design {
             observer,
             examination,
-            gains,
             parameters,
             notes,
+            ..
         } = &self.certified.design;
         writeln!(
             f,
-            "{}: {} observer, {} states",
+            "{}: {} observer, {}",
             self.plant,
             observer.family,
-            observer.states.len()
+            counted(observer.states.len(), "state")
         )?;
         writeln!(f, "  {}", examination.summary)?;
         if examination.fit == Fit::Undecided {
@@ -102,12 +93,7 @@ impl fmt::Display for DesignReport {
         for (name, value) in parameters {
             writeln!(f, "  {name:<14} {value}")?;
         }
-        for chain in gains {
-            writeln!(f, "\ngain of {} on", chain.output)?;
-            for (state, k) in &chain.entries {
-                writeln!(f, "  {state:<14} {k:.6e}")?;
-            }
-        }
+        write!(f, "{}", self.certified.correction)?;
         writeln!(
             f,
             "\n{}; `lynkeus certify` says more",

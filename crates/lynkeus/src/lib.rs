@@ -52,6 +52,7 @@
 
 mod certify;
 mod check;
+mod correction;
 mod design;
 mod error;
 mod estimate;
@@ -71,6 +72,7 @@ mod words;
 
 pub use certify::{CertifyReport, certify};
 pub use check::{CheckOptions, Report, check};
+pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;

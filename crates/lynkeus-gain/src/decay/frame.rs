@@ -103,7 +103,7 @@ fn middle(models: &[ErrorModel], sizes: &[f64]) -> DMatrix<f64> {
 
 /// Sizes for which rows and columns of the matrix have equal sums beside the diagonal
 /// (Osborne 1960).
-fn balanced(A: &DMatrix<f64>, sizes: &[f64]) -> Vec<f64> {
+pub(super) fn balanced(A: &DMatrix<f64>, sizes: &[f64]) -> Vec<f64> {
     let n = sizes.len();
     let mut d = vec![1.0_f64; n];
     for _ in 0..SWEEPS {
@@ -127,6 +127,12 @@ fn balanced(A: &DMatrix<f64>, sizes: &[f64]) -> Vec<f64> {
 
 /// P > 0 with AᵀP + PA = −I; none where A is not stable.
 fn lyapunov(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let P = lyapunov_equation(A)?;
+    P.clone().cholesky().map(|_| P)
+}
+
+/// The symmetric P with AᵀP + PA = −I; none where two eigenvalues of A cancel.
+pub(super) fn lyapunov_equation(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = A.nrows();
     let unit = DMatrix::<f64>::identity(n, n);
     let system = unit.kronecker(&A.transpose()) + A.transpose().kronecker(&unit);
@@ -134,7 +140,7 @@ fn lyapunov(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let solution = system.lu().solve(&right)?;
     let P = DMatrix::from_column_slice(n, n, solution.as_slice());
     let P = (&P + P.transpose()) * 0.5;
-    (P.iter().all(|x| x.is_finite()) && P.clone().cholesky().is_some()).then_some(P)
+    P.iter().all(|x| x.is_finite()).then_some(P)
 }
 
 #[cfg(test)]

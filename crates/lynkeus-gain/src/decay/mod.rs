@@ -17,12 +17,14 @@
 mod analysis;
 mod check;
 mod frame;
+mod growth;
 mod model;
 mod scale;
 mod synthesis;
 
 pub use analysis::{fastest, prove};
 pub use check::{holds, is_below};
+pub use growth::is_unstable;
 pub use model::{ErrorModel, Sector, expanded};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
 

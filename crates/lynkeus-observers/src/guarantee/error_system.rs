@@ -2,15 +2,18 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, Evaluator, Graph, MissingInput, Node, Op, Tape, Unary, jacobian};
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_gain::decay::ErrorModel;
+use lynkeus_gain::definite::IntervalMatrix;
 use lynkeus_structure::{
     Check, Condition, Dimension, Extended, Region, Slopes, range, range_within,
 };
 use nalgebra::DMatrix;
 
+use super::edges::edges;
 use super::{expanded, innovation};
-use crate::{Assumptions, Observer};
+use crate::{Assumptions, InputDerivative, Observer};
 
 /// Cells examined per end of the range of an injection.
 const CELLS: usize = 200;
@@ -30,6 +33,8 @@ pub(super) struct ErrorSystem {
     right: Tape,
     /// A as an expression, row by row
     entries: Vec<Node>,
+    /// F(x̂, u, h(x̂))
+    corrected: Vec<Node>,
     /// estimate (here also the state), known inputs, and time if A depends on it
     pub sides: Region,
 }
@@ -56,7 +61,7 @@ impl ErrorSystem {
         let mut system = Self::of(extended, &observer.derivatives, &symbols, region)?;
         system.around_innovations(extended, observer, &symbols)?;
         system.injection = injection(extended, observer, &system.region)?;
-        (system.right, system.sides) = right(extended, observer, &system)?;
+        right(extended, observer, &mut system)?;
         Ok(Ok(system))
     }
 
@@ -82,6 +87,7 @@ impl ErrorSystem {
         Ok(Self {
             right: Tape::new(graph, &region.symbols(), &entries)?,
             entries,
+            corrected: vec![],
             sides: region.clone(),
             models: expanded(&slopes.models),
             scale: extended.states.iter().map(size).collect(),
@@ -147,29 +153,23 @@ impl ErrorSystem {
         }
     }
 
+    /// A as an expression of estimate, known inputs, measurements and time, row by row.
+    pub fn entries(&self) -> &[Node] {
+        &self.entries
+    }
+
+    /// What the observer does where it is right, F(x̂, u, h(x̂)).
+    pub fn corrected(&self) -> &[Node] {
+        &self.corrected
+    }
+
     pub fn evaluator(&self) -> Evaluator {
         self.right.evaluator()
     }
 
     /// Whether an entry of A has kinks, jumps or singular ends: |x|, min, √, conditions.
     pub fn is_rough(&self, graph: &Graph) -> bool {
-        let rough = |node: Node| match graph.op(node) {
-            Op::Select(..) => true,
-            Op::Unary(op, _) => {
-                use Unary::{Abs, Floor, Sign, Sqrt};
-                matches!(op, Abs | Sign | Floor | Sqrt)
-            }
-            Op::Binary(Binary::Pow, _, power) => {
-                let power = graph.constant_value(power);
-                power.is_none_or(|power| power < 0.0 || power.fract() != 0.0)
-            }
-            Op::Binary(op, ..) => {
-                use Binary::{Equal, Less, LessEq, Max, Min};
-                matches!(op, Min | Max | Less | LessEq | Equal)
-            }
-            _ => false,
-        };
-        graph.reachable(&self.entries).into_iter().any(rough)
+        !edges(graph, &self.entries, &self.region.symbols()).is_empty()
     }
 
     /// A at x̂ = x, at a point of `sides`, for states in units of `scale`: in other units
@@ -181,14 +181,22 @@ impl ErrorSystem {
         let relative = |i: usize, j: usize| self.scale[j] / self.scale[i];
         DMatrix::from_fn(n, n, |i, j| entries[i * n + j] * relative(i, j))
     }
+
+    /// Enclosures of A at x̂ = x for every point of a part of `sides`.
+    pub fn enclosed_at(&self, cell: &[Interval]) -> IntervalMatrix {
+        let entries = self.right.eval_in(&Intervals, cell);
+        let rows = entries.chunks(self.scale.len());
+        rows.map(<[Interval]>::to_vec).collect()
+    }
 }
 
-/// A where the estimate is right: what is measured is then h at the estimate.
+/// What the system is where the estimate is right: what is measured is then h at the
+/// estimate. Derivatives of the inputs are 0 there: the inputs are constant.
 fn right(
     extended: &Extended<'_>,
     observer: &Observer,
-    system: &ErrorSystem,
-) -> Result<(Tape, Region), MissingInput> {
+    system: &mut ErrorSystem,
+) -> Result<(), MissingInput> {
     let graph = extended.graph();
     let hats = extended.states.iter().zip(&observer.states);
     let hats: HashMap<Node, Node> = hats
@@ -203,6 +211,7 @@ fn right(
         .zip(seen)
         .collect();
     let entries = graph.substitute(&system.entries, &measured);
+    let corrected = graph.substitute(&observer.derivatives, &measured);
     let mut sides = system.region.clone();
     let read = graph.symbols_of(&entries);
     // a witness tells the time only where time matters
@@ -210,7 +219,15 @@ fn right(
     sides
         .dimensions
         .retain(|d| !measured.contains_key(&d.symbol) && counts(d));
-    Ok((Tape::new(graph, &sides.symbols(), &entries)?, sides))
+    for side in &mut sides.dimensions {
+        let still = |d: &InputDerivative| d.signal.symbol == side.symbol;
+        if observer.input_derivatives.iter().any(still) {
+            (side.min, side.max) = (0.0, 0.0);
+        }
+    }
+    system.right = Tape::new(graph, &sides.symbols(), &entries)?;
+    (system.corrected, system.sides) = (corrected, sides);
+    Ok(())
 }
 
 /// The box in the observer's symbols, with the ranges of what is measured.

@@ -12,6 +12,9 @@
 //! ([`lynkeus_gain::decay`]); interval arithmetic accepts or rejects it.
 
 mod blocking;
+mod correction;
+mod edges;
+mod equilibrium;
 mod error_system;
 mod innovation;
 mod lmi;
@@ -22,8 +25,10 @@ use lynkeus_gain::decay::{self, ErrorModel, Proof};
 use lynkeus_structure::{Check, Condition, Extended, short};
 
 use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};
+pub use correction::{Correction, Injection};
 use error_system::ErrorSystem;
 pub(crate) use lmi::{asked_for, design as design_lmi};
+use refute::Sample;
 
 const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";
 /// Vertices up to which slopes are taken by their ends instead of by multipliers.
@@ -38,8 +43,8 @@ pub enum Claim {
     At(f64),
 }
 
-/// Whether decay of the observer's error is proved on the box, refuted by a point of the
-/// box, or neither.
+/// Whether decay of the observer's error is proved on the box, refuted by a state at which
+/// the plant can rest (or by an error system that does not depend on the plant), or neither.
 ///
 /// # Errors
 /// Parameters without value.
@@ -54,35 +59,28 @@ pub fn certify(
         Err(reason) => return Ok(not_covered(assumptions, reason)),
     };
     let mut hypotheses = vec![system.bounded()];
-    let sample = refute::worst(extended.graph(), &system)?;
-    if let Some(witness) = sample.witness {
-        let check = Check {
-            name: STABLE.to_owned(),
-            verdict: Condition::Refuted(witness),
-            detail: "the real part of an eigenvalue of the error's Jacobian is not negative, so no Lyapunov function covers the box".into(),
-        };
+    let sample = refute::worst(extended.graph(), &system);
+    if let Some(check) = refute::growing(extended, observer, &system, &sample)? {
         hypotheses.push(check);
         return Ok(Certificate::new(BASIS, assumptions, hypotheses));
     }
-    let found = match (system.is_bounded(), claim) {
+    let found = match (system.is_bounded() && !sample.unstable, claim) {
         (false, _) => None,
-        (true, Claim::Fastest) => decay::fastest(&system.models, &system.scale, sample.slowest),
+        (true, Claim::Fastest) => decay::fastest(&system.models, &system.scale, sample.limit),
         (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate),
     };
-    hypotheses.push(inequality(&system, found.as_ref()));
+    hypotheses.push(inequality(&system, &sample, found.as_ref()));
     let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
     match found {
         Some(proof) => fill(&mut certificate, extended, &system, &proof, assumptions),
         None if claim == Claim::Fastest => {
-            let said = still_said(&system, sample.slowest);
+            let said = still_said(&system, &sample);
             certificate.notes.extend(said);
         }
         None => {}
     }
     Ok(certificate)
 }
-
-const STABLE: &str = "the error's Jacobian is stable everywhere on the box";
 
 fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
     let check = Check {
@@ -93,32 +91,45 @@ fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
     Certificate::new(BASIS, assumptions, vec![check])
 }
 
-fn inequality(system: &ErrorSystem, proof: Option<&Proof>) -> Check {
-    let count = system.slopes.slopes.len();
+fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> Check {
+    let slopes = match system.slopes.slopes.len() {
+        0 => "the error's matrix is constant".to_owned(),
+        1 => "for the one slope within its range".to_owned(),
+        count => format!("for all {count} slopes within their ranges"),
+    };
     let name = "one Lyapunov function eᵀPe for the whole box".to_owned();
     match proof.filter(|proof| proof.rate > 0.0) {
         Some(proof) => Check {
             name,
             verdict: Condition::Proved,
             detail: format!(
-                "He(P J) + 2·{}·P < 0 for all {count} slopes within their ranges, by interval Cholesky factorisation",
+                "He(P J) + 2·{}·P < 0, {slopes}, by interval Cholesky factorisation",
                 short(proof.rate)
             ),
         },
         None => Check {
             name,
             verdict: Condition::Undecided(vec![]),
-            detail: format!("none was found for all {count} slopes within their ranges"),
+            detail: match sample.unstable {
+                true => format!(
+                    "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
+                    sample.worst
+                ),
+                false => format!("none was found ({slopes})"),
+            },
         },
     }
 }
 
 /// What can be said without a proof on the whole box.
-fn still_said(system: &ErrorSystem, slowest: f64) -> Vec<String> {
-    let mut notes = vec![format!(
-        "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
-        short(slowest)
-    )];
+fn still_said(system: &ErrorSystem, sample: &Sample) -> Vec<String> {
+    let mut notes = vec![];
+    if sample.slowest > 0.0 {
+        notes.push(format!(
+            "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
+            short(sample.slowest)
+        ));
+    }
     if system.is_bounded()
         && let Some(share) = blocking::provable_share(system)
     {
@@ -155,9 +166,14 @@ fn fill(
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
         ));
     }
-    if let Some(bounds) = ultimate::bounds(extended, system, proof, assumptions) {
-        certificate.ultimate_bound = Some(bounds.norm);
-        certificate.ultimate = bounds.states;
+    match ultimate::bounds(extended, system, proof, assumptions) {
+        Some(bounds) => {
+            certificate.ultimate_bound = Some(bounds.norm);
+            certificate.ultimate = bounds.states;
+        }
+        None => certificate.notes.push(
+            "no ultimate bound: what acts on the plant unknown to the observer, or a measurement error, has no bound".into(),
+        ),
     }
     certificate.notes.push(
         "holds while plant and estimate stay in the box; an estimate that starts near the plant stays near it".into(),

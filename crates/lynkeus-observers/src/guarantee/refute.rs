@@ -1,34 +1,45 @@
-//! The search for a point of the box at which the error's Jacobian is not stable: a
-//! right estimate does not stay right there.
+//! The search for a point of the box at which the error's Jacobian is not stable, and for
+//! what such a point shows.
+//!
+//! No quadratic form eᵀPe decays for the whole box where a Jacobian A in it is not stable.
+//! That alone makes no error grow: along a trajectory A changes, and neither do stable
+//! instants make a stable whole, nor unstable ones an unstable one. The error grows for
+//! certain where A is the same whatever the plant does, and where the plant can rest.
 
-use lynkeus_expr::{Evaluator, Graph};
-use lynkeus_structure::{Dimension, Point, Witness};
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
+use lynkeus_gain::decay::is_unstable;
+use lynkeus_structure::{Check, Dimension, Extended, Point};
+use nalgebra::DMatrix;
 
+use super::edges::edges;
+use super::equilibrium;
 use super::error_system::ErrorSystem;
-use crate::DesignError;
+use crate::Observer;
+use crate::proof::words::refuted;
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
 /// Halvings of the step while climbing.
 const HALVINGS: usize = 12;
-/// An eigenvalue this far from the imaginary axis, relative to the matrix, is not a
-/// matter of rounding.
-const CLEAR: f64 = 1e-9;
 /// Distance from the ends, relative to a side, where slopes may have kinks there.
 const INSET: f64 = 1e-4;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What the search found.
 pub(super) struct Sample {
-    /// the slowest decay over the points examined
+    /// the slowest decay over the points examined, in floating point
     pub slowest: f64,
-    /// a point with an eigenvalue that does not decay
-    pub witness: Option<Witness>,
+    /// no rate above this can be proved by one quadratic form
+    pub limit: f64,
+    /// where the decay is slowest, and the largest real part of an eigenvalue there
+    pub worst: Point,
+    /// an eigenvalue there is proved to have a positive real part
+    pub unstable: bool,
 }
 
 /// The worst point that a deterministic search finds.
-pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Result<Sample, DesignError> {
-    let sides = system.sides.dimensions.iter().map(finite);
+pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
+    let sides = system.sides.dimensions.iter().map(Side::finite);
     let mut search = Search {
         system,
         evaluator: system.evaluator(),
@@ -37,9 +48,9 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Result<Sample, Desig
             false => sides.collect(),
         },
     };
-    let (mut best, mut highest) = (search.point(0), f64::NEG_INFINITY);
+    let (mut best, mut highest) = (spread(&search.sides, 0), f64::NEG_INFINITY);
     for index in 0..POINTS {
-        let point = search.point(index);
+        let point = spread(&search.sides, index);
         if let Some(abscissa) = search.abscissa(&point)
             && abscissa > highest
         {
@@ -49,90 +60,148 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Result<Sample, Desig
     if highest.is_finite() {
         (best, highest) = search.climbed(best, highest);
     }
-    let A = system.at(&mut search.evaluator, &best);
-    let refuted = highest > CLEAR * A.amax();
     let coordinates = system.sides.dimensions.iter().zip(&best);
     let named = coordinates.map(|(d, x)| (d.name.clone(), *x));
-    let point = Point {
-        coordinates: named.collect(),
-        value: highest,
-    };
-    Ok(Sample {
+    let cell: Vec<Interval> = best.iter().map(|&x| Interval::point(x)).collect();
+    // the mean of all real parts is no higher than the highest, and no matter of rounding
+    let mean = system.at(&mut search.evaluator, &best).trace() / system.scale.len() as f64;
+    Sample {
         slowest: -highest,
-        witness: refuted.then(|| Witness {
-            points: vec![point],
-        }),
-    })
+        limit: match highest < 0.0 {
+            true => -highest,
+            false => -mean,
+        },
+        unstable: highest > 0.0 && is_unstable(&system.enclosed_at(&cell)),
+        worst: Point {
+            coordinates: named.collect(),
+            value: highest,
+        },
+    }
+}
+
+/// What shows that the error does not decay, if anything does.
+pub(super) fn growing(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    system: &ErrorSystem,
+    sample: &Sample,
+) -> Result<Option<Check>, MissingInput> {
+    if sample.slowest > 0.0 {
+        return Ok(None);
+    }
+    if sample.unstable && is_linear(extended, observer, system) {
+        let detail = "whatever the plant does, the error obeys e' = A e; for the constant inputs of this point A has an eigenvalue with a positive real part, by interval arithmetic";
+        return Ok(Some(refuted(DECAYS, sample.worst.clone(), detail)));
+    }
+    let found = equilibrium::repelling(extended, observer, system)?;
+    Ok(found.map(|point| {
+        let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
+        refuted(DECAYS, point, detail)
+    }))
+}
+
+const DECAYS: &str = "small errors decay wherever the plant stays in the box";
+
+/// Whether e' = A e with an A that depends on the known inputs alone.
+fn is_linear(extended: &Extended<'_>, observer: &Observer, system: &ErrorSystem) -> bool {
+    let graph = extended.graph();
+    let read = graph.symbols_of(system.entries());
+    let inputs = |symbol: &Node| extended.inputs.iter().any(|u| u.node == *symbol);
+    let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+    read.iter().all(inputs) && edges(graph, &observer.derivatives, &hats).is_empty()
 }
 
 struct Search<'a> {
     system: &'a ErrorSystem,
     evaluator: Evaluator,
-    sides: Vec<(f64, f64, bool)>,
+    sides: Vec<Side>,
 }
 
-/// The side with infinite ends replaced by large ones.
-fn finite(side: &Dimension) -> (f64, f64, bool) {
-    let low = if side.min.is_finite() {
-        side.min
-    } else {
-        side.max.min(1.0) - 2.0
-    };
-    let high = if side.max.is_finite() {
-        side.max
-    } else {
-        low.max(-1.0) + 2.0
-    };
-    (low, high.max(low), side.integer)
+/// A side of the box within which points are tried.
+#[derive(Clone, Debug)]
+pub(super) struct Side {
+    pub low: f64,
+    pub high: f64,
+    /// only whole numbers count
+    pub whole: bool,
+}
+
+impl Side {
+    /// With infinite ends replaced by large ones.
+    pub fn finite(side: &Dimension) -> Self {
+        let low = if side.min.is_finite() {
+            side.min
+        } else {
+            side.max.min(1.0) - 2.0
+        };
+        let high = if side.max.is_finite() {
+            side.max
+        } else {
+            low.max(-1.0) + 2.0
+        };
+        Self {
+            low,
+            high: high.max(low),
+            whole: side.integer,
+        }
+    }
 }
 
 /// The side without its ends and with another middle: a kink there, as of |x| at 0, has
 /// no slope, and that of one side need not be met in the box.
-fn inner((i, (low, high, whole)): (usize, (f64, f64, bool))) -> (f64, f64, bool) {
-    if whole {
-        return (low, high, whole);
+fn inner((i, side): (usize, Side)) -> Side {
+    if side.whole {
+        return side;
     }
-    let cut = INSET * (1.0 + (i as f64 * GOLDEN).fract()) * (high - low);
-    (low + cut, high - 0.5 * cut, whole)
+    let cut = INSET * (1.0 + (i as f64 * GOLDEN).fract()) * (side.high - side.low);
+    Side {
+        low: side.low + cut,
+        high: side.high - 0.5 * cut,
+        whole: false,
+    }
+}
+
+/// The middle, corners and points between, spread by irrational steps.
+pub(super) fn spread(sides: &[Side], index: usize) -> Vec<f64> {
+    let place = |i: usize| match index {
+        0 => 0.5,
+        _ if index % 2 == 1 => ((index * (i + 1)) as f64 * GOLDEN + i as f64 * 0.37)
+            .fract()
+            .round(),
+        _ => {
+            let step = ((i + 2) as f64).sqrt().fract();
+            (index as f64 * step + 0.5 * i as f64).fract()
+        }
+    };
+    let sides = sides.iter().enumerate();
+    sides
+        .map(|(i, side)| {
+            // low + (high − low) may be above high by rounding
+            let x = (side.low + place(i) * (side.high - side.low)).min(side.high);
+            if side.whole { x.round() } else { x }
+        })
+        .collect()
+}
+
+/// The largest real part of an eigenvalue.
+pub(super) fn abscissa(A: DMatrix<f64>) -> Option<f64> {
+    if !A.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    // a bounded number of sweeps: a matrix that does not converge is skipped
+    let schur = nalgebra::linalg::Schur::try_new(A, f64::EPSILON, 10_000)?;
+    let eigenvalues = schur.complex_eigenvalues();
+    let largest = eigenvalues
+        .iter()
+        .map(|λ| λ.re)
+        .fold(f64::NEG_INFINITY, f64::max);
+    largest.is_finite().then_some(largest)
 }
 
 impl Search<'_> {
-    /// The middle, corners and points between, spread by irrational steps.
-    fn point(&self, index: usize) -> Vec<f64> {
-        let place = |i: usize| match index {
-            0 => 0.5,
-            _ if index % 2 == 1 => ((index * (i + 1)) as f64 * GOLDEN + i as f64 * 0.37)
-                .fract()
-                .round(),
-            _ => {
-                let step = ((i + 2) as f64).sqrt().fract();
-                (index as f64 * step + 0.5 * i as f64).fract()
-            }
-        };
-        let sides = self.sides.iter().enumerate();
-        sides
-            .map(|(i, &(low, high, whole))| {
-                // low + (high − low) may be above high by rounding
-                let x = (low + place(i) * (high - low)).min(high);
-                if whole { x.round() } else { x }
-            })
-            .collect()
-    }
-
     /// The largest real part of an eigenvalue of A there.
     fn abscissa(&mut self, point: &[f64]) -> Option<f64> {
-        let A = self.system.at(&mut self.evaluator, point);
-        if !A.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        // a bounded number of sweeps: a matrix that does not converge is skipped
-        let schur = nalgebra::linalg::Schur::try_new(A, f64::EPSILON, 10_000)?;
-        let eigenvalues = schur.complex_eigenvalues();
-        let largest = eigenvalues
-            .iter()
-            .map(|λ| λ.re)
-            .fold(f64::NEG_INFINITY, f64::max);
-        largest.is_finite().then_some(largest)
+        abscissa(self.system.at(&mut self.evaluator, point))
     }
 
     /// Coordinate by coordinate to a worse point, with ever smaller steps.
@@ -140,7 +209,7 @@ impl Search<'_> {
         let mut step = 0.5;
         for _ in 0..HALVINGS {
             for i in 0..point.len() {
-                let (low, high, whole) = self.sides[i];
+                let Side { low, high, whole } = self.sides[i].clone();
                 if whole || low == high {
                     continue;
                 }

@@ -5,15 +5,20 @@
 //! (√V)' ≤ −rate·√V + √(wᵀPw), so in the end √V ≤ r = max √(wᵀPw)/rate, |e| ≤ r/√λ_min(P)
 //! and |e_i| ≤ r·√(P⁻¹)_ii.
 
+use lynkeus_expr::Interval;
 use lynkeus_gain::decay::{Proof, is_below};
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
 use super::error_system::ErrorSystem;
 use crate::Assumptions;
+use crate::enclosure::times;
+use crate::proof::sum;
 
-/// More than the rounding errors of the sums below.
-const GUARD: f64 = 1.0 + 1e-9;
+/// A guessed bound of a quadratic form is raised by this before it is tried.
+const RESERVE: f64 = 1e-6;
+/// How often it is raised further.
+const TRIES: usize = 40;
 
 /// Ultimate bounds of the error.
 pub(super) struct Bounds {
@@ -31,34 +36,32 @@ pub(super) fn bounds(
     assumptions: &Assumptions,
 ) -> Option<Bounds> {
     let n = extended.states.len();
-    let through = |i: usize| -> f64 {
+    let through = |i: usize| {
         let columns = system.injection[i].iter().zip(&assumptions.noise);
-        columns
-            .map(|(e, ν)| if *ν == 0.0 { 0.0 } else { e * ν })
-            .sum()
+        sum(columns.map(|(e, ν)| match times(*e, *ν) == 0.0 {
+            true => Interval::ZERO,
+            false => Interval::point(*e) * Interval::point(*ν),
+        }))
     };
     let drift = |i: usize| assumptions.drift.get(i).copied().unwrap_or(0.0);
-    let w: Vec<f64> = (0..n).map(|i| drift(i) + through(i)).collect();
-    if !w.iter().all(|w| w.is_finite()) {
-        return None;
+    let w: Vec<Interval> = (0..n)
+        .map(|i| Interval::point(drift(i)) + through(i))
+        .collect();
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+    for w in &w {
+        finite(w.hi())?;
     }
-    let mut square = 0.0;
-    for i in 0..n {
-        for j in 0..n {
-            square += proof.P[(i, j)].abs() * w[i] * w[j];
-        }
-    }
-    let r = square.sqrt() / proof.rate * GUARD;
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let square = sum(pairs.map(|(i, j)| Interval::point(proof.P[(i, j)]).abs() * w[i] * w[j]));
+    let r = square.sqrt() / Interval::point(proof.rate);
     let state = |i: usize| {
         let mut unit = DMatrix::zeros(n, n);
         unit[(i, i)] = 1.0;
-        Some((
-            extended.states[i].name.clone(),
-            r * width(&proof.P, &unit)? * GUARD,
-        ))
+        let bound = finite((r * width(&proof.P, &unit)?).hi())?;
+        Some((extended.states[i].name.clone(), bound))
     };
     Some(Bounds {
-        norm: r * width(&proof.P, &DMatrix::identity(n, n))? * GUARD,
+        norm: finite((r * width(&proof.P, &DMatrix::identity(n, n))?).hi())?,
         states: (0..n).map(state).collect::<Option<_>>()?,
     })
 }
@@ -67,22 +70,33 @@ pub(super) fn bounds(
 /// size may have no correct digit at the lower end.
 pub(super) fn spread(P: &DMatrix<f64>) -> Option<f64> {
     let n = P.nrows();
-    let largest = P.symmetric_eigenvalues().max().sqrt() * GUARD;
-    Some(largest * width(P, &DMatrix::identity(n, n))?)
+    let unit = DMatrix::identity(n, n);
+    let largest = raised(P.symmetric_eigenvalues().max(), |α| {
+        is_below(P, 1.0, &(&unit * α)).then(|| Interval::point(α).sqrt())
+    })?;
+    Some((largest * width(P, &unit)?).hi())
 }
 
 /// The smallest β, to six digits, that is proved to satisfy |Q^½ e| ≤ β·√(eᵀPe) for a
 /// projection Q.
-fn width(P: &DMatrix<f64>, Q: &DMatrix<f64>) -> Option<f64> {
+fn width(P: &DMatrix<f64>, Q: &DMatrix<f64>) -> Option<Interval> {
     // the largest eigenvalue of P^−½ Q P^−½ is that of QP⁻¹Q
     let inverse = P.clone().cholesky()?.inverse();
     let projected = Q * inverse * Q;
-    let mut β = projected.symmetric_eigenvalues().max() * (1.0 + 1e-6);
-    for _ in 0..40 {
-        if is_below(Q, 1.0 / β, P) {
-            return Some(β.sqrt() * GUARD);
+    raised(projected.symmetric_eigenvalues().max(), |β| {
+        let share = 1.0 / β;
+        is_below(Q, share, P).then(|| (Interval::ONE / Interval::point(share)).sqrt())
+    })
+}
+
+/// What is proved of the smallest number above a guess for which there is a proof.
+fn raised(guess: f64, proved: impl Fn(f64) -> Option<Interval>) -> Option<Interval> {
+    let mut bound = guess * (1.0 + RESERVE);
+    for _ in 0..TRIES {
+        if let Some(found) = proved(bound) {
+            return Some(found);
         }
-        β *= 1.1;
+        bound *= 1.1;
     }
     None
 }

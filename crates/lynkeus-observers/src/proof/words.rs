@@ -6,25 +6,8 @@ use lynkeus_structure::{Check, Condition, Extended, Point, Region, Witness, rang
 use super::Ultimate;
 use crate::{Certificate, Constant, DesignError, Verdict};
 
-/// Six significant digits.
-pub(crate) fn shown(x: f64) -> String {
-    let size = x.abs();
-    match size == 0.0 || (1e-4..1e6).contains(&size) {
-        true => {
-            let digits = if size == 0.0 {
-                0
-            } else {
-                (5 - size.log10().floor() as i32).max(0)
-            };
-            let text = format!("{x:.*}", digits as usize);
-            match text.contains('.') {
-                true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-                false => text,
-            }
-        }
-        false => format!("{x:.5e}"),
-    }
-}
+/// A number for a sentence.
+pub(crate) use lynkeus_structure::short as shown;
 
 pub(crate) fn proved(name: impl Into<String>, detail: impl Into<String>) -> Check {
     Check {

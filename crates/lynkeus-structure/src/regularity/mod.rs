@@ -12,7 +12,7 @@ mod walk;
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
-use crate::condition::short;
+use crate::words::short;
 use crate::region::Cell;
 use crate::{Condition, Region};
 use walk::Walk;

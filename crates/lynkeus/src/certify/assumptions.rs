@@ -1,5 +1,6 @@
 //! The box, the unknown influences and the measurement errors of a guarantee.
 
+use lynkeus_expr::{Graph, Interval, Node};
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Assumptions;
 use lynkeus_structure::{Dimension, Extended, Region, range};
@@ -41,29 +42,14 @@ fn drift(
         );
         return Err(name.blame(Error::input(message)));
     }
-    let mut wider = region.clone();
-    for name in &study.sensors.disturbances {
-        let Some(input) = plant.inputs.iter().find(|i| i.name == name.text) else {
-            continue;
-        };
-        wider.dimensions.push(Dimension {
-            name: input.name.clone(),
-            symbol: input.node,
-            min: input.min,
-            max: input.max,
-            integer: input.integer,
-        });
-    }
+    let wider = disturbed(study, plant, region);
     let graph = &plant.graph;
     let mut drift = vec![];
     for (&actual, &assumed) in plant.derivatives.iter().zip(&extended.derivatives) {
         let difference = graph.expr(actual) - graph.expr(assumed);
         drift.push(match actual == assumed {
             true => 0.0,
-            false => range(graph, difference.node(), &wider)
-                .map_err(|error| Error::input(error.to_string()))?
-                .enclosure
-                .magnitude(),
+            false => magnitude(graph, difference.node(), &wider)?,
         });
     }
     for input in unknown {
@@ -86,28 +72,118 @@ fn slew_of_no_unknown<'s>(study: &'s Study, unknown: &[Variable]) -> Option<&'s 
         .find(|(name, _)| !is_unknown(name))
 }
 
-/// Per measured output: three standard deviations.
+/// The box with the declared ranges of the disturbances.
+fn disturbed(study: &Study, plant: &Plant, region: &Region) -> Region {
+    let mut wider = region.clone();
+    for input in disturbances(study, plant) {
+        wider.dimensions.push(Dimension {
+            name: input.name.clone(),
+            symbol: input.node,
+            min: input.min,
+            max: input.max,
+            integer: input.integer,
+        });
+    }
+    wider
+}
+
+fn disturbances<'p>(study: &Study, plant: &'p Plant) -> Vec<&'p Variable> {
+    let named = |name: &Name| plant.inputs.iter().find(|i| i.name == name.text);
+    study
+        .sensors
+        .disturbances
+        .iter()
+        .filter_map(named)
+        .collect()
+}
+
+/// The largest absolute value; infinite where the expression has none somewhere.
+fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, Error> {
+    let found = range(graph, node, region).map_err(|error| Error::input(error.to_string()))?;
+    Ok(found.enclosure.magnitude())
+}
+
+/// Per measured output: how far what is measured may be from h(x, u) without disturbances.
+/// That is what these add to h, and three standard deviations of the noise, of which a
+/// relative one counts from the disturbed value.
 fn noise(
     study: &Study,
     plant: &Plant,
     extended: &Extended<'_>,
     region: &Region,
 ) -> Result<Vec<f64>, Error> {
+    let graph = &plant.graph;
+    let wider = disturbed(study, plant, region);
     let of = |output: &Variable| {
-        let given = study
-            .sensors
-            .noise
-            .iter()
-            .find(|(name, _)| name.text == output.name);
-        Ok(match given {
-            None => 0.0,
-            Some((_, Noise::Absolute(deviation))) => DEVIATIONS * deviation,
-            Some((_, Noise::Relative(share))) => {
-                let values = range(&plant.graph, output.node, region)
-                    .map_err(|error| Error::input(error.to_string()))?;
-                DEVIATIONS * share * values.enclosure.magnitude()
+        let declared = plant.outputs.iter().find(|o| o.name == output.name);
+        let actual = declared.map_or(output.node, |o| o.node);
+        let added = match actual == output.node {
+            true => 0.0,
+            false => {
+                let difference = graph.expr(actual) - graph.expr(output.node);
+                magnitude(graph, difference.node(), &wider)?
             }
-        })
+        };
+        let mut given = study.sensors.noise.iter();
+        let given = given.find(|(name, _)| name.text == output.name);
+        let deviation = match given {
+            None => Interval::ZERO,
+            Some((_, Noise::Absolute(deviation))) => Interval::point(*deviation),
+            Some((_, Noise::Relative(share))) => {
+                Interval::point(*share) * Interval::point(magnitude(graph, actual, &wider)?)
+            }
+        };
+        Ok((Interval::point(DEVIATIONS) * deviation + Interval::point(added)).hi())
     };
     extended.outputs.iter().map(|o| of(&o.variable)).collect()
+}
+
+/// What a reader of the guarantee has to know about what acts unknown to the observer.
+pub(super) fn notes(study: &Study, plant: &Plant, extended: &Extended<'_>) -> Vec<String> {
+    let mut notes = vec![];
+    let unbounded = disturbances(study, plant).into_iter();
+    let unbounded = unbounded.filter(|d| !(d.min.is_finite() && d.max.is_finite()));
+    let unbounded: Vec<&str> = unbounded.map(|d| d.name.as_str()).collect();
+    if !unbounded.is_empty() {
+        notes.push(format!(
+            "no bound covers what {} does to the error: it decays at the rate only up to what that leaves; declare min and max",
+            unbounded.join(", ")
+        ));
+    }
+    let unknown = &extended.states[extended.plant_states()..];
+    let given = |v: &&Variable| {
+        study
+            .certify
+            .slew
+            .iter()
+            .any(|(name, _)| name.text == v.name)
+    };
+    let (bounded, constant): (Vec<&Variable>, Vec<&Variable>) = unknown.iter().partition(given);
+    let names = |variables: &[&Variable]| {
+        let names: Vec<&str> = variables.iter().map(|v| v.name.as_str()).collect();
+        names.join(", ")
+    };
+    if !constant.is_empty() {
+        notes.push(format!(
+            "{} is taken as constant: `slew` in [certify] bounds how fast an unknown input changes",
+            names(&constant)
+        ));
+    }
+    if !bounded.is_empty() {
+        notes.push(format!(
+            "{} changes no faster than `slew` says",
+            names(&bounded)
+        ));
+    }
+    let open = unknown
+        .iter()
+        .filter(|v| !(v.min.is_finite() && v.max.is_finite()));
+    let open: Vec<&str> = open.map(|v| v.name.as_str()).collect();
+    if !open.is_empty() {
+        notes.push(format!(
+            "the unknown input {} has no declared range: the box does not bound it; declare min and max",
+            open.join(", ")
+        ));
+    }
+    notes
 }

@@ -10,7 +10,10 @@ use crate::check::point;
 /// `{verdict, rate, ultimate_bound, box, hypotheses, …}`; the hypotheses are those of
 /// the inequality, then those of the theorem.
 pub(crate) fn certificate(report: &CertifyReport) -> Value {
-    let best = report.best();
+    let mut best = report.best().clone();
+    if report.is_contradiction() {
+        (best.rate, best.ultimate_bound, best.ultimate) = (None, None, vec![]);
+    }
     let theorem = report.theorem.iter().flat_map(|t| &t.hypotheses);
     let hypotheses: Vec<Value> = report
         .certificate
@@ -19,7 +22,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
         .chain(theorem)
         .map(hypothesis)
         .collect();
-    let mut object = summary(best);
+    let mut object = summary(&best);
     object["verdict"] = json!(report.verdict().word());
     object["hypotheses"] = json!(hypotheses);
     let notes = report.theorem.iter().flat_map(|t| &t.notes);
@@ -29,6 +32,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
             .notes
             .iter()
             .chain(notes)
+            .chain(&report.assumed)
             .collect::<Vec<_>>()
     );
     if let Some(theorem) = &report.theorem {

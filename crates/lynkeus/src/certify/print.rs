@@ -24,31 +24,84 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .collect();
     writeln!(f, "box: {}", abbreviated(&sides))?;
     writeln!(f)?;
-    certificate(f, &report.certificate)?;
+    let verdict = report.certificate.verdict.word();
+    certificate(f, report, &report.certificate, verdict)?;
     if let Some(theorem) = &report.theorem {
         writeln!(f)?;
-        certificate(f, theorem)?;
+        // the observer may converge all the same
+        let verdict = match theorem.verdict {
+            Verdict::Refuted => "does not apply",
+            verdict => verdict.word(),
+        };
+        certificate(f, report, theorem, verdict)?;
+    }
+    if !report.assumed.is_empty() {
+        writeln!(f)?;
+    }
+    for note in &report.assumed {
+        writeln!(f, "note: {note}")?;
     }
     Ok(())
 }
 
 pub(super) fn conclusion(report: &CertifyReport) -> String {
     let best = report.best();
+    if report.is_contradiction() {
+        return "undecided: one way proves and the other refutes it, which is a defect of this program; believe neither and report it".to_owned();
+    }
     match (report.verdict(), best.rate) {
         (Verdict::Proved, Some(rate)) => {
-            let bound = match best.ultimate_bound {
-                Some(bound) if bound > 0.0 => format!(", in the end within {}", number(bound)),
-                _ => String::new(),
-            };
             format!(
-                "proved: the error decays at {} or faster{bound}",
-                number(rate)
+                "proved: the error decays at {} or faster{}",
+                number(rate),
+                left(report, best)
             )
         }
         (Verdict::Proved, None) => "proved: the error decays".to_owned(),
-        (Verdict::Refuted, _) => "refuted: at a point of the box the error grows".to_owned(),
+        (Verdict::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
         (Verdict::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
     }
+}
+
+/// Bounds named in the first line.
+const NAMED: usize = 4;
+
+/// What is left of the error in the end.
+fn left(report: &CertifyReport, best: &Certificate) -> String {
+    let Some(bound) = best.ultimate_bound else {
+        return "; what disturbances and measurement errors leave of it has no bound, see the notes".to_owned();
+    };
+    if bound <= 0.0 {
+        return String::new();
+    }
+    let bounds = bounds(report, best);
+    match bounds.len() {
+        0 => format!(
+            ", in the end within {} (Euclidean norm of all quantities)",
+            number(bound)
+        ),
+        count if count <= NAMED => format!(", in the end within {}", bounds.join(", ")),
+        count => format!(
+            ", in the end within {} and {} more",
+            bounds[..NAMED].join(", "),
+            count - NAMED
+        ),
+    }
+}
+
+/// `0.3 K of T`, for every bounded quantity.
+fn bounds(report: &CertifyReport, certificate: &Certificate) -> Vec<String> {
+    let estimates = &report.design.observer.estimates;
+    let unit = |name: &str| {
+        let mut found = estimates.iter().filter(|e| e.variable.name == name);
+        let unit = found.next().and_then(|e| e.variable.unit.as_deref());
+        unit.filter(|unit| !unit.is_empty())
+            .map_or(String::new(), |unit| format!(" {unit}"))
+    };
+    let entries = certificate.ultimate.iter();
+    entries
+        .map(|(name, bound)| format!("{}{} of {name}", number(*bound), unit(name)))
+        .collect()
 }
 
 /// Equal ranges of an array's elements are one entry.
@@ -70,8 +123,13 @@ fn abbreviated(sides: &[String]) -> String {
     texts.join(", ")
 }
 
-fn certificate(f: &mut fmt::Formatter<'_>, certificate: &Certificate) -> fmt::Result {
-    writeln!(f, "{}: {}", certificate.basis, certificate.verdict.word())?;
+fn certificate(
+    f: &mut fmt::Formatter<'_>,
+    report: &CertifyReport,
+    certificate: &Certificate,
+    verdict: &str,
+) -> fmt::Result {
+    writeln!(f, "{}: {verdict}", certificate.basis)?;
     conditions(f, &certificate.hypotheses, "hypotheses")?;
     for constant in &certificate.constants {
         writeln!(
@@ -83,12 +141,8 @@ fn certificate(f: &mut fmt::Formatter<'_>, certificate: &Certificate) -> fmt::Re
         )?;
     }
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {
-        let bounds: Vec<String> = certificate
-            .ultimate
-            .iter()
-            .map(|(n, b)| format!("{n} {}", number(*b)))
-            .collect();
-        writeln!(f, "  in the end within: {}", bounds.join(", "))?;
+        let bounds = bounds(report, certificate).join(", ");
+        writeln!(f, "  in the end within: {bounds}")?;
     }
     for note in &certificate.notes {
         writeln!(f, "  note: {note}")?;

@@ -1,0 +1,127 @@
+//! How the measurements enter an observer, read from its own equations.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
+use lynkeus_structure::Extended;
+use nalgebra::DMatrix;
+
+use super::edges::edges;
+use super::refute::{Side, spread};
+use crate::Observer;
+
+/// Points at which the copy of the plant is recognised.
+const POINTS: usize = 24;
+/// Rounding of the terms that cancel there, relative to their size.
+const ROUNDING: f64 = 1e-9;
+
+/// How the measurements correct the estimate.
+#[derive(Clone, Debug)]
+pub enum Correction {
+    /// x̂' = f(x̂, u) − K (ŷ − y) with this K: one row per extended state, one column per
+    /// measured output
+    Gain(DMatrix<f64>),
+    /// anything else: the entries of ∂F/∂y that are not 0
+    Varying(Vec<Injection>),
+}
+
+/// ∂F_i/∂y_j of an observer z' = F(t, z, u, y).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Injection {
+    /// name of the observer's state
+    pub state: String,
+    /// name of the measured output
+    pub output: String,
+    /// the derivative as an expression of time, the observer's states and its signals
+    pub node: Node,
+}
+
+impl Correction {
+    /// The correction of an observer of the plant.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an expression reads what the observer does not know.
+    pub fn of(extended: &Extended<'_>, observer: &Observer) -> Result<Self, MissingInput> {
+        let graph = extended.graph();
+        let measured: Vec<Node> = observer.measured.iter().map(|m| m.symbol).collect();
+        let jacobian = jacobian::forward(graph, &observer.derivatives, &measured);
+        let mut K = DMatrix::zeros(observer.states.len(), measured.len());
+        let mut constant = edges(graph, &observer.derivatives, &measured).is_empty();
+        for &(i, j, node) in &jacobian.entries {
+            if graph.symbols_of(&[node]).is_empty() {
+                let mut value = [0.0];
+                Tape::new(graph, &[], &[node])?
+                    .evaluator()
+                    .eval(&[], &mut value);
+                K[(i, j)] = value[0];
+            } else {
+                constant = false;
+            }
+        }
+        if constant && is_copy(extended, observer, &K)? {
+            return Ok(Self::Gain(K));
+        }
+        let entries = jacobian.entries.iter().map(|&(i, j, node)| Injection {
+            state: observer.states[i].0.name.clone(),
+            output: observer.measured[j].name.clone(),
+            node,
+        });
+        Ok(Self::Varying(entries.collect()))
+    }
+}
+
+/// Whether the observer's states are the estimate and F(x̂, u, h(x̂)) = f(x̂, u), at
+/// points spread over the box.
+fn is_copy(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    K: &DMatrix<f64>,
+) -> Result<bool, MissingInput> {
+    let pairs = observer.states.iter().zip(&observer.estimates);
+    let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
+    let n = extended.states.len();
+    if same != n || observer.states.len() != n || !observer.input_derivatives.is_empty() {
+        return Ok(false);
+    }
+    let graph = extended.graph();
+    let hats = extended.states.iter().zip(&observer.states);
+    let hats: HashMap<Node, Node> = hats
+        .map(|(state, (hat, _))| (state.node, hat.symbol))
+        .collect();
+    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let seen = graph.substitute(&outputs, &hats);
+    let signals = observer.measured.iter().map(|m| m.symbol);
+    let measured: HashMap<Node, Node> = signals.zip(seen.iter().copied()).collect();
+    let mut roots = graph.substitute(&observer.derivatives, &measured);
+    roots.extend(graph.substitute(&extended.derivatives, &hats));
+    roots.extend(&seen);
+    let mut region = extended.region();
+    for side in &mut region.dimensions {
+        side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
+    }
+    let sides: Vec<Side> = region.dimensions.iter().map(Side::finite).collect();
+    let mut evaluator = Tape::new(graph, &region.symbols(), &roots)?.evaluator();
+    let mut values = vec![0.0; roots.len()];
+    let mut compared = 0;
+    for index in 0..POINTS {
+        evaluator.eval(&spread(&sides, index), &mut values);
+        if !values.iter().all(|x| x.is_finite()) {
+            continue;
+        }
+        let (F, rest) = values.split_at(n);
+        let (f, y) = rest.split_at(n);
+        let close = |i: usize| {
+            let through: f64 = y
+                .iter()
+                .enumerate()
+                .map(|(j, y)| (K[(i, j)] * y).abs())
+                .sum();
+            (F[i] - f[i]).abs() <= ROUNDING * (F[i].abs() + f[i].abs() + through)
+        };
+        if !(0..n).all(close) {
+            return Ok(false);
+        }
+        compared += 1;
+    }
+    Ok(compared > 0)
+}
