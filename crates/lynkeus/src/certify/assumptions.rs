@@ -1,13 +1,14 @@
 //! The box, the unknown influences and the measurement errors of a guarantee.
 
-use lynkeus_model::{Plant, Variable};
+use lynkeus_expr::Node;
+use lynkeus_model::Plant;
 use lynkeus_observers::Assumptions;
-use lynkeus_structure::{Dimension, Extended, Region, range};
+use lynkeus_structure::{Dimension, Extended, Measurement, Region, range};
 
 use crate::study::{Name, Noise};
 use crate::{Error, Study};
 
-/// Measurement errors are taken to stay within this many standard deviations.
+/// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
 /// What the guarantee takes for granted.
@@ -41,30 +42,10 @@ fn drift(
         );
         return Err(name.blame(Error::input(message)));
     }
-    let mut wider = region.clone();
-    for name in &study.sensors.disturbances {
-        let Some(input) = plant.inputs.iter().find(|i| i.name == name.text) else {
-            continue;
-        };
-        wider.dimensions.push(Dimension {
-            name: input.name.clone(),
-            symbol: input.node,
-            min: input.min,
-            max: input.max,
-            integer: input.integer,
-        });
-    }
-    let graph = &plant.graph;
+    let wider = with_disturbances(study, plant, region);
     let mut drift = vec![];
     for (&actual, &assumed) in plant.derivatives.iter().zip(&extended.derivatives) {
-        let difference = graph.expr(actual) - graph.expr(assumed);
-        drift.push(match actual == assumed {
-            true => 0.0,
-            false => range(graph, difference.node(), &wider)
-                .map_err(|error| Error::input(error.to_string()))?
-                .enclosure
-                .magnitude(),
-        });
+        drift.push(largest_difference(plant, actual, assumed, &wider)?);
     }
     for input in unknown {
         let given = study
@@ -86,28 +67,69 @@ fn slew_of_no_unknown<'s>(study: &'s Study, unknown: &[Variable]) -> Option<&'s 
         .find(|(name, _)| !is_unknown(name))
 }
 
-/// Per measured output: three standard deviations.
+/// The box with the declared ranges of the disturbances.
+fn with_disturbances(study: &Study, plant: &Plant, region: &Region) -> Region {
+    let mut wider = region.clone();
+    for name in &study.sensors.disturbances {
+        let Some(input) = plant.inputs.iter().find(|i| i.name == name.text) else {
+            continue;
+        };
+        wider.dimensions.push(Dimension {
+            name: input.name.clone(),
+            symbol: input.node,
+            min: input.min,
+            max: input.max,
+            integer: input.integer,
+        });
+    }
+    wider
+}
+
+fn largest(plant: &Plant, node: Node, region: &Region) -> Result<f64, Error> {
+    let values = range(&plant.graph, node, region);
+    let values = values.map_err(|error| Error::input(error.to_string()))?;
+    Ok(values.enclosure.magnitude())
+}
+
+fn largest_difference(
+    plant: &Plant,
+    actual: Node,
+    assumed: Node,
+    region: &Region,
+) -> Result<f64, Error> {
+    if actual == assumed {
+        return Ok(0.0);
+    }
+    let difference = plant.graph.expr(actual) - plant.graph.expr(assumed);
+    largest(plant, difference.node(), region)
+}
+
+/// Per measured output: the bound of a uniform noise, three standard deviations of a
+/// Gaussian one, and what disturbances that stand in the output add to it.
 fn noise(
     study: &Study,
     plant: &Plant,
     extended: &Extended<'_>,
     region: &Region,
 ) -> Result<Vec<f64>, Error> {
-    let of = |output: &Variable| {
-        let given = study
-            .sensors
-            .noise
-            .iter()
-            .find(|(name, _)| name.text == output.name);
-        Ok(match given {
+    let wider = with_disturbances(study, plant, region);
+    let of = |output: &Measurement| {
+        let (name, assumed) = (&output.variable.name, output.variable.node);
+        let declared = plant.outputs.iter().find(|o| o.name == *name);
+        let actual = declared.map_or(assumed, |o| o.node);
+        let given = study.sensors.noise.iter().find(|(of, _)| of.text == *name);
+        // a share of nothing is nothing, of an unbounded output too
+        let noise = match given.map(|(_, n)| *n).filter(|n| n.size() > 0.0) {
             None => 0.0,
-            Some((_, Noise::Absolute(deviation))) => DEVIATIONS * deviation,
-            Some((_, Noise::Relative(share))) => {
-                let values = range(&plant.graph, output.node, region)
-                    .map_err(|error| Error::input(error.to_string()))?;
-                DEVIATIONS * share * values.enclosure.magnitude()
-            }
+            Some(Noise::Absolute(deviation)) => DEVIATIONS * deviation,
+            Some(Noise::Uniform(bound)) => bound,
+            Some(Noise::Relative(share)) => DEVIATIONS * share * largest(plant, actual, &wider)?,
+        };
+        let disturbance = largest_difference(plant, actual, assumed, &wider)?;
+        Ok(match noise == 0.0 {
+            true => disturbance,
+            false => (noise + disturbance).next_up(),
         })
     };
-    extended.outputs.iter().map(|o| of(&o.variable)).collect()
+    extended.outputs.iter().map(of).collect()
 }
