@@ -1,6 +1,11 @@
 //! The gain of a chain of integrators: S + AᵀS + SA − CᵀC = 0.
 
+use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, SymmetricEigen};
+
+/// More than what the eigenvalue solver loses of the largest eigenvalue, which it finds
+/// to some units in the last place; not so of the smallest one.
+const EIGENVALUE: f64 = 1.0 + 1e-12;
 
 /// The solution S of S + AᵀS + SA − CᵀC = 0 for x₁' = x₂, …, xₙ' = 0, y = x₁, and what
 /// proofs need of it. A − S⁻¹CᵀC has all its eigenvalues at −1.
@@ -14,9 +19,9 @@ use nalgebra::{DMatrix, SymmetricEigen};
 pub struct Chain {
     /// S⁻¹Cᵀ: the binomial coefficients C¹ₙ, …, Cⁿₙ
     pub gain: Vec<f64>,
-    /// smallest eigenvalue of S
+    /// a lower bound of the smallest eigenvalue of S
     pub smallest: f64,
-    /// largest eigenvalue of S
+    /// an upper bound of the largest eigenvalue of S
     pub largest: f64,
     /// diagonal of S: the binomial coefficients C^{i−1}_{2i−2}
     pub diagonal: Vec<f64>,
@@ -26,21 +31,59 @@ pub struct Chain {
 
 impl Chain {
     /// The chain of `n` integrators.
+    ///
+    /// S is Pascal's symmetric matrix but for signs, S = LLᵀ with L_ij = ±C^j_i and
+    /// (L⁻¹)_ij = C^j_i (counted from 0). So (S⁻¹)_ii = Σ_k (C^i_k)² is a whole number, and
+    /// S⁻¹ is similar to S: the smallest eigenvalue is one over the largest.
     pub fn new(n: usize) -> Self {
         let S = matrix(n);
         let values = SymmetricEigen::new(S.clone()).eigenvalues;
-        let inverse = S.clone().cholesky().map(|c| c.inverse());
-        let inverse_diagonal = inverse.map_or(vec![f64::INFINITY; n], |inverse| {
-            inverse.diagonal().iter().copied().collect()
-        });
+        let largest = values.iter().copied().fold(0.0, f64::max) * EIGENVALUE;
+        let squares = |i: usize| (i..n).map(move |k| binomial(k, i).powi(2));
         Self {
             diagonal: S.diagonal().iter().copied().collect(),
             gain: (1..=n).map(|i| binomial(n, i)).collect(),
-            smallest: values.iter().copied().fold(f64::INFINITY, f64::min),
-            largest: values.iter().copied().fold(0.0, f64::max),
-            inverse_diagonal,
+            smallest: 1.0 / largest,
+            largest,
+            inverse_diagonal: (0..n).map(|i| squares(i).sum()).collect(),
         }
     }
+}
+
+/// Whether a chain of `k` integrators is stable with the first `k` of the gains of a chain
+/// of `n`: an enclosure of the smallest of Routh's numbers of
+/// s^k + C¹ₙ s^{k−1} + … + C^kₙ, or of the first that is not positive. Positive: all zeros
+/// lie to the left of the imaginary axis; negative: some lie to the right.
+///
+/// Not every shorter chain is stable: the fifth partial sum of the exponential series, which
+/// this is for large n, has zeros to the right.
+///
+/// ```
+/// use lynkeus_gain::integrators::shortened_stability;
+/// assert!(shortened_stability(12, 6).is_positive());
+/// assert!(shortened_stability(13, 6).is_negative());
+/// ```
+pub fn shortened_stability(n: usize, k: usize) -> Interval {
+    let of_parity = |parity: usize| -> Vec<Interval> {
+        let places = (parity..=k).step_by(2);
+        places.map(|i| Interval::point(binomial(n, i))).collect()
+    };
+    let (mut above, mut row) = (of_parity(0), of_parity(1));
+    let mut least = above[0];
+    while let Some(&pivot) = row.first() {
+        if !pivot.is_positive() {
+            return pivot;
+        }
+        least = least.min(pivot);
+        let factor = above[0] / pivot;
+        let entry = |j: usize| {
+            let right = row.get(j + 1).copied().unwrap_or(Interval::ZERO);
+            above[j + 1] - factor * right
+        };
+        let next = (0..above.len() - 1).map(entry).collect();
+        above = std::mem::replace(&mut row, next);
+    }
+    least
 }
 
 /// S_ij = (−1)^{i+j} C^{j−1}_{i+j−2}
@@ -72,7 +115,42 @@ mod tests {
             let chain = Chain::new(n);
             let back = &S * DMatrix::from_column_slice(n, 1, &chain.gain) - C.transpose();
             assert!(back.amax() < 1e-9, "{back}");
-            assert!((chain.inverse_diagonal[0] - n as f64).abs() < 1e-6);
+            let inverse = S.try_inverse().unwrap();
+            for i in 0..n {
+                let found = chain.inverse_diagonal[i];
+                assert!(
+                    (found - inverse[(i, i)]).abs() < 1e-9 * found,
+                    "{i}: {found}"
+                );
+            }
+        }
+    }
+
+    /// Eigenvalues of Pascal's matrix of ten rows to twenty digits (mpmath, 40 digits):
+    /// a solver in double precision has half of the digits of the smallest one.
+    #[test]
+    fn the_eigenvalues_are_bounds() {
+        let chain = Chain::new(10);
+        let (largest, smallest) = (64460.88501701744511, 1.5513283749300115028e-5);
+        assert!(chain.largest >= largest && chain.largest < largest * (1.0 + 1e-11));
+        assert!(chain.smallest <= smallest && chain.smallest > smallest * (1.0 - 1e-11));
+    }
+
+    /// The first unstable shortened chain of each length, by NumPy's roots of the
+    /// polynomials: the largest real part changes from below −0.01 to above 0.01.
+    #[test]
+    fn shortened_chains() {
+        for (k, first) in [(5, 24), (6, 13), (7, 12), (8, 12), (9, 12), (10, 13)] {
+            for n in k..first {
+                assert!(shortened_stability(n, k).is_positive(), "{k} of {n}");
+            }
+            assert!(
+                shortened_stability(first, k).is_negative(),
+                "{k} of {first}"
+            );
+        }
+        for k in 1..=4 {
+            assert!((k..60).all(|n| shortened_stability(n, k).is_positive()));
         }
     }
 }

@@ -163,7 +163,8 @@ pub(crate) fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
     image.node()
 }
 
-fn middle(variable: &Variable) -> f64 {
+/// The middle of a range, 0 where it has none.
+pub(crate) fn middle(variable: &Variable) -> f64 {
     let middle = variable.min + (variable.max - variable.min) / 2.0;
     if middle.is_finite() { middle } else { 0.0 }
 }

@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
 
 use crate::Error;
 
-/// Gaussian noise on measured outputs, drawn anew every `sample_step` and held
-/// in between.
+/// Noise on measured outputs, Gaussian or uniform, drawn anew every `sample_step` and
+/// held in between.
 ///
 /// Every output has a random stream of its own: the ChaCha8 generator seeded
 /// with `seed` (as `SeedableRng::seed_from_u64` does), on the stream whose number
-/// is the 64-bit FNV-1a hash of the output's name, turned into normal deviates by
-/// the ziggurat method of `rand_distr` 0.6. The same seed gives the same noise on
+/// is the 64-bit FNV-1a hash of the output's name, turned by `rand_distr` 0.6 into normal
+/// deviates (the ziggurat method) or into uniform ones. The same seed gives the same noise on
 /// every machine, and a sensor added to a study leaves the noise of the others
 /// as it was.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,13 +27,27 @@ pub struct Noise {
     pub levels: BTreeMap<String, Level>,
 }
 
-/// Standard deviation of the noise of one output.
+/// The noise of one output: the standard deviation of a Gaussian one, or the bound of a
+/// uniform one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Level {
-    /// in the unit of the output
+    /// standard deviation, in the unit of the output
     Absolute(f64),
-    /// as a fraction of the present value: 0.05 is 5 %
+    /// standard deviation as a fraction of the present value: 0.05 is 5 %
     Relative(f64),
+    /// every error from −a to a is equally likely, none is larger; a in the unit of the
+    /// output. The standard deviation is a/√3
+    Uniform(f64),
+}
+
+impl Level {
+    /// The number that says how strong it is: a deviation, a fraction or a bound.
+    #[must_use]
+    pub fn size(self) -> f64 {
+        match self {
+            Level::Absolute(size) | Level::Relative(size) | Level::Uniform(size) => size,
+        }
+    }
 }
 
 /// The noise of all outputs of a plant, in their order.
@@ -56,7 +70,7 @@ impl Sensors {
                 let expected = format!("one of the outputs: {}", outputs.join(", "));
                 return Err(Error::setting("noise of", expected, format!("'{name}'")));
             }
-            let (Level::Absolute(value) | Level::Relative(value)) = *level;
+            let value = level.size();
             if !(value >= 0.0 && value.is_finite()) {
                 let what = format!("noise of '{name}'");
                 return Err(Error::setting(what, "a finite number, 0 or above", value));
@@ -85,7 +99,15 @@ impl Sensors {
     /// Draws the next sample of every channel.
     pub(crate) fn draw(&mut self) {
         for channel in self.channels.iter_mut().flatten() {
-            channel.deviate = StandardNormal.sample(&mut channel.stream);
+            channel.deviate = match channel.level {
+                Level::Absolute(_) | Level::Relative(_) => {
+                    StandardNormal.sample(&mut channel.stream)
+                }
+                Level::Uniform(_) => {
+                    let share: f64 = StandardUniform.sample(&mut channel.stream);
+                    2.0 * share - 1.0
+                }
+            };
         }
     }
 
@@ -94,7 +116,7 @@ impl Sensors {
         match &self.channels[index] {
             None => value,
             Some(Channel { level, deviate, .. }) => match level {
-                Level::Absolute(deviation) => value + deviation * deviate,
+                Level::Absolute(size) | Level::Uniform(size) => value + size * deviate,
                 Level::Relative(fraction) => value * (1.0 + fraction * deviate),
             },
         }
@@ -113,8 +135,12 @@ mod tests {
     use super::*;
 
     fn draws(seed: u64, outputs: &[&str], of: usize, count: usize) -> Vec<f64> {
+        draws_of(Level::Absolute(2.0), seed, outputs, of, count)
+    }
+
+    fn draws_of(level: Level, seed: u64, outputs: &[&str], of: usize, count: usize) -> Vec<f64> {
         let outputs: Vec<String> = outputs.iter().map(ToString::to_string).collect();
-        let levels = outputs.iter().map(|n| (n.clone(), Level::Absolute(2.0)));
+        let levels = outputs.iter().map(|n| (n.clone(), level));
         let noise = Noise {
             seed,
             sample_step: None,
@@ -160,10 +186,40 @@ mod tests {
         assert!((beyond - 0.05).abs() < 0.002, "{beyond}");
     }
 
+    /// Mean 0, variance a²/3 and fourth moment a⁴/5; no error beyond the bound.
+    #[test]
+    fn uniform_noise_fills_its_bound_and_no_more() {
+        let n = 200_000;
+        let e: Vec<f64> = draws_of(Level::Uniform(0.5), 3, &["y"], 0, n)
+            .iter()
+            .map(|y| y - 10.0)
+            .collect();
+        let mean = |power: i32| e.iter().map(|e| e.powi(power)).sum::<f64>() / n as f64;
+        // four standard errors of each moment
+        assert!(mean(1).abs() < 4.0 * 0.5 / (3.0 * n as f64).sqrt());
+        assert!((mean(2) / (0.25 / 3.0) - 1.0).abs() < 0.01, "{}", mean(2));
+        assert!(
+            (mean(4) / (0.0625 / 5.0) - 1.0).abs() < 0.015,
+            "{}",
+            mean(4)
+        );
+        let largest = e.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+        assert!(
+            largest <= 0.5 * (1.0 + 1e-14) && largest > 0.4999,
+            "{largest}"
+        );
+        let lag: f64 = e.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n as f64;
+        assert!(lag.abs() < 1e-3, "{lag}");
+    }
+
     #[test]
     fn impossible_levels_are_refused() {
         let outputs = ["y".to_string()];
-        for (name, level) in [("z", Level::Absolute(1.0)), ("y", Level::Relative(-0.1))] {
+        for (name, level) in [
+            ("z", Level::Absolute(1.0)),
+            ("y", Level::Relative(-0.1)),
+            ("y", Level::Uniform(f64::INFINITY)),
+        ] {
             let noise = Noise {
                 levels: [(name.to_string(), level)].into(),
                 ..Noise::default()

@@ -88,6 +88,7 @@ fn noise(
         let level = match *noise {
             Noise::Absolute(deviation) => Level::Absolute(deviation),
             Noise::Relative(share) => Level::Relative(share),
+            Noise::Uniform(bound) => Level::Uniform(bound),
         };
         levels.insert(name.text.clone(), level);
     }

@@ -17,22 +17,24 @@
 //! Beyond the print: C(u) need not be square, and y = C(u)x + d(u) is understood.
 
 mod excitation;
+mod gain;
 mod gramian;
 mod lyapunov;
+mod settings;
 mod theorem;
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
-use lynkeus_gain::UnitFactor;
 use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal};
 
 use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
-    Tuning, TuningError, Value,
+    Tuning,
 };
 use excitation::least_eigenvalue;
 use lyapunov::{Factor, Sparse};
+use settings::Settings;
 
 const NAME: &str = "state-affine";
 
@@ -54,7 +56,7 @@ impl Family for StateAffine {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["theta", "S0", "alarm"]
+        &settings::NAMES
     }
 
     fn examine(
@@ -119,75 +121,6 @@ fn form(
     Ok(Ok((form, examination)))
 }
 
-/// The study's numbers.
-struct Keys {
-    θ: f64,
-    /// S(0) in the order of the blocks
-    S0: UnitFactor,
-    alarm: Option<f64>,
-}
-
-impl Keys {
-    /// `order`: the states in the order of the blocks.
-    fn new(tuning: &Tuning, order: &[usize]) -> Result<Self, TuningError> {
-        let expected = "a positive number (the gain of block k grows like theta^k)";
-        let missing = || TuningError::new("theta", expected, "nothing");
-        Ok(Self {
-            θ: positive(tuning, "theta", expected)?.ok_or_else(missing)?,
-            S0: start(tuning, order)?,
-            alarm: positive(tuning, "alarm", "a positive number")?,
-        })
-    }
-}
-
-fn positive(tuning: &Tuning, key: &str, expected: &str) -> Result<Option<f64>, TuningError> {
-    match tuning.values.get(key) {
-        None => Ok(None),
-        Some(Value::Number(x)) if *x > 0.0 && x.is_finite() => Ok(Some(*x)),
-        Some(other) => Err(TuningError::new(key, expected, other)),
-    }
-}
-
-/// S(0): s·I for a number s, or a matrix in the order of the plant's states.
-fn start(tuning: &Tuning, order: &[usize]) -> Result<UnitFactor, TuningError> {
-    let n = order.len();
-    let expected = format!(
-        "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
-    );
-    let wrong = |found: String| TuningError::new("S0", expected.clone(), found);
-    let given = match tuning.values.get("S0") {
-        None => scaled_identity(n, 1.0),
-        Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => scaled_identity(n, *s),
-        Some(Value::List(rows)) => {
-            let entry = |x: &Value| match x {
-                Value::Number(x) => Ok(*x),
-                other => Err(wrong(other.to_string())),
-            };
-            let row = |row: &Value| match row {
-                Value::List(row) => row.iter().map(entry).collect::<Result<Vec<f64>, _>>(),
-                other => Err(wrong(other.to_string())),
-            };
-            rows.iter().map(row).collect::<Result<Vec<_>, _>>()?
-        }
-        Some(other) => return Err(wrong(other.to_string())),
-    };
-    if given.len() != n {
-        return Err(wrong(format!("{} rows", given.len())));
-    }
-    // refused in the user's order, factored in that of the blocks
-    UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
-    let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
-    let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
-    UnitFactor::new(&ordered).map_err(|error| wrong(error.to_string()))
-}
-
-fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {
-    let entry = |i: usize, j: usize| if i == j { s } else { 0.0 };
-    (0..n)
-        .map(|i| (0..n).map(|j| entry(i, j)).collect())
-        .collect()
-}
-
 /// Observer (7)–(8).
 fn assemble(
     extended: &Extended<'_>,
@@ -197,40 +130,33 @@ fn assemble(
 ) -> Result<Design, DesignError> {
     let graph = extended.graph();
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let keys = Keys::new(tuning, &order)?;
+    let settings = Settings::read(tuning, &order)?;
     let copy = Copy::new(extended, tuning);
     let Matrices { C, F } = Matrices::new(&copy, form, &order);
     let names: Vec<&str> = order
         .iter()
         .map(|&i| extended.states[i].name.as_str())
         .collect();
-    let factor = Factor::new(graph, &names, &keys.S0);
+    let factor = Factor::new(graph, &names, &settings.S0);
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let powers = form
         .blocks()
         .enumerate()
-        .flat_map(|(k, block)| block.iter().map(move |_| keys.θ.powi(k as i32 + 1)));
+        .flat_map(|(k, block)| block.iter().map(move |_| settings.θ.powi(k as i32 + 1)));
     let correction = factor.gain(&v, &innovations(&copy));
     for ((&state, power), z) in order.iter().zip(powers).zip(correction) {
         if let Some(z) = z {
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
-    derivatives.extend(factor.derivatives(keys.θ, &F, &v));
-    let alarm = match keys.alarm {
-        Some(alarm) => alarm,
-        None => ALARM * least_reach(extended, form)?,
-    };
+    derivatives.extend(factor.derivatives(settings.θ, &F, &v));
+    let alarm = alarm(extended, form, &settings)?;
     let mut observer = copy.observer(NAME, tuning, derivatives)?;
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
-    let parameters = vec![
-        ("θ".to_owned(), keys.θ.to_string()),
-        ("blocks".to_owned(), form.describe(extended)),
-        ("alarm".to_owned(), format!("excitation below {alarm:.3e}")),
-    ];
+    let parameters = gain::parameters(&copy, form, &order, &settings, tuning, alarm)?;
     Ok(Design {
         observer,
         notes: outside_last(extended, form).into_iter().collect(),
@@ -238,6 +164,18 @@ fn assemble(
         gains: vec![],
         parameters,
     })
+}
+
+/// Below this excitation the flag is raised.
+fn alarm(
+    extended: &Extended<'_>,
+    form: &Superdiagonal,
+    settings: &Settings,
+) -> Result<f64, DesignError> {
+    match settings.alarm {
+        Some(alarm) => Ok(alarm),
+        None => Ok(ALARM * least_reach(extended, form)?),
+    }
 }
 
 /// λ_min(S) with the flag that excitation is lost.

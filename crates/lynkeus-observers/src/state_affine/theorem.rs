@@ -16,7 +16,8 @@ use lynkeus_expr::{Interval, Node};
 use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
 
 use super::gramian::{TAU, above, below, largest_eigenvalue};
-use super::{ALARM, Keys, form, least_reach};
+use super::settings::Settings;
+use super::{alarm, form};
 use crate::proof::metzler::spectral_radius;
 use crate::proof::slopes::{Slope, magnitude, slopes, undeclared};
 use crate::proof::sum;
@@ -36,29 +37,26 @@ pub(super) fn certificate(
         Err(examination) => return Err(DesignError::Refused(Box::new(examination))),
     };
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let keys = Keys::new(tuning, &order)?;
+    let settings = Settings::read(tuning, &order)?;
     let block: Vec<usize> = form
         .blocks()
         .enumerate()
         .flat_map(|(k, b)| b.iter().map(move |_| k))
         .collect();
-    let alarm = match keys.alarm {
-        Some(alarm) => alarm,
-        None => ALARM * least_reach(extended, &form)?,
-    };
+    let alarm = alarm(extended, &form, &settings)?;
     let study = Study {
         extended,
         assumptions,
         form: &form,
         order,
         block,
-        keys,
+        settings,
         alarm,
     };
     // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
     let hidden = examination.checks.into_iter();
     let hidden = hidden.filter(|c| matches!(c.verdict, Condition::Refuted(_)));
-    study.certificate(hidden.collect(), tuning.clamp)
+    study.certificate(hidden.collect())
 }
 
 struct Study<'a> {
@@ -69,7 +67,7 @@ struct Study<'a> {
     order: Vec<usize>,
     /// the block of each place
     block: Vec<usize>,
-    keys: Keys,
+    settings: Settings,
     alarm: f64,
 }
 
@@ -99,7 +97,7 @@ impl Study<'_> {
         self.order.iter().position(|s| *s == state)
     }
 
-    fn certificate(&self, mut checks: Vec<Check>, clamp: bool) -> Result<Certificate, DesignError> {
+    fn certificate(&self, mut checks: Vec<Check>) -> Result<Certificate, DesignError> {
         let next = |row: usize, column: usize| match (self.place(row), self.place(column)) {
             (Some(p), Some(q)) => self.block[q] > self.block[p],
             _ => false,
@@ -121,7 +119,7 @@ impl Study<'_> {
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        certificate.notes.push(box_note(clamp));
+        certificate.notes.push(box_note(self.settings.clamp));
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, &spectrum);
         }
@@ -189,7 +187,7 @@ impl Study<'_> {
         let drift = &self.assumptions.drift;
         let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
         match self.order.iter().find(|state| !known(state)) {
-            None => proved(name, "by the assumed drift"),
+            None => proved(name, self.assumed_drift()),
             Some(&state) => {
                 let name_of = &self.extended.states[state].name;
                 undecided(
@@ -197,6 +195,22 @@ impl Study<'_> {
                     format!("no bound is assumed for the drift of {name_of}"),
                 )
             }
+        }
+    }
+
+    fn assumed_drift(&self) -> String {
+        let n = self.extended.plant_states();
+        let unknown = self.extended.states.iter().enumerate().skip(n);
+        let constant: Vec<&str> = unknown
+            .filter(|(i, _)| self.assumptions.drift[*i] == 0.0)
+            .map(|(_, v)| v.name.as_str())
+            .collect();
+        match constant.is_empty() {
+            true => "by the assumed drift".to_owned(),
+            false => format!(
+                "by the assumed drift, which takes {} as constant",
+                constant.join(", ")
+            ),
         }
     }
 
@@ -229,7 +243,8 @@ impl Study<'_> {
         excitation: Option<f64>,
         constants: &mut Vec<Constant>,
     ) -> Spectrum {
-        let largest = largest_eigenvalue(&above(&self.keys.S0, &sizes.C, &sizes.F, &self.block));
+        let largest =
+            largest_eigenvalue(&above(&self.settings.S0, &sizes.C, &sizes.F, &self.block));
         let smallest = excitation.unwrap_or(self.alarm);
         let source = match excitation {
             Some(_) => "lower bound of the eigenvalues of S(t), t ≥ 10/θ",
@@ -292,7 +307,7 @@ impl Study<'_> {
             let loss = ratio * Interval::point(self.coupling(slopes, θ)) / Interval::point(θ);
             (Interval::point(0.5) - loss).lo()
         };
-        let θ = self.keys.θ;
+        let θ = self.settings.θ;
         let θ0 = first(θ, |θ| μ(θ) > 0.0);
         let mut add = |name: &str, value: f64, meaning: &str| {
             constants.push(Constant::new(name, value, meaning));
@@ -331,7 +346,7 @@ impl Study<'_> {
     /// Rate and ultimate bounds: of the certificate where A4 is proved, else as
     /// constants that hold while the monitor raises no flag.
     fn conclude(&self, certificate: &mut Certificate, rate: f64, spectrum: &Spectrum) {
-        let θ = Interval::point(self.keys.θ);
+        let θ = Interval::point(self.settings.θ);
         let scale = |p: usize| θ.powi(self.block[p] as i32);
         let drift = self.order.iter().enumerate().map(|(p, &state)| {
             let d = Interval::point(self.assumptions.drift[state]) / scale(p);

@@ -7,70 +7,44 @@ use lynkeus_gain::integrators;
 use lynkeus_structure::{Extended, Matrix};
 
 use super::NAME;
-use super::bound;
+use super::bound::{self, Choice};
 use super::form::Form;
-use crate::conditions::names;
+use super::matrices::Matrices;
+use super::settings::{Settings, Thetas};
 use crate::estimate::{Copy, limited};
-use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
-
-/// θ₁ and θ₂ with what is to be said about them.
-pub(super) struct Thetas {
-    pub θ1: f64,
-    pub θ2: f64,
-    pub notes: Vec<String>,
-}
+use crate::matrices::Start;
+use crate::{Design, DesignError, Examination, Tuning};
 
 pub(super) fn design(
     extended: &Extended<'_>,
     tuning: &Tuning,
+    settings: &Settings,
     form: &Form<'_, '_>,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    let thetas = match given(tuning)? {
-        Some(thetas) => thetas,
+    let chosen = match settings.thetas {
+        Some(thetas) => Choice::given(thetas),
         None => bound::thetas(form)?,
     };
     let copy = Copy::new(extended, tuning);
-    let derivatives = derivatives(form, &copy, tuning, &thetas);
-    let outputs: Vec<&str> = form
-        .first
-        .iter()
-        .map(|&i| extended.outputs[i].variable.name.as_str())
-        .collect();
+    let thetas = chosen.thetas;
+    let derivatives = derivatives(form, &copy, settings, &thetas);
+    let start = Start::new(&copy, tuning)?;
+    let matrices = Matrices::new(form, thetas);
     Ok(Design {
         observer: copy.observer(NAME, tuning, derivatives)?,
-        gains: gains(form, &thetas),
-        parameters: vec![
-            ("θ1".into(), thetas.θ1.to_string()),
-            ("θ2".into(), thetas.θ2.to_string()),
-            ("partition".into(), outputs.join(", ")),
-        ],
-        notes: thetas.notes,
+        gains: matrices.gains(&start)?,
+        parameters: matrices.parameters(&start)?,
+        notes: chosen.notes,
         examination,
     })
-}
-
-pub(super) fn given(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
-    let Some(found) = tuning.numbers("theta")? else {
-        return Ok(None);
-    };
-    let expected = "two positive numbers [θ1, θ2]: θ1 for the unknown inputs, θ2 for the states";
-    let [θ1, θ2] = found[..] else {
-        let found = format!("{} number(s)", found.len());
-        return Err(TuningError::new("theta", expected, found));
-    };
-    if let Some(wrong) = [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
-        return Err(TuningError::new("theta", expected, wrong));
-    }
-    let notes = vec![];
-    Ok(Some(Thetas { θ1, θ2, notes }))
 }
 
 /// The right-hand side of (14), in the order of the extended states.
 fn derivatives(
     form: &Form<'_, '_>,
     copy: &Copy<'_, '_>,
-    tuning: &Tuning,
+    settings: &Settings,
     thetas: &Thetas,
 ) -> Vec<Node> {
     let extended = form.extended;
@@ -86,7 +60,7 @@ fn derivatives(
     let at_s = factors.map(|node| graph.substitute(&[node], &measured)[0]);
     let e1 = column(graph, &innovations(copy, &form.first));
     let e2 = column(graph, &innovations(copy, &form.second));
-    let Thetas { θ1, θ2, .. } = *thetas;
+    let Thetas { θ1, θ2 } = *thetas;
     let drift = copy.at_estimate(&form.layers.drift);
     let input = at_s.times(&v̂);
     let mut total: Vec<Expr<'_>> = (0..n)
@@ -107,7 +81,7 @@ fn derivatives(
     let D_e1: Vec<Matrix<'_>> = (1..=form.q())
         .map(|k| at_measured.γ_times(k, &e1))
         .collect();
-    let Λ2 = at_tilde(&at_measured, copy, tuning, &measured, &D_e1);
+    let Λ2 = at_tilde(&at_measured, copy, settings, &measured, &D_e1);
     let K = integrators::Chain::new(form.q()).gain;
     for k in 1..=form.q() {
         let correction = Λ2[k - 1].left_divide(&e2);
@@ -137,7 +111,7 @@ fn innovations(copy: &Copy<'_, '_>, outputs: &[usize]) -> Vec<Node> {
 fn at_tilde<'p>(
     form: &Form<'_, 'p>,
     copy: &Copy<'_, '_>,
-    tuning: &Tuning,
+    settings: &Settings,
     measured: &HashMap<Node, Node>,
     D_e1: &[Matrix<'_>],
 ) -> Vec<Matrix<'p>> {
@@ -153,7 +127,7 @@ fn at_tilde<'p>(
             let hat = graph.expr(copy.hats[state].symbol);
             let tilde = (hat - graph.expr(D_e1[k - 1].node(row, 0))).node();
             let variable = &extended.states[state];
-            let image = match tuning.clamp {
+            let image = match settings.clamp {
                 true => limited(graph, tilde, variable),
                 false => tilde,
             };
@@ -164,34 +138,4 @@ fn at_tilde<'p>(
     blocks
         .map(|block| block.map(|node| graph.substitute(&[node], &seen)[0]))
         .collect()
-}
-
-/// What multiplies the innovations before the left inverses.
-fn gains(form: &Form<'_, '_>, thetas: &Thetas) -> Vec<ChainGain> {
-    let extended = form.extended;
-    let joined = |states: &[usize]| names(extended, states).join(", ");
-    let output = |i: &usize| extended.outputs[*i].variable.name.clone();
-    let unknown: Vec<usize> = (extended.plant_states()..extended.states.len()).collect();
-    let Thetas { θ1, θ2, .. } = *thetas;
-    let heads = &form.layers.layers[0];
-    let first = form.first.iter().map(|i| ChainGain {
-        output: output(i),
-        entries: vec![
-            (joined(&[heads[*i]]), 2.0 * θ1),
-            (joined(&unknown), θ1 * θ1),
-        ],
-    });
-    let K = integrators::Chain::new(form.q()).gain;
-    let second = form.second.iter().map(|i| {
-        let state = |k: usize| match k {
-            1 => joined(&[heads[*i]]),
-            _ => joined(&form.block(k)),
-        };
-        let entry = |k: usize| (state(k), θ2.powi(k as i32) * K[k - 1]);
-        ChainGain {
-            output: output(i),
-            entries: (1..=form.q()).map(entry).collect(),
-        }
-    });
-    first.chain(second).collect()
 }

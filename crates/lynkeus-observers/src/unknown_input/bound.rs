@@ -23,20 +23,34 @@ use lynkeus_expr::{Node, jacobian};
 use lynkeus_gain::integrators::Chain;
 use lynkeus_structure::{Matrix, Region};
 
-use super::assemble::Thetas;
+use super::blocks::Shape;
 use super::form::Form;
+use super::settings::{Thetas, no_theta};
+use crate::DesignError;
 use crate::enclosure::Enclosure;
-use crate::{DesignError, TuningError};
 
 /// θ₁ exceeds its bound by this factor.
 const MARGIN: f64 = 1.1;
 /// Larger gains are not chosen: no integrator follows them.
 const LARGEST: f64 = 1e6;
 
+/// θ₁ and θ₂ with what is to be said about them.
+pub(super) struct Choice {
+    pub thetas: Thetas,
+    pub notes: Vec<String>,
+}
+
+impl Choice {
+    pub fn given(thetas: Thetas) -> Self {
+        let notes = vec![];
+        Self { thetas, notes }
+    }
+}
+
 /// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so.
-pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Thetas, DesignError> {
+pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Choice, DesignError> {
     let q = form.q();
-    if (2..=q).any(|k| form.block(k).len() != form.second.len()) {
+    if form.shape() != Shape::Square {
         return Err(missing(
             "Λ₂ has blocks that are not square, which the proof's inequality does not cover",
         ));
@@ -50,25 +64,23 @@ pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Thetas, DesignError> {
             .max(θ2 - c4 + c1)
             .max(c1 + c * c * θ2 * θ2 / (θ2 - c4));
     if !θ1.is_finite() || θ1 > LARGEST {
-        return Err(TuningError::new(
-            "theta",
-            format!("two positive numbers [θ1, θ2]; the inequality of the proof of Theorem 1 gives [{θ1:.1e}, {θ2:.1e}] on the declared box, far more than needed and than any integrator follows; start with small ones, θ1 > θ2"),
-            "nothing",
-        )
-        .into());
+        let reason = format!(
+            "the inequality of the proof of Theorem 1 gives [{θ1:.1e}, {θ2:.1e}] on the declared box, far more than needed and than any integrator follows; start with small ones, θ1 > θ2"
+        );
+        return Err(no_theta(&reason).into());
     }
     let note = format!(
         "theta: [{θ1:.4e}, {θ2:.4e}] from the inequality at the end of the proof of Theorem 1 with c1 = {c1:.3e}, c2 = {c2:.3e}, c4 = {c4:.3e}, c5 = {c5:.3e}, bounds on the declared box of the error linearised along the trajectory; sufficient, by far not necessary: give theta to amplify noise less"
     );
-    let notes = vec![note];
-    Ok(Thetas { θ1, θ2, notes })
+    Ok(Choice {
+        thetas: Thetas { θ1, θ2 },
+        notes: vec![note],
+    })
 }
 
 fn missing(reason: &str) -> DesignError {
-    let expected = format!(
-        "two positive numbers [θ1, θ2]; no bound could be computed from the proof of Theorem 1: {reason}"
-    );
-    TuningError::new("theta", expected, "nothing").into()
+    let reason = format!("no bound could be computed from the proof of Theorem 1: {reason}");
+    no_theta(&reason).into()
 }
 
 /// c₁, c₂, c₄, c₅

@@ -18,50 +18,13 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node, jacobian};
-use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, sign};
+use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, rank, sign};
 
+use super::blocks::{self, Shape};
 use super::form::Form;
-use crate::Assumptions;
-use crate::enclosure::{Enclosure, length, norm, product, times, up};
-
-/// Norms over the box of the matrices above.
-pub(super) struct Norms {
-    /// N₀
-    pub N0: f64,
-    /// N₁ and N₂
-    pub N: [f64; 2],
-    /// Ġ₁¹(G₁¹)⁺
-    pub turning: f64,
-    /// G₁¹ and its left inverse
-    pub G11: f64,
-    pub left: f64,
-    /// γ_k
-    pub γ: Vec<f64>,
-    /// ∂Z_k/∂x^j for j ≤ k
-    pub Z: Vec<Vec<f64>>,
-    /// |η_j| ≤ Σ_i W_ji |e²_i|
-    pub W: Vec<Vec<f64>>,
-    /// Ψ_kj
-    pub Ψ: Vec<Vec<f64>>,
-    /// Y_k
-    pub Y: Vec<f64>,
-    /// 1/P_k at points and for means
-    pub P_inverse: Vec<f64>,
-    /// whether Λ₂ is regular with the signals apart from the states they show
-    pub regular: Check,
-    /// what has no bound on the box
-    pub open: Vec<String>,
-}
-
-/// c₁, c₂, c₄ and c₅ of (24).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Constants {
-    pub c1: f64,
-    pub c2: f64,
-    pub c4: f64,
-    pub c5: f64,
-}
+use super::norms::{Norms, inverse_triangle};
+use crate::enclosure::Enclosure;
+use crate::{Assumptions, DesignError};
 
 /// The form at the signals that the observer knows, and how these move.
 struct Signals<'e, 'p> {
@@ -71,7 +34,7 @@ struct Signals<'e, 'p> {
     box_: Enclosure<'p>,
 }
 
-pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<Norms, MissingInput> {
+pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<Norms, DesignError> {
     let signals = Signals::new(form, assumptions)?;
     let (form, box_) = (&signals.form, &signals.box_);
     let q = form.q();
@@ -91,11 +54,11 @@ pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<No
         N[1] = box_.norm(&N2)?;
     }
     let P = form.Λ2();
-    let Z = signals.coordinates(&P);
-    let inverse = |P: &Matrix<'_>| box_.inverse_norm(P);
-    let P_inverse: Vec<f64> = P.iter().map(inverse).collect::<Result<_, _>>()?;
-    let Z_norms = signals.lower(&Z)?;
-    let ψ = signals.remainders(&P, &Z, &γ);
+    let tall = form.shape() == Shape::Tall;
+    let Coordinates { Z, Ψ, P_inverse } = match tall && !form.bends() {
+        true => signals.straight(&P)?,
+        false => signals.curved(&P, &γ)?,
+    };
     let each = |A: &Matrix<'_>| box_.norm(A);
     let Y: Vec<Matrix<'_>> = (1..=q).map(|k| signals.Y(k, &γ)).collect();
     let turning = signals.along(&form.G11()).times(&left);
@@ -106,17 +69,70 @@ pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<No
         G11: box_.norm(&form.G11())?,
         left: box_.norm(&left)?,
         γ: γ.iter().map(each).collect::<Result<_, _>>()?,
-        W: inverse_triangle(&Z_norms, &P_inverse),
-        Z: Z_norms,
-        Ψ: signals.lower(&ψ)?,
+        W: inverse_triangle(&Z, &P_inverse),
+        Z,
+        Ψ,
         Y: Y.iter().map(each).collect::<Result<_, _>>()?,
         P_inverse,
+        tall,
+        blocks: blocks::covered(form, box_.region())?,
         regular: signals.regular(&P)?,
         open: box_.open(),
     })
 }
 
+/// Norms of ∂Z_k/∂x^j, of Ψ_kj and of Λ₂'s inverses.
+struct Coordinates {
+    Z: Vec<Vec<f64>>,
+    Ψ: Vec<Vec<f64>>,
+    P_inverse: Vec<f64>,
+}
+
 impl<'e, 'p> Signals<'e, 'p> {
+    /// The coordinates Z_k.
+    fn curved(&self, P: &[Matrix<'p>], γ: &[Matrix<'p>]) -> Result<Coordinates, MissingInput> {
+        let Z = self.coordinates(P);
+        let inverse = |P: &Matrix<'_>| self.box_.inverse_norm(P);
+        Ok(Coordinates {
+            Ψ: self.lower(&self.remainders(P, &Z, γ))?,
+            Z: self.lower(&Z)?,
+            P_inverse: P.iter().map(inverse).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// ζ_k = P_k η_k where P does not read X²: ∂ζ_k/∂x^k = P_k alone, and
+    /// Ψ_kj = P_k ∂f̄_k/∂x^j, with P_k' where j = k.
+    fn straight(&self, P: &[Matrix<'p>]) -> Result<Coordinates, MissingInput> {
+        let q = P.len();
+        let own = |k: usize, j: usize| match j == k {
+            true => self.box_.norm(&P[k]),
+            false => Ok(0.0),
+        };
+        let slope = |k: usize, j: usize| -> Result<f64, MissingInput> {
+            if j > k {
+                return Ok(0.0);
+            }
+            let block = P[k].times(&self.slopes_in(&self.reduced(k + 1), j + 1));
+            match j == k {
+                true => self.box_.norm(&block.plus(&self.along(&P[k]))),
+                false => self.box_.norm(&block),
+            }
+        };
+        let table = |entry: &dyn Fn(usize, usize) -> Result<f64, MissingInput>| {
+            let row = |k| (0..q).map(|j| entry(k, j)).collect::<Result<Vec<f64>, _>>();
+            (0..q).map(row).collect::<Result<Vec<_>, _>>()
+        };
+        let inverse = |P: &Matrix<'p>| {
+            let unit = Matrix::identity(P.graph(), P.rows);
+            self.box_.norm(&P.left_divide(&unit))
+        };
+        Ok(Coordinates {
+            Z: table(&own)?,
+            Ψ: table(&slope)?,
+            P_inverse: P.iter().map(inverse).collect::<Result<_, _>>()?,
+        })
+    }
+
     /// A symbol for each measured signal that G reads, apart from the state that it
     /// shows: a mean over states does not move the signal.
     fn new(form: &Form<'e, 'p>, assumptions: &Assumptions) -> Result<Self, MissingInput> {
@@ -143,6 +159,7 @@ impl<'e, 'p> Signals<'e, 'p> {
         }
         for input in &extended.inputs {
             let name = format!("the derivative of {}", input.name);
+            // (H3) wants a bound of |u'|; the assumptions have none
             slopes.push((input.node, box_.within(name, f64::INFINITY)));
         }
         let factors = &form.layers.factors;
@@ -216,19 +233,19 @@ impl<'e, 'p> Signals<'e, 'p> {
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
     /// signals. That it is singular there refutes the proof, not the observer.
-    fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, MissingInput> {
+    fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, DesignError> {
         let graph = self.form.extended.graph();
         let name = "Λ₂ is regular for estimates that differ from the measured signals";
-        for (k, P) in P
-            .iter()
-            .enumerate()
-            .skip(1)
-            .filter(|(_, P)| P.rows == P.columns)
-        {
-            let det = P
-                .determinant()
-                .unwrap_or_else(|| graph.constant(0.0).node());
-            let found = sign::keeps_sign(graph, name.to_owned(), det, self.box_.region())?.check;
+        for (k, P) in P.iter().enumerate().skip(1) {
+            let region = self.box_.region();
+            let found = match P.rows == P.columns {
+                true => {
+                    let det = P.determinant();
+                    let det = det.unwrap_or_else(|| graph.constant(0.0).node());
+                    sign::keeps_sign(graph, name.to_owned(), det, region)?.check
+                }
+                false => rank::full_column_rank(name.to_owned(), P, region)?,
+            };
             if found.verdict != Condition::Proved {
                 return Ok(Check {
                     verdict: Condition::Undecided(vec![]),
@@ -240,7 +257,7 @@ impl<'e, 'p> Signals<'e, 'p> {
         Ok(Check {
             name: name.to_owned(),
             verdict: Condition::Proved,
-            detail: "each block's determinant keeps its sign".to_owned(),
+            detail: "each block has full column rank on the box".to_owned(),
         })
     }
 
@@ -301,70 +318,4 @@ fn slope(
     let symbol = extended.graph().symbol(&format!("slope of {name}")).node();
     box_.add(label, symbol, low - drift, high + drift);
     Ok(symbol)
-}
-
-/// W from |η_k| ≤ w_k (|e²_k| + Σ_{j<k} Z_kj |η_j|).
-fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
-    let q = w.len();
-    let mut W = vec![vec![0.0; q]; q];
-    for k in 0..q {
-        W[k][k] = w[k];
-        let through = |i: usize| {
-            let terms = (i..k).map(|j| times(Z[k][j], W[j][i]));
-            up(times(w[k], terms.sum()))
-        };
-        let row: Vec<f64> = (0..k).map(through).collect();
-        W[k][..k].copy_from_slice(&row);
-    }
-    W
-}
-
-impl Norms {
-    /// c₁, c₂, c₄ and c₅ for every θ₂ ≥ 1.
-    pub fn constants(&self) -> Constants {
-        let q = self.W.len();
-        let (S2, root) = (Chain::new(q), f64::sqrt);
-        let at = |i: usize| root(S2.inverse_diagonal[i]);
-        // |e₁| ≤ √2 √V₁, |e¹₂| ≤ θ₁ √V₁; √(1, 0)S₁(1, 0)ᵀ = 1, √(0, 1)S₁(0, 1)ᵀ = √2
-        let c1 = up(8f64.sqrt() * (self.N0 + self.turning));
-        let N = [self.N.to_vec()];
-        let through = product(&N, &self.W[..q.min(2)]);
-        let sum: f64 = (0..q.min(2)).map(|i| times(through[0][i], at(i))).sum();
-        let c2 = up(2.0 * sum);
-
-        let mut B = product(&self.Ψ, &self.W);
-        let back: Vec<f64> = (0..q).map(|k| self.back(&S2, k)).collect();
-        for (row, back) in B.iter_mut().zip(&back) {
-            row[0] += back;
-        }
-        let weighted = |k: usize| {
-            let terms = (0..q).map(|i| times(B[k][i], at(i)));
-            root(S2.diagonal[k]) * terms.sum::<f64>()
-        };
-        let weighted: f64 = (0..q).map(weighted).sum();
-        let κ = root(S2.largest / S2.smallest);
-        let c4 = up(2.0 * weighted.min(κ * norm(&B)));
-
-        let γ1 = self.γ[0];
-        let pushed = product(
-            &self.Z,
-            &self.Y.iter().map(|&y| vec![y]).collect::<Vec<_>>(),
-        );
-        let p: Vec<f64> = (0..q).map(|k| pushed[k][0] + times(back[k], γ1)).collect();
-        let c5 = up(8f64.sqrt() * (in_S(&S2, &p) + at(0) * γ1));
-        Constants { c1, c2, c4, c5 }
-    }
-
-    /// Σ_{j<k} ‖∂Z_k/∂x^j P_j⁻¹‖ C^j_q: what Λ₂ leaves of the correction beside the
-    /// constant gain.
-    pub fn back(&self, S2: &Chain, k: usize) -> f64 {
-        let terms = (0..k).map(|j| times(self.Z[k][j], self.P_inverse[j]) * S2.gain[j]);
-        up(terms.sum())
-    }
-}
-
-/// A bound of √(pᵀSp) for entries up to p.
-pub(super) fn in_S(S: &Chain, p: &[f64]) -> f64 {
-    let weighted: f64 = p.iter().zip(&S.diagonal).map(|(p, s)| p * s.sqrt()).sum();
-    up(weighted).min(up(S.largest.sqrt() * length(p) * (1.0 + 1e-9)))
 }

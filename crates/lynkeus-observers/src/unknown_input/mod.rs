@@ -19,15 +19,20 @@
 //! it implies (ii).
 
 mod assemble;
+mod blocks;
 mod bound;
 mod constants;
 mod form;
+mod matrices;
+mod norms;
 mod partition;
+mod settings;
 mod theorem;
 
 use lynkeus_structure::Extended;
 
 use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
+use settings::Settings;
 
 const NAME: &str = "unknown-input";
 
@@ -45,7 +50,7 @@ impl Family for UnknownInput {
     }
 
     fn keys(&self) -> &'static [&'static str] {
-        &["theta", "partition"]
+        &settings::NAMES
     }
 
     fn examine(
@@ -53,32 +58,35 @@ impl Family for UnknownInput {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        Ok(
-            match partition::search(extended, tuning, &extended.region())? {
-                Ok((_, examination)) | Err(examination) => examination,
-            },
-        )
+        let settings = Settings::of_form(tuning, extended)?;
+        let found = partition::search(extended, &settings, &extended.region())?;
+        Ok(match found {
+            Ok((_, examination)) | Err(examination) => examination,
+        })
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match partition::search(extended, tuning, &extended.region())? {
+        let settings = Settings::read(tuning, extended)?;
+        match partition::search(extended, &settings, &extended.region())? {
             Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
-                assemble::design(extended, tuning, &form, examination)
+                assemble::design(extended, tuning, &settings, &form, examination)
             }
             Ok((_, examination)) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
             }
         }
     }
+
     fn theorem(
         &self,
         extended: &Extended<'_>,
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        match partition::search(extended, tuning, &assumptions.region)? {
+        let settings = Settings::read(tuning, extended)?;
+        match partition::search(extended, &settings, &assumptions.region)? {
             Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
-                theorem::certificate(&form, examination, tuning, assumptions)
+                theorem::certificate(&form, examination, &settings, assumptions)
             }
             Ok((_, examination)) | Err(examination) if examination.refuted().is_some() => {
                 let checks = examination.checks;

@@ -4,10 +4,12 @@ use lynkeus_expr::{MissingInput, Node};
 use lynkeus_structure::{Check, Condition, Extended, Layers, Region, layers, rank};
 
 use super::NAME;
+use super::blocks::{self, Shape};
 use super::form::Form;
+use super::settings::{Settings, wrong_size};
 use crate::conditions::{fit, lipschitz, names, output_slope};
 use crate::family;
-use crate::{DesignError, Examination, Fit, Tuning, TuningError, Value};
+use crate::{DesignError, Examination, Fit, TuningError};
 
 /// More partitions are not tried.
 const MAX_PARTITIONS: usize = 500;
@@ -18,7 +20,7 @@ type Found<'e, 'p> = Result<(Form<'e, 'p>, Examination), Examination>;
 /// refutes; else the examination that says why there is none.
 pub(super) fn search<'e, 'p>(
     extended: &'e Extended<'p>,
-    tuning: &Tuning,
+    settings: &Settings,
     region: &Region,
 ) -> Result<Found<'e, 'p>, DesignError> {
     let layers = match layers::find(extended) {
@@ -27,7 +29,7 @@ pub(super) fn search<'e, 'p>(
             return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
-    let given = given(extended, &layers, tuning)?;
+    let given = given(extended, &layers, settings)?;
     let shared = shared(extended, &layers, region)?;
     let candidates = match &given {
         Some(first) => vec![first.clone()],
@@ -84,52 +86,40 @@ fn candidates(extended: &Extended<'_>, layers: &Layers<'_>) -> Vec<Vec<usize>> {
     all
 }
 
-/// The key `partition`: the outputs of x₁¹.
+/// The outputs of x₁¹ that the study asks for.
 fn given(
     extended: &Extended<'_>,
     layers: &Layers<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
 ) -> Result<Option<Vec<usize>>, TuningError> {
-    let Some(value) = tuning.values.get("partition") else {
+    let Some(first) = &settings.partition else {
         return Ok(None);
     };
-    let outputs: Vec<&str> = extended
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.as_str())
-        .collect();
-    let expected = format!(
-        "a list of measured outputs, those of x₁¹ ({})",
-        outputs.join(", ")
-    );
-    let Value::List(list) = value else {
-        return Err(TuningError::new("partition", expected, value));
-    };
-    let mut first = vec![];
-    for entry in list {
-        let place = match entry {
-            Value::Text(name) => outputs.iter().position(|o| o == name),
-            _ => None,
-        };
-        let place = place.filter(|place| !first.contains(place));
-        first.push(place.ok_or_else(|| TuningError::new("partition", expected.as_str(), entry))?);
-    }
     let sizes = sizes(extended, layers);
-    if !sizes.contains(&first.len()) {
-        let expected = format!(
-            "between {} and {} of the {} measured outputs: at least one per unknown input, and as many left as there are states behind the measured ones",
-            sizes.start(),
-            sizes.end(),
-            outputs.len()
-        );
-        return Err(TuningError::new(
-            "partition",
-            expected,
-            format!("{} outputs", first.len()),
-        ));
+    match sizes.contains(&first.len()) {
+        true => Ok(Some(first.clone())),
+        false => Err(wrong_size(&sizes, extended.outputs.len(), first.len())),
     }
-    first.sort_unstable();
-    Ok(Some(first))
+}
+
+/// A partition that meets (H4) and makes every block of Λ₂ square, as `partition` wants it.
+pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<String>, DesignError> {
+    let extended = form.extended;
+    let own = form.block(form.q().min(2)).len();
+    let size = extended.outputs.len() - own;
+    if form.q() < 2 || size < form.layers.factors.columns || form.shape() == Shape::Narrowing {
+        return Ok(None);
+    }
+    let all = rank::subsets(extended.outputs.len(), size, MAX_PARTITIONS).unwrap_or_default();
+    for first in all {
+        let candidate = self::form(extended, &form.layers, first);
+        if fit(&conditions(&candidate, region)?) == Fit::Fits {
+            let name = |&i: &usize| format!("\"{}\"", extended.outputs[i].variable.name);
+            let outputs: Vec<String> = candidate.first.iter().map(name).collect();
+            return Ok(Some(outputs.join(", ")));
+        }
+    }
+    Ok(None)
 }
 
 /// (H1), (H2) and what belongs to no partition.
@@ -197,7 +187,9 @@ fn conditions(form: &Form<'_, '_>, region: &Region) -> Result<Vec<Check>, Design
         },
         false => rank::full_column_rank(name, &form.ii(), region)?,
     };
-    Ok(vec![i, eleven, ii])
+    let mut checks = vec![i, eleven, ii];
+    checks.extend(blocks::shortened(form));
+    Ok(checks)
 }
 
 fn finish<'e, 'p>(

@@ -8,15 +8,17 @@
 //! quadratic form is at most −λ V, λ > 0 where θ₂ > c₄ and
 //! θ₁ > c₁ + (c₂ + c₅)²θ₂²/(4(θ₂ − c₄)), so √V falls at the rate λ/2 down to 2|δ|/λ.
 
+use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_structure::{Check, Condition};
 
-use super::assemble::{Thetas, given};
 use super::bound;
-use super::constants::{self, Constants, Norms, in_S};
+use super::constants;
 use super::form::Form;
+use super::norms::{Constants, Norms, in_S};
+use super::settings::{Settings, Thetas};
 use crate::enclosure::{figures, length, times, up};
-use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Tuning};
+use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Verdict};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
 /// Numbers that have to be exceeded are by this factor at least.
@@ -25,18 +27,16 @@ const CLEAR: f64 = 1.0 + 1e-9;
 pub(super) fn certificate(
     form: &Form<'_, '_>,
     examination: Examination,
-    tuning: &Tuning,
+    settings: &Settings,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let norms = constants::norms(form, assumptions)?;
     let c = norms.constants();
-    let thetas = match given(tuning)? {
-        Some(thetas) => Some(thetas),
-        None => bound::thetas(form).ok(),
-    };
+    let chosen = || bound::thetas(form).ok().map(|choice| choice.thetas);
+    let thetas = settings.thetas.or_else(chosen);
     let proof = Proof { form, norms, c };
     let mut hypotheses = examination.checks;
-    hypotheses.push(proof.square());
+    hypotheses.push(proof.norms.blocks.clone());
     hypotheses.push(proof.norms.regular.clone());
     hypotheses.push(proof.finite());
     hypotheses.push(proof.slow(assumptions));
@@ -71,21 +71,6 @@ fn check(name: impl Into<String>, holds: bool, detail: impl Into<String>) -> Che
 }
 
 impl Proof<'_, '_, '_> {
-    fn square(&self) -> Check {
-        let wide = self.form.second.len();
-        let sizes: Vec<usize> = (1..=self.form.q())
-            .map(|k| self.form.block(k).len())
-            .collect();
-        let square = sizes.iter().all(|&size| size == wide);
-        let detail = match square {
-            true => format!("{wide} states in each block of X²"),
-            false => format!(
-                "{wide} outputs in x₂¹ for layers of {sizes:?} states: Λ₂⁺Λ₂ is a projection, and the step to (24) does not hold as printed"
-            ),
-        };
-        check("the blocks of Λ₂ are square", square, detail)
-    }
-
     fn finite(&self) -> Check {
         let Constants { c1, c2, c4, c5 } = self.c;
         let finite = [c1, c2, c4, c5].iter().all(|c| c.is_finite());
@@ -98,7 +83,7 @@ impl Proof<'_, '_, '_> {
                 shown.join(", "),
                 if further { ", and so on" } else { "" }
             ),
-            (false, true) if self.square().verdict != Condition::Proved => {
+            (false, true) if self.norms.blocks.verdict != Condition::Proved => {
                 "Λ₂ has no inverse but a left one".to_owned()
             }
             (false, true) => "Λ₂ has no bounded inverse as far as interval arithmetic can tell on a box this large: declare a smaller one".to_owned(),
@@ -207,6 +192,12 @@ impl Proof<'_, '_, '_> {
         found: &mut Certificate,
     ) -> Result<(), DesignError> {
         let λ = self.λ(θ);
+        if λ.is_nan() || λ <= 0.0 {
+            // θ₁ exceeds θ₁* by less than rounding
+            found.hypotheses.push(check("λ > 0", false, figures(λ)));
+            found.verdict = Verdict::of(&found.hypotheses);
+            return Ok(());
+        }
         found.rate = Some(λ / 2.0);
         let peak = up(self.root_V_of(θ) * length(&self.out_of_V(θ)));
         let list = &mut found.constants;
@@ -224,6 +215,10 @@ impl Proof<'_, '_, '_> {
             found.notes.push("no ultimate bound: G or Λ₂ reads measured signals, and the proof does not cover noise in them".to_owned());
             return Ok(());
         };
+        if !δ.is_finite() {
+            found.notes.push("no ultimate bound: a disturbance or a measurement error has none; declare min and max of the disturbances".to_owned());
+            return Ok(());
+        }
         let root_V = up(2.0 * δ / λ);
         let sizes: Vec<f64> = self.out_of_V(θ).iter().map(|s| up(s * root_V)).collect();
         found.ultimate_bound = Some(length(&sizes));
@@ -232,12 +227,14 @@ impl Proof<'_, '_, '_> {
     }
 
     /// The smallest eigenvalue of −V̇ as a form in √V₁ and √V₂, rounded down.
-    fn λ(&self, [θ1, θ2]: [f64; 2]) -> f64 {
+    fn λ(&self, θ: [f64; 2]) -> f64 {
         let Constants { c1, c2, c4, c5 } = self.c;
-        let (a, b, half) = (θ1 - c1, θ2 - c4, (c2 + c5) * θ2 / 2.0);
-        let root = ((a - b) * (a - b) / 4.0 + half * half).sqrt();
-        let determinant = a * b / up(1.0) - up(half * half);
-        determinant / up(up((a + b) / 2.0 + root))
+        let [c1, c2, c4, c5, θ1, θ2] = [c1, c2, c4, c5, θ[0], θ[1]].map(Interval::point);
+        let two = Interval::point(2.0);
+        let (a, b, half) = (θ1 - c1, θ2 - c4, (c2 + c5) * θ2 / two);
+        let root = (((a - b) / two).powi(2) + half.powi(2)).sqrt();
+        // the determinant over the larger eigenvalue: no cancellation of the two roots
+        ((a * b - half.powi(2)) / ((a + b) / two + root)).lo()
     }
 
     /// |e₁|, |v̂ − v| and the |X̂² − X²| of each block for √V = 1.
@@ -296,7 +293,7 @@ impl Proof<'_, '_, '_> {
             // 2I − Π is I for a square G₁¹
             δ1 += θ1 * 2f64.sqrt() * if square { n1 } else { 2.0 * n1 };
             let back: Vec<f64> = (0..q).map(|k| self.norms.back(&S2, k) * n2).collect();
-            δ2 += θ2 * S2.inverse_diagonal[0].sqrt() * n2 + in_S(&S2, &back);
+            δ2 += θ2 * self.norms.push(&S2) * n2 + in_S(&S2, &back);
         }
         Ok(Some(up(length(&[δ1, δ2]))))
     }

@@ -494,3 +494,27 @@ fn keys_that_cannot_be_used_are_named() {
     );
     assert!(text(&tuning(1.0, &[("x4", 1.0)])).contains("x1, x2, x3"));
 }
+
+/// The gain at the start, θΔ⁻¹S(0)⁻¹Cᵀ, for S(0) = [2, 0.5; 0.5, 1] and C = (3, 0), θ = 4:
+/// 4·3·(1, −0.5)/1.75 with the second row times θ.
+#[test]
+fn the_gain_is_shown_at_the_start() {
+    let plant = plant(
+        "model Cart Real place; Real speed; input Real u(start = 0.5); output Real y = 3*place;
+         equation der(place) = (1 + u)*speed; der(speed) = -place; end Cart;",
+    );
+    let mut tuning = tuning(4.0, &[]);
+    let row = |a: f64, b: f64| Value::List(vec![Value::Number(a), Value::Number(b)]);
+    let S0 = Value::List(vec![row(2.0, 0.5), row(0.5, 1.0)]);
+    tuning.values.insert("S0".into(), S0);
+    let design = design(&plant, &[], &tuning);
+    assert!(design.gains.is_empty());
+    let value = |name: &str| {
+        let found = design.parameters.iter().find(|(n, _)| n == name);
+        found.unwrap_or_else(|| panic!("{name}")).1.clone()
+    };
+    assert_eq!(value("C(u)"), "[[3, 0]]");
+    assert_eq!(value("F(u, x)"), "[[0, u + 1], [0, 0]]");
+    assert_eq!(value("S(0)"), "[[2, 0.5], [0.5, 1]]");
+    assert_eq!(value("θΔ⁻¹S⁻¹Cᵀ at the start"), "[[6.85714], [-13.7143]]");
+}

@@ -153,3 +153,30 @@ fn simulations_keep_the_guarantee() {
         }
     }
 }
+
+/// An unknown input is taken as constant, and the certificate says so; with a bound of its
+/// rate the error is allowed for.
+#[test]
+fn an_unknown_input_is_said_to_be_constant() {
+    let text = "model Pushed Real place; input Real force; output Real y = place;
+      equation der(place) = force; end Pushed;";
+    let plant = plant(text);
+    let of = |slew: f64| {
+        let mut study = study(&plant, Tuning::from([("theta", 4.0)]));
+        study.unknown = &["force"];
+        study.drift = vec![0.0, slew];
+        study.certificate()
+    };
+    let still = of(0.0);
+    assert_eq!(still.verdict, Verdict::Proved);
+    let bounded = hypothesis(&still, "(A3)");
+    assert!(
+        bounded.detail.contains("takes force as constant"),
+        "{}",
+        bounded.detail
+    );
+    assert_eq!(still.ultimate_bound, Some(0.0));
+    let moving = of(0.5);
+    assert!(!hypothesis(&moving, "(A3)").detail.contains("constant"));
+    assert!(moving.ultimate_bound.unwrap() > 0.0);
+}

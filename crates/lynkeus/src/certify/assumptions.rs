@@ -8,7 +8,7 @@ use lynkeus_structure::{Dimension, Extended, Region, range};
 use crate::study::{Name, Noise};
 use crate::{Error, Study};
 
-/// Measurement errors are taken to stay within this many standard deviations.
+/// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
 /// What the guarantee takes for granted.
@@ -104,8 +104,8 @@ fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, Error> {
 }
 
 /// Per measured output: how far what is measured may be from h(x, u) without disturbances.
-/// That is what these add to h, and three standard deviations of the noise, of which a
-/// relative one counts from the disturbed value.
+/// That is what these add to h, and the bound of a uniform noise or three standard
+/// deviations of a Gaussian one, of which a relative one counts from the disturbed value.
 fn noise(
     study: &Study,
     plant: &Plant,
@@ -126,14 +126,18 @@ fn noise(
         };
         let mut given = study.sensors.noise.iter();
         let given = given.find(|(name, _)| name.text == output.name);
-        let deviation = match given {
+        let deviations = Interval::point(DEVIATIONS);
+        // a share of nothing is nothing, of an unbounded output too
+        let error = match given.map(|(_, n)| *n).filter(|n| n.size() > 0.0) {
             None => Interval::ZERO,
-            Some((_, Noise::Absolute(deviation))) => Interval::point(*deviation),
-            Some((_, Noise::Relative(share))) => {
-                Interval::point(*share) * Interval::point(magnitude(graph, actual, &wider)?)
+            Some(Noise::Absolute(deviation)) => deviations * Interval::point(deviation),
+            Some(Noise::Uniform(bound)) => Interval::point(bound),
+            Some(Noise::Relative(share)) => {
+                let size = Interval::point(magnitude(graph, actual, &wider)?);
+                deviations * Interval::point(share) * size
             }
         };
-        Ok((Interval::point(DEVIATIONS) * deviation + Interval::point(added)).hi())
+        Ok((error + Interval::point(added)).hi())
     };
     extended.outputs.iter().map(|o| of(&o.variable)).collect()
 }

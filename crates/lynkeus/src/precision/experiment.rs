@@ -147,6 +147,11 @@ impl Reach {
     }
 }
 
+/// √(a²/3): the standard deviation of an error that is equally likely from −a to a.
+fn deviation_of_uniform(bound: f64) -> f64 {
+    bound / 3f64.sqrt()
+}
+
 /// How noisy sensors are.
 struct Sensors<'a> {
     study: &'a Study,
@@ -175,6 +180,7 @@ impl<'a> Sensors<'a> {
         let share = |(v, noise): (&Variable, &Option<Noise>)| match noise {
             Some(Noise::Relative(share)) => *share,
             Some(Noise::Absolute(deviation)) => deviation / sensors.scale(v),
+            Some(Noise::Uniform(bound)) => deviation_of_uniform(*bound) / sensors.scale(v),
             None => SHARE,
         };
         let logs: f64 = measured.iter().zip(&stated).map(share).map(f64::ln).sum();
@@ -192,10 +198,9 @@ impl<'a> Sensors<'a> {
     fn stated(&self, variable: &Variable) -> Option<Noise> {
         let noise = &self.study.sensors.noise;
         let found = noise.iter().find(|(name, _)| name.text == variable.name);
-        found.map(|(_, noise)| *noise).filter(|noise| {
-            let (Noise::Absolute(value) | Noise::Relative(value)) = *noise;
-            value > 0.0
-        })
+        found
+            .map(|(_, noise)| *noise)
+            .filter(|noise| noise.size() > 0.0)
     }
 
     /// The range of an output, else that of the state that it shows.
@@ -220,6 +225,11 @@ impl<'a> Sensors<'a> {
                 Deviation::Absolute(deviation),
                 format!("±{}", number(deviation)),
             ),
+            Noise::Uniform(bound) => {
+                let deviation = deviation_of_uniform(bound);
+                let words = format!("±{} (even within ±{})", number(deviation), number(bound));
+                (Deviation::Absolute(deviation), words)
+            }
             Noise::Relative(share) => {
                 let greatest = match self.reach.magnitude(&variable.name) {
                     0.0 => self.scale(variable),

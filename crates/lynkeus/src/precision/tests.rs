@@ -72,6 +72,16 @@ fn candidates_are_as_noisy_as_what_is_measured() {
     // 2 % of the range of the level; of the magnitude where there is no range
     let absolute = noises("measured = ['y']\nnoise = { y = 0.08 }");
     assert_eq!(absolute[2], "warmth ±6");
+    // √(a²/3); the standard errors are those of Gaussian noise of this deviation
+    let even = noises("measured = ['y']\nnoise = { y = { uniform = 0.12 } }");
+    assert_eq!(even[0], "y ±0.0693 (even within ±0.12)");
+    let errors = |noise: &str| {
+        let sensors = format!("measured = ['y']\nnoise = {{ y = {noise} }}");
+        let found = report(&sensors, &Options::default()).unwrap();
+        found.last().unwrap().present[0]
+    };
+    let (even, normal) = (errors("{ uniform = 0.12 }"), errors("0.06928203230275509"));
+    assert!((even / normal - 1.0).abs() < 1e-12, "{even} {normal}");
     // no noise would tell everything at once
     assert_eq!(noises("measured = ['y']\nnoise = { y = 0 }")[0], "y ±0.04");
 }

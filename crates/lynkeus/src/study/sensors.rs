@@ -19,13 +19,25 @@ pub struct Sensors {
     pub noise: Vec<(Name, Noise)>,
 }
 
-/// The standard deviation of white measurement noise.
+/// White measurement noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Noise {
-    /// In the unit of the output.
+    /// Standard deviation, in the unit of the output.
     Absolute(f64),
-    /// As a fraction of the present value: `"5%"` is 0.05.
+    /// Standard deviation as a fraction of the present value: `"5%"` is 0.05.
     Relative(f64),
+    /// Every error from −a to a is equally likely, none is larger: `{ uniform = a }`.
+    Uniform(f64),
+}
+
+impl Noise {
+    /// The number that says how strong it is: a deviation, a fraction or a bound.
+    #[must_use]
+    pub fn size(self) -> f64 {
+        match self {
+            Noise::Absolute(size) | Noise::Relative(size) | Noise::Uniform(size) => size,
+        }
+    }
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
@@ -58,7 +70,16 @@ fn names(entry: Option<Entry<'_>>) -> Result<Vec<Name>, Error> {
 }
 
 fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
-    let refusal = entry.wrong("a standard deviation >= 0, or a share such as \"5%\"");
+    let refusal = entry.wrong(
+        "a standard deviation >= 0, a share such as \"5%\", or a bound such as { uniform = 0.05 }",
+    );
+    if entry.is_table() {
+        let mut section = entry.section("noise of [sensors]", &["uniform"])?;
+        let bound = section.take("uniform").ok_or(refusal)?;
+        let wrong = bound.wrong("a bound >= 0, in the unit of the output");
+        let bound = bound.number().ok().filter(|a| *a >= 0.0);
+        return bound.map(Noise::Uniform).ok_or(wrong);
+    }
     let (value, kind): (Option<f64>, fn(f64) -> Noise) = match entry.as_text() {
         Some(text) => {
             let share = text.trim().strip_suffix('%');

@@ -11,7 +11,7 @@ alpha = 1.65
 measured = ["top", "bottom"]
 unknown = ["Zf"]
 disturbances = ["e1"]
-noise = { top = 0.05, bottom = "5%" }
+noise = { top = { uniform = 0.05 }, bottom = "5%" }
 [observer]
 family = "triangular"
 theta = 3.5
@@ -42,6 +42,7 @@ show = ["Zf", "x[2]"]
 fn every_key_arrives() {
     let study = Study::parse(WHOLE, "study.toml").unwrap();
     assert_eq!(study.parameters["alpha"], 1.65);
+    assert_eq!(study.sensors.noise[0].1, Noise::Uniform(0.05));
     assert_eq!(study.sensors.noise[1].1, Noise::Relative(0.05));
     let tuning = &study.observer.tuning;
     assert_eq!(tuning.numbers("theta").unwrap(), Some(vec![3.5]));
@@ -104,6 +105,18 @@ fn wrong_values_say_what_was_expected_and_found() {
             "\"y\" in `noise` of [sensors] must be a standard deviation >= 0",
         ),
         ("[sensors]\nnoise = { y = \"5\" }", "found the text \"5\""),
+        (
+            "[sensors]\nnoise = { y = { uniform = -0.1 } }",
+            "must be a bound >= 0, in the unit of the output, found -0.1",
+        ),
+        (
+            "[sensors]\nnoise = { y = { unifrom = 0.1 } }",
+            "unknown key \"unifrom\" in noise of [sensors]; did you mean \"uniform\"?",
+        ),
+        (
+            "[sensors]\nnoise = { y = {} }",
+            "such as { uniform = 0.05 }",
+        ),
         ("[sensors]\nmeasured = []", "at least one output"),
         (
             "[parameters]\nk = nan",

@@ -112,7 +112,7 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
 fn noise(stated: Noise, measured: &[String], truth: &Trajectory, notes: &mut Vec<String>) -> Noise {
     let is_noisy = |name: &String| {
         let level = stated.levels.get(name);
-        level.is_some_and(|(Level::Absolute(x) | Level::Relative(x))| *x > 0.0)
+        level.is_some_and(|level| level.size() > 0.0)
     };
     if measured.iter().any(is_noisy) {
         return stated;
@@ -127,7 +127,7 @@ fn noise(stated: Noise, measured: &[String], truth: &Trajectory, notes: &mut Vec
     let levels: BTreeMap<String, Level> = measured.iter().map(level).collect();
     let words: Vec<String> = levels
         .iter()
-        .map(|(name, Level::Absolute(x) | Level::Relative(x))| format!("{name} {x:.2e}"))
+        .map(|(name, level)| format!("{name} {:.2e}", level.size()))
         .collect();
     notes.push(format!(
         "the study states no noise: 1 % of what each output spans in the run is taken ({}); set `noise` in [sensors] to state yours",

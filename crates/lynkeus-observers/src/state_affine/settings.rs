@@ -1,0 +1,106 @@
+//! The study's keys.
+
+use lynkeus_gain::UnitFactor;
+
+use crate::{KeySpec, Tuning, TuningError, Value};
+
+const THETA: KeySpec = KeySpec {
+    name: "theta",
+    kind: "number > 0",
+    default: "required",
+    meaning: "the speed θ, in 1/(unit of time): the gain of block k grows like θ^k. Theorem 1 is stated for θ ≥ 1, so choose a unit of time in which the entries of F are of the order of 1",
+};
+
+const START: KeySpec = KeySpec {
+    name: "S0",
+    kind: "number s > 0, or a matrix as a list of rows",
+    default: "1",
+    meaning: "S(0) = s·I, or the matrix; rows and columns in the order of the plant's states, then the unknown inputs",
+};
+
+const ALARM: KeySpec = KeySpec {
+    name: "alarm",
+    kind: "number > 0",
+    default: "see below",
+    meaning: "the flag is raised where `excitation` is below this",
+};
+
+/// Every key of the family.
+pub(super) const KEYS: [KeySpec; 3] = [THETA, START, ALARM];
+pub(super) static NAMES: [&str; 3] = KeySpec::names(&KEYS);
+
+/// The keys, read.
+pub(super) struct Settings {
+    pub θ: f64,
+    /// S(0) in the order of the blocks
+    pub S0: UnitFactor,
+    pub alarm: Option<f64>,
+    /// the plant's functions see the estimate limited to its range
+    pub clamp: bool,
+}
+
+impl Settings {
+    /// `order`: the states in the order of the blocks.
+    pub fn read(tuning: &Tuning, order: &[usize]) -> Result<Self, TuningError> {
+        let expected = "a positive number (the gain of block k grows like theta^k)";
+        let missing = || TuningError::new(THETA.name, expected, "nothing");
+        Ok(Self {
+            θ: THETA.positive(tuning)?.ok_or_else(missing)?,
+            S0: start(tuning, order)?,
+            alarm: ALARM.positive(tuning)?,
+            clamp: tuning.clamp,
+        })
+    }
+}
+
+/// S(0): s·I for a number s, or a matrix in the order of the plant's states.
+fn start(tuning: &Tuning, order: &[usize]) -> Result<UnitFactor, TuningError> {
+    let n = order.len();
+    let expected = format!(
+        "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
+    );
+    let wrong = |found: String| TuningError::new(START.name, expected.clone(), found);
+    let given = match tuning.values.get(START.name) {
+        None => scaled_identity(n, 1.0),
+        Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => scaled_identity(n, *s),
+        Some(Value::List(rows)) => {
+            let entry = |x: &Value| match x {
+                Value::Number(x) => Ok(*x),
+                other => Err(wrong(other.to_string())),
+            };
+            let row = |row: &Value| match row {
+                Value::List(row) => row.iter().map(entry).collect::<Result<Vec<f64>, _>>(),
+                other => Err(wrong(other.to_string())),
+            };
+            rows.iter().map(row).collect::<Result<Vec<_>, _>>()?
+        }
+        Some(other) => return Err(wrong(other.to_string())),
+    };
+    if given.len() != n {
+        return Err(wrong(format!("{} rows", given.len())));
+    }
+    // refused in the user's order, factored in that of the blocks
+    UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
+    let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
+    let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
+    UnitFactor::new(&ordered).map_err(|error| wrong(error.to_string()))
+}
+
+fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {
+    let entry = |i: usize, j: usize| if i == j { s } else { 0.0 };
+    (0..n)
+        .map(|i| (0..n).map(|j| entry(i, j)).collect())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    /// The page of the family shows the table of its keys as it is declared here.
+    #[test]
+    fn the_page_shows_the_keys() {
+        let page = include_str!("../../../../docs/state-affine.md");
+        for key in super::KEYS {
+            assert!(page.contains(&key.row()), "{}", key.row());
+        }
+    }
+}

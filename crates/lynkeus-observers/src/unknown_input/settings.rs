@@ -1,0 +1,136 @@
+//! The study's keys.
+
+use lynkeus_structure::Extended;
+
+use crate::{KeySpec, Tuning, TuningError, Value};
+
+const THETA: KeySpec = KeySpec {
+    name: "theta",
+    kind: "list of two numbers > 0, [θ1, θ2]",
+    default: "from the proof, where a bound exists",
+    meaning: "θ1 for the unknown inputs and x₁¹, θ2 for the rest",
+};
+
+const PARTITION: KeySpec = KeySpec {
+    name: "partition",
+    kind: "list of measured outputs",
+    default: "found",
+    meaning: "the outputs of x₁¹",
+};
+
+/// Every key of the family.
+pub(super) const KEYS: [KeySpec; 2] = [THETA, PARTITION];
+pub(super) static NAMES: [&str; 2] = KeySpec::names(&KEYS);
+
+/// θ₁ and θ₂.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Thetas {
+    pub θ1: f64,
+    pub θ2: f64,
+}
+
+/// The keys, read.
+pub(super) struct Settings {
+    /// none where the proof is to choose them
+    pub thetas: Option<Thetas>,
+    /// places of the measured outputs of x₁¹ in ascending order; none to search them
+    pub partition: Option<Vec<usize>>,
+    /// the plant's functions see the estimate limited to its range
+    pub clamp: bool,
+}
+
+impl Settings {
+    pub fn read(tuning: &Tuning, extended: &Extended<'_>) -> Result<Self, TuningError> {
+        Ok(Self {
+            thetas: thetas(tuning)?,
+            ..Self::of_form(tuning, extended)?
+        })
+    }
+
+    /// What the form depends on. `theta` belongs to other families too, with another
+    /// shape: where `auto` only examines the plant it is not read.
+    pub fn of_form(tuning: &Tuning, extended: &Extended<'_>) -> Result<Self, TuningError> {
+        Ok(Self {
+            thetas: None,
+            partition: partition(tuning, extended)?,
+            clamp: tuning.clamp,
+        })
+    }
+}
+
+fn thetas(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {
+    let Some(found) = tuning.numbers(THETA.name)? else {
+        return Ok(None);
+    };
+    let [θ1, θ2] = found[..] else {
+        return Err(THETA.wrong(format!("{} number(s)", found.len())));
+    };
+    match [θ1, θ2].iter().find(|θ| !(**θ > 0.0 && θ.is_finite())) {
+        Some(wrong) => Err(THETA.wrong(wrong)),
+        None => Ok(Some(Thetas { θ1, θ2 })),
+    }
+}
+
+fn partition(tuning: &Tuning, extended: &Extended<'_>) -> Result<Option<Vec<usize>>, TuningError> {
+    let Some(value) = tuning.values.get(PARTITION.name) else {
+        return Ok(None);
+    };
+    let outputs: Vec<&str> = extended
+        .outputs
+        .iter()
+        .map(|o| o.variable.name.as_str())
+        .collect();
+    let wrong = |found: &Value| {
+        let expected = format!(
+            "a list of measured outputs, those of x₁¹ ({})",
+            outputs.join(", ")
+        );
+        TuningError::new(PARTITION.name, expected, found)
+    };
+    let Value::List(list) = value else {
+        return Err(wrong(value));
+    };
+    let mut first = vec![];
+    for entry in list {
+        let place = match entry {
+            Value::Text(name) => outputs.iter().position(|o| o == name),
+            _ => None,
+        };
+        let place = place.filter(|place| !first.contains(place));
+        first.push(place.ok_or_else(|| wrong(entry))?);
+    }
+    first.sort_unstable();
+    Ok(Some(first))
+}
+
+/// A number of outputs in `partition` that cannot be.
+pub(super) fn wrong_size(
+    sizes: &std::ops::RangeInclusive<usize>,
+    measured: usize,
+    found: usize,
+) -> TuningError {
+    let expected = format!(
+        "between {} and {} of the {measured} measured outputs: at least one per unknown input, and as many left as there are states behind the measured ones",
+        sizes.start(),
+        sizes.end(),
+    );
+    TuningError::new(PARTITION.name, expected, format!("{found} outputs"))
+}
+
+/// No θ is given, and `reason` says why the proof gives none.
+pub(super) fn no_theta(reason: &str) -> TuningError {
+    let expected = format!("two positive numbers [θ1, θ2]; {reason}");
+    TuningError::new(THETA.name, expected, "nothing")
+}
+
+#[cfg(test)]
+mod tests {
+    /// The page of the family shows the table of its keys as it is declared here.
+    #[test]
+    fn the_page_shows_the_keys() {
+        let page = include_str!("../../../../docs/unknown-input.md");
+        for key in super::KEYS {
+            assert!(page.contains(&key.row()), "{}", key.row());
+        }
+    }
+}
