@@ -96,11 +96,10 @@ fn certificate(plant: &Plant, tuning: &Tuning, slew: f64, noise: f64) -> Certifi
     let extended = Extended::new(plant, &sensors()).unwrap();
     let mut drift = vec![0.0; extended.states.len()];
     drift[extended.plant_states()] = slew;
-    let assumptions = Assumptions {
-        region: extended.region(),
-        drift,
-        noise: vec![noise; extended.outputs.len()],
-    };
+    let assumptions = Assumptions::new(&extended, extended.region())
+        .unwrap()
+        .with_drift(drift)
+        .with_noise(vec![noise; extended.outputs.len()]);
     UnknownInput
         .theorem(&extended, tuning, &assumptions)
         .unwrap()
