@@ -12,7 +12,7 @@ const FACTORS: usize = 32;
 
 /// The expressions with sign(a)·a written as |a|, the factors of a product in any order:
 /// what the derivative of a·|a| has in it does not jump, though its factor sign(a) does.
-pub(super) fn without_removable_jumps(graph: &Graph, roots: &[Node]) -> Vec<Node> {
+pub(crate) fn without_removable_jumps(graph: &Graph, roots: &[Node]) -> Vec<Node> {
     let nodes = graph.reachable(roots);
     let has_sign = |&node: &Node| matches!(graph.op(node), Op::Unary(Unary::Sign, _));
     if !nodes.iter().any(has_sign) {

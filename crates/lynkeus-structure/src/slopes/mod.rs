@@ -26,7 +26,8 @@ use lynkeus_expr::{Graph, Interval, MissingInput, Node, jacobian};
 use lynkeus_gain::decay::ErrorModel;
 
 use crate::Region;
-use kinks::{jumps_in, without_removable_jumps};
+use kinks::jumps_in;
+pub(crate) use kinks::without_removable_jumps;
 use model::model;
 
 /// Inputs whose ranges become vertices: 2⁴ models at most.
