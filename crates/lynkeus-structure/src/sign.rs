@@ -5,6 +5,7 @@ use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::Cell;
 use crate::regularity::is_regular;
+use crate::slopes::without_removable_jumps;
 use crate::words::short;
 use crate::{Check, Condition, Point, Range, Region, Regularity, Witness, range, range_within};
 
@@ -118,12 +119,17 @@ fn witness(
     };
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    // a·sign(a) does not jump
+    let smooth = without_removable_jumps(graph, &[node])
+        .first()
+        .copied()
+        .unwrap_or(node);
     for point in [lowest, highest] {
         let value = enclosure(&tape, point);
         // where it jumps, the value between is no zero
         if value.lo() == 0.0
             && value.hi() == 0.0
-            && is_regular(graph, node, &region, &around(point, &region))?
+            && is_regular(graph, smooth, &region, &around(point, &region))?
         {
             return Ok(Some(Witness {
                 points: vec![point.clone()],
@@ -135,7 +141,7 @@ fn witness(
     }
     let mut points = vec![lowest.clone(), highest.clone()];
     if let Some((bracket, zero)) = zero_between(&tape, &region, lowest, highest)
-        && is_regular(graph, node, &region, &bracket)?
+        && is_regular(graph, smooth, &region, &bracket)?
     {
         points.insert(0, zero);
     }
@@ -179,19 +185,28 @@ fn zero_between(
     let middle_of = |p: &[f64], q: &[f64]| -> Vec<f64> {
         p.iter().zip(q).map(|(p, q)| p + (q - p) / 2.0).collect()
     };
-    for _ in 0..200 {
-        let middle = middle_of(&p, &q);
-        let cell: Vec<Interval> = middle.iter().map(|&x| Interval::point(x)).collect();
+    let sign_at = |x: &[f64]| {
+        let cell: Vec<Interval> = x.iter().map(|&x| Interval::point(x)).collect();
         let value = tape.eval_in(&Intervals, &cell)[0];
-        let side = match () {
-            () if middle == p || middle == q => break,
-            () if value.is_negative() => &mut p,
-            () if value.is_positive() => &mut q,
-            () => break,
-        };
-        *side = middle;
+        i8::from(value.is_positive()) - i8::from(value.is_negative())
+    };
+    let mut middle = middle_of(&p, &q);
+    while middle != p && middle != q {
+        match sign_at(&middle) {
+            -1 => p = middle,
+            1 => q = middle,
+            _ => break,
+        }
+        middle = middle_of(&p, &q);
     }
-    let middle = middle_of(&p, &q);
+    // a zero within rounding errors: its neighbours with a sign, on both sides
+    for (end, sign) in [(&mut p, -1), (&mut q, 1)] {
+        let mut next = middle_of(end, &middle);
+        while next != *end && next != middle && sign_at(&next) == sign {
+            *end = next;
+            next = middle_of(end, &middle);
+        }
+    }
     let mut value = [0.0];
     tape.evaluator().eval(&middle, &mut value);
     let ends = p.iter().zip(&q);

@@ -220,3 +220,60 @@ fn a_picture_of_the_singular_set_needs_two_states() {
     assert_eq!(ended.code, 2, "{}", ended.out);
     assert!(ended.err.contains("needs two"), "{}", ended.err);
 }
+
+const MOTOR: &str = "model Motor
+  input Real u(min = -24, max = 24); input Real TL(min = -0.2, max = 0.2);
+  Real th(min = -100, max = 100); Real w(min = -500, max = 500); Real i(min = -20, max = 20);
+  output Real encoder = th; output Real current = i;
+equation
+  der(th) = w; 1e-4*der(w) = 0.05*i - 1e-5*w - TL; 2e-3*der(i) = u - 1.2*i - 0.05*w;
+end Motor;";
+
+/// Of current and load torque a sum alone shows in the angle, unless the torque is constant.
+#[test]
+fn the_box_and_the_verdicts_do_not_contradict_each_other() {
+    let folder = Folder::empty();
+    folder.write("motor.mo", MOTOR);
+    let examined = |measured: &str| {
+        let study = format!(
+            "plant = \"motor.mo\"\n[sensors]\nmeasured = [{measured}]\nunknown = [\"TL\"]\n[observer]\nfamily = \"auto\"\n"
+        );
+        folder.write("study.toml", &study);
+        let text = folder.run(&["check", "study.toml"]).out;
+        let json = folder.run(&["check", "study.toml", "--json"]).json();
+        (text, json["uniform"].clone())
+    };
+    let (text, uniform) = examined("\"encoder\"");
+    assert!(text.contains("states not observable: i\n"), "{text}");
+    assert!(
+        !text.contains("everywhere on the box") && uniform.is_null(),
+        "{text}"
+    );
+    assert!(!text.contains("can be estimated: th, w, i"), "{text}");
+    let (text, uniform) = examined("\"encoder\", \"current\"");
+    assert!(
+        text.contains("for every constant input (while TL stays constant too) and everywhere on the box: proved"),
+        "{text}"
+    );
+    assert_eq!(uniform["verdict"], "proved");
+}
+
+/// Without ranges no point is worth printing: they are asked for.
+#[test]
+fn missing_ranges_are_asked_for() {
+    let folder = Folder::empty();
+    folder.write(
+        "open.mo",
+        "model Open Real a; Real b; output Real y = a; equation der(a) = b^3 - b; der(b) = -b; end Open;",
+    );
+    let ended = folder.run(&["check", "open.mo"]);
+    assert!(
+        ended.out.contains("declare min and max of b"),
+        "{}",
+        ended.out
+    );
+    let machine = folder.run(&["check", "open.mo", "--json"]).out;
+    for text in [&ended.out, &machine] {
+        assert!(!text.contains("e307") && !text.contains("e308"), "{text}");
+    }
+}
