@@ -1,7 +1,7 @@
 //! The box, the unknown influences and the measurement errors of a guarantee.
 
 use lynkeus_expr::Node;
-use lynkeus_model::Plant;
+use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Assumptions;
 use lynkeus_structure::{Dimension, Extended, Measurement, Region, range};
 
