@@ -13,6 +13,8 @@ use crate::{DesignError, Examination, Fit, TuningError};
 
 /// More partitions are not tried.
 const MAX_PARTITIONS: usize = 500;
+/// Nor more only to advise one.
+const MAX_ADVISED: usize = 20;
 
 type Found<'e, 'p> = Result<(Form<'e, 'p>, Examination), Examination>;
 
@@ -111,7 +113,7 @@ pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<Stri
         return Ok(None);
     }
     let all = rank::subsets(extended.outputs.len(), size, MAX_PARTITIONS).unwrap_or_default();
-    for first in all {
+    for first in all.into_iter().take(MAX_ADVISED) {
         let candidate = self::form(extended, &form.layers, first);
         if fit(&conditions(&candidate, region)?) == Fit::Fits {
             let name = |&i: &usize| format!("\"{}\"", extended.outputs[i].variable.name);

@@ -1,5 +1,6 @@
 //! The family `unknown-input` against the formulas of its paper.
 
+mod promises;
 mod shapes;
 mod theorem;
 
