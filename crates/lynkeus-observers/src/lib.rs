@@ -13,16 +13,16 @@
 pub mod block_triangular;
 mod certificate;
 mod conditions;
-pub mod drift_observable;
 mod correction;
+pub mod drift_observable;
 mod enclosure;
 mod estimate;
 mod family;
 mod guarantee;
 mod observer;
 mod peaking;
-mod proof;
 mod prolongation;
+mod proof;
 mod stability;
 pub mod state_affine;
 pub mod triangular;
