@@ -30,7 +30,11 @@ pub fn decide(coefficients: &[Interval]) -> Stability {
     if coefficients.iter().any(|c| c.hi() <= 0.0) {
         return Stability::Unstable;
     }
-    let all: Vec<Interval> = [Interval::ONE].iter().chain(coefficients).copied().collect();
+    let all: Vec<Interval> = [Interval::ONE]
+        .iter()
+        .chain(coefficients)
+        .copied()
+        .collect();
     let every_other = |from: usize| all.iter().skip(from).step_by(2).copied().collect();
     let (mut above, mut row): (Vec<Interval>, Vec<Interval>) = (every_other(0), every_other(1));
     while let Some(&pivot) = row.first() {
@@ -84,7 +88,11 @@ mod tests {
         let with = |a: f64| decide(&points(&[3.0, 3.0, a]));
         assert_eq!(with(8.999), Stability::Stable);
         assert_eq!(with(9.001), Stability::Unstable);
-        let wide = [Interval::point(3.0), Interval::point(3.0), Interval::new(8.0, 10.0).unwrap()];
+        let wide = [
+            Interval::point(3.0),
+            Interval::point(3.0),
+            Interval::new(8.0, 10.0).unwrap(),
+        ];
         assert_eq!(decide(&wide), Stability::Unknown);
         // on the imaginary axis is not in the open half-plane
         assert_eq!(decide(&points(&[0.0, 1.0])), Stability::Unstable);

@@ -17,10 +17,13 @@
 //! instead, and its constants explode doubly exponentially with the length. Then
 //! s_kk > s²/d_{k−1} (Schur again, d the pivots of S) keeps S positive definite.
 
+pub mod elimination;
 mod kernel;
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use lynkeus_expr::Interval;
+use nalgebra::{DMatrix, SymmetricEigen};
 
+use elimination::{Column, Tails};
 pub use kernel::{Breaking, Kernel, kernel};
 
 use crate::{Tridiagonal, TridiagonalError};
@@ -69,14 +72,6 @@ pub enum Error {
         /// α₂
         upper: f64,
     },
-    /// too many vertices
-    #[error(
-        "a chain of {size} is too long for Lemma 1's construction (at most {MAX_SIZE}): give S explicitly"
-    )]
-    TooLong {
-        /// states of the chain
-        size: usize,
-    },
     /// numbers ran out of range
     #[error(
         "Lemma 1's construction loses definiteness at row {row} in floating point: the bounds are too wide apart; narrow min/max or give S explicitly"
@@ -87,8 +82,11 @@ pub enum Error {
     },
 }
 
-/// 2^(n−2) vertices are visited.
-const MAX_SIZE: usize = 16;
+/// Partials that vary up to which all of their vertices are visited; beyond, the states are
+/// eliminated one by one.
+const VERTICES: usize = 10;
+/// Bisections of a number that elimination proves.
+const BISECTIONS: usize = 60;
 /// How far |s_{k−1,k}| lies above its limit, and s_kk above its own. Chosen by
 /// a scan over n = 2…7 with a ≡ 1: the pair with the most even error poles.
 const MARGIN_OFF_DIAGONAL: f64 = 1.3;
@@ -99,21 +97,28 @@ const RHO: f64 = 2.0;
 /// S, ρ, η for a chain of `bounds.len() + 1` states.
 ///
 /// # Errors
-/// Bounds that are not positive and finite, a chain longer than 16, or bounds so
-/// far apart that the construction leaves the range of `f64`.
+/// Bounds that are not positive and finite, or so far apart, for a chain so long, that the
+/// construction leaves the range of `f64`.
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     let size = check(bounds)?;
     let w = scale(bounds);
     let scaled: Vec<Bounds> = bounds.iter().map(|b| b.times(w)).collect();
-    let (mut diagonal, mut off) = (vec![1.0], vec![]);
+    let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
+    let mut growth = Growth::new();
     for (k, bound) in scaled.iter().enumerate() {
-        let worst =
-            worst_cross_term(&diagonal, &off, &scaled[..k]).ok_or(Error::Lost { row: k + 2 })?;
+        let before = off.last().copied().unwrap_or(0.0);
+        let worst = growth.cross([before, diagonal[k]]);
         let s: f64 = -MARGIN_OFF_DIAGONAL * 0.5 * bound.upper * worst;
+        growth.add([before, diagonal[k], s], *bound);
         off.push(s);
-        diagonal.push(MARGIN_DIAGONAL * s * s / pivot);
-        pivot = (MARGIN_DIAGONAL - 1.0) * s * s / pivot;
+        // s² alone may leave the range of numbers
+        diagonal.push(MARGIN_DIAGONAL * s * (s / pivot));
+        pivot = (MARGIN_DIAGONAL - 1.0) * s * (s / pivot);
+        let sound = pivot.is_finite() && pivot > 0.0 && growth.positive();
+        if !sound {
+            return Err(Error::Lost { row: k + 2 });
+        }
     }
     let lost = Error::Lost { row: size };
     let S = unscaled(diagonal, off, w).map_err(|_| lost.clone())?;
@@ -136,11 +141,7 @@ fn check(bounds: &[Bounds]) -> Result<usize, Error> {
             });
         }
     }
-    let size = bounds.len() + 1;
-    if size > MAX_SIZE {
-        return Err(Error::TooLong { size });
-    }
-    Ok(size)
+    Ok(bounds.len() + 1)
 }
 
 /// 1/geometric mean of the bounds: w·a is then around one. In the coordinates
@@ -161,43 +162,113 @@ fn unscaled(diagonal: Vec<f64>, off: Vec<f64>, w: f64) -> Result<Tridiagonal, Tr
     Tridiagonal::new(diagonal.collect(), off.collect())
 }
 
-/// max over the vertices of cᵀ(−P)⁻¹c with c the last column of S, computed in
-/// coordinates in which S has a unit diagonal.
-fn worst_cross_term(diagonal: &[f64], off: &[f64], bounds: &[Bounds]) -> Option<f64> {
-    let n = diagonal.len();
-    let S = |i: usize, j: usize| match i.abs_diff(j) {
-        0 => diagonal[i],
-        1 => off[i.min(j)],
-        _ => 0.0,
-    };
-    let c = DVector::from_fn(n, |i, _| S(i, n - 1) / diagonal[i].sqrt());
-    let mut worst: f64 = 0.0;
-    for a in vertices(bounds) {
-        let factor = Cholesky::new(-inequality(n, S, RHO, &a))?;
-        worst = worst.max(c.dot(&factor.solve(&c)));
+/// The elimination while S grows, each state in a unit in which its column is about one:
+/// the numbers of long chains spread over hundreds of decades.
+struct Growth {
+    tails: Option<Tails>,
+    /// 1/unit of the last two states
+    units: [f64; 2],
+}
+
+impl Growth {
+    fn new() -> Self {
+        Self {
+            tails: None,
+            units: [0.0, 1.0],
+        }
     }
-    worst.is_finite().then_some(worst)
+
+    /// max of cᵀ(−P)⁻¹c over the bounds, c being zero but in its last two entries.
+    fn cross(&self, c: [f64; 2]) -> f64 {
+        let c = [0, 1].map(|i| Interval::point(c[i]) * Interval::point(self.units[i]));
+        match &self.tails {
+            Some(tails) => tails.cross(c),
+            None => (c[1].powi(2) / Interval::point(RHO)).hi(),
+        }
+    }
+
+    /// The column with a·(s_{k−2,k−1}, s_{k−1,k−1}, 2s_{k−1,k}).
+    fn add(&mut self, [far, near, s]: [f64; 3], bounds: Bounds) {
+        let unit = (-2.0 * s * bounds.upper).sqrt().recip();
+        let scaled = |x: f64, unit: f64, other: f64| {
+            Interval::point(x) * Interval::point(unit) * Interval::point(other)
+        };
+        let column = Column {
+            far: scaled(far, self.units[0], unit),
+            near: scaled(near, self.units[1], unit),
+            own: scaled(-2.0 * s, unit, unit),
+        };
+        self.tails = Some(match &self.tails {
+            Some(tails) => tails.grown(&column, bounds, 0.0),
+            None => Tails::new(Interval::point(RHO), &column, bounds, 0.0),
+        });
+        self.units = [self.units[1], unit];
+    }
+
+    fn positive(&self) -> bool {
+        self.tails.as_ref().is_none_or(Tails::positive)
+    }
 }
 
 /// An η > 0 with P(a) ≤ −η I on all of the bounds, or a number ≤ 0 where (17)
 /// fails. λ_max is convex in a, so the vertices decide. With D² = diag S the
 /// largest eigenvalue −μ of D⁻¹PD⁻¹ gives xᵀPx ≤ −μ|Dx|² ≤ −μ·min(S_ii)·|x|²,
-/// and is well conditioned where P itself is not.
+/// and is well conditioned where P itself is not. Of long chains the states are
+/// eliminated instead; a number ≤ 0 may then also mean that (17) is not proved.
 pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
     let entry = |i: usize, j: usize| S.get(i, j);
-    let μ = vertices(bounds)
-        .map(|a| {
-            -SymmetricEigen::new(inequality(S.size(), entry, ρ, &a))
-                .eigenvalues
-                .max()
-        })
-        .fold(f64::INFINITY, f64::min);
+    let μ = match varying(bounds) > VERTICES {
+        true => eliminated_decay(S, ρ, bounds),
+        false => vertices(bounds)
+            .map(|a| {
+                -SymmetricEigen::new(inequality(S.size(), entry, ρ, &a))
+                    .eigenvalues
+                    .max()
+            })
+            .fold(f64::INFINITY, f64::min),
+    };
     let ends = |f: fn(f64, f64) -> f64, start| S.diagonal().iter().copied().fold(start, f);
     // a negative μ is scaled the other way: P has an eigenvalue above zero anyhow
     match μ > 0.0 {
         true => μ * ends(f64::min, f64::INFINITY),
         false => μ * ends(f64::max, 0.0),
     }
+}
+
+/// The largest μ with D⁻¹PD⁻¹ ≤ −μ that elimination proves, or zero.
+fn eliminated_decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
+    let columns = columns(S);
+    let first = Interval::point(ρ) / Interval::point(S.get(0, 0));
+    let mut ends = (0.0, first.hi());
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (ends.0 + ends.1);
+        match elimination::positive(first, &columns, bounds, middle) {
+            true => ends.0 = middle,
+            false => ends.1 = middle,
+        }
+    }
+    ends.0
+}
+
+/// The columns of −D⁻¹PD⁻¹ from the second state on, D² = diag S.
+fn columns(S: &Tridiagonal) -> Vec<Column> {
+    let d = |i: usize| Interval::point(S.get(i, i)).sqrt();
+    let entry = |i: usize, j: usize, rows: (usize, usize)| {
+        Interval::point(S.get(i, j)) / (d(rows.0) * d(rows.1))
+    };
+    let column = |j: usize| Column {
+        far: match j {
+            1 => Interval::ZERO,
+            _ => entry(j - 2, j - 1, (j - 2, j)),
+        },
+        near: entry(j - 1, j - 1, (j - 1, j)),
+        own: Interval::point(-2.0) * entry(j, j - 1, (j, j)),
+    };
+    (1..S.size()).map(column).collect()
+}
+
+fn varying(bounds: &[Bounds]) -> usize {
+    bounds.iter().filter(|b| b.lower < b.upper).count()
 }
 
 /// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S and (SA)_ij = S_{i,j−1} a_{j−1}.
@@ -300,6 +371,41 @@ mod tests {
         }])
         .unwrap_err();
         assert!(matches!(error, Error::Bounds { index: 1, .. }));
+    }
+
+    /// Twenty states, beyond any list of vertices: (17) at random choices of the ends, by
+    /// eigenvalues.
+    #[test]
+    fn twenty_states_hold_at_random_vertices() {
+        let bounds = [Bounds {
+            lower: 0.95,
+            upper: 1.05,
+        }; 19];
+        let found = construct(&bounds).unwrap();
+        assert!(found.η > 0.0 && found.S.is_positive_definite());
+        let mut choice = 12_345_u64;
+        for _ in 0..200 {
+            let mut end = || {
+                choice = choice
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                if choice >> 63 == 0 { 0.95 } else { 1.05 }
+            };
+            let a: Vec<f64> = (0..19).map(|_| end()).collect();
+            let P = inequality(20, |i, j| found.S.get(i, j), found.ρ, &a);
+            let smallest = found
+                .S
+                .diagonal()
+                .iter()
+                .copied()
+                .fold(f64::INFINITY, f64::min);
+            let μ = -SymmetricEigen::new(P).eigenvalues.max();
+            assert!(μ * smallest >= found.η * (1.0 - 1e-9), "{μ} {}", found.η);
+        }
+        let Kernel::Holds { ρ } = kernel(&found.S, &bounds).unwrap() else {
+            panic!()
+        };
+        assert!(ρ < RHO, "{ρ}");
     }
 
     proptest! {

@@ -59,7 +59,11 @@ impl Correction<'_> {
         let named = self.states.iter().zip(self.on_output(extended));
         let row = |(&state, gain): (&usize, Node)| {
             let name = format!("gain of {output} on {}", extended.states[state].name);
-            let limited = if self.limited { ", on the limited error" } else { "" };
+            let limited = if self.limited {
+                ", on the limited error"
+            } else {
+                ""
+            };
             (name, format!("{}{limited}", start.shown(gain)))
         };
         named.map(row).collect()

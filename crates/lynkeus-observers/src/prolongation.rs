@@ -67,7 +67,13 @@ pub(crate) fn prolong(
         return Ok(());
     }
     let graph = copy.extended.graph();
-    for Continued { row, next, sign, bounds } in rows {
+    for Continued {
+        row,
+        next,
+        sign,
+        bounds,
+    } in rows
+    {
         let variable = &copy.extended.states[next];
         let Some(slope) = nominal(sign, bounds) else {
             let expected = format!(
@@ -87,7 +93,11 @@ pub(crate) fn prolong(
 /// Refuses the key where an observer has no such form.
 pub(crate) fn refuse(tuning: &Tuning, observer: &str) -> Result<(), TuningError> {
     match tuning.flag(KEY)? {
-        true => Err(TuningError::new(KEY, format!("no prolongation with {observer}"), "true")),
+        true => Err(TuningError::new(
+            KEY,
+            format!("no prolongation with {observer}"),
+            "true",
+        )),
         false => Ok(()),
     }
 }

@@ -100,16 +100,28 @@ mod tests {
     /// Positive partials are not enough for three states: (3, 3, 1) needs a₂ < 9.
     #[test]
     fn a_positive_partial_can_be_too_large() {
-        assert_eq!(frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (10.0, 10.0)]), Stability::Unstable);
-        assert_eq!(frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (8.0, 8.0)]), Stability::Stable);
+        assert_eq!(
+            frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (10.0, 10.0)]),
+            Stability::Unstable
+        );
+        assert_eq!(
+            frozen(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (8.0, 8.0)]),
+            Stability::Stable
+        );
     }
 
     #[test]
     fn pairs_are_listed_once() {
-        let chain = GainedChain { K: &[-2.0, 5.0], partials: &[(1.0, 1.0)] };
+        let chain = GainedChain {
+            K: &[-2.0, 5.0],
+            partials: &[(1.0, 1.0)],
+        };
         assert_eq!(listed(&chain.eigenvalues(&[1.0])), "1 ± 2i");
         assert_eq!(chain.middle(), Some(vec![1.0]));
-        let mixed = GainedChain { K: &[1.0, 1.0], partials: &[(-1.0, 1.0)] };
+        let mixed = GainedChain {
+            K: &[1.0, 1.0],
+            partials: &[(-1.0, 1.0)],
+        };
         assert_eq!(mixed.middle(), None);
     }
 }

@@ -53,13 +53,18 @@ pub(crate) fn certified(study: &Study, explore: bool) -> Result<CertifyReport, E
         plant: &plant,
         inputs,
         explore,
-        // inside the box, where the guarantee holds, the limits of `clamp` do nothing
-        tuning: Tuning {
-            clamp: false,
-            ..study.observer.tuning.clone()
-        },
+        tuning: inside_the_box(&study.observer.tuning),
     };
     task.report()
+}
+
+/// Inside the box, where an inequality guarantees anything, limits and prolongation of the
+/// functions do nothing.
+fn inside_the_box(tuning: &Tuning) -> Tuning {
+    let mut inside = tuning.clone();
+    inside.clamp = false;
+    inside.values.remove("prolong");
+    inside
 }
 
 struct Task<'a> {
@@ -103,7 +108,11 @@ impl Task<'_> {
         let theorem = match family.filter(|_| !lmi) {
             Some(family) => {
                 let assumptions = assumptions::of(self.study, self.plant, place)?;
-                let theorem = family.theorem(place, &self.tuning, &assumptions);
+                let tuning = Tuning {
+                    clamp: false,
+                    ..self.study.observer.tuning.clone()
+                };
+                let theorem = family.theorem(place, &tuning, &assumptions);
                 Some(theorem.map_err(|error| prepare::refusal(self.study, &error))?)
             }
             None => None,

@@ -10,9 +10,10 @@
 //! satisfies the lemma for no ρ, and the eigenvector is the direction that shows it.
 //! Both λ_max(P̂(a)) and pᵀ(−P̂)⁻¹p are convex in a: the vertices decide.
 
+use lynkeus_expr::Interval;
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::{Bounds, Error, check, vertices};
+use super::{BISECTIONS, Bounds, Error, VERTICES, check, columns, elimination, varying, vertices};
 use crate::Tridiagonal;
 
 /// What (17) asks of ρ.
@@ -42,12 +43,15 @@ pub struct Breaking {
 ///
 /// # Errors
 /// Bounds that are not positive and finite or of another number than S has
-/// partials for; a chain longer than 16.
+/// partials for; a long chain of which neither is found.
 pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
     check(bounds)?;
     let n = S.size();
     if bounds.len() + 1 != n {
         return Err(Error::Lost { row: n });
+    }
+    if varying(bounds) > VERTICES {
+        return eliminated(S, bounds);
     }
     let (mut least, mut worst): (f64, Option<Breaking>) = (0.0, None);
     for a in vertices(bounds) {
@@ -68,6 +72,70 @@ pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
         }
     }
     Ok(worst.map_or(Kernel::Holds { ρ: least }, Kernel::Breaks))
+}
+
+/// Powers of two that ρ is sought among.
+const DOUBLINGS: i32 = 400;
+
+/// The same by elimination, for chains with many vertices.
+fn eliminated(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
+    let columns = columns(S);
+    let lowest = Interval::point(bounds[0].lower) * columns[0].own;
+    // the second state is the first on the kernel of C, and the larger its partial the better
+    let definite =
+        lowest.is_positive() && elimination::positive(lowest, &columns[1..], &bounds[1..], 0.0);
+    if !definite {
+        let found = ascended(S, bounds);
+        let lost = Error::Lost { row: S.size() };
+        return if found.eigenvalue > 0.0 {
+            Ok(Kernel::Breaks(found))
+        } else {
+            Err(lost)
+        };
+    }
+    let holds = |ρ: f64| {
+        let first = Interval::point(ρ) / Interval::point(S.get(0, 0));
+        elimination::positive(first, &columns, bounds, 0.0)
+    };
+    let power = |k: i32| 2f64.powi(k);
+    let Some(k) = (-DOUBLINGS..DOUBLINGS).find(|&k| holds(power(k))) else {
+        return Err(Error::Lost { row: S.size() });
+    };
+    let mut ends = (power(k - 1), power(k));
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (ends.0 + ends.1);
+        match holds(middle) {
+            true => ends.1 = middle,
+            false => ends.0 = middle,
+        }
+    }
+    Ok(Kernel::Holds { ρ: ends.1 })
+}
+
+/// A vertex at which no other end of a single partial gives a larger eigenvalue.
+fn ascended(S: &Tridiagonal, bounds: &[Bounds]) -> Breaking {
+    let n = S.size();
+    let at = |a: &[f64]| {
+        let Phat = inequality(S, a).view((1, 1), (n - 1, n - 1)).into_owned();
+        breaking(a.to_vec(), Phat)
+    };
+    let mut best = at(&bounds.iter().map(|b| b.upper).collect::<Vec<f64>>());
+    loop {
+        let flipped = |i: usize| {
+            let mut a = best.a.clone();
+            a[i] = if a[i] == bounds[i].upper {
+                bounds[i].lower
+            } else {
+                bounds[i].upper
+            };
+            at(&a)
+        };
+        let found = (0..bounds.len()).map(flipped);
+        match found.max_by(|x, y| x.eigenvalue.total_cmp(&y.eigenvalue)) {
+            Some(found) if found.eigenvalue > best.eigenvalue => best = found,
+            _ => return best,
+        }
+    }
 }
 
 /// A(a)ᵀS + S A(a).

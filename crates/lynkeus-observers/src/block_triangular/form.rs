@@ -37,7 +37,10 @@ pub(super) fn form(
         Err(summary) => return Ok(Err(refusal(summary))),
     };
     let mut best: Option<Form> = None;
-    for choice in distinct(extended, tuning, &arrangements)?.into_iter().take(EXAMINED) {
+    for choice in distinct(extended, tuning, &arrangements)?
+        .into_iter()
+        .take(EXAMINED)
+    {
         let form = examined(extended, tuning, &settings, choice)?;
         let rank = |fit: Fit| match fit {
             Fit::Fits => 0,
@@ -48,7 +51,10 @@ pub(super) fn form(
         if best.as_ref().is_none_or(better) {
             best = Some(form);
         }
-        if best.as_ref().is_some_and(|b| b.examination.fit == Fit::Fits) {
+        if best
+            .as_ref()
+            .is_some_and(|b| b.examination.fit == Fit::Fits)
+        {
             break;
         }
     }
@@ -125,7 +131,13 @@ fn examined(
         checks.extend(output_slope(extended, *output, &region)?);
         let (found, signs) = partials(extended, &chain.states, &region)?;
         checks.extend(signs);
-        checks.extend(stable(extended, settings, &chain.states, &K[*output], &found));
+        checks.extend(stable(
+            extended,
+            settings,
+            &chain.states,
+            &K[*output],
+            &found,
+        ));
         all.push(found);
     }
     checks.push(lipschitz(extended, &region)?);
@@ -145,7 +157,8 @@ fn examined(
         };
     }
     if orders > 1 {
-        summary += &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");
+        summary +=
+            &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");
     }
     let chains = blocks.names(extended);
     let found = family::Form { summary, chains };

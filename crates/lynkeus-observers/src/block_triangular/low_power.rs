@@ -43,7 +43,11 @@ pub(super) fn assemble(
         let f: Vec<Node> = chain.states.iter().map(derivative).collect();
         let output_name = &extended.outputs[*output].variable.name;
         let found = &form.partials[place];
-        notes.extend(variation(output_name, &bounds(found), &coefficients.K[*output]));
+        notes.extend(variation(
+            output_name,
+            &bounds(found),
+            &coefficients.K[*output],
+        ));
         let added = run.add(&Part {
             states: &chain.states,
             f: &graph.substitute(&f, &injected(&copy, blocks, place)),

@@ -32,7 +32,10 @@ pub(super) fn stable(
     if settings.low_power || (integrators && !settings.given) {
         return None;
     }
-    let chain = GainedChain { K, partials: &ranges };
+    let chain = GainedChain {
+        K,
+        partials: &ranges,
+    };
     let states = names(extended, states).join(" → ");
     let name = match integrators {
         true => format!("A − KC is stable for ({states})"),

@@ -9,16 +9,16 @@ use lynkeus_expr::Interval;
 use lynkeus_structure::{Blocks, Check, Extended};
 
 use super::form::form;
-use super::transformed::{Plant, Similar, Table, Term};
 use super::settings::{Correction, Settings};
+use super::transformed::{Plant, Similar, Table, Term};
 use super::{chain_rule, coefficients, theta};
 use crate::conditions::{Partial, fit, names, output_slope, partials};
 use crate::peaking::Departure;
-use crate::stability::GainedChain;
 use crate::proof::slopes::{Slope, slopes};
 use crate::proof::threshold::{first, lightest};
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
 use crate::proof::{Chain, Comparison, lyapunov};
+use crate::stability::GainedChain;
 use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning, prolongation};
 
 const BASIS: &str = "Theorem 1 of Lee, Yee and Park";

@@ -78,11 +78,15 @@ impl LowPower {
     pub fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
         if let Some(poles) = tuning.values.get(POLES) {
             let chains = chains(POLES, poles)?;
-            chains.iter().try_for_each(|chain| negative(chain, poles).map(drop))?;
+            chains
+                .iter()
+                .try_for_each(|chain| negative(chain, poles).map(drop))?;
         }
         if let Some(given) = tuning.values.get(GIVEN) {
             let chains = chains(GIVEN, given)?;
-            chains.iter().try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
+            chains
+                .iter()
+                .try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
         }
         Ok(())
     }
@@ -174,7 +178,8 @@ fn chains<'v>(key: &str, value: &'v Value) -> Result<&'v [Value], TuningError> {
 /// The factors of a chain as parameters: each acts on the innovation of its block, not on
 /// ŷ − y, so they are no gain K.
 pub(crate) fn factor_rows(output: &str, factors: Vec<(String, f64)>) -> Vec<(String, String)> {
-    let row = |(state, factor): (String, f64)| (format!("{output}: on {state}"), factor.to_string());
+    let row =
+        |(state, factor): (String, f64)| (format!("{output}: on {state}"), factor.to_string());
     factors.into_iter().map(row).collect()
 }
 

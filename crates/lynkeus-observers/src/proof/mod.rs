@@ -10,7 +10,8 @@
 //! D² = diag S, z = Dε, two inequalities prove the decay:
 //!
 //! 1. AᵀS + SA − SgC − CᵀgᵀS ≤ −μD² at every vertex of the bounds of a, checked by
-//!    an elimination in interval arithmetic (`definite`);
+//!    an elimination in interval arithmetic (`definite`; for many vertices and a
+//!    tridiagonal S state by state, `elimination`);
 //! 2. N = −τμ + |S̄|G + Gᵀ|S̄| < 0 with S̄ = D⁻¹SD⁻¹, G_ab = D_a L_ab (s_b/s_a)/D_b,
 //!    since V' ≤ |z|ᵀN|z|: off its diagonal N has nothing negative (`metzler`).
 //!
@@ -19,6 +20,7 @@
 //! outward-rounded bound.
 
 pub(crate) mod definite;
+mod elimination;
 pub(crate) mod lyapunov;
 pub(crate) mod metzler;
 pub(crate) mod slopes;
@@ -49,8 +51,8 @@ pub(crate) struct Chain {
 
 /// Bisections: enough for all digits of a number between zero and its bound.
 const BISECTIONS: usize = 50;
-/// 2^(n−1) vertices are visited.
-const MAX_SIZE: usize = 16;
+/// Partials that vary up to which all of their vertices are visited.
+const VERTICES: usize = 10;
 
 impl Chain {
     fn size(&self) -> usize {
@@ -59,8 +61,17 @@ impl Chain {
 
     /// μ of the first inequality: proved, and as large as the arithmetic proves.
     pub fn decay(&self) -> Option<f64> {
-        if self.size() > MAX_SIZE || !definite::positive(&self.S) {
+        if !definite::positive(&self.S) {
             return None;
+        }
+        if self
+            .partials
+            .iter()
+            .filter(|(low, high)| low < high)
+            .count()
+            > VERTICES
+        {
+            return self.eliminated_decay();
         }
         let mut μ = f64::INFINITY;
         for a in vertices(&self.partials) {

@@ -4,10 +4,10 @@ use lynkeus_expr::Graph;
 use lynkeus_structure::{Check, Extended, Region};
 
 use super::form::Form;
+use crate::DesignError;
 use crate::conditions::{output_slope, partials};
 use crate::proof::slopes::{Slope, slopes, undeclared};
 use crate::proof::words::undecided;
-use crate::DesignError;
 
 /// What is known of the plant on the box of the assumptions.
 pub(super) struct Facts {
@@ -25,7 +25,12 @@ impl Facts {
             checks.extend(output_slope(extended, i, region)?);
             let (found, signs) = partials(extended, &chain.states, region)?;
             checks.extend(signs);
-            bounds.push(found.iter().map(|partial| partial.bounds).collect::<Vec<_>>());
+            bounds.push(
+                found
+                    .iter()
+                    .map(|partial| partial.bounds)
+                    .collect::<Vec<_>>(),
+            );
         }
         let along = |a: usize, b: usize| {
             chains

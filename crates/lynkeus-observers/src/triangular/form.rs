@@ -44,7 +44,9 @@ pub(super) fn form(
     } else {
         let count = extended.outputs.len();
         if let Some(δ) = tuning.positive_per_chain("delta", count)? {
-            assignments.iter_mut().for_each(|a| lead_within_window(a, &δ));
+            assignments
+                .iter_mut()
+                .for_each(|a| lead_within_window(a, &δ));
         }
     }
     let choices = assignments.len();
@@ -105,7 +107,9 @@ fn carried(
         return Ok(vec![]);
     };
     let count = assignment.chains.len();
-    let r = tuning.positive_per_chain("r", count)?.unwrap_or(vec![1.0; count]);
+    let r = tuning
+        .positive_per_chain("r", count)?
+        .unwrap_or(vec![1.0; count]);
     let divided = tuning.flag("partials")?;
     let mut checks = vec![];
     for (i, chain) in assignment.chains.iter().enumerate() {
@@ -114,7 +118,10 @@ fn carried(
             .iter()
             .map(|p| if divided { (1.0, 1.0) } else { p.bounds })
             .collect();
-        let gained = GainedChain { K: &K, partials: &ranges };
+        let gained = GainedChain {
+            K: &K,
+            partials: &ranges,
+        };
         let Some(a) = gained.middle() else { continue };
         let eigenvalues = gained.eigenvalues(&a);
         let rightmost = eigenvalues.first().map_or(f64::NAN, |λ| λ.0);
@@ -162,7 +169,9 @@ fn examined(
     }
     if assignment.either {
         let leading = &extended.outputs[assignment.leading].variable.name;
-        summary += &format!("; either chain can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise");
+        summary += &format!(
+            "; either chain can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
+        );
     }
     let found = family::Form { summary, chains };
     let examination = Examination::new(extended, &region, NAME, found, checks)?;

@@ -44,7 +44,8 @@ pub(super) fn certificate(
     let facts = Facts::new(extended, &form, region)?;
     let mut checks = facts.checks.clone();
     if let Some(departure) = Departure::of(tuning, &["lemma1"])? {
-        checks.push(departure.check("the observer is (9) with a constant gain from a tridiagonal S"));
+        checks
+            .push(departure.check("the observer is (9) with a constant gain from a tridiagonal S"));
         return Ok(Certificate::new(BASIS, assumptions, checks));
     }
     let unbounded = facts
@@ -272,9 +273,8 @@ const BROKEN: &str = "A refuted Lemma 1 ends this proof, whatever θ is. It does
 /// Theorem 2's window for δ2/δ1.
 fn windowed(window: &Window, constants: &mut Vec<Constant>) -> Check {
     let Window { low, high, ratio } = *window;
-    let mut add = |name: &str, value: f64, meaning: &str| {
-        constants.push(Constant::new(name, value, meaning))
-    };
+    let mut add =
+        |name: &str, value: f64, meaning: &str| constants.push(Constant::new(name, value, meaning));
     add(
         "(2n1−1)/(2n2−1)",
         low,

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod block_triangular;
+mod chains;
 mod common;
 mod drift_observable;
 mod peaking;

@@ -26,11 +26,10 @@ struct Promise<'a> {
 impl Promise<'_> {
     fn certificate(&self, tuning: &Tuning) -> Certificate {
         let extended = Extended::new(self.plant, &self.sensors).unwrap();
-        let assumptions = Assumptions {
-            region: extended.region(),
-            drift: self.drift.to_vec(),
-            noise: self.noise.to_vec(),
-        };
+        let assumptions = Assumptions::new(&extended, extended.region())
+            .unwrap()
+            .with_drift(self.drift.to_vec())
+            .with_noise(self.noise.to_vec());
         UnknownInput
             .theorem(&extended, tuning, &assumptions)
             .unwrap()
