@@ -126,12 +126,8 @@ pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Chec
     let jacobian = lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &symbols);
     let name = "∂f/∂x is bounded on the box".to_owned();
     let regularity = Regularity::of(graph, &extended.derivatives, &symbols, region)?;
-    if let Some(trouble) = regularity.trouble() {
-        return Ok(Check {
-            name,
-            verdict: regularity.verdict(),
-            detail: trouble.to_string(),
-        });
+    if !regularity.holds() {
+        return Ok(regularity.check(name));
     }
     for &(row, column, node) in &jacobian.entries {
         if sign::bounded(graph, node, region)? {

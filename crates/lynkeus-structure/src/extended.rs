@@ -237,14 +237,7 @@ impl<'p> Extended<'p> {
         let outputs = self.outputs.iter().map(|o| o.variable.node);
         let all: Vec<Node> = self.derivatives.iter().copied().chain(outputs).collect();
         let found = Regularity::of(self.graph(), &all, &self.symbols(), region)?;
-        Ok(Check {
-            name: "f and h have values everywhere on the box and do not jump".into(),
-            verdict: found.verdict(),
-            detail: match found.trouble() {
-                None => format!("{} expressions examined", all.len()),
-                Some(trouble) => trouble.to_string(),
-            },
-        })
+        Ok(found.check("f and h have values everywhere on the box and do not jump"))
     }
 
     /// The box: declared ranges of the states, unknown and known inputs; time is free.

@@ -18,7 +18,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node, jacobian};
-use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, rank, sign};
+use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, Regularity, rank, sign};
 
 use super::blocks::{self, Shape};
 use super::form::Form;
@@ -77,6 +77,7 @@ pub(super) fn norms(form: &Form<'_, '_>, assumptions: &Assumptions) -> Result<No
         tall,
         blocks: blocks::covered(form, box_.region())?,
         regular: signals.regular(&P)?,
+        continuous: signals.continuous(&P)?,
         open: box_.open(),
     })
 }
@@ -229,6 +230,19 @@ impl<'e, 'p> Signals<'e, 'p> {
         let q = columns.len();
         let row = |k| (0..q).map(|j| one(k, j)).collect();
         (0..q).map(row).collect()
+    }
+
+    /// The proof follows G₁¹, Λ₂ and the coordinates Z along the plant: as states, signals,
+    /// inputs and time move. A jump would be missing in each of their derivatives.
+    fn continuous(&self, P: &[Matrix<'p>]) -> Result<Check, MissingInput> {
+        let Z = self.coordinates(P);
+        let G11 = self.form.G11();
+        let all = P.iter().chain(&Z).chain([&G11]);
+        let nodes: Vec<Node> = all.flat_map(Matrix::nonzero).collect();
+        let region = self.box_.region();
+        let graph = self.form.extended.graph();
+        let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
+        Ok(found.check("what the proof differentiates has values on the box and does not jump"))
     }
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured

@@ -34,6 +34,8 @@ pub(super) struct Norms {
     pub blocks: Check,
     /// whether Λ₂ is regular with the signals apart from the states they show
     pub regular: Check,
+    /// whether what the proof differentiates has values and does not jump
+    pub continuous: Check,
     /// what has no bound on the box
     pub open: Vec<String>,
 }

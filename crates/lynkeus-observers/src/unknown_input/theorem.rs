@@ -38,6 +38,7 @@ pub(super) fn certificate(
     let mut hypotheses = examination.checks;
     hypotheses.push(proof.norms.blocks.clone());
     hypotheses.push(proof.norms.regular.clone());
+    hypotheses.push(proof.norms.continuous.clone());
     hypotheses.push(proof.finite());
     hypotheses.push(proof.slow(assumptions));
     hypotheses.extend(proof.gains(thetas.as_ref()));

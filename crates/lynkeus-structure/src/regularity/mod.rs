@@ -14,7 +14,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
 use crate::words::short;
 use crate::region::Cell;
-use crate::{Condition, Region};
+use crate::{Check, Condition, Region};
 use walk::Walk;
 
 /// Cells looked at.
@@ -80,6 +80,19 @@ impl Regularity {
     /// What stands against it.
     pub fn trouble(&self) -> Option<&Trouble> {
         self.trouble.as_ref()
+    }
+
+    /// The verdict as a condition of that name.
+    pub fn check(&self, name: impl Into<String>) -> Check {
+        let examined = || "every operation examined".to_owned();
+        Check {
+            name: name.into(),
+            verdict: self.verdict(),
+            detail: self
+                .trouble
+                .as_ref()
+                .map_or_else(examined, Trouble::to_string),
+        }
     }
 
     /// Proved, or undecided with the place. Never refuted: a jump or a missing value in a
