@@ -201,7 +201,7 @@ impl<'a> Analysis<'a> {
         let columns = Columns::new(self.model, self.last_order(&ground.surroundings));
         let mut search = self.search(&ground.start, columns);
         let ended = match &ground.surroundings {
-            Surroundings::Generic => search.to_the_end().map(|()| vec![Hidden::all(&search)]),
+            Surroundings::Generic => search.run_out().map(|()| vec![Hidden::all(&search)]),
             Surroundings::Special(set) if self.model.unknown_inputs == 0 => {
                 self.beside(ground, set, &mut search)
             }

@@ -55,7 +55,7 @@ impl<'a> Search<'a> {
     }
 
     /// Adds orders at a generic start until none can bring anything new.
-    pub fn to_the_end(&mut self) -> Result<(), Stop> {
+    pub fn run_out(&mut self) -> Result<(), Stop> {
         // the number of states and parameters, and one more for unknown inputs, is enough
         for k in 0..=self.model.depth {
             let before = self.settled();
