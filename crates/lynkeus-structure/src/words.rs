@@ -12,7 +12,10 @@ const PLAIN: std::ops::Range<i32> = -5..6;
 /// assert_eq!(figures(3e20, 4), "3e20");
 /// ```
 pub fn figures(value: f64, count: usize) -> String {
-    if value == 0.0 || !value.is_finite() {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if !value.is_finite() {
         return format!("{value}");
     }
     let behind = count.saturating_sub(1);
@@ -53,6 +56,7 @@ mod tests {
     fn numbers_read_well() {
         for (value, text) in [
             (0.0, "0"),
+            (-0.0, "0"),
             (0.5, "0.5"),
             (-1.0, "-1"),
             (1234567.8, "1.23457e6"),

@@ -32,7 +32,7 @@ const STILL: f64 = 1e-10;
 /// Halvings of the step along the equilibria.
 const HALVINGS: usize = 6;
 /// Distance of an equilibrium from the ends of the box, relative to a side.
-const INSET: f64 = 1e-6;
+const INSET: f64 = 1e-3;
 /// Radii of Krawczyk's test, relative to the sides.
 const RADII: [f64; 4] = [1e-11, 1e-9, 1e-7, 1e-5];
 /// Singular values below this share of the largest count as none.

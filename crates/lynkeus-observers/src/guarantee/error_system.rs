@@ -7,7 +7,7 @@ use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobia
 use lynkeus_gain::decay::ErrorModel;
 use lynkeus_gain::definite::IntervalMatrix;
 use lynkeus_structure::{
-    Check, Condition, Dimension, Extended, Region, Slopes, range, range_within,
+    Check, Condition, Dimension, Extended, Region, Slopes, counted, range, range_within,
 };
 use nalgebra::DMatrix;
 
@@ -127,7 +127,7 @@ impl ErrorSystem {
     pub fn bounded(&self) -> Check {
         let name = "every slope of a nonlinear term is bounded on the box".to_owned();
         let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
-            let detail = format!("{} slopes enclosed", self.slopes.slopes.len());
+            let detail = format!("{} enclosed", counted(self.slopes.slopes.len(), "slope"));
             let verdict = Condition::Proved;
             return Check {
                 name,

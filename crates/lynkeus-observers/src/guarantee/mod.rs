@@ -93,9 +93,9 @@ fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
 
 fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> Check {
     let slopes = match system.slopes.slopes.len() {
-        0 => "the error's matrix is constant".to_owned(),
-        1 => "for the one slope within its range".to_owned(),
-        count => format!("for all {count} slopes within their ranges"),
+        0 => String::new(),
+        1 => " for the one slope within its range".to_owned(),
+        count => format!(" for all {count} slopes within their ranges"),
     };
     let name = "one Lyapunov function eᵀPe for the whole box".to_owned();
     match proof.filter(|proof| proof.rate > 0.0) {
@@ -103,7 +103,7 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
             name,
             verdict: Condition::Proved,
             detail: format!(
-                "He(P J) + 2·{}·P < 0, {slopes}, by interval Cholesky factorisation",
+                "He(P J) + 2·{}·P < 0{slopes}, by interval Cholesky factorisation",
                 short(proof.rate)
             ),
         },
@@ -115,7 +115,7 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
                     "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
                     sample.worst
                 ),
-                false => format!("none was found ({slopes})"),
+                false => format!("none was found{slopes}"),
             },
         },
     }

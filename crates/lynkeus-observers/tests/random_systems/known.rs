@@ -55,21 +55,71 @@ fn a_kink_inside_the_box_is_no_obstacle() {
     assert_eq!(verdict, Verdict::Proved);
 }
 
-/// Without the time, the point would show nothing.
+/// The error of x' = (3 sin t − 1) x decays like exp(−t − 3 cos t), though its Jacobian is
+/// positive for a part of every period.
 #[test]
-fn a_witness_tells_the_time_where_it_matters() {
-    let text = "model P Real x(min = -1, max = 1); output Real y = x;
-         equation der(x) = -x + 3*sin(time)*x; end P;";
-    let verdict = certified(text, &[0.0], |pair, certificate| {
-        judge::witness(pair, certificate, &Sides::new(certificate, 1));
-    });
-    assert_eq!(verdict, Verdict::Refuted);
+fn an_instant_refutes_nothing() {
+    for rate in ["3*sin(time) - 1", "if mod(time, 2) < 0.9 then 1 else -1"] {
+        let text = format!(
+            "model P Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = ({rate})*x; end P;"
+        );
+        assert_eq!(certified(&text, &[0.0], |_, _| ()), Verdict::Undecided);
+    }
+}
+
+/// e' = e whatever the plant does, at any time.
+#[test]
+fn a_linear_error_that_grows_is_refuted_without_a_time() {
     let text = "model P Real x(min = -1, max = 1); output Real y = x;
          equation der(x) = x + time; end P;";
-    certified(text, &[0.0], |_, certificate| {
+    let verdict = certified(text, &[0.0], |_, certificate| {
         let text = format!("{:?}", certificate.hypotheses);
         assert!(text.contains("Refuted") && !text.contains("time"), "{text}");
     });
+    assert_eq!(verdict, Verdict::Refuted);
+}
+
+/// The largest eigenvalue of the error's Jacobian is about b² − 1 where b is large: that
+/// refutes where the plant can rest there, at b = √3, and nothing where it only passes.
+#[test]
+fn an_unstable_jacobian_refutes_where_the_plant_can_rest() {
+    for (fall, expected) in [("b", Verdict::Refuted), ("0", Verdict::Undecided)] {
+        let text = format!(
+            "model P Real a(min = -3, max = 3); Real b(min = 0.5, max = 2); output Real y = a;
+             equation der(a) = b - a; der(b) = b^3/3 - {fall}; end P;"
+        );
+        let verdict = certified(&text, &[0.3, 0.01], |pair, certificate| {
+            if certificate.verdict == Verdict::Refuted {
+                judge::witness(pair, certificate, &Sides::new(certificate, 2));
+            }
+        });
+        assert_eq!(verdict, expected, "{fall}");
+    }
+}
+
+/// At rest on an edge of the box half of the errors are outside.
+#[test]
+fn a_rest_on_the_edge_refutes_nothing() {
+    let text = "model P Real x(min = 0, max = 1); output Real y = x;
+         equation der(x) = x*(1 - x)*(1 - x)/(1 + x); end P;";
+    assert_ne!(certified(text, &[0.5], |_, _| ()), Verdict::Refuted);
+}
+
+/// At 0 alone the written derivative is +0.5; on either side of it the slope is −0.5.
+#[test]
+fn a_rest_where_the_derivative_jumps_refutes_nothing() {
+    for term in ["x*sign(x)*sign(x)", "abs(x)*sign(x)"] {
+        let text = format!(
+            "model P Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = 0.5*x - {term}; end P;"
+        );
+        assert_ne!(
+            certified(&text, &[0.0], |_, _| ()),
+            Verdict::Refuted,
+            "{term}"
+        );
+    }
 }
 
 /// A jump that a state makes has no slope, whichever way it jumps.

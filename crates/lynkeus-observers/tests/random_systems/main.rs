@@ -112,7 +112,7 @@ fn every_verdict_on_a_random_system_stands() {
         "{} systems: {failed:?}; {tally:?}",
         failed.len()
     );
-    assert!(tally.proved >= 150 && tally.refuted >= 150, "{tally:?}");
+    assert!(tally.proved >= 150 && tally.refuted >= 50, "{tally:?}");
     assert!(tally.undecided >= 50, "{tally:?}");
     assert!(2 * tally.seen >= tally.proved, "{tally:?}");
 }

@@ -2,6 +2,7 @@
 
 mod column;
 mod errors;
+mod printed;
 
 use lynkeus::Study;
 use serde_json::Value;
@@ -125,38 +126,69 @@ fn the_column_of_the_paper_fails_lemma_1_in_a_direction() {
     }
 }
 
-/// A gain that makes the error grow, with the point that shows it.
-#[test]
-fn a_refuted_guarantee_has_a_witness_in_json() {
+/// A plant whose b grows where it is large: a nearly blind gain does not hold it. With
+/// `fall` = b it can rest at b = ±√3.
+fn grows(fall: &str) -> Folder {
     let folder = Folder::empty();
-    // b grows where it is large, and a nearly blind gain does not hold it
     folder.write(
         "grows.mo",
-        "model Grows
-  Real a(start = 0, min = -1, max = 1);
-  Real b(start = 0, min = -2, max = 2);
+        &format!(
+            "model Grows
+  Real a(start = 0, min = -3, max = 3);
+  Real b(start = 1, min = 0.5, max = 2);
   output Real y = a;
 equation
-  der(a) = b;
-  der(b) = b^3/3;
+  der(a) = b - a;
+  der(b) = b^3/3 - {fall};
 end Grows;
-",
+"
+        ),
     );
     folder.write(
         "grows.toml",
         "plant = \"grows.mo\"\n[observer]\nfamily = \"triangular\"\ntheta = 0.1\n",
     );
+    folder
+}
+
+/// A gain that makes the error grow, with the point that shows it.
+#[test]
+fn a_refuted_guarantee_has_a_witness_in_json() {
+    let folder = grows("b");
     let ended = folder.run(&["certify", "grows.toml", "--json"]);
     assert_eq!(ended.code, 1, "{ended:?}");
     let certificate = &ended.json()["certificate"];
     well_formed(certificate, "refuted");
     let checks = certificate["hypotheses"].as_array().unwrap();
     let check = checks.iter().find(|c| c["verdict"] == "refuted").unwrap();
-    // λ of [−k1 1; −k2 b²] at b = ±2: nearly b²
-    let value = check["witness"][0]["value"].as_f64().unwrap();
-    assert!((3.0..4.0).contains(&value), "{check}");
+    // λ of [−1−k1 1; −k2 b²−1] at b = √3: nearly 2
+    let witness = &check["witness"][0];
+    assert!(
+        (1.9..2.0).contains(&witness["value"].as_f64().unwrap()),
+        "{check}"
+    );
+    let b = witness["at"]["b"].as_f64().unwrap();
+    assert!((b - 3f64.sqrt()).abs() < 1e-9, "{check}");
     let text = folder.run(&["certify", "grows.toml"]);
-    says(&text.out, &["refuted", "b = "]);
+    says(&text.out, &["refuted", "b = 1.73205"]);
+}
+
+/// Without a rest the plant only passes the points where the Jacobian is not stable, and
+/// leaves the box.
+#[test]
+fn an_unstable_jacobian_on_the_way_refutes_nothing() {
+    let folder = grows("0");
+    let ended = folder.run(&["certify", "grows.toml", "--json"]);
+    assert_eq!(ended.code, 0, "{ended:?}");
+    well_formed(&ended.json()["certificate"], "undecided");
+    let text = folder.run(&["certify", "grows.toml"]);
+    says(
+        &text.out,
+        &[
+            "there is none in these coordinates",
+            "refutes no convergence",
+        ],
+    );
 }
 
 #[test]
