@@ -1,9 +1,9 @@
 //! The box, the unknown influences and the measurement errors of a guarantee.
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Assumptions;
-use lynkeus_structure::{Dimension, Extended, Measurement, Region, range};
+use lynkeus_structure::{Dimension, Extended, Matrix, Measurement, Region, range};
 
 use crate::study::{Name, Noise};
 use crate::{Error, Study};
@@ -100,8 +100,22 @@ fn largest_difference(
     if actual == assumed {
         return Ok(0.0);
     }
-    let difference = plant.graph.expr(actual) - plant.graph.expr(assumed);
-    largest(plant, difference.node(), region)
+    let graph = &plant.graph;
+    let difference = graph.expr(actual) - graph.expr(assumed);
+    // what is linear in the inputs: its range has none of the states that cancel
+    let inputs: Vec<Node> = plant.inputs.iter().map(|i| i.node).collect();
+    let slopes = jacobian::forward(graph, &[difference.node()], &inputs);
+    let zero = graph.constant(0.0);
+    let linear = slopes
+        .row(0)
+        .map(|(i, slope)| graph.expr(slope) * graph.expr(inputs[i]))
+        .fold(zero, |sum, term| sum + term);
+    let rest = (difference - linear).node();
+    let same = Matrix::from_fn(graph, (1, 1), |_, _| Some(rest));
+    match same.get(0, 0) {
+        None => largest(plant, linear.node(), region),
+        Some(_) => largest(plant, difference.node(), region),
+    }
 }
 
 /// Per measured output: the bound of a uniform noise, three standard deviations of a
