@@ -1,9 +1,9 @@
 //! The box, the unknown influences and the measurement errors of a guarantee.
 
-use lynkeus_expr::{Graph, Interval, Node};
+use lynkeus_expr::{Graph, Interval, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Assumptions;
-use lynkeus_structure::{Dimension, Extended, Region, range};
+use lynkeus_structure::{Dimension, Extended, Matrix, Region, range};
 
 use crate::study::{Name, Noise};
 use crate::{Error, Study};
@@ -43,14 +43,9 @@ fn drift(
         return Err(name.blame(Error::input(message)));
     }
     let wider = disturbed(study, plant, region);
-    let graph = &plant.graph;
     let mut drift = vec![];
     for (&actual, &assumed) in plant.derivatives.iter().zip(&extended.derivatives) {
-        let difference = graph.expr(actual) - graph.expr(assumed);
-        drift.push(match actual == assumed {
-            true => 0.0,
-            false => magnitude(graph, difference.node(), &wider)?,
-        });
+        drift.push(largest_difference(plant, actual, assumed, &wider)?);
     }
     for input in unknown {
         let given = study
@@ -103,6 +98,33 @@ fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, Error> {
     Ok(found.enclosure.magnitude())
 }
 
+/// The largest |actual − assumed|; what is linear in the inputs without the states that
+/// cancel, so that an output without range has one.
+fn largest_difference(
+    plant: &Plant,
+    actual: Node,
+    assumed: Node,
+    region: &Region,
+) -> Result<f64, Error> {
+    if actual == assumed {
+        return Ok(0.0);
+    }
+    let graph = &plant.graph;
+    let difference = graph.expr(actual) - graph.expr(assumed);
+    let inputs: Vec<Node> = plant.inputs.iter().map(|i| i.node).collect();
+    let slopes = jacobian::forward(graph, &[difference.node()], &inputs);
+    let zero = graph.constant(0.0);
+    let linear = slopes
+        .row(0)
+        .map(|(i, slope)| graph.expr(slope) * graph.expr(inputs[i]))
+        .fold(zero, |sum, term| sum + term);
+    let rest = (difference - linear).node();
+    let same = Matrix::from_fn(graph, (1, 1), |_, _| Some(rest));
+    let equal = same.get(0, 0).is_none();
+    let tightest = if equal { linear } else { difference };
+    magnitude(graph, tightest.node(), region)
+}
+
 /// Per measured output: how far what is measured may be from h(x, u) without disturbances.
 /// That is what these add to h, and the bound of a uniform noise or three standard
 /// deviations of a Gaussian one, of which a relative one counts from the disturbed value.
@@ -117,13 +139,7 @@ fn noise(
     let of = |output: &Variable| {
         let declared = plant.outputs.iter().find(|o| o.name == output.name);
         let actual = declared.map_or(output.node, |o| o.node);
-        let added = match actual == output.node {
-            true => 0.0,
-            false => {
-                let difference = graph.expr(actual) - graph.expr(output.node);
-                magnitude(graph, difference.node(), &wider)?
-            }
-        };
+        let added = largest_difference(plant, actual, output.node, &wider)?;
         let mut given = study.sensors.noise.iter();
         let given = given.find(|(name, _)| name.text == output.name);
         let deviations = Interval::point(DEVIATIONS);
