@@ -12,6 +12,8 @@
 //! follows Px would not do: times a distance without bound, its own change has none.
 
 use lynkeus_expr::Node;
+use lynkeus_model::Variable;
+use lynkeus_structure::{Extended, Region};
 
 use crate::conditions::Partial;
 use crate::estimate::{Copy, limited};
@@ -103,9 +105,19 @@ pub(crate) fn refuse(tuning: &Tuning, observer: &str) -> Result<(), TuningError>
 }
 
 /// Where the estimate may be for the guarantee to hold.
-pub(crate) fn note(tuning: &Tuning) -> String {
-    match asked_for(tuning) {
-        true => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with slopes along the chains between the same bounds ('prolong').".into(),
-        false => box_note(tuning.clamp),
+///
+/// Everywhere only where the box of the proof is the one that the observer projects on and
+/// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
+pub(crate) fn note(tuning: &Tuning, extended: &Extended<'_>, region: &Region) -> String {
+    let whole = |variable: &Variable| {
+        let mut sides = region.dimensions.iter();
+        let side = sides.find(|d| d.symbol == variable.node);
+        side.is_none_or(|d| d.min <= variable.min && d.max >= variable.max)
+    };
+    let declared = extended.plant.states.iter().chain(&extended.plant.inputs);
+    match (asked_for(tuning), declared.into_iter().all(whole)) {
+        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with slopes along the chains between the same bounds ('prolong').".into(),
+        (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
+        (false, _) => box_note(tuning.clamp),
     }
 }

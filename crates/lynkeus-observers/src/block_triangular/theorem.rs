@@ -315,7 +315,10 @@ impl Study<'_> {
     /// Where the estimate may be: M of observer (7) moves with it, so the box bounds it.
     fn place(&self) -> String {
         match self.classical {
-            true => prolongation::note(self.tuning),
+            true => {
+                let region = &self.plant.assumptions.region;
+                prolongation::note(self.tuning, self.plant.extended, region)
+            }
             false => box_note(self.tuning.clamp),
         }
     }

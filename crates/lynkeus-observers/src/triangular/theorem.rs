@@ -119,7 +119,8 @@ impl Study<'_> {
         };
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        certificate.notes.push(prolongation::note(self.tuning));
+        let place = prolongation::note(self.tuning, self.extended, &self.assumptions.region);
+        certificate.notes.push(place);
         certificate.notes.extend(broken.then(|| BROKEN.to_owned()));
         if let Some((σ, c)) = rate {
             self.conclude(&mut certificate, σ, c)?;

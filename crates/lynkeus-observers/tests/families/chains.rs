@@ -83,11 +83,8 @@ fn three_chains_of_three_one_and_two() {
         all.extend_from_slice(keys);
         let design = design_with(&BlockTriangular, &plant, &[], &with(θ, &all)).unwrap();
         assert_eq!(design.examination.fit, Fit::Undecided, "no box is declared");
-        assert!(
-            design.examination.summary.contains("2 orders"),
-            "{}",
-            design.examination.summary
-        );
+        let said = design.examination.summary.contains("2 orders");
+        assert_eq!(said, keys.is_empty(), "{}", design.examination.summary);
         slope(
             &plant,
             &design,
@@ -233,7 +230,7 @@ fn a_gain_with_the_sign_of_the_partial_is_proved() {
     );
     let found = certificate(&BlockTriangular, &plant, tuning);
     assert_eq!(found.verdict, Verdict::Proved, "{found:#?}");
-    keeps(&plant, &design, &found, &[0.5, 0.1]);
+    keeps(&plant, &design, &found, &[-0.4, 0.6]);
 }
 
 /// For three states a positive partial can be too large: s³ + 3s² + 3s + 10 is unstable.
@@ -343,7 +340,7 @@ fn the_printed_gain_is_the_one_that_acts() {
         &Triangular,
         &constant,
         &[],
-        &with(&[3.0], &[divided.clone()]),
+        &with(&[3.0], std::slice::from_ref(&divided)),
     )
     .unwrap();
     let printed: Vec<f64> = design.gains[0].entries.iter().map(|e| e.1).collect();
@@ -367,9 +364,9 @@ fn the_printed_gain_is_the_one_that_acts() {
     assert!((number - 9.0 * GAIN_2 / 3.0).abs() < 1e-9, "{row:?}");
 }
 
-/// Second entry of Lemma 1's S⁻¹Cᵀ for two states with a = 1: s = −0.65, s₂₂ = 3s²,
-/// det = 2s².
-const GAIN_2: f64 = 0.65 / (2.0 * 0.65 * 0.65);
+/// Second entry of Lemma 1's S⁻¹Cᵀ for two states with a = 1: s = −1.3/4, s₂₂ = 3s²,
+/// −s/det S = 1/(2|s|).
+const GAIN_2: f64 = 1.0 / (2.0 * 0.325);
 
 /// The run stays below λ₁ e^{−σt} |e(0)|.
 fn keeps(plant: &Plant, design: &lynkeus_observers::Design, found: &Certificate, x0: &[f64]) {
