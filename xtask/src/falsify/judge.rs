@@ -90,9 +90,7 @@ pub fn judge(
         let study = Study::load(&study).map_err(|e| e.to_string())?;
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let extended = lynkeus::prepare::extended(&study, &plant).map_err(|e| e.to_string())?;
-        let t0 = std::time::Instant::now();
         let found = claims::findings(&study, &plant, &extended, effort.thorough);
-        let t1 = t0.elapsed().as_secs_f64();
         if tune && round < 2 && retune::raised(&mut case, &found, &extended, numbers) {
             continue;
         }
@@ -104,9 +102,7 @@ pub fn judge(
             violations: vec![],
             counts: found.counts.clone(),
         };
-        let t2 = std::time::Instant::now();
         looked.everything(numbers);
-        if tune { eprintln!("TIME {} find {t1:.4} attack {:.4} proved {} steps {round}", case.kind.word(), t2.elapsed().as_secs_f64(), looked.found.claims.len()); }
         let (counts, violations) = (looked.counts, looked.violations);
         if violations.is_empty() && effort.facts && found.fits() && numbers.chance(0.15) {
             let mut judgement = Judgement {

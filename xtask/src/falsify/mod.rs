@@ -97,8 +97,14 @@ fn work(
         let judged = guarded(&case, &desk, &mut numbers, options.effort(index));
         let (counts, found) = match judged {
             Ok(judgement) => {
-                let violations = judgement.violations;
-                let found = shrink::smallest(&judgement.case, &desk, &violations, options.effort(index));
+                let first = judgement.violations.into_iter().next();
+                let found = first.map(|first| {
+                    let common = report.lock().is_ok_and(|r| r.is_common(kind, &first.flaw));
+                    match common {
+                        true => (judgement.case, first),
+                        false => shrink::smallest(&judgement.case, &desk, &first, options.effort(index)),
+                    }
+                });
                 (judgement.counts, found)
             }
             Err(violation) => (tally::Counts::default(), Some((case, violation))),

@@ -1,10 +1,11 @@
 //! What was asked for, and what was found.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use super::case::{Case, Kind};
-use super::judge::{Effort, Violation};
+use super::judge::{Effort, Flaw, Violation};
 use super::tally::{Counts, Tally};
 
 /// What to search, and for how long.
@@ -15,6 +16,8 @@ pub struct Options {
     pub count: usize,
     /// refutations to look at
     pub refutations: usize,
+    /// after which the search ends, reached or not
+    pub seconds: Option<u64>,
     /// all where none is named
     pub kind: Option<Kind>,
     /// where false claims are kept
@@ -22,12 +25,13 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `--seed N --count N --refutations N --family F`.
+    /// Reads `--seed N --count N --refutations N --seconds N --family F`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
         let mut options = Self {
             seed: 1,
             count: 20_000,
             refutations: 5_000,
+            seconds: None,
             kind: None,
             folder: PathBuf::from("target/falsify"),
         };
@@ -39,18 +43,19 @@ impl Options {
                 "--seed" => options.seed = number()?,
                 "--count" => options.count = number()? as usize,
                 "--refutations" => options.refutations = number()? as usize,
+                "--seconds" => options.seconds = Some(number()?),
                 "--family" => options.kind = Some(kind(value)?),
-                _ => return Err(format!("expected --seed, --count, --refutations or --family, found {key}")),
+                _ => return Err(format!("expected --seed, --count, --refutations, --seconds or --family, found {key}")),
             }
         }
         Ok(options)
     }
 
-    /// All families examine one plant in eight, for their refutations.
+    /// All families examine one plant in sixteen, for their refutations.
     pub fn effort(&self, index: u64) -> Effort {
         Effort {
             runs: 30,
-            thorough: index.is_multiple_of(8),
+            thorough: index.is_multiple_of(16),
             facts: true,
         }
     }
@@ -67,6 +72,22 @@ pub struct Found {
     pub index: u64,
     pub case: Case,
     pub violation: Violation,
+}
+
+impl Found {
+    /// False claims of one sort probably have one cause.
+    fn sort(&self) -> String {
+        let kind = self.case.kind.word();
+        let evidence = &self.violation.evidence;
+        // what is said first is what the claim rests on
+        let basis = evidence.split([':', '\n']).next().unwrap_or_default();
+        match &self.violation.flaw {
+            flaw @ (Flaw::Exceeded | Flaw::Witness | Flaw::Panic) => {
+                format!("{flaw:?}, {kind}, {basis}")
+            }
+            flaw => format!("{flaw:?}, {kind}"),
+        }
+    }
 }
 
 pub struct Report {
@@ -89,11 +110,18 @@ impl Report {
         }
     }
 
+    /// Whether a flaw of a kind of case has been made small often enough.
+    pub fn is_common(&self, kind: Kind, flaw: &Flaw) -> bool {
+        let alike = |found: &&Found| found.case.kind == kind && found.violation.flaw == *flaw;
+        self.found.iter().filter(alike).count() >= 6
+    }
+
     pub fn is_enough(&self, options: &Options) -> bool {
         let total = self.tally.total();
         let reached = total.proved >= options.count && total.refutations >= options.refutations;
+        let late = options.seconds.is_some_and(|s| self.started.elapsed().as_secs() >= s);
         // a search in which nothing is proved ends, too
-        reached || total.plants >= 40 * (options.count + options.refutations).max(50)
+        reached || late || total.plants >= 40 * (options.count + options.refutations).max(50)
     }
 
     pub fn add(
@@ -131,13 +159,13 @@ impl Report {
         let seconds = self.started.elapsed().as_secs();
         let mut text = self.tally.table();
         text += &format!("\n{seconds} s; witnesses of further conditions: {}\n", self.tally.total().unread);
-        let mut kinds = std::collections::BTreeMap::<_, usize>::new();
+        let mut sorts = BTreeMap::<_, Vec<u64>>::new();
         for found in &self.found {
-            let flaw = format!("{:?}", found.violation.flaw);
-            *kinds.entry((flaw, found.case.kind.word())).or_default() += 1;
+            sorts.entry(found.sort()).or_default().push(found.index);
         }
-        for ((flaw, kind), count) in kinds {
-            text += &format!("{flaw} {kind}: {count}\n");
+        for (sort, indices) in sorts {
+            let first: Vec<String> = indices.iter().take(5).map(u64::to_string).collect();
+            text += &format!("{sort}: {}, e.g. {}\n", indices.len(), first.join(", "));
         }
         eprint!("{text}");
     }

@@ -8,14 +8,13 @@ use super::numbers::Numbers;
 /// Cases tried at most.
 const TRIALS: usize = 150;
 
-/// The smallest case found with the first of the violations; none where there is none.
+/// The smallest case found with a violation of the same kind.
 pub fn smallest(
     case: &Case,
     desk: &Desk,
-    violations: &[Violation],
+    first: &Violation,
     effort: Effort,
-) -> Option<(Case, Violation)> {
-    let first = violations.first()?;
+) -> (Case, Violation) {
     let mut best = (case.clone(), first.clone());
     let mut trials = 0;
     loop {
@@ -29,7 +28,7 @@ pub fn smallest(
         });
         match smaller {
             Some(smaller) => best = smaller,
-            None => return Some(best),
+            None => return best,
         }
     }
 }
