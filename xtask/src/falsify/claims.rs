@@ -46,24 +46,22 @@ pub struct Findings {
     pub examination: Option<Examination>,
     /// the theorem is proved and a point refutes it, in one report
     pub contradicts: bool,
+    /// the gain as it is printed for machines
+    pub gain: serde_json::Value,
     pub counts: Counts,
     /// the certificates, for settings that follow from their constants
     pub certificates: Vec<Certificate>,
 }
 
 /// Asks the library.
-pub fn findings(
-    study: &Study,
-    plant: &Plant,
-    extended: &Extended<'_>,
-    thorough: bool,
-) -> Findings {
+pub fn findings(study: &Study, plant: &Plant, extended: &Extended<'_>, thorough: bool) -> Findings {
     let mut found = Findings {
         design: None,
         claims: vec![],
         refutations: vec![],
         examination: None,
         contradicts: false,
+        gain: serde_json::Value::Null,
         counts: Counts::default(),
         certificates: vec![],
     };
@@ -81,6 +79,7 @@ pub fn findings(
     let Ok(report) = lynkeus::certify(study) else {
         return found;
     };
+    found.gain = report.to_json()["gain"].take();
     let theorem = report.theorem.as_ref();
     found.contradicts = report.certificate.verdict == Verdict::Refuted
         && theorem.is_some_and(|theorem| theorem.verdict == Verdict::Proved);
@@ -94,7 +93,9 @@ pub fn findings(
 impl Findings {
     /// Whether the family is said to fit, with every condition proved.
     pub fn fits(&self) -> bool {
-        self.examination.as_ref().is_some_and(|e| e.fit == Fit::Fits)
+        self.examination
+            .as_ref()
+            .is_some_and(|e| e.fit == Fit::Fits)
     }
 
     fn examined(&mut self, extended: &Extended<'_>, thorough: bool) {

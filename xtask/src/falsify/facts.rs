@@ -58,7 +58,10 @@ impl Facts<'_> {
             let (t, x, u) = self.point(numbers);
             let values = self.pair.plant(t, &x, &u);
             if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-                let what = format!("value {i} is {} at t = {t}, x = {x:?}, u = {u:?}", values[i]);
+                let what = format!(
+                    "value {i} is {} at t = {t}, x = {x:?}, u = {u:?}",
+                    values[i]
+                );
                 return Some((Fact::Undefined, what));
             }
         }
@@ -77,24 +80,39 @@ impl Facts<'_> {
                 to[axis] = end[axis];
             }
             let at = |share: f64| -> Vec<f64> {
-                from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect()
+                from.iter()
+                    .zip(&to)
+                    .map(|(a, b)| a + share * (b - a))
+                    .collect()
             };
             let count = self.pair.states + self.pair.measured;
             for i in 0..count {
                 let mut value = |share: f64| self.pair.plant(t, &at(share), &u)[i];
-                let ends: Vec<f64> = (0..=PIECES).map(|k| value(k as f64 / PIECES as f64)).collect();
+                let ends: Vec<f64> = (0..=PIECES)
+                    .map(|k| value(k as f64 / PIECES as f64))
+                    .collect();
                 let step = |k: &usize| (ends[k + 1] - ends[*k]).abs();
                 let steepest = (0..PIECES).max_by(|a, b| step(a).total_cmp(&step(b)))?;
-                let (mut low, mut high) = (steepest as f64 / PIECES as f64, (steepest + 1) as f64 / PIECES as f64);
+                let (mut low, mut high) = (
+                    steepest as f64 / PIECES as f64,
+                    (steepest + 1) as f64 / PIECES as f64,
+                );
                 for _ in 0..44 {
                     let middle = f64::midpoint(low, high);
                     let (a, b, c) = (value(low), value(middle), value(high));
-                    *(if (b - a).abs() > (c - b).abs() { &mut high } else { &mut low }) = middle;
+                    *(if (b - a).abs() > (c - b).abs() {
+                        &mut high
+                    } else {
+                        &mut low
+                    }) = middle;
                 }
                 let (a, b) = (value(low), value(high));
                 let size = ends.iter().fold(1e-12_f64, |m, v| m.max(v.abs()));
                 if (b - a).abs() > 1e-4 * size || !(b - a).is_finite() {
-                    let what = format!("value {i} goes from {a} to {b} at t = {t}, x = {:?}, u = {u:?}", at(low));
+                    let what = format!(
+                        "value {i} goes from {a} to {b} at t = {t}, x = {:?}, u = {u:?}",
+                        at(low)
+                    );
                     return Some((Fact::Jumps, what));
                 }
             }
@@ -103,7 +121,11 @@ impl Facts<'_> {
     }
 
     /// Whether x_column moves x'_row up here and down there.
-    fn signs(&mut self, numbers: &mut Numbers, chains: &[(usize, usize)]) -> Option<(Fact, String)> {
+    fn signs(
+        &mut self,
+        numbers: &mut Numbers,
+        chains: &[(usize, usize)],
+    ) -> Option<(Fact, String)> {
         for &(row, column) in chains {
             let mut seen: Option<(f64, String)> = None;
             for _ in 0..60 {
@@ -112,7 +134,11 @@ impl Facts<'_> {
                 let before = self.pair.plant(t, &x, &u)[row];
                 let from = x[column];
                 let far = numbers.size(1e-4, 1.0) * (high - low);
-                x[column] = if from + far <= high { from + far } else { from - far };
+                x[column] = if from + far <= high {
+                    from + far
+                } else {
+                    from - far
+                };
                 if x[column] < low {
                     continue;
                 }
@@ -122,7 +148,9 @@ impl Facts<'_> {
                 if (after - before).abs() < 1e-9 * (before.abs() + 1e-9) {
                     continue;
                 }
-                let here = format!("slope {slope} of x'[{row}] in x[{column}] at t = {t}, x = {x:?}, u = {u:?}");
+                let here = format!(
+                    "slope {slope} of x'[{row}] in x[{column}] at t = {t}, x = {x:?}, u = {u:?}"
+                );
                 match &seen {
                     Some((other, there)) if other * slope < 0.0 => {
                         return Some((Fact::Sign, format!("{there}; {here}")));
@@ -139,8 +167,16 @@ impl Facts<'_> {
 /// Ends of declared ranges; something finite where there are none.
 pub fn finite(low: f64, high: f64) -> [f64; 2] {
     [
-        if low.is_finite() { low } else { high.min(1.0) - 3.0 },
-        if high.is_finite() { high } else { low.max(-1.0) + 3.0 },
+        if low.is_finite() {
+            low
+        } else {
+            high.min(1.0) - 3.0
+        },
+        if high.is_finite() {
+            high
+        } else {
+            low.max(-1.0) + 3.0
+        },
     ]
 }
 
@@ -151,5 +187,7 @@ pub fn neighbours(chains: &[Vec<String>], extended: &Extended<'_>) -> Vec<(usize
         found.filter(|i| *i < extended.plant_states())
     };
     let pairs = chains.iter().flat_map(|chain| chain.windows(2));
-    pairs.filter_map(|pair| Some((index(&pair[0])?, index(&pair[1])?))).collect()
+    pairs
+        .filter_map(|pair| Some((index(&pair[0])?, index(&pair[1])?)))
+        .collect()
 }

@@ -92,7 +92,11 @@ pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits
             let difference: f64 = (0..7).map(|s| E[s] * k[s][i]).sum::<f64>() * step;
             let size = x[i].abs().max(stage[i].abs()) + limits.scale[i];
             let one = (difference / (limits.tolerance * size)).abs();
-            if one.is_nan() { f64::INFINITY } else { worst.max(one) }
+            if one.is_nan() {
+                f64::INFINITY
+            } else {
+                worst.max(one)
+            }
         });
         let factor = match error {
             0.0 => 5.0,
@@ -114,7 +118,11 @@ pub fn follow(flow: &mut impl Flow, start: &[f64], [t0, until]: [f64; 2], limits
             let (first, rest) = k.split_at_mut(6);
             first[0].copy_from_slice(&rest[0]);
         }
-        h = if last { h.max(step * factor) } else { step * factor };
+        h = if last {
+            h.max(step * factor)
+        } else {
+            step * factor
+        };
     }
 }
 

@@ -27,6 +27,8 @@ pub enum Flaw {
     Diverges,
     /// proved and refuted in one report
     Contradiction,
+    /// the gain that is printed is not the observer's
+    Gain,
     /// a witness that shows nothing
     Witness,
     /// the library panics
@@ -135,7 +137,10 @@ struct Look<'a, 'p> {
 impl Look<'_, '_> {
     fn everything(&mut self, numbers: &mut Numbers) {
         if self.found.contradicts {
-            self.note(Flaw::Contradiction, "theorem proved, inequality refuted".into());
+            self.note(
+                Flaw::Contradiction,
+                "theorem proved, inequality refuted".into(),
+            );
         }
         if let Some(design) = &self.found.design {
             self.against_claims(&design.observer, numbers);
@@ -152,16 +157,35 @@ impl Look<'_, '_> {
     }
 
     fn against_claims(&mut self, observer: &Observer, numbers: &mut Numbers) {
-        if self.found.claims.is_empty() {
-            return;
-        }
         let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
-            return self.note(Flaw::Exceeded, "the observer reads what nobody knows".into());
+            return self.note(
+                Flaw::Exceeded,
+                "the observer reads what nobody knows".into(),
+            );
         };
         if pair.estimates() != self.extended.states.len() {
             return;
         }
-        let mut attack = attack(self.case, self.extended, &mut pair, &self.found.claims);
+        let found = self.found;
+        let mut attack = attack(self.case, self.extended, &mut pair, &found.claims);
+        let names: Vec<String> = self
+            .extended
+            .states
+            .iter()
+            .map(|s| s.name.clone())
+            .collect();
+        if let Some(evidence) = attack.misprint(numbers, &found.gain, &names) {
+            self.violations.push(Violation {
+                flaw: Flaw::Gain,
+                evidence,
+            });
+        }
+        if found.claims.is_empty() {
+            return;
+        }
+        if let Some(evidence) = attack.secant(numbers) {
+            return self.note(Flaw::Exceeded, evidence);
+        }
         let (plan, worst) = attack.search(numbers, self.effort.runs);
         if worst.long {
             self.counts.followed += self.found.claims.len();
@@ -193,7 +217,10 @@ impl Look<'_, '_> {
                 facts.inputs[i] = [0.0, 0.0];
             }
         }
-        let chained = matches!(self.case.kind, Kind::Triangular | Kind::BlockTriangular | Kind::Designed);
+        let chained = matches!(
+            self.case.kind,
+            Kind::Triangular | Kind::BlockTriangular | Kind::Designed
+        );
         let chains = match &self.found.examination {
             Some(examination) if chained => facts::neighbours(&examination.chains, self.extended),
             _ => vec![],
@@ -227,7 +254,10 @@ pub fn attack<'a>(
     claims: &'a [claims::Claim],
 ) -> Attack<'a> {
     let side = |state: &lynkeus::model::Variable| {
-        let own = claims.iter().flat_map(|c| &c.sides).filter(|s| s.0 == state.name);
+        let own = claims
+            .iter()
+            .flat_map(|c| &c.sides)
+            .filter(|s| s.0 == state.name);
         // the smallest of the boxes, where two proofs have two
         own.fold([state.min, state.max], |[low, high], (_, min, max)| {
             [low.max(*min), high.min(*max)]
@@ -237,19 +267,26 @@ pub fn attack<'a>(
     // the practical observer of Germani and Manes follows the inputs by filters
     let filtered = case.setting("variant") == Some("\"practical\"");
     let extra = pair.start.len().saturating_sub(sides.len());
-    let known: Vec<_> = case.inputs.iter().filter(|i| i.role == Role::Known).collect();
+    let known: Vec<_> = case
+        .inputs
+        .iter()
+        .filter(|i| i.role == Role::Known)
+        .collect();
     let mut guards = vec![];
     if filtered && extra > 0 && !known.is_empty() {
         for (k, index) in (sides.len()..pair.start.len()).enumerate() {
             let orders = extra / known.len();
             let slope = case.slope.unwrap_or(f64::INFINITY);
-            guards.push((index, match k % orders.max(1) {
-                0 => {
-                    let side = &known[(k / orders.max(1)).min(known.len() - 1)].side;
-                    [side.low, side.high]
-                }
-                _ => [-slope, slope],
-            }));
+            guards.push((
+                index,
+                match k % orders.max(1) {
+                    0 => {
+                        let side = &known[(k / orders.max(1)).min(known.len() - 1)].side;
+                        [side.low, side.high]
+                    }
+                    _ => [-slope, slope],
+                },
+            ));
         }
     }
     Attack {

@@ -6,6 +6,7 @@ mod case;
 mod claims;
 mod facts;
 mod generate;
+mod instant;
 mod integrate;
 mod judge;
 mod numbers;
@@ -14,9 +15,12 @@ mod precise;
 mod refute;
 mod report;
 mod retune;
+mod run;
 mod shrink;
 mod signals;
 mod tally;
+#[cfg(test)]
+mod tests;
 
 use std::path::Path;
 use std::sync::Mutex;
@@ -33,7 +37,7 @@ pub use report::Options;
 pub fn run(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     let report = search(&options)?;
-    report.print();
+    eprint!("{}", report.text());
     match report.found.is_empty() {
         true => Ok(()),
         false => Err(format!(
@@ -91,6 +95,9 @@ fn work(
             return Ok(());
         }
         let index = next.fetch_add(1, Ordering::Relaxed);
+        if options.plants.is_some_and(|plants| index >= plants) {
+            return Ok(());
+        }
         let kind = options.kind.unwrap_or(ROUND[index as usize % ROUND.len()]);
         let mut numbers = Numbers::new(options.seed, index);
         let case = generate::case(&mut numbers, kind);
@@ -102,7 +109,9 @@ fn work(
                     let common = report.lock().is_ok_and(|r| r.is_common(kind, &first.flaw));
                     match common {
                         true => (judgement.case, first),
-                        false => shrink::smallest(&judgement.case, &desk, &first, options.effort(index)),
+                        false => {
+                            shrink::smallest(&judgement.case, &desk, &first, options.effort(index))
+                        }
                     }
                 });
                 (judgement.counts, found)

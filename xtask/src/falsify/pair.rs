@@ -47,16 +47,29 @@ impl Pair {
         let graph = &plant.graph;
         let nodes = |list: &[lynkeus::model::Variable]| list.iter().map(|v| v.node).collect();
         let (states, inputs): (Vec<Node>, Vec<Node>) = (nodes(&plant.states), nodes(&plant.inputs));
-        let shown = |name: &str| plant.outputs.iter().find(|o| o.name == name).map(|o| o.node);
+        let shown = |name: &str| {
+            plant
+                .outputs
+                .iter()
+                .find(|o| o.name == name)
+                .map(|o| o.node)
+        };
         // as the plant has them, disturbances included
-        let h = extended.outputs.iter().filter_map(|o| shown(&o.variable.name));
+        let h = extended
+            .outputs
+            .iter()
+            .filter_map(|o| shown(&o.variable.name));
         let right: Vec<Node> = plant.derivatives.iter().copied().chain(h).collect();
         let seen = [&[plant.time], &states[..], &inputs].concat();
         let z: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let of = |signals: &[lynkeus::observers::Signal]| -> Vec<Node> {
             signals.iter().map(|s| s.symbol).collect()
         };
-        let moving: Vec<Node> = observer.input_derivatives.iter().map(|d| d.signal.symbol).collect();
+        let moving: Vec<Node> = observer
+            .input_derivatives
+            .iter()
+            .map(|d| d.signal.symbol)
+            .collect();
         let own = [
             &[observer.time],
             &z[..],
@@ -67,18 +80,30 @@ impl Pair {
         .concat();
         let estimates = observer.estimates.iter().map(|e| e.node);
         let monitors = observer.monitors.iter().map(|m| m.node);
-        let left: Vec<Node> = observer.derivatives.iter().copied().chain(estimates).chain(monitors).collect();
+        let left: Vec<Node> = observer
+            .derivatives
+            .iter()
+            .copied()
+            .chain(estimates)
+            .chain(monitors)
+            .collect();
         let input = |name: &str| plant.inputs.iter().position(|i| i.name == name);
         let truth = |name: &str| {
             let state = plant.states.iter().position(|s| s.name == name);
-            state.map(Truth::State).or_else(|| input(name).map(Truth::Input))
+            state
+                .map(Truth::State)
+                .or_else(|| input(name).map(Truth::Input))
         };
         let names = observer.estimates.iter().map(|e| e.variable.name.as_str());
         Ok(Self {
             plant: Tape::new(graph, &seen, &right)?.evaluator(),
             observer: Tape::new(graph, &own, &left)?.evaluator(),
             truths: names.filter_map(truth).collect(),
-            known: observer.inputs.iter().filter_map(|s| input(&s.name)).collect(),
+            known: observer
+                .inputs
+                .iter()
+                .filter_map(|s| input(&s.name))
+                .collect(),
             derivatives: observer
                 .input_derivatives
                 .iter()
@@ -135,7 +160,7 @@ impl Pair {
     ) {
         let (x, z) = state.split_at(self.states);
         self.plant(t, x, u);
-        let (n, m) = (self.states, self.measured);
+        let n = self.states;
         out[..n].copy_from_slice(&self.plant_out[..n]);
         self.own[0] = t;
         let mut at = 1;
@@ -149,8 +174,9 @@ impl Pair {
             self.own[at] = signals[i].derivative(t, order);
             at += 1;
         }
-        for j in 0..m {
-            self.own[at + j] = self.plant_out[n + j] + noise[j];
+        let measured = self.plant_out[n..].iter().zip(noise).map(|(y, ν)| y + ν);
+        for (own, y) in self.own[at..].iter_mut().zip(measured) {
+            *own = y;
         }
         self.observer.eval(&self.own, &mut self.observer_out);
         out[n..].copy_from_slice(&self.observer_out[..z.len()]);
@@ -166,6 +192,7 @@ impl Pair {
     pub fn is_withdrawn(&self) -> bool {
         let first = self.start.len() + self.truths.len();
         // the tool says so below 6·10⁻⁴
-        self.rcond.is_some_and(|i| self.observer_out[first + i] < 1e-3)
+        self.rcond
+            .is_some_and(|i| self.observer_out[first + i] < 1e-3)
     }
 }

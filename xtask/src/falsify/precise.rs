@@ -3,14 +3,14 @@
 use std::cell::RefCell;
 
 use astro_float_num::{BigFloat, Consts, INF_NEG, INF_POS, NAN, RoundingMode};
-use lynkeus::expr::{Algebra, Binary, Unary};
+use lynkeus::expr::{Algebra, Binary, Reals, Unary};
 
 /// Bits.
 const PRECISION: usize = 256;
 const ROUNDING: RoundingMode = RoundingMode::ToEven;
 
 /// Numbers of 256 bits with infinities and NaN, with the meaning that `f64` gives to
-/// every operation. The condition estimate of a linear system is 1: regular systems only.
+/// every operation. The condition estimate of a linear system is that of `f64`.
 pub struct Precise(RefCell<Consts>);
 
 impl Precise {
@@ -51,7 +51,11 @@ impl Precise {
             return f64::NAN;
         }
         if x.is_inf() {
-            return if x.is_negative() { f64::NEG_INFINITY } else { f64::INFINITY };
+            return if x.is_negative() {
+                f64::NEG_INFINITY
+            } else {
+                f64::INFINITY
+            };
         }
         let (Some(words), Some(exponent)) = (x.mantissa_digits(), x.exponent()) else {
             return 0.0;
@@ -182,7 +186,13 @@ impl Algebra for Precise {
     fn solve(&self, a: &[BigFloat], b: &[BigFloat]) -> (Vec<BigFloat>, BigFloat) {
         let n = b.len();
         let mut rows: Vec<Vec<BigFloat>> = (0..n)
-            .map(|i| a[i * n..(i + 1) * n].iter().chain([&b[i]]).cloned().collect())
+            .map(|i| {
+                a[i * n..(i + 1) * n]
+                    .iter()
+                    .chain([&b[i]])
+                    .cloned()
+                    .collect()
+            })
             .collect();
         for k in 0..n {
             let size = |row: &Vec<BigFloat>| Self::rounded(&row[k]).abs();
@@ -193,33 +203,63 @@ impl Algebra for Precise {
                     continue;
                 }
                 let factor = Self::div(&rows[i][k], &rows[k][k]);
-                for j in k..=n {
-                    rows[i][j] = Self::sub(&rows[i][j], &Self::mul(&factor, &rows[k][j]));
+                let pivot = rows[k].clone();
+                for (entry, above) in rows[i].iter_mut().zip(&pivot).skip(k) {
+                    *entry = Self::sub(entry, &Self::mul(&factor, above));
                 }
             }
         }
-        let x = (0..n).map(|k| Self::div(&rows[k][n], &rows[k][k])).collect();
-        (x, Self::from(1.0))
+        let x = (0..n)
+            .map(|k| Self::div(&rows[k][n], &rows[k][k]))
+            .collect();
+        // its meaning is that of the factorisation that is used at run time
+        let near = |values: &[BigFloat]| values.iter().map(Self::rounded).collect::<Vec<f64>>();
+        let (_, rcond) = Reals.solve(&near(a), &near(b));
+        (x, Self::from(rcond))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lynkeus::expr::{Graph, Reals, Tape};
+    use lynkeus::expr::{Graph, Tape};
 
     /// At many points the nearest number is what `f64` computes, up to its rounding.
     #[test]
     fn every_operation_means_what_it_means_in_f64() {
         let precise = Precise::new().unwrap();
         let unary = [
-            Unary::Neg, Unary::Abs, Unary::Sign, Unary::Floor, Unary::Sqrt, Unary::Exp, Unary::Ln,
-            Unary::Sin, Unary::Cos, Unary::Tan, Unary::Asin, Unary::Acos, Unary::Atan, Unary::Sinh,
-            Unary::Cosh, Unary::Tanh, Unary::Not,
+            Unary::Neg,
+            Unary::Abs,
+            Unary::Sign,
+            Unary::Floor,
+            Unary::Sqrt,
+            Unary::Exp,
+            Unary::Ln,
+            Unary::Sin,
+            Unary::Cos,
+            Unary::Tan,
+            Unary::Asin,
+            Unary::Acos,
+            Unary::Atan,
+            Unary::Sinh,
+            Unary::Cosh,
+            Unary::Tanh,
+            Unary::Not,
         ];
         let binary = [
-            Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Pow, Binary::Atan2,
-            Binary::Min, Binary::Max, Binary::Less, Binary::LessEq, Binary::Equal, Binary::And,
+            Binary::Add,
+            Binary::Sub,
+            Binary::Mul,
+            Binary::Div,
+            Binary::Pow,
+            Binary::Atan2,
+            Binary::Min,
+            Binary::Max,
+            Binary::Less,
+            Binary::LessEq,
+            Binary::Equal,
+            Binary::And,
             Binary::Or,
         ];
         let points = [-2.5, -1.0, -0.3, 0.0, 0.2, 1.0, 1.7, 3.0];
@@ -231,10 +271,18 @@ mod tests {
         for x in points {
             let big = Precise::from(x);
             for op in unary {
-                agree(format!("{op:?} {x}"), &precise.unary(op, &big), Reals.unary(op, &x));
+                agree(
+                    format!("{op:?} {x}"),
+                    &precise.unary(op, &big),
+                    Reals.unary(op, &x),
+                );
             }
             for n in [-3, 0, 2, 5] {
-                agree(format!("{x}^{n}"), &precise.powi(&big, n), Reals.powi(&x, n));
+                agree(
+                    format!("{x}^{n}"),
+                    &precise.powi(&big, n),
+                    Reals.powi(&x, n),
+                );
             }
             for y in points {
                 for op in binary {

@@ -21,7 +21,10 @@ pub enum Answer {
 
 /// Judges a refutation.
 pub fn check(refutation: &Refutation, extended: &Extended<'_>, design: Option<&Design>) -> Answer {
-    let judged = match (refutation.of_error, slope_of(&refutation.condition, extended)) {
+    let judged = match (
+        refutation.of_error,
+        slope_of(&refutation.condition, extended),
+    ) {
         (false, Some(slope)) => sign(&slope, refutation, extended),
         (true, _) => match design {
             Some(design) => unstable(&design.observer, refutation, extended),
@@ -40,11 +43,21 @@ struct Slope {
 
 /// The slope that a condition is about, by its name.
 fn slope_of(condition: &str, extended: &Extended<'_>) -> Option<Slope> {
-    let (value, of) = condition.strip_suffix(" keeps its sign")?.strip_prefix('∂')?.split_once("/∂")?;
+    let (value, of) = condition
+        .strip_suffix(" keeps its sign")?
+        .strip_prefix('∂')?
+        .split_once("/∂")?;
     let of = extended.states[extended.state_index(of)?].node;
     let value = match value.strip_prefix("f(").and_then(|v| v.strip_suffix(')')) {
         Some(state) => extended.derivatives[extended.state_index(state)?],
-        None => extended.outputs.iter().find(|o| o.variable.name == value)?.variable.node,
+        None => {
+            extended
+                .outputs
+                .iter()
+                .find(|o| o.variable.name == value)?
+                .variable
+                .node
+        }
     };
     Some(Slope { value, of })
 }
@@ -61,14 +74,20 @@ fn sign(slope: &Slope, refutation: &Refutation, extended: &Extended<'_>) -> Resu
     let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     for (point, value) in refutation.points.iter().zip(&values) {
         if value.is_nan() || (value - point.value).abs() > 1e-6 * (1e-3 + size) {
-            return Err(format!("the slope is {value}, said to be {} at {:?}", point.value, point.coordinates));
+            return Err(format!(
+                "the slope is {value}, said to be {} at {:?}",
+                point.value, point.coordinates
+            ));
         }
     }
     let vanishes = values.iter().any(|v| v.abs() <= STEP);
     let differs = values.iter().any(|v| *v < -STEP) && values.iter().any(|v| *v > STEP);
     match vanishes || differs {
         true => Ok(Answer::Confirmed),
-        false => Err(format!("the slopes {values:?} show no change of sign: {:?}", refutation.points)),
+        false => Err(format!(
+            "the slopes {values:?} show no change of sign: {:?}",
+            refutation.points
+        )),
     }
 }
 
@@ -79,7 +98,11 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
     let symbols = region.symbols();
     let mut place = vec![];
     for side in &region.dimensions {
-        let given = point.coordinates.iter().find(|c| c.0 == side.name).map(|c| c.1);
+        let given = point
+            .coordinates
+            .iter()
+            .find(|c| c.0 == side.name)
+            .map(|c| c.1);
         if given.is_some_and(|x| !(side.min <= x && x <= side.max)) {
             return Err(format!("{} = {given:?} is outside of the box", side.name));
         }
@@ -87,7 +110,10 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
         let anywhere = side.min.max(side.max.min(0.0)).clamp(-1e300, 1e300);
         place.push(Precise::from(given.unwrap_or(anywhere)));
     }
-    let moved = symbols.iter().position(|s| *s == slope.of).ok_or("no such symbol")?;
+    let moved = symbols
+        .iter()
+        .position(|s| *s == slope.of)
+        .ok_or("no such symbol")?;
     let tape = Tape::new(graph, &symbols, &[slope.value]).map_err(|e| e.to_string())?;
     let precise = Precise::new()?;
     let at = |by: f64| {
@@ -104,7 +130,11 @@ fn difference(above: &BigFloat, below: &BigFloat) -> BigFloat {
 
 /// An eigenvalue of the error's Jacobian is said not to decay, by more than 1e-9 of the
 /// matrix's size.
-fn unstable(observer: &Observer, refutation: &Refutation, extended: &Extended<'_>) -> Result<Answer, String> {
+fn unstable(
+    observer: &Observer,
+    refutation: &Refutation,
+    extended: &Extended<'_>,
+) -> Result<Answer, String> {
     let Some(point) = refutation.points.first() else {
         return Err("no point".into());
     };
@@ -112,22 +142,35 @@ fn unstable(observer: &Observer, refutation: &Refutation, extended: &Extended<'_
         return Ok(Answer::Unread);
     };
     let n = A.len();
-    let size = A.iter().flatten().fold(0.0_f64, |m, a| m.max(Precise::rounded(a).abs()));
+    let size = A
+        .iter()
+        .flatten()
+        .fold(0.0_f64, |m, a| m.max(Precise::rounded(a).abs()));
     if !size.is_finite() {
-        return Err(format!("the Jacobian has no value at {:?}", point.coordinates));
+        return Err(format!(
+            "the Jacobian has no value at {:?}",
+            point.coordinates
+        ));
     }
     let mut shifted = A;
     for (i, row) in shifted.iter_mut().enumerate() {
         row[i] = Precise::sub(&row[i], &Precise::from(1e-10 * size));
     }
     match is_hurwitz(&shifted) {
-        true => Err(format!("all {n} eigenvalues decay at {:?}", point.coordinates)),
+        true => Err(format!(
+            "all {n} eigenvalues decay at {:?}",
+            point.coordinates
+        )),
         false => Ok(Answer::Confirmed),
     }
 }
 
 /// ∂x̂'/∂x̂ where the estimate is right; none for observers with further states or signals.
-fn jacobian(observer: &Observer, point: &Point, extended: &Extended<'_>) -> Result<Option<Vec<Vec<BigFloat>>>, String> {
+fn jacobian(
+    observer: &Observer,
+    point: &Point,
+    extended: &Extended<'_>,
+) -> Result<Option<Vec<Vec<BigFloat>>>, String> {
     let n = extended.states.len();
     if observer.states.len() != n || !observer.input_derivatives.is_empty() {
         return Ok(None);
@@ -165,7 +208,11 @@ fn jacobian(observer: &Observer, point: &Point, extended: &Extended<'_>) -> Resu
             tape.eval_in(&precise, &place)
         };
         let (above, below) = (at(STEP), at(-STEP));
-        let column: Vec<BigFloat> = above.iter().zip(&below).map(|(a, b)| difference(a, b)).collect();
+        let column: Vec<BigFloat> = above
+            .iter()
+            .zip(&below)
+            .map(|(a, b)| difference(a, b))
+            .collect();
         columns.push(column);
     }
     let row = |i: usize| columns.iter().map(|c| c[i].clone()).collect();
@@ -189,7 +236,14 @@ fn is_hurwitz(A: &[Vec<BigFloat>]) -> bool {
         let trace = (0..n).fold(zero.clone(), |sum, i| Precise::add(&sum, &AM[i][i]));
         coefficients.push(Precise::div(&trace, &Precise::from(-(k as f64))));
     }
-    let every = |start: usize| coefficients.iter().skip(start).step_by(2).cloned().collect();
+    let every = |start: usize| {
+        coefficients
+            .iter()
+            .skip(start)
+            .step_by(2)
+            .cloned()
+            .collect()
+    };
     let mut rows: [Vec<BigFloat>; 2] = [every(0), every(1)];
     for _ in 0..n {
         let [above, below] = &rows;
@@ -213,9 +267,13 @@ fn is_hurwitz(A: &[Vec<BigFloat>]) -> bool {
 fn product(A: &[Vec<BigFloat>], B: &[Vec<BigFloat>]) -> Vec<Vec<BigFloat>> {
     let n = A.len();
     let entry = |i: usize, j: usize| {
-        (0..n).fold(Precise::from(0.0), |sum, k| Precise::add(&sum, &Precise::mul(&A[i][k], &B[k][j])))
+        (0..n).fold(Precise::from(0.0), |sum, k| {
+            Precise::add(&sum, &Precise::mul(&A[i][k], &B[k][j]))
+        })
     };
-    (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect()
+    (0..n)
+        .map(|i| (0..n).map(|j| entry(i, j)).collect())
+        .collect()
 }
 
 #[cfg(test)]
@@ -223,7 +281,9 @@ mod tests {
     use super::*;
 
     fn matrix(rows: &[&[f64]]) -> Vec<Vec<BigFloat>> {
-        rows.iter().map(|row| row.iter().map(|x| Precise::from(*x)).collect()).collect()
+        rows.iter()
+            .map(|row| row.iter().map(|x| Precise::from(*x)).collect())
+            .collect()
     }
 
     #[test]

@@ -16,6 +16,8 @@ pub struct Options {
     pub count: usize,
     /// refutations to look at
     pub refutations: usize,
+    /// plants at most
+    pub plants: Option<u64>,
     /// after which the search ends, reached or not
     pub seconds: Option<u64>,
     /// all where none is named
@@ -25,27 +27,39 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `--seed N --count N --refutations N --seconds N --family F`.
+    /// Reads `--seed N --count N --refutations N --plants N --seconds N --family F`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
         let mut options = Self {
             seed: 1,
             count: 20_000,
             refutations: 5_000,
+            plants: None,
             seconds: None,
             kind: None,
             folder: PathBuf::from("target/falsify"),
         };
         let mut rest = arguments.iter();
         while let Some(key) = rest.next() {
-            let value = rest.next().ok_or_else(|| format!("{key}: expected a value"))?;
-            let number = || value.parse::<u64>().map_err(|_| format!("{key}: expected a whole number, found \"{value}\""));
+            let value = rest
+                .next()
+                .ok_or_else(|| format!("{key}: expected a value"))?;
+            let number = || {
+                value
+                    .parse::<u64>()
+                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
+            };
             match key.as_str() {
                 "--seed" => options.seed = number()?,
                 "--count" => options.count = number()? as usize,
                 "--refutations" => options.refutations = number()? as usize,
+                "--plants" => options.plants = Some(number()?),
                 "--seconds" => options.seconds = Some(number()?),
                 "--family" => options.kind = Some(kind(value)?),
-                _ => return Err(format!("expected --seed, --count, --refutations, --seconds or --family, found {key}")),
+                _ => {
+                    return Err(format!(
+                        "expected --seed, --count, --refutations, --plants, --seconds or --family, found {key}"
+                    ));
+                }
             }
         }
         Ok(options)
@@ -64,7 +78,12 @@ impl Options {
 fn kind(word: &str) -> Result<Kind, String> {
     let words: Vec<&str> = Kind::ALL.iter().map(|k| k.word()).collect();
     let found = Kind::ALL.into_iter().find(|k| k.word() == word);
-    found.ok_or_else(|| format!("--family: expected one of {}, found \"{word}\"", words.join(", ")))
+    found.ok_or_else(|| {
+        format!(
+            "--family: expected one of {}, found \"{word}\"",
+            words.join(", ")
+        )
+    })
 }
 
 /// A false claim, as small as it could be made.
@@ -119,7 +138,9 @@ impl Report {
     pub fn is_enough(&self, options: &Options) -> bool {
         let total = self.tally.total();
         let reached = total.proved >= options.count && total.refutations >= options.refutations;
-        let late = options.seconds.is_some_and(|s| self.started.elapsed().as_secs() >= s);
+        let late = options
+            .seconds
+            .is_some_and(|s| self.started.elapsed().as_secs() >= s);
         // a search in which nothing is proved ends, too
         reached || late || total.plants >= 40 * (options.count + options.refutations).max(50)
     }
@@ -137,7 +158,14 @@ impl Report {
         if total.plants / 2000 > self.said {
             self.said = total.plants / 2000;
             let seconds = self.started.elapsed().as_secs();
-            eprintln!("{} plants, {} certificates proved, {} false, {} refutations, {} wrong, {seconds} s", total.plants, total.proved, self.found.len(), total.refutations, total.wrong);
+            eprintln!(
+                "{} plants, {} certificates proved, {} false, {} refutations, {} wrong, {seconds} s",
+                total.plants,
+                total.proved,
+                self.found.len(),
+                total.refutations,
+                total.wrong
+            );
         }
         let Some((case, violation)) = found else {
             return Ok(());
@@ -154,11 +182,14 @@ impl Report {
         Ok(())
     }
 
-    /// The table, then the false claims.
-    pub fn print(&self) {
+    /// The table, then the false claims by sort.
+    pub fn text(&self) -> String {
         let seconds = self.started.elapsed().as_secs();
         let mut text = self.tally.table();
-        text += &format!("\n{seconds} s; witnesses of further conditions: {}\n", self.tally.total().unread);
+        text += &format!(
+            "\n{seconds} s; witnesses of further conditions: {}\n",
+            self.tally.total().unread
+        );
         let mut sorts = BTreeMap::<_, Vec<u64>>::new();
         for found in &self.found {
             sorts.entry(found.sort()).or_default().push(found.index);
@@ -167,7 +198,7 @@ impl Report {
             let first: Vec<String> = indices.iter().take(5).map(u64::to_string).collect();
             text += &format!("{sort}: {}, e.g. {}\n", indices.len(), first.join(", "));
         }
-        eprint!("{text}");
+        text
     }
 }
 

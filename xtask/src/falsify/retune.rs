@@ -62,7 +62,10 @@ fn bounded(
         return false;
     };
     let known = case.inputs.iter().filter(|i| i.role == Role::Known).count();
-    if case.slope.is_some() || known != 1 || design.observer.estimates.len() != extended.states.len() {
+    if case.slope.is_some()
+        || known != 1
+        || design.observer.estimates.len() != extended.states.len()
+    {
         return false;
     }
     let observer = &design.observer;
@@ -112,7 +115,11 @@ fn scale(case: &mut Case, factor: f64) -> bool {
 
 /// Where every condition is proved, some gain has to make a small error shrink. Looks
 /// for a plant on which the error grows a hundredfold for each of several gains.
-pub fn diverges(case: &Case, desk: &Desk, numbers: &mut Numbers) -> Result<Option<Violation>, String> {
+pub fn diverges(
+    case: &Case,
+    desk: &Desk,
+    numbers: &mut Numbers,
+) -> Result<Option<Violation>, String> {
     let mut evidence = vec![];
     for factor in [1.0, 10.0, 100.0] {
         let mut faster = case.clone();

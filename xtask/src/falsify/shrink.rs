@@ -9,12 +9,7 @@ use super::numbers::Numbers;
 const TRIALS: usize = 150;
 
 /// The smallest case found with a violation of the same kind.
-pub fn smallest(
-    case: &Case,
-    desk: &Desk,
-    first: &Violation,
-    effort: Effort,
-) -> (Case, Violation) {
+pub fn smallest(case: &Case, desk: &Desk, first: &Violation, effort: Effort) -> (Case, Violation) {
     let mut best = (case.clone(), first.clone());
     let mut trials = 0;
     loop {
@@ -38,7 +33,10 @@ fn again(case: &Case, desk: &Desk, like: &Violation, effort: Effort) -> Option<V
     let mut numbers = Numbers::new(7, 7);
     let judged = std::panic::AssertUnwindSafe(|| judge(case, desk, &mut numbers, effort, false));
     let judgement = std::panic::catch_unwind(judged).ok()?.ok()?;
-    judgement.violations.into_iter().find(|v| v.flaw == like.flaw)
+    judgement
+        .violations
+        .into_iter()
+        .find(|v| v.flaw == like.flaw)
 }
 
 /// Cases with one thing less.

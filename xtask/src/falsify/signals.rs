@@ -21,26 +21,44 @@ pub enum Signal {
         phase: f64,
     },
     /// up and down between the ends at a constant slope
-    Triangle { ends: [f64; 2], slope: f64 },
+    Triangle {
+        ends: [f64; 2],
+        slope: f64,
+    },
     /// one end or the other by the sign of an error: the worst that can be done to it
-    Feedback { ends: [f64; 2], of: usize, sharpness: f64 },
+    Feedback {
+        ends: [f64; 2],
+        of: usize,
+        sharpness: f64,
+    },
 }
 
 impl Signal {
     pub fn value(&self, t: f64, error: &[f64]) -> f64 {
         match self {
             Self::Constant(x) => *x,
-            Self::Bang { ends, period, phase } => {
+            Self::Bang {
+                ends,
+                period,
+                phase,
+            } => {
                 let half = ((t - phase) / period).floor().rem_euclid(2.0);
                 ends[usize::from(half >= 1.0)]
             }
             Self::Wave { middle, .. } => middle + self.wave(t, 0),
-            Self::Triangle { ends: [low, high], slope } => {
+            Self::Triangle {
+                ends: [low, high],
+                slope,
+            } => {
                 let width = high - low;
                 let way = (t * slope).rem_euclid(2.0 * width);
                 (low + if way > width { 2.0 * width - way } else { way }).clamp(*low, *high)
             }
-            Self::Feedback { ends: [low, high], of, sharpness } => {
+            Self::Feedback {
+                ends: [low, high],
+                of,
+                sharpness,
+            } => {
                 let e = error.get(*of).copied().unwrap_or(0.0);
                 let share = 0.5 + 0.5 * (e * sharpness).tanh();
                 low + share * (high - low)
@@ -55,7 +73,12 @@ impl Signal {
 
     fn wave(&self, t: f64, order: usize) -> f64 {
         match self {
-            Self::Wave { amplitude, pace, phase, .. } => {
+            Self::Wave {
+                amplitude,
+                pace,
+                phase,
+                ..
+            } => {
                 let angle = pace * t + phase + order as f64 * FRAC_PI_2;
                 amplitude * pace.powi(order as i32) * angle.sin()
             }
@@ -66,7 +89,10 @@ impl Signal {
     pub fn next_break(&self, t: f64) -> f64 {
         let (period, phase) = match self {
             Self::Bang { period, phase, .. } => (*period, *phase),
-            Self::Triangle { ends: [low, high], slope } => ((high - low) / slope, 0.0),
+            Self::Triangle {
+                ends: [low, high],
+                slope,
+            } => ((high - low) / slope, 0.0),
             _ => return f64::INFINITY,
         };
         let next = phase + (((t - phase) / period).floor() + 1.0) * period;
@@ -119,7 +145,12 @@ pub fn known(numbers: &mut Numbers, side: &Side, slope: Option<f64>, errors: usi
     let pace = numbers.size(0.2, 1.0);
     match wave(numbers, range, pace) {
         _ if numbers.chance(0.3) => constant,
-        Signal::Wave { middle, amplitude, pace, phase } => Signal::Wave {
+        Signal::Wave {
+            middle,
+            amplitude,
+            pace,
+            phase,
+        } => Signal::Wave {
             middle,
             amplitude: amplitude.min(slope / pace),
             pace,
@@ -144,7 +175,10 @@ pub fn of_role(
         Role::Disturbance if quiet => Signal::Constant(0.0),
         Role::Disturbance => free(numbers, range, errors),
         Role::Unknown(Some(slew)) if !quiet && slew > 0.0 => match numbers.chance(0.7) {
-            true => Signal::Triangle { ends: range, slope: slew },
+            true => Signal::Triangle {
+                ends: range,
+                slope: slew,
+            },
             false => {
                 let amplitude = 0.5 * side.width();
                 Signal::Wave {
@@ -172,7 +206,14 @@ mod tests {
             high: 0.7,
         };
         for _ in 0..200 {
-            let signal = of_role(&mut numbers, &side, Role::Unknown(Some(0.2)), None, false, 2);
+            let signal = of_role(
+                &mut numbers,
+                &side,
+                Role::Unknown(Some(0.2)),
+                None,
+                false,
+                2,
+            );
             let known = known(&mut numbers, &side, Some(0.4), 2);
             for step in 0..100 {
                 let (t, h) = (f64::from(step) * 0.1 - 3.0, 1e-4);

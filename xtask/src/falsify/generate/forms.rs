@@ -27,7 +27,15 @@ impl Draft<'_> {
     /// One chain of states per sensor.
     pub fn chains(&mut self, kind: Kind, several: bool) -> Case {
         let one: &[&[usize]] = &[&[2], &[2], &[2], &[3], &[3], &[4], &[1, 1], &[2, 1]];
-        let many: &[&[usize]] = &[&[1, 1], &[2, 1], &[2, 1], &[1, 2], &[2, 2], &[1, 1, 1], &[3, 1]];
+        let many: &[&[usize]] = &[
+            &[1, 1],
+            &[2, 1],
+            &[2, 1],
+            &[1, 2],
+            &[2, 2],
+            &[1, 1, 1],
+            &[3, 1],
+        ];
         let lengths = *self.numbers.of(if several { many } else { one });
         let states = self.sides(lengths.iter().sum());
         let mut inputs = self.known(1);

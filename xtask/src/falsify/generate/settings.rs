@@ -53,7 +53,11 @@ fn remedy(numbers: &mut Numbers, case: &mut Case, θ: f64) {
 fn block_triangular(numbers: &mut Numbers, case: &mut Case) {
     family(case, "block-triangular");
     let θ = theta(numbers, case);
-    let correction = if numbers.chance(0.6) { "classical" } else { "lee" };
+    let correction = if numbers.chance(0.6) {
+        "classical"
+    } else {
+        "lee"
+    };
     match numbers.below(10) {
         0 => remedy(numbers, case, θ),
         _ => case.key("correction", format!("{correction:?}")),
@@ -105,6 +109,9 @@ fn unknown_input(numbers: &mut Numbers, case: &mut Case) {
     family(case, "unknown-input");
     if numbers.chance(0.2) {
         let (first, second) = (numbers.size(2.0, 300.0), numbers.size(1.0, 20.0));
-        case.key("theta", format!("[{:?}, {:?}]", round(first), round(second)));
+        case.key(
+            "theta",
+            format!("[{:?}, {:?}]", round(first), round(second)),
+        );
     }
 }
