@@ -146,19 +146,19 @@ impl Findings {
     }
 }
 
-/// The overshoot under the name that each proof gives it.
-const OVERSHOOTS: &[&str] = &["√cond(P)", "λ1", "λθ1", "μ"];
+/// How the proofs describe the factor c of c·e^(−rate·t)·|e(0)|; its letter is another
+/// in every paper, and the same letter is another number elsewhere.
+const OVERSHOOTS: &[&str] = &["overshoot", "at most this times", "may peak"];
 
 fn claim(certificate: &Certificate) -> Option<Claim> {
     if certificate.verdict != Verdict::Proved {
         return None;
     }
-    let constant = |name: &str| {
-        let found = certificate.constants.iter().find(|c| c.name == name);
-        found.map(|c| c.value)
-    };
-    // `unknown-input` calls its rate μ
-    let overshoot = OVERSHOOTS.iter().find_map(|name| constant(name));
+    let is_overshoot = |meaning: &str| OVERSHOOTS.iter().any(|words| meaning.contains(words));
+    let mut constants = certificate.constants.iter();
+    let overshoot = constants
+        .find(|c| is_overshoot(&c.meaning))
+        .map(|c| c.value);
     Some(Claim {
         basis: certificate.basis.clone(),
         rate: certificate.rate.unwrap_or(0.0),

@@ -149,6 +149,9 @@ impl Look<'_, '_> {
             self.against_facts(numbers);
         }
         self.witnesses();
+        if let Some(design) = &self.found.design {
+            self.against_print(&design.observer, numbers);
+        }
         self.counts.violated = usize::from(!self.violations.is_empty());
     }
 
@@ -167,22 +170,10 @@ impl Look<'_, '_> {
             return;
         }
         let found = self.found;
-        let mut attack = attack(self.case, self.extended, &mut pair, &found.claims);
-        let names: Vec<String> = self
-            .extended
-            .states
-            .iter()
-            .map(|s| s.name.clone())
-            .collect();
-        if let Some(evidence) = attack.misprint(numbers, &found.gain, &names) {
-            self.violations.push(Violation {
-                flaw: Flaw::Gain,
-                evidence,
-            });
-        }
         if found.claims.is_empty() {
             return;
         }
+        let mut attack = attack(self.case, self.extended, &mut pair, &found.claims);
         if let Some(evidence) = attack.secant(numbers) {
             return self.note(Flaw::Exceeded, evidence);
         }
@@ -193,6 +184,25 @@ impl Look<'_, '_> {
         if worst.ratio > 1.0 + 1e-4 {
             let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
             self.note(Flaw::Exceeded, evidence);
+        }
+    }
+
+    fn against_print(&mut self, observer: &Observer, numbers: &mut Numbers) {
+        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
+            return;
+        };
+        if pair.estimates() != self.extended.states.len() {
+            return;
+        }
+        let names: Vec<String> = self
+            .extended
+            .states
+            .iter()
+            .map(|s| s.name.clone())
+            .collect();
+        let mut attack = attack(self.case, self.extended, &mut pair, &[]);
+        if let Some(evidence) = attack.misprint(numbers, &self.found.gain, &names) {
+            self.note(Flaw::Gain, evidence);
         }
     }
 
