@@ -1,5 +1,6 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
+mod falsify;
 mod gallery;
 mod gap;
 mod process;
@@ -16,11 +17,14 @@ usage: cargo xtask <task>
   ci        format check, lints, documentation, then `test`
   gallery   draw the pictures of docs/pictures again from the shipped studies
   gap       compute the table of docs/gap.md again from the shipped studies;
-            `gap NAME` only the rows of that example";
+            `gap NAME` only the rows of that example
+  falsify   try to break the certificates of random and adversarial plants
+            [--seed N] [--count N] [--refutations N] [--family F]; build with --release";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let (task, name) = match arguments.as_slice() {
+        [task, ..] if task == "falsify" => ("falsify", None),
         [task] => (task.as_str(), None),
         [task, name] if task == "gap" => ("gap", Some(name.as_str())),
         _ => ("", None),
@@ -30,6 +34,7 @@ fn main() -> ExitCode {
         "ci" => ci(),
         "gallery" => gallery::draw(),
         "gap" => gap::tabulate(name),
+        "falsify" => falsify::run(&arguments[1..]),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

@@ -1,0 +1,259 @@
+//! The search for a start, inputs, disturbances and noise that break a certificate.
+
+use super::case::{Case, Role};
+use super::claims::Claim;
+use super::integrate::{Flow, Limits, follow};
+use super::numbers::Numbers;
+use super::pair::Pair;
+use super::run::Run;
+use super::signals::{self, Signal};
+
+/// Everything that the adversary chooses.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    pub start: f64,
+    /// places in the box, from 0 to 1
+    pub plant: Vec<f64>,
+    pub estimate: Vec<f64>,
+    pub inputs: Vec<Signal>,
+    pub noise: Vec<Signal>,
+    /// disturbances, noise and slews at rest
+    pub quiet: bool,
+}
+
+/// The worst that was seen of one plan.
+#[derive(Clone, Debug, Default)]
+pub struct Worst {
+    /// found over allowed
+    pub ratio: f64,
+    pub what: String,
+    /// whether a time constant of a claim was followed inside the box
+    pub long: bool,
+}
+
+pub struct Attack<'a> {
+    pub case: &'a Case,
+    pub pair: &'a mut Pair,
+    pub claims: &'a [Claim],
+    /// the box of what is estimated, in its order
+    pub sides: Vec<[f64; 2]>,
+    /// observer states beside the estimate that have to stay in a box, too
+    pub guards: Vec<(usize, [f64; 2])>,
+}
+
+/// Standard deviations that noise stays within.
+const DEVIATIONS: f64 = 3.0;
+
+impl Attack<'_> {
+    /// The worst plan of a search of about `runs` simulations, seen again at a
+    /// tighter tolerance.
+    pub fn search(&mut self, numbers: &mut Numbers, runs: usize) -> (Plan, Worst) {
+        let mut best: Option<(Plan, Worst)> = None;
+        let mut long = false;
+        for run in 0..runs {
+            let plan = match &best {
+                Some((plan, _)) if run > runs / 3 => self.changed(numbers, plan, run),
+                _ => self.plan(numbers),
+            };
+            let worst = self.run(&plan, 1e-8, 400);
+            long |= worst.long;
+            let better = best.as_ref().is_none_or(|(_, b)| worst.ratio > b.ratio);
+            if better {
+                best = Some((plan, worst));
+            }
+            if best.as_ref().is_some_and(|(_, b)| b.ratio > 1.05) {
+                break;
+            }
+        }
+        let (plan, mut worst) = best.unwrap_or_else(|| (self.plan(numbers), Worst::default()));
+        if worst.ratio > 1.0 {
+            worst = self.run(&plan, 1e-11, 40_000);
+        }
+        worst.long |= long;
+        (plan, worst)
+    }
+
+    fn place(&self, numbers: &mut Numbers, count: usize) -> Vec<f64> {
+        let manner = numbers.below(4);
+        let depth = numbers.unit();
+        let one = |_| match manner {
+            0 => f64::from(u8::from(numbers.chance(0.5))),
+            1 => numbers.unit(),
+            _ => 0.5 + depth * (numbers.unit() - 0.5),
+        };
+        (0..count).map(one).collect()
+    }
+
+    fn plan(&self, numbers: &mut Numbers) -> Plan {
+        let n = self.pair.estimates();
+        let quiet = numbers.chance(0.3);
+        let plant = self.place(numbers, n);
+        let estimate = match numbers.chance(0.3) {
+            true => {
+                let near = numbers.size(1e-4, 0.3);
+                let moved = plant
+                    .iter()
+                    .map(|x| (x + near * numbers.normal()).clamp(0.0, 1.0));
+                moved.collect()
+            }
+            false => self.place(numbers, n),
+        };
+        let mut plan = Plan {
+            start: numbers.between(-10.0, 10.0),
+            plant,
+            estimate,
+            inputs: vec![],
+            noise: vec![],
+            quiet,
+        };
+        plan.inputs = self.signals(numbers, quiet);
+        plan.noise = self.errors(numbers, quiet);
+        plan
+    }
+
+    /// Near the middle of the box, with a small error and nothing that acts.
+    pub fn rest(&self, numbers: &mut Numbers, error: f64) -> Plan {
+        let n = self.pair.estimates();
+        let plant: Vec<f64> = (0..n).map(|_| numbers.between(0.45, 0.55)).collect();
+        let estimate = plant.iter().map(|x| x + error * numbers.normal()).collect();
+        let constant = |_: &Signal| Signal::Constant(0.0);
+        let inputs = self.signals(numbers, true);
+        let still = |signal: Signal| match signal {
+            Signal::Constant(_) => signal,
+            moving => Signal::Constant(moving.value(0.0, &[])),
+        };
+        Plan {
+            start: 0.0,
+            plant,
+            estimate,
+            noise: self.errors(numbers, true).iter().map(constant).collect(),
+            inputs: inputs.into_iter().map(still).collect(),
+            quiet: true,
+        }
+    }
+
+    fn signals(&self, numbers: &mut Numbers, quiet: bool) -> Vec<Signal> {
+        let n = self.pair.estimates();
+        let inputs = self.case.inputs.iter();
+        inputs
+            .map(|i| signals::of_role(numbers, &i.side, i.role, self.case.slope, quiet, n))
+            .collect()
+    }
+
+    fn errors(&self, numbers: &mut Numbers, quiet: bool) -> Vec<Signal> {
+        let n = self.pair.estimates();
+        let of = |σ: &f64| match quiet || *σ == 0.0 {
+            true => Signal::Constant(0.0),
+            false => signals::free(numbers, [-DEVIATIONS * σ, DEVIATIONS * σ], n),
+        };
+        self.case.noise.iter().map(of).collect()
+    }
+
+    /// The plan with one of its parts changed.
+    fn changed(&self, numbers: &mut Numbers, plan: &Plan, run: usize) -> Plan {
+        let mut plan = plan.clone();
+        let pace = numbers.size(1e-3, 0.5) / (1.0 + 0.02 * run as f64);
+        match numbers.below(6) {
+            0 | 1 => shake(numbers, &mut plan.plant, pace),
+            2 | 3 => shake(numbers, &mut plan.estimate, pace),
+            4 => plan.inputs = self.signals(numbers, plan.quiet),
+            _ => plan.noise = self.errors(numbers, plan.quiet),
+        }
+        plan
+    }
+
+    /// Follows a plan.
+    pub fn run(&mut self, plan: &Plan, tolerance: f64, budget: usize) -> Worst {
+        let n = self.pair.states;
+        let inside = |share: &f64, side: &[f64; 2]| match side {
+            [low, high] if low.is_finite() && high.is_finite() => low + share * (high - low),
+            _ => 4.0 * share - 2.0,
+        };
+        let x = plan
+            .plant
+            .iter()
+            .zip(&self.sides)
+            .map(|(s, side)| inside(s, side));
+        let hat: Vec<f64> = plan
+            .estimate
+            .iter()
+            .zip(&self.sides)
+            .map(|(s, side)| inside(s, side))
+            .collect();
+        let mut state: Vec<f64> = x.take(n).collect();
+        let mut z = self.pair.start.clone();
+        for (held, hat) in self.pair.held.iter().zip(&hat) {
+            if let Some(held) = held {
+                z[*held] = *hat;
+            }
+        }
+        self.settle(plan, &mut z);
+        state.extend(z);
+        let mut scale = vec![1e-3; state.len()];
+        for (i, side) in self.sides.iter().enumerate() {
+            let width = if side[1] - side[0] < 1e300 {
+                side[1] - side[0]
+            } else {
+                1.0
+            };
+            if i < n {
+                scale[i] = 1e-2 * width;
+            }
+            if let Some(held) = self.pair.held[i] {
+                scale[n + held] = 1e-2 * width;
+            }
+        }
+        let rate = self
+            .claims
+            .iter()
+            .map(|c| c.rate)
+            .fold(f64::INFINITY, f64::min);
+        let length = (40.0 / rate).min(1e6);
+        let mut run = Run::new(plan, self.claims, &self.sides, &self.guards, self.pair);
+        let mut out = vec![0.0; state.len()];
+        run.slope(plan.start, &state, &mut out);
+        if run.seen(plan.start, &state) {
+            let limits = Limits {
+                tolerance,
+                scale: &scale,
+                budget,
+            };
+            follow(&mut run, &state, [plan.start, plan.start + length], &limits);
+        }
+        run.worst
+    }
+
+    /// Filters of known inputs start where these are: what they do to the error from
+    /// elsewhere is no part of the claims.
+    fn settle(&self, plan: &Plan, z: &mut [f64]) {
+        let mut guards = self.guards.iter();
+        for (input, signal) in self.case.inputs.iter().zip(&plan.inputs) {
+            if input.role != Role::Known {
+                continue;
+            }
+            let per_input = self.guards.len()
+                / self
+                    .case
+                    .inputs
+                    .iter()
+                    .filter(|i| i.role == Role::Known)
+                    .count();
+            for (order, (index, _)) in guards.by_ref().take(per_input).enumerate() {
+                z[*index] = match order {
+                    0 => signal.value(plan.start, &[]),
+                    _ => signal.derivative(plan.start, order),
+                };
+            }
+        }
+    }
+}
+
+fn shake(numbers: &mut Numbers, places: &mut [f64], pace: f64) {
+    let all = numbers.chance(0.4);
+    let one = numbers.below(places.len().max(1));
+    for (i, place) in places.iter_mut().enumerate() {
+        if all || i == one {
+            *place = (*place + pace * numbers.normal()).clamp(0.0, 1.0);
+        }
+    }
+}

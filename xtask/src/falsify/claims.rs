@@ -1,0 +1,177 @@
+//! What the library says about a case: every claim that can be attacked. The only file
+//! that knows what certificates look like.
+
+use lynkeus::Study;
+use lynkeus::model::Plant;
+use lynkeus::observers::{Certificate, Design, Examination, FAMILIES, Fit, Tuning, Verdict};
+use lynkeus::structure::{Check, Condition, Extended};
+use nalgebra::DMatrix;
+
+use super::tally::Counts;
+
+/// |e(t)| ≤ overshoot·e^(−rate·t)·|e(0)| + ultimate bound, while plant and estimate
+/// stay in the box.
+#[derive(Clone, Debug)]
+pub struct Claim {
+    pub basis: String,
+    pub rate: f64,
+    /// none where the certificate names no such constant
+    pub overshoot: Option<f64>,
+    /// none where the certificate makes no statement
+    pub ultimate: Option<f64>,
+    /// the same per quantity
+    pub each: Vec<(String, f64)>,
+    /// V = eᵀPe falls at 2·rate without disturbance and noise
+    pub lyapunov: Option<DMatrix<f64>>,
+    /// the box by names
+    pub sides: Vec<(String, f64, f64)>,
+}
+
+/// A condition that is said to fail, with the points that are to show it.
+#[derive(Clone, Debug)]
+pub struct Refutation {
+    pub condition: String,
+    pub points: Vec<lynkeus::structure::Point>,
+    /// of the observer's error, not of the plant
+    pub of_error: bool,
+}
+
+/// Everything said about one case.
+pub struct Findings {
+    /// none where the family does not take the plant
+    pub design: Option<Design>,
+    pub claims: Vec<Claim>,
+    pub refutations: Vec<Refutation>,
+    /// the family that the study asks for
+    pub examination: Option<Examination>,
+    /// the theorem is proved and a point refutes it, in one report
+    pub contradicts: bool,
+    /// the gain as it is printed for machines
+    pub gain: serde_json::Value,
+    pub counts: Counts,
+    /// the certificates, for settings that follow from their constants
+    pub certificates: Vec<Certificate>,
+}
+
+/// Asks the library.
+pub fn findings(study: &Study, plant: &Plant, extended: &Extended<'_>, thorough: bool) -> Findings {
+    let mut found = Findings {
+        design: None,
+        claims: vec![],
+        refutations: vec![],
+        examination: None,
+        contradicts: false,
+        gain: serde_json::Value::Null,
+        counts: Counts::default(),
+        certificates: vec![],
+    };
+    found.counts.plants = 1;
+    if let Ok(mut examinations) = lynkeus::prepare::examinations(study, extended) {
+        found.examination = examinations.pop();
+    }
+    found.examined(extended, thorough);
+    let Ok(design) = lynkeus::prepare::design(study, extended) else {
+        return found;
+    };
+    debug_assert_eq!(plant.name, extended.plant.name);
+    found.design = Some(design);
+    found.counts.designs = 1;
+    let Ok(report) = lynkeus::certify(study) else {
+        return found;
+    };
+    found.gain = report.to_json()["gain"].take();
+    let theorem = report.theorem.as_ref();
+    found.contradicts = report.certificate.verdict == Verdict::Refuted
+        && theorem.is_some_and(|theorem| theorem.verdict == Verdict::Proved);
+    found.certified(report.certificate, true);
+    if let Some(theorem) = report.theorem {
+        found.certified(theorem, false);
+    }
+    found
+}
+
+impl Findings {
+    /// Whether the family is said to fit, with every condition proved.
+    pub fn fits(&self) -> bool {
+        self.examination
+            .as_ref()
+            .is_some_and(|e| e.fit == Fit::Fits)
+    }
+
+    fn examined(&mut self, extended: &Extended<'_>, thorough: bool) {
+        match self.examination.as_ref().map(|e| e.fit) {
+            Some(Fit::Fits) => self.counts.fits += 1,
+            Some(Fit::Undecided) => self.counts.open_fits += 1,
+            _ => self.counts.misfits += 1,
+        }
+        let others = match thorough {
+            true => FAMILIES,
+            false => &[],
+        };
+        let others = others.iter().filter_map(|family| {
+            let tuning = Tuning::default();
+            family.examine(extended, &tuning).ok()
+        });
+        let all: Vec<Examination> = self.examination.iter().cloned().chain(others).collect();
+        for examination in &all {
+            self.refuted(&examination.checks, false);
+        }
+    }
+
+    fn certified(&mut self, certificate: Certificate, of_error: bool) {
+        match certificate.verdict {
+            Verdict::Proved => self.counts.proved += 1,
+            Verdict::Undecided => self.counts.undecided += 1,
+            Verdict::Refuted => self.counts.refuted += 1,
+        }
+        self.refuted(&certificate.hypotheses, of_error);
+        self.claims.extend(claim(&certificate));
+        self.certificates.push(certificate);
+    }
+
+    fn refuted(&mut self, checks: &[Check], of_error: bool) {
+        for check in checks {
+            let Condition::Refuted(witness) = &check.verdict else {
+                continue;
+            };
+            let known = self.refutations.iter().any(|r| r.condition == check.name);
+            if !known {
+                self.refutations.push(Refutation {
+                    condition: check.name.clone(),
+                    points: witness.points.clone(),
+                    of_error,
+                });
+            }
+        }
+    }
+}
+
+/// How the proofs describe the factor c of c·e^(−rate·t)·|e(0)|; its letter is another
+/// in every paper, and the same letter is another number elsewhere.
+const OVERSHOOTS: &[&str] = &["overshoot", "at most this times", "may peak"];
+
+fn claim(certificate: &Certificate) -> Option<Claim> {
+    if certificate.verdict != Verdict::Proved {
+        return None;
+    }
+    let is_overshoot = |meaning: &str| OVERSHOOTS.iter().any(|words| meaning.contains(words));
+    let mut constants = certificate.constants.iter();
+    let overshoot = constants
+        .find(|c| is_overshoot(&c.meaning))
+        .map(|c| c.value);
+    Some(Claim {
+        basis: certificate.basis.clone(),
+        rate: certificate.rate.unwrap_or(0.0),
+        overshoot,
+        ultimate: certificate.ultimate_bound,
+        each: certificate.ultimate.clone(),
+        lyapunov: certificate.lyapunov.clone(),
+        sides: certificate.region.clone(),
+    })
+}
+
+/// A constant of one of the certificates.
+pub fn constant(certificates: &[Certificate], name: &str) -> Option<f64> {
+    let mut constants = certificates.iter().flat_map(|c| &c.constants);
+    constants.find(|c| c.name == name).map(|c| c.value)
+}

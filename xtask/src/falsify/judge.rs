@@ -1,0 +1,309 @@
+//! One case: what the library says of it, and what is wrong with that.
+
+use std::path::{Path, PathBuf};
+
+use lynkeus::Study;
+use lynkeus::observers::Observer;
+use lynkeus::structure::Extended;
+
+use super::attack::Attack;
+use super::case::{Case, Kind, Role};
+use super::claims::{self, Findings};
+use super::facts::{self, Fact, Facts};
+use super::numbers::Numbers;
+use super::pair::Pair;
+use super::refute;
+use super::retune;
+use super::tally::Counts;
+
+/// What kind of claim turned out to be false.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Flaw {
+    /// a proved bound of the error is exceeded
+    Exceeded,
+    /// every condition proved, and the plant contradicts one
+    Condition(Fact),
+    /// every condition proved, and the error grows from nothing for every gain
+    Diverges,
+    /// proved and refuted in one report
+    Contradiction,
+    /// the gain that is printed is not the observer's
+    Gain,
+    /// a witness that shows nothing
+    Witness,
+    /// the library panics
+    Panic,
+}
+
+/// A false claim with its evidence.
+#[derive(Clone, Debug)]
+pub struct Violation {
+    pub flaw: Flaw,
+    pub evidence: String,
+}
+
+/// How much of a case is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// simulations per proof
+    pub runs: usize,
+    /// conditions of all families instead of the study's
+    pub thorough: bool,
+    /// whether plant and gain are looked at beside the certificates
+    pub facts: bool,
+}
+
+/// A folder in which the case is written for the library to read.
+pub struct Desk(PathBuf);
+
+impl Desk {
+    pub fn new(folder: &Path) -> std::io::Result<Self> {
+        std::fs::create_dir_all(folder)?;
+        Ok(Self(folder.to_owned()))
+    }
+
+    pub fn write(&self, case: &Case) -> std::io::Result<PathBuf> {
+        std::fs::write(self.0.join("plant.mo"), case.model())?;
+        let study = self.0.join("study.toml");
+        std::fs::write(&study, case.study())?;
+        Ok(study)
+    }
+}
+
+/// What was seen of a case.
+pub struct Judgement {
+    pub counts: Counts,
+    pub violations: Vec<Violation>,
+    /// the case as it was judged, with the gains that its theorem asks for
+    pub case: Case,
+}
+
+/// Judges a case; with `tune` its gains are raised to what a theorem asks for.
+pub fn judge(
+    case: &Case,
+    desk: &Desk,
+    numbers: &mut Numbers,
+    effort: Effort,
+    tune: bool,
+) -> Result<Judgement, String> {
+    let mut case = case.clone();
+    for round in 0..3 {
+        let study = desk.write(&case).map_err(|e| e.to_string())?;
+        let study = Study::load(&study).map_err(|e| e.to_string())?;
+        let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
+        let extended = lynkeus::prepare::extended(&study, &plant).map_err(|e| e.to_string())?;
+        let found = claims::findings(&study, &plant, &extended, effort.thorough);
+        if tune && round < 2 && retune::raised(&mut case, &found, &extended, numbers) {
+            continue;
+        }
+        let mut looked = Look {
+            case: &case,
+            extended: &extended,
+            found: &found,
+            effort,
+            violations: vec![],
+            counts: found.counts.clone(),
+        };
+        looked.everything(numbers);
+        let (counts, violations) = (looked.counts, looked.violations);
+        if violations.is_empty() && effort.facts && found.fits() && numbers.chance(0.15) {
+            let mut judgement = Judgement {
+                counts,
+                violations,
+                case,
+            };
+            let diverges = retune::diverges(&judgement.case, desk, numbers)?;
+            judgement.violations.extend(diverges);
+            return Ok(judgement);
+        }
+        return Ok(Judgement {
+            counts,
+            violations,
+            case,
+        });
+    }
+    Err("no round".into())
+}
+
+struct Look<'a, 'p> {
+    case: &'a Case,
+    extended: &'a Extended<'p>,
+    found: &'a Findings,
+    effort: Effort,
+    violations: Vec<Violation>,
+    counts: Counts,
+}
+
+impl Look<'_, '_> {
+    fn everything(&mut self, numbers: &mut Numbers) {
+        if self.found.contradicts {
+            self.note(
+                Flaw::Contradiction,
+                "theorem proved, inequality refuted".into(),
+            );
+        }
+        if let Some(design) = &self.found.design {
+            self.against_claims(&design.observer, numbers);
+        }
+        if self.effort.facts && self.found.fits() {
+            self.against_facts(numbers);
+        }
+        self.witnesses();
+        if let Some(design) = &self.found.design {
+            self.against_print(&design.observer, numbers);
+        }
+        self.counts.violated = usize::from(!self.violations.is_empty());
+    }
+
+    fn note(&mut self, flaw: Flaw, evidence: String) {
+        self.violations.push(Violation { flaw, evidence });
+    }
+
+    fn against_claims(&mut self, observer: &Observer, numbers: &mut Numbers) {
+        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
+            return self.note(
+                Flaw::Exceeded,
+                "the observer reads what nobody knows".into(),
+            );
+        };
+        if pair.estimates() != self.extended.states.len() {
+            return;
+        }
+        let found = self.found;
+        if found.claims.is_empty() {
+            return;
+        }
+        let mut attack = attack(self.case, self.extended, &mut pair, &found.claims);
+        if let Some(evidence) = attack.secant(numbers) {
+            return self.note(Flaw::Exceeded, evidence);
+        }
+        let (plan, worst) = attack.search(numbers, self.effort.runs);
+        if worst.long {
+            self.counts.followed += self.found.claims.len();
+        }
+        if worst.ratio > 1.0 + 1e-4 {
+            let evidence = format!("{} (ratio {})\n{plan:#?}", worst.what, worst.ratio);
+            self.note(Flaw::Exceeded, evidence);
+        }
+    }
+
+    fn against_print(&mut self, observer: &Observer, numbers: &mut Numbers) {
+        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, observer) else {
+            return;
+        };
+        if pair.estimates() != self.extended.states.len() {
+            return;
+        }
+        let names: Vec<String> = self
+            .extended
+            .states
+            .iter()
+            .map(|s| s.name.clone())
+            .collect();
+        let mut attack = attack(self.case, self.extended, &mut pair, &[]);
+        if let Some(evidence) = attack.misprint(numbers, &self.found.gain, &names) {
+            self.note(Flaw::Gain, evidence);
+        }
+    }
+
+    fn against_facts(&mut self, numbers: &mut Numbers) {
+        let Some(design) = &self.found.design else {
+            return;
+        };
+        let Ok(mut pair) = Pair::new(self.extended.plant, self.extended, &design.observer) else {
+            return;
+        };
+        let plant = self.extended.plant;
+        let side = |v: &lynkeus::model::Variable| facts::finite(v.min, v.max);
+        let mut facts = Facts {
+            pair: &mut pair,
+            states: plant.states.iter().map(side).collect(),
+            inputs: plant.inputs.iter().map(side).collect(),
+        };
+        // what the observer takes as zero is no part of the conditions
+        for input in &self.case.inputs {
+            let place = plant.inputs.iter().position(|i| i.name == input.side.name);
+            if let (Role::Disturbance, Some(i)) = (input.role, place) {
+                facts.inputs[i] = [0.0, 0.0];
+            }
+        }
+        let chained = matches!(
+            self.case.kind,
+            Kind::Triangular | Kind::BlockTriangular | Kind::Designed
+        );
+        let chains = match &self.found.examination {
+            Some(examination) if chained => facts::neighbours(&examination.chains, self.extended),
+            _ => vec![],
+        };
+        if let Some((fact, evidence)) = facts.against(numbers, &chains) {
+            self.note(Flaw::Condition(fact), evidence);
+        }
+    }
+
+    fn witnesses(&mut self) {
+        for refutation in &self.found.refutations {
+            match refute::check(refutation, self.extended, self.found.design.as_ref()) {
+                refute::Answer::Confirmed => self.counts.refutations += 1,
+                refute::Answer::Unread => self.counts.unread += 1,
+                refute::Answer::Wrong(evidence) => {
+                    self.counts.refutations += 1;
+                    self.counts.wrong += 1;
+                    let evidence = format!("{}: {evidence}", refutation.condition);
+                    self.note(Flaw::Witness, evidence);
+                }
+            }
+        }
+    }
+}
+
+/// The attack with the box of everything that is estimated.
+pub fn attack<'a>(
+    case: &'a Case,
+    extended: &Extended<'_>,
+    pair: &'a mut Pair,
+    claims: &'a [claims::Claim],
+) -> Attack<'a> {
+    let side = |state: &lynkeus::model::Variable| {
+        let own = claims
+            .iter()
+            .flat_map(|c| &c.sides)
+            .filter(|s| s.0 == state.name);
+        // the smallest of the boxes, where two proofs have two
+        own.fold([state.min, state.max], |[low, high], (_, min, max)| {
+            [low.max(*min), high.min(*max)]
+        })
+    };
+    let sides: Vec<[f64; 2]> = extended.states.iter().map(side).collect();
+    // the practical observer of Germani and Manes follows the inputs by filters
+    let filtered = case.setting("variant") == Some("\"practical\"");
+    let extra = pair.start.len().saturating_sub(sides.len());
+    let known: Vec<_> = case
+        .inputs
+        .iter()
+        .filter(|i| i.role == Role::Known)
+        .collect();
+    let mut guards = vec![];
+    if filtered && extra > 0 && !known.is_empty() {
+        for (k, index) in (sides.len()..pair.start.len()).enumerate() {
+            let orders = extra / known.len();
+            let slope = case.slope.unwrap_or(f64::INFINITY);
+            guards.push((
+                index,
+                match k % orders.max(1) {
+                    0 => {
+                        let side = &known[(k / orders.max(1)).min(known.len() - 1)].side;
+                        [side.low, side.high]
+                    }
+                    _ => [-slope, slope],
+                },
+            ));
+        }
+    }
+    Attack {
+        case,
+        pair,
+        claims,
+        sides,
+        guards,
+    }
+}

@@ -1,0 +1,89 @@
+//! Counts.
+
+use std::collections::BTreeMap;
+
+use super::case::Kind;
+
+/// What was seen of one kind of case.
+#[derive(Clone, Debug, Default)]
+pub struct Counts {
+    pub plants: usize,
+    pub designs: usize,
+    /// the family fits, every condition proved
+    pub fits: usize,
+    pub open_fits: usize,
+    pub misfits: usize,
+    /// certificates by verdict
+    pub proved: usize,
+    pub undecided: usize,
+    pub refuted: usize,
+    /// proofs of which a trajectory was followed for at least one time constant
+    pub followed: usize,
+    /// cases with a violation
+    pub violated: usize,
+    /// refutations re-evaluated, and those found wrong
+    pub refutations: usize,
+    pub wrong: usize,
+    /// refutations of conditions that are not re-evaluated
+    pub unread: usize,
+}
+
+impl Counts {
+    pub fn add(&mut self, other: &Self) {
+        self.plants += other.plants;
+        self.designs += other.designs;
+        self.fits += other.fits;
+        self.open_fits += other.open_fits;
+        self.misfits += other.misfits;
+        self.proved += other.proved;
+        self.undecided += other.undecided;
+        self.refuted += other.refuted;
+        self.followed += other.followed;
+        self.violated += other.violated;
+        self.refutations += other.refutations;
+        self.wrong += other.wrong;
+        self.unread += other.unread;
+    }
+}
+
+/// Counts per kind of case.
+#[derive(Clone, Debug, Default)]
+pub struct Tally(pub BTreeMap<Kind, Counts>);
+
+impl Tally {
+    pub fn add(&mut self, kind: Kind, counts: &Counts) {
+        self.0.entry(kind).or_default().add(counts);
+    }
+
+    pub fn total(&self) -> Counts {
+        let mut total = Counts::default();
+        self.0.values().for_each(|counts| total.add(counts));
+        total
+    }
+
+    /// A table in Markdown.
+    pub fn table(&self) -> String {
+        let mut text = "| | plants | observers | fits | proved | undecided | refuted | followed | violated | witnesses checked | wrong |\n\
+                        |---|---|---|---|---|---|---|---|---|---|---|\n"
+            .to_owned();
+        let rows = self.0.iter().map(|(kind, counts)| (kind.word(), counts));
+        let total = self.total();
+        for (name, c) in rows.chain([("all", &total)]) {
+            let numbers = [
+                c.plants,
+                c.designs,
+                c.fits,
+                c.proved,
+                c.undecided,
+                c.refuted,
+                c.followed,
+                c.violated,
+                c.refutations,
+                c.wrong,
+            ];
+            let cells = numbers.map(|n| n.to_string()).join(" | ");
+            text += &format!("| {name} | {cells} |\n");
+        }
+        text
+    }
+}

@@ -1,0 +1,179 @@
+//! The falsifier finds what is false, lets stand what is true, and finds nothing in a
+//! short search.
+
+use nalgebra::DMatrix;
+
+use super::case::{Case, Input, Kind, Role, Side};
+use super::claims::Claim;
+use super::facts::{Fact, Facts};
+use super::judge::{Desk, attack};
+use super::numbers::Numbers;
+use super::pair::Pair;
+use super::report::Options;
+use lynkeus::Study;
+
+fn side(name: &str, low: f64, high: f64) -> Side {
+    Side {
+        name: name.into(),
+        low,
+        high,
+    }
+}
+
+/// x1' = −x1 + x2, x2' = −x2 + the term, y = x1 + d.
+fn case(term: &str) -> Case {
+    let mut case = Case {
+        kind: Kind::StateAffine,
+        states: vec![side("x1", -2.0, 2.0), side("x2", -2.0, 2.0)],
+        inputs: vec![Input {
+            side: side("d", -0.1, 0.1),
+            role: Role::Disturbance,
+            declared: true,
+        }],
+        equations: vec![
+            vec!["-x1".into(), "x2".into()],
+            vec!["-x2".into(), term.into()],
+        ],
+        outputs: vec![vec!["x1".into(), "d".into()]],
+        noise: vec![0.0],
+        slope: None,
+        observer: vec![],
+    };
+    case.key("family", "\"triangular\"");
+    // the copy of the plant with next to no correction
+    case.key("theta", "1e-6");
+    case
+}
+
+fn with_pair<T>(
+    case: &Case,
+    name: &str,
+    look: impl FnOnce(&mut Pair, &lynkeus::structure::Extended<'_>) -> T,
+) -> T {
+    let folder =
+        std::env::temp_dir().join(format!("lynkeus-falsify-{name}-{}", std::process::id()));
+    let desk = Desk::new(&folder).unwrap();
+    let study = Study::load(desk.write(case).unwrap()).unwrap();
+    let plant = lynkeus::prepare::plant(&study).unwrap();
+    let extended = lynkeus::prepare::extended(&study, &plant).unwrap();
+    let design = lynkeus::prepare::design(&study, &extended).unwrap();
+    let mut pair = Pair::new(&plant, &extended, &design.observer).unwrap();
+    let seen = look(&mut pair, &extended);
+    std::fs::remove_dir_all(folder).unwrap();
+    seen
+}
+
+fn claim(rate: f64, overshoot: f64, ultimate: f64) -> Claim {
+    Claim {
+        basis: "a claim".into(),
+        rate,
+        overshoot: Some(overshoot),
+        ultimate: Some(ultimate),
+        each: vec![],
+        lyapunov: None,
+        sides: vec![],
+    }
+}
+
+fn ratio(case: &Case, name: &str, claim: Claim) -> f64 {
+    with_pair(case, name, |pair, extended| {
+        let claims = [claim];
+        let mut attack = attack(case, extended, pair, &claims);
+        let (_, worst) = attack.search(&mut Numbers::new(5, 0), 60);
+        worst.ratio
+    })
+}
+
+/// The error obeys e' = [−1, 1; 0, −1] e: |e(t)| ≤ √(1 + t + t²)·e^(−t)|e(0)| at most,
+/// below 1.5·e^(−0.8t)|e(0)|; nothing acts on it but d through gains of 1e-6.
+#[test]
+fn a_true_claim_stands_and_false_ones_fall() {
+    let case = case("0");
+    let found = [
+        ("true", claim(0.7, 1.6, 1e-5)),
+        ("rate", claim(1.2, 1.6, 1e-5)),
+        ("overshoot", claim(0.99, 1.0, 1e-5)),
+    ]
+    .map(|(name, claim)| ratio(&case, name, claim));
+    assert!(found[0] <= 1.0, "{found:?}");
+    assert!(found[1] > 1.0 && found[2] > 1.0, "{found:?}");
+}
+
+/// V = |e|² falls at 2·rate with rate = 1/2: −1 ± ½ are the eigenvalues of the
+/// symmetric part.
+#[test]
+fn a_function_that_does_not_fall_is_found_without_simulation() {
+    let case = case("0.1*sin(x1)*0");
+    let of = |rate: f64, name: &str| {
+        let mut claim = claim(rate, 1.0, 1.0);
+        claim.lyapunov = Some(DMatrix::identity(2, 2));
+        with_pair(&case, name, |pair, extended| {
+            let claims = [claim];
+            attack(&case, extended, pair, &claims).secant(&mut Numbers::new(5, 0))
+        })
+    };
+    assert_eq!(of(0.49, "falls"), None);
+    assert!(of(0.52, "rises").is_some());
+}
+
+#[test]
+fn what_a_plant_does_is_seen_by_its_values() {
+    for (term, expected) in [
+        ("sin(x1)", None),
+        ("abs(x1 - 0.3)", None),
+        ("tanh(20*x1)", None),
+        ("0.01*sign(x1 - 0.371)", Some(Fact::Jumps)),
+        ("0.1*atan2(x1, -1.0)", Some(Fact::Jumps)),
+        ("mod(x2, 0.7)", Some(Fact::Jumps)),
+        ("log(x1 + 1.5)", Some(Fact::Undefined)),
+        ("(x2 + 1)^1.5", Some(Fact::Undefined)),
+    ] {
+        let found = with_pair(&case(term), "facts", |pair, _| {
+            let mut facts = Facts {
+                pair,
+                states: vec![[-2.0, 2.0]; 2],
+                inputs: vec![[0.0, 0.0]],
+            };
+            facts.against(&mut Numbers::new(3, 0), &[(0, 1)])
+        });
+        assert_eq!(found.map(|f| f.0), expected, "{term}");
+    }
+    let found = with_pair(&case("0"), "signs", |pair, _| {
+        let mut facts = Facts {
+            pair,
+            states: vec![[-2.0, 2.0]; 2],
+            inputs: vec![[0.0, 0.0]],
+        };
+        [(0, 1), (1, 0)].map(|pair| facts.against(&mut Numbers::new(3, 0), &[pair]))
+    });
+    // x2 moves x1' up everywhere, x1 does not move x2'
+    assert_eq!(found, [None, None]);
+}
+
+/// The same search as `cargo xtask falsify`, short.
+#[test]
+fn a_short_search_finds_no_false_claim() {
+    let folder = std::env::temp_dir().join(format!("lynkeus-falsify-{}", std::process::id()));
+    let options = Options {
+        folder: folder.clone(),
+        plants: Some(PLANTS),
+        count: usize::MAX,
+        ..Options::read(&[]).unwrap()
+    };
+    let report = super::search(&options).unwrap();
+    let total = report.tally.total();
+    assert!(
+        report.found.is_empty(),
+        "kept under {}:\n{}",
+        folder.display(),
+        report.text()
+    );
+    // a search that proves, follows and refutes nothing would find nothing either
+    assert!(total.proved as u64 > PLANTS / 4, "{total:?}");
+    assert!(2 * total.followed > total.proved, "{total:?}");
+    assert!(total.refutations as u64 > PLANTS / 20, "{total:?}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// About half a minute in a debug build.
+const PLANTS: u64 = 120;
