@@ -1,7 +1,7 @@
 //! What a simulation or a replay gives.
 
 use lynkeus_observers::{Design, Monitor};
-use lynkeus_run::{Error as RunError, Interrupted, Trajectory};
+use lynkeus_run::{Error as RunError, Trajectory};
 
 use crate::Error;
 use crate::systems::hat;
@@ -123,13 +123,13 @@ pub(crate) fn alarms(watches: &[Watch]) -> Vec<String> {
 
 /// A run that ended early: no result; an estimate that left every bound is an
 /// answer, everything else is a fault of the input.
-pub(crate) fn interrupted(interrupted: &Interrupted, place: &str) -> Error {
-    let text = interrupted.error.to_string();
-    let error = match interrupted.error {
+pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
+    let text = error.to_string();
+    let told = match error {
         RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. } => {
             Error::refused(text)
         }
         _ => Error::input(text),
     };
-    error.at(place)
+    told.caused_by(error).at(place)
 }

@@ -8,6 +8,7 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Level, Method, Simulation, Step, Tolerances, Trajectory};
 
 use crate::outcome::{alarms, interrupted, watches};
+use crate::prepare::Prepared;
 use crate::study::{self, Noise, Rk4Step, SimulateSettings, Solver};
 use crate::systems::{self, hat};
 use crate::{Error, Outcome, Quantity, Study, prepare};
@@ -26,8 +27,7 @@ pub fn simulate(
 ) -> Result<Outcome, Error> {
     let settings = settings(study)?;
     let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = prepare::design(study, &extended)?;
+    let design = Prepared::new(study, &plant)?.design()?;
     let simulation = Simulation {
         observer: Some(systems::observer(&plant, &design.observer)?),
         inputs: systems::inputs(study, &plant, settings, &design.observer)?,
@@ -35,7 +35,7 @@ pub fn simulate(
     };
     let trajectory = simulation
         .run_watched(watch)
-        .map_err(|error| interrupted(&error, &study.file))?;
+        .map_err(|error| interrupted(error.error, &study.file))?;
     Ok(outcome(&plant, design, &trajectory))
 }
 

@@ -45,7 +45,7 @@ pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
         &observer.derivatives,
         &outputs,
     )
-    .map_err(|error| Error::input(error.to_string()))
+    .map_err(Error::from_source)
 }
 
 /// The plant with the study's start values; its outputs are those of the model.
@@ -85,7 +85,7 @@ pub(crate) fn plant_reading(
         &plant.derivatives,
         &named(&plant.outputs),
     )
-    .map_err(|error| Error::input(error.to_string()))
+    .map_err(Error::from_source)
 }
 
 /// Variables with the nodes that stand for them.
@@ -111,15 +111,14 @@ pub(crate) fn inputs(
     let mut outputs = input_expressions(study, plant, settings)?;
     let derivatives = observer
         .input_derivative_expressions(&plant.graph, &outputs)
-        .map_err(|error| Error::input(error.to_string()))?;
+        .map_err(Error::from_source)?;
     outputs.extend(derivatives);
     of_time(plant, &outputs)
 }
 
 /// Expressions of time as a system.
 pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<System, Error> {
-    System::new(&plant.graph, plant.time, &[], &[], &[], outputs)
-        .map_err(|error| Error::input(error.to_string()))
+    System::new(&plant.graph, plant.time, &[], &[], &[], outputs).map_err(Error::from_source)
 }
 
 /// The plant's inputs by name.
