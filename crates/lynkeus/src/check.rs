@@ -98,6 +98,7 @@ impl Report {
     ///
     /// # Errors
     /// Another number of states, or a state without range.
+    #[cfg(feature = "plot")]
     pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
         match &self.uniformity {
             Some(uniformity) => uniform::picture(&self.plant, uniformity),

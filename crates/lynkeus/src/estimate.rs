@@ -6,11 +6,10 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
-use crate::outcome::{alarms, interrupted, watches};
+use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
 use crate::prepare::Prepared;
-use crate::simulate::{measurements, method, show_measurements};
 use crate::study::{BetweenSamples, EstimateSettings};
-use crate::systems::{self, hat};
+use crate::systems::{self, hat, method};
 use crate::{Error, Outcome, Quantity, Study, Table, prepare};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.

@@ -3,9 +3,9 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::Observer;
-use lynkeus_run::System;
+use lynkeus_run::{Method, Step, System, Tolerances};
 
-use crate::study::{Expression, Name, SimulateSettings};
+use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
 
 /// The column of an estimate.
@@ -181,5 +181,27 @@ pub(crate) fn input_expression(
         ))
         .at(&study.file)
         .hint(format!("add inputs = {{ {} = \"…\" }}, or a start value in the model", input.name))),
+    }
+}
+
+/// The study's method as the runner has it.
+pub(crate) fn method(method: &study::Method) -> Method {
+    match *method {
+        study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
+        study::Method::Rk4(Rk4Step::PerRow(n)) => {
+            Method::Rk4(Step::Substeps(usize::try_from(n).unwrap_or(usize::MAX)))
+        }
+        study::Method::Adaptive { solver, rtol, atol } => {
+            let tolerances = Tolerances {
+                relative: rtol,
+                absolute: atol,
+                ..Tolerances::default()
+            };
+            match solver {
+                Solver::Auto => Method::Adaptive(tolerances),
+                Solver::Explicit => Method::Explicit(tolerances),
+                Solver::Stiff => Method::Stiff(tolerances),
+            }
+        }
     }
 }

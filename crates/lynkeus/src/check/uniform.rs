@@ -6,8 +6,8 @@ use lynkeus_structure::uniform::Part;
 use lynkeus_structure::{Blind, Condition, Uniformity};
 use serde_json::{Map, Value, json};
 
-use crate::Error;
-use crate::plot::Plane;
+#[cfg(feature = "plot")]
+use crate::{Error, plot::Plane};
 use crate::words::{number, side};
 
 /// Parts of the singular set listed for machines.
@@ -113,6 +113,7 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
 }
 
 /// The singular set of a plant with two states.
+#[cfg(feature = "plot")]
 pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
     let [(x, x_low, x_high), (y, y_low, y_high)] = &uniformity.sides[..] else {
         let message = format!(

@@ -4,6 +4,7 @@
 //! The definitions are in [`lynkeus_observability::precision`].
 
 mod experiment;
+#[cfg(feature = "plot")]
 mod picture;
 mod report;
 #[cfg(test)]

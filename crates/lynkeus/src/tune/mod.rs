@@ -9,6 +9,7 @@ mod crew;
 mod errors;
 mod holdout;
 mod measures;
+#[cfg(feature = "plot")]
 mod picture;
 mod reference;
 mod replay;
