@@ -6,9 +6,9 @@ use lynkeus_structure::uniform::Part;
 use lynkeus_structure::{Blind, Condition, Uniformity};
 use serde_json::{Map, Value, json};
 
+use crate::words::{number, side};
 #[cfg(feature = "plot")]
 use crate::{Error, plot::Plane};
-use crate::words::{number, side};
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;

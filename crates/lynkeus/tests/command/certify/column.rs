@@ -76,7 +76,7 @@ fn pairs(
         .map(|e| &e.variable.name)
         .map(|name| (place(name.clone()), place(format!("{name}_hat"))))
         .collect();
-    let row = |(_, row): (f64, &[f64])| columns.iter().map(|&(i, j)| (row[i], row[j])).unzip();
+    let row = |(_, row): (f64, Vec<f64>)| columns.iter().map(|&(i, j)| (row[i], row[j])).unzip();
     table.rows().map(row).collect()
 }
 
