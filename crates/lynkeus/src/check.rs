@@ -10,6 +10,7 @@ use lynkeus_observers::{Examination, Fit};
 use lynkeus_structure::{Condition, Point, uniformity};
 use serde_json::{Value, json};
 
+use crate::prepare::Prepared;
 use crate::words::conditions;
 use crate::{Error, Study, prepare};
 pub use uniform::Uniform;
@@ -80,11 +81,11 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
         let plant = prepare::plant(study)?;
-        let extended = prepare::extended(study, &plant)?;
-        let examined = uniformity(&extended).map_err(|error| Error::input(error.to_string()))?;
+        let prepared = Prepared::new(study, &plant)?;
+        let examined = uniformity(prepared.extended()).map_err(Error::from_source)?;
         report.uniform =
             examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
-        report.examinations = prepare::examinations(study, &extended)?;
+        report.examinations = prepared.examinations()?.to_vec();
         report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
     Ok(report)
@@ -100,6 +101,7 @@ impl Report {
     ///
     /// # Errors
     /// Another number of states, or a state without range.
+    #[cfg(feature = "plot")]
     pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),

@@ -48,6 +48,9 @@
 //!
 //! With files instead, [`Study::load`] reads a study, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
+//!
+//! Features, all on by default: `plot` draws pictures, `tune` sweeps tunings, and `command` is
+//! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod certify;
@@ -56,10 +59,12 @@ mod correction;
 mod design;
 mod error;
 mod estimate;
+#[cfg(feature = "plot")]
 mod figure;
 mod files;
 mod near;
 mod outcome;
+#[cfg(feature = "plot")]
 pub mod plot;
 pub mod precision;
 pub mod prepare;
@@ -67,6 +72,7 @@ mod simulate;
 pub mod study;
 mod systems;
 pub mod table;
+#[cfg(feature = "tune")]
 pub mod tune;
 mod words;
 
@@ -76,6 +82,7 @@ pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
+#[cfg(feature = "plot")]
 pub use figure::figure;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use precision::precision;
@@ -83,6 +90,7 @@ pub use simulate::simulate;
 pub use study::Study;
 pub use systems::observer as observer_system;
 pub use table::Table;
+#[cfg(feature = "tune")]
 pub use tune::tune;
 
 pub use lynkeus_expr as expr;

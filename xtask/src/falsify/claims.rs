@@ -1,8 +1,7 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
-use lynkeus::Study;
-use lynkeus::model::Plant;
+use lynkeus::prepare::Prepared;
 use lynkeus::observers::{Certificate, Design, Examination, FAMILIES, Fit, Tuning, Verdict};
 use lynkeus::structure::{Check, Condition, Extended};
 use nalgebra::DMatrix;
@@ -54,7 +53,7 @@ pub struct Findings {
 }
 
 /// Asks the library.
-pub fn findings(study: &Study, plant: &Plant, extended: &Extended<'_>, thorough: bool) -> Findings {
+pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     let mut found = Findings {
         design: None,
         claims: vec![],
@@ -66,17 +65,16 @@ pub fn findings(study: &Study, plant: &Plant, extended: &Extended<'_>, thorough:
         certificates: vec![],
     };
     found.counts.plants = 1;
-    if let Ok(mut examinations) = lynkeus::prepare::examinations(study, extended) {
-        found.examination = examinations.pop();
+    if let Ok(examinations) = prepared.examinations() {
+        found.examination = examinations.last().cloned();
     }
-    found.examined(extended, thorough);
-    let Ok(design) = lynkeus::prepare::design(study, extended) else {
+    found.examined(prepared.extended(), thorough);
+    let Ok(design) = prepared.design() else {
         return found;
     };
-    debug_assert_eq!(plant.name, extended.plant.name);
     found.design = Some(design);
     found.counts.designs = 1;
-    let Ok(report) = lynkeus::certify(study) else {
+    let Ok(report) = lynkeus::certify(prepared.study()) else {
         return found;
     };
     found.gain = report.to_json()["gain"].take();

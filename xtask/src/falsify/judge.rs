@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use lynkeus::prepare::Prepared;
 use lynkeus::Study;
 use lynkeus::observers::Observer;
 use lynkeus::structure::Extended;
@@ -91,14 +92,15 @@ pub fn judge(
         let study = desk.write(&case).map_err(|e| e.to_string())?;
         let study = Study::load(&study).map_err(|e| e.to_string())?;
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
-        let extended = lynkeus::prepare::extended(&study, &plant).map_err(|e| e.to_string())?;
-        let found = claims::findings(&study, &plant, &extended, effort.thorough);
-        if tune && round < 2 && retune::raised(&mut case, &found, &extended, numbers) {
+        let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
+        let extended = prepared.extended();
+        let found = claims::findings(&prepared, effort.thorough);
+        if tune && round < 2 && retune::raised(&mut case, &found, extended, numbers) {
             continue;
         }
         let mut looked = Look {
             case: &case,
-            extended: &extended,
+            extended,
             found: &found,
             effort,
             violations: vec![],

@@ -1,5 +1,6 @@
 //! Other gains for a case: what a theorem asks for, and much larger ones.
 
+use lynkeus::prepare::Prepared;
 use lynkeus::Study;
 use lynkeus::structure::Extended;
 
@@ -129,11 +130,12 @@ pub fn diverges(
         let study = desk.write(&faster).map_err(|e| e.to_string())?;
         let study = Study::load(&study).map_err(|e| e.to_string())?;
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
-        let extended = lynkeus::prepare::extended(&study, &plant).map_err(|e| e.to_string())?;
-        let Ok(design) = lynkeus::prepare::design(&study, &extended) else {
+        let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
+        let extended = prepared.extended();
+        let Ok(design) = prepared.design() else {
             return Ok(None);
         };
-        let Ok(mut pair) = Pair::new(&plant, &extended, &design.observer) else {
+        let Ok(mut pair) = Pair::new(&plant, extended, &design.observer) else {
             return Ok(None);
         };
         if pair.estimates() != extended.states.len() || pair.held.iter().any(Option::is_none) {

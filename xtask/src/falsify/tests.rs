@@ -10,6 +10,7 @@ use super::judge::{Desk, attack};
 use super::numbers::Numbers;
 use super::pair::Pair;
 use super::report::Options;
+use lynkeus::prepare::Prepared;
 use lynkeus::Study;
 
 fn side(name: &str, low: f64, high: f64) -> Side {
@@ -55,10 +56,10 @@ fn with_pair<T>(
     let desk = Desk::new(&folder).unwrap();
     let study = Study::load(desk.write(case).unwrap()).unwrap();
     let plant = lynkeus::prepare::plant(&study).unwrap();
-    let extended = lynkeus::prepare::extended(&study, &plant).unwrap();
-    let design = lynkeus::prepare::design(&study, &extended).unwrap();
-    let mut pair = Pair::new(&plant, &extended, &design.observer).unwrap();
-    let seen = look(&mut pair, &extended);
+    let prepared = Prepared::new(&study, &plant).unwrap();
+    let design = prepared.design().unwrap();
+    let mut pair = Pair::new(&plant, prepared.extended(), &design.observer).unwrap();
+    let seen = look(&mut pair, prepared.extended());
     std::fs::remove_dir_all(folder).unwrap();
     seen
 }

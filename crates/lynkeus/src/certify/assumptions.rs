@@ -12,16 +12,11 @@ use crate::{Error, Study};
 const DEVIATIONS: f64 = 3.0;
 
 /// What the guarantee takes for granted.
-pub(super) fn of(
-    study: &Study,
-    plant: &Plant,
-    extended: &Extended<'_>,
-) -> Result<Assumptions, Error> {
-    let region = extended.region();
+pub(super) fn of(study: &Study, extended: &Extended<'_>) -> Result<Assumptions, Error> {
+    let (plant, region) = (extended.plant, extended.region());
     let drift = drift(study, plant, extended, &region)?;
     let noise = noise(study, plant, extended, &region)?;
-    let assumptions = Assumptions::new(extended, region);
-    let assumptions = assumptions.map_err(|error| Error::input(error.to_string()))?;
+    let assumptions = Assumptions::new(extended, region).map_err(Error::from_source)?;
     Ok(assumptions.with_drift(drift).with_noise(noise))
 }
 
@@ -94,7 +89,7 @@ fn disturbances<'p>(study: &Study, plant: &'p Plant) -> Vec<&'p Variable> {
 
 /// The largest absolute value; infinite where the expression has none somewhere.
 fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f64, Error> {
-    let found = range(graph, node, region).map_err(|error| Error::input(error.to_string()))?;
+    let found = range(graph, node, region).map_err(Error::from_source)?;
     Ok(found.enclosure.magnitude())
 }
 
