@@ -1,6 +1,6 @@
 //! What can be guaranteed about an observer, and why.
 
-use lynkeus_structure::{Check, Condition, Region};
+use lynkeus_structure::{Check, Condition, Dimension, Region};
 use nalgebra::DMatrix;
 
 use crate::Fit;
@@ -15,6 +15,8 @@ pub struct Assumptions {
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
+    /// per known input: bounds of |u'|, |u''|, …, as many as are known
+    pub input_derivatives: Vec<Vec<f64>>,
 }
 
 /// The verdict on a guarantee.
@@ -103,7 +105,8 @@ impl Certificate {
     /// A certificate without rate, bounds, constants and notes; its verdict is
     /// that of the hypotheses.
     pub fn new(basis: impl Into<String>, region: &Region, hypotheses: Vec<Check>) -> Self {
-        let sides = region.dimensions.iter().filter(|d| d.name != "time");
+        let bounded = |d: &&Dimension| d.name != "time" || d.max.is_finite();
+        let sides = region.dimensions.iter().filter(bounded);
         Self {
             basis: basis.into(),
             verdict: Verdict::of(&hypotheses),

@@ -63,7 +63,7 @@ pub enum SensorsError {
 pub enum NarrowError {
     /// no such state or input
     #[error(
-        "the box has no side '{name}': expected a state or an input ({})",
+        "the box has no side '{name}': expected a state, an input or time ({})",
         list(found)
     )]
     NoSuchName {
@@ -119,6 +119,8 @@ pub struct Extended<'p> {
     pub outputs: Vec<Measurement>,
     /// row by row which extended states the derivative depends on
     pub pattern: Vec<Vec<usize>>,
+    /// the side of time in the box; the whole line unless narrowed
+    pub time: Dimension,
 }
 
 impl<'p> Extended<'p> {
@@ -157,15 +159,35 @@ impl<'p> Extended<'p> {
             inputs,
             outputs,
             pattern,
+            time: Dimension {
+                name: "time".into(),
+                symbol: plant.time,
+                min: f64::NEG_INFINITY,
+                max: f64::INFINITY,
+                integer: false,
+            },
         })
     }
 
     /// The same on a smaller box: states and inputs named by `side` (an array's name
-    /// stands for its elements) are limited to [low, high] as well.
+    /// stands for its elements), or `time`, are limited to [low, high] as well.
     ///
     /// # Errors
     /// No such variable, or nothing in common with its declared range.
     pub fn narrow(&mut self, side: &str, low: f64, high: f64) -> Result<(), NarrowError> {
+        if side == "time" {
+            // no state or input can have that name
+            let (min, max) = (self.time.min.max(low), self.time.max.min(high));
+            if min > max {
+                return Err(NarrowError::Outside {
+                    name: side.to_owned(),
+                    min: self.time.min,
+                    max: self.time.max,
+                });
+            }
+            (self.time.min, self.time.max) = (min, max);
+            return Ok(());
+        }
         let is_meant = |name: &str| {
             let element = name.strip_prefix(side);
             element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
@@ -228,7 +250,7 @@ impl<'p> Extended<'p> {
         jacobian.get(0, 0)
     }
 
-    /// The box: declared ranges of the states, unknown and known inputs; time is free.
+    /// The box: declared ranges of the states, unknown and known inputs, time.
     pub fn region(&self) -> Region {
         let side = |v: &Variable| Dimension {
             name: v.name.clone(),
@@ -239,13 +261,7 @@ impl<'p> Extended<'p> {
         };
         let mut dimensions: Vec<Dimension> =
             self.states.iter().chain(&self.inputs).map(side).collect();
-        dimensions.push(Dimension {
-            name: "time".into(),
-            symbol: self.plant.time,
-            min: f64::NEG_INFINITY,
-            max: f64::INFINITY,
-            integer: false,
-        });
+        dimensions.push(self.time.clone());
         Region { dimensions }
     }
 }

@@ -12,13 +12,16 @@ use std::collections::HashMap;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
-use crate::output_map::{determinant, jacobian_rows, observability_indices, output_derivatives};
+use crate::indices::Codistribution;
+use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
 use crate::region::Cell;
 use crate::visibility::inside;
 use crate::{Check, Condition, Extended, Region, Vanishing, sign, vanishes};
 
 /// A determinant of more states has too many terms.
 const STATES: usize = 6;
+/// Further choices of rows whose determinant is examined.
+const CHOICES: usize = 8;
 /// Cells of the subdivision that is told.
 const CELLS: usize = 256;
 
@@ -65,15 +68,13 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         return Ok(None);
     }
     let graph = extended.graph();
-    let Some(node) = map_determinant(extended)? else {
+    let region = extended.region();
+    let Some(Map { node, regular }) = map(extended, &region)? else {
         return Ok(None);
     };
-    let region = extended.region();
     if vanishes(graph, node, &region)? == Vanishing::Everywhere {
         return Ok(None);
     }
-    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input".to_owned();
-    let regular = sign::keeps_sign(graph, name, node, &region)?.check;
     let (singular, share) = match regular.verdict {
         Condition::Proved => (vec![], 0.0),
         _ => cells(graph, node, &region)?,
@@ -94,8 +95,63 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
     }))
 }
 
-/// det ∂(y, y', …)/∂x for constant inputs, rows chosen at generic points.
-fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput> {
+/// A determinant of n rows of ∂(y, y', …)/∂x for constant inputs.
+struct Map {
+    node: Node,
+    regular: Check,
+}
+
+/// The first choice of rows whose determinant is proved to keep its sign, else the
+/// first that is independent at generic points.
+fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingInput> {
+    let rows = gradients(extended)?;
+    let mut codistribution = Codistribution::new(extended, &rows)?;
+    let first = codistribution.krener_respondek();
+    if first.iter().sum::<usize>() < extended.states.len() {
+        return Ok(None);
+    }
+    let Some(found) = examined(extended, &rows, &first, region)? else {
+        return Ok(None);
+    };
+    if found.regular.verdict == Condition::Proved {
+        return Ok(Some(found));
+    }
+    let mut others = codistribution.alternatives(&first);
+    others.truncate(CHOICES);
+    for indices in others {
+        if codistribution.changes_sign(&indices) {
+            continue;
+        }
+        let other = examined(extended, &rows, &indices, region)?;
+        let other = other.filter(|map| map.regular.verdict == Condition::Proved);
+        if other.is_some() {
+            return Ok(other);
+        }
+    }
+    Ok(Some(found))
+}
+
+fn examined(
+    extended: &Extended<'_>,
+    rows: &[Rows],
+    indices: &[usize],
+    region: &Region,
+) -> Result<Option<Map>, MissingInput> {
+    let graph = extended.graph();
+    let pairs = rows.iter().zip(indices);
+    let chosen: Rows = pairs
+        .flat_map(|(rows, &count)| rows.iter().take(count).cloned())
+        .collect();
+    let Some(node) = determinant(graph, &chosen) else {
+        return Ok(None);
+    };
+    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input";
+    let regular = sign::keeps_sign(graph, name.to_owned(), node, region)?.check;
+    Ok(Some(Map { node, regular }))
+}
+
+/// ∂y_i^(k)/∂x for constant inputs, k = 0 … n − 1.
+fn gradients(extended: &Extended<'_>) -> Result<Vec<Rows>, MissingInput> {
     let n = extended.states.len();
     let graph = extended.graph();
     let zero = graph.constant(0.0).node();
@@ -110,20 +166,10 @@ fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput
         .collect();
     let derivatives = output_derivatives(extended, &constant, n.saturating_sub(1))?;
     let symbols = extended.symbols();
-    let rows: Vec<_> = derivatives
-        .iter()
+    let rows = derivatives.iter();
+    Ok(rows
         .map(|y| jacobian_rows(graph, y, &symbols))
-        .collect();
-    let indices = observability_indices(extended, &rows)?;
-    if indices.iter().sum::<usize>() < n {
-        return Ok(None);
-    }
-    let chosen: Vec<Vec<Option<Node>>> = rows
-        .into_iter()
-        .zip(&indices)
-        .flat_map(|(rows, &count)| rows.into_iter().take(count))
-        .collect();
-    Ok(determinant(graph, &chosen))
+        .collect())
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.

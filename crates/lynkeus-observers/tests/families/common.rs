@@ -223,6 +223,7 @@ impl Guaranteed<'_> {
             region: extended.region(),
             drift: self.drift.clone(),
             noise: self.noise.clone(),
+            input_derivatives: vec![],
         };
         self.family
             .theorem(&extended, &self.tuning, &assumptions)

@@ -45,6 +45,7 @@ fn certificate(
         region: extended.region(),
         drift: drift.to_vec(),
         noise: noise.to_vec(),
+        input_derivatives: vec![],
     };
     lynkeus_observers::certify(extended, observer, &assumptions, sought).unwrap()
 }

@@ -31,6 +31,7 @@ fn certificate(plant: &Plant, tuning: &Tuning, drift: &[f64], noise: &[f64]) -> 
         region: extended.region(),
         drift: drift.to_vec(),
         noise: noise.to_vec(),
+        input_derivatives: vec![],
     };
     UnknownInput
         .theorem(&extended, tuning, &assumptions)
