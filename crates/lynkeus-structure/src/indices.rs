@@ -89,7 +89,10 @@ impl Codistribution {
                 if seen.len() >= VISITED || !seen.insert(next.clone()) {
                     continue;
                 }
-                if points.iter().any(|values| self.is_independent(values, &next)) {
+                if points
+                    .iter()
+                    .any(|values| self.is_independent(values, &next))
+                {
                     found.push(next.clone());
                 }
                 open.push_back(next);

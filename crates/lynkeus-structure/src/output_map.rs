@@ -173,9 +173,8 @@ pub fn relative_degree(
             Vanishing::Undecided => proved = false,
             Vanishing::NotAt(point) => {
                 let order = k + 1;
-                let detail = format!(
-                    "{input} appears in y^({order}): ∂y^({order})/∂{input} is {point}"
-                );
+                let detail =
+                    format!("{input} appears in y^({order}): ∂y^({order})/∂{input} is {point}");
                 return Ok(Degree {
                     r: k + 1,
                     proved,

@@ -28,11 +28,7 @@ const CELLS: usize = 2000;
 ///
 /// # Errors
 /// [`MissingInput`] where an entry depends on a symbol outside the region.
-pub fn regular(
-    name: String,
-    matrix: &Matrix<'_>,
-    region: &Region,
-) -> Result<Check, MissingInput> {
+pub fn regular(name: String, matrix: &Matrix<'_>, region: &Region) -> Result<Check, MissingInput> {
     let check = |verdict, detail| Check {
         name: name.clone(),
         verdict,
@@ -368,7 +364,11 @@ mod tests {
         });
         let found = regular("Q".into(), &matrix, &region(&[x], 3.0)).unwrap();
         assert_eq!(found.verdict, Condition::Proved);
-        assert!(found.detail.starts_with("|det| lies in"), "{}", found.detail);
+        assert!(
+            found.detail.starts_with("|det| lies in"),
+            "{}",
+            found.detail
+        );
     }
 
     #[test]
@@ -377,7 +377,8 @@ mod tests {
         let x = g.symbol("x");
         // two columns for three rows
         let matrix = Matrix::from_fn(&g, (7, 7), |i, j| {
-            (i == j || (i > 3 && j < 2)).then(|| (x + 2.0).node())
+            (i == j || (i > 3 && j < 2))
+                .then(|| (x + 2.0).node())
                 .filter(|_| i < 4 || j < 2)
         });
         let found = regular("Q".into(), &matrix, &region(&[x], 1.0)).unwrap();

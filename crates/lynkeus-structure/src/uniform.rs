@@ -167,9 +167,7 @@ fn gradients(extended: &Extended<'_>) -> Result<Vec<Rows>, MissingInput> {
     let derivatives = output_derivatives(extended, &constant, n.saturating_sub(1))?;
     let symbols = extended.symbols();
     let rows = derivatives.iter();
-    Ok(rows
-        .map(|y| jacobian_rows(graph, y, &symbols))
-        .collect())
+    Ok(rows.map(|y| jacobian_rows(graph, y, &symbols)).collect())
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.

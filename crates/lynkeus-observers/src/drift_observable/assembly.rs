@@ -202,6 +202,8 @@ fn numbers(
 pub(super) struct Solution {
     x: Vec<Node>,
     pub rcond: Node,
+    /// the same number as an expression that does not read the right-hand side
+    pub alone: Node,
 }
 
 /// x with Q x = b. Columns are scaled by the states' ranges and rows to length
@@ -225,6 +227,8 @@ fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
         right.push((graph.expr(b[i]) / norm).node());
     }
     let solution = graph.solve(&A, &right);
+    let zeros = vec![graph.constant(0.0).node(); n];
+    let alone = graph.solve(&A, &zeros).rcond;
     let ratio = graph.expr(solution.rcond) / WITHDRAWN;
     let share = 1.0 - (-(ratio * ratio)).exp();
     let x = solution.x.iter().zip(&scales);
@@ -232,6 +236,7 @@ fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
         x: x.map(|(&x, &scale)| (graph.expr(x) * scale * share).node())
             .collect(),
         rcond: solution.rcond,
+        alone,
     }
 }
 

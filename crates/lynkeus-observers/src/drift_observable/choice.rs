@@ -100,11 +100,16 @@ impl Search<'_, '_> {
         if first.len() > 1 {
             candidates.extend(self.rows.alternatives(first));
         }
-        let fits = |μ: &Vec<usize>| μ.iter().zip(lengths).all(|(μ, l)| l.is_none_or(|l| l == *μ));
+        let fits = |μ: &Vec<usize>| {
+            μ.iter()
+                .zip(lengths)
+                .all(|(μ, l)| l.is_none_or(|l| l == *μ))
+        };
         let impossible = listed(&candidates);
         candidates.retain(fits);
         let Some((first, rest)) = candidates.split_first() else {
-            let expected = format!("lists of lengths that make up a map of the state: {impossible}");
+            let expected =
+                format!("lists of lengths that make up a map of the state: {impossible}");
             let found = "lists of other lengths";
             return Err(TuningError::new("poles", expected, found).into());
         };
@@ -185,8 +190,5 @@ fn told(chosen: &[usize], others: &[Other]) -> String {
     if others.len() > TOLD {
         shown.push(format!("{} more", others.len() - TOLD));
     }
-    format!(
-        "; indices {chosen:?} (possible as well: {})",
-        shown.join(", ")
-    )
+    format!("; indices {chosen:?} (others: {})", shown.join(", "))
 }

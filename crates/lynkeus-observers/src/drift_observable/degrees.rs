@@ -19,8 +19,7 @@ pub(super) fn degrees(
         let mut all = vec![];
         for (rows, &μ) in gradients.iter().zip(μ) {
             let rows = &rows[..μ];
-            let of_input =
-                |j| output_map::relative_degree(extended, rows, &map.affine, j, region);
+            let of_input = |j| output_map::relative_degree(extended, rows, &map.affine, j, region);
             let row: Result<Vec<Degree>, _> = (0..extended.inputs.len()).map(of_input).collect();
             all.push(row?);
         }

@@ -69,10 +69,7 @@ impl Gains {
     }
 }
 
-fn by_lemma(
-    tuning: &Tuning,
-    μ: &[usize],
-) -> Result<(Vec<Vec<Pole>>, Vec<Lemma32>), TuningError> {
+fn by_lemma(tuning: &Tuning, μ: &[usize]) -> Result<(Vec<Vec<Pole>>, Vec<Lemma32>), TuningError> {
     let found = keys::lemma(tuning, μ)?;
     let poles = |lemma: &Option<Lemma32>| {
         let poles = lemma.iter().flat_map(|lemma| &lemma.poles);
@@ -86,7 +83,9 @@ fn by_lemma(
 
 /// The smallest decay among the poles.
 pub(super) fn slowest(λ: &[Vec<Pole>]) -> f64 {
-    λ.iter().flatten().fold(f64::INFINITY, |m, λ| m.min(-λ.re()))
+    λ.iter()
+        .flatten()
+        .fold(f64::INFINITY, |m, λ| m.min(-λ.re()))
 }
 
 /// A − KC, a block per chain.

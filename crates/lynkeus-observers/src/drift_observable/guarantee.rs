@@ -12,12 +12,14 @@
 //! c₁ = γ_Φ̄ γ_Φ̄⁻¹ √cn(P),  c₂ = γ_Φ̄⁻¹ √(‖P‖ cn(P_a)),  c₄ = γ_Φ̄⁻¹ √cn(P_a),
 //! c₃ = γ_Φ̄⁻¹ √(‖P‖ (a/√(2α₁) + φ/α₁)² + a²),  a² = ‖P_a‖ w_M²/(2α₂).
 //!
-//! As t → ∞ the fixed point of ν' says a little less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁).
+//! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
+//! will do, also one with a smaller α₁, and the states are bounded one by one.
 
 use lynkeus_gain::riccati::Riccati;
 
 use super::gains::{closed_loop, slowest, spread};
-use super::proof::{Proof, undecided};
+use super::lipschitz::Share;
+use super::proof::{Proof, Solutions, undecided};
 use super::variant::Variant;
 use crate::enclosure::{length, times, up};
 use crate::{Assumptions, Certificate, Constant, Verdict};
@@ -34,10 +36,11 @@ struct Filter {
 
 pub(super) fn conclude(
     proof: &Proof<'_, '_>,
-    P: &Riccati,
+    solutions: &Solutions,
     assumptions: &Assumptions,
     found: &mut Certificate,
 ) {
+    let P = &solutions.fastest;
     let filtered = proof.form.variant == Variant::Practical && proof.w.iter().any(|&w| w > 0.0)
         || proof.gains.K2.iter().any(|K| !K.is_empty());
     let filter = match filtered {
@@ -54,19 +57,48 @@ pub(super) fn conclude(
         },
         false => None,
     };
-    let (γ, peak) = (proof.lipschitz.inverse, up((P.largest / P.smallest).sqrt()));
+    let peak = up((P.largest / P.smallest).sqrt());
     let α = filter.as_ref().map_or(P.α, |f| P.α.min(f.α));
     found.rate = Some(α);
     let φ = of_rows(P, &proof.lipschitz.unseen);
-    print(proof, P, peak, filter.as_ref().zip(Some(φ)), &mut found.constants);
+    let parts = filter.as_ref().zip(Some(φ));
+    print(proof, P, peak, parts, &mut found.constants);
     let a = filter.map_or(0.0, |f| f.rest);
-    let f = up(φ + forces(proof, P, assumptions));
-    let root_ν = up((f + (f * f + 2.0 * P.α * a * a).sqrt()) / (2.0 * P.α));
-    let e_z = up(P.largest.sqrt() * root_ν);
-    found.ultimate_bound = Some(up(γ * length(&[e_z, a])));
-    let states = proof.extended.states.iter().zip(&proof.lipschitz.states);
-    let ultimate = states.map(|(x, (z, through))| (x.name.clone(), up(z * e_z + through * a)));
-    found.ultimate = ultimate.collect();
+    let left = std::iter::once(P)
+        .chain(&solutions.slower)
+        .map(|P| Left::of(proof, P, a, assumptions));
+    if let Some(left) = left.min_by(|x, y| x.whole.total_cmp(&y.whole)) {
+        let names = proof.extended.states.iter().map(|x| x.name.clone());
+        found.ultimate_bound = Some(left.whole);
+        found.ultimate = names.zip(left.each).collect();
+    }
+}
+
+/// Bounds as t → ∞.
+struct Left {
+    /// of every state's error
+    each: Vec<f64>,
+    /// of the length of the error
+    whole: f64,
+}
+
+impl Left {
+    /// By P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and |e_z,j| ≤ √(P_jj ν).
+    fn of(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Self {
+        let f = up(of_rows(P, &proof.lipschitz.unseen) + forces(proof, P, assumptions));
+        let root_ν = up((f + (f * f + 2.0 * P.α * a * a).sqrt()) / (2.0 * P.α));
+        let e_z = up(P.largest.sqrt() * root_ν);
+        let part = |j: usize| up(P.P[j][j].sqrt() * root_ν).min(e_z);
+        let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+        let of_state = |share: &Share| {
+            let one_by_one = share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)).sum();
+            let together = times(length(&share.z), e_z);
+            up(f64::min(one_by_one, together) + times(share.through, a))
+        };
+        let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
+        let whole = up(proof.lipschitz.inverse * length(&[e_z, a])).min(length(&each));
+        Self { each, whole }
+    }
 }
 
 /// The P_a of (4.27) with the smallest bound of the filter's error.
@@ -176,7 +208,11 @@ fn print(
         up(inverse * length(&[e_z, filter.rest])),
         "of (4.30), corrected: what the filter and n̄w leave",
     );
-    add("|n̄w|", n̄, "missing in (4.25): the part of the last derivatives that (4.22) lacks");
+    add(
+        "|n̄w|",
+        n̄,
+        "missing in (4.25): the part of the last derivatives that (4.22) lacks",
+    );
     add(
         "c4",
         up(inverse * filter.peak),

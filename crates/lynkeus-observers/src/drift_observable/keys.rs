@@ -40,7 +40,12 @@ pub(super) fn filter_initial(
     tuning: &Tuning,
     needed: &Needed<'_>,
 ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-    numbers_per_input(tuning, "filter_initial", "numbers for the filter of", needed)
+    numbers_per_input(
+        tuning,
+        "filter_initial",
+        "numbers for the filter of",
+        needed,
+    )
 }
 
 /// `filter_poles`: the eigenvalues of the filter per input.
@@ -248,9 +253,7 @@ impl<'a> PerInput<'a> {
     ) -> Result<Vec<Option<T>>, TuningError> {
         let one = |entry: &Option<(&Value, usize)>| match entry {
             None => Ok(None),
-            Some((value, order)) => read(value, *order)?
-                .map(Some)
-                .ok_or_else(|| self.wrong()),
+            Some((value, order)) => read(value, *order)?.map(Some).ok_or_else(|| self.wrong()),
         };
         self.entries.iter().map(one).collect()
     }
@@ -266,4 +269,3 @@ fn numbers(value: &Value) -> Option<Vec<f64>> {
         one => Some(vec![number(one)?]),
     }
 }
-

@@ -40,12 +40,20 @@ pub(super) struct Lipschitz {
     pub unseen: Vec<f64>,
     /// |Q̄| entry by entry
     pub Q: Vec<Vec<f64>>,
-    /// |Q̃⁻¹| and |Q̃⁻¹Q̃_a| row by row: of the error of each state
-    pub states: Vec<(f64, f64)>,
+    /// what the error of each state is made of
+    pub states: Vec<Share>,
     /// det Q̄ keeps its sign for inputs and slopes within bounds
     pub regular: Check,
     /// what has no bound
     pub open: Vec<String>,
+}
+
+/// |e_x| of one state is at most Σ_j z_j |e_z,j| + through |e_a|.
+pub(super) struct Share {
+    /// its row of |Q̃⁻¹|
+    pub z: Vec<f64>,
+    /// the length of its row of |Q̃⁻¹Q̃_a|
+    pub through: f64,
 }
 
 pub(super) fn bounds(
@@ -116,7 +124,12 @@ pub(super) fn bounds(
         drift: of_remainder(&drift)?,
         input: input_rows,
         unseen: forced(&unseen, &box_)?,
-        states: states.map(|(z, a)| (length(z), length(a))).collect(),
+        states: states
+            .map(|(z, a)| Share {
+                z: z.clone(),
+                through: length(a),
+            })
+            .collect(),
         Q: Q_size,
         regular: regular(extended, name, &form.Q, box_.region())?,
         open: box_.open(),

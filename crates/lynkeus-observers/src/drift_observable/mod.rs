@@ -69,12 +69,10 @@ impl Family for DriftObservable {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        Ok(
-            match choice::form(extended, tuning, &extended.region())? {
-                Ok(form) => form.examination,
-                Err(examination) => examination,
-            },
-        )
+        Ok(match choice::form(extended, tuning, &extended.region())? {
+            Ok(form) => form.examination,
+            Err(examination) => examination,
+        })
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {

@@ -12,6 +12,8 @@ use crate::enclosure::{figures, length, up};
 
 /// Steps of a bisection on a logarithmic scale.
 const STEPS: usize = 40;
+/// Shares of the largest α tried for the bounds as t → ∞.
+const SHARES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 0.9];
 /// α of the question whether there is any, as a share of the slowest pole.
 pub(super) const SLOW: f64 = 1e-6;
 
@@ -47,9 +49,21 @@ pub(super) fn check(name: &str, holds: bool, detail: String) -> Check {
     }
 }
 
+/// Solutions of the Riccati inequality; any of them proves something.
+pub(super) struct Solutions {
+    /// with the largest α
+    pub fastest: Riccati,
+    /// with smaller α, which may leave smaller bounds as t → ∞
+    pub slower: Vec<Riccati>,
+}
+
 impl Proof<'_, '_> {
-    /// The fastest P for the study's gain, and hypothesis 4 with both numbers.
-    pub fn riccati(&self, u_M: f64, constants: &mut Vec<Constant>) -> (Option<Riccati>, Vec<Check>) {
+    /// P for the study's gain, and hypothesis 4 with both numbers.
+    pub fn riccati(
+        &self,
+        u_M: f64,
+        constants: &mut Vec<Constant>,
+    ) -> (Option<Solutions>, Vec<Check>) {
         let mut checks = vec![];
         let drift = &self.lipschitz.drift;
         let with_input = |u: f64| -> Vec<f64> {
@@ -88,7 +102,14 @@ impl Proof<'_, '_> {
         if !g.iter().all(|g| g.is_finite()) {
             return (None, checks);
         }
-        let P = Riccati::fastest(&self.A, &spread(&g), 1.0, self.slowest);
+        let E = spread(&g);
+        let P = Riccati::fastest(&self.A, &E, 1.0, self.slowest).map(|fastest| {
+            let at = |share: &f64| Riccati::solve(&self.A, &E, share * fastest.α, 1.0);
+            Solutions {
+                slower: SHARES.iter().filter_map(at).collect(),
+                fastest,
+            }
+        });
         if P.is_none() && checks.iter().all(|c| c.verdict == Condition::Proved) {
             checks.push(undecided(name, "no P was found for these poles"));
         }

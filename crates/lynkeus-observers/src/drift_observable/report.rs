@@ -65,7 +65,7 @@ impl Laid<'_, '_> {
         let (Some(numbers), false) = (numbers, filtered) else {
             return Ok(vec![]);
         };
-        let whole = self.at_start(&[self.solution.rcond])?;
+        let whole = self.at_start(&[self.solution.alone])?;
         match whole {
             Some(rcond) if rcond[0] >= WHOLE => {}
             _ => return Ok(vec![]),
@@ -99,13 +99,19 @@ impl Laid<'_, '_> {
     pub fn parameters(&self) -> Result<Vec<(String, String)>, DesignError> {
         let mut rows = vec![("variant".to_owned(), self.form.variant.word().to_owned())];
         let outputs = self.extended.outputs.iter().zip(&self.gains.λ);
-        for ((output, λ), K) in outputs.zip(&self.gains.K).filter(|((_, λ), _)| !λ.is_empty()) {
+        for ((output, λ), K) in outputs
+            .zip(&self.gains.K)
+            .filter(|((_, λ), _)| !λ.is_empty())
+        {
             let y = &output.variable.name;
             rows.push((format!("λ of {y}"), poles::list(λ)));
             rows.push((format!("K of {y}"), listed(K)));
         }
         let inputs = self.extended.inputs.iter().zip(&self.gains.filter_λ);
-        for ((input, λ), K2) in inputs.zip(&self.gains.K2).filter(|((_, λ), _)| !λ.is_empty()) {
+        for ((input, λ), K2) in inputs
+            .zip(&self.gains.K2)
+            .filter(|((_, λ), _)| !λ.is_empty())
+        {
             let u = &input.name;
             rows.push((format!("λ of the filter of {u}"), poles::list(λ)));
             rows.push((format!("K2 of the filter of {u}"), listed(K2)));

@@ -278,4 +278,3 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
         .map(|(name, value, meaning)| Constant::new(name, value, meaning))
         .collect()
 }
-

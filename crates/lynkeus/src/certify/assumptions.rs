@@ -29,7 +29,10 @@ pub(super) fn of(
 fn input_derivatives(study: &Study, extended: &Extended<'_>) -> Result<Vec<Vec<f64>>, Error> {
     let names: Vec<&str> = extended.inputs.iter().map(|i| i.name.as_str()).collect();
     let given = &study.certify.input_derivatives;
-    if let Some((name, _)) = given.iter().find(|(n, _)| !names.contains(&n.text.as_str())) {
+    if let Some((name, _)) = given
+        .iter()
+        .find(|(n, _)| !names.contains(&n.text.as_str()))
+    {
         let known = match names.is_empty() {
             true => "none".to_owned(),
             false => names.join(", "),

@@ -36,7 +36,9 @@ pub(super) fn read(entry: Entry<'_>) -> Result<CertifySettings, Error> {
         input_derivatives: section
             .optional("input_derivatives", |entry| {
                 let pairs = entry.pairs()?.into_iter();
-                pairs.map(|(name, value)| Ok((name, bounds(value)?))).collect()
+                pairs
+                    .map(|(name, value)| Ok((name, bounds(value)?)))
+                    .collect()
             })?
             .unwrap_or_default(),
     })

@@ -57,7 +57,9 @@ impl Driven<'_> {
         let extended = Extended::new(plant, &Sensors::default()).unwrap();
         let design = DriftObservable.design(&extended, &self.tuning()).unwrap();
         let n = extended.states.len();
-        let times: Vec<f64> = (0..=400).map(|k| self.until * f64::from(k) / 400.0).collect();
+        let times: Vec<f64> = (0..=400)
+            .map(|k| self.until * f64::from(k) / 400.0)
+            .collect();
         let start: Vec<f64> = extended.states.iter().map(|s| s.start.unwrap()).collect();
         let rows = run(plant, &design, self.inputs, &start, &times, 1e-3).rows;
         let last = rows.iter().filter(|row| row[0] > 0.75 * self.until);
@@ -65,7 +67,11 @@ impl Driven<'_> {
         for row in last {
             let errors = (0..n).map(|i| row[1 + i] - row[1 + n + i]);
             all = all.max(errors.clone().map(|e| e * e).sum::<f64>().sqrt());
-            each = each.iter().zip(errors).map(|(m, e)| m.max(e.abs())).collect();
+            each = each
+                .iter()
+                .zip(errors)
+                .map(|(m, e)| m.max(e.abs()))
+                .collect();
         }
         (each, all)
     }
@@ -78,7 +84,11 @@ impl Driven<'_> {
         let (each, all) = self.left(&plant);
         let bound = found.ultimate_bound.unwrap();
         assert!(all > 1e-4, "{}: nothing is left", self.text);
-        assert!(all <= bound && bound <= slack * all, "{}: {all} {bound}", self.text);
+        assert!(
+            all <= bound && bound <= slack * all,
+            "{}: {all} {bound}",
+            self.text
+        );
         for (left, (name, bound)) in each.iter().zip(&found.ultimate) {
             assert!(left <= bound, "{name}: {left} {bound}");
         }
@@ -125,7 +135,7 @@ fn what_is_left_of_one_input_is_bounded() {
         text: "model B input Real u(min = -1, max = 1); Real a(start = 0, min = -4, max = 4); Real b(start = 0, min = -4, max = 4);
           Real c(start = 0, min = -4, max = 4); output Real y = a;
           equation der(a) = b; der(b) = c + u; der(c) = -0.2*sin(a) - c - b; end B;",
-        poles: list(&[-5.0, -6.0, -7.2]),
+        poles: list(&[-6.0, -7.0, -8.0]),
         filter: &[("u", &[-100.0])],
         slopes,
         inputs: &[("u", "sin(time)")],
@@ -136,7 +146,7 @@ fn what_is_left_of_one_input_is_bounded() {
         text: "model C input Real u(min = -1, max = 1); Real a(start = 0, min = -4, max = 4); Real b(start = 0, min = -4, max = 4);
           Real c(start = 0, min = -4, max = 4); output Real y = a;
           equation der(a) = b + u; der(b) = c; der(c) = -0.1*sin(a) - c - b; end C;",
-        poles: list(&[-5.0, -6.0, -7.2]),
+        poles: list(&[-6.0, -7.0, -8.0]),
         filter: &[("u", &[-100.0, -120.0])],
         slopes: &[("u", &[1.0, 1.0])],
         inputs: &[("u", "sin(time)")],
@@ -179,7 +189,7 @@ fn what_is_left_of_several_inputs_is_bounded() {
         text: "model F input Real u(min = -1, max = 1); Real a(start = 0, min = -4, max = 4); Real b(start = 0, min = -4, max = 4);
           Real c(start = 0, min = -4, max = 4); output Real y = a; output Real z = c;
           equation der(a) = b + u; der(b) = -a - b + 0.2*c; der(c) = -c + 0.2*sin(b); end F;",
-        poles: Value::List(vec![list(&[-4.0, -6.0]), list(&[-4.0])]),
+        poles: Value::List(vec![list(&[-6.0, -8.0]), list(&[-8.0])]),
         filter: &[("u", &[-100.0])],
         slopes: &[("u", &[1.0])],
         inputs: &[("u", "sin(time)")],

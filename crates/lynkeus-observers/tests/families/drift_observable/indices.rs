@@ -81,10 +81,20 @@ fn indices_2_3_against_substitution_by_hand() {
         assert_near(&found, &five(x, u, y, z), 1e-12);
     }
     let start = [0.3, -0.2, 0.5, 0.1, -0.4];
-    let mut wrong = with(&[("poles", Value::List(vec![list(&[-3.0, -4.0]), list(&[-3.0, -4.0, -5.0])]))]);
+    let mut wrong = with(&[(
+        "poles",
+        Value::List(vec![list(&[-3.0, -4.0]), list(&[-3.0, -4.0, -5.0])]),
+    )]);
     wrong.initial.default = Some(0.0);
     let design = design_with(&DriftObservable, &plant, &[], &wrong).unwrap();
-    let found = run(&plant, &design, &[("u", "sin(time)")], &start, &[0.0, 8.0], 1e-3);
+    let found = run(
+        &plant,
+        &design,
+        &[("u", "sin(time)")],
+        &start,
+        &[0.0, 8.0],
+        1e-3,
+    );
     let last = &found.rows[1];
     for i in 1..6 {
         assert!((last[i] - last[i + 5]).abs() < 1e-6, "state {i}");
@@ -102,11 +112,19 @@ fn indices_that_are_regular_everywhere_are_preferred() {
     let slowest = with(&[("poles", list(&[-3.0, -3.5]))]);
     let found = examine(SINGULAR, &slowest).unwrap();
     assert_eq!(found.fit, Fit::Fits, "{:#?}", found);
-    assert!(found.summary.contains("ya, ya', ya'', yb,"), "{}", found.summary);
-    let told = "indices [3, 1] (possible as well: [2, 2] does not fit";
-    assert!(found.summary.contains(told), "{}", found.summary);
+    assert!(
+        found.summary.contains("ya, ya', ya'', yb,"),
+        "{}",
+        found.summary
+    );
+    for told in ["; indices [3, 1] (others: ", "[2, 2] does not fit"] {
+        assert!(found.summary.contains(told), "{}", found.summary);
+    }
     let design = design_with(&DriftObservable, &plant(SINGULAR), &[], &slowest).unwrap();
-    assert_eq!(parameter(&design, "λ of ya"), "-3, -3.5999999999999996, -4.32");
+    assert_eq!(
+        parameter(&design, "λ of ya"),
+        "-3, -3.5999999999999996, -4.32"
+    );
     assert_eq!(parameter(&design, "λ of yb"), "-3.5");
 }
 
@@ -125,7 +143,11 @@ fn given_indices_are_not_overruled() {
     // one of them is enough, where the other chain has its slowest pole
     let partly = Value::List(vec![Value::Number(-2.0), list(&[-3.0])]);
     let found = examine(SINGULAR, &with(&[("poles", partly)])).unwrap();
-    assert!(found.summary.contains("ya, ya', ya'', yb,"), "{}", found.summary);
+    assert!(
+        found.summary.contains("ya, ya', ya'', yb,"),
+        "{}",
+        found.summary
+    );
 }
 
 #[test]
@@ -143,7 +165,10 @@ fn poles_that_fit_no_indices_are_refused_with_those_that_do() {
         list(&[-1.0]),
     ]);
     assert!(text(unstable).contains("negative numbers, found 1"));
-    let real = Value::List(vec![Value::List(vec![pair(-1.0, 0.0)]), Value::Number(-1.0)]);
+    let real = Value::List(vec![
+        Value::List(vec![pair(-1.0, 0.0)]),
+        Value::Number(-1.0),
+    ]);
     assert!(text(real).contains("im ≠ 0"));
     let half = Value::Table([("re".to_owned(), Value::Number(-1.0))].into());
     let half = Value::List(vec![Value::List(vec![half]), Value::Number(-1.0)]);
@@ -158,8 +183,18 @@ fn an_input_that_another_brings_along_is_seen() {
       output Real y = a; output Real z = d;
       equation der(a) = b + u*d; der(b) = c; der(c) = -a - 3*b - 3*c; der(d) = -d + v; end B;";
     let found = examine(text, &with(&[("indices", list(&[3.0, 1.0]))])).unwrap();
-    assert!(found.summary.contains("which read u, u', v;"), "{}", found.summary);
-    assert!(found.checks[0].detail.contains("y: r = 2, v appears in y^(2)"), "{}", found.checks[0].detail);
+    assert!(
+        found.summary.contains("which read u, u', v;"),
+        "{}",
+        found.summary
+    );
+    assert!(
+        found.checks[0]
+            .detail
+            .contains("y: r = 2, v appears in y^(2)"),
+        "{}",
+        found.checks[0].detail
+    );
 }
 
 /// Seven states in a chain that bends: Q is unit lower triangular.
@@ -177,5 +212,9 @@ fn long_chains_are_proved_regular() {
     );
     let found = examine(&text, &Tuning::default()).unwrap();
     assert_eq!(found.fit, Fit::Fits, "{:#?}", found.checks);
-    assert!(found.checks[1].detail.contains("|det| lies in [1, 1]"), "{}", found.checks[1].detail);
+    assert!(
+        found.checks[1].detail.contains("|det| lies in [1, 1]"),
+        "{}",
+        found.checks[1].detail
+    );
 }

@@ -276,12 +276,7 @@ fn what_the_filter_and_the_inputs_derivative_leave() {
 #[test]
 fn disturbances_without_range_are_undecided_by_name() {
     let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
-    let found = certificate(
-        &plant(PENDULUM),
-        &poles,
-        &[0.0, f64::INFINITY],
-        &[0.0],
-    );
+    let found = certificate(&plant(PENDULUM), &poles, &[0.0, f64::INFINITY], &[0.0]);
     assert_eq!(found.verdict, Verdict::Undecided);
     let open = hypothesis(&found, "disturbances and measurement errors are bounded");
     assert!(open.detail.contains("acts on b:"), "{}", open.detail);
@@ -320,7 +315,12 @@ fn bounds_of_slopes_may_come_from_the_assumptions() {
 fn the_stay_in_the_box_is_said() {
     for variant in ["bounded", "theoretical", "practical"] {
         let lists: [(&str, &[f64]); 1] = [("poles", &[-6.0, -8.0])];
-        let found = certificate(&plant(PENDULUM), &tuning(variant, &lists), &[0.0; 2], &[0.0]);
+        let found = certificate(
+            &plant(PENDULUM),
+            &tuning(variant, &lists),
+            &[0.0; 2],
+            &[0.0],
+        );
         let said = |note: &String| note.contains("not proved: plant and estimate stay in the box");
         assert!(found.notes.iter().any(said), "{:?}", found.notes);
     }
