@@ -13,6 +13,7 @@ pub mod chains;
 mod condition;
 mod extended;
 pub mod indices;
+mod irreducible;
 pub mod layers;
 mod matrix;
 pub mod output_map;

@@ -1,6 +1,7 @@
 //! `certify`, and `gain = "lmi"`: what is proved, and what a refusal says.
 
 mod column;
+mod moving;
 
 use lynkeus::Study;
 use serde_json::Value;
