@@ -3,9 +3,9 @@
 //!
 //! The outputs with their first derivatives along the flow, for inputs that stay
 //! constant, are a map of the state; of its rows n independent ones are chosen
-//! ([`crate::output_map::observability_indices`]). Where their determinant is not zero the state is
-//! seen, at once and for any small error. Where it is zero, that many derivatives do
-//! not show it.
+//! ([`crate::indices`]), with a determinant that is proved to keep its sign if there are any.
+//! Where their determinant is not zero the state is seen, at once and for any small error.
+//! Where it is zero, that many derivatives do not show it.
 
 use std::collections::HashMap;
 

@@ -53,5 +53,8 @@ fn bounds_of_other_inputs_and_negative_ones_are_refused() {
         &["a bound, a number ≥ 0"],
     );
     let none = ramp("").run(&["certify", "ramp.toml"]);
-    says(&none.out, &["no bound of the derivatives of u", "[certify]"]);
+    says(
+        &none.out,
+        &["no bound of the derivatives of u", "[certify]"],
+    );
 }
