@@ -34,6 +34,85 @@ pub fn place(poles: &[f64]) -> Vec<f64> {
     polynomial.split_off(1)
 }
 
+/// Eigenvalues of a real matrix: a real one, or two conjugate ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pole {
+    /// λ
+    Real(f64),
+    /// re ± i im
+    Pair {
+        /// real part of both
+        re: f64,
+        /// imaginary part of one of them
+        im: f64,
+    },
+}
+
+impl Pole {
+    /// How many eigenvalues it is.
+    pub fn count(self) -> usize {
+        match self {
+            Pole::Real(_) => 1,
+            Pole::Pair { .. } => 2,
+        }
+    }
+
+    /// The real part.
+    pub fn re(self) -> f64 {
+        match self {
+            Pole::Real(re) | Pole::Pair { re, .. } => re,
+        }
+    }
+
+    /// Multiplied by a number.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        match self {
+            Pole::Real(λ) => Pole::Real(by * λ),
+            Pole::Pair { re, im } => Pole::Pair {
+                re: by * re,
+                im: by * im,
+            },
+        }
+    }
+}
+
+impl std::fmt::Display for Pole {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Pole::Real(λ) => write!(f, "{λ}"),
+            Pole::Pair { re, im } => write!(f, "{re} ± {}i", im.abs()),
+        }
+    }
+}
+
+/// K with the eigenvalues of A_n − K C_n at `poles`, n of them in all: [`place`] for poles that
+/// may be complex.
+///
+/// ```
+/// use lynkeus_gain::vandermonde::{Pole, place_all};
+///
+/// // (s + 3)((s + 2)² + 1) = s³ + 7s² + 17s + 15
+/// let poles = [Pole::Real(-3.0), Pole::Pair { re: -2.0, im: 1.0 }];
+/// assert_eq!(place_all(&poles), [7.0, 17.0, 15.0]);
+/// ```
+pub fn place_all(poles: &[Pole]) -> Vec<f64> {
+    let mut polynomial = vec![1.0];
+    for pole in poles {
+        // s − λ, or s² + p s + q
+        let (p, q) = match *pole {
+            Pole::Real(λ) => (-λ, 0.0),
+            Pole::Pair { re, im } => (-2.0 * re, re * re + im * im),
+        };
+        polynomial.resize(polynomial.len() + pole.count(), 0.0);
+        for k in (1..polynomial.len()).rev() {
+            let second = if k > 1 { q * polynomial[k - 2] } else { 0.0 };
+            polynomial[k] += p * polynomial[k - 1] + second;
+        }
+    }
+    polynomial.split_off(1)
+}
+
 /// V_n⁻¹(λ). Its column j holds the coefficients of the Lagrange polynomial
 /// ∏_{i≠j} (s − λ_i)/(λ_j − λ_i), so that nothing is inverted; entries are not
 /// finite where two poles coincide.
@@ -174,6 +253,31 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
+        /// The characteristic polynomial of A − KC has every pole, complex ones too, as a root.
+        #[test]
+        fn complex_poles_are_eigenvalues(
+            real in prop::collection::vec(-5.0..-0.1f64, 0..4),
+            pairs in prop::collection::vec((-3.0..-0.1f64, 0.1..4.0f64), 0..3)
+        ) {
+            let mut poles: Vec<Pole> = real.iter().map(|&λ| Pole::Real(λ)).collect();
+            poles.extend(pairs.iter().map(|&(re, im)| Pole::Pair { re, im }));
+            let K = place_all(&poles);
+            prop_assert_eq!(K.len(), poles.iter().map(|p| p.count()).sum::<usize>());
+            for pole in poles {
+                let (re, im) = match pole {
+                    Pole::Real(λ) => (λ, 0.0),
+                    Pole::Pair { re, im } => (re, im),
+                };
+                // Horner's rule over complex numbers
+                let (mut value, mut size) = ((1.0, 0.0), 1.0f64);
+                for k in &K {
+                    value = (value.0 * re - value.1 * im + k, value.0 * im + value.1 * re);
+                    size = size * re.hypot(im) + k.abs();
+                }
+                prop_assert!(value.0.hypot(value.1) < 1e-12 * size);
+            }
+        }
+
         /// (2.26): V(A − KC) = ΛV.
         #[test]
         fn the_vandermonde_matrix_diagonalises(poles in prop::collection::vec(-5.0..-0.1f64, 1..7)) {

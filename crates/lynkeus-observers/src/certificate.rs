@@ -1,7 +1,7 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Extended, Region};
+use lynkeus_structure::{Check, Condition, Dimension, Extended, Region};
 use nalgebra::DMatrix;
 
 use crate::Fit;
@@ -16,14 +16,16 @@ pub struct Assumptions {
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
+    /// per known input: bounds of |u'|, |u''|, …, as many as are known
+    pub input_derivatives: Vec<Vec<f64>>,
     /// f and h have values on that box and do not jump
     regularity: Check,
 }
 
 impl Assumptions {
     /// That plant and estimate stay in the box, and nothing else acts: neither drift nor
-    /// noise. The plant is examined there: what has no value or jumps is covered by no
-    /// proof.
+    /// noise; of the inputs' derivatives nothing is known. The plant is examined there: what
+    /// has no value or jumps is covered by no proof.
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
@@ -31,6 +33,7 @@ impl Assumptions {
         Ok(Self {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
+            input_derivatives: vec![],
             regularity: extended.regularity(&region)?,
             region,
         })
@@ -47,6 +50,13 @@ impl Assumptions {
     #[must_use]
     pub fn with_noise(mut self, noise: Vec<f64>) -> Self {
         self.noise = noise;
+        self
+    }
+
+    /// With bounds of |u'|, |u''|, … per known input, as many as are known.
+    #[must_use]
+    pub fn with_input_derivatives(mut self, bounds: Vec<Vec<f64>>) -> Self {
+        self.input_derivatives = bounds;
         self
     }
 }
@@ -144,8 +154,8 @@ impl Certificate {
         assumptions: &Assumptions,
         hypotheses: Vec<Check>,
     ) -> Self {
-        let sides = &assumptions.region.dimensions;
-        let sides = sides.iter().filter(|d| d.name != "time");
+        let bounded = |d: &&Dimension| d.name != "time" || d.max.is_finite();
+        let sides = assumptions.region.dimensions.iter().filter(bounded);
         let first = std::iter::once(assumptions.regularity.clone());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {

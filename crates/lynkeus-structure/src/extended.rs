@@ -63,7 +63,7 @@ pub enum SensorsError {
 pub enum NarrowError {
     /// no such state or input
     #[error(
-        "the box has no side '{name}': expected a state or an input ({})",
+        "the box has no side '{name}': expected a state, an input or time ({})",
         list(found)
     )]
     NoSuchName {
@@ -119,6 +119,8 @@ pub struct Extended<'p> {
     pub outputs: Vec<Measurement>,
     /// row by row which extended states the derivative depends on
     pub pattern: Vec<Vec<usize>>,
+    /// the side of time in the box; the whole line unless narrowed
+    pub time: Dimension,
 }
 
 impl<'p> Extended<'p> {
@@ -157,15 +159,29 @@ impl<'p> Extended<'p> {
             inputs,
             outputs,
             pattern,
+            time: Dimension {
+                name: "time".into(),
+                symbol: plant.time,
+                min: f64::NEG_INFINITY,
+                max: f64::INFINITY,
+                integer: false,
+            },
         })
     }
 
     /// The same on a smaller box: states and inputs named by `side` (an array's name
-    /// stands for its elements) are limited to [low, high] as well.
+    /// stands for its elements), or `time`, are limited to [low, high] as well.
     ///
     /// # Errors
     /// No such variable, or nothing in common with its declared range.
     pub fn narrow(&mut self, side: &str, low: f64, high: f64) -> Result<(), NarrowError> {
+        if side == "time" {
+            // no state or input can have that name
+            let time = &mut self.time;
+            let (min, max) = (time.min.max(low), time.max.min(high));
+            (time.min, time.max) = limited(side, (time.min, time.max), (min, max))?;
+            return Ok(());
+        }
         let is_meant = |name: &str| {
             let element = name.strip_prefix(side);
             element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
@@ -175,14 +191,8 @@ impl<'p> Extended<'p> {
         for variable in variables.filter(|v| is_meant(&v.name)) {
             found = true;
             let (min, max) = (variable.min.max(low), variable.max.min(high));
-            if min > max {
-                return Err(NarrowError::Outside {
-                    name: variable.name.clone(),
-                    min: variable.min,
-                    max: variable.max,
-                });
-            }
-            (variable.min, variable.max) = (min, max);
+            let declared = (variable.min, variable.max);
+            (variable.min, variable.max) = limited(&variable.name, declared, (min, max))?;
         }
         match found {
             true => Ok(()),
@@ -240,7 +250,7 @@ impl<'p> Extended<'p> {
         Ok(found.check("f and h have values everywhere on the box and do not jump"))
     }
 
-    /// The box: declared ranges of the states, unknown and known inputs; time is free.
+    /// The box: declared ranges of the states, unknown and known inputs, time.
     pub fn region(&self) -> Region {
         let side = |v: &Variable| Dimension {
             name: v.name.clone(),
@@ -251,14 +261,24 @@ impl<'p> Extended<'p> {
         };
         let mut dimensions: Vec<Dimension> =
             self.states.iter().chain(&self.inputs).map(side).collect();
-        dimensions.push(Dimension {
-            name: "time".into(),
-            symbol: self.plant.time,
-            min: f64::NEG_INFINITY,
-            max: f64::INFINITY,
-            integer: false,
-        });
+        dimensions.push(self.time.clone());
         Region { dimensions }
+    }
+}
+
+/// The part of a declared range, where it is one.
+fn limited(
+    name: &str,
+    (min, max): (f64, f64),
+    part: (f64, f64),
+) -> Result<(f64, f64), NarrowError> {
+    match part.0 <= part.1 {
+        true => Ok(part),
+        false => Err(NarrowError::Outside {
+            name: name.to_owned(),
+            min,
+            max,
+        }),
     }
 }
 
@@ -354,66 +374,4 @@ fn affine_state(graph: &Graph, output: Node, states: &[Node]) -> Option<(usize, 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use lynkeus_model::LoadOptions;
-
-    const PLANT: &str = "model P
-      input Real u; input Real v; input Real e;
-      Real a; Real b;
-      output Real y = 2*a + u; output Real z = a*b;
-    equation
-      der(a) = b + v; der(b) = -a + u + e;
-    end P;";
-
-    fn plant() -> Plant {
-        Plant::from_modelica(PLANT, "p.mo", &LoadOptions::default()).unwrap()
-    }
-
-    #[test]
-    fn unknown_inputs_become_states_and_disturbances_vanish() {
-        let plant = plant();
-        let sensors = Sensors {
-            measured: vec!["y".into()],
-            unknown: vec!["v".into()],
-            disturbances: vec!["e".into()],
-        };
-        let extended = Extended::new(&plant, &sensors).unwrap();
-        let names: Vec<_> = extended.states.iter().map(|s| s.name.as_str()).collect();
-        assert_eq!(names, ["a", "b", "v"]);
-        assert_eq!(extended.pattern, [vec![1, 2], vec![0], vec![]]);
-        assert_eq!(extended.inputs.len(), 1);
-        let (state, slope, _) = extended.outputs[0].state.unwrap();
-        assert_eq!((state, plant.graph.constant_value(slope)), (0, Some(2.0)));
-    }
-
-    #[test]
-    fn a_product_of_states_is_no_affine_output() {
-        let plant = plant();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        assert!(extended.outputs[1].state.is_none());
-    }
-
-    #[test]
-    fn wrong_names_are_told_with_the_right_ones() {
-        let plant = plant();
-        let sensors = Sensors {
-            measured: vec!["level".into()],
-            ..Sensors::default()
-        };
-        let text = Extended::new(&plant, &sensors).unwrap_err().to_string();
-        assert!(
-            text.contains("no output named 'level'") && text.contains("y, z"),
-            "{text}"
-        );
-        let twice = Sensors {
-            unknown: vec!["u".into()],
-            disturbances: vec!["u".into()],
-            ..Sensors::default()
-        };
-        assert!(matches!(
-            Extended::new(&plant, &twice),
-            Err(SensorsError::Twice { .. })
-        ));
-    }
-}
+mod tests;

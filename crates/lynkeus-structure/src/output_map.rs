@@ -10,18 +10,9 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::flow::{self, Flow, InputJet};
-use lynkeus_expr::{Expr, Graph, MissingInput, Node, Tape, jacobian};
-use nalgebra::DVector;
+use lynkeus_expr::{Expr, Graph, MissingInput, Node, jacobian};
 
-use crate::visibility::{inside, spread};
-use crate::{Extended, Vanishing, vanishes};
-
-/// Points at which the rank of the rows is tried.
-const POINTS: usize = 5;
-/// A row of unit length that keeps less than this beside the rows before it
-/// depends on them. Long chains lose about a digit per row without being
-/// singular, rounding leaves 1e-15.
-const RANK_TOLERANCE: f64 = 1e-12;
+use crate::{Extended, Region, Vanishing, vanishes};
 
 /// A matrix row by row; none where an entry is zero everywhere.
 pub type Rows = Vec<Vec<Option<Node>>>;
@@ -154,8 +145,12 @@ pub struct Degree {
     pub detail: String,
 }
 
-/// The relative degree of an output whose Lie derivatives have the gradients
-/// `rows`, with respect to input j.
+/// The relative degree with respect to input j of an output whose derivatives have
+/// the gradients `rows`, those of L_f^k h, or those of y^(k) as functions of x and U.
+/// Where the map reads other inputs only the latter tell whether these bring this one along:
+/// y' = u₁x, x' = u₂ has u₂ in y'' though L_g₂ L_f h = 0.
+///
+/// `region` has the box of x and of whatever else the gradients read.
 ///
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
@@ -164,20 +159,22 @@ pub fn relative_degree(
     rows: &[Vec<Option<Node>>],
     form: &AffineForm,
     j: usize,
+    region: &Region,
 ) -> Result<Degree, MissingInput> {
     let graph = extended.graph();
-    let region = extended.region();
     let input = &extended.inputs[j].name;
     let mut proved = true;
     for (k, row) in rows.iter().enumerate() {
         let Some(node) = along_column(graph, row, &form.input_columns[j]) else {
             continue;
         };
-        match vanishes(graph, node, &region)? {
+        match vanishes(graph, node, region)? {
             Vanishing::Everywhere => {}
             Vanishing::Undecided => proved = false,
             Vanishing::NotAt(point) => {
-                let detail = format!("{input} appears in y^({}): L_g L_f^{k} h is {point}", k + 1);
+                let order = k + 1;
+                let detail =
+                    format!("{input} appears in y^({order}): ∂y^({order})/∂{input} is {point}");
                 return Ok(Degree {
                     r: k + 1,
                     proved,
@@ -191,87 +188,6 @@ pub fn relative_degree(
         proved,
         detail: format!("{input} does not appear before y^({})", rows.len()),
     })
-}
-
-/// The observability indices μ_i with Σμ_i = n: rows dL_f^k h_i are taken in the
-/// order k = 0, 1, …, within k in the order of the outputs, and kept while they
-/// are independent of those before; an output that fails once is left out from
-/// there on (Krener and Respondek, SIAM J. Control Optim. 23 (1985) 197–216,
-/// after Brunovsky). Ranks are those at generic points of the box. Fewer than n
-/// in sum where no point shows more.
-///
-/// # Errors
-/// [`MissingInput`] where the plant has parameters without value.
-pub fn observability_indices(
-    extended: &Extended<'_>,
-    rows: &[Rows],
-) -> Result<Vec<usize>, MissingInput> {
-    let n = extended.states.len();
-    let zero = extended.graph().constant(0.0).node();
-    let entries: Vec<Node> = rows
-        .iter()
-        .flatten()
-        .flatten()
-        .map(|e| e.unwrap_or(zero))
-        .collect();
-    let variables: Vec<_> = extended.states.iter().chain(&extended.inputs).collect();
-    let mut symbols: Vec<Node> = variables.iter().map(|v| v.node).collect();
-    symbols.push(extended.plant.time);
-    let tape = Tape::new(extended.graph(), &symbols, &entries)?;
-    let mut evaluator = tape.evaluator();
-    let mut best: Vec<usize> = vec![0; rows.len()];
-    for point in 0..POINTS {
-        let mut at: Vec<f64> = variables
-            .iter()
-            .enumerate()
-            .map(|(i, v)| inside(v.min, v.max, spread(point, i)))
-            .collect();
-        at.push(0.37 * point as f64);
-        let mut values = vec![0.0; entries.len()];
-        evaluator.eval(&at, &mut values);
-        if !values.iter().all(|v| v.is_finite()) {
-            continue;
-        }
-        let indices = indices_at(&values, rows.len(), n);
-        if indices.iter().sum::<usize>() > best.iter().sum() {
-            best = indices;
-        }
-    }
-    Ok(best)
-}
-
-/// `values`: output by output, order by order, n numbers per row.
-fn indices_at(values: &[f64], outputs: usize, n: usize) -> Vec<usize> {
-    let orders = values.len() / (outputs * n).max(1);
-    let mut kept: Vec<DVector<f64>> = vec![];
-    let mut indices = vec![0; outputs];
-    for k in 0..orders {
-        for (i, index) in indices.iter_mut().enumerate() {
-            if *index < k || kept.len() == n {
-                continue;
-            }
-            let start = (i * orders + k) * n;
-            let mut row = DVector::from_column_slice(&values[start..start + n]);
-            let norm = row.norm();
-            if norm == 0.0 {
-                continue;
-            }
-            row /= norm;
-            // twice is enough for orthogonality to rounding
-            for _ in 0..2 {
-                for q in &kept {
-                    let share = q.dot(&row);
-                    row.axpy(-share, q, 1.0);
-                }
-            }
-            let left = row.norm();
-            if left > RANK_TOLERANCE {
-                kept.push(row / left);
-                *index = k + 1;
-            }
-        }
-    }
-    indices
 }
 
 /// The determinant by Laplace expansion with shared minors: 2ⁿ of them at most, so
@@ -321,35 +237,6 @@ mod tests {
     use crate::Sensors;
     use lynkeus_model::{LoadOptions, Plant};
     use proptest::prelude::*;
-
-    fn indices(text: &str) -> Vec<usize> {
-        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
-        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        let form = affine_form(&extended).unwrap().unwrap();
-        let n = extended.states.len();
-        let h = lie_derivatives(&extended, &form, n - 1).unwrap();
-        let rows: Vec<Rows> = h
-            .iter()
-            .map(|h| jacobian_rows(&plant.graph, h, &extended.symbols()))
-            .collect();
-        observability_indices(&extended, &rows).unwrap()
-    }
-
-    /// Two sensors on chains of 3 and 1, and a third that adds nothing.
-    #[test]
-    fn rows_are_taken_while_they_are_independent() {
-        let text = "model P Real a; Real b; Real c; Real d;
-          output Real y = a; output Real z = a + d; output Real w = 2*a;
-          equation der(a) = b; der(b) = c + d*a; der(c) = -sin(a); der(d) = -d; end P;";
-        assert_eq!(indices(text), [3, 1, 0]);
-    }
-
-    #[test]
-    fn what_no_output_feels_leaves_the_sum_short() {
-        let text = "model P Real a; Real b; output Real y = a;
-          equation der(a) = -a; der(b) = a; end P;";
-        assert_eq!(indices(text), [1]);
-    }
 
     #[test]
     fn the_first_equation_that_is_not_affine_is_named() {

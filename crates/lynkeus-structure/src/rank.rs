@@ -2,7 +2,9 @@
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Tape, jacobian};
 
-use crate::{Check, Condition, Dimension, Matrix, Point, Region, Regularity, Witness, sign, steps};
+use crate::{
+    Check, Condition, Dimension, Matrix, Point, Region, Regularity, Witness, regular, sign, steps,
+};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -13,7 +15,8 @@ const MAX_MINORS: usize = 250;
 ///
 /// Proved by one minor that keeps its sign, or by the sum of the squares of all
 /// minors, det AᵀA, being positive. Refuted where every minor is zero
-/// everywhere, where the only minor vanishes, or at a point where all do.
+/// everywhere, where the only minor vanishes, or at a point where all do. Large square
+/// matrices are decided by [`regular::regular`].
 ///
 /// # Errors
 /// [`MissingInput`] where an entry depends on a symbol outside the region.
@@ -23,6 +26,9 @@ pub fn full_column_rank(
     region: &Region,
 ) -> Result<Check, MissingInput> {
     let graph = matrix.graph();
+    if matrix.rows == matrix.columns && matrix.columns > MAX_COLUMNS {
+        return regular::regular(name, matrix, region);
+    }
     let Some(mut minors) = minors(matrix) else {
         let detail = format!(
             "a {}×{} matrix has too many minors to decide",

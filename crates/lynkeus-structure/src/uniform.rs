@@ -3,22 +3,25 @@
 //!
 //! The outputs with their first derivatives along the flow, for inputs that stay
 //! constant, are a map of the state; of its rows n independent ones are chosen
-//! ([`crate::output_map::observability_indices`]). Where their determinant is not zero the state is
-//! seen, at once and for any small error. Where it is zero, that many derivatives do
-//! not show it.
+//! ([`crate::indices`]), with a determinant that is proved to keep its sign if there are any.
+//! Where their determinant is not zero the state is seen, at once and for any small error.
+//! Where it is zero, that many derivatives do not show it.
 
 use std::collections::HashMap;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
-use crate::output_map::{determinant, jacobian_rows, observability_indices, output_derivatives};
+use crate::indices::Codistribution;
+use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
 use crate::region::Cell;
 use crate::visibility::inside;
-use crate::{Check, Condition, Extended, Region, Vanishing, sign, vanishes};
+use crate::{Check, Condition, Extended, Region, Regularity, Vanishing, sign, vanishes};
 
 /// A determinant of more states has too many terms.
 const STATES: usize = 6;
+/// Further choices of rows whose determinant is examined.
+const CHOICES: usize = 8;
 /// Cells of the subdivision that is told.
 const CELLS: usize = 256;
 
@@ -67,15 +70,13 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         return Ok(None);
     }
     let graph = extended.graph();
-    let Some(node) = map_determinant(extended)? else {
+    let region = extended.region();
+    let Some(Map { node, regular }) = map(extended, &region)? else {
         return Ok(None);
     };
-    let region = extended.region();
     if vanishes(graph, node, &region)? == Vanishing::Everywhere {
         return Ok(None);
     }
-    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input".to_owned();
-    let regular = without_jumps(sign::keeps_sign(graph, name, node, &region)?.check, &region);
     let (singular, share) = match regular.verdict {
         Condition::Proved => (vec![], 0.0),
         _ => cells(graph, node, &region)?,
@@ -115,8 +116,85 @@ fn without_jumps(check: Check, region: &Region) -> Check {
     }
 }
 
-/// det ∂(y, y', …)/∂x for constant inputs, rows chosen at generic points.
-fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput> {
+/// A determinant of n rows of ∂(y, y', …)/∂x for constant inputs.
+struct Map {
+    node: Node,
+    regular: Check,
+}
+
+/// The first choice of rows whose determinant is proved to keep its sign, else the
+/// first that is independent at generic points.
+fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingInput> {
+    let derivatives = Derivatives::new(extended)?;
+    let mut codistribution = Codistribution::new(extended, &derivatives.gradients)?;
+    let first = codistribution.krener_respondek();
+    if first.iter().sum::<usize>() < extended.states.len() {
+        return Ok(None);
+    }
+    let Some(found) = examined(extended, &derivatives, &first, region)? else {
+        return Ok(None);
+    };
+    if found.regular.verdict == Condition::Proved {
+        return Ok(Some(found));
+    }
+    let mut others = codistribution.alternatives(&first);
+    others.truncate(CHOICES);
+    for indices in others {
+        if codistribution.changes_sign(&indices) {
+            continue;
+        }
+        let other = examined(extended, &derivatives, &indices, region)?;
+        let other = other.filter(|map| map.regular.verdict == Condition::Proved);
+        if other.is_some() {
+            return Ok(other);
+        }
+    }
+    Ok(Some(found))
+}
+
+fn examined(
+    extended: &Extended<'_>,
+    derivatives: &Derivatives,
+    indices: &[usize],
+    region: &Region,
+) -> Result<Option<Map>, MissingInput> {
+    let graph = extended.graph();
+    let pairs = derivatives.gradients.iter().zip(indices);
+    let chosen: Rows = pairs
+        .flat_map(|(rows, &count)| rows.iter().take(count).cloned())
+        .collect();
+    let Some(node) = determinant(graph, &chosen) else {
+        return Ok(None);
+    };
+    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input";
+    let pairs = derivatives.values.iter().zip(indices);
+    let map: Vec<Node> = pairs
+        .flat_map(|(y, &count)| y.iter().take(count).copied())
+        .collect();
+    // where the map itself jumps, its derivative tells nothing
+    let mut moving = extended.symbols();
+    moving.push(extended.plant.time);
+    let regularity = Regularity::of(graph, &map, &moving, region)?;
+    let regular = match regularity.holds() {
+        true => without_jumps(
+            sign::keeps_sign(graph, name.to_owned(), node, region)?.check,
+            region,
+        ),
+        false => regularity.check(name),
+    };
+    Ok(Some(Map { node, regular }))
+}
+
+/// The outputs' derivatives along the flow for constant inputs.
+struct Derivatives {
+    /// y_i^(k), k = 0 … n − 1
+    values: Vec<Vec<Node>>,
+    /// ∂y_i^(k)/∂x
+    gradients: Vec<Rows>,
+}
+
+impl Derivatives {
+    fn new(extended: &Extended<'_>) -> Result<Self, MissingInput> {
     let n = extended.states.len();
     let graph = extended.graph();
     let zero = graph.constant(0.0).node();
@@ -129,22 +207,14 @@ fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput
                 .collect()
         })
         .collect();
-    let derivatives = output_derivatives(extended, &constant, n.saturating_sub(1))?;
+    let values = output_derivatives(extended, &constant, n.saturating_sub(1))?;
     let symbols = extended.symbols();
-    let rows: Vec<_> = derivatives
-        .iter()
-        .map(|y| jacobian_rows(graph, y, &symbols))
-        .collect();
-    let indices = observability_indices(extended, &rows)?;
-    if indices.iter().sum::<usize>() < n {
-        return Ok(None);
-    }
-    let chosen: Vec<Vec<Option<Node>>> = rows
-        .into_iter()
-        .zip(&indices)
-        .flat_map(|(rows, &count)| rows.into_iter().take(count))
-        .collect();
-    Ok(determinant(graph, &chosen))
+    let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
+    Ok(Self {
+        gradients: values.iter().map(gradient).collect(),
+        values,
+    })
+}
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.

@@ -6,11 +6,13 @@ use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_structure::Extended;
 
-use super::conditions::Form;
-use super::keys::{Gains, Variant, list};
+use super::form::Form;
+use super::gains::Gains;
+use super::report::{Laid, notes};
+use super::variant::Variant;
 use super::{NAME, derivative_name};
 use crate::estimate::Copy;
-use crate::{ChainGain, Design, DesignError, InputDerivative, Monitor, Signal, Tuning};
+use crate::{Design, DesignError, InputDerivative, Monitor, Signal, Tuning};
 
 /// Below this rcond of Q̄, with rows and columns scaled, the flag is raised.
 const ALARM: f64 = 1e-2;
@@ -18,6 +20,8 @@ const ALARM: f64 = 1e-2;
 /// from 6·WITHDRAWN on, and small enough below for Q̄⁻¹, which grows like
 /// 1/rcond, to pass a singularity in bounds.
 const WITHDRAWN: f64 = 1e-4;
+/// From here on the correction is not withdrawn at all.
+pub(super) const WHOLE: f64 = 6.0 * WITHDRAWN;
 
 pub(super) fn design(
     extended: &Extended<'_>,
@@ -54,11 +58,19 @@ pub(super) fn design(
     if form.variant == Variant::Theoretical {
         observer.input_derivatives = input_derivatives(extended, &form);
     }
+    let laid = Laid {
+        extended,
+        form: &form,
+        gains: &gains,
+        Q: &Q,
+        solution: &solution,
+        observer: &observer,
+    };
     Ok(Design {
         notes: notes(extended, &form, &observer.input_derivatives),
+        gains: laid.constant_gains()?,
+        parameters: laid.parameters()?,
         observer,
-        gains: table(extended, &form, &gains),
-        parameters: parameters(extended, &form, &gains),
         examination: form.examination,
     })
 }
@@ -187,9 +199,11 @@ fn numbers(
 }
 
 /// The correction and the rcond that it was found with.
-struct Solution {
+pub(super) struct Solution {
     x: Vec<Node>,
-    rcond: Node,
+    pub rcond: Node,
+    /// the same number as an expression that does not read the right-hand side
+    pub alone: Node,
 }
 
 /// x with Q x = b. Columns are scaled by the states' ranges and rows to length
@@ -213,6 +227,8 @@ fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
         right.push((graph.expr(b[i]) / norm).node());
     }
     let solution = graph.solve(&A, &right);
+    let zeros = vec![graph.constant(0.0).node(); n];
+    let alone = graph.solve(&A, &zeros).rcond;
     let ratio = graph.expr(solution.rcond) / WITHDRAWN;
     let share = 1.0 - (-(ratio * ratio)).exp();
     let x = solution.x.iter().zip(&scales);
@@ -220,6 +236,7 @@ fn solve(extended: &Extended<'_>, Q: &[Node], b: &[Node]) -> Solution {
         x: x.map(|(&x, &scale)| (graph.expr(x) * scale * share).node())
             .collect(),
         rcond: solution.rcond,
+        alone,
     }
 }
 
@@ -248,69 +265,4 @@ fn input_derivatives(extended: &Extended<'_>, form: &Form) -> Vec<InputDerivativ
         }
     }
     needed
-}
-
-fn notes(extended: &Extended<'_>, form: &Form, derivatives: &[InputDerivative]) -> Vec<String> {
-    let mut notes = vec![];
-    if let [_, _, ..] = form.indices[..] {
-        let outputs = extended.outputs.iter().zip(&form.indices);
-        let parts: Vec<String> = outputs
-            .map(|(o, μ)| format!("{} {μ}", o.variable.name))
-            .collect();
-        notes.push(format!(
-            "derivatives used of each output: {}; the key 'indices' decides otherwise",
-            parts.join(", ")
-        ));
-    }
-    if !derivatives.is_empty() {
-        let names: Vec<&str> = derivatives.iter().map(|d| d.signal.name.as_str()).collect();
-        notes.push(format!(
-            "the theoretical observer needs {} exactly, which only a simulation has; for a log use variant = \"practical\"",
-            names.join(", ")
-        ));
-    }
-    if form.variant == Variant::Bounded && form.U.iter().any(|U| !U.is_empty()) {
-        notes.push("the bounded variant converges for small inputs only (Theorem 3.3)".to_owned());
-    }
-    notes
-}
-
-/// K₁ per output and K₂ per filter, against the derivative each entry corrects.
-fn table(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Vec<ChainGain> {
-    let row = |name: &str, output: String, K: &[f64]| ChainGain {
-        output,
-        entries: K
-            .iter()
-            .enumerate()
-            .map(|(k, &gain)| (derivative_name(name, k), gain))
-            .collect(),
-    };
-    let outputs = extended.outputs.iter().zip(&form.indices).zip(&gains.K);
-    let outputs = outputs
-        .filter(|((_, μ), _)| **μ > 0)
-        .map(|((o, _), K)| row(&o.variable.name, o.variable.name.clone(), K));
-    let inputs = extended.inputs.iter().zip(&gains.K2);
-    let filters = inputs
-        .filter(|(_, K2)| !K2.is_empty())
-        .map(|(input, K2)| row(&input.name, format!("filter of {}", input.name), K2));
-    outputs.chain(filters).collect()
-}
-
-fn parameters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Vec<(String, String)> {
-    let mut rows = vec![("variant".to_owned(), form.variant.word().to_owned())];
-    for (output, λ) in extended.outputs.iter().zip(&gains.λ) {
-        if !λ.is_empty() {
-            rows.push((format!("λ of {}", output.variable.name), list(λ)));
-        }
-    }
-    for (input, λ) in extended.inputs.iter().zip(&gains.filter_λ) {
-        if !λ.is_empty() {
-            rows.push((format!("λ of the filter of {}", input.name), list(λ)));
-        }
-    }
-    for found in &gains.lemma {
-        rows.push(("σ of Lemma 3.2".to_owned(), found.σ.to_string()));
-        rows.push(("√cn(P)".to_owned(), found.peaking.to_string()));
-    }
-    rows
 }

@@ -1,17 +1,27 @@
 //! Rate, peak and ultimate bound once the hypotheses hold.
 //!
 //! In (4.39) the print drops γ²_Φ̄⁻¹|e_a|², in (4.40) c₃ lacks the factor γ and c₂ has √γ for γ.
-//! With P for E = (√m g_k e_k) and γ = 1, so that γ/β of the print is one,
+//! (4.23) gives the observer a term n̄(ẑ, x̂_a)w that (4.22) does not have, so that n̄(z, x_a)w drives the
+//! error. With P for E = (√m g_k e_k) and γ = 1, so that γ/β of the print is one, (4.35) becomes
+//!
+//! ν' ≤ −2α₁ν + |e_a|² + 2φ√ν,  φ² ≥ (B n̄ w)ᵀP⁻¹(B n̄ w),
+//!
+//! hence √ν ≤ √p + q for p' = −2α₁p + |e_a|², q' = −α₁q + φ, and
 //!
 //! |e_x| ≤ c₁ e^(−α₁t)|e_x(0)| + (c₁ e^(−α₁t) + c₂ √ε + c₄ e^(−α₂t)) |e_a(0)| + c₃,
 //! c₁ = γ_Φ̄ γ_Φ̄⁻¹ √cn(P),  c₂ = γ_Φ̄⁻¹ √(‖P‖ cn(P_a)),  c₄ = γ_Φ̄⁻¹ √cn(P_a),
-//! c₃ = γ_Φ̄⁻¹ a √(‖P‖/(2α₁) + 1),  a² = ‖P_a‖ w_M²/(2α₂).
+//! c₃ = γ_Φ̄⁻¹ √(‖P‖ (a/√(2α₁) + φ/α₁)² + a²),  a² = ‖P_a‖ w_M²/(2α₂).
+//!
+//! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
+//! will do, also one with a smaller α₁, and the states are bounded one by one.
 
 use lynkeus_gain::riccati::Riccati;
 
-use super::keys::Variant;
-use super::theorem::{Proof, closed_loop, slowest, spread, undecided};
-use crate::enclosure::{length, up};
+use super::gains::{closed_loop, slowest, spread};
+use super::lipschitz::Share;
+use super::proof::{Proof, Solutions, undecided};
+use super::variant::Variant;
+use crate::enclosure::{length, times, up};
 use crate::{Assumptions, Certificate, Constant, Verdict};
 
 /// Shares of the filter's slowest pole tried for α₂.
@@ -26,10 +36,11 @@ struct Filter {
 
 pub(super) fn conclude(
     proof: &Proof<'_, '_>,
-    P: &Riccati,
+    solutions: &Solutions,
     assumptions: &Assumptions,
     found: &mut Certificate,
 ) {
+    let P = &solutions.fastest;
     let filtered = proof.form.variant == Variant::Practical && proof.w.iter().any(|&w| w > 0.0)
         || proof.gains.K2.iter().any(|K| !K.is_empty());
     let filter = match filtered {
@@ -46,18 +57,48 @@ pub(super) fn conclude(
         },
         false => None,
     };
-    let (γ, peak) = (proof.lipschitz.inverse, up((P.largest / P.smallest).sqrt()));
+    let peak = up((P.largest / P.smallest).sqrt());
     let α = filter.as_ref().map_or(P.α, |f| P.α.min(f.α));
     found.rate = Some(α);
-    print(proof, P, peak, filter.as_ref(), &mut found.constants);
+    let φ = of_rows(P, &proof.lipschitz.unseen);
+    let parts = filter.as_ref().zip(Some(φ));
+    print(proof, P, peak, parts, &mut found.constants);
     let a = filter.map_or(0.0, |f| f.rest);
-    let f = forces(proof, P, assumptions);
-    let root_ν = up((f + (f * f + 2.0 * P.α * a * a).sqrt()) / (2.0 * P.α));
-    let e_z = up(P.largest.sqrt() * root_ν);
-    found.ultimate_bound = Some(up(γ * length(&[e_z, a])));
-    let states = proof.extended.states.iter().zip(&proof.lipschitz.states);
-    let ultimate = states.map(|(x, (z, through))| (x.name.clone(), up(z * e_z + through * a)));
-    found.ultimate = ultimate.collect();
+    let left = std::iter::once(P)
+        .chain(&solutions.slower)
+        .map(|P| Left::of(proof, P, a, assumptions));
+    if let Some(left) = left.min_by(|x, y| x.whole.total_cmp(&y.whole)) {
+        let names = proof.extended.states.iter().map(|x| x.name.clone());
+        found.ultimate_bound = Some(left.whole);
+        found.ultimate = names.zip(left.each).collect();
+    }
+}
+
+/// Bounds as t → ∞.
+struct Left {
+    /// of every state's error
+    each: Vec<f64>,
+    /// of the length of the error
+    whole: f64,
+}
+
+impl Left {
+    /// By P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and |e_z,j| ≤ √(P_jj ν).
+    fn of(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Self {
+        let f = up(of_rows(P, &proof.lipschitz.unseen) + forces(proof, P, assumptions));
+        let root_ν = up((f + (f * f + 2.0 * P.α * a * a).sqrt()) / (2.0 * P.α));
+        let e_z = up(P.largest.sqrt() * root_ν);
+        let part = |j: usize| up(P.P[j][j].sqrt() * root_ν).min(e_z);
+        let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+        let of_state = |share: &Share| {
+            let one_by_one = share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)).sum();
+            let together = times(length(&share.z), e_z);
+            up(f64::min(one_by_one, together) + times(share.through, a))
+        };
+        let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
+        let whole = up(proof.lipschitz.inverse * length(&[e_z, a])).min(length(&each));
+        Self { each, whole }
+    }
 }
 
 /// The P_a of (4.27) with the smallest bound of the filter's error.
@@ -83,23 +124,26 @@ fn filter(proof: &Proof<'_, '_>) -> Option<Filter> {
     found.min_by(|a, b| a.rest.total_cmp(&b.rest))
 }
 
+/// √(fᵀP⁻¹f) for every f with |f_k| ≤ `size[k]`.
+fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
+    let unit = |k: usize| {
+        let entry = |i: usize| f64::from(u8::from(i == k));
+        (0..size.len()).map(entry).collect::<Vec<_>>()
+    };
+    let each = size.iter().enumerate().filter(|(_, size)| **size > 0.0);
+    let one_by_one: f64 = each.map(|(k, size)| P.weight(&unit(k)) * size).sum();
+    up(one_by_one.min(length(size) / P.smallest.sqrt()))
+}
+
 /// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
 fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 {
     let n = proof.A.len();
     let pushed = |row: &Vec<f64>| {
         let terms = row.iter().zip(&assumptions.drift);
-        up(terms.map(|(q, d)| if *d > 0.0 { q * d } else { 0.0 }).sum())
+        up(terms.map(|(q, d)| times(*q, *d)).sum())
     };
     let q: Vec<f64> = proof.lipschitz.Q.iter().map(pushed).collect();
-    let unit = |k: usize| {
-        (0..n)
-            .map(|i| f64::from(u8::from(i == k)))
-            .collect::<Vec<_>>()
-    };
-    let each = q.iter().enumerate().filter(|(_, q)| **q > 0.0);
-    let one_by_one: f64 = each.map(|(k, q)| P.weight(&unit(k)) * q).sum();
-    let together = length(&q) / P.smallest.sqrt();
-    let mut sum = one_by_one.min(together);
+    let mut sum = of_rows(P, &q);
     let mut start = 0;
     for (i, K) in proof.gains.K.iter().enumerate() {
         let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
@@ -117,7 +161,7 @@ fn print(
     proof: &Proof<'_, '_>,
     P: &Riccati,
     peak: f64,
-    filter: Option<&Filter>,
+    filter: Option<(&Filter, f64)>,
     constants: &mut Vec<Constant>,
 ) {
     let (map, inverse) = (proof.lipschitz.map, proof.lipschitz.inverse);
@@ -141,7 +185,7 @@ fn print(
     add("‖P‖", P.largest, "largest eigenvalue of P");
     add("λmin(P)", P.smallest, "smallest eigenvalue of P");
     add("α", P.α, "the rate that P proves");
-    let Some(filter) = filter else {
+    let Some((filter, φ)) = filter else {
         add(
             "μ",
             μ,
@@ -150,7 +194,8 @@ fn print(
         return;
     };
     let spreading = P.largest.sqrt() * filter.peak;
-    let rest = (P.largest / (2.0 * P.α) + 1.0).sqrt();
+    let e_z = P.largest.sqrt() * (filter.rest / (2.0 * P.α).sqrt() + φ / P.α);
+    let n̄ = length(&proof.lipschitz.unseen);
     add("α2", filter.α, "the rate of the filter");
     add("c1", μ, "of (4.30): the factor of the initial errors");
     add(
@@ -160,8 +205,13 @@ fn print(
     );
     add(
         "c3",
-        up(inverse * filter.rest * rest),
-        "of (4.30), corrected: what the filter leaves",
+        up(inverse * length(&[e_z, filter.rest])),
+        "of (4.30), corrected: what the filter and n̄w leave",
+    );
+    add(
+        "|n̄w|",
+        n̄,
+        "missing in (4.25): the part of the last derivatives that (4.22) lacks",
     );
     add(
         "c4",

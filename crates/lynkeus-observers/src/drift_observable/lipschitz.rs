@@ -8,15 +8,24 @@
 //!
 //! with means of the Jacobians, so that e_x = Q̃⁻¹(e_z − Q̃_a e_a) and the remainder
 //! is ãQ̃⁻¹ e_z + (b̃ − ãQ̃⁻¹Q̃_a) e_a. The box has to be convex in x, not in z.
+//!
+//! The last rows of the plant are y_i^(μ_i) = m̄_i(x, x_a) + Σ_j n̄_ij(x, x_a) w_j, w_j the first
+//! derivative of u_j that x_a lacks. (4.1) knows w and has n̄(x̂, x_a)w itself. (4.22) has
+//! ẑ' = Aẑ + Bm̄(ẑ, x̂_a) + K₁(y − h(x̂)) without w, whatever (4.23) says: there only m̄ is
+//! compared, and n̄(x, x_a)w is left over as a force that does not vanish with the error.
+
+use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
-use lynkeus_structure::{Check, Extended, Matrix, Region, output_map};
+use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
 
-use super::conditions::{Form, regular, slope_symbol};
+use super::conditions::regular;
+use super::degrees::slope_symbol;
 use super::derivative_name;
-use super::keys::Variant;
+use super::form::Form;
+use super::variant::Variant;
 use crate::DesignError;
-use crate::enclosure::{Enclosure, length, norm, product};
+use crate::enclosure::{Enclosure, length, norm, product, times, up};
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {
@@ -27,14 +36,26 @@ pub(super) struct Lipschitz {
     pub drift: Vec<f64>,
     /// per row of z: of what multiplies an input, summed over the inputs; (3.1) only
     pub input: Vec<f64>,
+    /// per row of z: Σ_j |n̄_ij w_j|, what drives the plant and (4.22) does not hold; zero else
+    pub unseen: Vec<f64>,
     /// |Q̄| entry by entry
     pub Q: Vec<Vec<f64>>,
-    /// |Q̃⁻¹| and |Q̃⁻¹Q̃_a| row by row: of the error of each state
-    pub states: Vec<(f64, f64)>,
+    /// what the error of each state is made of
+    pub states: Vec<Share>,
     /// det Q̄ keeps its sign for inputs and slopes within bounds
     pub regular: Check,
+    /// the last rows have values and do not jump
+    pub continuous: Check,
     /// what has no bound
     pub open: Vec<String>,
+}
+
+/// |e_x| of one state is at most Σ_j z_j |e_z,j| + through |e_a|.
+pub(super) struct Share {
+    /// its row of |Q̃⁻¹|
+    pub z: Vec<f64>,
+    /// the length of its row of |Q̃⁻¹Q̃_a|
+    pub through: f64,
 }
 
 pub(super) fn bounds(
@@ -63,7 +84,14 @@ pub(super) fn bounds(
     } else {
         Q_a
     };
-    let (drift, input) = remainders(extended, form, &U)?;
+    let Remainders {
+        drift,
+        input,
+        unseen,
+    } = remainders(extended, form, &U)?;
+    let rows: Vec<Node> = input.iter().flatten().chain(&drift).copied().collect();
+    let sides = box_.region();
+    let continuous = Regularity::of(graph, &rows, &sides.symbols(), sides)?;
     let found = box_.inverse(&Q)?;
     let unknown = || vec![vec![f64::INFINITY; n]; n];
     let size = found.as_ref().map_or_else(unknown, |found| found.bounds());
@@ -100,9 +128,16 @@ pub(super) fn bounds(
         inverse: norm(&beside(&size, &size_a)),
         drift: of_remainder(&drift)?,
         input: input_rows,
-        states: states.map(|(z, a)| (length(z), length(a))).collect(),
+        unseen: forced(&unseen, &box_)?,
+        states: states
+            .map(|(z, a)| Share {
+                z: z.clone(),
+                through: length(a),
+            })
+            .collect(),
         Q: Q_size,
         regular: regular(extended, name, &form.Q, box_.region())?,
+        continuous: continuous.check("the last rows have values on the box and do not jump"),
         open: box_.open(),
     })
 }
@@ -130,13 +165,28 @@ fn further(
     U
 }
 
-/// Row by row of z what z' holds beside the next row: without the inputs, and for
-/// (3.1) the factor of each input.
+/// What z' holds beside the next row, row by row of z.
+struct Remainders {
+    /// without the inputs for (3.1), without w for (4.22)
+    drift: Vec<Node>,
+    /// (3.1): the factor of each input
+    input: Vec<Vec<Node>>,
+    /// (4.22): n̄ and the symbols of w
+    unseen: Unseen,
+}
+
+/// n̄ w
+struct Unseen {
+    /// rows of z, columns of w
+    factors: Vec<Vec<Option<Node>>>,
+    w: Vec<Node>,
+}
+
 fn remainders(
     extended: &Extended<'_>,
     form: &Form,
     U: &[Vec<Node>],
-) -> Result<(Vec<Node>, Vec<Vec<Node>>), MissingInput> {
+) -> Result<Remainders, MissingInput> {
     let graph = extended.graph();
     let zero = graph.constant(0.0).node();
     let order = form.indices.iter().copied().max().unwrap_or(0);
@@ -152,15 +202,56 @@ fn remainders(
         true => y[i][k + 1],
         false => zero,
     };
-    let drift = form.rows.iter().map(last).collect();
-    let Some(affine) = bounded else {
-        return Ok((drift, vec![]));
+    let drift: Vec<Node> = form.rows.iter().map(last).collect();
+    let w = match form.variant {
+        Variant::Practical => unseen_derivatives(form, U),
+        _ => vec![],
     };
-    let along = |row: &Vec<Option<Node>>, g: &Vec<Option<Node>>| {
+    let still: HashMap<Node, Node> = w.iter().map(|&w| (w, zero)).collect();
+    Ok(Remainders {
+        unseen: Unseen {
+            factors: output_map::jacobian_rows(graph, &drift, &w),
+            w,
+        },
+        drift: graph.substitute(&drift, &still),
+        input: bounded.map_or_else(Vec::new, |affine| {
+            let columns = affine.input_columns.iter();
+            columns.map(|g| along(extended, form, g)).collect()
+        }),
+    })
+}
+
+/// L_g of every row of the map.
+fn along(extended: &Extended<'_>, form: &Form, g: &[Option<Node>]) -> Vec<Node> {
+    let graph = extended.graph();
+    let of_row = |row: &Vec<Option<Node>>| {
         let pairs = row.iter().zip(g);
         let terms = pairs.filter_map(|(q, g)| Some(graph.expr((*q)?) * graph.expr((*g)?)));
-        terms.reduce(|a, b| a + b).map_or(zero, |sum| sum.node())
+        terms
+            .reduce(|a, b| a + b)
+            .map_or_else(|| graph.constant(0.0).node(), |sum| sum.node())
     };
-    let column = |g: &Vec<Option<Node>>| form.Q.iter().map(|row| along(row, g)).collect();
-    Ok((drift, affine.input_columns.iter().map(column).collect()))
+    form.Q.iter().map(of_row).collect()
+}
+
+/// The first derivative of each input that its filter lacks.
+fn unseen_derivatives(form: &Form, U: &[Vec<Node>]) -> Vec<Node> {
+    let pairs = form.U.iter().zip(U).filter(|(jet, _)| !jet.is_empty());
+    pairs
+        .filter_map(|(jet, further)| further.get(jet.len()).copied())
+        .collect()
+}
+
+/// Bounds of |n̄ w| row by row. y^(μ) is affine in w, so that n̄ reads none of it.
+fn forced(unseen: &Unseen, box_: &Enclosure<'_>) -> Result<Vec<f64>, MissingInput> {
+    let row = |row: &Vec<Option<Node>>| {
+        let mut sum = 0.0;
+        for (factor, &w) in row.iter().zip(&unseen.w) {
+            let Some(factor) = factor else { continue };
+            let (low, high) = box_.side(w);
+            sum += times(box_.magnitude(*factor)?, low.abs().max(high.abs()));
+        }
+        Ok(up(sum))
+    };
+    unseen.factors.iter().map(row).collect()
 }

@@ -11,16 +11,25 @@
 //!               x̂_a' = A x̂_a + K₂(u − x̂_a1)                                      (4.22)
 //!
 //! Corrections to the print: Remark 4.2 must read r ≥ n − 1 (then no derivative of
-//! the input is needed); (3.20) needs ‖V⁻¹‖²; Theorem 3.3's bound is u_M ≤ β λ_min(P).
+//! the input is needed); (3.20) needs ‖V⁻¹‖²; Theorem 3.3's bound is u_M ≤ β λ_min(P); (4.22) holds
+//! no n̄(ẑ, x̂_a)w, so the error of the practical observer is driven by n̄(z, x_a)w.
 //! Beyond the print: several inputs, each with a filter of its own order, and
 //! several outputs with the indices of Krener and Respondek.
 
 mod assembly;
+mod choice;
 mod conditions;
+mod degrees;
+mod form;
+mod gains;
 mod guarantee;
 mod keys;
 mod lipschitz;
+mod poles;
+mod proof;
+mod report;
 mod theorem;
+mod variant;
 
 use lynkeus_structure::Extended;
 
@@ -60,21 +69,19 @@ impl Family for DriftObservable {
         extended: &Extended<'_>,
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
-        Ok(
-            match conditions::form(extended, tuning, &extended.region())? {
-                Ok(form) => form.examination,
-                Err(examination) => examination,
-            },
-        )
+        Ok(match choice::form(extended, tuning, &extended.region())? {
+            Ok(form) => form.examination,
+            Err(examination) => examination,
+        })
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match conditions::form(extended, tuning, &extended.region())? {
+        match choice::form(extended, tuning, &extended.region())? {
             Ok(form) if form.examination.fit != Fit::DoesNotFit => {
-                let gains = keys::Gains::new(extended, tuning, &form)?;
+                let gains = gains::Gains::new(extended, tuning, &form)?;
                 assembly::design(extended, tuning, form, gains)
             }
-            Ok(conditions::Form { examination, .. }) | Err(examination) => {
+            Ok(form::Form { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
             }
         }
@@ -85,17 +92,17 @@ impl Family for DriftObservable {
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        match conditions::form(extended, tuning, &assumptions.region)? {
+        match choice::form(extended, tuning, &assumptions.region)? {
             Ok(form) if form.examination.fit != Fit::DoesNotFit => {
                 theorem::certificate(extended, tuning, form, assumptions)
             }
-            Ok(conditions::Form { examination, .. }) | Err(examination)
+            Ok(form::Form { examination, .. }) | Err(examination)
                 if examination.refuted().is_some() =>
             {
                 let (basis, checks) = (self.paper(), examination.checks);
                 Ok(Certificate::new(basis, assumptions, checks))
             }
-            Ok(conditions::Form { examination, .. }) | Err(examination) => {
+            Ok(form::Form { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
             }
         }

@@ -1,7 +1,7 @@
 //! What the theorems 3.1, 4.1 and 4.5 guarantee.
 //!
 //! e_z' = (A − KC) e_z + Σ_k e_k (r_k − r̂_k) + f, |r_k − r̂_k| ≤ g_k |(e_z, e_a)| in m rows k,
-//! f from disturbances and noise. With E = (√m g_k e_k) the perturbation is E v with
+//! f from disturbances, noise, and for (4.22) from n̄(z, x_a)w, which the observer lacks. With E = (√m g_k e_k) the perturbation is E v with
 //! |v|² ≤ |e_z|² + |e_a|², and any P of (3.2), (4.7), (4.33) with γ = 1 gives for ν = e_zᵀP⁻¹e_z
 //!
 //! ν' ≤ −2αν + |e_a|² + 2√ν √(fᵀP⁻¹f)
@@ -9,35 +9,18 @@
 //! e_a is the error of the filter, zero for (3.1) and (4.1). P is sought for the study's K,
 //! not K for a P: the theorems only ask that there is one.
 
-use lynkeus_gain::riccati::Riccati;
 use lynkeus_gain::vandermonde;
 use lynkeus_structure::{Check, Condition, Extended};
 
-use super::conditions::Form;
+use super::form::Form;
+use super::gains::{Gains, closed_loop, slowest};
 use super::guarantee;
-use super::keys::{Gains, SLOPES, Variant, slopes};
+use super::keys::{self, Needed, SLOPES};
 use super::lipschitz::{self, Lipschitz};
-use crate::enclosure::{figures, length, up};
+use super::proof::{Proof, SLOW, check, undecided};
+use super::variant::Variant;
+use crate::enclosure::{figures, length};
 use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, TuningError};
-
-/// Steps of a bisection on a logarithmic scale.
-const STEPS: usize = 40;
-/// α of the question whether there is any, as a share of the slowest pole.
-const SLOW: f64 = 1e-6;
-
-/// Everything the conclusions are drawn from.
-pub(super) struct Proof<'a, 'p> {
-    pub extended: &'a Extended<'p>,
-    pub form: &'a Form,
-    pub gains: &'a Gains,
-    pub lipschitz: &'a Lipschitz,
-    /// A − KC
-    pub A: Vec<Vec<f64>>,
-    /// the slowest pole's absolute value
-    pub slowest: f64,
-    /// per input: the bound of the derivative that drives the filter
-    pub w: Vec<f64>,
-}
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -45,12 +28,20 @@ pub(super) fn certificate(
     form: Form,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let slopes = slopes(extended, tuning, &form)?;
+    let slopes = slopes(extended, tuning, &form, assumptions)?;
     let lipschitz = lipschitz::bounds(extended, &form, &slopes, &assumptions.region)?;
     let u_M = largest_input(extended, assumptions);
     let gains = gains(extended, tuning, &form)?;
-    // the last check of the family is on inputs without bounds on their slopes
-    let mut hypotheses: Vec<Check> = form.examination.checks.iter().take(3).cloned().collect();
+    // not that on inputs, which is about slopes without bounds
+    let conditions = form.checks.clone();
+    let mut hypotheses = vec![
+        conditions.degree,
+        conditions.regular,
+        conditions.lipschitz,
+        conditions.continuous,
+        lipschitz.continuous.clone(),
+    ];
+    hypotheses.extend(of_what_acts(extended, assumptions));
     hypotheses.extend(of_the_map(extended, &form, &slopes, &lipschitz));
     let order = |jet: &Vec<_>, given: &Option<Vec<f64>>| match (jet.is_empty(), given) {
         (true, _) => 0.0,
@@ -86,7 +77,7 @@ pub(super) fn certificate(
     }
     let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
-    certificate.notes = notes(&form);
+    certificate.notes = notes(extended, &form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
         guarantee::conclude(&proof, &P, assumptions, &mut certificate);
     }
@@ -101,12 +92,73 @@ fn basis(variant: Variant) -> &'static str {
     }
 }
 
-fn notes(form: &Form) -> Vec<String> {
-    let mut notes = vec!["where the column rcond is below 6·10⁻⁴ the tool withdraws a part of the correction, and the theorem says nothing".to_owned()];
-    if form.variant == Variant::Practical {
-        notes.push("in the box beside plant and estimate: the filter's estimates of the inputs and their derivatives; the bound holds once the filter has settled, at the same rate".to_owned());
+fn notes(extended: &Extended<'_>, form: &Form, assumptions: &Assumptions) -> Vec<String> {
+    let mut notes = vec![match form.variant {
+        Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".to_owned(),
+        _ => "taken for granted, not proved: plant and estimate stay in the box".to_owned(),
+    }];
+    let unknown = extended.states.iter().zip(&assumptions.drift);
+    let unknown = unknown.skip(extended.plant_states());
+    let constant: Vec<&str> = unknown
+        .filter(|(_, drift)| **drift == 0.0)
+        .map(|(v, _)| v.name.as_str())
+        .collect();
+    if !constant.is_empty() {
+        notes.push(format!(
+            "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
+            constant.join(", ")
+        ));
     }
+    notes.push("where the column rcond is below 6·10⁻⁴ the tool withdraws a part of the correction, and the theorem says nothing".to_owned());
     notes
+}
+
+/// Per input bounds of u', u'', …, one more than the observer reads: the family's key, else
+/// what holds for every family.
+fn slopes(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    form: &Form,
+    assumptions: &Assumptions,
+) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+    let orders: Vec<usize> = match form.variant {
+        Variant::Bounded => vec![0; form.U.len()],
+        _ => form.U.iter().map(Vec::len).collect(),
+    };
+    let own = keys::slopes(tuning, &Needed::new(extended, orders.clone()))?;
+    let general = |j: usize| {
+        let bounds = assumptions.input_derivatives.get(j)?;
+        bounds.get(..orders[j]).map(<[f64]>::to_vec)
+    };
+    let own = own.into_iter().enumerate();
+    Ok(own
+        .map(|(j, bounds)| bounds.or_else(|| general(j)))
+        .collect())
+}
+
+/// What acts on the plant and on the sensors has bounds, where anything does.
+fn of_what_acts(extended: &Extended<'_>, assumptions: &Assumptions) -> Option<Check> {
+    let states = extended.states.iter().zip(&assumptions.drift);
+    let outputs = extended.outputs.iter().zip(&assumptions.noise);
+    let all: Vec<(&str, f64)> = states
+        .map(|(x, drift)| (x.name.as_str(), *drift))
+        .chain(outputs.map(|(y, noise)| (y.variable.name.as_str(), *noise)))
+        .filter(|(_, size)| *size != 0.0)
+        .collect();
+    let open: Vec<&str> = all
+        .iter()
+        .filter(|(_, size)| !size.is_finite())
+        .map(|(name, _)| *name)
+        .collect();
+    let detail = match open.is_empty() {
+        true => "assumed, by the declared ranges and deviations".to_owned(),
+        false => format!(
+            "no bound of what acts on {}: declare min and max of the disturbances and of the states that they meet",
+            open.join(", ")
+        ),
+    };
+    let name = "disturbances and measurement errors are bounded";
+    (!all.is_empty()).then(|| check(name, open.is_empty(), detail))
 }
 
 /// None where the study has no pole yet.
@@ -130,56 +182,6 @@ fn largest_input(extended: &Extended<'_>, assumptions: &Assumptions) -> f64 {
     largest.fold(0.0, f64::max)
 }
 
-pub(super) fn slowest(λ: &[Vec<f64>]) -> f64 {
-    λ.iter().flatten().fold(f64::INFINITY, |m, λ| m.min(-λ))
-}
-
-/// A − KC, a block per chain.
-pub(super) fn closed_loop(K: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let n = K.iter().map(Vec::len).sum();
-    let mut A = vec![vec![0.0; n]; n];
-    let mut start = 0;
-    for K in K {
-        for (k, gain) in K.iter().enumerate() {
-            A[start + k][start] = -gain;
-            if k + 1 < K.len() {
-                A[start + k][start + k + 1] += 1.0;
-            }
-        }
-        start += K.len();
-    }
-    A
-}
-
-/// Columns √m s_k e_k for the m numbers s_k > 0.
-pub(super) fn spread(s: &[f64]) -> Vec<Vec<f64>> {
-    let rows: Vec<usize> = (0..s.len()).filter(|&k| s[k] > 0.0).collect();
-    let root = (rows.len() as f64).sqrt();
-    let row = |k: usize| {
-        let entry = |&column: &usize| if column == k { up(root * s[k]) } else { 0.0 };
-        rows.iter().map(entry).collect()
-    };
-    (0..s.len()).map(row).collect()
-}
-
-pub(super) fn undecided(name: &str, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.to_owned(),
-        verdict: Condition::Undecided(vec![]),
-        detail: detail.into(),
-    }
-}
-
-fn check(name: &str, holds: bool, detail: String) -> Check {
-    Check {
-        verdict: match holds {
-            true => Condition::Proved,
-            false => Condition::Undecided(vec![]),
-        },
-        ..undecided(name, detail)
-    }
-}
-
 /// Hypotheses 1 and 2 of the theorems.
 fn of_the_map(
     extended: &Extended<'_>,
@@ -196,7 +198,7 @@ fn of_the_map(
         let detail = match names.is_empty() {
             true => "assumed, as the study gives them".to_owned(),
             false => format!(
-                "no bound of the derivatives of {}: give the key '{SLOPES}'",
+                "no bound of the derivatives of {}: give the key '{SLOPES}', in [observer] or in [certify]",
                 names.join(", ")
             ),
         };
@@ -281,104 +283,4 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
     finite
         .map(|(name, value, meaning)| Constant::new(name, value, meaning))
         .collect()
-}
-
-impl Proof<'_, '_> {
-    /// The fastest P for the study's gain, and hypothesis 4 with both numbers.
-    fn riccati(&self, u_M: f64, constants: &mut Vec<Constant>) -> (Option<Riccati>, Vec<Check>) {
-        let mut checks = vec![];
-        let drift = &self.lipschitz.drift;
-        let with_input = |u: f64| -> Vec<f64> {
-            let pairs = drift.iter().zip(&self.lipschitz.input);
-            pairs
-                .map(|(γ, H)| if *H > 0.0 { up(γ + u * H) } else { *γ })
-                .collect()
-        };
-        let γ = length(drift);
-        let limit = self.largest(|s| drift.iter().map(|g| g * s).collect()) * γ;
-        let name = "γ ≤ γ*: K and some P > 0 solve the Riccati inequality";
-        let holds = limit >= γ;
-        if limit.is_finite() && γ.is_finite() && γ > 0.0 {
-            constants.push(Constant::new("γ*", limit, "what these poles can bear"));
-            let word = if holds { "≤" } else { ">" };
-            let detail = format!("{} {word} {}", figures(γ), figures(limit));
-            checks.push(check(name, holds, detail));
-            constants.extend(self.scale());
-        } else if !γ.is_finite() {
-            checks.push(undecided(name, "γ has no bound"));
-        }
-        if !γ.is_finite() || (γ > 0.0 && !holds) {
-            return (None, checks);
-        }
-        if length(&self.lipschitz.input) > 0.0 {
-            let limit = self.largest(with_input);
-            if limit.is_finite() {
-                let meaning = "the largest |u| that these poles can bear";
-                constants.push(Constant::new("u_M", limit, meaning));
-            }
-            let word = if u_M <= limit { "≤" } else { ">" };
-            let detail = format!("{} {word} {}", figures(u_M), figures(limit));
-            checks.push(check("|u| ≤ u_M", u_M <= limit, detail));
-        }
-        let g = with_input(u_M);
-        if !g.iter().all(|g| g.is_finite()) {
-            return (None, checks);
-        }
-        let P = Riccati::fastest(&self.A, &spread(&g), 1.0, self.slowest);
-        if P.is_none() && checks.iter().all(|c| c.verdict == Condition::Proved) {
-            checks.push(undecided(name, "no P was found for these poles"));
-        }
-        (P, checks)
-    }
-
-    /// The largest s for which g(s) can be borne; 0 where none can, infinite
-    /// where all can.
-    fn largest(&self, g: impl Fn(f64) -> Vec<f64>) -> f64 {
-        let bears = |s: f64| self.bears(&self.A, &g(s), self.slowest);
-        edge(|s| !bears(s)).map_or(
-            f64::INFINITY,
-            |s| if bears(s / 1.01) { s / 1.01 } else { 0.0 },
-        )
-    }
-
-    fn bears(&self, A: &[Vec<f64>], g: &[f64], slowest: f64) -> bool {
-        g.iter().all(|g| g.is_finite())
-            && Riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
-    }
-
-    /// The smallest factor of all poles that the proof allows.
-    fn scale(&self) -> Option<Constant> {
-        let bears = |s: f64| {
-            let scaled = |λ: &Vec<f64>| -> Vec<f64> {
-                vandermonde::place(&λ.iter().map(|λ| λ * s).collect::<Vec<_>>())
-            };
-            let K: Vec<Vec<f64>> = self.gains.λ.iter().map(scaled).collect();
-            self.bears(&closed_loop(&K), &self.lipschitz.drift, s * self.slowest)
-        };
-        let s = edge(bears)?;
-        let meaning = "the proof allows these poles times this factor, without input";
-        Some(Constant::new("s0", s, meaning))
-    }
-}
-
-/// The smallest s > 0 from which on `holds`, to a thousandth, rounded up; none up to 10⁶.
-fn edge(holds: impl Fn(f64) -> bool) -> Option<f64> {
-    let (mut low, mut high) = (1e-9f64, 1.0f64);
-    while !holds(high) {
-        (low, high) = (high, high * 4.0);
-        if high > 1e6 {
-            return None;
-        }
-    }
-    for _ in 0..STEPS {
-        let middle = (low * high).sqrt();
-        match holds(middle) {
-            true => high = middle,
-            false => low = middle,
-        }
-        if high < low * 1.001 {
-            break;
-        }
-    }
-    Some(high)
 }

@@ -1,5 +1,7 @@
 //! The family `drift-observable` against the formulas of Germani and Manes.
 
+mod driven;
+mod indices;
 mod theorem;
 
 use std::collections::BTreeMap;
@@ -93,6 +95,14 @@ fn solve(Q: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
 fn K() -> [f64; 3] {
     let [a, b, c] = POLES;
     [-(a + b + c), a * b + b * c + c * a, -a * b * c]
+}
+
+/// What the design tells under that name.
+fn parameter(design: &Design, name: &str) -> String {
+    let row = design.parameters.iter().find(|(n, _)| n == name);
+    row.unwrap_or_else(|| panic!("{name} in {:?}", design.parameters))
+        .1
+        .clone()
 }
 
 fn assert_near(found: &[f64], expected: &[f64], tolerance: f64) {
@@ -333,6 +343,9 @@ fn a_maximal_relative_degree_needs_nothing_of_the_input() {
     let found = slope(&plant, &design, &[0.4, 0.2], &[0.3], &[0.5]);
     let expected = [0.2 + 5.0 * 0.1, 0.3 - 0.4f64.sin() + 6.0 * 0.1];
     assert_near(&found, &expected, 1e-14);
+    // Q is the identity: f − K(ŷ − y) is the observer
+    let gains = design.gains[0].entries.clone();
+    assert_eq!(gains, [("q".to_owned(), 5.0), ("w".to_owned(), 6.0)]);
 }
 
 /// Two outputs and two inputs: indices (2, 1), and y' reads both inputs, so that
@@ -360,9 +373,11 @@ fn several_inputs_and_outputs() {
             tuning.values.insert("filter_initial".to_owned(), start);
         }
         let design = design_with(&DriftObservable, &plant, &[], &tuning).unwrap();
-        let lengths: Vec<usize> = design.gains.iter().map(|g| g.entries.len()).collect();
         let filters = design.observer.states.len() - 3;
-        assert_eq!((lengths[0], lengths[1]), (2, 1));
+        assert_eq!(parameter(&design, "K of y"), "7, 12");
+        assert_eq!(parameter(&design, "K of z"), "5");
+        // Q̄ follows the estimate and the input: no constant K tells the observer
+        assert!(design.gains.is_empty());
         assert_eq!(filters, if variant == "practical" { 2 } else { 0 });
         if filters > 0 {
             let start: Vec<f64> = design.observer.states[3..].iter().map(|s| s.1).collect();
@@ -383,14 +398,11 @@ fn lemma_3_2_gives_the_poles() {
     let plant = plant(PLANT);
     let tuning = Tuning::from([("alpha", 0.5), ("beta", 1.0), ("gamma", 0.8)]);
     let design = design_with(&DriftObservable, &plant, &[], &tuning).unwrap();
-    let found = |name: &str| {
-        let row = design.parameters.iter().find(|(n, _)| n == name);
-        row.unwrap().1.clone()
-    };
-    let σ: f64 = found("σ of Lemma 3.2").parse().unwrap();
+    let σ: f64 = parameter(&design, "σ of Lemma 3.2").parse().unwrap();
     // σ ≥ α + 3β²/2 + γ²‖V⁻¹‖²/2 with ‖V⁻¹‖ > 1
     assert!(σ > 0.5 + 1.5 + 0.32 && σ < 3.2, "{σ}");
-    let k1: f64 = design.gains[0].entries[0].1;
+    let K = parameter(&design, "K of y");
+    let k1: f64 = K.split(", ").next().unwrap().parse().unwrap();
     assert_near(&[k1], &[σ + σ.powi(2) + σ.powi(3)], 1e-14);
 }
 

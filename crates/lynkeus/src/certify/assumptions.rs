@@ -17,7 +17,34 @@ pub(super) fn of(study: &Study, extended: &Extended<'_>) -> Result<Assumptions, 
     let drift = drift(study, plant, extended, &region)?;
     let noise = noise(study, plant, extended, &region)?;
     let assumptions = Assumptions::new(extended, region).map_err(Error::from_source)?;
-    Ok(assumptions.with_drift(drift).with_noise(noise))
+    Ok(assumptions
+        .with_drift(drift)
+        .with_noise(noise)
+        .with_input_derivatives(input_derivatives(study, extended)?))
+}
+
+/// Per known input: the bounds of its derivatives that the study gives.
+fn input_derivatives(study: &Study, extended: &Extended<'_>) -> Result<Vec<Vec<f64>>, Error> {
+    let names: Vec<&str> = extended.inputs.iter().map(|i| i.name.as_str()).collect();
+    let given = &study.certify.input_derivatives;
+    if let Some((name, _)) = given
+        .iter()
+        .find(|(n, _)| !names.contains(&n.text.as_str()))
+    {
+        let known = match names.is_empty() {
+            true => "none".to_owned(),
+            false => names.join(", "),
+        };
+        let message = format!(
+            "no known input is called '{name}'; `input_derivatives` bounds the derivatives of the known inputs ({known})"
+        );
+        return Err(name.blame(Error::input(message)));
+    }
+    let of = |input: &&str| {
+        let found = given.iter().find(|(name, _)| name.text == **input);
+        found.map_or_else(Vec::new, |(_, bounds)| bounds.clone())
+    };
+    Ok(names.iter().map(of).collect())
 }
 
 /// Per extended state: what disturbances within their declared ranges add to its

@@ -4,7 +4,7 @@ use super::Name;
 use super::section::Entry;
 use crate::Error;
 
-const KEYS: &[&str] = &["tube", "slew"];
+const KEYS: &[&str] = &["tube", "slew", "input_derivatives"];
 
 /// Ranges narrower than the model's `min` and `max`: (name, smallest, largest). An array's
 /// name stands for every element.
@@ -17,6 +17,8 @@ pub struct CertifySettings {
     pub tube: Option<f64>,
     /// Bounds of the rates of change of unknown inputs; one not listed is constant.
     pub slew: Vec<(Name, f64)>,
+    /// Bounds of |u'|, |u''|, … of known inputs, as many as are known.
+    pub input_derivatives: Vec<(Name, Vec<f64>)>,
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<CertifySettings, Error> {
@@ -31,7 +33,27 @@ pub(super) fn read(entry: Entry<'_>) -> Result<CertifySettings, Error> {
                     .collect()
             })?
             .unwrap_or_default(),
+        input_derivatives: section
+            .optional("input_derivatives", |entry| {
+                let pairs = entry.pairs()?.into_iter();
+                pairs
+                    .map(|(name, value)| Ok((name, bounds(value)?)))
+                    .collect()
+            })?
+            .unwrap_or_default(),
     })
+}
+
+/// A bound, or a list of them: numbers that are not negative.
+fn bounds(entry: Entry<'_>) -> Result<Vec<f64>, Error> {
+    let one = |entry: Entry<'_>| {
+        let wrong = entry.wrong("a bound, a number ≥ 0");
+        entry.number().ok().filter(|x| *x >= 0.0).ok_or(wrong)
+    };
+    match entry.is_list() {
+        true => entry.list_of(one),
+        false => Ok(vec![one(entry)?]),
+    }
 }
 
 /// `name = number` or `name = [smallest, largest]`.

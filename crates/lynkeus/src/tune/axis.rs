@@ -80,6 +80,8 @@ impl Axis {
         match slot {
             Value::Number(x) => *x = self.chosen(*x, value),
             Value::List(entries) => entries.iter_mut().for_each(|e| self.scale(e, value)),
+            // a conjugate pair of poles
+            Value::Table(parts) => parts.values_mut().for_each(|x| self.scale(x, value)),
             _ => {}
         }
     }
@@ -226,7 +228,14 @@ fn present<'s>(study: &'s Study, base: &str, path: &[usize]) -> Result<Option<&'
 fn numeric(value: &Value) -> bool {
     match value {
         Value::Number(_) => true,
-        Value::List(entries) => !entries.is_empty() && entries.iter().all(numeric),
+        Value::List(entries) => {
+            let scaled = |e: &Value| match e {
+                // a conjugate pair of poles
+                Value::Table(parts) => parts.values().all(numeric),
+                _ => numeric(e),
+            };
+            !entries.is_empty() && entries.iter().all(scaled)
+        }
         _ => false,
     }
 }

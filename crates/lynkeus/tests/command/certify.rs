@@ -2,6 +2,7 @@
 
 mod column;
 mod errors;
+mod moving;
 mod printed;
 
 use lynkeus::Study;

@@ -1,0 +1,194 @@
+//! Which derivatives of which outputs: the indices.
+//!
+//! Those of Krener and Respondek are taken where all is proved with them. Else others
+//! are examined, on the box of the states and the declared ranges of the inputs, so that a
+//! certificate on a smaller range of the inputs is about the same observer.
+
+use lynkeus_structure::indices::Codistribution;
+use lynkeus_structure::{Condition, Extended, Region};
+
+use super::form::{Form, Map, blind};
+use super::keys::{self, Asked};
+use super::variant::Variant;
+use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+
+/// Further index vectors that are examined.
+const EXAMINED: usize = 6;
+/// Further index vectors that are told.
+const TOLD: usize = 4;
+
+/// The form of the plant on `region`, or why there is none.
+pub(super) fn form(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    region: &Region,
+) -> Result<Result<Form, Examination>, DesignError> {
+    let asked = keys::indices(extended, tuning)?;
+    let map = match Map::new(extended, Variant::read(tuning)?, region)? {
+        Ok(map) => map,
+        Err(examination) => return Ok(Err(examination)),
+    };
+    let lengths = match asked {
+        Asked::Indices(indices) => return Ok(Ok(Form::new(extended, &map, indices, region)?)),
+        Asked::Lengths(lengths) => lengths,
+    };
+    let mut rows = Codistribution::new(extended, &map.gradients)?;
+    let first = rows.krener_respondek();
+    if first.iter().sum::<usize>() < extended.states.len() {
+        return Ok(Err(blind(extended, &first)?));
+    }
+    let mut search = Search {
+        extended,
+        map: &map,
+        region: declared(extended, region),
+        rows,
+    };
+    let found = search.best(&first, &lengths)?;
+    let mut form = match search.region == *region {
+        true => found.form,
+        false => Form::new(extended, &map, found.form.indices, region)?,
+    };
+    form.examination.summary += &told(&form.indices, &found.others);
+    Ok(Ok(form))
+}
+
+/// The region with the inputs' declared ranges.
+fn declared(extended: &Extended<'_>, region: &Region) -> Region {
+    let mut region = region.clone();
+    for side in &mut region.dimensions {
+        let mut inputs = extended.plant.inputs.iter();
+        let known = extended.inputs.iter().any(|i| i.node == side.symbol);
+        if let Some(input) = inputs.find(|i| known && i.node == side.symbol) {
+            (side.min, side.max) = (input.min, input.max);
+        }
+    }
+    region
+}
+
+/// An index vector that was not chosen.
+struct Other {
+    indices: Vec<usize>,
+    known: Known,
+}
+
+/// What is known of it.
+enum Known {
+    /// every condition was looked at
+    Examined(Fit),
+    /// det Q has both signs at points of the box
+    Singular,
+    /// nothing
+    Open,
+}
+
+struct Chosen {
+    form: Form,
+    others: Vec<Other>,
+}
+
+struct Search<'a, 'p> {
+    extended: &'a Extended<'p>,
+    map: &'a Map,
+    region: Region,
+    rows: Codistribution,
+}
+
+impl Search<'_, '_> {
+    /// The first of the candidates with which most is proved.
+    fn best(&mut self, first: &[usize], lengths: &[Option<usize>]) -> Result<Chosen, DesignError> {
+        let mut candidates = vec![first.to_vec()];
+        if first.len() > 1 {
+            candidates.extend(self.rows.alternatives(first));
+        }
+        let fits = |μ: &Vec<usize>| {
+            μ.iter()
+                .zip(lengths)
+                .all(|(μ, l)| l.is_none_or(|l| l == *μ))
+        };
+        let impossible = listed(&candidates);
+        candidates.retain(fits);
+        let Some((first, rest)) = candidates.split_first() else {
+            let expected =
+                format!("lists of lengths that make up a map of the state: {impossible}");
+            let found = "lists of other lengths";
+            return Err(TuningError::new("poles", expected, found).into());
+        };
+        let mut form = self.examined(first)?;
+        let mut others = vec![];
+        let mut examined = 0;
+        for indices in rest {
+            let open = form.examination.fit != Fit::Fits && examined < EXAMINED;
+            let known = match open {
+                false => Known::Open,
+                true if self.rows.changes_sign(indices) => Known::Singular,
+                true => {
+                    examined += 1;
+                    let next = self.examined(indices)?;
+                    let (kept, left) = match rank(&next) < rank(&form) {
+                        true => (next, form),
+                        false => (form, next),
+                    };
+                    form = kept;
+                    others.push(Other {
+                        indices: left.indices,
+                        known: Known::Examined(left.examination.fit),
+                    });
+                    continue;
+                }
+            };
+            others.push(Other {
+                indices: indices.clone(),
+                known,
+            });
+        }
+        Ok(Chosen { form, others })
+    }
+
+    fn examined(&self, indices: &[usize]) -> Result<Form, DesignError> {
+        Form::new(self.extended, self.map, indices.to_vec(), &self.region)
+    }
+}
+
+/// Smaller for what is closer to a proof.
+fn rank(form: &Form) -> (u8, usize, usize) {
+    let count = |test: fn(&Condition) -> bool| {
+        let checks = form.examination.checks.iter();
+        checks.filter(|c| test(&c.verdict)).count()
+    };
+    let fit = match form.examination.fit {
+        Fit::Fits => 0,
+        Fit::Undecided => 1,
+        Fit::DoesNotFit => 2,
+    };
+    (
+        fit,
+        count(|v| matches!(v, Condition::Refuted(_))),
+        count(|v| matches!(v, Condition::Undecided(_))),
+    )
+}
+
+fn listed(all: &[Vec<usize>]) -> String {
+    let shown: Vec<String> = all.iter().take(TOLD).map(|μ| format!("{μ:?}")).collect();
+    shown.join(", ")
+}
+
+/// The chosen indices and the others, for the summary; nothing where there is no choice.
+fn told(chosen: &[usize], others: &[Other]) -> String {
+    if others.is_empty() {
+        return String::new();
+    }
+    let one = |other: &Other| {
+        let known = match other.known {
+            Known::Examined(Fit::Fits) => "fits, too",
+            Known::Examined(fit) => fit.words(),
+            Known::Singular => "det Q changes its sign",
+            Known::Open => "not examined",
+        };
+        format!("{:?} {known}", other.indices)
+    };
+    let mut shown: Vec<String> = others.iter().take(TOLD).map(one).collect();
+    if others.len() > TOLD {
+        shown.push(format!("{} more", others.len() - TOLD));
+    }
+    format!("; indices {chosen:?} (others: {})", shown.join(", "))
+}

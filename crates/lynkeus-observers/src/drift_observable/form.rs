@@ -1,0 +1,251 @@
+//! The form of the paper in a plant: the map Φ̄ with its Jacobians, and the conditions on it.
+
+use lynkeus_expr::Node;
+use lynkeus_structure::output_map::{self, AffineForm, Rows};
+use lynkeus_structure::{Check, Condition, Extended, Region, Regularity, visibility};
+
+use super::conditions::{self, Inputs};
+use super::variant::Variant;
+use super::{NAME, degrees, derivative_name};
+use crate::conditions::{fit, lipschitz, names};
+use crate::family;
+use crate::{DesignError, Examination, Fit};
+
+/// What does not depend on how many derivatives of which output count.
+pub(super) struct Map {
+    pub affine: AffineForm,
+    /// L_f^k h_i: output by output, k = 0 … n − 1
+    lie: Vec<Vec<Node>>,
+    /// ∂L_f^k h_i/∂x
+    pub gradients: Vec<Rows>,
+    /// the right-hand side is Lipschitz
+    lipschitz: Check,
+    /// the key `variant`
+    asked: Option<Variant>,
+}
+
+impl Map {
+    /// Inside: what breaks the form.
+    pub fn new(
+        extended: &Extended<'_>,
+        asked: Option<Variant>,
+        region: &Region,
+    ) -> Result<Result<Self, Examination>, DesignError> {
+        let graph = extended.graph();
+        let affine = match output_map::affine_form(extended)? {
+            Ok(affine) => affine,
+            Err(why) => return Ok(Err(unfit(why))),
+        };
+        let order = extended.states.len().saturating_sub(1);
+        let lie = output_map::lie_derivatives(extended, &affine, order)?;
+        let x = extended.symbols();
+        Ok(Ok(Self {
+            affine,
+            gradients: lie
+                .iter()
+                .map(|h| output_map::jacobian_rows(graph, h, &x))
+                .collect(),
+            lie,
+            lipschitz: lipschitz(extended, region)?,
+            asked,
+        }))
+    }
+}
+
+/// The conditions, each by what it is about.
+#[derive(Clone)]
+pub(super) struct Checks {
+    /// Definition 2.2
+    pub degree: Check,
+    /// drift-observability: Q is regular
+    pub regular: Check,
+    /// ∂f/∂x is bounded
+    pub lipschitz: Check,
+    /// the map has values and does not jump
+    pub continuous: Check,
+    /// what the observer needs of the inputs, where the map reads them
+    pub inputs: Option<Check>,
+}
+
+impl Checks {
+    /// Theorem 2.4: Q̄ is regular for small enough inputs whatever the box says, and the
+    /// observer watches it. So the condition on the inputs never refuses.
+    fn fit(&self) -> Fit {
+        let first = fit(&[
+            self.degree.clone(),
+            self.regular.clone(),
+            self.lipschitz.clone(),
+            self.continuous.clone(),
+        ]);
+        match &self.inputs {
+            Some(check) if first == Fit::Fits && check.verdict != Condition::Proved => {
+                Fit::Undecided
+            }
+            _ => first,
+        }
+    }
+
+    pub fn all(&self) -> Vec<Check> {
+        let first = [
+            &self.degree,
+            &self.regular,
+            &self.lipschitz,
+            &self.continuous,
+        ];
+        first.into_iter().chain(&self.inputs).cloned().collect()
+    }
+}
+
+/// The map of a plant with the facts about it.
+pub(super) struct Form {
+    pub variant: Variant,
+    /// (output, order of the derivative) of each row, chain by chain
+    pub rows: Vec<(usize, usize)>,
+    /// μ_i: how many derivatives of each output count, from order 0
+    pub indices: Vec<usize>,
+    /// symbols of u_j, u_j', … on which Φ̄ depends: n − r of them for one output
+    pub U: Vec<Vec<Node>>,
+    /// Q or, for (4.1) and (4.22), Q̄
+    pub Q: Rows,
+    /// Q̄_a, columns in the order of `U`; empty for (3.1)
+    pub Q_a: Rows,
+    pub checks: Checks,
+    pub examination: Examination,
+}
+
+impl Form {
+    /// With μ_i derivatives of output i, Σμ_i = n.
+    pub fn new(
+        extended: &Extended<'_>,
+        map: &Map,
+        indices: Vec<usize>,
+        region: &Region,
+    ) -> Result<Self, DesignError> {
+        let degrees = degrees::degrees(extended, map, &indices, region)?;
+        let U = degrees::input_symbols(extended, &indices, &degrees);
+        let variant = map.asked.unwrap_or_else(|| Variant::suited(&U));
+        let rows: Vec<(usize, usize)> = indices
+            .iter()
+            .enumerate()
+            .flat_map(|(i, &μ)| (0..μ).map(move |k| (i, k)))
+            .collect();
+        let Q: Rows = rows
+            .iter()
+            .map(|&(i, k)| map.gradients[i][k].clone())
+            .collect();
+        let name = "Q(x) is regular on the box (drift-observable)";
+        let regular = conditions::regular(extended, name, &Q, region)?;
+        let (Φ, Q, Q_a) = match variant {
+            Variant::Bounded => {
+                let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
+                (Φ, Q, vec![])
+            }
+            _ => with_inputs(extended, &rows, &U)?,
+        };
+        // the map is followed along the plant: as states, inputs and time move
+        let moving = degrees::with_slopes(extended, &U, region);
+        let continuous = Regularity::of(extended.graph(), &Φ, &moving.symbols(), &moving)?;
+        let reads = U.iter().any(|jet| !jet.is_empty());
+        let inputs = Inputs {
+            extended,
+            U: &U,
+            Q̄: &Q,
+            region,
+        };
+        let checks = Checks {
+            degree: degrees::known(extended, &indices, &degrees),
+            regular,
+            lipschitz: map.lipschitz.clone(),
+            continuous: continuous
+                .check("the map to the outputs' derivatives has values on the box and does not jump"),
+            inputs: match reads {
+                true => Some(inputs.check(variant)?),
+                false => None,
+            },
+        };
+        let every: Vec<usize> = (0..extended.states.len()).collect();
+        let found = family::Form {
+            summary: summary(extended, variant, &rows, &U),
+            chains: vec![names(extended, &every)],
+        };
+        let mut examination = Examination::new(extended, region, NAME, found, checks.all())?;
+        if examination.fit == Fit::DoesNotFit {
+            examination.fit = checks.fit();
+        }
+        Ok(Self {
+            variant,
+            rows,
+            indices,
+            U,
+            Q,
+            Q_a,
+            checks,
+            examination,
+        })
+    }
+}
+
+fn unfit(summary: String) -> Examination {
+    Examination::unfit(NAME, summary, vec![])
+}
+
+/// Why the derivatives of the outputs do not determine the state.
+pub(super) fn blind(
+    extended: &Extended<'_>,
+    indices: &[usize],
+) -> Result<Examination, DesignError> {
+    let n = extended.states.len();
+    let seen = visibility::visible(extended)?;
+    let hidden: Vec<usize> = (0..n).filter(|&i| !seen[i]).collect();
+    let found: usize = indices.iter().sum();
+    let advice = match hidden.is_empty() {
+        true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
+        false => format!(
+            "no measured output feels {}; measure more",
+            names(extended, &hidden).join(", ")
+        ),
+    };
+    Ok(unfit(format!(
+        "with u = 0 the outputs and their derivatives determine {found} of {n} combinations of states: {advice}"
+    )))
+}
+
+/// Φ̄, and Q̄ and Q̄_a of (4.20).
+fn with_inputs(
+    extended: &Extended<'_>,
+    rows: &[(usize, usize)],
+    U: &[Vec<Node>],
+) -> Result<(Vec<Node>, Rows, Rows), DesignError> {
+    let graph = extended.graph();
+    let order = rows.iter().map(|r| r.1).max().unwrap_or(0);
+    let y = output_map::output_derivatives(extended, U, order)?;
+    let Φ̄: Vec<Node> = rows.iter().map(|&(i, k)| y[i][k]).collect();
+    let Q̄ = output_map::jacobian_rows(graph, &Φ̄, &extended.symbols());
+    let Q̄_a = output_map::jacobian_rows(graph, &Φ̄, &U.concat());
+    Ok((Φ̄, Q̄, Q̄_a))
+}
+
+fn summary(
+    extended: &Extended<'_>,
+    variant: Variant,
+    rows: &[(usize, usize)],
+    U: &[Vec<Node>],
+) -> String {
+    let y = |&(i, k): &(usize, usize)| derivative_name(&extended.outputs[i].variable.name, k);
+    let map: Vec<String> = rows.iter().map(y).collect();
+    let u = extended
+        .inputs
+        .iter()
+        .zip(U)
+        .flat_map(|(input, jet)| (0..jet.len()).map(|k| derivative_name(&input.name, k)));
+    let u: Vec<String> = u.collect();
+    let inputs = match u.is_empty() {
+        true => "free of the inputs (r = n)".to_owned(),
+        false => format!("which read {}", u.join(", ")),
+    };
+    format!(
+        "the state from {}, {inputs}; variant {}",
+        map.join(", "),
+        variant.word()
+    )
+}
