@@ -84,6 +84,20 @@ impl Family for BlockTriangular {
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
         LowPower::refuse_unstable(tuning)?;
+        let Settings {
+            correction,
+            low_power,
+            ..
+        } = Settings::read(tuning)?;
+        if low_power && correction == Correction::Lee {
+            return Ok(Examination {
+                family: NAME,
+                fit: Fit::DoesNotFit,
+                summary: low_power::ONLY_CLASSICAL.to_owned(),
+                chains: vec![],
+                checks: vec![],
+            });
+        }
         Ok(match form(extended, tuning)? {
             Ok(Form { examination, .. }) | Err(examination) => examination,
         })
