@@ -187,6 +187,8 @@ fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Desi
                     parameters.push((format!("M{}", output + 1), start.table(&found.M)));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
+                let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
+                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
                 parameters.extend(printed.expressions(&start));
             }
         }
