@@ -81,7 +81,7 @@ fn line(row: &Row) -> Result<String, String> {
             _ => "–".to_owned(),
         },
         rate(row, certified.rate_by_inequality()),
-        designed(row, &text, &certified)?,
+        designed(row, &text)?,
     ];
     Ok(format!("| {} |", cells.join(" | ")))
 }
@@ -111,11 +111,11 @@ fn theorem(row: &Row) -> Result<String, String> {
 }
 
 /// The fastest decay with gains no larger than the study's.
-fn designed(row: &Row, text: &Text, certified: &tool::Certificate) -> Result<String, String> {
+fn designed(row: &Row, text: &Text) -> Result<String, String> {
     if !row.redesign {
         return Ok("–".to_owned());
     }
-    let limit = certified.largest_gain();
+    let limit = tool::largest_gain(&text.scaled(1.0))?;
     let found = tool::certify(&text.with_designed_gain(limit));
     let found = found.ok().and_then(|c| c.rate_by_inequality());
     Ok(match found {

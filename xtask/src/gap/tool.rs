@@ -37,17 +37,6 @@ impl Certificate {
         found["value"].as_f64()
     }
 
-    /// The largest entry of the gain.
-    pub fn largest_gain(&self) -> f64 {
-        let rows = self.0["gain"].as_object();
-        let entries = rows.into_iter().flat_map(|rows| rows.values());
-        let entries = entries
-            .filter_map(Value::as_object)
-            .flat_map(|row| row.values());
-        let sizes = entries.filter_map(Value::as_f64).map(f64::abs);
-        sizes.fold(0.0, f64::max)
-    }
-
     /// The range of a quantity on the box.
     pub fn range(&self, name: &str) -> Option<(f64, f64)> {
         let side = &self.0["certificate"]["box"][name];
@@ -57,6 +46,32 @@ impl Certificate {
 
 /// Exit codes of an answer: yes, and no.
 const ANSWERS: [i32; 2] = [0, 1];
+
+/// The largest entry of the gain of a study given as text; of a gain that moves, of the
+/// constant matrix that it is made of.
+pub fn largest_gain(study: &str) -> Result<f64, String> {
+    let output = lynkeus("design", study, &["--json"])?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let answer: Value = serde_json::from_str(&text)
+        .map_err(|_| String::from_utf8_lossy(&output.stderr).into_owned())?;
+    let rows = answer["gain"].as_object();
+    let rows = rows.into_iter().flat_map(|rows| rows.values());
+    let entries = rows
+        .filter_map(Value::as_object)
+        .flat_map(|row| row.values());
+    let constant = entries.filter_map(Value::as_f64);
+    let parameters = answer["parameters"].as_object();
+    let made_of = |name: &str| name.starts_with("rΔS⁻¹Cᵀ") || name.starts_with("Δ⁻¹K");
+    let lists = parameters
+        .into_iter()
+        .flatten()
+        .filter(|(name, _)| made_of(name))
+        .filter_map(|(_, list)| list.as_str());
+    let moving = lists
+        .flat_map(|list| list.split(", "))
+        .filter_map(|x| x.parse().ok());
+    Ok(constant.chain(moving).map(f64::abs).fold(0.0, f64::max))
+}
 
 /// Certifies a study given as text.
 pub fn certify(study: &str) -> Result<Certificate, String> {

@@ -14,15 +14,17 @@ use crate::peaking::{
 };
 use crate::{Design, DesignError, Tuning, TuningError, prolongation};
 
+/// Why there is no such form of the default observer.
+pub(super) const ONLY_CLASSICAL: &str =
+    "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
+
 pub(super) fn assemble(
     extended: &Extended<'_>,
     tuning: &Tuning,
     form: Form,
 ) -> Result<Design, DesignError> {
     if Settings::read(tuning)?.correction == Correction::Lee {
-        let expected =
-            "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
-        return Err(TuningError::new("correction", expected, "lee").into());
+        return Err(TuningError::new("correction", ONLY_CLASSICAL, "lee").into());
     }
     prolongation::refuse(tuning, "form = \"low-power\"")?;
     let blocks = &form.blocks;

@@ -84,6 +84,20 @@ impl Family for BlockTriangular {
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
         LowPower::refuse_unstable(tuning)?;
+        let Settings {
+            correction,
+            low_power,
+            ..
+        } = Settings::read(tuning)?;
+        if low_power && correction == Correction::Lee {
+            return Ok(Examination {
+                family: NAME,
+                fit: Fit::DoesNotFit,
+                summary: low_power::ONLY_CLASSICAL.to_owned(),
+                chains: vec![],
+                checks: vec![],
+            });
+        }
         Ok(match form(extended, tuning)? {
             Ok(Form { examination, .. }) | Err(examination) => examination,
         })
@@ -173,6 +187,8 @@ fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Desi
                     parameters.push((format!("M{}", output + 1), start.table(&found.M)));
                     parameters.push((format!("L{}", output + 1), start.table(&L)));
                 }
+                let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
+                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
                 parameters.extend(printed.expressions(&start));
             }
         }

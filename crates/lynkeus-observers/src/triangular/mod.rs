@@ -139,7 +139,11 @@ fn assemble(
         };
         match printed.constant(extended) {
             Some(constant) => table.push(constant),
-            None => parameters.extend(printed.expressions(&start)),
+            None => {
+                let constants: Vec<String> = gains.chain(i).iter().map(f64::to_string).collect();
+                parameters.push((format!("rΔS⁻¹Cᵀ{}", i + 1), constants.join(", ")));
+                parameters.extend(printed.expressions(&start));
+            }
         }
     }
     prolong(&copy, tuning, continued(&form), &mut derivatives)?;

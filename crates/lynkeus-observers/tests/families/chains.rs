@@ -8,7 +8,7 @@ use lynkeus_observers::{
     Certificate, Family, Fit, Tuning, Value, Verdict, block_triangular::BlockTriangular,
     triangular::Triangular,
 };
-use lynkeus_structure::Condition;
+use lynkeus_structure::{Condition, Extended, Sensors};
 
 fn numbers(x: &[f64]) -> Value {
     Value::List(x.iter().map(|&x| Value::Number(x)).collect())
@@ -199,6 +199,22 @@ fn more_than_seven_outputs_are_arranged() {
 const NEGATIVE: &str = "model Neg input Real u(min=-1,max=1);
   Real a(min=-2,max=2,start=0.5); Real b(min=-2,max=2,start=0.1); output Real y = a;
   equation der(a) = -2*b + 0.1*a*u; der(b) = 2*a - b + u; end Neg;";
+
+/// The low-power form divides by −2: it fits. Observer (7) has no such form.
+#[test]
+fn the_low_power_form_knows_the_sign() {
+    let plant = plant(NEGATIVE);
+    let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+    let form = ("form", Value::Text("low-power".into()));
+    let fit = |keys: &[(&str, Value)]| {
+        BlockTriangular
+            .examine(&extended, &with(&[5.0], keys))
+            .unwrap()
+            .fit
+    };
+    assert_eq!(fit(std::slice::from_ref(&form)), Fit::DoesNotFit);
+    assert_eq!(fit(&[form, classical()]), Fit::Fits);
+}
 
 /// s² + 2s − 2 has the zero √3 − 1: the classical K does not know the sign.
 #[test]
