@@ -10,6 +10,8 @@
 //! (Krawczyk 1969), in which as many coordinates as there are equations move and the
 //! others, inputs among them, are numbers.
 
+use std::cmp::Ordering;
+
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_gain::decay::is_unstable;
@@ -359,7 +361,7 @@ fn pivots(mut J: DMatrix<f64>) -> Option<Vec<usize>> {
             size(a).total_cmp(&size(b))
         })?;
         let lead = J[(row, column)];
-        if !(lead.abs() > RANK * size) {
+        if lead.abs().partial_cmp(&(RANK * size)) != Some(Ordering::Greater) {
             return None;
         }
         rows.swap_remove(k);

