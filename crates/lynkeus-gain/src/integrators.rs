@@ -126,12 +126,12 @@ mod tests {
         }
     }
 
-    /// Eigenvalues of Pascal's matrix of ten rows to twenty digits (mpmath, 40 digits):
+    /// Eigenvalues of Pascal's matrix of ten rows (mpmath, 40 digits):
     /// a solver in double precision has half of the digits of the smallest one.
     #[test]
     fn the_eigenvalues_are_bounds() {
         let chain = Chain::new(10);
-        let (largest, smallest) = (64460.88501701744511, 1.5513283749300115028e-5);
+        let (largest, smallest) = (64460.88501701745, 1.551_328_374_930_011_5e-5);
         assert!(chain.largest >= largest && chain.largest < largest * (1.0 + 1e-11));
         assert!(chain.smallest <= smallest && chain.smallest > smallest * (1.0 - 1e-11));
     }
