@@ -106,7 +106,9 @@ fn work(
             Ok(judgement) => {
                 let first = judgement.violations.into_iter().next();
                 let found = first.map(|first| {
-                    let common = report.lock().is_ok_and(|r| r.is_common(kind, &first.flaw));
+                    // what is printed is told by the observer at one point, however large
+                    let common = first.flaw == Flaw::Gain
+                        || report.lock().is_ok_and(|r| r.is_common(kind, &first.flaw));
                     match common {
                         true => (judgement.case, first),
                         false => {

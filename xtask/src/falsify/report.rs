@@ -132,7 +132,7 @@ impl Report {
     /// Whether a flaw of a kind of case has been made small often enough.
     pub fn is_common(&self, kind: Kind, flaw: &Flaw) -> bool {
         let alike = |found: &&Found| found.case.kind == kind && found.violation.flaw == *flaw;
-        self.found.iter().filter(alike).count() >= 6
+        self.found.iter().filter(alike).count() >= 3
     }
 
     pub fn is_enough(&self, options: &Options) -> bool {

@@ -6,7 +6,7 @@ use super::judge::{Desk, Effort, Violation, judge};
 use super::numbers::Numbers;
 
 /// Cases tried at most.
-const TRIALS: usize = 150;
+const TRIALS: usize = 60;
 
 /// The smallest case found with a violation of the same kind.
 pub fn smallest(case: &Case, desk: &Desk, first: &Violation, effort: Effort) -> (Case, Violation) {
