@@ -3,8 +3,8 @@
 use crate::{Binary, Graph, Node, Unary, linear, real};
 
 /// A set of values closed under every operation of a graph. A tape evaluated
-/// over an algebra gives bounds, Taylor coefficients, lanes or new nodes with
-/// the one interpreter that also gives numbers.
+/// over an algebra gives bounds, Taylor coefficients or new nodes with the one
+/// interpreter that also gives numbers.
 pub trait Algebra {
     /// The values.
     type Value: Clone;
@@ -20,6 +20,45 @@ pub trait Algebra {
     fn select(&self, condition: &Self::Value, x: &Self::Value, y: &Self::Value) -> Self::Value;
     /// (x with A x = b, reciprocal condition estimate of A); `a` is n×n row by row.
     fn solve(&self, a: &[Self::Value], b: &[Self::Value]) -> (Vec<Self::Value>, Self::Value);
+    /// [`Algebra::solve`] where `b` becomes x and `a` may be consumed; returns the reciprocal
+    /// condition estimate.
+    fn solve_in_place(&self, a: &mut [Self::Value], b: &mut [Self::Value]) -> Self::Value {
+        let (x, rcond) = self.solve(a, b);
+        b.clone_from_slice(&x);
+        rcond
+    }
+}
+
+impl<A: Algebra> Algebra for &A {
+    type Value = A::Value;
+
+    fn constant(&self, value: f64) -> A::Value {
+        (**self).constant(value)
+    }
+
+    fn unary(&self, op: Unary, x: &A::Value) -> A::Value {
+        (**self).unary(op, x)
+    }
+
+    fn powi(&self, x: &A::Value, n: i32) -> A::Value {
+        (**self).powi(x, n)
+    }
+
+    fn binary(&self, op: Binary, x: &A::Value, y: &A::Value) -> A::Value {
+        (**self).binary(op, x, y)
+    }
+
+    fn select(&self, condition: &A::Value, x: &A::Value, y: &A::Value) -> A::Value {
+        (**self).select(condition, x, y)
+    }
+
+    fn solve(&self, a: &[A::Value], b: &[A::Value]) -> (Vec<A::Value>, A::Value) {
+        (**self).solve(a, b)
+    }
+
+    fn solve_in_place(&self, a: &mut [A::Value], b: &mut [A::Value]) -> A::Value {
+        (**self).solve_in_place(a, b)
+    }
 }
 
 /// The numbers: `f64`.
@@ -40,7 +79,8 @@ impl Algebra for Reals {
 
     #[inline(always)]
     fn powi(&self, x: &f64, n: i32) -> f64 {
-        x.powi(n)
+        // the square is the power that models are made of
+        if n == 2 { x * x } else { x.powi(n) }
     }
 
     #[inline(always)]
@@ -57,6 +97,10 @@ impl Algebra for Reals {
         let mut x = b.to_vec();
         let rcond = linear::solve(&mut a.to_vec(), &mut x);
         (x, rcond)
+    }
+
+    fn solve_in_place(&self, a: &mut [f64], b: &mut [f64]) -> f64 {
+        linear::solve(a, b)
     }
 }
 

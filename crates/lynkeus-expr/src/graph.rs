@@ -2,7 +2,9 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::hash::Hash;
 
+use crate::facts::Facts;
 use crate::{Binary, Expr, Op, Unary, real};
 
 /// A node of a [`Graph`]: cheap to copy, meaningful only with its graph.
@@ -17,12 +19,29 @@ impl Node {
     }
 }
 
-/// A linear system A x = b of a [`Op::Solve`] node.
+/// The linear system A x = b of an [`Op::Solve`] node.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub(crate) struct LinearSystem {
+pub struct LinearSystem {
     /// A row by row (n²), then b (n)
-    pub arguments: Vec<Node>,
-    pub n: usize,
+    arguments: Vec<Node>,
+    n: usize,
+}
+
+impl LinearSystem {
+    /// Number of unknowns n.
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
+    /// A, n×n, row by row.
+    pub fn matrix(&self) -> &[Node] {
+        &self.arguments[..self.n * self.n]
+    }
+
+    /// b, n entries.
+    pub fn right(&self) -> &[Node] {
+        &self.arguments[self.n * self.n..]
+    }
 }
 
 /// The result of [`Graph::solve`].
@@ -36,7 +55,7 @@ pub struct Solution {
     pub rcond: Node,
 }
 
-#[derive(PartialEq, Eq, Hash)]
+#[derive(Clone, PartialEq, Eq, Hash)]
 enum Key {
     Constant(u64),
     Symbol(u32),
@@ -47,7 +66,7 @@ enum Key {
     Entry(Node, u32),
 }
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Inner {
     ops: Vec<Op>,
     known: HashMap<Key, Node>,
@@ -81,9 +100,13 @@ impl Inner {
 /// let x = g.symbol("x");
 /// assert_eq!(((x + 1.0) * x).node(), (x * (1.0 + x)).node());
 /// ```
-#[derive(Default)]
+///
+/// A graph is `Send` and not `Sync`: every thread works on its own clone. The nodes of a graph
+/// mean the same in its clones; those that are built after the cloning do not.
+#[derive(Clone, Default)]
 pub struct Graph {
     inner: RefCell<Inner>,
+    facts: RefCell<Facts>,
 }
 
 impl std::fmt::Debug for Graph {
@@ -170,9 +193,31 @@ impl Graph {
         }
     }
 
-    /// The linear system of a `Solve` node: (A row by row then b, n).
-    pub(crate) fn system(&self, index: u32) -> LinearSystem {
-        self.inner.borrow().systems[index as usize].clone()
+    /// The linear system, where the node is an [`Op::Solve`].
+    pub fn system(&self, node: Node) -> Option<LinearSystem> {
+        let Op::Solve(index) = self.op(node) else {
+            return None;
+        };
+        self.inner.borrow().systems.get(index as usize).cloned()
+    }
+
+    /// What was [noted](Graph::note) about a question that names nodes of this graph.
+    pub fn noted<K, V>(&self, question: &K) -> Option<V>
+    where
+        K: Eq + Hash + Send + Sync + 'static,
+        V: Clone + Send + Sync + 'static,
+    {
+        self.facts.borrow().get(question)
+    }
+
+    /// Keeps the answer to a question about nodes, such as a range on a box, with the graph
+    /// and its clones. Nodes never change, so that it stays true.
+    pub fn note<K, V>(&self, question: K, answer: V)
+    where
+        K: Clone + Eq + Hash + Send + Sync + 'static,
+        V: Clone + Send + Sync + 'static,
+    {
+        self.facts.borrow_mut().insert(question, answer);
     }
 
     /// A function of one node.
@@ -372,6 +417,39 @@ mod tests {
             assert_eq!(same.node(), x.node());
         }
         assert_eq!((x * -1.0).node(), (-x).node());
+    }
+
+    #[test]
+    fn a_clone_in_another_thread_knows_the_same_nodes_and_facts() {
+        let g = Graph::new();
+        let sum = (g.symbol("x") + 1.0).node();
+        g.note(sum, 2.5_f64);
+        let copy = g.clone();
+        let built = std::thread::spawn(move || {
+            let again = (copy.symbol("x") + 1.0).node();
+            let beyond = (copy.symbol("x") + 2.0).node();
+            copy.note(beyond, 3.5_f64);
+            (again, copy.noted::<Node, f64>(&again), copy.len())
+        });
+        let (again, fact, length) = built.join().unwrap();
+        assert_eq!((again, fact), (sum, Some(2.5)));
+        assert!(length > g.len());
+        let other = (g.symbol("x") * 7.0).node();
+        assert_eq!(g.noted::<Node, f64>(&other), None);
+    }
+
+    #[test]
+    fn a_system_tells_its_matrix() {
+        let g = Graph::new();
+        let [a, b, c] = ["a", "b", "c"].map(|name| g.symbol(name).node());
+        let x = g.solve(&[a, b, c, a], &[b, c]).x[0];
+        let Op::Entry(solve, 0) = g.op(x) else {
+            panic!()
+        };
+        let system = g.system(solve).unwrap();
+        assert_eq!((system.size(), system.right()), (2, &[b, c][..]));
+        assert_eq!(system.matrix(), [a, b, c, a]);
+        assert_eq!(g.system(x), None);
     }
 
     #[test]

@@ -151,12 +151,10 @@ fn solve_tangents(
     node: Node,
     tangents: &HashMap<Node, Tangent>,
 ) -> BTreeMap<usize, Vec<Node>> {
-    let Op::Solve(index) = build.graph.op(node) else {
+    let Some(system) = build.graph.system(node) else {
         return BTreeMap::new();
     };
-    let system = build.graph.system(index);
-    let n = system.n;
-    let (a, b) = system.arguments.split_at(n * n);
+    let (n, a, b) = (system.size(), system.matrix(), system.right());
     let mut right: BTreeMap<usize, BTreeMap<usize, Node>> = BTreeMap::new();
     for (i, b) in b.iter().enumerate() {
         for (&column, &db) in tangents.get(b).into_iter().flatten() {
@@ -246,22 +244,21 @@ fn solve_adjoints(
     results: &BTreeMap<u32, Node>,
     adjoints: &mut BTreeMap<Node, Node>,
 ) {
-    let Op::Solve(index) = build.graph.op(node) else {
+    let Some(system) = build.graph.system(node) else {
         return;
     };
-    let system = build.graph.system(index);
-    let n = system.n;
+    let n = system.size();
     let bar: Vec<Node> = (0..n as u32)
         .map(|i| results.get(&i).copied().unwrap_or_else(|| build.zero()))
         .collect();
     let transposed: Vec<Node> = (0..n * n)
-        .map(|k| system.arguments[k % n * n + k / n])
+        .map(|k| system.matrix()[k % n * n + k / n])
         .collect();
     let λ = build.graph.solve(&transposed, &bar).x;
     for (i, &λi) in λ.iter().enumerate() {
-        build.add_to(adjoints, system.arguments[n * n + i], λi);
+        build.add_to(adjoints, system.right()[i], λi);
         for j in 0..n {
-            let entry = system.arguments[i * n + j];
+            let entry = system.matrix()[i * n + j];
             let term = build.times(λi, build.graph.entry(node, j as u32));
             let sum = build.minus(adjoints.get(&entry).copied(), term);
             adjoints.insert(entry, sum);

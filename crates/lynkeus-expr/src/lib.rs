@@ -2,7 +2,7 @@
 //!
 //! A [`Graph`] holds expressions, each distinct one once. A [`Tape`] is a graph
 //! compiled to straight-line code; it is evaluated over any [`Algebra`]: numbers,
-//! lanes of numbers, intervals, Taylor series, and the nodes of a graph itself.
+//! intervals, Taylor series, and the nodes of a graph itself.
 //!
 //! ```
 //! use lynkeus_expr::{Graph, Tape, jacobian};
@@ -26,25 +26,24 @@
 
 mod algebra;
 mod expr;
+mod facts;
 pub mod flow;
 mod graph;
 pub mod interval;
 pub mod jacobian;
 mod jet;
-mod lanes;
 mod linear;
 mod op;
 mod partials;
 pub mod real;
+mod rebuild;
 mod render;
-mod substitute;
 mod tape;
 
 pub use algebra::{Algebra, Nodes, Reals};
 pub use expr::Expr;
-pub use graph::{Graph, Node, Solution};
+pub use graph::{Graph, LinearSystem, Node, Solution};
 pub use interval::Interval;
 pub use jet::{Jet, Jets};
-pub use lanes::Lanes;
 pub use op::{Binary, Op, Unary};
 pub use tape::{Evaluator, MissingInput, Tape};

@@ -8,14 +8,18 @@ const RANK_TOLERANCE: f64 = 1e-13;
 /// Returns the ratio of the smallest to the largest pivot, an estimate of
 /// 1/cond(A). Where it is below [`RANK_TOLERANCE`] the components along the
 /// lost directions are set to zero, so that x stays bounded.
+///
+/// Nothing is allocated: what is needed later stands in `a` where zeros would.
 pub(crate) fn solve(a: &mut [f64], b: &mut [f64]) -> f64 {
     let n = b.len();
-    let mut order: Vec<usize> = (0..n).collect();
     for k in 0..n {
         let pivot = largest_column(a, n, k);
         swap_columns(a, n, k, pivot);
-        order.swap(k, pivot);
         reflect(a, b, n, k);
+        if k + 1 < n {
+            // the last column has no choice of pivot, and no place for it
+            a[(k + 1) * n + k] = pivot as f64;
+        }
     }
     let largest = if n == 0 { 1.0 } else { a[0].abs() };
     let rank = (0..n)
@@ -33,9 +37,8 @@ pub(crate) fn solve(a: &mut [f64], b: &mut [f64]) -> f64 {
         let tail: f64 = (k + 1..n).map(|j| a[k * n + j] * b[j]).sum();
         b[k] = (b[k] - tail) / a[k * n + k];
     }
-    let permuted = b.to_vec();
-    for (k, &column) in order.iter().enumerate() {
-        b[column] = permuted[k];
+    for k in (1..n).rev() {
+        b.swap(k - 1, a[k * n + k - 1] as usize);
     }
     let smallest = if n == 0 { 1.0 } else { a[n * n - 1].abs() };
     if largest > 0.0 {
@@ -48,7 +51,14 @@ pub(crate) fn solve(a: &mut [f64], b: &mut [f64]) -> f64 {
 /// The column of the remaining block with the largest norm.
 fn largest_column(a: &[f64], n: usize, k: usize) -> usize {
     let norm = |j: usize| (k..n).map(|i| a[i * n + j].powi(2)).sum::<f64>();
-    (k..n).fold(k, |best, j| if norm(j) > norm(best) { j } else { best })
+    let mut best = (k, norm(k));
+    for j in k + 1..n {
+        let norm = norm(j);
+        if norm > best.1 {
+            best = (j, norm);
+        }
+    }
+    best.0
 }
 
 fn swap_columns(a: &mut [f64], n: usize, j: usize, k: usize) {
@@ -59,7 +69,7 @@ fn swap_columns(a: &mut [f64], n: usize, j: usize, k: usize) {
     }
 }
 
-/// Householder reflection that zeroes column k below the diagonal.
+/// Householder reflection that zeroes column k below the diagonal; its vector is left there.
 fn reflect(a: &mut [f64], b: &mut [f64], n: usize, k: usize) {
     let scale = (k..n).fold(0.0, |m: f64, i| m.max(a[i * n + k].abs()));
     if scale == 0.0 {
@@ -70,22 +80,33 @@ fn reflect(a: &mut [f64], b: &mut [f64], n: usize, k: usize) {
             .map(|i| (a[i * n + k] / scale).powi(2))
             .sum::<f64>()
             .sqrt();
-    let alpha = if a[k * n + k] > 0.0 { -norm } else { norm };
-    let mut v: Vec<f64> = (k..n).map(|i| a[i * n + k] / scale).collect();
-    v[0] -= alpha / scale;
-    let vv: f64 = v.iter().map(|x| x * x).sum();
+    let corner = a[k * n + k];
+    let alpha = if corner > 0.0 { -norm } else { norm };
+    let first = corner / scale - alpha / scale;
+    let v = |a: &[f64], i: usize| if i == k { first } else { a[i * n + k] };
+    // the column itself first: its place below the diagonal then takes the vector
+    let mut own = first * corner;
+    let mut vv = first * first;
+    for i in k + 1..n {
+        let entry = a[i * n + k];
+        let scaled = entry / scale;
+        own += scaled * entry;
+        vv += scaled * scaled;
+        a[i * n + k] = scaled;
+    }
     if vv == 0.0 {
         return;
     }
-    for j in k..n {
-        let dot: f64 = (k..n).map(|i| v[i - k] * a[i * n + j]).sum();
+    a[k * n + k] -= 2.0 * own / vv * first;
+    for j in k + 1..n {
+        let dot: f64 = (k..n).map(|i| v(a, i) * a[i * n + j]).sum();
         for i in k..n {
-            a[i * n + j] -= 2.0 * dot / vv * v[i - k];
+            a[i * n + j] -= 2.0 * dot / vv * v(a, i);
         }
     }
-    let dot: f64 = (k..n).map(|i| v[i - k] * b[i]).sum();
-    for i in k..n {
-        b[i] -= 2.0 * dot / vv * v[i - k];
+    let dot: f64 = (k..n).map(|i| v(a, i) * b[i]).sum();
+    for (i, b) in b.iter_mut().enumerate().skip(k) {
+        *b -= 2.0 * dot / vv * v(a, i);
     }
 }
 

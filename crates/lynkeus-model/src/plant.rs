@@ -13,7 +13,7 @@ use crate::{Diagnostic, LoadError, elaborate, ode_model};
 ///
 /// `derivatives`, `outputs` and `algebraics` are expressions over the symbols `time`,
 /// the states and the inputs, and over the parameters where these stay symbolic.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Plant {
     /// name of the model
     pub name: String,

@@ -104,11 +104,10 @@ impl<'g> Enclosure<'g> {
 
     /// |x_i| ≤ Σ_j |(A⁻¹)_ij| |b_j| for an entry of the solution of A x = b.
     fn of_solution(&self, node: Node, system: Node, i: usize) -> Result<f64, MissingInput> {
-        let arguments = self.graph.arguments(system);
-        // n² + n of them
-        let n = (0..arguments.len()).find(|n| n * (n + 1) == arguments.len());
-        let n = n.unwrap_or(0);
-        let (A, b) = arguments.split_at(n * n);
+        let Some(system) = self.graph.system(system) else {
+            return Ok(f64::INFINITY);
+        };
+        let (n, A, b) = (system.size(), system.matrix(), system.right());
         let number = |one: bool| self.graph.constant(f64::from(u8::from(one))).node();
         let mut sum = 0.0;
         for (j, &b) in b.iter().enumerate() {

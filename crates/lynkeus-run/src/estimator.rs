@@ -36,8 +36,7 @@ impl Default for EstimatorSettings {
 
 /// An observer that takes one sample after the other, live or from a log.
 ///
-/// With [`Step::Substeps`] or [`Step::AtMost`] a push does not allocate after the
-/// second (linear systems in the observer's equations apart).
+/// With [`Step::Substeps`] or [`Step::AtMost`] a push does not allocate after the second.
 ///
 /// ```
 /// use lynkeus_expr::Graph;

@@ -95,7 +95,6 @@ mod spectral;
 mod switches;
 mod system;
 mod trajectory;
-mod transplant;
 
 pub use dynamics::{Dynamics, Function};
 pub use error::{Error, Interrupted};

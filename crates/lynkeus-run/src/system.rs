@@ -6,7 +6,6 @@ use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
 use crate::error::state_text;
 use crate::switches::Switches;
-use crate::transplant::transplant;
 use crate::{Dynamics, Error};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
@@ -71,7 +70,7 @@ impl System {
             .chain(outputs.iter().map(|(_, node)| *node))
             .collect();
         let all: Vec<Node> = symbols.iter().chain(&roots).copied().collect();
-        let image = transplant(graph, &all, &own);
+        let image = own.copied(graph, &all);
         let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let extracted = Switches::extract(&own, image[&time], &roots)?;
@@ -161,8 +160,7 @@ impl System {
     }
 }
 
-/// Evaluates one [`System`] without allocating (the arguments of linear systems
-/// in its code apart); holds the values of its signals.
+/// Evaluates one [`System`] without allocating; holds the values of its signals.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
     system: System,

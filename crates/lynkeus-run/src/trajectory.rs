@@ -1,20 +1,20 @@
 //! Tables of values over time.
 
-/// Named columns over time, row by row.
+/// Named columns over time; runs add their rows, tables and pictures take the columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     names: Vec<String>,
     times: Vec<f64>,
-    values: Vec<f64>,
+    columns: Vec<Vec<f64>>,
 }
 
 impl Trajectory {
     /// An empty table with these columns beside time.
     pub fn new(names: Vec<String>) -> Self {
         Self {
+            columns: vec![vec![]; names.len()],
             names,
             times: vec![],
-            values: vec![],
         }
     }
 
@@ -25,7 +25,9 @@ impl Trajectory {
     pub fn push(&mut self, time: f64, values: &[f64]) {
         assert_eq!(values.len(), self.names.len(), "one value per column");
         self.times.push(time);
-        self.values.extend_from_slice(values);
+        for (column, value) in self.columns.iter_mut().zip(values) {
+            column.push(*value);
+        }
     }
 
     /// Names of the columns, without time.
@@ -49,21 +51,21 @@ impl Trajectory {
     }
 
     /// Time and values of row `index`.
-    pub fn row(&self, index: usize) -> Option<(f64, &[f64])> {
-        let width = self.names.len();
-        let values = self.values.get(index * width..(index + 1) * width)?;
-        Some((*self.times.get(index)?, values))
+    pub fn row(&self, index: usize) -> Option<(f64, Vec<f64>)> {
+        let time = *self.times.get(index)?;
+        let values = self.columns.iter().map(|column| column[index]);
+        Some((time, values.collect()))
     }
 
     /// Rows in order of time.
-    pub fn rows(&self) -> impl Iterator<Item = (f64, &[f64])> + '_ {
+    pub fn rows(&self) -> impl Iterator<Item = (f64, Vec<f64>)> + '_ {
         (0..self.len()).filter_map(|index| self.row(index))
     }
 
     /// The values of one column.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let place = self.names.iter().position(|n| n == name)?;
-        Some(self.rows().map(|(_, row)| row[place]).collect())
+        Some(self.columns[place].clone())
     }
 }
 
@@ -78,7 +80,7 @@ mod tests {
         table.push(0.5, &[3.0, 4.0]);
         assert_eq!(table.column("b"), Some(vec![2.0, 4.0]));
         assert_eq!(table.column("c"), None);
-        assert_eq!(table.row(1), Some((0.5, &[3.0, 4.0][..])));
+        assert_eq!(table.row(1), Some((0.5, vec![3.0, 4.0])));
         assert_eq!(table.row(2), None);
     }
 

@@ -105,7 +105,7 @@ pub struct Measurement {
 /// v' = 0 (the true v' is an unknown bounded disturbance of that equation, as for
 /// the feed composition in Hammouri, Targui and Armanet, section 3), and with
 /// its disturbances set to zero.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Extended<'p> {
     /// the plant
     pub plant: &'p Plant,

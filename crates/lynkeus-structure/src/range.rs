@@ -50,11 +50,59 @@ pub fn range_within(
     budget: usize,
 ) -> Result<Range, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
+    let question = Question::new(node, &region, budget);
+    if let Some(known) = graph.noted(&question) {
+        return Ok(known);
+    }
+    let found = search(graph, node, &region, budget)?;
+    graph.note(question, found.clone());
+    Ok(found)
+}
+
+/// What a range depends on; the graph keeps the answers.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Question {
+    node: Node,
+    sides: Vec<Side>,
+    budget: usize,
+}
+
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Side {
+    name: String,
+    symbol: Node,
+    /// bits of min and max
+    ends: [u64; 2],
+    integer: bool,
+}
+
+impl Question {
+    fn new(node: Node, region: &Region, budget: usize) -> Self {
+        let side = |side: &Dimension| Side {
+            name: side.name.clone(),
+            symbol: side.symbol,
+            ends: [side.min, side.max].map(f64::to_bits),
+            integer: side.integer,
+        };
+        Self {
+            node,
+            sides: region.dimensions.iter().map(side).collect(),
+            budget,
+        }
+    }
+}
+
+fn search(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    budget: usize,
+) -> Result<Range, MissingInput> {
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut search = Search {
         evaluator: tape.evaluator(),
-        tape,
-        region: &region,
+        bounds: tape.evaluator_in(Intervals),
+        region,
         budget,
     };
     let lower = search.minimum(1.0);
@@ -103,7 +151,7 @@ struct Minimum {
 }
 
 struct Search<'a> {
-    tape: Tape,
+    bounds: Evaluator<Intervals>,
     evaluator: Evaluator,
     region: &'a Region,
     budget: usize,
@@ -144,8 +192,10 @@ impl Search<'_> {
     }
 
     /// (lower bound of sign·f on the cell, f is defined on all of it)
-    fn bound(&self, cell: &Cell, sign: f64) -> (f64, bool) {
-        let value = &self.tape.eval_in(&Intervals, cell)[0];
+    fn bound(&mut self, cell: &Cell, sign: f64) -> (f64, bool) {
+        let mut values = [Interval::ENTIRE];
+        self.bounds.eval(cell, &mut values);
+        let [value] = values;
         if value.is_empty() {
             return (f64::INFINITY, false);
         }

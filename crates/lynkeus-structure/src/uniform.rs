@@ -130,8 +130,11 @@ fn map_determinant(extended: &Extended<'_>) -> Result<Option<Node>, MissingInput
 fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Part>, f64), MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
-    let may_vanish = |cell: &Cell| {
-        let value = tape.eval_in(&Intervals, cell)[0];
+    let mut bounds = tape.evaluator_in(Intervals);
+    let mut may_vanish = |cell: &Cell| {
+        let mut values = [lynkeus_expr::Interval::ENTIRE];
+        bounds.eval(cell, &mut values);
+        let [value] = values;
         value.contains_zero() || !value.is_defined()
     };
     let mut open = vec![(region.cell(), 1.0_f64)];

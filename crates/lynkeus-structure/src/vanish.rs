@@ -27,7 +27,12 @@ pub enum Vanishing {
 pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Vanishing, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
-    let value = |cell: &[Interval]| tape.eval_in(&Intervals, cell)[0];
+    let mut bounds = tape.evaluator_in(Intervals);
+    let mut value = |cell: &[Interval]| {
+        let mut values = [Interval::ENTIRE];
+        bounds.eval(cell, &mut values);
+        values[0]
+    };
     let whole = region.cell();
     let enclosure = value(&whole);
     if enclosure.lo() == 0.0 && enclosure.hi() == 0.0 {

@@ -6,7 +6,7 @@ use crate::recipe::{INPUTS, Style, compute, follow, recipe, symbols, without_sys
 use crate::sample::member;
 use astro_float::BigFloat;
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Graph, Interval, Lanes, Node, Nodes, Op, Reals, Tape, jacobian};
+use lynkeus_expr::{Algebra, Graph, Interval, Node, Nodes, Op, Reals, Tape, jacobian};
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -114,16 +114,19 @@ proptest! {
     }
 
     #[test]
-    fn lanes_equal_numbers_bit_for_bit(recipe in recipe(STEPS), x in prop::array::uniform3(inputs())) {
+    fn an_evaluator_keeps_nothing_of_earlier_points(recipe in recipe(STEPS), x in prop::array::uniform3(inputs())) {
         let graph = Graph::new();
         let nodes = follow(&recipe, &graph, Style::Wild);
         let tape = Tape::new(&graph, &symbols(&graph), &nodes).expect("symbols are inputs");
-        let packed: Vec<[f64; 3]> = (0..INPUTS).map(|i| x.each_ref().map(|x| x[i])).collect();
-        let found = tape.eval_in(&Lanes::<3>, &packed);
-        for (lane, x) in x.iter().enumerate() {
-            for (found, expected) in found.iter().zip(evaluate(&graph, &nodes, x)) {
-                prop_assert!(same(found[lane], expected), "{found:?} for {expected} in {lane}");
-            }
+        let (mut reused, mut bounds) = (tape.evaluator(), tape.evaluator_in(Intervals));
+        let (mut found, mut enclosures) = (vec![0.0; nodes.len()], vec![Interval::ZERO; nodes.len()]);
+        for x in &x {
+            reused.eval(x, &mut found);
+            let fresh = tape.eval_in(&Reals, x);
+            prop_assert!(found.iter().zip(&fresh).all(|(a, b)| same(*a, *b)), "{found:?} for {fresh:?}");
+            let boxed: Vec<Interval> = x.iter().map(|&x| Interval::point(x)).collect();
+            bounds.eval(&boxed, &mut enclosures);
+            prop_assert_eq!(&enclosures, &tape.eval_in(&Intervals, &boxed));
         }
     }
 

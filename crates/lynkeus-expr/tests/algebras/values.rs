@@ -1,10 +1,10 @@
-//! Every operation of the table, as a tape over numbers, lanes, intervals and with hundreds of bits.
+//! Every operation of the table, as a tape over numbers, intervals and with hundreds of bits.
 
 use crate::exact::{Exact, error, holds};
 use crate::operations::{Case, cases};
 use crate::sample::member;
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Algebra, Interval, Lanes};
+use lynkeus_expr::{Algebra, Interval};
 use proptest::prelude::*;
 
 const SPACE: Exact = Exact(192);
@@ -60,23 +60,6 @@ proptest! {
             }
             let regular = !case.name.starts_with("solve");
             prop_assert!(found.is_defined() || !regular, "{} on {boxed:?}", case.name);
-        }
-    }
-
-    #[test]
-    fn lanes_equal_numbers_bit_for_bit(lanes in prop::array::uniform4(places())) {
-        for case in cases() {
-            let tape = case.tape();
-            let x = lanes.each_ref().map(|places| point(&case, places));
-            let packed: Vec<[f64; 4]> = (0..case.domain.len())
-                .map(|i| x.each_ref().map(|x| x[i]))
-                .collect();
-            let found = tape.eval_in(&Lanes::<4>, &packed)[0];
-            for (x, found) in x.iter().zip(found) {
-                let mut expected = [0.0];
-                tape.evaluator().eval(x, &mut expected);
-                prop_assert_eq!(expected[0].to_bits(), found.to_bits(), "{}", case.name);
-            }
         }
     }
 }

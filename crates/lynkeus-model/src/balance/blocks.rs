@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use lynkeus_expr::{Binary, Node, Op, Unary};
+use lynkeus_expr::{Binary, Node, Unary};
 
 use super::incidence::{Incidence, arguments};
 use super::linear::{Form, Linear};
@@ -151,14 +151,14 @@ impl<'a> Solver<'a> {
                 stack.pop();
                 continue;
             }
-            let op = self.system.graph.op(node);
-            let open = arguments(op).filter(|argument| !self.replaced.contains_key(argument));
+            let open = arguments(self.system.graph.op(node))
+                .filter(|argument| !self.replaced.contains_key(argument));
             let before = stack.len();
             if self.incidence.contains(node) {
                 stack.extend(open);
             }
             if stack.len() == before {
-                let new = self.rebuilt(node, op);
+                let new = self.rebuilt(node);
                 self.replaced.insert(node, new);
                 stack.pop();
             }
@@ -166,19 +166,15 @@ impl<'a> Solver<'a> {
         self.replaced.get(&root).copied().unwrap_or(root)
     }
 
-    fn rebuilt(&self, node: Node, op: Op) -> Node {
+    fn rebuilt(&self, node: Node) -> Node {
         let graph = self.system.graph;
         let new = |argument: Node| self.replaced.get(&argument).copied().unwrap_or(argument);
         if !self.incidence.contains(node) {
             return node;
         }
-        match op {
-            Op::Symbol(_) => self.solution.get(&node).copied().unwrap_or(node),
-            Op::Unary(unary, a) => graph.unary(unary, new(a)),
-            Op::Powi(a, n) => graph.powi(new(a), n),
-            Op::Binary(binary, a, b) => graph.binary(binary, new(a), new(b)),
-            Op::Select(c, a, b) => graph.select(new(c), new(a), new(b)),
-            Op::Constant(_) | Op::Solve(_) | Op::Entry(..) => node,
+        match self.solution.get(&node) {
+            Some(&value) => value,
+            None => graph.rebuilt(graph, node, new).unwrap_or(node),
         }
     }
 

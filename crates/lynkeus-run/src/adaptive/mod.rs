@@ -1,6 +1,7 @@
 //! Error-controlled integration that chooses between an explicit and an
 //! implicit method.
 
+mod dop853;
 mod explicit;
 mod implicit;
 mod radau;
@@ -8,6 +9,7 @@ mod radau;
 use crate::error::state_text;
 use crate::{Dynamics, Error, Tolerances, spectral_radius};
 
+use dop853::Dop853;
 use radau::Radau;
 
 /// Which methods may be used.
@@ -36,6 +38,7 @@ pub(crate) struct Adaptive {
     choice: Choice,
     tolerances: Tolerances,
     implicit: bool,
+    explicit: Option<Box<Dop853>>,
     radau: Option<Radau>,
     pace: Pace,
 }
@@ -77,6 +80,7 @@ impl Adaptive {
             choice,
             tolerances,
             implicit: choice == Choice::Stiff,
+            explicit: None,
             radau: None,
             pace: Pace::default(),
         }
@@ -98,8 +102,8 @@ impl Adaptive {
             steps_left: self.tolerances.budget,
         };
         loop {
-            leg.check_start(f)?;
             let ran = if self.implicit {
+                leg.check_start(f)?;
                 self.run_implicit(f, &mut leg)?
             } else {
                 self.run_explicit(f, &mut leg)?

@@ -265,19 +265,16 @@ impl Builder<'_> {
 
     /// Gaussian elimination; pivots are generic, so that only structural zeros matter.
     fn solve(&mut self, node: Node) -> Result<(), Unsupported> {
-        let arguments: Vec<usize> = self
-            .graph
-            .arguments(node)
-            .into_iter()
-            .map(|a| self.slots[&a])
-            .collect();
-        let n = (0..).find(|n| n * n + n >= arguments.len()).unwrap_or(0);
+        let Some(system) = self.graph.system(node) else {
+            return Ok(());
+        };
+        let n = system.size();
         let zero = |builder: &Self, slot: usize| matches!(builder.program.steps[slot], Step::Constant(c) if c.is_zero());
         let mut rows: Vec<Vec<usize>> = (0..n)
             .map(|i| {
-                let mut row = arguments[i * n..(i + 1) * n].to_vec();
-                row.push(arguments[n * n + i]);
-                row
+                let row = &system.matrix()[i * n..(i + 1) * n];
+                let row = row.iter().chain(&system.right()[i..=i]);
+                row.map(|node| self.slots[node]).collect()
             })
             .collect();
         for k in 0..n {

@@ -1,0 +1,82 @@
+//! Nodes built again over other arguments: substitution, and copies in another graph.
+
+use std::collections::HashMap;
+
+use crate::{Graph, Node, Op};
+
+impl Graph {
+    /// The roots with every node that is a key of `map` replaced by its value
+    /// (values are not searched again).
+    pub fn substitute(&self, roots: &[Node], map: &HashMap<Node, Node>) -> Vec<Node> {
+        let mut new: HashMap<Node, Node> = HashMap::new();
+        for node in self.reachable(roots) {
+            let image = match map.get(&node) {
+                Some(&image) => Some(image),
+                None => self.rebuilt(self, node, |argument| new[&argument]),
+            };
+            if let Some(image) = image {
+                new.insert(node, image);
+            }
+        }
+        roots.iter().map(|root| new[root]).collect()
+    }
+
+    /// Copies everything below `roots` of another graph into this one, symbols by their
+    /// names; the images of all nodes but linear systems.
+    pub fn copied(&self, from: &Graph, roots: &[Node]) -> HashMap<Node, Node> {
+        let mut images: HashMap<Node, Node> = HashMap::new();
+        for node in from.reachable(roots) {
+            if let Some(image) = self.rebuilt(from, node, |argument| images[&argument]) {
+                images.insert(node, image);
+            }
+        }
+        images
+    }
+
+    /// A node of `from` (this graph, or another) over the images of its arguments, in this
+    /// graph. None for an [`Op::Solve`], which has no value: the images of its arguments are
+    /// asked for where an [`Op::Entry`] of it is rebuilt.
+    pub fn rebuilt(&self, from: &Graph, node: Node, image: impl Fn(Node) -> Node) -> Option<Node> {
+        Some(match from.op(node) {
+            Op::Constant(_) | Op::Symbol(_) if std::ptr::eq(self, from) => node,
+            Op::Constant(value) => self.constant(value).node(),
+            Op::Symbol(_) => self.symbol(&from.symbol_name(node)?).node(),
+            Op::Unary(op, a) => self.unary(op, image(a)),
+            Op::Powi(a, n) => self.powi(image(a), n),
+            Op::Binary(op, a, b) => self.binary(op, image(a), image(b)),
+            Op::Select(c, a, b) => self.select(image(c), image(a), image(b)),
+            Op::Solve(_) => return None,
+            Op::Entry(solve, entry) => {
+                let system = from.system(solve)?;
+                let images = |nodes: &[Node]| nodes.iter().map(|&n| image(n)).collect::<Vec<_>>();
+                let solution = self.solve(&images(system.matrix()), &images(system.right()));
+                *solution.x.get(entry as usize).unwrap_or(&solution.rcond)
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Tape;
+
+    #[test]
+    fn a_copy_computes_the_same() {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let system = [x.exp(), y, y, x + 3.0].map(|e| e.node());
+        let solution = g.solve(&system, &[x.node(), y.powi(3).node()]);
+        let root = (g.expr(solution.x[1]) + x.less(y).select(x.sin(), y.max(x))).node();
+        let copy = Graph::new();
+        let image = copy.copied(&g, &[root, x.node(), y.node()]);
+        let value = |graph: &Graph, inputs: [Node; 2], root: Node| {
+            let mut out = [0.0];
+            let tape = Tape::new(graph, &inputs, &[root]).unwrap();
+            tape.evaluator().eval(&[0.3, 0.9], &mut out);
+            out[0]
+        };
+        let copied = value(&copy, [image[&x.node()], image[&y.node()]], image[&root]);
+        assert_eq!(copied, value(&g, [x.node(), y.node()], root));
+    }
+}

@@ -1,0 +1,362 @@
+//! The explicit method of Dormand and Prince of order 8 with its error estimate of orders 5
+//! and 3 (DOP853 of Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I,
+//! section II.10), without the further stages of its dense output: runs stop at every row.
+
+use super::Point;
+use crate::{Dynamics, Tolerances};
+
+const STAGES: usize = 12;
+
+/// Factors on a step after its error is known.
+const SAFETY: f64 = 0.9;
+const LEAST: f64 = 0.2;
+const MOST: f64 = 10.0;
+/// Factor on a step that leads beyond all numbers.
+const FAR: f64 = 0.25;
+
+/// Order of the local error of the step that is kept.
+const ORDER: f64 = 8.0;
+
+/// A coefficient with the stage it belongs to; zeros are left out.
+type Row = &'static [(usize, f64)];
+
+/// Nodes of the stages after the first.
+const C: [f64; STAGES - 1] = [
+    5.260_015_195_876_773E-2,
+    7.890_022_793_815_16E-2,
+    1.183_503_419_072_274E-1,
+    2.816_496_580_927_726E-1,
+    3.333_333_333_333_333E-1,
+    0.25,
+    3.076_923_076_923_077E-1,
+    6.512_820_512_820_513E-1,
+    0.6,
+    8.571_428_571_428_571E-1,
+    1.0,
+];
+
+/// What the stages after the first take of those before them.
+const A: [Row; STAGES - 1] = [
+    &[(0, 5.260_015_195_876_773E-2)],
+    &[(0, 1.972_505_698_453_79E-2), (1, 5.917_517_095_361_37E-2)],
+    &[(0, 2.958_758_547_680_685E-2), (2, 8.876_275_643_042_054E-2)],
+    &[
+        (0, 2.413_651_341_592_667E-1),
+        (2, -8.845_494_793_282_861E-1),
+        (3, 9.248_340_032_617_92E-1),
+    ],
+    &[
+        (0, 3.703_703_703_703_703_5E-2),
+        (3, 1.708_286_087_294_738_6E-1),
+        (4, 1.254_676_875_668_224_2E-1),
+    ],
+    &[
+        (0, 3.7109375E-2),
+        (3, 1.702_522_110_195_440_5E-1),
+        (4, 6.021_653_898_045_596E-2),
+        (5, -1.7578125E-2),
+    ],
+    &[
+        (0, 3.709_200_011_850_479E-2),
+        (3, 1.703_839_257_122_399_8E-1),
+        (4, 1.072_620_304_463_732_8E-1),
+        (5, -1.531_943_774_862_440_2E-2),
+        (6, 8.273_789_163_814_023E-3),
+    ],
+    &[
+        (0, 6.241_109_587_160_757E-1),
+        (3, -3.360_892_629_446_941_4),
+        (4, -8.682_193_468_417_26E-1),
+        (5, 2.759_209_969_944_671E1),
+        (6, 2.015_406_755_047_789_4E1),
+        (7, -4.348_988_418_106_996E1),
+    ],
+    &[
+        (0, 4.776_625_364_382_643_4E-1),
+        (3, -2.488_114_619_971_667_7),
+        (4, -5.902_908_268_368_43E-1),
+        (5, 2.123_005_144_818_119_3E1),
+        (6, 1.527_923_363_288_242_3E1),
+        (7, -3.328_821_096_898_486E1),
+        (8, -2.033_120_170_850_862_7E-2),
+    ],
+    &[
+        (0, -9.371_424_300_859_873E-1),
+        (3, 5.186_372_428_844_064),
+        (4, 1.091_437_348_996_729_5),
+        (5, -8.149_787_010_746_927),
+        (6, -1.852_006_565_999_696E1),
+        (7, 2.273_948_709_935_050_5E1),
+        (8, 2.493_605_552_679_652_3),
+        (9, -3.046_764_471_898_219_6),
+    ],
+    &[
+        (0, 2.273_310_147_516_538),
+        (3, -1.053_449_546_673_725E1),
+        (4, -2.000_872_058_224_862_5),
+        (5, -1.795_893_186_311_88E1),
+        (6, 2.794_888_452_941_996E1),
+        (7, -2.858_998_277_135_023_5),
+        (8, -8.872_856_933_530_63),
+        (9, 1.236_056_717_579_430_3E1),
+        (10, 6.433_927_460_157_636E-1),
+    ],
+];
+
+/// The step that is kept.
+const B: Row = &[
+    (0, 5.429_373_411_656_876_5E-2),
+    (5, 4.450_312_892_752_409),
+    (6, 1.891_517_899_314_500_3),
+    (7, -5.801_203_960_010_585),
+    (8, 3.111_643_669_578_199E-1),
+    (9, -1.521_609_496_625_161E-1),
+    (10, 2.013_654_008_040_303_4E-1),
+    (11, 4.471_061_572_777_259E-2),
+];
+
+/// Its difference from the embedded step of order 5.
+const FIFTH: Row = &[
+    (0, 1.312_004_499_419_488E-2),
+    (5, -1.225_156_446_376_204_4),
+    (6, -4.957_589_496_572_502E-1),
+    (7, 1.664_377_182_454_986_4),
+    (8, -3.503_288_487_499_736_6E-1),
+    (9, 3.341_791_187_130_175E-1),
+    (10, 8.192_320_648_511_571E-2),
+    (11, -2.235_530_786_388_629_4E-2),
+];
+
+/// The embedded step of order 3.
+const THIRD: Row = &[
+    (0, 2.440_944_881_889_764E-1),
+    (8, 7.338_466_882_816_118E-1),
+    (11, 2.205_882_352_941_176_6E-2),
+];
+
+/// What came of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Tried {
+    /// the new state is in [`Dop853::reached`]; the factor on the next step
+    Accepted(f64),
+    /// the error is too large; the factor on the step
+    Rejected(f64),
+}
+
+/// Working memory of the method; nothing is allocated from step to step.
+#[derive(Clone, Debug)]
+pub(super) struct Dop853 {
+    /// the derivative at the start of the step, then those of the stages
+    slopes: [Vec<f64>; STAGES],
+    stage: Vec<f64>,
+    /// Σ bᵢ kᵢ
+    segment: Vec<f64>,
+    reached: Vec<f64>,
+    /// a step before this one was rejected
+    is_retry: bool,
+}
+
+impl Dop853 {
+    pub fn new(dimension: usize) -> Self {
+        Self {
+            slopes: std::array::from_fn(|_| vec![0.0; dimension]),
+            stage: vec![0.0; dimension],
+            segment: vec![0.0; dimension],
+            reached: vec![0.0; dimension],
+            is_retry: false,
+        }
+    }
+
+    /// Takes the derivative at the start of a step; false where it is not finite.
+    pub fn begin(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) -> bool {
+        self.is_retry = false;
+        f.derivatives(t, x, &mut self.slopes[0]);
+        finite(&self.slopes[0])
+    }
+
+    /// The state after an accepted step.
+    pub fn reached(&self) -> &[f64] {
+        &self.reached
+    }
+
+    /// Tries a step from where [`Dop853::begin`] was called. A stage without finite
+    /// derivative rejects it and is written to `bad`.
+    pub fn attempt(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, x): (f64, &[f64]),
+        h: f64,
+        tolerances: &Tolerances,
+        bad: &mut Option<Point>,
+    ) -> Tried {
+        for (i, (c, row)) in C.iter().zip(A).enumerate() {
+            self.stage.copy_from_slice(x);
+            for &(j, a) in row {
+                add(&mut self.stage, a * h, &self.slopes[j]);
+            }
+            let at = t + c * h;
+            f.derivatives(at, &self.stage, &mut self.slopes[i + 1]);
+            if !finite(&self.slopes[i + 1]) {
+                *bad = Some((at, self.stage.clone()));
+                return self.rejected(LEAST);
+            }
+        }
+        combine(&mut self.segment, B, &self.slopes);
+        self.reached.copy_from_slice(x);
+        add(&mut self.reached, h, &self.segment);
+        if !finite(&self.reached) {
+            return self.rejected(FAR);
+        }
+        let error = self.error(x, h, tolerances);
+        if error.is_nan() {
+            return self.rejected(LEAST);
+        }
+        let factor = (SAFETY * error.powf(-1.0 / ORDER)).clamp(LEAST, MOST);
+        if error > 1.0 {
+            return self.rejected(factor);
+        }
+        // after a rejection the step does not grow at once
+        let limit = if self.is_retry { 1.0 } else { MOST };
+        Tried::Accepted(factor.min(limit))
+    }
+
+    fn rejected(&mut self, factor: f64) -> Tried {
+        self.is_retry = true;
+        Tried::Rejected(factor)
+    }
+
+    /// The estimate of the error over the step, in tolerances: 1 is just allowed.
+    fn error(&mut self, x: &[f64], h: f64, tolerances: &Tolerances) -> f64 {
+        let difference = &mut self.stage;
+        combine(difference, FIFTH, &self.slopes);
+        let fifth = squares(x, &self.reached, difference, tolerances);
+        difference.copy_from_slice(&self.segment);
+        for &(j, b) in THIRD {
+            add(difference, -b, &self.slopes[j]);
+        }
+        let third = squares(x, &self.reached, difference, tolerances);
+        let both = fifth + 0.01 * third;
+        let both = if both <= 0.0 { 1.0 } else { both };
+        h.abs() * fifth * (1.0 / (both * x.len() as f64)).sqrt()
+    }
+
+    /// A first step for an interval of length `span` (section II.4 of the book), after
+    /// [`Dop853::begin`].
+    pub fn first_step(
+        &mut self,
+        f: &mut impl Dynamics,
+        (t, x): (f64, &[f64]),
+        span: f64,
+        tolerances: &Tolerances,
+    ) -> f64 {
+        let scale = |x: f64| tolerances.absolute + tolerances.relative * x.abs();
+        let norm = |values: &[f64]| -> f64 {
+            let parts = values.iter().zip(x).map(|(v, x)| (v / scale(*x)).powi(2));
+            parts.fold(0.0, |sum, part| sum + part)
+        };
+        let (slope, size) = (norm(&self.slopes[0]), norm(x));
+        let h = if slope <= 1e-10 || size <= 1e-10 {
+            1e-6
+        } else {
+            (size / slope).sqrt() * 0.01
+        };
+        self.stage.copy_from_slice(x);
+        add(&mut self.stage, h, &self.slopes[0]);
+        let [first, second, ..] = &mut self.slopes;
+        f.derivatives(t + h, &self.stage, second);
+        add(second, -1.0, first);
+        let curvature = norm(second).sqrt() / h;
+        let fastest = slope.sqrt().max(curvature);
+        let wanted = if fastest <= 1e-15 {
+            h * 1e-3
+        } else {
+            (0.01 / fastest).powf(1.0 / ORDER)
+        };
+        (h * 100.0).min(wanted).min(span)
+    }
+}
+
+fn finite(values: &[f64]) -> bool {
+    values.iter().all(|v| v.is_finite())
+}
+
+fn add(to: &mut [f64], factor: f64, values: &[f64]) {
+    for (to, value) in to.iter_mut().zip(values) {
+        *to += factor * value;
+    }
+}
+
+fn combine(to: &mut [f64], row: Row, slopes: &[Vec<f64>; STAGES]) {
+    to.fill(0.0);
+    for &(j, b) in row {
+        add(to, b, &slopes[j]);
+    }
+}
+
+/// Σ (error / tolerance)² over the states.
+fn squares(from: &[f64], to: &[f64], errors: &[f64], tolerances: &Tolerances) -> f64 {
+    let ends = from.iter().zip(to);
+    let parts = ends.zip(errors).map(|((from, to), error)| {
+        let scale = tolerances.absolute + tolerances.relative * from.abs().max(to.abs());
+        (error / scale).powi(2)
+    });
+    parts.fold(0.0, |sum, part| sum + part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Function;
+
+    /// One step of x' = x·cos t against exp(sin t).
+    fn error_of_a_step(h: f64) -> f64 {
+        let mut f = Function::new(1, |t: f64, x: &[f64], dx: &mut [f64]| {
+            dx[0] = x[0] * t.cos()
+        });
+        let loose = Tolerances {
+            relative: 1.0,
+            absolute: 1.0,
+            ..Tolerances::default()
+        };
+        let mut method = Dop853::new(1);
+        assert!(method.begin(&mut f, 0.0, &[1.0]));
+        let tried = method.attempt(&mut f, (0.0, &[1.0]), h, &loose, &mut None);
+        assert!(matches!(tried, Tried::Accepted(_)), "{tried:?}");
+        (method.reached()[0] - h.sin().exp()).abs()
+    }
+
+    #[test]
+    fn the_local_error_is_of_order_nine() {
+        let order = (error_of_a_step(0.8) / error_of_a_step(0.4)).log2();
+        assert!((8.5..10.5).contains(&order), "{order}");
+    }
+
+    #[test]
+    fn rows_sum_to_their_nodes() {
+        for (row, c) in A.iter().zip(C) {
+            let sum: f64 = row.iter().map(|(_, a)| a).sum();
+            assert!((sum - c).abs() < 1e-13, "{sum} for {c}");
+        }
+        let total = |row: Row| row.iter().map(|(_, b)| b).sum::<f64>();
+        assert!((total(B) - 1.0).abs() < 1e-14 && (total(THIRD) - 1.0).abs() < 1e-14);
+        assert!(total(FIFTH).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_stage_without_value_rejects_the_step() {
+        let mut f = Function::new(1, |_, x: &[f64], dx: &mut [f64]| dx[0] = -x[0].sqrt());
+        let mut method = Dop853::new(1);
+        let mut bad = None;
+        assert!(method.begin(&mut f, 0.0, &[1e-4]));
+        let tried = method.attempt(
+            &mut f,
+            (0.0, &[1e-4]),
+            9.0,
+            &Tolerances::default(),
+            &mut bad,
+        );
+        assert_eq!(tried, Tried::Rejected(LEAST));
+        assert!(bad.is_some_and(|(_, x)| x[0] < 0.0));
+        assert!(!method.begin(&mut f, 0.0, &[-1.0]));
+    }
+}
