@@ -5,7 +5,6 @@ use lynkeus_expr::Node;
 use super::incidence::Incidence;
 use super::matching::Matching;
 use super::{FlatEquation, System, Unknown};
-use crate::elaborate::line_of;
 use crate::syntax::{Problem, Result, Span};
 
 /// A system with a maximum matching, which shows what is wrong with its balance.
@@ -190,7 +189,7 @@ fn reached(start: usize, edges: &[Vec<usize>], back: &[Option<usize>]) -> (Vec<u
 
 /// "line 4" or "lines 4, 5 and 9".
 pub(super) fn lines(source: &str, spans: impl Iterator<Item = Span>) -> String {
-    let mut numbers: Vec<usize> = spans.take(8).map(|span| line_of(source, span)).collect();
+    let mut numbers: Vec<usize> = spans.take(8).map(|span| span.line(source)).collect();
     numbers.sort_unstable();
     numbers.dedup();
     let words: Vec<String> = numbers.iter().map(usize::to_string).collect();

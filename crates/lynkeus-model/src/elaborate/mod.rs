@@ -75,9 +75,3 @@ pub(crate) fn names(source: &str) -> Result<Vec<String>> {
     let name = |model: &ModelSyntax| model.name.text(source).to_owned();
     Ok(models.iter().map(name).collect())
 }
-
-/// Line of a span, from 1.
-pub(crate) fn line_of(source: &str, span: Span) -> usize {
-    let before = source.as_bytes().iter().take(span.start as usize);
-    1 + before.filter(|&&byte| byte == b'\n').count()
-}

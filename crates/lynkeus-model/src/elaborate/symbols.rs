@@ -247,7 +247,7 @@ fn index_names<'a>(
             return Err(Problem::new(declaration.name, message).hint("choose another name"));
         }
         if let Some(earlier) = by_name.insert(name, place) {
-            let line = super::line_of(source, declarations[earlier].name);
+            let line = declarations[earlier].name.line(source);
             let message = format!("`{name}` is declared twice");
             return Err(Problem::new(declaration.name, message)
                 .hint(format!("it is first declared on line {line}")));

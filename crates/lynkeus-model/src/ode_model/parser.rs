@@ -1,7 +1,6 @@
 //! A model's equations to a syntax tree.
 
 use super::lexer::{Lexer, Token};
-use crate::elaborate::line_of;
 use crate::limits::{MAX_NESTING, MAX_SYNTAX_NODES, grouped};
 use crate::syntax::ast::{Ast, ExprId, Expression, Kind};
 use crate::syntax::{Problem, Result, Span};
@@ -203,7 +202,7 @@ impl Parser<'_> {
         if self.token != Token::End {
             return problem;
         }
-        let line = line_of(self.source, self.model.head);
+        let line = self.model.head.line(self.source);
         problem.hint(format!("close the model of line {line} with `)`"))
     }
 

@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use super::expressions::is_elementary;
 use super::parser::{Equation, Mention, Model};
-use crate::elaborate::line_of;
 use crate::limits::{Budget, MAX_SCALARS};
 use crate::syntax::{Problem, Result, Span};
 
@@ -84,7 +83,7 @@ impl<'s> Names<'s> {
 
     fn twice(&self, name: Span, role: Role, other: Role, place: Span) -> Problem {
         let text = name.text(self.source);
-        let line = line_of(self.source, place);
+        let line = place.line(self.source);
         let label = format!("the other equation is on line {line}");
         if role == other {
             let problem = Problem::new(name, format!("`{text}` has two equations"));
@@ -126,7 +125,7 @@ impl<'s> Names<'s> {
     fn with_and_without_time(&self, name: Span, place: Span) -> Problem {
         let text = name.text(self.source);
         let message = format!("`{text}` stands with and without `(t)`");
-        let label = format!("the other one is on line {}", line_of(self.source, place));
+        let label = format!("the other one is on line {}", place.line(self.source));
         Problem::new(name, message).label(label).hint(format!(
             "write `{text}(t)` everywhere for a function of time, `{text}` for a parameter"
         ))

@@ -90,6 +90,9 @@ impl Parser<'_> {
                 pending_level = level;
             }
             self.advance()?;
+            if let Infix::Power(_) = infix {
+                self.refuse_sign("an exponent without sign", "as in `2^(-1)`")?;
+            }
             let right = self.operators(level + 1)?;
             match infix {
                 Infix::Chain(operator) => {
@@ -135,6 +138,18 @@ impl Parser<'_> {
         }
     }
 
+    /// Modelica has no sign behind `^` or behind another sign.
+    fn refuse_sign(&self, expected: &str, example: &str) -> Result<()> {
+        match self.token {
+            Token::Symbol(
+                Symbol::Minus | Symbol::ElementMinus | Symbol::Plus | Symbol::ElementPlus,
+            ) => Err(self.unexpected(expected).hint(format!(
+                "Modelica takes no sign here: put it in parentheses, {example}"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// An operand, or `not` or a sign with what it applies to: `-a*b` is −(a b), `2*-a^2` is
     /// 2 (−(a²)).
     fn prefixed(&mut self, least: u8) -> Result<ExprId> {
@@ -149,6 +164,9 @@ impl Parser<'_> {
             _ => return self.primary(),
         };
         let (start, first) = (self.advance()?, self.next_id());
+        if operator != UnaryOperator::Not {
+            self.refuse_sign("an operand after the sign", "as in `-(-3)`")?;
+        }
         let operand = self.operators(level)?;
         self.push(Kind::Unary(operator, operand), start, first)
     }

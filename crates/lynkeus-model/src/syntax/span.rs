@@ -31,6 +31,12 @@ impl Span {
             .get(self.start as usize..self.end as usize)
             .unwrap_or_default()
     }
+
+    /// The line on which the span starts, from 1.
+    pub(crate) fn line(self, source: &str) -> usize {
+        let before = source.as_bytes().iter().take(self.start as usize);
+        1 + before.filter(|&&byte| byte == b'\n').count()
+    }
 }
 
 /// What is wrong and where, before it is tied to a file. Boxed, so that the results of the

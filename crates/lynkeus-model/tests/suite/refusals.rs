@@ -197,6 +197,27 @@ fn types_and_numbers() {
 }
 
 #[test]
+fn a_sign_behind_a_sign_or_a_power() {
+    for (formula, found) in [
+        ("2^-1", "expected an exponent without sign, found `-`"),
+        ("x^+2", "expected an exponent without sign, found `+`"),
+        ("x.^-2", "expected an exponent without sign, found `-`"),
+        ("--3", "expected an operand after the sign, found `-`"),
+        ("-+x", "expected an operand after the sign, found `+`"),
+        ("x - --3", "expected an operand after the sign, found `-`"),
+    ] {
+        let text = format!("model M Real x; equation der(x) = {formula}; end M;");
+        let message = refused(&text).to_string();
+        assert!(message.contains(found), "{formula}: {message}");
+        assert!(message.contains("put it in parentheses"), "{message}");
+    }
+    for formula in ["2^(-1)", "-(-3)", "-x^2", "x - (-3)"] {
+        let text = format!("model M Real x; equation der(x) = {formula}; end M;");
+        Plant::from_modelica(&text, "test.mo", &LoadOptions::default()).unwrap();
+    }
+}
+
+#[test]
 fn cycles_name_their_members() {
     check(
         r#"
