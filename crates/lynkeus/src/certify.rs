@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use lynkeus_model::Plant;
 use lynkeus_observers::{Certificate, Claim, Design, Tuning, Verdict};
 use lynkeus_structure::Extended;
 
+use crate::prepare::Prepared;
 use crate::{Error, Study, prepare, words};
 
 mod assumptions;
@@ -40,14 +40,11 @@ pub fn certify(study: &Study) -> Result<CertifyReport, Error> {
 /// The same; the search for wider ranges of the inputs only on request.
 pub(crate) fn certified(study: &Study, explore: bool) -> Result<CertifyReport, Error> {
     let plant = prepare::plant(study)?;
-    let inputs = {
-        let extended = prepare::extended(study, &plant)?;
-        prepare::simulated_inputs(study, &extended)?
-    };
+    let prepared = Prepared::new(study, &plant)?;
     let task = Task {
         study,
-        plant: &plant,
-        inputs,
+        inputs: prepared.simulated_inputs()?,
+        prepared,
         explore,
         // inside the box, where the guarantee holds, the limits of `clamp` do nothing
         tuning: Tuning {
@@ -60,7 +57,7 @@ pub(crate) fn certified(study: &Study, explore: bool) -> Result<CertifyReport, E
 
 struct Task<'a> {
     study: &'a Study,
-    plant: &'a Plant,
+    prepared: Prepared<'a>,
     /// ranges of the simulated inputs where these are narrower than the declared
     inputs: Vec<(String, f64, f64)>,
     explore: bool,
@@ -70,15 +67,14 @@ struct Task<'a> {
 /// Steps of the search for the widest ranges of the inputs.
 const HALVINGS: usize = 5;
 
-impl Task<'_> {
+impl<'a> Task<'a> {
     fn report(&self) -> Result<CertifyReport, Error> {
         let declared = self.on(1.0)?;
         let simulated = match self.inputs.is_empty() {
             true => None,
             false => Some(self.on(0.0)?),
         };
-        let whole = prepare::extended(self.study, self.plant)?;
-        let design = prepare::design_with(self.study, &whole, &self.tuning)?;
+        let design = self.prepared.design_with(&self.tuning)?;
         let lmi = prepare::is_certified_gain(&self.tuning);
         let claim = match self.tuning.numbers("rate") {
             Ok(Some(rate)) if lmi => Claim::At(rate[0]),
@@ -98,14 +94,14 @@ impl Task<'_> {
         let family = lynkeus_observers::find(design.observer.family);
         let theorem = match family.filter(|_| !lmi) {
             Some(family) => {
-                let assumptions = assumptions::of(self.study, self.plant, place)?;
+                let assumptions = assumptions::of(self.study, place)?;
                 let theorem = family.theorem(place, &self.tuning, &assumptions);
-                Some(theorem.map_err(|error| prepare::refusal(self.study, &error))?)
+                Some(theorem.map_err(|error| self.prepared.refusal(error))?)
             }
             None => None,
         };
         Ok(CertifyReport {
-            plant: self.plant.name.clone(),
+            plant: self.prepared.plant().name.clone(),
             design,
             certificate,
             theorem,
@@ -113,18 +109,14 @@ impl Task<'_> {
     }
 
     /// The box with the inputs' ranges between the simulated (0) and the declared (1).
-    fn on(&self, share: f64) -> Result<Extended<'_>, Error> {
-        let mut extended = prepare::extended(self.study, self.plant)?;
-        for (name, low, high) in self.ranges(&extended, share) {
-            let narrowed = extended.narrow(&name, low, high);
-            narrowed.map_err(|error| Error::input(error.to_string()).at(&self.study.file))?;
-        }
-        Ok(extended)
+    fn on(&self, share: f64) -> Result<Extended<'a>, Error> {
+        self.prepared.narrowed(&self.ranges(share))
     }
 
-    fn ranges(&self, extended: &Extended<'_>, share: f64) -> Vec<(String, f64, f64)> {
+    fn ranges(&self, share: f64) -> Vec<(String, f64, f64)> {
         let wider = |(name, low, high): &(String, f64, f64)| {
-            let declared = extended.inputs.iter().find(|i| i.name == *name)?;
+            let mut inputs = self.prepared.extended().inputs.iter();
+            let declared = inputs.find(|i| i.name == *name)?;
             let towards = |from: f64, to: f64| match share {
                 0.0 => from,
                 1.0 => to,
@@ -146,9 +138,9 @@ impl Task<'_> {
         design: &Design,
         claim: Claim,
     ) -> Result<Certificate, Error> {
-        let assumptions = assumptions::of(self.study, self.plant, extended)?;
+        let assumptions = assumptions::of(self.study, extended)?;
         lynkeus_observers::certify(extended, &design.observer, &assumptions, claim)
-            .map_err(|error| prepare::refusal(self.study, &error))
+            .map_err(|error| self.prepared.refusal(error))
     }
 
     /// How far the inputs may leave the study's, in words.
@@ -177,7 +169,7 @@ impl Task<'_> {
                 _ => high = share,
             }
         }
-        let reached = self.ranges(&self.on(1.0)?, low);
+        let reached = self.ranges(low);
         Ok(match low > 0.0 {
             true => format!(
                 "{simulated}; at nine tenths of the rate also proved for {}",

@@ -10,6 +10,7 @@ use lynkeus_observers::{Examination, Fit};
 use lynkeus_structure::{Condition, Point, Uniformity, uniformity};
 use serde_json::{Value, json};
 
+use crate::prepare::Prepared;
 use crate::words::conditions;
 use crate::{Error, Study, prepare};
 
@@ -79,10 +80,9 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
         let plant = prepare::plant(study)?;
-        let extended = prepare::extended(study, &plant)?;
-        report.uniformity =
-            uniformity(&extended).map_err(|error| Error::input(error.to_string()))?;
-        report.examinations = prepare::examinations(study, &extended)?;
+        let prepared = Prepared::new(study, &plant)?;
+        report.uniformity = uniformity(prepared.extended()).map_err(Error::from_source)?;
+        report.examinations = prepared.examinations()?.to_vec();
         report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
     Ok(report)
@@ -98,6 +98,7 @@ impl Report {
     ///
     /// # Errors
     /// Another number of states, or a state without range.
+    #[cfg(feature = "plot")]
     pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
         match &self.uniformity {
             Some(uniformity) => uniform::picture(&self.plant, uniformity),

@@ -1,6 +1,7 @@
 //! The one error type of this crate: what was expected, what was found, where, and what to do.
 
 use std::fmt;
+use std::sync::Arc;
 
 /// What kind of answer an [`Error`] is; the command's exit code follows from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,12 +17,13 @@ pub enum ErrorKind {
 ///
 /// Its text is one line (several when it quotes a Modelica source line under its message):
 /// the place, what is wrong, what was expected, and what to do.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Error {
     kind: ErrorKind,
     place: Option<String>,
     message: String,
     hint: Option<String>,
+    source: Option<Arc<dyn std::error::Error + Send + Sync>>,
 }
 
 impl Error {
@@ -35,13 +37,27 @@ impl Error {
         Self::new(ErrorKind::Refused, message.into())
     }
 
+    /// An error in what the user gave, in the words of the error that tells it; that error
+    /// is the [source](std::error::Error::source).
+    pub fn from_source(source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::input(source.to_string()).caused_by(source)
+    }
+
     fn new(kind: ErrorKind, message: String) -> Self {
         Self {
             kind,
             place: None,
             message,
             hint: None,
+            source: None,
         }
+    }
+
+    /// Keeps the error that it comes from.
+    #[must_use]
+    pub fn caused_by(mut self, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        self.source = Some(Arc::new(source));
+        self
     }
 
     /// Adds where it happened: a file, or `file:line:column`.
@@ -82,4 +98,36 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        let source = self.source.as_deref()?;
+        Some(source)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::error::Error as _;
+
+    use lynkeus_expr::MissingInput;
+
+    use super::*;
+
+    #[test]
+    fn the_source_is_kept_through_place_and_hint() {
+        let name = "pump".to_owned();
+        let error = Error::from_source(MissingInput { name })
+            .at("s.toml:3")
+            .hint("name it");
+        let text = error.to_string();
+        assert!(
+            text.starts_with("s.toml:3: the expression depends on 'pump'"),
+            "{text}"
+        );
+        let source = error
+            .source()
+            .and_then(|s| s.downcast_ref::<MissingInput>());
+        assert_eq!(source.map(|s| s.name.as_str()), Some("pump"));
+        assert!(Error::input("no").source().is_none());
+    }
+}

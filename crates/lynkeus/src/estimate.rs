@@ -6,10 +6,10 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
-use crate::outcome::{alarms, interrupted, watches};
-use crate::simulate::{measurements, method, show_measurements};
+use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::prepare::Prepared;
 use crate::study::{BetweenSamples, EstimateSettings};
-use crate::systems::{self, hat};
+use crate::systems::{self, hat, method};
 use crate::{Error, Outcome, Quantity, Study, Table, prepare};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
@@ -24,8 +24,7 @@ pub fn estimate(
 ) -> Result<Outcome, Error> {
     let settings = &study.estimate;
     let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = prepare::design(study, &extended)?;
+    let design = Prepared::new(study, &plant)?.design()?;
     refuse_derivatives(study, &design)?;
     let observer = systems::observer(&plant, &design.observer)?;
     refuse_stray_columns(&plant, settings)?;
@@ -33,7 +32,7 @@ pub fn estimate(
     let run = run_settings(settings);
     let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
-        .map_err(|error| interrupted(&error, table.file()))?;
+        .map_err(|error| interrupted(error.error, table.file()))?;
     let mut notes = design.notes.clone();
     if between == lynkeus_run::BetweenSamples::Linear {
         notes.push(
@@ -135,7 +134,7 @@ fn log(table: &Table, settings: &EstimateSettings, observer: &System) -> Result<
         .iter()
         .map(column)
         .collect::<Result<Vec<_>, Error>>()?;
-    Log::new(names, time, columns).map_err(|error| Error::input(error.to_string()).at(table.file()))
+    Log::new(names, time, columns).map_err(|error| Error::from_source(error).at(table.file()))
 }
 
 /// A column of the log, if it has one with numbers.

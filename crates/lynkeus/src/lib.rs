@@ -48,6 +48,9 @@
 //!
 //! With files instead, [`Study::load`] reads a study, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
+//!
+//! Features, all on by default: `plot` draws pictures, `tune` sweeps tunings, and `command` is
+//! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod certify;
@@ -55,10 +58,12 @@ mod check;
 mod design;
 mod error;
 mod estimate;
+#[cfg(feature = "plot")]
 mod figure;
 mod files;
 mod near;
 mod outcome;
+#[cfg(feature = "plot")]
 pub mod plot;
 pub mod precision;
 pub mod prepare;
@@ -66,6 +71,7 @@ mod simulate;
 pub mod study;
 mod systems;
 pub mod table;
+#[cfg(feature = "tune")]
 pub mod tune;
 mod words;
 
@@ -74,6 +80,7 @@ pub use check::{CheckOptions, Report, check};
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
+#[cfg(feature = "plot")]
 pub use figure::figure;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use precision::precision;
@@ -81,6 +88,7 @@ pub use simulate::simulate;
 pub use study::Study;
 pub use systems::observer as observer_system;
 pub use table::Table;
+#[cfg(feature = "tune")]
 pub use tune::tune;
 
 pub use lynkeus_expr as expr;

@@ -1,7 +1,8 @@
 //! What a simulation or a replay gives.
 
+use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor};
-use lynkeus_run::{Error as RunError, Interrupted, Trajectory};
+use lynkeus_run::{Error as RunError, Trajectory};
 
 use crate::Error;
 use crate::systems::hat;
@@ -123,13 +124,50 @@ pub(crate) fn alarms(watches: &[Watch]) -> Vec<String> {
 
 /// A run that ended early: no result; an estimate that left every bound is an
 /// answer, everything else is a fault of the input.
-pub(crate) fn interrupted(interrupted: &Interrupted, place: &str) -> Error {
-    let text = interrupted.error.to_string();
-    let error = match interrupted.error {
+pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
+    let text = error.to_string();
+    let told = match error {
         RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. } => {
             Error::refused(text)
         }
         _ => Error::input(text),
     };
-    error.at(place)
+    told.caused_by(error).at(place)
+}
+
+/// The measured outputs of which `values` knows the values.
+pub(crate) fn measurements(
+    design: &Design,
+    values: impl Fn(&str) -> Option<Vec<f64>>,
+) -> Vec<(String, Vec<f64>)> {
+    let measured = design.observer.measured.iter();
+    measured
+        .filter_map(|signal| Some((signal.name.clone(), values(&signal.name)?)))
+        .collect()
+}
+
+/// Puts each measurement beside the state it shows; one that shows none becomes
+/// a quantity of its own.
+pub(crate) fn show_measurements(
+    plant: &Plant,
+    measurements: &[(String, Vec<f64>)],
+    quantities: &mut Vec<Quantity>,
+) {
+    for (name, values) in measurements {
+        let Some(output) = plant.outputs.iter().find(|o| o.name == *name) else {
+            continue;
+        };
+        let state = plant.states.iter().find(|s| s.node == output.node);
+        let shown = state.and_then(|s| quantities.iter_mut().find(|q| q.name == s.name));
+        match shown {
+            Some(quantity) => quantity.measured = Some(values.clone()),
+            None => quantities.push(Quantity {
+                name: output.name.clone(),
+                unit: output.unit.clone(),
+                description: output.description.clone(),
+                measured: Some(values.clone()),
+                ..Quantity::default()
+            }),
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! From a study to its plant and its observer.
 
-use lynkeus_model::{LoadOptions, Plant};
+use std::cell::OnceCell;
+
+use lynkeus_model::{LoadError, LoadOptions, Plant};
 use lynkeus_observers::{Design, DesignError, Examination, Family, Fit, Tuning, Value};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
@@ -34,28 +36,169 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
         parameters: study.parameters.clone(),
         symbolic_parameters,
     };
-    Plant::load(path, &options).map_err(|error| Error::input(error.to_string()))
+    Plant::load(path, &options).map_err(|error| match error {
+        LoadError::Refused(diagnostic) => Error::from_source(diagnostic),
+        other => Error::from_source(other),
+    })
 }
 
-/// The plant as the observer of a study sees it.
-///
-/// # Errors
-/// Names among the sensors that the plant does not have.
-pub fn extended<'p>(study: &Study, plant: &'p Plant) -> Result<Extended<'p>, Error> {
-    let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
-    let sensors = Sensors {
-        measured: texts(study.sensors.measured.as_deref().unwrap_or_default()),
-        unknown: texts(&study.sensors.unknown),
-        disturbances: texts(&study.sensors.disturbances),
-    };
-    let mut extended = Extended::new(plant, &sensors).map_err(|error| blame(study, &error))?;
-    for (name, low, high) in &study.narrower {
-        extended
-            .narrow(&name.text, *low, *high)
-            .map_err(|error| name.blame(Error::input(error.to_string())))?;
+/// A study with its plant as the observer sees it, and what the families find in it: made
+/// once, used by every command.
+#[derive(Debug)]
+pub struct Prepared<'a> {
+    study: &'a Study,
+    extended: Extended<'a>,
+    /// made when first asked for
+    examinations: OnceCell<Vec<Examination>>,
+}
+
+/// Sides of a smaller box: name, least and greatest value.
+pub(crate) type Sides = [(String, f64, f64)];
+
+impl<'a> Prepared<'a> {
+    /// Applies the study's sensors, `[box]` and tube to its plant.
+    ///
+    /// # Errors
+    /// Names among the sensors or in `[box]` that the plant does not have.
+    pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
+        let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
+        let sensors = Sensors {
+            measured: texts(study.sensors.measured.as_deref().unwrap_or_default()),
+            unknown: texts(&study.sensors.unknown),
+            disturbances: texts(&study.sensors.disturbances),
+        };
+        let mut extended = Extended::new(plant, &sensors).map_err(|error| blame(study, error))?;
+        for (name, low, high) in &study.narrower {
+            extended
+                .narrow(&name.text, *low, *high)
+                .map_err(|error| name.blame(Error::from_source(error)))?;
+        }
+        tube(study, &mut extended)?;
+        Ok(Self {
+            study,
+            extended,
+            examinations: OnceCell::new(),
+        })
     }
-    tube(study, &mut extended)?;
-    Ok(extended)
+
+    /// The study.
+    pub fn study(&self) -> &'a Study {
+        self.study
+    }
+
+    /// The plant.
+    pub fn plant(&self) -> &'a Plant {
+        self.extended.plant
+    }
+
+    /// The plant as the observer sees it.
+    pub fn extended(&self) -> &Extended<'a> {
+        &self.extended
+    }
+
+    /// What every family that the study allows finds in the plant.
+    ///
+    /// # Errors
+    /// Keys of `[observer]` that cannot be used.
+    pub fn examinations(&self) -> Result<&[Examination], Error> {
+        if let Some(known) = self.examinations.get() {
+            return Ok(known);
+        }
+        let observer = &self.study.observer;
+        let examine = |family: &dyn Family| {
+            let found = family.examine(&self.extended, &observer.tuning);
+            found.map_err(|error| self.refusal(error))
+        };
+        let found = observer.families().map(examine).collect::<Result<_, _>>()?;
+        Ok(self.examinations.get_or_init(|| found))
+    }
+
+    /// The observer of the study.
+    ///
+    /// # Errors
+    /// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
+    /// `[observer]` cannot be used.
+    pub fn design(&self) -> Result<Design, Error> {
+        self.design_with(&self.study.observer.tuning)
+    }
+
+    /// The same with another tuning.
+    pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<Design, Error> {
+        let examinations = self.examinations()?;
+        let Some(chosen) = recommended(examinations) else {
+            return Err(none_fits(self.study, examinations));
+        };
+        let family = lynkeus_observers::find(chosen.family)
+            .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
+        // a certified gain holds for the known inputs as the study simulates them
+        let simulated = match is_certified_gain(tuning) {
+            true => Some(self.narrowed(&self.simulated_inputs()?)?),
+            false => None,
+        };
+        family
+            .design(simulated.as_ref().unwrap_or(&self.extended), tuning)
+            .map_err(|error| self.refusal(error))
+    }
+
+    /// The plant on a smaller box.
+    ///
+    /// # Errors
+    /// Sides that the box does not have, or that have nothing in common with it.
+    pub(crate) fn narrowed(&self, sides: &Sides) -> Result<Extended<'a>, Error> {
+        let mut narrowed = self.extended.clone();
+        for (name, low, high) in sides {
+            let narrow = narrowed.narrow(name, *low, *high);
+            narrow.map_err(|error| Error::from_source(error).at(&self.study.file))?;
+        }
+        Ok(narrowed)
+    }
+
+    /// Ranges of the known inputs over the simulated time where these are narrower than
+    /// the declared ones; a range in `[box]` is the user's own choice and stays.
+    pub(crate) fn simulated_inputs(&self) -> Result<Vec<(String, f64, f64)>, Error> {
+        let Some(settings) = &self.study.simulate else {
+            return Ok(vec![]);
+        };
+        let plant = self.plant();
+        let time = Dimension {
+            name: "time".into(),
+            symbol: plant.time,
+            min: settings.start,
+            max: settings.until,
+            integer: false,
+        };
+        let region = Region {
+            dimensions: vec![time],
+        };
+        let mut narrower = vec![];
+        let is_chosen = |name: &str| self.study.narrower.iter().any(|(n, ..)| n.text == name);
+        let inputs = self.extended.inputs.iter();
+        for input in inputs.filter(|input| !is_chosen(&input.name)) {
+            let node = systems::input_expression(self.study, plant, settings, input)?;
+            let values = range(&plant.graph, node, &region).map_err(Error::from_source)?;
+            let (low, high) = (
+                values.enclosure.lo().max(input.min),
+                values.enclosure.hi().min(input.max),
+            );
+            if low <= high && (low > input.min || high < input.max) {
+                narrower.push((input.name.clone(), low, high));
+            }
+        }
+        Ok(narrower)
+    }
+
+    /// What a family refuses, at its place in the study.
+    pub(crate) fn refusal(&self, error: DesignError) -> Error {
+        let study = self.study;
+        match &error {
+            DesignError::Tuning(tuning) => study.observer.blame(tuning, &study.file),
+            DesignError::Refused(_) => Error::refused(error.to_string())
+                .caused_by(error)
+                .at(&study.file),
+            DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, &error),
+            DesignError::MissingInput(_) => Error::from_source(error).at(&study.file),
+        }
+    }
 }
 
 /// Limits the states to a tube around their start values.
@@ -72,17 +215,17 @@ fn tube(study: &Study, extended: &mut Extended<'_>) -> Result<(), Error> {
             return Err(Error::input(message).at(&study.file));
         };
         let narrowed = extended.narrow(&state.name, start - radius, start + radius);
-        narrowed.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+        narrowed.map_err(|error| Error::from_source(error).at(&study.file))?;
     }
     Ok(())
 }
 
 /// The place in the study of a name that does not fit.
-fn blame(study: &Study, error: &SensorsError) -> Error {
-    let name = match error {
+fn blame(study: &Study, error: SensorsError) -> Error {
+    let name = match &error {
         SensorsError::NoSuchName { name, .. } | SensorsError::Twice { name, .. } => name,
         SensorsError::NothingMeasured { .. } => {
-            return Error::input(error.to_string()).at(&study.file);
+            return Error::from_source(error).at(&study.file);
         }
     };
     let sensors = &study.sensors;
@@ -91,24 +234,12 @@ fn blame(study: &Study, error: &SensorsError) -> Error {
         &sensors.unknown,
         &sensors.disturbances,
     ];
-    let refusal = Error::input(error.to_string());
-    match lists.into_iter().flatten().rfind(|n| n.text == *name) {
+    let found = lists.into_iter().flatten().rfind(|n| n.text == *name);
+    let refusal = Error::from_source(error);
+    match found {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),
     }
-}
-
-/// What every family that the study allows finds in the plant.
-///
-/// # Errors
-/// Keys of `[observer]` that cannot be used.
-pub fn examinations(study: &Study, extended: &Extended<'_>) -> Result<Vec<Examination>, Error> {
-    let examine = |family: &dyn Family| {
-        family
-            .examine(extended, &study.observer.tuning)
-            .map_err(|error| refusal(study, &error))
-    };
-    study.observer.families().map(examine).collect()
 }
 
 /// The family to use: the first that fits, else the first that is undecided.
@@ -117,86 +248,9 @@ pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
     with(Fit::Fits).or_else(|| with(Fit::Undecided))
 }
 
-/// The observer of a study.
-///
-/// # Errors
-/// No family fits ([`ErrorKind::Refused`](crate::ErrorKind)), or a key of
-/// `[observer]` cannot be used.
-pub fn design(study: &Study, extended: &Extended<'_>) -> Result<Design, Error> {
-    design_with(study, extended, &study.observer.tuning)
-}
-
-/// Ranges of the known inputs over the simulated time where these are narrower than
-/// the declared ones; a range in `[box]` is the user's own choice and stays.
-pub(crate) fn simulated_inputs(
-    study: &Study,
-    extended: &Extended<'_>,
-) -> Result<Vec<(String, f64, f64)>, Error> {
-    let Some(settings) = &study.simulate else {
-        return Ok(vec![]);
-    };
-    let plant = extended.plant;
-    let time = Dimension {
-        name: "time".into(),
-        symbol: plant.time,
-        min: settings.start,
-        max: settings.until,
-        integer: false,
-    };
-    let region = Region {
-        dimensions: vec![time],
-    };
-    let mut narrower = vec![];
-    let chosen = |name: &str| study.narrower.iter().any(|(side, ..)| side.text == name);
-    for input in extended.inputs.iter().filter(|input| !chosen(&input.name)) {
-        let node = systems::input_expression(study, plant, settings, input)?;
-        let values =
-            range(&plant.graph, node, &region).map_err(|error| Error::input(error.to_string()))?;
-        let (low, high) = (
-            values.enclosure.lo().max(input.min),
-            values.enclosure.hi().min(input.max),
-        );
-        if low <= high && (low > input.min || high < input.max) {
-            narrower.push((input.name.clone(), low, high));
-        }
-    }
-    Ok(narrower)
-}
-
-/// The box of a certified gain: the known inputs as the study simulates them.
-fn simulated_box<'p>(study: &Study, extended: &Extended<'p>) -> Result<Extended<'p>, Error> {
-    let mut narrowed = self::extended(study, extended.plant)?;
-    for (name, low, high) in simulated_inputs(study, extended)? {
-        let narrow = narrowed.narrow(&name, low, high);
-        narrow.map_err(|error| Error::input(error.to_string()).at(&study.file))?;
-    }
-    Ok(narrowed)
-}
-
 /// Whether the study asks for a certified gain.
 pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
     tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
-}
-
-/// The same with another tuning.
-pub(crate) fn design_with(
-    study: &Study,
-    extended: &Extended<'_>,
-    tuning: &Tuning,
-) -> Result<Design, Error> {
-    let examinations = examinations(study, extended)?;
-    let Some(chosen) = recommended(&examinations) else {
-        return Err(none_fits(study, &examinations));
-    };
-    let family = lynkeus_observers::find(chosen.family)
-        .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
-    let simulated = match is_certified_gain(tuning) {
-        true => Some(simulated_box(study, extended)?),
-        false => None,
-    };
-    family
-        .design(simulated.as_ref().unwrap_or(extended), tuning)
-        .map_err(|error| refusal(study, &error))
 }
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
@@ -207,13 +261,4 @@ fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     Error::refused(reasons.join("\n"))
         .at(&study.file)
         .hint("`lynkeus check` shows every condition")
-}
-
-pub(crate) fn refusal(study: &Study, error: &DesignError) -> Error {
-    match error {
-        DesignError::Tuning(error) => study.observer.blame(error, &study.file),
-        DesignError::Refused(_) => Error::refused(error.to_string()).at(&study.file),
-        DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, error),
-        DesignError::MissingInput(_) => Error::input(error.to_string()).at(&study.file),
-    }
 }

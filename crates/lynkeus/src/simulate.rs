@@ -5,11 +5,12 @@ use std::ops::ControlFlow;
 
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
-use lynkeus_run::{Level, Method, Simulation, Step, Tolerances, Trajectory};
+use lynkeus_run::{Level, Simulation, Trajectory};
 
-use crate::outcome::{alarms, interrupted, watches};
-use crate::study::{self, Noise, Rk4Step, SimulateSettings, Solver};
-use crate::systems::{self, hat};
+use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::prepare::Prepared;
+use crate::study::{Noise, SimulateSettings};
+use crate::systems::{self, hat, method};
 use crate::{Error, Outcome, Quantity, Study, prepare};
 
 /// Rows of a result whose study does not say how many.
@@ -26,8 +27,7 @@ pub fn simulate(
 ) -> Result<Outcome, Error> {
     let settings = settings(study)?;
     let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = prepare::design(study, &extended)?;
+    let design = Prepared::new(study, &plant)?.design()?;
     let simulation = Simulation {
         observer: Some(systems::observer(&plant, &design.observer)?),
         inputs: systems::inputs(study, &plant, settings, &design.observer)?,
@@ -35,7 +35,7 @@ pub fn simulate(
     };
     let trajectory = simulation
         .run_watched(watch)
-        .map_err(|error| interrupted(&error, &study.file))?;
+        .map_err(|error| interrupted(error.error, &study.file))?;
     Ok(outcome(&plant, design, &trajectory))
 }
 
@@ -98,28 +98,6 @@ fn noise(
     })
 }
 
-/// The study's method as the runner has it.
-pub(crate) fn method(method: &study::Method) -> Method {
-    match *method {
-        study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
-        study::Method::Rk4(Rk4Step::PerRow(n)) => {
-            Method::Rk4(Step::Substeps(usize::try_from(n).unwrap_or(usize::MAX)))
-        }
-        study::Method::Adaptive { solver, rtol, atol } => {
-            let tolerances = Tolerances {
-                relative: rtol,
-                absolute: atol,
-                ..Tolerances::default()
-            };
-            match solver {
-                Solver::Auto => Method::Adaptive(tolerances),
-                Solver::Explicit => Method::Explicit(tolerances),
-                Solver::Stiff => Method::Stiff(tolerances),
-            }
-        }
-    }
-}
-
 fn outcome(plant: &Plant, design: Design, trajectory: &Trajectory) -> Outcome {
     let column = |name: &str| trajectory.column(name);
     let quantity = |variable: &Variable| Quantity {
@@ -161,42 +139,5 @@ fn outcome(plant: &Plant, design: Design, trajectory: &Trajectory) -> Outcome {
         measurements,
         watches,
         notes,
-    }
-}
-
-/// The measured outputs of which `values` knows the values.
-pub(crate) fn measurements(
-    design: &Design,
-    values: impl Fn(&str) -> Option<Vec<f64>>,
-) -> Vec<(String, Vec<f64>)> {
-    let measured = design.observer.measured.iter();
-    measured
-        .filter_map(|signal| Some((signal.name.clone(), values(&signal.name)?)))
-        .collect()
-}
-
-/// Puts each measurement beside the state it shows; one that shows none becomes
-/// a quantity of its own.
-pub(crate) fn show_measurements(
-    plant: &Plant,
-    measurements: &[(String, Vec<f64>)],
-    quantities: &mut Vec<Quantity>,
-) {
-    for (name, values) in measurements {
-        let Some(output) = plant.outputs.iter().find(|o| o.name == *name) else {
-            continue;
-        };
-        let state = plant.states.iter().find(|s| s.node == output.node);
-        let shown = state.and_then(|s| quantities.iter_mut().find(|q| q.name == s.name));
-        match shown {
-            Some(quantity) => quantity.measured = Some(values.clone()),
-            None => quantities.push(Quantity {
-                name: output.name.clone(),
-                unit: output.unit.clone(),
-                description: output.description.clone(),
-                measured: Some(values.clone()),
-                ..Quantity::default()
-            }),
-        }
     }
 }

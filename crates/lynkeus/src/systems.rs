@@ -3,9 +3,9 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::Observer;
-use lynkeus_run::System;
+use lynkeus_run::{Method, Step, System, Tolerances};
 
-use crate::study::{Expression, Name, SimulateSettings};
+use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
 
 /// The column of an estimate.
@@ -45,7 +45,7 @@ pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
         &observer.derivatives,
         &outputs,
     )
-    .map_err(|error| Error::input(error.to_string()))
+    .map_err(Error::from_source)
 }
 
 /// The plant with the study's start values; its outputs are those of the model.
@@ -85,7 +85,7 @@ pub(crate) fn plant_reading(
         &plant.derivatives,
         &named(&plant.outputs),
     )
-    .map_err(|error| Error::input(error.to_string()))
+    .map_err(Error::from_source)
 }
 
 /// Variables with the nodes that stand for them.
@@ -111,15 +111,14 @@ pub(crate) fn inputs(
     let mut outputs = input_expressions(study, plant, settings)?;
     let derivatives = observer
         .input_derivative_expressions(&plant.graph, &outputs)
-        .map_err(|error| Error::input(error.to_string()))?;
+        .map_err(Error::from_source)?;
     outputs.extend(derivatives);
     of_time(plant, &outputs)
 }
 
 /// Expressions of time as a system.
 pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<System, Error> {
-    System::new(&plant.graph, plant.time, &[], &[], &[], outputs)
-        .map_err(|error| Error::input(error.to_string()))
+    System::new(&plant.graph, plant.time, &[], &[], &[], outputs).map_err(Error::from_source)
 }
 
 /// The plant's inputs by name.
@@ -182,5 +181,27 @@ pub(crate) fn input_expression(
         ))
         .at(&study.file)
         .hint(format!("add inputs = {{ {} = \"…\" }}, or a start value in the model", input.name))),
+    }
+}
+
+/// The study's method as the runner has it.
+pub(crate) fn method(method: &study::Method) -> Method {
+    match *method {
+        study::Method::Rk4(Rk4Step::Length(h)) => Method::Rk4(Step::AtMost(h)),
+        study::Method::Rk4(Rk4Step::PerRow(n)) => {
+            Method::Rk4(Step::Substeps(usize::try_from(n).unwrap_or(usize::MAX)))
+        }
+        study::Method::Adaptive { solver, rtol, atol } => {
+            let tolerances = Tolerances {
+                relative: rtol,
+                absolute: atol,
+                ..Tolerances::default()
+            };
+            match solver {
+                Solver::Auto => Method::Adaptive(tolerances),
+                Solver::Explicit => Method::Explicit(tolerances),
+                Solver::Stiff => Method::Stiff(tolerances),
+            }
+        }
     }
 }

@@ -11,12 +11,8 @@ use crate::{Error, Study};
 const DEVIATIONS: f64 = 3.0;
 
 /// What the guarantee takes for granted.
-pub(super) fn of(
-    study: &Study,
-    plant: &Plant,
-    extended: &Extended<'_>,
-) -> Result<Assumptions, Error> {
-    let region = extended.region();
+pub(super) fn of(study: &Study, extended: &Extended<'_>) -> Result<Assumptions, Error> {
+    let (plant, region) = (extended.plant, extended.region());
     Ok(Assumptions {
         drift: drift(study, plant, extended, &region)?,
         noise: noise(study, plant, extended, &region)?,
@@ -61,7 +57,7 @@ fn drift(
         drift.push(match actual == assumed {
             true => 0.0,
             false => range(graph, difference.node(), &wider)
-                .map_err(|error| Error::input(error.to_string()))?
+                .map_err(Error::from_source)?
                 .enclosure
                 .magnitude(),
         });
@@ -103,8 +99,8 @@ fn noise(
             None => 0.0,
             Some((_, Noise::Absolute(deviation))) => DEVIATIONS * deviation,
             Some((_, Noise::Relative(share))) => {
-                let values = range(&plant.graph, output.node, region)
-                    .map_err(|error| Error::input(error.to_string()))?;
+                let values =
+                    range(&plant.graph, output.node, region).map_err(Error::from_source)?;
                 DEVIATIONS * share * values.enclosure.magnitude()
             }
         })

@@ -31,25 +31,24 @@ pub(super) fn answer(
         limits: options.limits,
         ..Question::default()
     };
-    analyse(plant, &question).map_err(|error| blame(study, &error))
+    analyse(plant, &question).map_err(|error| blame(study, error))
 }
 
 /// The place in the study of a name that does not fit.
-fn blame(study: &Study, error: &QuestionError) -> Error {
-    let refusal = Error::input(error.to_string());
-    let QuestionError::NoSuchName { name, .. } = error else {
-        return match error {
-            QuestionError::Expression(_) => refusal,
-            _ => refusal.at(&study.file),
-        };
+fn blame(study: &Study, error: QuestionError) -> Error {
+    let name = match error {
+        QuestionError::Expression(_) => return Error::from_source(error),
+        QuestionError::NoSuchName { ref name, .. } => name.clone(),
+        other => return Error::from_source(other).at(&study.file),
     };
+    let refusal = Error::from_source(error);
     let sensors = &study.sensors;
     let measured = sensors.measured.as_deref().unwrap_or_default();
     let mut names = measured
         .iter()
         .chain(&sensors.unknown)
         .chain(&sensors.disturbances);
-    match names.find(|n| n.text == *name) {
+    match names.find(|n| n.text == name) {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),
     }

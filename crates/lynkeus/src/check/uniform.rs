@@ -6,9 +6,9 @@ use lynkeus_structure::uniform::Part;
 use lynkeus_structure::{Blind, Condition, Uniformity};
 use serde_json::{Map, Value, json};
 
-use crate::Error;
-use crate::plot::Plane;
 use crate::words::{number, side};
+#[cfg(feature = "plot")]
+use crate::{Error, plot::Plane};
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
@@ -113,6 +113,7 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
 }
 
 /// The singular set of a plant with two states.
+#[cfg(feature = "plot")]
 pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
     let [(x, x_low, x_high), (y, y_low, y_high)] = &uniformity.sides[..] else {
         let message = format!(

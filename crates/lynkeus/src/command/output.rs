@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 use std::path::Path;
 
+use lynkeus::model::Diagnostic;
 use lynkeus::{Error, table};
 
 /// Writes a file through a temporary one beside it, so that it is whole or absent.
@@ -77,12 +78,11 @@ pub(super) fn note(text: &str) {
 }
 
 pub(super) fn complain(error: &Error) {
-    let text = error.to_string();
-    // a Modelica diagnostic brings its own heading
-    let heading = if text.starts_with("error") {
-        ""
-    } else {
-        "error: "
-    };
-    let _ = writeln!(io::stderr(), "{heading}{text}");
+    let heading = if brings_heading(error) { "" } else { "error: " };
+    let _ = writeln!(io::stderr(), "{heading}{error}");
+}
+
+/// A diagnostic of a model starts with its own "error".
+fn brings_heading(error: &Error) -> bool {
+    std::error::Error::source(error).is_some_and(|source| source.is::<Diagnostic>())
 }

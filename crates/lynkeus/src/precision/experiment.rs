@@ -42,7 +42,7 @@ impl<'p> Setup<'p> {
         run.noise = lynkeus_run::Noise::default();
         let trajectory = run
             .run()
-            .map_err(|error| interrupted(&error, &study.file))?;
+            .map_err(|error| interrupted(error.error, &study.file))?;
         let reach = Reach { trajectory };
         let measured: Vec<Variable> = extended
             .outputs

@@ -4,6 +4,7 @@
 //! The definitions are in [`lynkeus_observability::precision`].
 
 mod experiment;
+#[cfg(feature = "plot")]
 mod picture;
 mod report;
 #[cfg(test)]
@@ -12,6 +13,7 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
+use crate::prepare::Prepared;
 use crate::{Error, Study, prepare, simulate};
 use experiment::Setup;
 
@@ -86,12 +88,12 @@ pub struct Report {
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = simulate::settings(study)?;
     let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let setup = Setup::new(study, settings, &extended, options)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let setup = Setup::new(study, settings, prepared.extended(), options)?;
     let found = setup
         .experiment
         .run()
-        .map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+        .map_err(|error| Error::from_source(error).at(&study.file))?;
     let measured: Vec<usize> = (0..setup.measured).collect();
     let at = |horizon: usize| found.deviations(horizon, &measured);
     let candidates: Vec<usize> = (0..found.sensors.len()).collect();

@@ -30,13 +30,15 @@ enum News<T> {
 }
 
 /// Does the runs 0 … `count` − 1 on as many threads as there are processors; `watch` is told
-/// the fraction done of them all, on the caller's thread, and may stop them.
+/// the fraction done of them all, on the caller's thread, and may stop them. The runs of a
+/// thread have one clone of `shared`.
 ///
 /// # Errors
 /// The error of the first run that has one, or that `watch` stopped them.
-pub(super) fn every<T: Send>(
+pub(super) fn every<S: Clone + Send, T: Send>(
     count: usize,
-    run: &(impl Fn(usize, &mut Watch<'_>) -> Result<T, Error> + Sync),
+    shared: &S,
+    run: &(impl Fn(&S, usize, &mut Watch<'_>) -> Result<T, Error> + Sync),
     watch: &mut Watch<'_>,
 ) -> Result<Vec<T>, Error> {
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -45,7 +47,8 @@ pub(super) fn every<T: Send>(
     let results = thread::scope(|scope| {
         for _ in 0..threads.min(count) {
             let (sender, next, stop) = (sender.clone(), &next, &stop);
-            scope.spawn(move || work(count, run, next, stop, &sender));
+            let own = shared.clone();
+            scope.spawn(move || work(count, &|i, watch| run(&own, i, watch), next, stop, &sender));
         }
         drop(sender);
         collect(count, &receiver, &stop, watch)
@@ -136,9 +139,10 @@ mod tests {
         let mut last = 0.0;
         let squares = every(
             50,
-            &|i, watch| {
+            &3,
+            &|offset, i, watch| {
                 let _ = watch(0.5);
-                Ok(i * i)
+                Ok(i * i + offset)
             },
             &mut |fraction| {
                 last = fraction;
@@ -146,22 +150,22 @@ mod tests {
             },
         )
         .unwrap();
-        assert_eq!(squares, (0..50).map(|i| i * i).collect::<Vec<_>>());
+        assert_eq!(squares, (0..50).map(|i| i * i + 3).collect::<Vec<_>>());
         assert!((last - 1.0_f64).abs() < 1e-9);
     }
 
     #[test]
     fn an_error_and_a_stop_end_the_sweep() {
-        let fail = |i: usize, _: &mut Watch<'_>| match i {
+        let fail = |_: &(), i: usize, _: &mut Watch<'_>| match i {
             7 => Err(Error::input("seven")),
             _ => Ok(i),
         };
-        let error = every(100, &fail, &mut |_| ControlFlow::Continue(())).unwrap_err();
+        let error = every(100, &(), &fail, &mut |_| ControlFlow::Continue(())).unwrap_err();
         assert_eq!(error.to_string(), "seven");
-        let slow = |i: usize, watch: &mut Watch<'_>| match watch(0.5) {
+        let slow = |_: &(), i: usize, watch: &mut Watch<'_>| match watch(0.5) {
             ControlFlow::Break(()) => Err(Error::input("told to stop")),
             ControlFlow::Continue(()) => Ok(i),
         };
-        assert!(every(1000, &slow, &mut |_| ControlFlow::Break(())).is_err());
+        assert!(every(1000, &(), &slow, &mut |_| ControlFlow::Break(())).is_err());
     }
 }

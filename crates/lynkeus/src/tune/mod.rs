@@ -9,6 +9,7 @@ mod crew;
 mod errors;
 mod holdout;
 mod measures;
+#[cfg(feature = "plot")]
 mod picture;
 mod reference;
 mod replay;
@@ -24,7 +25,9 @@ pub use axis::Axis;
 pub use measures::Measure;
 pub use rewrite::Change;
 
-use crate::{Error, Study, Table, prepare};
+use crate::prepare::Prepared;
+use crate::{Error, ErrorKind, Study, Table, prepare};
+use crew::Watch;
 use reference::Reference;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.
@@ -115,46 +118,85 @@ pub fn tune(
     let axes = axis::axes(study)?;
     let grid = axis::grid(study, &axes)?;
     let plant = prepare::plant(study)?;
-    let mut notes = vec![];
-    let rows = match log {
-        Some(table) => crew::every(
-            grid.len(),
-            &|i, watch| match grid.get(i) {
-                Some((values, study)) => replay::logged(study, values, table, watch),
-                None => Err(Error::input("no such value")),
-            },
-            watch,
-        )?,
-        None => {
-            let measured = prepare::extended(study, &plant)?;
-            let names = measured.outputs.iter().map(|o| o.variable.name.clone());
-            let reference = Reference::new(study, &names.collect::<Vec<_>>())?;
-            notes.extend(reference.notes.iter().cloned());
-            crew::every(
-                grid.len(),
-                &|i, watch| match grid.get(i) {
-                    Some((values, study)) => trial::simulated(study, values, &reference, watch),
-                    None => Err(Error::input("no such value")),
-                },
-                watch,
-            )?
-        }
-    };
+    let prepared = Prepared::new(study, &plant)?;
+    let bench = Bench::new(&prepared, log)?;
+    // what is proved here comes with every clone of the plant; a refusal is the rows' to tell
+    let _ = prepared.examinations();
+    let rows = crew::every(
+        grid.len(),
+        &plant,
+        &|plant, i, watch| match grid.get(i) {
+            Some((values, study)) => {
+                // of its own: what one value builds must not meet the next
+                let plant = plant.clone();
+                bench.row(&Prepared::new(study, &plant)?, values, watch)
+            }
+            None => Err(Error::input("no such value")),
+        },
+        watch,
+    )?;
+    let mut notes = bench.notes().to_vec();
     let knee = least(&rows);
     notes.extend(knee.and_then(|knee| at_an_end(&axes, rows.get(knee)?)));
     Ok(Sweep {
         plant: plant.name.clone(),
         log: log.map(|table| table.file().to_owned()),
-        measures: match log {
-            Some(_) => measures::LOGGED,
-            None => measures::SIMULATED,
-        },
+        measures: bench.measures(),
         axes,
         rows,
         knee,
         time_unit: study.time_unit.clone(),
         notes,
     })
+}
+
+/// What a value is judged on.
+enum Bench<'a> {
+    Simulation(Box<Reference>),
+    Log(&'a Table),
+}
+
+impl<'a> Bench<'a> {
+    fn new(prepared: &Prepared<'_>, log: Option<&'a Table>) -> Result<Self, Error> {
+        Ok(match log {
+            Some(table) => Self::Log(table),
+            None => Self::Simulation(Box::new(Reference::new(prepared)?)),
+        })
+    }
+
+    fn row(
+        &self,
+        prepared: &Prepared<'_>,
+        values: &[f64],
+        watch: &mut Watch<'_>,
+    ) -> Result<Row, Error> {
+        let row = Row::empty(values, self.measures().len());
+        let design = match prepared.design() {
+            Ok(design) => design,
+            Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
+            Err(error) => return Err(error),
+        };
+        match self {
+            Self::Simulation(reference) => {
+                trial::simulated(prepared, &design, reference, row, watch)
+            }
+            Self::Log(table) => replay::logged(prepared, &design, table, row, watch),
+        }
+    }
+
+    fn notes(&self) -> &[String] {
+        match self {
+            Self::Simulation(reference) => &reference.notes,
+            Self::Log(_) => &[],
+        }
+    }
+
+    fn measures(&self) -> &'static [Measure] {
+        match self {
+            Self::Simulation(_) => measures::SIMULATED,
+            Self::Log(_) => measures::LOGGED,
+        }
+    }
 }
 
 fn least(rows: &[Row]) -> Option<usize> {

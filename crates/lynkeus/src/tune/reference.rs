@@ -7,9 +7,10 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Dynamics, Level, Noise, Trajectory};
 
+use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
 use crate::systems;
-use crate::{Error, Study, prepare};
+use crate::{Error, Study};
 
 /// Noise where the study states none, as a share of what the output spans in the run.
 const DEFAULT_NOISE: f64 = 0.01;
@@ -36,19 +37,21 @@ impl Reference {
     ///
     /// # Errors
     /// A study that cannot be simulated.
-    pub fn new(study: &Study, measured: &[String]) -> Result<Self, Error> {
+    pub fn new(prepared: &Prepared<'_>) -> Result<Self, Error> {
+        let (study, plant) = (prepared.study(), prepared.plant());
         let settings = settings(study)?;
-        let plant = prepare::plant(study)?;
-        let mut alone = open_loop(study, settings, &plant)?;
+        let mut alone = open_loop(study, settings, plant)?;
         let stated = std::mem::take(&mut alone.noise);
         let truth = alone
             .run_watched(&mut |_| ControlFlow::Continue(()))
-            .map_err(|error| crate::outcome::interrupted(&error, &study.file))?;
-        let scales = scales(&plant, &truth);
-        let starts = starts(study, &plant)?;
+            .map_err(|error| crate::outcome::interrupted(error.error, &study.file))?;
+        let scales = scales(plant, &truth);
+        let starts = starts(study, plant)?;
         let last = starts.last().copied().unwrap_or(settings.start);
         let mut notes = vec![];
-        let noise = noise(stated, measured, &truth, &mut notes);
+        let measured = prepared.extended().outputs.iter();
+        let measured: Vec<String> = measured.map(|o| o.variable.name.clone()).collect();
+        let noise = noise(stated, &measured, &truth, &mut notes);
         Ok(Self {
             tail: (last + settings.until) / 2.0,
             sample_step: noise.sample_step.unwrap_or(alone.output_step),
@@ -102,7 +105,7 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
     systems::of_time(plant, &inputs)?
         .evaluation()
         .switches(settings.start, settings.until, &mut instants)
-        .map_err(|error| Error::input(error.to_string()).at(&study.file))?;
+        .map_err(|error| Error::from_source(error).at(&study.file))?;
     instants.sort_by(f64::total_cmp);
     instants.dedup();
     Ok(instants)

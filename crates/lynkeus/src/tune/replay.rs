@@ -15,28 +15,21 @@ use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::estimate::{header, refuse_derivatives, refuse_stray_columns, run_settings};
 use crate::outcome::interrupted;
-use crate::{Error, ErrorKind, Study, Table, prepare, systems};
+use crate::prepare::Prepared;
+use crate::{Error, Study, Table, systems};
 
-/// Judges the tuning of `study` on a log; an estimate that diverges, or an observer that is
-/// refused, is a row without figures.
+/// Judges the tuning of a study on a log; an estimate that diverges is a row without figures.
 ///
 /// # Errors
 /// A study or a log that cannot be used.
 pub(super) fn logged(
-    study: &Study,
-    values: &[f64],
+    prepared: &Prepared<'_>,
+    design: &Design,
     table: &Table,
+    mut row: Row,
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
-    let mut row = Row::empty(values, measures::LOGGED.len());
-    let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = match prepare::design(study, &extended) {
-        Ok(design) => design,
-        Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
-        Err(error) => return Err(error),
-    };
-    let replay = Replay::new(study, &plant, &design, table)?;
+    let replay = Replay::new(prepared.study(), prepared.plant(), design, table)?;
     match replay.judge(&mut row, watch)? {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
@@ -127,11 +120,11 @@ impl<'a> Replay<'a> {
         let mut columns = self.columns.clone();
         columns.push(held_out);
         let log = Log::new(names, self.time.to_vec(), columns)
-            .map_err(|error| Error::input(error.to_string()).at(self.file))?;
+            .map_err(|error| Error::from_source(error).at(self.file))?;
         match estimate_watched(&self.observer, &log, settings, watch) {
             Ok(estimates) => Ok(Ok(estimates.trajectory)),
             Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
-            Err(error) => Err(interrupted(&error, self.file)),
+            Err(error) => Err(interrupted(error.error, self.file)),
         }
     }
 
@@ -155,7 +148,9 @@ impl<'a> Replay<'a> {
         let innovation = |(name, values): &(String, Vec<f64>)| -> Option<Vec<f64>> {
             let prediction = run.column(&predicted(name))?;
             let pairs = values.iter().zip(&prediction).skip(self.plan.first);
-            Some(pairs.map(|(y, hat)| (y - hat) / span(values)).collect())
+            // over all rows: not within the loop over them
+            let span = span(values);
+            Some(pairs.map(|(y, hat)| (y - hat) / span).collect())
         };
         let all: Vec<Vec<f64>> = self.measured.iter().filter_map(innovation).collect();
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();

@@ -13,41 +13,34 @@ use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use super::{Peak, Row, measures};
 use crate::outcome::interrupted;
+use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
 use crate::systems::{self, hat, named};
-use crate::{Error, ErrorKind, Study, prepare};
+use crate::{Error, Study};
 
 /// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
 /// parts, but never fewer than the second number.
 const STEPS: f64 = 5e5;
 const STEPS_PER_ROW: f64 = 500.0;
 
-/// Judges the tuning of `study`; an estimate that diverges, or an observer that is refused, is
-/// a row without figures.
+/// Judges the tuning of a study; an estimate that diverges is a row without figures.
 ///
 /// # Errors
 /// A study that cannot be simulated.
 pub(super) fn simulated(
-    study: &Study,
-    values: &[f64],
+    prepared: &Prepared<'_>,
+    design: &Design,
     reference: &Reference,
+    mut row: Row,
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
-    let mut row = Row::empty(values, measures::SIMULATED.len());
-    let plant = prepare::plant(study)?;
-    let extended = prepare::extended(study, &plant)?;
-    let design = match prepare::design(study, &extended) {
-        Ok(design) => design,
-        Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
-        Err(error) => return Err(error),
-    };
     let trial = Trial {
-        study,
-        plant: &plant,
+        study: prepared.study(),
+        plant: prepared.plant(),
         observer: transparent(&design.observer),
         reference,
     };
-    match trial.judge(&design, &mut row, watch)? {
+    match trial.judge(design, &mut row, watch)? {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
     }
@@ -133,7 +126,7 @@ impl Trial<'_> {
         let derivatives = self
             .observer
             .input_derivative_expressions(graph, &inputs)
-            .map_err(|error| Error::input(error.to_string()))?;
+            .map_err(Error::from_source)?;
         let mut signals: Vec<(String, Node)> = named(&plant.inputs);
         for (name, expression) in &study.tune.disturbance {
             let signal = signals.iter_mut().find(|(n, _)| *n == name.text);
@@ -163,7 +156,7 @@ impl Trial<'_> {
         match simulation.run_watched(watch) {
             Ok(run) => Ok(Ok(run)),
             Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
-            Err(error) => Err(interrupted(&error, &self.study.file)),
+            Err(error) => Err(interrupted(error.error, &self.study.file)),
         }
     }
 

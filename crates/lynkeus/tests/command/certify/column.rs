@@ -1,10 +1,11 @@
 //! The distillation column with `gain = "lmi"`: the certificate against trajectories.
 
+use lynkeus::Study;
 use lynkeus::expr::Node;
 use lynkeus::model::Plant;
 use lynkeus::observers::{Certificate, Design, Verdict};
+use lynkeus::prepare::{self, Prepared};
 use lynkeus::run::{Simulation, System};
-use lynkeus::{Study, prepare};
 
 use super::column;
 
@@ -75,7 +76,7 @@ fn pairs(
         .map(|e| &e.variable.name)
         .map(|name| (place(name.clone()), place(format!("{name}_hat"))))
         .collect();
-    let row = |(_, row): (f64, &[f64])| columns.iter().map(|&(i, j)| (row[i], row[j])).unzip();
+    let row = |(_, row): (f64, Vec<f64>)| columns.iter().map(|&(i, j)| (row[i], row[j])).unzip();
     table.rows().map(row).collect()
 }
 
@@ -113,7 +114,7 @@ fn the_certified_decay_is_seen_from_random_starts() {
     assert_eq!(side(certificate, "x[7]"), (0.0, 1.0));
     // the same gain over a graph of our own
     let plant = prepare::plant(&study).unwrap();
-    let design = prepare::design(&study, &prepare::extended(&study, &plant).unwrap()).unwrap();
+    let design = Prepared::new(&study, &plant).unwrap().design().unwrap();
     assert_eq!(design.gains, report.design.gains);
     let mut numbers = Numbers(13);
     let (mut compared, mut informative) = (0, 0);
