@@ -148,7 +148,9 @@ impl<'a> Replay<'a> {
         let innovation = |(name, values): &(String, Vec<f64>)| -> Option<Vec<f64>> {
             let prediction = run.column(&predicted(name))?;
             let pairs = values.iter().zip(&prediction).skip(self.plan.first);
-            Some(pairs.map(|(y, hat)| (y - hat) / span(values)).collect())
+            // over all rows: not within the loop over them
+            let span = span(values);
+            Some(pairs.map(|(y, hat)| (y - hat) / span).collect())
         };
         let all: Vec<Vec<f64>> = self.measured.iter().filter_map(innovation).collect();
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
