@@ -90,13 +90,8 @@ impl Family for BlockTriangular {
             ..
         } = Settings::read(tuning)?;
         if low_power && correction == Correction::Lee {
-            return Ok(Examination {
-                family: NAME,
-                fit: Fit::DoesNotFit,
-                summary: low_power::ONLY_CLASSICAL.to_owned(),
-                chains: vec![],
-                checks: vec![],
-            });
+            let summary = low_power::ONLY_CLASSICAL.to_owned();
+            return Ok(Examination::unfit(NAME, summary, vec![]));
         }
         Ok(match form(extended, tuning)? {
             Ok(Form { examination, .. }) | Err(examination) => examination,

@@ -2,13 +2,12 @@
 
 use lynkeus_gain::Tridiagonal;
 use lynkeus_gain::hurwitz::Stability;
-use lynkeus_structure::{Assignment, Check, Extended, chains};
+use lynkeus_structure::{Assignment, Extended, chains};
 
 use super::NAME;
 use super::gains::{Window, explicit};
 use crate::conditions::{Partial, chain_request, lipschitz, names, output_slope, partials};
 use crate::family;
-use crate::proof::words::undecided;
 use crate::stability::{GainedChain, listed};
 use crate::{DesignError, Examination, Fit, Tuning, TuningError};
 
@@ -95,14 +94,15 @@ fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
     }
 }
 
-/// What an S of the study does to a chain by itself. Never a refusal: a plant that is
-/// damped by itself may carry it, as the paper's column does.
+/// What an S of the study does to a chain by itself, in words. No condition of the form: a
+/// plant that is damped by itself may carry it, as the paper's column does; what is
+/// guaranteed of the gain is the theorem's to say.
 fn carried(
     extended: &Extended<'_>,
     tuning: &Tuning,
     assignment: &Assignment,
     all: &[Vec<Partial>],
-) -> Result<Vec<Check>, TuningError> {
+) -> Result<Vec<String>, TuningError> {
     let Some(S) = explicit(tuning)? else {
         return Ok(vec![]);
     };
@@ -111,7 +111,7 @@ fn carried(
         .positive_per_chain("r", count)?
         .unwrap_or(vec![1.0; count]);
     let divided = tuning.flag("partials")?;
-    let mut checks = vec![];
+    let mut words = vec![];
     for (i, chain) in assignment.chains.iter().enumerate() {
         let K: Vec<f64> = S[i].gain().into_iter().map(|s| r[i] * s).collect();
         let ranges: Vec<(f64, f64)> = all[i]
@@ -127,16 +127,13 @@ fn carried(
         let rightmost = eigenvalues.first().map_or(f64::NAN, |λ| λ.0);
         if gained.frozen() == Stability::Unstable || rightmost >= 0.0 {
             let states = names(extended, &chain.states).join(" → ");
-            checks.push(undecided(
-                format!("A(a) − rS⁻¹CᵀC is stable for ({states})"),
-                format!(
-                    "it is not, with the S given: eigenvalues {} in the middle of the partials' bounds. Only a plant that is damped by itself converges with such a gain; Lemma 1's own S (leave the key S out) is stable",
-                    listed(&eigenvalues)
-                ),
+            words.push(format!(
+                "; with the S given A(a) − rS⁻¹CᵀC is not stable for ({states}), eigenvalues {} in the middle of the partials' bounds: only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
+                listed(&eigenvalues)
             ));
         }
     }
-    Ok(checks)
+    Ok(words)
 }
 
 /// Condition H3 for one assignment.
@@ -155,7 +152,6 @@ fn examined(
         all.push(found);
     }
     checks.push(lipschitz(extended, &region)?);
-    checks.extend(carried(extended, tuning, &assignment, &all)?);
     let chains = assignment
         .chains
         .iter()
@@ -167,6 +163,7 @@ fn examined(
             ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
         );
     }
+    summary += &carried(extended, tuning, &assignment, &all)?.concat();
     if assignment.either {
         let leading = &extended.outputs[assignment.leading].variable.name;
         summary += &format!(
