@@ -135,6 +135,14 @@ impl<'n> Draft<'n> {
             true => next.name.clone(),
             false => format!("({} - {})", next.name, number(next.middle())),
         };
+        // now and then it is not monotone at all: the condition has to be refuted
+        if self.numbers.chance(0.12) {
+            return match (self.numbers.below(3), inputs.first()) {
+                (0, Some(u)) => format!("{a}*{}*{x}", u.name),
+                (1, _) => format!("{a}*sin(3*{x})"),
+                _ => format!("{a}*{x}^2"),
+            };
+        }
         let w = self.strength.min(0.3);
         let w = number(round(w));
         match self.numbers.below(12) {
