@@ -1,8 +1,12 @@
 //! The hash-consed arena: an expression built twice is one node.
 
+mod systems;
+
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::Hash;
+
+pub use systems::{LinearSystem, Solution};
 
 use crate::facts::Facts;
 use crate::{Binary, Expr, Op, Unary, real};
@@ -17,42 +21,6 @@ impl Node {
     pub fn index(self) -> usize {
         self.0 as usize
     }
-}
-
-/// The linear system A x = b of an [`Op::Solve`] node.
-#[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub struct LinearSystem {
-    /// A row by row (n²), then b (n)
-    arguments: Vec<Node>,
-    n: usize,
-}
-
-impl LinearSystem {
-    /// Number of unknowns n.
-    pub fn size(&self) -> usize {
-        self.n
-    }
-
-    /// A, n×n, row by row.
-    pub fn matrix(&self) -> &[Node] {
-        &self.arguments[..self.n * self.n]
-    }
-
-    /// b, n entries.
-    pub fn right(&self) -> &[Node] {
-        &self.arguments[self.n * self.n..]
-    }
-}
-
-/// The result of [`Graph::solve`].
-#[derive(Clone, Debug)]
-pub struct Solution {
-    /// the n components of x with A x = b
-    pub x: Vec<Node>,
-    /// estimate of 1/cond(A) in [0, 1]; near 0 where A is close to singular and
-    /// `x` is the bounded answer of a truncated factorisation. Its derivative
-    /// is taken as zero: it is a diagnostic, not part of the solution.
-    pub rcond: Node,
 }
 
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -193,14 +161,6 @@ impl Graph {
         }
     }
 
-    /// The linear system, where the node is an [`Op::Solve`].
-    pub fn system(&self, node: Node) -> Option<LinearSystem> {
-        let Op::Solve(index) = self.op(node) else {
-            return None;
-        };
-        self.inner.borrow().systems.get(index as usize).cloned()
-    }
-
     /// What was [noted](Graph::note) about a question that names nodes of this graph.
     pub fn noted<K, V>(&self, question: &K) -> Option<V>
     where
@@ -317,45 +277,6 @@ impl Graph {
             .intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
     }
 
-    /// The solution of A x = b; `a` is n×n row by row, `b` has n entries.
-    ///
-    /// # Panics
-    /// If `a.len() != b.len()²`.
-    pub fn solve(&self, a: &[Node], b: &[Node]) -> Solution {
-        let n = b.len();
-        assert_eq!(a.len(), n * n, "A must be n×n for the n entries of b");
-        let system = LinearSystem {
-            arguments: a.iter().chain(b).copied().collect(),
-            n,
-        };
-        let mut inner = self.inner.borrow_mut();
-        let node = match inner.known_systems.get(&system) {
-            Some(&node) => node,
-            None => {
-                let index = inner.systems.len() as u32;
-                inner.systems.push(system.clone());
-                let node = inner.push(Op::Solve(index));
-                inner.known_systems.insert(system, node);
-                node
-            }
-        };
-        let mut entry = |i: usize| {
-            let i = i as u32;
-            inner.intern(Key::Entry(node, i), Op::Entry(node, i))
-        };
-        Solution {
-            x: (0..n).map(&mut entry).collect(),
-            rcond: entry(n),
-        }
-    }
-
-    /// One result of a `Solve` node built before.
-    pub(crate) fn entry(&self, solve: Node, i: u32) -> Node {
-        self.inner
-            .borrow_mut()
-            .intern(Key::Entry(solve, i), Op::Entry(solve, i))
-    }
-
     /// Every node that the roots need, arguments before their users.
     pub fn reachable(&self, roots: &[Node]) -> Vec<Node> {
         let Some(last) = roots.iter().max() else {
@@ -436,20 +357,6 @@ mod tests {
         assert!(length > g.len());
         let other = (g.symbol("x") * 7.0).node();
         assert_eq!(g.noted::<Node, f64>(&other), None);
-    }
-
-    #[test]
-    fn a_system_tells_its_matrix() {
-        let g = Graph::new();
-        let [a, b, c] = ["a", "b", "c"].map(|name| g.symbol(name).node());
-        let x = g.solve(&[a, b, c, a], &[b, c]).x[0];
-        let Op::Entry(solve, 0) = g.op(x) else {
-            panic!()
-        };
-        let system = g.system(solve).unwrap();
-        assert_eq!((system.size(), system.right()), (2, &[b, c][..]));
-        assert_eq!(system.matrix(), [a, b, c, a]);
-        assert_eq!(g.system(x), None);
     }
 
     #[test]
