@@ -11,10 +11,10 @@ use std::collections::VecDeque;
 use lynkeus_expr::interval::{Intervals, solve};
 use lynkeus_expr::{Interval, MissingInput, Tape};
 
-use crate::words::short;
 use crate::irreducible::blocks;
 use crate::output_map::determinant;
 use crate::region::Cell;
+use crate::words::short;
 use crate::{Check, Condition, Matrix, Point, Region, Witness, sign};
 
 /// Determinants of larger blocks are not expanded.

@@ -195,26 +195,26 @@ struct Derivatives {
 
 impl Derivatives {
     fn new(extended: &Extended<'_>) -> Result<Self, MissingInput> {
-    let n = extended.states.len();
-    let graph = extended.graph();
-    let zero = graph.constant(0.0).node();
-    let constant: Vec<Vec<Node>> = extended
-        .inputs
-        .iter()
-        .map(|input| {
-            std::iter::once(input.node)
-                .chain((0..n).map(|_| zero))
-                .collect()
+        let n = extended.states.len();
+        let graph = extended.graph();
+        let zero = graph.constant(0.0).node();
+        let constant: Vec<Vec<Node>> = extended
+            .inputs
+            .iter()
+            .map(|input| {
+                std::iter::once(input.node)
+                    .chain((0..n).map(|_| zero))
+                    .collect()
+            })
+            .collect();
+        let values = output_derivatives(extended, &constant, n.saturating_sub(1))?;
+        let symbols = extended.symbols();
+        let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
+        Ok(Self {
+            gradients: values.iter().map(gradient).collect(),
+            values,
         })
-        .collect();
-    let values = output_derivatives(extended, &constant, n.saturating_sub(1))?;
-    let symbols = extended.symbols();
-    let gradient = |y: &Vec<Node>| jacobian_rows(graph, y, &symbols);
-    Ok(Self {
-        gradients: values.iter().map(gradient).collect(),
-        values,
-    })
-}
+    }
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.

@@ -113,7 +113,8 @@ impl<'a> Task<'a> {
             }
             None => None,
         };
-        let correction = correction::of(self.study, self.prepared.plant(), place, &design.observer)?;
+        let correction =
+            correction::of(self.study, self.prepared.plant(), place, &design.observer)?;
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
             design,

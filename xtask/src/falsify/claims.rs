@@ -1,8 +1,8 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
-use lynkeus::prepare::Prepared;
 use lynkeus::observers::{Certificate, Design, Examination, FAMILIES, Fit, Tuning, Verdict};
+use lynkeus::prepare::Prepared;
 use lynkeus::structure::{Check, Condition, Extended};
 use nalgebra::DMatrix;
 

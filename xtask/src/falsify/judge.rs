@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use lynkeus::prepare::Prepared;
 use lynkeus::Study;
 use lynkeus::observers::Observer;
+use lynkeus::prepare::Prepared;
 use lynkeus::structure::Extended;
 
 use super::attack::Attack;

@@ -1,7 +1,7 @@
 //! Other gains for a case: what a theorem asks for, and much larger ones.
 
-use lynkeus::prepare::Prepared;
 use lynkeus::Study;
+use lynkeus::prepare::Prepared;
 use lynkeus::structure::Extended;
 
 use super::case::{Case, Kind, Role};

@@ -10,8 +10,8 @@ use super::judge::{Desk, attack};
 use super::numbers::Numbers;
 use super::pair::Pair;
 use super::report::Options;
-use lynkeus::prepare::Prepared;
 use lynkeus::Study;
+use lynkeus::prepare::Prepared;
 
 fn side(name: &str, low: f64, high: f64) -> Side {
     Side {

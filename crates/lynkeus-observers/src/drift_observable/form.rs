@@ -156,8 +156,9 @@ impl Form {
             degree: degrees::known(extended, &indices, &degrees),
             regular,
             lipschitz: map.lipschitz.clone(),
-            continuous: continuous
-                .check("the map to the outputs' derivatives has values on the box and does not jump"),
+            continuous: continuous.check(
+                "the map to the outputs' derivatives has values on the box and does not jump",
+            ),
             inputs: match reads {
                 true => Some(inputs.check(variant)?),
                 false => None,

@@ -12,8 +12,8 @@ mod walk;
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
-use crate::words::short;
 use crate::region::Cell;
+use crate::words::short;
 use crate::{Check, Condition, Region};
 use walk::Walk;
 
