@@ -97,7 +97,8 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
     let region = extended.region();
     let symbols = region.symbols();
     let mut place = vec![];
-    for side in &region.dimensions {
+    // what the slope does not depend on is in the middle of its range
+    for (side, centre) in region.dimensions.iter().zip(&region.centre()) {
         let given = point
             .coordinates
             .iter()
@@ -106,9 +107,7 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
         if given.is_some_and(|x| !(side.min <= x && x <= side.max)) {
             return Err(format!("{} = {given:?} is outside of the box", side.name));
         }
-        // what the slope does not depend on may be anywhere
-        let anywhere = side.min.max(side.max.min(0.0)).clamp(-1e300, 1e300);
-        place.push(Precise::from(given.unwrap_or(anywhere)));
+        place.push(Precise::from(given.unwrap_or(*centre)));
     }
     let moved = symbols
         .iter()

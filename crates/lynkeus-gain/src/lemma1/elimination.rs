@@ -10,7 +10,7 @@
 //! * of two matrices T ≤ T' only T counts (monotone),
 //! * any lower bound of several may stand for them.
 //!
-//! The first two lose nothing; the third is used where more than [`MOST`] are left.
+//! The first two lose nothing; the third is used where more than `MOST` are left.
 
 use lynkeus_expr::Interval;
 

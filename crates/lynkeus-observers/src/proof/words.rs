@@ -98,8 +98,11 @@ pub(crate) fn conclude(
     match ultimate {
         Some(found) if found.norm.is_finite() => {
             certificate.ultimate_bound = Some(found.norm);
+            // in the order of the states, whatever that of the chains is
+            let mut states = found.states;
+            states.sort_unstable_by_key(|(i, _)| *i);
             let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound);
-            certificate.ultimate = found.states.into_iter().map(name).collect();
+            certificate.ultimate = states.into_iter().map(name).collect();
         }
         _ => certificate.notes.push(
             "no ultimate bound: the assumed drift or noise has no bound, or S⁻¹ could not be enclosed".into(),
