@@ -82,7 +82,8 @@ impl Facts<'_> {
             let at = |share: f64| -> Vec<f64> {
                 from.iter()
                     .zip(&to)
-                    .map(|(a, b)| a + share * (b - a))
+                    // rounding must not leave the box: at its end a step may begin
+                    .map(|(a, b)| (a + share * (b - a)).clamp(a.min(*b), a.max(*b)))
                     .collect()
             };
             let count = self.pair.states + self.pair.measured;

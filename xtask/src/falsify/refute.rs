@@ -63,7 +63,9 @@ fn slope_of(condition: &str, extended: &Extended<'_>) -> Option<Slope> {
 }
 
 /// Steps of differences, to be seen against 1e-77.
-const STEP: f64 = 1e-26;
+const STEP: f64 = 1e-36;
+/// Slopes below it count as zero.
+const ZERO: f64 = 1e-26;
 
 fn sign(slope: &Slope, refutation: &Refutation, extended: &Extended<'_>) -> Result<Answer, String> {
     let values: Vec<f64> = refutation
@@ -80,8 +82,8 @@ fn sign(slope: &Slope, refutation: &Refutation, extended: &Extended<'_>) -> Resu
             ));
         }
     }
-    let vanishes = values.iter().any(|v| v.abs() <= STEP);
-    let differs = values.iter().any(|v| *v < -STEP) && values.iter().any(|v| *v > STEP);
+    let vanishes = values.iter().any(|v| v.abs() <= ZERO);
+    let differs = values.iter().any(|v| *v < -ZERO) && values.iter().any(|v| *v > ZERO);
     match vanishes || differs {
         true => Ok(Answer::Confirmed),
         false => Err(format!(
