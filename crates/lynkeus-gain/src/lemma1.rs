@@ -17,34 +17,16 @@
 //! instead, and its constants explode doubly exponentially with the length. Then
 //! s_kk > s²/d_{k−1} (Schur again, d the pivots of S) keeps S positive definite.
 
-pub mod elimination;
 mod kernel;
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::elimination::{self, Column, Tails};
+use lynkeus_proof::{Bounds, vertices};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use elimination::{Column, Tails};
 pub use kernel::{Breaking, Kernel, kernel};
 
 use crate::{Tridiagonal, TridiagonalError};
-
-/// α₁ ≤ a(t) ≤ α₂, both positive: what is known of one partial derivative.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// α₁
-    pub lower: f64,
-    /// α₂
-    pub upper: f64,
-}
-
-impl Bounds {
-    fn times(self, factor: f64) -> Self {
-        Self {
-            lower: self.lower * factor,
-            upper: self.upper * factor,
-        }
-    }
-}
 
 /// What [`construct`] found.
 #[derive(Clone, Debug)]
@@ -102,7 +84,7 @@ const RHO: f64 = 2.0;
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     let size = check(bounds)?;
     let w = scale(bounds);
-    let scaled: Vec<Bounds> = bounds.iter().map(|b| b.times(w)).collect();
+    let scaled: Vec<Bounds> = bounds.iter().map(|b| b.scaled(w)).collect();
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
     let mut growth = Growth::new();
@@ -282,24 +264,6 @@ fn inequality(n: usize, S: impl Fn(usize, usize) -> f64, ρ: f64, a: &[f64]) -> 
     let mut p = &sa + sa.transpose();
     p[(0, 0)] -= ρ / S(0, 0);
     p
-}
-
-/// Every choice of one end per bound; ends that coincide count once.
-fn vertices(bounds: &[Bounds]) -> impl Iterator<Item = Vec<f64>> {
-    let open: Vec<usize> = (0..bounds.len())
-        .filter(|&i| bounds[i].lower < bounds[i].upper)
-        .collect();
-    let lower: Vec<f64> = bounds.iter().map(|b| b.lower).collect();
-    let bounds = bounds.to_vec();
-    (0..1usize << open.len()).map(move |choice| {
-        let mut a = lower.clone();
-        for (bit, &i) in open.iter().enumerate() {
-            if choice >> bit & 1 == 1 {
-                a[i] = bounds[i].upper;
-            }
-        }
-        a
-    })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! sⁿ + k₁sⁿ⁻¹ + a₁k₂sⁿ⁻² + a₁a₂k₃sⁿ⁻³ + …
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::hurwitz::{self, Stability};
+use lynkeus_proof::hurwitz::{self, Stability};
 use lynkeus_structure::Point;
 
 use crate::proof::words::shown;

@@ -1,10 +1,12 @@
 //! The paper's constants, and what the decay of ẽ says of the error itself.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::{Chain, Disturbance, Ultimate, ultimate};
+use lynkeus_proof::matrix::{square, sum, upper};
+use lynkeus_proof::metzler;
 
 use super::theorem::{Facts, Study};
 use super::transformed::{Similar, Table, product};
-use crate::proof::{Chain, Disturbance, Ultimate, metzler, square, ultimate, upper};
 use crate::{Constant, DesignError};
 
 impl Study<'_> {
@@ -118,7 +120,7 @@ impl Study<'_> {
         let squares = states
             .iter()
             .map(|&(_, b)| Interval::point(b) * Interval::point(b));
-        found.norm = crate::proof::sum(squares).sqrt().hi();
+        found.norm = sum(squares).sqrt().hi();
         found.states = states;
         // e(0) goes through M of that time, ē(t) back through M⁻¹ of another
         let norms = |table: fn(&Similar) -> &Table| {

@@ -6,6 +6,9 @@
 //! bounds of its entries. The paper's μ_ij are formed of the same bounds.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::{Chain, Comparison, Slope};
+use lynkeus_proof::lyapunov;
+use lynkeus_proof::search::{first, lightest};
 use lynkeus_structure::{Blocks, Check, Extended};
 
 use super::form::form;
@@ -14,10 +17,8 @@ use super::transformed::{Plant, Similar, Table, Term};
 use super::{chain_rule, coefficients, theta};
 use crate::conditions::{Partial, fit, names, output_slope, partials};
 use crate::peaking::Departure;
-use crate::proof::slopes::{Slope, slopes};
-use crate::proof::threshold::{first, lightest};
+use crate::proof::slopes::slopes;
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
-use crate::proof::{Chain, Comparison, lyapunov};
 use crate::stability::GainedChain;
 use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning, prolongation};
 
@@ -217,7 +218,10 @@ impl Study<'_> {
                 .iter()
                 .map(|&k| Interval::point(k) * error)
                 .collect(),
-            partials: facts.partials[i].clone(),
+            partials: facts.partials[i]
+                .iter()
+                .map(|&range| range.into())
+                .collect(),
         }
     }
 

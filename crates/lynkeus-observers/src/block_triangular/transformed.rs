@@ -13,12 +13,13 @@
 //! with powers of θ, and the terms here carry them.
 
 use lynkeus_expr::{Interval, Node, jacobian};
+use lynkeus_proof::chain::Slope;
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{Blocks, Chain, Extended, Matrix, range};
 
 use super::lee::{Sparse, own_jacobian, transformation};
-use crate::DesignError;
-use crate::proof::slopes::{Slope, magnitude};
-use crate::{Assumptions, proof};
+use crate::proof::slopes::magnitude;
+use crate::{Assumptions, DesignError};
 
 /// A table of upper bounds, row by row.
 pub(super) type Table = Vec<Vec<f64>>;
@@ -37,7 +38,7 @@ impl Term {
         let grown = self.powers.iter().map(|&(c, k, coefficient)| {
             Interval::point(coefficient) * Interval::point(θ[c]).powi(k as i32)
         });
-        let size = (Interval::point(self.size) + proof::sum(grown)).hi();
+        let size = (Interval::point(self.size) + sum(grown)).hi();
         Slope {
             row: self.row,
             column: self.column,
@@ -70,7 +71,7 @@ pub(super) fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Table {
     let entry = |row: &Vec<f64>, j: usize| {
         // zero times unbounded is zero: the entry is not there
         let terms = row.iter().zip(B).filter(|(a, b)| **a != 0.0 && b[j] != 0.0);
-        proof::sum(terms.map(|(&a, b)| Interval::point(a) * Interval::point(b[j]))).hi()
+        sum(terms.map(|(&a, b)| Interval::point(a) * Interval::point(b[j]))).hi()
     };
     A.iter()
         .map(|row| (0..columns).map(|j| entry(row, j)).collect())

@@ -1,13 +1,13 @@
 //! The numbers of the gain, and the matrices that they make.
 
 use lynkeus_gain::vandermonde::{self, Lemma32, Pole};
+use lynkeus_proof::magnitude::up;
 use lynkeus_structure::Extended;
 
 use super::form::Form;
 use super::keys::{self, Needed};
 use super::poles::spaced;
 use super::variant::Variant;
-use crate::enclosure::up;
 use crate::{Tuning, TuningError};
 
 /// Default ratio of the filter's slowest pole to that of the observer: that of the

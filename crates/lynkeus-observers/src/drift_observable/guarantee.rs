@@ -15,13 +15,13 @@
 //! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
 //! will do, also one with a smaller α₁, and the states are bounded one by one.
 
-use lynkeus_gain::riccati::Riccati;
+use lynkeus_proof::magnitude::{length, times, up};
+use lynkeus_proof::riccati::Riccati;
 
 use super::gains::{closed_loop, slowest, spread};
 use super::lipschitz::Share;
 use super::proof::{Proof, Solutions, undecided};
 use super::variant::Variant;
-use crate::enclosure::{length, times, up};
 use crate::{Assumptions, Certificate, Constant, Verdict};
 
 /// Shares of the filter's slowest pole tried for α₂.

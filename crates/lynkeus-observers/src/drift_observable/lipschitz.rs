@@ -17,6 +17,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
+use lynkeus_proof::magnitude::{length, norm, product, times, up};
 use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
 
 use super::conditions::regular;
@@ -25,7 +26,7 @@ use super::derivative_name;
 use super::form::Form;
 use super::variant::Variant;
 use crate::DesignError;
-use crate::enclosure::{Enclosure, length, norm, product, times, up};
+use crate::enclosure::Enclosure;
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {

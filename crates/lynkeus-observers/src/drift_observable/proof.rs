@@ -1,14 +1,15 @@
 //! P for the study's gain, and hypothesis 4 of the theorems.
 
-use lynkeus_gain::riccati::Riccati;
 use lynkeus_gain::vandermonde::{self, Pole};
+use lynkeus_proof::magnitude::{length, up};
+use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{Check, Condition, Extended};
 
 use super::form::Form;
 use super::gains::{Gains, closed_loop, spread};
 use super::lipschitz::Lipschitz;
 use crate::Constant;
-use crate::enclosure::{figures, length, up};
+use crate::enclosure::figures;
 
 /// Steps of a bisection on a logarithmic scale.
 const STEPS: usize = 40;

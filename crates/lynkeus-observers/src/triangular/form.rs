@@ -1,7 +1,7 @@
 //! The triangular form: chains, the partials along them, condition H3.
 
 use lynkeus_gain::Tridiagonal;
-use lynkeus_gain::hurwitz::Stability;
+use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::{Assignment, Extended, chains};
 
 use super::NAME;

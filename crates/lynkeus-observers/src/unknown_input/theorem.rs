@@ -10,6 +10,7 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
+use lynkeus_proof::magnitude::{length, times, up};
 use lynkeus_structure::{Check, Condition};
 
 use super::bound;
@@ -17,7 +18,7 @@ use super::constants;
 use super::form::Form;
 use super::norms::{Constants, Norms, in_S};
 use super::settings::{Settings, Thetas};
-use crate::enclosure::{figures, length, times, up};
+use crate::enclosure::figures;
 use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Verdict};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";

@@ -40,7 +40,7 @@ impl Riccati {
     /// A proved solution of the inequality; none where none was found.
     ///
     /// ```
-    /// use lynkeus_gain::riccati::Riccati;
+    /// use lynkeus_proof::riccati::Riccati;
     ///
     /// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
     /// let one = |x: f64| vec![vec![x]];

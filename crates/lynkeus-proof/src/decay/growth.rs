@@ -11,7 +11,8 @@ use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, DVector};
 
 use super::frame::{balanced, lyapunov_equation};
-use crate::definite::{IntervalMatrix, is_positive_definite};
+use crate::definite::is_positive_definite;
+use crate::matrix::IntervalMatrix;
 
 /// States up to which H is sought: its equation has n² unknowns.
 const STATES: usize = 32;
@@ -28,7 +29,7 @@ const SWEEPS: usize = 10_000;
 ///
 /// ```
 /// use lynkeus_expr::Interval;
-/// use lynkeus_gain::decay::is_unstable;
+/// use lynkeus_proof::decay::is_unstable;
 ///
 /// let saddle = |x: f64| vec![
 ///     vec![Interval::point(-1.0), Interval::ONE],

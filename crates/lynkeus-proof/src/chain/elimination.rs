@@ -1,10 +1,12 @@
 //! The first inequality for chains whose partials have too many vertices to visit.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::Bounds;
-use lynkeus_gain::lemma1::elimination::{Column, positive};
 
-use super::{Chain, largest, sum};
+use crate::elimination::{Column, positive};
+
+use super::Chain;
+use crate::matrix::sum;
+use crate::search::largest;
 
 impl Chain {
     /// μ, state by state; none for an S that is not tridiagonal.
@@ -31,11 +33,9 @@ impl Chain {
             own: Interval::point(-2.0) * S[j][j - 1] / (D[j] * D[j]),
         };
         let columns: Vec<Column> = (1..n).map(column).collect();
-        let side = |&(lower, upper): &(f64, f64)| Bounds { lower, upper };
-        let bounds: Vec<Bounds> = self.partials.iter().map(side).collect();
         let proved = |μ: f64| {
             let shift = (Interval::point(μ) + Interval::point(stray)).hi();
-            positive(first, &columns, &bounds, shift)
+            positive(first, &columns, &self.partials, shift)
         };
         largest(first.hi(), proved)
     }

@@ -4,7 +4,7 @@ use lynkeus_expr::{Interval, interval};
 
 /// The symmetric P of A(a) − gC with the n − 1 partials a above the diagonal of A, in
 /// floating point; none where the equation has no unique solution. A proof has to check it.
-pub(crate) fn chain(g: &[f64], a: &[f64]) -> Option<Vec<Vec<f64>>> {
+pub fn chain(g: &[f64], a: &[f64]) -> Option<Vec<Vec<f64>>> {
     let n = g.len();
     let above = |i: usize, j: usize| {
         if j == i + 1 {

@@ -19,7 +19,7 @@ pub enum Stability {
 ///
 /// ```
 /// use lynkeus_expr::Interval;
-/// use lynkeus_gain::hurwitz::{Stability, decide};
+/// use lynkeus_proof::hurwitz::{Stability, decide};
 ///
 /// let point = |c: [f64; 3]| c.map(Interval::point);
 /// assert_eq!(decide(&point([3.0, 3.0, 1.0])), Stability::Stable);

@@ -3,7 +3,7 @@
 use lynkeus_expr::Interval;
 use nalgebra::DMatrix;
 
-use crate::definite::IntervalMatrix;
+use crate::matrix::IntervalMatrix;
 
 /// θ b e_sᵀ with θ in a range: the slope of one nonlinear term in one state.
 #[derive(Clone, Debug, PartialEq)]

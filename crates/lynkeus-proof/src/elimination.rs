@@ -14,7 +14,7 @@
 
 use lynkeus_expr::Interval;
 
-use super::Bounds;
+use crate::Bounds;
 
 /// Lower bounds kept beside each other. A chain of nine is decided exactly.
 const MOST: usize = 64;
@@ -129,7 +129,7 @@ fn smaller(A: [f64; 3], B: [f64; 3]) -> Tail {
 
 /// Lower bounds for all partials so far.
 #[derive(Clone, Debug)]
-pub(super) struct Tails(Vec<Tail>);
+pub struct Tails(Vec<Tail>);
 
 impl Tails {
     /// After the second state: [first, −a·near; ·, a·own − shift].

@@ -8,17 +8,17 @@
 use lynkeus_expr::Interval;
 
 /// Upper bounds of the entries, row by row.
-pub(crate) type Bounds = Vec<Vec<f64>>;
+pub type Bounds = Vec<Vec<f64>>;
 
 /// Proves that M is negative definite; `false` where it is not or nearly not.
-pub(crate) fn negative(M: &Bounds) -> bool {
+pub fn negative(M: &Bounds) -> bool {
     let Some(v) = witness(M) else { return false };
     M.iter().all(|row| product(row, &v).hi() < 0.0)
 }
 
 /// A bound of the largest eigenvalue of a matrix without negative entries, not
 /// necessarily symmetric: max_i (M v)_i/v_i for a positive v (Collatz, Wielandt).
-pub(crate) fn spectral_radius(M: &Bounds) -> f64 {
+pub fn spectral_radius(M: &Bounds) -> f64 {
     let n = M.len();
     let scale = M.iter().flatten().fold(0.0, |m: f64, &x| m.max(x));
     if scale == 0.0 || !scale.is_finite() {

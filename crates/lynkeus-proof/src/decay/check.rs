@@ -5,7 +5,8 @@ use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, DVector};
 
 use super::{ErrorModel, Proof};
-use crate::definite::{IntervalMatrix, is_positive_definite};
+use crate::definite::is_positive_definite;
+use crate::matrix::IntervalMatrix;
 
 /// Whether the proof holds for every model: P > 0, every multiplier positive, and
 /// He(P A(θ)) + 2·rate·P < 0 for every θ in the ranges.

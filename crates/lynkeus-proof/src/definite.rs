@@ -2,17 +2,16 @@
 //! arithmetic: where every pivot is proved positive, every symmetric matrix between
 //! the bounds is positive definite.
 
-use lynkeus_expr::Interval;
+use lynkeus_expr::{Interval, interval};
 
-/// A matrix of intervals, row by row.
-pub type IntervalMatrix = Vec<Vec<Interval>>;
+use crate::matrix::IntervalMatrix;
 
 /// Whether every symmetric matrix within the entries is positive definite. False may
 /// also mean that the bounds are too wide to tell. Only the lower triangle is read.
 ///
 /// ```
 /// use lynkeus_expr::Interval;
-/// use lynkeus_gain::definite::is_positive_definite;
+/// use lynkeus_proof::definite::is_positive_definite;
 ///
 /// let near = |x: f64| Interval::new(x - 0.1, x + 0.1).unwrap();
 /// assert!(is_positive_definite(&[vec![near(2.0), near(1.0)], vec![near(1.0), near(2.0)]]));
@@ -45,6 +44,26 @@ pub fn is_positive_definite(matrix: &[Vec<Interval>]) -> bool {
     true
 }
 
+/// Upper bounds of (S⁻¹)_jj, or none where the enclosure of S⁻¹ is not finite.
+pub fn inverse_diagonal(matrix: &IntervalMatrix) -> Option<Vec<f64>> {
+    let n = matrix.len();
+    let flat: Vec<Interval> = matrix.iter().flatten().copied().collect();
+    let entry = |j: usize| {
+        let unit = |i: usize| {
+            if i == j {
+                Interval::ONE
+            } else {
+                Interval::ZERO
+            }
+        };
+        let right: Vec<Interval> = (0..n).map(unit).collect();
+        let (column, regular) = interval::solve(&flat, &right);
+        let bound = column[j].hi();
+        (regular && bound.is_finite() && bound > 0.0).then_some(bound)
+    };
+    (0..n).map(entry).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,6 +81,33 @@ mod tests {
         assert!(!is_positive_definite(&[vec![Interval::EMPTY]]));
         assert!(!is_positive_definite(&[vec![Interval::ENTIRE]]));
         assert!(!is_positive_definite(&[vec![Interval::ONE], vec![]]));
+    }
+
+    fn rows(rows: &[&[f64]]) -> IntervalMatrix {
+        let row = |r: &&[f64]| r.iter().map(|&x| Interval::point(x)).collect();
+        rows.iter().map(row).collect()
+    }
+
+    #[test]
+    fn a_margin_of_rounding_decides() {
+        let e = 1e-9;
+        assert!(is_positive_definite(&rows(&[
+            &[1.0, 1.0 - e],
+            &[1.0 - e, 1.0]
+        ])));
+        assert!(!is_positive_definite(&rows(&[&[1.0, 1.0], &[1.0, 1.0]])));
+        assert!(!is_positive_definite(&rows(&[
+            &[1.0, 1.0 + e],
+            &[1.0 + e, 1.0]
+        ])));
+    }
+
+    #[test]
+    fn the_diagonal_of_an_inverse() {
+        let found = inverse_diagonal(&rows(&[&[2.0, 1.0], &[1.0, 2.0]])).unwrap();
+        for bound in found {
+            assert!((bound - 2.0 / 3.0).abs() < 1e-12 && bound >= 2.0 / 3.0);
+        }
     }
 
     proptest! {
