@@ -21,7 +21,8 @@ mod kernel;
 
 use lynkeus_expr::Interval;
 use lynkeus_proof::elimination::{self, Column, Tails};
-use lynkeus_proof::{Bounds, vertices};
+use lynkeus_proof::search::largest;
+use lynkeus_proof::{Bounds, varying, vertices};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 pub use kernel::{Breaking, Kernel, kernel};
@@ -221,36 +222,13 @@ pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
 fn eliminated_decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
     let columns = columns(S);
     let first = Interval::point(ρ) / Interval::point(S.get(0, 0));
-    let mut ends = (0.0, first.hi());
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (ends.0 + ends.1);
-        match elimination::positive(first, &columns, bounds, middle) {
-            true => ends.0 = middle,
-            false => ends.1 = middle,
-        }
-    }
-    ends.0
+    let proved = |μ: f64| elimination::positive(first, &columns, bounds, μ);
+    largest(first.hi(), proved).unwrap_or(0.0)
 }
 
 /// The columns of −D⁻¹PD⁻¹ from the second state on, D² = diag S.
 fn columns(S: &Tridiagonal) -> Vec<Column> {
-    let d = |i: usize| Interval::point(S.get(i, i)).sqrt();
-    let entry = |i: usize, j: usize, rows: (usize, usize)| {
-        Interval::point(S.get(i, j)) / (d(rows.0) * d(rows.1))
-    };
-    let column = |j: usize| Column {
-        far: match j {
-            1 => Interval::ZERO,
-            _ => entry(j - 2, j - 1, (j - 2, j)),
-        },
-        near: entry(j - 1, j - 1, (j - 1, j)),
-        own: Interval::point(-2.0) * entry(j, j - 1, (j, j)),
-    };
-    (1..S.size()).map(column).collect()
-}
-
-fn varying(bounds: &[Bounds]) -> usize {
-    bounds.iter().filter(|b| b.lower < b.upper).count()
+    elimination::columns(S.size(), |i, j| Interval::point(S.get(i, j)))
 }
 
 /// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S and (SA)_ij = S_{i,j−1} a_{j−1}.

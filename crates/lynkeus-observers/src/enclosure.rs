@@ -4,9 +4,10 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Unary};
-use lynkeus_proof::inverse::{Inverse, inverse_of_ranges};
+use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
+use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
+use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{Dimension, Matrix, Region, range_within};
 
 /// Cells examined per end of the range of an entry.
@@ -166,17 +167,23 @@ impl<'g> Enclosure<'g> {
         if A.rows != A.columns {
             return Ok(None);
         }
-        let entry = |i, j| A.get(i, j).map_or(Ok((0.0, 0.0)), |node| self.range(node));
+        let entry = |i, j| match A.get(i, j) {
+            Some(node) => {
+                let (low, high) = self.range(node)?;
+                Ok(Interval::new(low, high).unwrap_or(Interval::ENTIRE))
+            }
+            None => Ok(Interval::ZERO),
+        };
         let row = |i: usize| (0..A.columns).map(|j| entry(i, j)).collect();
-        let ranges: Vec<Vec<(f64, f64)>> = (0..A.rows).map(row).collect::<Result<_, _>>()?;
-        Ok(inverse_of_ranges(&ranges))
+        let ranges: Result<IntervalMatrix, MissingInput> = (0..A.rows).map(row).collect();
+        Ok(Inverse::of(&ranges?))
     }
 
     /// Bounds of the entries of B̃ Ã⁻¹ for means of B and A along the same line.
     pub fn divided(&self, B: &Matrix<'_>, A: &Inverse) -> Result<Vec<Vec<f64>>, MissingInput> {
-        let n = A.R.len();
+        let n = A.R.nrows();
         let R = Matrix::from_fn(self.graph, (n, n), |i, j| {
-            Some(self.graph.constant(A.R[i][j]).node())
+            Some(self.graph.constant(A.R[(i, j)]).node())
         });
         Ok(product(&self.magnitudes(&B.times(&R))?, &A.N))
     }

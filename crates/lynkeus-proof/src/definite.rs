@@ -2,9 +2,11 @@
 //! arithmetic: where every pivot is proved positive, every symmetric matrix between
 //! the bounds is positive definite.
 
-use lynkeus_expr::{Interval, interval};
+use lynkeus_expr::Interval;
+use nalgebra::DMatrix;
 
-use crate::matrix::IntervalMatrix;
+use crate::matrix::{IntervalMatrix, square};
+use crate::search::largest;
 
 /// Whether every symmetric matrix within the entries is positive definite. False may
 /// also mean that the bounds are too wide to tell. Only the lower triangle is read.
@@ -44,30 +46,45 @@ pub fn is_positive_definite(matrix: &[Vec<Interval>]) -> bool {
     true
 }
 
-/// Upper bounds of (S⁻¹)_jj, or none where the enclosure of S⁻¹ is not finite.
-pub fn inverse_diagonal(matrix: &IntervalMatrix) -> Option<Vec<f64>> {
-    let n = matrix.len();
-    let flat: Vec<Interval> = matrix.iter().flatten().copied().collect();
-    let entry = |j: usize| {
-        let unit = |i: usize| {
-            if i == j {
-                Interval::ONE
-            } else {
-                Interval::ZERO
-            }
+/// Whether P − βQ is positive definite for symmetric P and Q of one size: a bound of one
+/// quadratic form by another.
+pub fn is_below(Q: &DMatrix<f64>, β: f64, P: &DMatrix<f64>) -> bool {
+    let β = Interval::point(β);
+    let entry = |i, j| Interval::point(P[(i, j)]) - β * Interval::point(Q[(i, j)]);
+    P.shape() == Q.shape() && is_positive_definite(&square(P.nrows(), entry))
+}
+
+/// A lower bound of the least eigenvalue of every symmetric matrix within the entries, as
+/// large as the arithmetic proves but at most `limit`; none where it is not proved to be
+/// positive.
+///
+/// ```
+/// use lynkeus_expr::Interval;
+/// use lynkeus_proof::definite::least_eigenvalue;
+///
+/// let matrix = [[2.0, 1.0], [1.0, 2.0]].map(|row| row.map(Interval::point).to_vec());
+/// let found = least_eigenvalue(&matrix, f64::INFINITY).unwrap();
+/// assert!(found < 1.0 && found > 1.0 - 1e-12);
+/// ```
+pub fn least_eigenvalue(matrix: &[Vec<Interval>], limit: f64) -> Option<f64> {
+    let above = |μ: f64| {
+        let entry = |i: usize, j: usize| match i == j {
+            true => matrix[i][j] - Interval::point(μ),
+            false => matrix[i][j],
         };
-        let right: Vec<Interval> = (0..n).map(unit).collect();
-        let (column, regular) = interval::solve(&flat, &right);
-        let bound = column[j].hi();
-        (regular && bound.is_finite() && bound > 0.0).then_some(bound)
+        is_positive_definite(&square(matrix.len(), entry))
     };
-    (0..n).map(entry).collect()
+    let diagonal = (0..matrix.len()).map(|i| matrix[i][i].hi());
+    let limit = diagonal.fold(limit, f64::min);
+    match limit > 0.0 && limit.is_finite() && above(limit) {
+        true => Some(limit),
+        false => largest(limit, above),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DMatrix;
     use proptest::prelude::*;
 
     fn points(matrix: &DMatrix<f64>, radius: f64) -> IntervalMatrix {
@@ -100,14 +117,6 @@ mod tests {
             &[1.0, 1.0 + e],
             &[1.0 + e, 1.0]
         ])));
-    }
-
-    #[test]
-    fn the_diagonal_of_an_inverse() {
-        let found = inverse_diagonal(&rows(&[&[2.0, 1.0], &[1.0, 2.0]])).unwrap();
-        for bound in found {
-            assert!((bound - 2.0 / 3.0).abs() < 1e-12 && bound >= 2.0 / 3.0);
-        }
     }
 
     proptest! {

@@ -32,6 +32,22 @@ pub struct Column {
     pub own: Interval,
 }
 
+/// The columns of −D⁻¹PD⁻¹ from the second state on for a tridiagonal S, D² = diag S, where
+/// P = AᵀS + SA has (SA)_ij = S_{i,j−1} a_{j−1}.
+pub fn columns(n: usize, S: impl Fn(usize, usize) -> Interval) -> Vec<Column> {
+    let weight = |j: usize| S(j, j).sqrt();
+    let entry = |i: usize, j: usize, row: usize| S(i, j) / (weight(row) * weight(j + 1));
+    let column = |j: usize| Column {
+        far: match j {
+            1 => Interval::ZERO,
+            _ => entry(j - 2, j - 1, j - 2),
+        },
+        near: entry(j - 1, j - 1, j - 1),
+        own: Interval::point(-2.0) * entry(j, j - 1, j),
+    };
+    (1..n).map(column).collect()
+}
+
 /// [t11, t12; t12, t22], a lower bound of the Schur complement on the last two states.
 #[derive(Clone, Copy, Debug)]
 struct Tail([f64; 3]);

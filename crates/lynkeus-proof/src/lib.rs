@@ -16,4 +16,4 @@ pub mod riccati;
 pub mod search;
 mod vertices;
 
-pub use vertices::{Bounds, vertices};
+pub use vertices::{Bounds, varying, vertices};

@@ -1,15 +1,10 @@
-//! Bounds of sizes.
+//! Arithmetic of upper bounds of sizes, which are never negative: every result is rounded
+//! up, and an infinite bound is one that is not known.
 
 use lynkeus_expr::Interval;
 
-/// More than the rounding errors of a sum of some hundred positive numbers.
-const GUARD: f64 = 1e-12;
-
-/// Raised by more than the rounding of a few dozen plain operations on positive numbers
-/// has cost.
-pub fn up(x: f64) -> f64 {
-    x * (1.0 + GUARD)
-}
+/// Bounds of the absolute values of a matrix, row by row.
+pub type Magnitudes = Vec<Vec<f64>>;
 
 /// A bound as an interval: an infinite one bounds nothing.
 pub fn size(bound: f64) -> Interval {
@@ -43,7 +38,7 @@ pub fn root(a: f64) -> f64 {
 }
 
 /// The product of two matrices of bounds.
-pub fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Magnitudes {
     let columns = B.first().map_or(0, Vec::len);
     let entry = |row: &Vec<f64>, j: usize| {
         let terms = row.iter().zip(B);

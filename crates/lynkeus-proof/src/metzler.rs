@@ -7,18 +7,18 @@
 
 use lynkeus_expr::Interval;
 
-/// Upper bounds of the entries, row by row.
-pub type Bounds = Vec<Vec<f64>>;
+use crate::magnitude::Magnitudes;
+use crate::matrix::{square, sum};
 
 /// Proves that M is negative definite; `false` where it is not or nearly not.
-pub fn negative(M: &Bounds) -> bool {
+pub fn is_negative_definite(M: &Magnitudes) -> bool {
     let Some(v) = witness(M) else { return false };
     M.iter().all(|row| product(row, &v).hi() < 0.0)
 }
 
 /// A bound of the largest eigenvalue of a matrix without negative entries, not
 /// necessarily symmetric: max_i (M v)_i/v_i for a positive v (Collatz, Wielandt).
-pub fn spectral_radius(M: &Bounds) -> f64 {
+pub fn spectral_radius(M: &Magnitudes) -> f64 {
     let n = M.len();
     let scale = M.iter().flatten().fold(0.0, |m: f64, &x| m.max(x));
     if scale == 0.0 || !scale.is_finite() {
@@ -44,15 +44,24 @@ pub fn spectral_radius(M: &Bounds) -> f64 {
     least
 }
 
+/// A bound of the spectral norm of every matrix with entries up to those of M, which are
+/// not negative: ‖M‖² is the spectral radius of MᵀM.
+pub fn spectral_norm(M: &Magnitudes) -> f64 {
+    let columns = M.first().map_or(0, Vec::len);
+    let column = |j: usize| M.iter().map(move |row| Interval::point(row[j]));
+    let entry = |i, j| sum(column(i).zip(column(j)).map(|(a, b)| a * b)).hi();
+    Interval::point(spectral_radius(&square(columns, entry)))
+        .sqrt()
+        .hi()
+}
+
 fn product(row: &[f64], v: &[f64]) -> Interval {
     let terms = row.iter().zip(v);
-    terms.fold(Interval::ZERO, |sum, (&m, &v)| {
-        sum + Interval::point(m) * Interval::point(v)
-    })
+    sum(terms.map(|(&m, &v)| Interval::point(m) * Interval::point(v)))
 }
 
 /// v with M v = −1, by elimination; positive exactly where −M is an M-matrix.
-fn witness(M: &Bounds) -> Option<Vec<f64>> {
+fn witness(M: &Magnitudes) -> Option<Vec<f64>> {
     let n = M.len();
     let mut a: Vec<Vec<f64>> = M
         .iter()
@@ -86,7 +95,11 @@ mod tests {
     #[test]
     fn definite_up_to_rounding() {
         let with = |c: f64| vec![vec![-1.0, c], vec![c, -4.0]];
-        assert!(negative(&with(1.999_999)) && !negative(&with(2.0)) && !negative(&with(2.1)));
+        assert!(
+            is_negative_definite(&with(1.999_999))
+                && !is_negative_definite(&with(2.0))
+                && !is_negative_definite(&with(2.1))
+        );
     }
 
     #[test]

@@ -11,10 +11,10 @@
 //! Both λ_max(P̂(a)) and pᵀ(−P̂)⁻¹p are convex in a: the vertices decide.
 
 use lynkeus_expr::Interval;
-use lynkeus_proof::{Bounds, elimination, vertices};
+use lynkeus_proof::{Bounds, elimination, varying, vertices};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::{BISECTIONS, Error, VERTICES, check, columns, varying};
+use super::{BISECTIONS, Error, VERTICES, check, columns};
 use crate::Tridiagonal;
 
 /// What (17) asks of ρ.

@@ -9,7 +9,7 @@ use lynkeus_expr::Interval;
 use lynkeus_proof::chain::Chain;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::lyapunov;
-use lynkeus_proof::matrix::square;
+use lynkeus_proof::matrix::points;
 use lynkeus_structure::{Check, Extended};
 
 use super::settings::{Correction, Settings};
@@ -90,12 +90,12 @@ fn advice(correction: Correction, K: &[f64], a: &[f64]) -> String {
 
 /// μ of the first inequality with the P of the partials `a`.
 fn decay(K: &[f64], a: &[f64], ranges: &[(f64, f64)]) -> Option<f64> {
-    let P = lyapunov::chain(K, a)?;
+    let P = lyapunov::of_chain(K, a)?;
     let chain = Chain {
         states: (0..K.len()).collect(),
         speed: Interval::ONE,
         scales: vec![Interval::ONE; K.len()],
-        S: square(K.len(), |i, j| Interval::point(P[i][j])),
+        S: points(&P),
         g: K.iter().map(|&k| Interval::point(k)).collect(),
         partials: ranges.iter().map(|&range| range.into()).collect(),
     };

@@ -6,7 +6,8 @@
 //! and |e_i| ≤ r·√(P⁻¹)_ii.
 
 use lynkeus_expr::Interval;
-use lynkeus_proof::decay::{Proof, is_below};
+use lynkeus_proof::decay::Proof;
+use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::Extended;

@@ -2,10 +2,9 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_gain::UnitFactor;
-use lynkeus_proof::definite::is_positive_definite;
+use lynkeus_proof::definite::least_eigenvalue;
 use lynkeus_proof::matrix::{IntervalMatrix, square, sum, upper};
 use lynkeus_proof::metzler;
-use lynkeus_proof::search::largest;
 
 /// After this many 1/θ the past is forgotten but for e^{−τ}.
 pub(super) const TAU: f64 = 10.0;
@@ -92,13 +91,7 @@ pub(super) fn below(C: &[Vec<f64>], F: &[Vec<f64>], blocks: usize) -> Option<f64
             integrals[a + b] * outer
         }))
     });
-    let limit = (0..n).map(|i| G[i][i].hi()).fold(f64::INFINITY, f64::min);
-    largest(limit, |m| {
-        is_positive_definite(&square(n, |i, j| match i == j {
-            true => G[i][j] - Interval::point(m),
-            false => G[i][j],
-        }))
-    })
+    least_eigenvalue(&G, f64::INFINITY)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::Interval;
 
-use crate::elimination::{Column, positive};
+use crate::elimination::{columns, positive};
 
 use super::Chain;
 use crate::matrix::sum;
@@ -24,15 +24,7 @@ impl Chain {
         // g = rS⁻¹Cᵀ up to rounding: the rest of Sg is small, its arrow has this norm
         let rest = (1..n).map(|i| (Sg[i] / (D[0] * D[i])).powi(2));
         let stray = sum(rest).sqrt().hi();
-        let column = |j: usize| Column {
-            far: match j {
-                1 => Interval::ZERO,
-                _ => S[j - 2][j - 1] / (D[j - 2] * D[j]),
-            },
-            near: S[j - 1][j - 1] / (D[j - 1] * D[j]),
-            own: Interval::point(-2.0) * S[j][j - 1] / (D[j] * D[j]),
-        };
-        let columns: Vec<Column> = (1..n).map(column).collect();
+        let columns = columns(n, |i, j| S[i][j]);
         let proved = |μ: f64| {
             let shift = (Interval::point(μ) + Interval::point(stray)).hi();
             positive(first, &columns, &self.partials, shift)

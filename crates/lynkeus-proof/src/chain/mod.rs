@@ -23,10 +23,12 @@ mod elimination;
 
 use lynkeus_expr::Interval;
 
-use crate::definite::{inverse_diagonal, is_positive_definite};
+use crate::definite::{is_positive_definite, least_eigenvalue};
+use crate::magnitude::Magnitudes;
 use crate::matrix::{IntervalMatrix, square, sum, upper};
 use crate::search::largest;
-use crate::{Bounds, metzler, vertices};
+use crate::vertices::{Bounds, varying, vertices};
+use crate::{inverse, metzler};
 
 /// One entry of the Jacobian.
 #[derive(Clone, Debug)]
@@ -69,19 +71,13 @@ impl Chain {
         if !is_positive_definite(&self.S) {
             return None;
         }
-        if self.partials.iter().filter(|b| b.lower < b.upper).count() > VERTICES {
+        if varying(&self.partials) > VERTICES {
             return self.eliminated_decay();
         }
         let mut μ = f64::INFINITY;
         for a in vertices(&self.partials) {
             let Q = self.scaled_form(&a);
-            let diagonal = (0..self.size()).map(|i| Q[i][i].hi());
-            let limit = diagonal.fold(μ, f64::min);
-            let proved = |μ: f64| is_positive_definite(&shifted(&Q, μ));
-            if limit == μ && proved(μ) {
-                continue;
-            }
-            μ = largest(limit, proved)?;
+            μ = least_eigenvalue(&Q, μ)?;
         }
         (μ > 0.0 && μ.is_finite()).then_some(μ)
     }
@@ -100,9 +96,7 @@ impl Chain {
         let column = |i: usize, j: usize| if j == 0 { Sg[i] } else { Interval::ZERO };
         let entry = |i: usize, j: usize| column(i, j) + column(j, i) - SA(i, j) - SA(j, i);
         let scaled = |i: usize, j: usize| entry(i, j) / (S[i][i] * S[j][j]).sqrt();
-        (0..n)
-            .map(|i| (0..n).map(|j| scaled(i, j)).collect())
-            .collect()
+        square(n, scaled)
     }
 
     /// D_j, the weight of ε_j.
@@ -114,9 +108,9 @@ impl Chain {
 /// The second inequality for chains whose first one holds with `μ`.
 pub struct Comparison {
     /// N, upper bounds
-    N: metzler::Bounds,
+    N: Magnitudes,
     /// |S̄|, upper bounds
-    S̄: metzler::Bounds,
+    S̄: Magnitudes,
 }
 
 impl Comparison {
@@ -156,7 +150,7 @@ impl Comparison {
 
     /// Whether the decay is proved.
     pub fn holds(&self) -> bool {
-        metzler::negative(&self.N)
+        metzler::is_negative_definite(&self.N)
     }
 
     /// σ: V' ≤ −2σV is proved.
@@ -168,7 +162,7 @@ impl Comparison {
                 let (N, S̄) = (Interval::point(self.N[p][q]), Interval::point(self.S̄[p][q]));
                 (N + Interval::point(2.0 * σ) * S̄).hi()
             });
-            metzler::negative(&shifted)
+            metzler::is_negative_definite(&shifted)
         })?;
         (σ > 0.0).then_some(σ)
     }
@@ -222,9 +216,9 @@ pub fn ultimate(chains: &[Chain], σ: f64, outside: &Disturbance<'_>) -> Option<
     for (i, chain) in chains.iter().enumerate() {
         let β = push(chain, outside.drift, *outside.noise.get(i)?)?;
         β2 = β2 + β * β;
-        let inverse = inverse_diagonal(&normalised(chain))?;
+        let steep = inverse::diagonal(&normalised(chain))?;
         let mut trace = Interval::ZERO;
-        for (j, bound) in inverse.into_iter().enumerate() {
+        for (j, bound) in steep.into_iter().enumerate() {
             let square = Interval::point(bound) / chain.S[j][j];
             let radius = chain.scales[j] * square.sqrt();
             trace = trace + radius * radius;
@@ -273,13 +267,4 @@ fn normalised(chain: &Chain) -> IntervalMatrix {
         true => Interval::ONE,
         false => S[i][j] / (S[i][i] * S[j][j]).sqrt(),
     })
-}
-
-/// Q − μI
-fn shifted(Q: &IntervalMatrix, μ: f64) -> IntervalMatrix {
-    let entry = |i: usize, j: usize| match i == j {
-        true => Q[i][j] - Interval::point(μ),
-        false => Q[i][j],
-    };
-    square(Q.len(), entry)
 }

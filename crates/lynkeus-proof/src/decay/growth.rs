@@ -10,9 +10,10 @@
 use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, DVector};
 
-use super::frame::{balanced, lyapunov_equation};
+use super::frame::balanced;
 use crate::definite::is_positive_definite;
-use crate::matrix::IntervalMatrix;
+use crate::lyapunov;
+use crate::matrix::{IntervalMatrix, square, sum};
 
 /// States up to which H is sought: its equation has n² unknowns.
 const STATES: usize = 32;
@@ -41,8 +42,8 @@ const SWEEPS: usize = 10_000;
 pub fn is_unstable(A: &IntervalMatrix) -> bool {
     let n = A.len();
     let finite = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
-    let square = A.iter().all(|row| row.len() == n);
-    if n == 0 || n > STATES || !square || !A.iter().flatten().all(finite) {
+    let is_square = A.iter().all(|row| row.len() == n);
+    if n == 0 || n > STATES || !is_square || !A.iter().flatten().all(finite) {
         return false;
     }
     let middle = DMatrix::from_fn(n, n, |i, j| A[i][j].midpoint());
@@ -52,14 +53,12 @@ pub fn is_unstable(A: &IntervalMatrix) -> bool {
         .map(|d| d.log2().round().exp2())
         .collect();
     let scaled = |i: usize, j: usize| Interval::point(sizes[j] / sizes[i]) * A[i][j];
-    let A: IntervalMatrix = (0..n)
-        .map(|i| (0..n).map(|j| scaled(i, j)).collect())
-        .collect();
+    let A = square(n, scaled);
     let middle = DMatrix::from_fn(n, n, |i, j| A[i][j].midpoint());
     let shifts = shifts(&middle).into_iter();
     shifts.take(SHIFTS).any(|σ| {
         let shifted = &middle - DMatrix::identity(n, n) * σ;
-        lyapunov_equation(&shifted).is_some_and(|P| grows(&A, σ, &-P))
+        lyapunov::solve(&shifted, &-DMatrix::identity(n, n)).is_some_and(|H| grows(&A, σ, &H))
     })
 }
 
@@ -92,13 +91,9 @@ fn grows(A: &IntervalMatrix, σ: f64, H: &DMatrix<f64>) -> bool {
         true => A[k][j] - Interval::point(σ),
         false => A[k][j],
     };
-    let product = |i: usize, j: usize| {
-        (0..n).fold(Interval::ZERO, |sum, k| {
-            sum + Interval::point(H[(i, k)]) * shifted(k, j)
-        })
-    };
-    let row = |i: usize| (0..=i).map(|j| product(i, j) + product(j, i)).collect();
-    let He: IntervalMatrix = (0..n).map(row).collect();
+    let product =
+        |i: usize, j: usize| sum((0..n).map(|k| Interval::point(H[(i, k)]) * shifted(k, j)));
+    let He = square(n, |i, j| product(i, j) + product(j, i));
     is_positive_definite(&He) && is_positive_somewhere(H)
 }
 
@@ -108,14 +103,9 @@ fn is_positive_somewhere(H: &DMatrix<f64>) -> bool {
         .eigenvectors
         .column(eigen.eigenvalues.imax())
         .into_owned();
-    let mut form = Interval::ZERO;
-    for i in 0..e.len() {
-        for j in 0..e.len() {
-            form =
-                form + Interval::point(e[i]) * Interval::point(H[(i, j)]) * Interval::point(e[j]);
-        }
-    }
-    form.is_positive()
+    let point = Interval::point;
+    let row = |i: usize| sum((0..e.len()).map(|j| point(H[(i, j)]) * point(e[j])));
+    sum((0..e.len()).map(|i| point(e[i]) * row(i))).is_positive()
 }
 
 #[cfg(test)]

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::analysis::{inequality, prove, symmetric};
+use super::analysis::{inequality, prove};
 use super::{ErrorModel, Proof, scale::Scale};
 use crate::lmi::{Affine, Failure, Problem, Solution};
+use crate::lyapunov::symmetric;
 
 /// Rounds of the alternation between K and P.
 const ROUNDS: usize = 6;
