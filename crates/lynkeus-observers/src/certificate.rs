@@ -141,8 +141,7 @@ pub struct Certificate {
     pub lyapunov: Option<DMatrix<f64>>,
     /// what the reader should know, in words
     pub notes: Vec<String>,
-    /// made by [`Certificate::new`] only, which asks whether the plant is regular
-    _examined: (),
+    regularity: Check,
 }
 
 impl Certificate {
@@ -169,8 +168,14 @@ impl Certificate {
             constants: vec![],
             lyapunov: None,
             notes: vec![],
-            _examined: (),
+            regularity: assumptions.regularity.clone(),
         }
+    }
+
+    /// That the plant has values on the box and does not jump: no certificate is made without
+    /// asking, and it is the first of the hypotheses.
+    pub fn regularity(&self) -> &Check {
+        &self.regularity
     }
 
     /// The first hypothesis that is not proved.

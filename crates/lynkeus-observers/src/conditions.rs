@@ -2,7 +2,9 @@
 
 use lynkeus_expr::Node;
 use lynkeus_structure::sign::{self, Sign};
-use lynkeus_structure::{ChainRequest, Check, Condition, Dimension, Extended, Region, Regularity};
+use lynkeus_structure::{
+    ChainRequest, Check, Condition, Dimension, Extended, Region, Regularity, has_value_at,
+};
 
 use crate::{DesignError, Fit, Tuning, TuningError};
 
@@ -20,7 +22,15 @@ fn partial(
         .unwrap_or_else(|| graph.constant(0.0).node());
     let (f, x) = (&extended.states[row].name, &extended.states[column].name);
     let name = format!("∂f({f})/∂{x} keeps its sign");
-    Ok((node, sign::keeps_sign(graph, name, node, region)?))
+    let mut found = sign::keeps_sign(graph, name, node, region)?;
+    // log(x) has a derivative at x < 0, where it has no value: no witness lies there
+    if let Condition::Refuted(witness) = &found.check.verdict
+        && !has_value_at(graph, extended.derivatives[row], witness, region)?
+    {
+        found.check.detail = format!("{}, but where f({f}) has no value", found.check.detail);
+        found.check.verdict = Condition::Undecided(region.sides(&graph.symbols_of(&[node])));
+    }
+    Ok((node, found))
 }
 
 /// ∂f_j/∂x_{j+1} along a chain.

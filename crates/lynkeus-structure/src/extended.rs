@@ -247,7 +247,7 @@ impl<'p> Extended<'p> {
         let outputs = self.outputs.iter().map(|o| o.variable.node);
         let all: Vec<Node> = self.derivatives.iter().copied().chain(outputs).collect();
         let found = Regularity::of(self.graph(), &all, &self.symbols(), region)?;
-        Ok(found.check("f and h have values everywhere on the box and do not jump"))
+        Ok(found.check("f and h have values on the whole box and do not jump"))
     }
 
     /// The box: declared ranges of the states, unknown and known inputs, time.

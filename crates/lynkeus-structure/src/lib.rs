@@ -39,7 +39,7 @@ pub use layers::Layers;
 pub use matrix::Matrix;
 pub use range::{Range, range, range_within};
 pub use region::{Dimension, Region};
-pub use regularity::{Regularity, Trouble, steps};
+pub use regularity::{Regularity, Trouble, has_value_at, steps};
 pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, uniformity};

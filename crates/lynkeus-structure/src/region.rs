@@ -43,6 +43,12 @@ impl Region {
         }
     }
 
+    /// Names and ends of the sides of some symbols.
+    pub fn sides(&self, symbols: &[Node]) -> Vec<(String, f64, f64)> {
+        let used = self.restricted(symbols);
+        used.named(&used.cell())
+    }
+
     /// The symbols, in order.
     pub fn symbols(&self) -> Vec<Node> {
         self.dimensions.iter().map(|d| d.symbol).collect()
@@ -153,6 +159,11 @@ impl Region {
         } else {
             middle
         }
+    }
+
+    /// A point inside: the middle, or a number within reach where a side has no end.
+    pub fn centre(&self) -> Vec<f64> {
+        self.middle_point(&self.cell())
     }
 
     /// The middle of a cell.

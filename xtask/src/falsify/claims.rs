@@ -52,22 +52,16 @@ pub struct Findings {
     pub certificates: Vec<Certificate>,
 }
 
+/// What every family finds in the plant, and nothing of an observer.
+pub fn examined(prepared: &Prepared<'_>) -> Findings {
+    let mut found = Findings::new(prepared);
+    found.examined(prepared.extended(), true);
+    found
+}
+
 /// Asks the library.
 pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
-    let mut found = Findings {
-        design: None,
-        claims: vec![],
-        refutations: vec![],
-        examination: None,
-        contradicts: false,
-        gain: serde_json::Value::Null,
-        counts: Counts::default(),
-        certificates: vec![],
-    };
-    found.counts.plants = 1;
-    if let Ok(examinations) = prepared.examinations() {
-        found.examination = examinations.last().cloned();
-    }
+    let mut found = Findings::new(prepared);
     found.examined(prepared.extended(), thorough);
     let Ok(design) = prepared.design() else {
         return found;
@@ -94,6 +88,23 @@ impl Findings {
         self.examination
             .as_ref()
             .is_some_and(|e| e.fit == Fit::Fits)
+    }
+
+    fn new(prepared: &Prepared<'_>) -> Self {
+        let examinations = prepared.examinations();
+        Self {
+            design: None,
+            claims: vec![],
+            refutations: vec![],
+            examination: examinations.ok().and_then(|all| all.last().cloned()),
+            contradicts: false,
+            gain: serde_json::Value::Null,
+            counts: Counts {
+                plants: 1,
+                ..Counts::default()
+            },
+            certificates: vec![],
+        }
     }
 
     fn examined(&mut self, extended: &Extended<'_>, thorough: bool) {

@@ -50,6 +50,8 @@ pub struct Effort {
     pub runs: usize,
     /// conditions of all families instead of the study's
     pub thorough: bool,
+    /// every family examines the plant; no observer is attacked
+    pub refutations_only: bool,
     /// whether plant and gain are looked at beside the certificates
     pub facts: bool,
 }
@@ -94,8 +96,12 @@ pub fn judge(
         let plant = lynkeus::prepare::plant(&study).map_err(|e| e.to_string())?;
         let prepared = Prepared::new(&study, &plant).map_err(|e| e.to_string())?;
         let extended = prepared.extended();
-        let found = claims::findings(&prepared, effort.thorough);
-        if tune && round < 2 && retune::raised(&mut case, &found, extended, numbers) {
+        let found = match effort.refutations_only {
+            true => claims::examined(&prepared),
+            false => claims::findings(&prepared, effort.thorough),
+        };
+        let tuned = tune && !effort.refutations_only;
+        if tuned && round < 2 && retune::raised(&mut case, &found, extended, numbers) {
             continue;
         }
         let mut looked = Look {
@@ -108,7 +114,8 @@ pub fn judge(
         };
         looked.everything(numbers);
         let (counts, violations) = (looked.counts, looked.violations);
-        if violations.is_empty() && effort.facts && found.fits() && numbers.chance(0.15) {
+        let simulated = effort.facts && !effort.refutations_only;
+        if violations.is_empty() && simulated && found.fits() && numbers.chance(0.15) {
             let mut judgement = Judgement {
                 counts,
                 violations,
@@ -138,6 +145,11 @@ struct Look<'a, 'p> {
 
 impl Look<'_, '_> {
     fn everything(&mut self, numbers: &mut Numbers) {
+        if self.effort.refutations_only {
+            self.witnesses();
+            self.counts.violated = usize::from(!self.violations.is_empty());
+            return;
+        }
         if self.found.contradicts {
             self.note(
                 Flaw::Contradiction,

@@ -91,9 +91,13 @@ fn work(
 ) -> Result<(), String> {
     let desk = desk(&options.folder, worker)?;
     loop {
-        if report.lock().map_err(|e| e.to_string())?.is_enough(options) {
-            return Ok(());
-        }
+        let proved = {
+            let report = report.lock().map_err(|e| e.to_string())?;
+            if report.is_enough(options) {
+                return Ok(());
+            }
+            report.tally.total().proved
+        };
         let index = next.fetch_add(1, Ordering::Relaxed);
         if options.plants.is_some_and(|plants| index >= plants) {
             return Ok(());
@@ -101,7 +105,8 @@ fn work(
         let kind = options.kind.unwrap_or(ROUND[index as usize % ROUND.len()]);
         let mut numbers = Numbers::new(options.seed, index);
         let case = generate::case(&mut numbers, kind);
-        let judged = guarded(&case, &desk, &mut numbers, options.effort(index));
+        let effort = options.effort(index, proved);
+        let judged = guarded(&case, &desk, &mut numbers, effort);
         let (counts, found) = match judged {
             Ok(judgement) => {
                 let first = judgement.violations.into_iter().next();
@@ -111,9 +116,7 @@ fn work(
                         || report.lock().is_ok_and(|r| r.is_common(kind, &first.flaw));
                     match common {
                         true => (judgement.case, first),
-                        false => {
-                            shrink::smallest(&judgement.case, &desk, &first, options.effort(index))
-                        }
+                        false => shrink::smallest(&judgement.case, &desk, &first, effort),
                     }
                 });
                 (judgement.counts, found)

@@ -65,12 +65,15 @@ impl Options {
         Ok(options)
     }
 
-    /// All families examine one plant in sixteen, for their refutations.
-    pub fn effort(&self, index: u64) -> Effort {
+    /// All families examine one plant in sixteen, for their refutations; every one, and
+    /// nothing else, once enough is proved.
+    pub fn effort(&self, index: u64, proved: usize) -> Effort {
+        let enough = proved >= self.count;
         Effort {
             runs: 30,
-            thorough: index.is_multiple_of(16),
+            thorough: enough || index.is_multiple_of(16),
             facts: true,
+            refutations_only: enough,
         }
     }
 }
@@ -142,7 +145,8 @@ impl Report {
             .seconds
             .is_some_and(|s| self.started.elapsed().as_secs() >= s);
         // a search in which nothing is proved ends, too
-        reached || late || total.plants >= 40 * (options.count + options.refutations).max(50)
+        let wanted = options.count.saturating_add(options.refutations).max(50);
+        reached || late || total.plants >= wanted.saturating_mul(40)
     }
 
     pub fn add(

@@ -347,7 +347,9 @@ fn known_starts() {
         ..LoadOptions::default()
     };
     let unvalued = Plant::from_modelica(text, "m.mo", &options).unwrap();
-    assert!(!unvalued.states[0].fixed);
+    // known, though not as a number
+    assert!(unvalued.states[0].fixed && unvalued.states[0].start.is_none());
+    assert!(unvalued.states[0].start_node.is_some());
     let refused = refused("model M Real x(fixed = 1); equation der(x) = 1; end M;");
     assert_eq!(refused.message, "expected `true` or `false`");
 }

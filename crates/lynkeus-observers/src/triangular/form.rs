@@ -1,14 +1,12 @@
 //! The triangular form: chains, the partials along them, condition H3.
 
 use lynkeus_gain::Tridiagonal;
-use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::{Assignment, Extended, chains};
 
 use super::NAME;
 use super::gains::{Window, explicit};
 use crate::conditions::{Partial, chain_request, lipschitz, names, output_slope, partials};
 use crate::family;
-use crate::stability::{GainedChain, listed};
 use crate::{DesignError, Examination, Fit, Tuning, TuningError};
 
 /// The triangular form of a plant with the facts about its partials.
@@ -94,48 +92,6 @@ fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
     }
 }
 
-/// What an S of the study does to a chain by itself, in words. No condition of the form: a
-/// plant that is damped by itself may carry it, as the paper's column does; what is
-/// guaranteed of the gain is the theorem's to say.
-fn carried(
-    extended: &Extended<'_>,
-    tuning: &Tuning,
-    assignment: &Assignment,
-    all: &[Vec<Partial>],
-) -> Result<Vec<String>, TuningError> {
-    let Some(S) = explicit(tuning)? else {
-        return Ok(vec![]);
-    };
-    let count = assignment.chains.len();
-    let r = tuning
-        .positive_per_chain("r", count)?
-        .unwrap_or(vec![1.0; count]);
-    let divided = tuning.flag("partials")?;
-    let mut words = vec![];
-    for (i, chain) in assignment.chains.iter().enumerate() {
-        let K: Vec<f64> = S[i].gain().into_iter().map(|s| r[i] * s).collect();
-        let ranges: Vec<(f64, f64)> = all[i]
-            .iter()
-            .map(|p| if divided { (1.0, 1.0) } else { p.bounds })
-            .collect();
-        let gained = GainedChain {
-            K: &K,
-            partials: &ranges,
-        };
-        let Some(a) = gained.middle() else { continue };
-        let eigenvalues = gained.eigenvalues(&a);
-        let rightmost = eigenvalues.first().map_or(f64::NAN, |λ| λ.0);
-        if gained.frozen() == Stability::Unstable || rightmost >= 0.0 {
-            let states = names(extended, &chain.states).join(" → ");
-            words.push(format!(
-                "; with the S given A(a) − rS⁻¹CᵀC is not stable for ({states}), eigenvalues {} in the middle of the partials' bounds: only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
-                listed(&eigenvalues)
-            ));
-        }
-    }
-    Ok(words)
-}
-
 /// Condition H3 for one assignment.
 fn examined(
     extended: &Extended<'_>,
@@ -163,7 +119,6 @@ fn examined(
             ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
         );
     }
-    summary += &carried(extended, tuning, &assignment, &all)?.concat();
     if assignment.either {
         let leading = &extended.outputs[assignment.leading].variable.name;
         summary += &format!(
@@ -172,9 +127,11 @@ fn examined(
     }
     let found = family::Form { summary, chains };
     let examination = Examination::new(extended, &region, NAME, found, checks)?;
-    Ok(Form {
+    let mut form = Form {
         assignment,
         partials: all,
         examination,
-    })
+    };
+    form.settle(extended, tuning)?;
+    Ok(form)
 }

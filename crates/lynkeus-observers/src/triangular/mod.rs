@@ -9,6 +9,7 @@
 //! r = ρ/2 > 0 throughout; the signs of Remark 2 multiply along the chain,
 //! ε_{j+1} = ε_j·sign(∂f_j/∂x_{j+1}), with ε_1 = 1 because y is measured.
 
+mod damping;
 mod facts;
 mod form;
 mod gains;

@@ -289,9 +289,10 @@ fn an_unstable_k_is_refused_with_its_eigenvalues() {
     }
 }
 
-/// An S whose gain does not stabilise a chain of integrators is not called proved.
+/// An S whose gain does not stabilise a chain of integrators is called proved only where
+/// the plant's own damping carries it: s² + (4θ/3 + 1)s + 4θ/3 − 2θ²/3.
 #[test]
-fn an_s_that_rests_on_damping_is_undecided() {
+fn an_s_that_rests_on_damping_is_told() {
     let plant = plant(
         "model I Real a; Real b; output Real y = a; equation der(a) = b; der(b) = -b; end I;",
     );
@@ -301,14 +302,17 @@ fn an_s_that_rests_on_damping_is_undecided() {
         ("S", Value::List(vec![Value::Table(pairs.into())]))
     };
     // S⁻¹Cᵀ = (1, −off)/(1 − off²)
-    let fit = |off: f64| {
-        let tuning = with(&[1.0], &[table(off)]);
+    let fit = |θ: f64, off: f64| {
+        let tuning = with(&[θ], &[table(off)]);
         design_with(&Triangular, &plant, &[], &tuning)
             .unwrap()
             .examination
     };
-    assert_eq!(fit(-0.5).fit, Fit::Fits);
-    let wrong = fit(0.5);
+    assert_eq!(fit(10.0, -0.5).fit, Fit::Fits);
+    let carried = fit(1.0, 0.5);
+    assert_eq!(carried.fit, Fit::Fits);
+    assert!(carried.summary.contains("is not stable for (a → b)"));
+    let wrong = fit(10.0, 0.5);
     assert_eq!(wrong.fit, Fit::Undecided);
     let check = wrong.checks.last().unwrap();
     // s² + 4s/3 − 2/3

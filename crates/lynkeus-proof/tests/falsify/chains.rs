@@ -45,12 +45,8 @@ fn plant(random: &mut Random) -> Option<Plant> {
         let row = random.below(STATES);
         Slope {
             row,
-            // triangular within a chain and from chain to chain
-            column: if row < 2 {
-                random.below(row + 1)
-            } else {
-                random.below(row + 1)
-            },
+            // as of a plant in triangular form
+            column: random.below(row + 1),
             size: random.within(0.0, 1.0),
         }
     };

@@ -14,7 +14,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
 use crate::region::Cell;
 use crate::words::short;
-use crate::{Check, Condition, Region};
+use crate::{Check, Condition, Region, Witness};
 use walk::Walk;
 
 /// Cells looked at.
@@ -148,6 +148,33 @@ fn nearest(low: f64, high: f64) -> f64 {
         true => low,
         false => high,
     }
+}
+
+/// Whether an expression has a value where a witness of another one lies; what the witness
+/// does not tell is in the middle of its range.
+///
+/// # Errors
+/// [`MissingInput`] where the expression reads a symbol outside the region.
+pub fn has_value_at(
+    graph: &Graph,
+    node: Node,
+    witness: &Witness,
+    region: &Region,
+) -> Result<bool, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let mut walk = Walk::new(graph, &[node], &[], &region)?;
+    let middle = region.middle_point(&region.cell());
+    for point in &witness.points {
+        let told = |name: &str| point.coordinates.iter().find(|c| c.0 == name);
+        let sides = region.dimensions.iter().zip(&middle);
+        let cell: Cell = sides
+            .map(|(d, &middle)| Interval::point(told(&d.name).map_or(middle, |c| c.1)))
+            .collect();
+        if walk.trouble(&[node], &cell).is_some() {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Whether an expression has values everywhere on one cell and does not jump there,

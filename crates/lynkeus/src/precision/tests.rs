@@ -74,7 +74,7 @@ fn candidates_are_as_noisy_as_what_is_measured() {
     assert_eq!(absolute[2], "warmth ±6");
     // √(a²/3); the standard errors are those of Gaussian noise of this deviation
     let even = noises("measured = ['y']\nnoise = { y = { uniform = 0.12 } }");
-    assert_eq!(even[0], "y ±0.0693 (even within ±0.12)");
+    assert_eq!(even[0], "y ±0.06928 (even within ±0.12)");
     let errors = |noise: &str| {
         let sensors = format!("measured = ['y']\nnoise = {{ y = {noise} }}");
         let found = report(&sensors, &Options::default()).unwrap();

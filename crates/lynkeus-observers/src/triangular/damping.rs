@@ -1,0 +1,115 @@
+//! What an S of the study does by itself, and with the plant's own damping.
+
+use lynkeus_expr::{MissingInput, Tape, jacobian};
+use lynkeus_proof::hurwitz::Stability;
+use lynkeus_structure::Extended;
+use nalgebra::DMatrix;
+
+use super::form::Form;
+use super::gains::{Gains, explicit};
+use crate::conditions::names;
+use crate::proof::words::undecided;
+use crate::stability::{GainedChain, listed};
+use crate::{DesignError, Fit, Tuning};
+
+impl Form {
+    /// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
+    /// such a gain, as the paper's column does; where it does not even in the middle of the
+    /// box, the gain is not called fit.
+    pub(super) fn settle(
+        &mut self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+    ) -> Result<(), DesignError> {
+        let loose = self.loose(extended, tuning)?;
+        if loose.is_empty() {
+            return Ok(());
+        }
+        let words = format!(
+            "with the S given A(a) − rS⁻¹CᵀC is not stable for {}; only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
+            loose.join(" and ")
+        );
+        if self.is_damped(extended, tuning)? {
+            self.examination.summary += &format!("; {words}");
+            return Ok(());
+        }
+        let name = "the error decays where it is small, in the middle of the box";
+        self.examination.checks.push(undecided(name, words));
+        if self.examination.fit == Fit::Fits {
+            self.examination.fit = Fit::Undecided;
+        }
+        Ok(())
+    }
+
+    /// The chains that the gain does not stabilise by itself, with their eigenvalues.
+    fn loose(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Vec<String>, DesignError> {
+        let Some(S) = explicit(tuning)? else {
+            return Ok(vec![]);
+        };
+        let chains = &self.assignment.chains;
+        let r = tuning.positive_per_chain("r", chains.len())?;
+        let r = r.unwrap_or(vec![1.0; chains.len()]);
+        let divided = tuning.flag("partials")?;
+        let mut loose = vec![];
+        for (i, chain) in chains.iter().enumerate() {
+            let K: Vec<f64> = S[i].gain().into_iter().map(|s| r[i] * s).collect();
+            let bounds = self.partials[i].iter().map(|p| match divided {
+                true => (1.0, 1.0),
+                false => p.bounds,
+            });
+            let gained = GainedChain {
+                K: &K,
+                partials: &bounds.collect::<Vec<_>>(),
+            };
+            let Some(a) = gained.middle() else { continue };
+            let eigenvalues = gained.eigenvalues(&a);
+            let rightmost = eigenvalues.first().map_or(f64::NAN, |λ| λ.0);
+            if gained.frozen() == Stability::Unstable || rightmost >= 0.0 {
+                loose.push(format!(
+                    "({}), eigenvalues {} in the middle of the partials' bounds",
+                    names(extended, &chain.states).join(" → "),
+                    listed(&eigenvalues)
+                ));
+            }
+        }
+        Ok(loose)
+    }
+
+    /// Whether the error's Jacobian at x̂ = x in the middle of the box is stable; false where
+    /// the study has no θ yet.
+    fn is_damped(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<bool, MissingInput> {
+        let Ok(gains) = Gains::new(self, tuning) else {
+            return Ok(false);
+        };
+        let n = extended.states.len();
+        let graph = extended.graph();
+        let jacobian = jacobian::forward(graph, &extended.derivatives, &extended.symbols());
+        let region = extended.region();
+        let nodes: Vec<_> = jacobian.entries.iter().map(|e| e.2).collect();
+        let mut values = vec![0.0; nodes.len()];
+        Tape::new(graph, &region.symbols(), &nodes)?
+            .evaluator()
+            .eval(&region.centre(), &mut values);
+        let mut A = DMatrix::zeros(n, n);
+        for (&(i, j, _), value) in jacobian.entries.iter().zip(values) {
+            A[(i, j)] = value;
+        }
+        for (i, chain) in self.assignment.chains.iter().enumerate() {
+            // the signs of Remark 2, or divided by the partials
+            let along = chain.states.windows(2).map(|pair| A[(pair[0], pair[1])]);
+            let factors: Vec<f64> = along
+                .map(|a| if gains.divided { 1.0 / a } else { a.signum() })
+                .collect();
+            let mut product = 1.0;
+            for (j, (&state, k)) in chain.states.iter().zip(gains.chain(i)).enumerate() {
+                product *= if j == 0 { 1.0 } else { factors[j - 1] };
+                A[(state, chain.states[0])] -= product * k;
+            }
+        }
+        if !A.iter().all(|x| x.is_finite()) {
+            return Ok(false);
+        }
+        let schur = nalgebra::linalg::Schur::try_new(A, f64::EPSILON, 10_000);
+        Ok(schur.is_some_and(|s| s.complex_eigenvalues().iter().all(|λ| λ.re < 0.0)))
+    }
+}
