@@ -85,7 +85,10 @@ const RHO: f64 = 2.0;
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     let size = check(bounds)?;
     let w = scale(bounds);
-    let scaled: Vec<Bounds> = bounds.iter().map(|b| b.scaled(w)).collect();
+    let scaled: Vec<Bounds> = bounds
+        .iter()
+        .map(|b| (b.lower * w, b.upper * w).into())
+        .collect();
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
     let mut growth = Growth::new();
@@ -199,15 +202,10 @@ impl Growth {
 /// and is well conditioned where P itself is not. Of long chains the states are
 /// eliminated instead; a number ≤ 0 may then also mean that (17) is not proved.
 pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
-    let entry = |i: usize, j: usize| S.get(i, j);
     let μ = match varying(bounds) > VERTICES {
         true => eliminated_decay(S, ρ, bounds),
         false => vertices(bounds)
-            .map(|a| {
-                -SymmetricEigen::new(inequality(S.size(), entry, ρ, &a))
-                    .eigenvalues
-                    .max()
-            })
+            .map(|a| -SymmetricEigen::new(inequality(S, ρ, &a)).eigenvalues.max())
             .fold(f64::INFINITY, f64::min),
     };
     let ends = |f: fn(f64, f64) -> f64, start| S.diagonal().iter().copied().fold(start, f);
@@ -231,17 +229,23 @@ fn columns(S: &Tridiagonal) -> Vec<Column> {
     elimination::columns(S.size(), |i, j| Interval::point(S.get(i, j)))
 }
 
-/// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S and (SA)_ij = S_{i,j−1} a_{j−1}.
-fn inequality(n: usize, S: impl Fn(usize, usize) -> f64, ρ: f64, a: &[f64]) -> DMatrix<f64> {
-    let sa = DMatrix::from_fn(n, n, |i, j| {
-        if j == 0 {
-            return 0.0;
-        }
-        S(i, j - 1) * a[j - 1] / (S(i, i).sqrt() * S(j, j).sqrt())
+/// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S.
+fn inequality(S: &Tridiagonal, ρ: f64, a: &[f64]) -> DMatrix<f64> {
+    let mut P = unforced(S, a);
+    P[(0, 0)] -= ρ;
+    let weight = |i: usize| S.get(i, i).sqrt();
+    DMatrix::from_fn(S.size(), S.size(), |i, j| {
+        P[(i, j)] / (weight(i) * weight(j))
+    })
+}
+
+/// A(a)ᵀS + S A(a), where (SA)_ij = S_{i,j−1} a_{j−1}.
+fn unforced(S: &Tridiagonal, a: &[f64]) -> DMatrix<f64> {
+    let SA = DMatrix::from_fn(S.size(), S.size(), |i, j| match j {
+        0 => 0.0,
+        _ => S.get(i, j - 1) * a[j - 1],
     });
-    let mut p = &sa + sa.transpose();
-    p[(0, 0)] -= ρ / S(0, 0);
-    p
+    &SA + SA.transpose()
 }
 
 #[cfg(test)]
@@ -279,7 +283,7 @@ mod tests {
         }; 6];
         let unscaled = |ρ: f64| {
             let d = |i: usize| s.get(i, i).sqrt();
-            let p = inequality(7, |i, j| s.get(i, j), ρ, &[1.0; 6]);
+            let p = inequality(&s, ρ, &[1.0; 6]);
             let p = DMatrix::from_fn(7, 7, |i, j| d(i) * p[(i, j)] * d(j));
             SymmetricEigen::new(p).eigenvalues.max()
         };
@@ -334,7 +338,7 @@ mod tests {
                 if choice >> 63 == 0 { 0.95 } else { 1.05 }
             };
             let a: Vec<f64> = (0..19).map(|_| end()).collect();
-            let P = inequality(20, |i, j| found.S.get(i, j), found.ρ, &a);
+            let P = inequality(&found.S, found.ρ, &a);
             let smallest = found
                 .S
                 .diagonal()

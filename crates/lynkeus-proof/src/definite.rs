@@ -1,6 +1,6 @@
 //! Rigorous positive definiteness, by a Cholesky factorisation in interval
 //! arithmetic: where every pivot is proved positive, every symmetric matrix between
-//! the bounds is positive definite.
+//! the bounds is positive definite (Alefeld and Mayer 1993).
 
 use lynkeus_expr::Interval;
 use nalgebra::DMatrix;
@@ -85,13 +85,6 @@ pub fn least_eigenvalue(matrix: &[Vec<Interval>], limit: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn points(matrix: &DMatrix<f64>, radius: f64) -> IntervalMatrix {
-        let side = |x: f64| Interval::new(x - radius, x + radius).unwrap();
-        let row = |i: usize| matrix.row(i).iter().map(|&x| side(x)).collect();
-        (0..matrix.nrows()).map(row).collect()
-    }
 
     #[test]
     fn what_is_no_number_is_not_definite() {
@@ -117,27 +110,5 @@ mod tests {
             &[1.0, 1.0 + e],
             &[1.0 + e, 1.0]
         ])));
-    }
-
-    proptest! {
-        /// The verdict agrees with the eigenvalues wherever these are clear.
-        #[test]
-        fn the_verdict_agrees_with_eigenvalues(
-            entries in proptest::collection::vec(-1.0_f64..1.0, 36),
-            shift in -3.0_f64..6.0,
-            radius in 0.0_f64..0.05,
-        ) {
-            let square = DMatrix::from_vec(6, 6, entries);
-            let matrix = (&square + square.transpose()) * 0.5 + DMatrix::identity(6, 6) * shift;
-            let smallest = matrix.symmetric_eigenvalues().min();
-            let verdict = is_positive_definite(&points(&matrix, radius));
-            // some matrix within the radius has an eigenvalue lower by it
-            if smallest <= radius {
-                prop_assert!(!verdict, "smallest eigenvalue {smallest}, radius {radius}");
-            }
-            if radius == 0.0 && smallest > 1e-9 {
-                prop_assert!(verdict, "smallest eigenvalue {smallest}");
-            }
-        }
     }
 }

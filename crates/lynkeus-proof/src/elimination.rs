@@ -1,4 +1,4 @@
-//! (17) for chains of any length, at a cost that grows with the length and not with the
+//! (17) of Hammouri, Targui and Armanet (2002) for chains of any length, at a cost that grows with the length and not with the
 //! number of vertices of the bounds.
 //!
 //! −P(a) has in its column j, down to the diagonal, a_{j−1} times three numbers (S is
@@ -10,7 +10,7 @@
 //! * of two matrices T ≤ T' only T counts (monotone),
 //! * any lower bound of several may stand for them.
 //!
-//! The first two lose nothing; the third is used where more than [`MOST`] are left.
+//! The first two lose nothing; the third is used where more than `MOST` are left.
 
 use lynkeus_expr::Interval;
 

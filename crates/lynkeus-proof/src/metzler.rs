@@ -1,4 +1,5 @@
-//! Comparison matrices: symmetric, nothing negative off the diagonal.
+//! Comparison matrices: symmetric, nothing negative off the diagonal (Berman and Plemmons
+//! 1979, *Nonnegative matrices in the mathematical sciences*, chapter 6).
 //!
 //! If |z|ᵀM|z| bounds a quadratic form from above and M v < 0 for one positive
 //! vector v, then M is negative definite (−M is an M-matrix), and so is the form.
@@ -7,8 +8,8 @@
 
 use lynkeus_expr::Interval;
 
-use crate::magnitude::Magnitudes;
-use crate::matrix::{square, sum};
+use crate::magnitude::{self, Magnitudes, root};
+use crate::matrix::sum;
 
 /// Proves that M is negative definite; `false` where it is not or nearly not.
 pub fn is_negative_definite(M: &Magnitudes) -> bool {
@@ -48,11 +49,9 @@ pub fn spectral_radius(M: &Magnitudes) -> f64 {
 /// not negative: ‖M‖² is the spectral radius of MᵀM.
 pub fn spectral_norm(M: &Magnitudes) -> f64 {
     let columns = M.first().map_or(0, Vec::len);
-    let column = |j: usize| M.iter().map(move |row| Interval::point(row[j]));
-    let entry = |i, j| sum(column(i).zip(column(j)).map(|(a, b)| a * b)).hi();
-    Interval::point(spectral_radius(&square(columns, entry)))
-        .sqrt()
-        .hi()
+    let transposed = |j: usize| M.iter().map(|row| row[j]).collect();
+    let transposed: Magnitudes = (0..columns).map(transposed).collect();
+    root(spectral_radius(&magnitude::product(&transposed, M)))
 }
 
 fn product(row: &[f64], v: &[f64]) -> Interval {

@@ -1,4 +1,5 @@
-//! Searches along one number.
+//! Searches along one number, and over weights, for the best of what a test proves. They
+//! decide nothing: an answer is a number for which the test was passed.
 
 /// Bisections: enough for all digits of a number between zero and its bound.
 const BISECTIONS: usize = 50;

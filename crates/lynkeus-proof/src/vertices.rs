@@ -11,15 +11,6 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The bounds of a multiple of it by a positive factor, rounded to the nearest.
-    #[must_use]
-    pub fn scaled(self, factor: f64) -> Self {
-        Self {
-            lower: self.lower * factor,
-            upper: self.upper * factor,
-        }
-    }
-
     fn vary(&self) -> bool {
         self.lower < self.upper
     }

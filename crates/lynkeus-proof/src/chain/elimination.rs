@@ -17,9 +17,7 @@ impl Chain {
             return None;
         }
         let D: Vec<Interval> = (0..n).map(|j| self.weight(j)).collect();
-        let Sg: Vec<Interval> = (0..n)
-            .map(|i| sum((0..n).map(|j| S[i][j] * self.g[j])))
-            .collect();
+        let Sg = self.pushed();
         let first = Interval::point(2.0) * Sg[0] / S[0][0];
         // g = rS⁻¹Cᵀ up to rounding: the rest of Sg is small, its arrow has this norm
         let rest = (1..n).map(|i| (Sg[i] / (D[0] * D[i])).powi(2));

@@ -10,10 +10,10 @@
 //! D² = diag S, z = Dε, two inequalities prove the decay:
 //!
 //! 1. AᵀS + SA − SgC − CᵀgᵀS ≤ −μD² at every vertex of the bounds of a, checked by
-//!    an elimination in interval arithmetic (`definite`; for many vertices and a
-//!    tridiagonal S state by state, `elimination`);
+//!    an elimination in interval arithmetic ([`definite`](crate::definite); for many vertices and a
+//!    tridiagonal S state by state, [`crate::elimination`]);
 //! 2. N = −τμ + |S̄|G + Gᵀ|S̄| < 0 with S̄ = D⁻¹SD⁻¹, G_ab = D_a L_ab (s_b/s_a)/D_b,
-//!    since V' ≤ |z|ᵀN|z|: off its diagonal N has nothing negative (`metzler`).
+//!    since V' ≤ |z|ᵀN|z|: off its diagonal N has nothing negative ([`metzler`]).
 //!
 //! The rate σ is the largest with N + 2σ|S̄| < 0: then V' ≤ −2σV. Entry by entry this
 //! is sharper than ‖S‖, λ_min(S) and one Lipschitz constant, and each number is an
@@ -86,17 +86,20 @@ impl Chain {
     fn scaled_form(&self, a: &[f64]) -> IntervalMatrix {
         let n = self.size();
         let S = &self.S;
-        let Sg: Vec<Interval> = (0..n)
-            .map(|i| sum((0..n).map(|j| S[i][j] * self.g[j])))
-            .collect();
+        let Sg = self.pushed();
         let SA = |i: usize, j: usize| match j {
             0 => Interval::ZERO,
             _ => S[i][j - 1] * Interval::point(a[j - 1]),
         };
         let column = |i: usize, j: usize| if j == 0 { Sg[i] } else { Interval::ZERO };
         let entry = |i: usize, j: usize| column(i, j) + column(j, i) - SA(i, j) - SA(j, i);
-        let scaled = |i: usize, j: usize| entry(i, j) / (S[i][i] * S[j][j]).sqrt();
-        square(n, scaled)
+        square(n, |i, j| entry(i, j) / (S[i][i] * S[j][j]).sqrt())
+    }
+
+    /// Sg
+    fn pushed(&self) -> Vec<Interval> {
+        let products = |row: &Vec<Interval>| sum(row.iter().zip(&self.g).map(|(s, g)| *s * *g));
+        self.S.iter().map(products).collect()
     }
 
     /// D_j, the weight of ε_j.
@@ -123,15 +126,11 @@ impl Comparison {
             .flat_map(|(i, c)| (0..c.size()).map(move |j| (i, j)))
             .collect();
         let n = places.len();
-        let correlation = |p: usize, q: usize| {
-            let ((i, j), (l, k)) = (places[p], places[q]);
-            let S = &chains[i].S;
-            match i == l {
-                true => (S[j][k] / (S[j][j] * S[k][k]).sqrt()).abs(),
-                false => Interval::ZERO,
-            }
-        };
-        let S̄ = square(n, correlation);
+        let blocks: Vec<IntervalMatrix> = chains.iter().map(normalised).collect();
+        let S̄ = square(n, |p, q| match (places[p], places[q]) {
+            ((i, j), (l, k)) if i == l => blocks[i][j][k].abs(),
+            _ => Interval::ZERO,
+        });
         let G = couplings(chains, &places, slopes);
         let H = square(n, |p, q| sum((0..n).map(|r| S̄[p][r] * G[r][q])));
         let N = square(n, |p, q| {

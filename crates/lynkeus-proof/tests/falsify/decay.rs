@@ -4,7 +4,9 @@ use lynkeus_expr::Interval;
 use lynkeus_proof::decay::{self, ErrorModel, Proof, Sector};
 use lynkeus_proof::riccati::Riccati;
 use nalgebra::{DMatrix, DVector};
+use proptest::prelude::*;
 
+use crate::matrices::around;
 use crate::{Random, largest};
 
 /// More than the rounding of an eigenvalue of a matrix of size one.
@@ -203,4 +205,28 @@ fn riccati_solutions_satisfy_the_inequality() {
         }
     }
     assert!(proved >= 30, "{proved} of 80");
+}
+
+proptest! {
+    /// It agrees with the eigenvalues wherever these are clear, and never says more.
+    #[test]
+    fn instability_agrees_with_eigenvalues(
+        entries in proptest::collection::vec(-1.0_f64..1.0, 25),
+        shift in -3.0_f64..2.0,
+        radius in prop_oneof![Just(0.0), 0.0_f64..0.2],
+    ) {
+        let A = DMatrix::from_vec(5, 5, entries) + DMatrix::identity(5, 5) * shift;
+        let highest = |A: &DMatrix<f64>| {
+            A.complex_eigenvalues().iter().map(|λ| λ.re).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let verdict = decay::is_unstable(&around(&A, radius));
+        // the matrix shifted by the radius lies within the entries, too
+        let least = highest(&A) - radius;
+        if least < -1e-9 {
+            prop_assert!(!verdict, "{least}");
+        }
+        if radius == 0.0 && least > 1e-3 {
+            prop_assert!(verdict, "{least}");
+        }
+    }
 }

@@ -8,9 +8,11 @@ use lynkeus_proof::matrix::{IntervalMatrix, square};
 use lynkeus_proof::metzler;
 use nalgebra::DMatrix;
 
+use proptest::prelude::*;
+
 use crate::Random;
 
-fn around(middle: &DMatrix<f64>, radius: f64) -> IntervalMatrix {
+pub fn around(middle: &DMatrix<f64>, radius: f64) -> IntervalMatrix {
     square(middle.nrows(), |i, j| {
         Interval::new(middle[(i, j)] - radius, middle[(i, j)] + radius).unwrap()
     })
@@ -156,4 +158,26 @@ fn accepted_comparison_matrices_are_negative_definite() {
         missed += usize::from(!verdict && top < -1e-9);
     }
     assert!(accepted >= 100 && missed == 0, "{accepted} {missed}");
+}
+
+proptest! {
+    /// The verdict agrees with the eigenvalues wherever these are clear.
+    #[test]
+    fn the_verdict_agrees_with_eigenvalues(
+        entries in proptest::collection::vec(-1.0_f64..1.0, 36),
+        shift in -3.0_f64..6.0,
+        radius in 0.0_f64..0.05,
+    ) {
+        let square = DMatrix::from_vec(6, 6, entries);
+        let matrix = (&square + square.transpose()) * 0.5 + DMatrix::identity(6, 6) * shift;
+        let smallest = matrix.symmetric_eigenvalues().min();
+        let verdict = is_positive_definite(&around(&matrix, radius));
+        // some matrix within the radius has an eigenvalue lower by it
+        if smallest <= radius {
+            prop_assert!(!verdict, "smallest eigenvalue {smallest}, radius {radius}");
+        }
+        if radius == 0.0 && smallest > 1e-9 {
+            prop_assert!(verdict, "smallest eigenvalue {smallest}");
+        }
+    }
 }
