@@ -3,6 +3,8 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_proof::chain::{Chain, Comparison, Disturbance, Slope, ultimate};
+use lynkeus_proof::elimination::{Column, positive};
+use lynkeus_proof::search::largest;
 use lynkeus_proof::{Bounds, lyapunov, matrix, vertices};
 use nalgebra::{DMatrix, DVector};
 
@@ -183,54 +185,37 @@ fn ultimate_bounds_stand_the_worst_disturbance() {
     assert!(proved >= 15 && reached > 0.05, "{proved} {reached}");
 }
 
-/// Elimination, which long chains need, proves no more than their vertices allow.
+/// Elimination, which long chains need, proves no more than random partials allow.
 #[test]
 fn eliminated_chains_stand_random_partials() {
     let mut random = Random::new(22);
-    for n in [12, 16] {
-        let a = vec![1.0; n - 1];
-        let bounds: Vec<Bounds> = (1..n).map(|_| Bounds::from((0.97, 1.03))).collect();
-        // tridiagonal: a diagonal S and the damping on every state instead of C alone
-        let S = matrix::square(n, |i, j| match i.abs_diff(j) {
-            0 => Interval::point(4f64.powi(i as i32)),
-            1 => Interval::point(-0.45 * 2f64.powi((i + j) as i32)),
-            _ => Interval::ZERO,
-        });
-        let numbers = DMatrix::from_fn(n, n, |i, j| S[i][j].midpoint());
-        let mut right = DVector::zeros(n);
-        right[0] = 40.0;
-        let g = numbers.clone().lu().solve(&right).unwrap();
-        let chain = Chain {
-            states: (0..n).collect(),
-            speed: Interval::ONE,
-            scales: vec![Interval::ONE; n],
-            S,
-            g: g.iter().map(|&g| Interval::point(g)).collect(),
-            partials: bounds.clone(),
+    for states in [12, 16, 20, 24] {
+        let mut draw =
+            |size: f64| -> Vec<f64> { (1..states).map(|_| random.within(-size, size)).collect() };
+        let (far, near) = (draw(0.15), draw(0.35));
+        let column = |j: usize| Column {
+            far: Interval::point(far[j]),
+            near: Interval::point(near[j]),
+            own: Interval::ONE,
         };
-        let found = chain.decay();
-        let form = |a: &[f64]| {
-            let A = DMatrix::from_fn(n, n, |i, j| {
-                let above = if j == i + 1 { a[i] } else { 0.0 };
-                above - if j == 0 { g[i] } else { 0.0 }
-            });
-            let raw = -(&numbers * &A + A.transpose() * &numbers);
-            DMatrix::from_fn(n, n, |i, j| {
-                raw[(i, j)] / (numbers[(i, i)] * numbers[(j, j)]).sqrt()
-            })
-        };
-        let middle = form(&a).symmetric_eigenvalues().min();
-        assert_eq!(found.is_some(), middle > 0.05, "{n}: {found:?} {middle}");
+        let columns: Vec<Column> = (0..states - 1).map(column).collect();
+        let bounds = vec![Bounds::from((1.0, 1.3)); states - 1];
+        let proved = |shift: f64| positive(Interval::ONE, &columns, &bounds, shift);
+        let found = largest(1.0, proved).unwrap();
         for _ in 0..300 {
-            let a: Vec<f64> = bounds
-                .iter()
-                .map(|b| random.of_range(b.lower, b.upper))
-                .collect();
-            let least = form(&a).symmetric_eigenvalues().min();
-            assert!(
-                found.is_none_or(|μ| least >= μ * (1.0 - 1e-9)),
-                "{least} {found:?}"
-            );
+            let a: Vec<f64> = (1..states).map(|_| random.of_range(1.0, 1.3)).collect();
+            let matrix = DMatrix::from_fn(states, states, |i, j| {
+                let (i, j) = (i.min(j), i.max(j));
+                match (j, j - i) {
+                    (_, 0) if i == 0 => 1.0,
+                    (_, 0) => a[j - 1],
+                    (_, 1) => -a[j - 1] * near[j - 1],
+                    (_, 2) => -a[j - 1] * far[j - 1],
+                    _ => 0.0,
+                }
+            });
+            let least = matrix.symmetric_eigenvalues().min();
+            assert!(least >= found - 1e-12, "{least} {found}");
         }
     }
 }
