@@ -1,11 +1,10 @@
 //! The gain of a chain of integrators: S + AᵀS + SA − CᵀC = 0.
 
 use lynkeus_expr::Interval;
-use nalgebra::{DMatrix, SymmetricEigen};
-
-/// More than what the eigenvalue solver loses of the largest eigenvalue, which it finds
-/// to some units in the last place; not so of the smallest one.
-const EIGENVALUE: f64 = 1.0 + 1e-12;
+use lynkeus_proof::hurwitz::first_column;
+use lynkeus_proof::matrix::square;
+use lynkeus_proof::metzler::spectral_radius;
+use nalgebra::DMatrix;
 
 /// The solution S of S + AᵀS + SA − CᵀC = 0 for x₁' = x₂, …, xₙ' = 0, y = x₁, and what
 /// proofs need of it. A − S⁻¹CᵀC has all its eigenvalues at −1.
@@ -37,13 +36,13 @@ impl Chain {
     /// S⁻¹ is similar to S: the smallest eigenvalue is one over the largest.
     pub fn new(n: usize) -> Self {
         let S = matrix(n);
-        let values = SymmetricEigen::new(S.clone()).eigenvalues;
-        let largest = values.iter().copied().fold(0.0, f64::max) * EIGENVALUE;
+        // the signs are those of a change of coordinates
+        let largest = spectral_radius(&square(n, |i, j| S[(i, j)].abs()));
         let squares = |i: usize| (i..n).map(move |k| binomial(k, i).powi(2));
         Self {
             diagonal: S.diagonal().iter().copied().collect(),
             gain: (1..=n).map(|i| binomial(n, i)).collect(),
-            smallest: 1.0 / largest,
+            smallest: (Interval::ONE / Interval::point(largest)).lo(),
             largest,
             inverse_diagonal: (0..n).map(|i| squares(i).sum()).collect(),
         }
@@ -64,26 +63,12 @@ impl Chain {
 /// assert!(shortened_stability(13, 6).is_negative());
 /// ```
 pub fn shortened_stability(n: usize, k: usize) -> Interval {
-    let of_parity = |parity: usize| -> Vec<Interval> {
-        let places = (parity..=k).step_by(2);
-        places.map(|i| Interval::point(binomial(n, i))).collect()
-    };
-    let (mut above, mut row) = (of_parity(0), of_parity(1));
-    let mut least = above[0];
-    while let Some(&pivot) = row.first() {
-        if !pivot.is_positive() {
-            return pivot;
-        }
-        least = least.min(pivot);
-        let factor = above[0] / pivot;
-        let entry = |j: usize| {
-            let right = row.get(j + 1).copied().unwrap_or(Interval::ZERO);
-            above[j + 1] - factor * right
-        };
-        let next = (0..above.len() - 1).map(entry).collect();
-        above = std::mem::replace(&mut row, next);
+    let coefficients = (1..=k).map(|i| Interval::point(binomial(n, i)));
+    let column = first_column(&coefficients.collect::<Vec<_>>());
+    match column.last() {
+        Some(last) if !last.is_positive() => *last,
+        _ => column.into_iter().fold(Interval::ONE, Interval::min),
     }
-    least
 }
 
 /// S_ij = (−1)^{i+j} C^{j−1}_{i+j−2}

@@ -17,34 +17,17 @@
 //! instead, and its constants explode doubly exponentially with the length. Then
 //! s_kk > s²/d_{k−1} (Schur again, d the pivots of S) keeps S positive definite.
 
-pub mod elimination;
 mod kernel;
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::elimination::{self, Column, Tails};
+use lynkeus_proof::search::largest;
+use lynkeus_proof::{Bounds, varying, vertices};
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use elimination::{Column, Tails};
 pub use kernel::{Breaking, Kernel, kernel};
 
 use crate::{Tridiagonal, TridiagonalError};
-
-/// α₁ ≤ a(t) ≤ α₂, both positive: what is known of one partial derivative.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// α₁
-    pub lower: f64,
-    /// α₂
-    pub upper: f64,
-}
-
-impl Bounds {
-    fn times(self, factor: f64) -> Self {
-        Self {
-            lower: self.lower * factor,
-            upper: self.upper * factor,
-        }
-    }
-}
 
 /// What [`construct`] found.
 #[derive(Clone, Debug)]
@@ -102,7 +85,10 @@ const RHO: f64 = 2.0;
 pub fn construct(bounds: &[Bounds]) -> Result<Lemma1, Error> {
     let size = check(bounds)?;
     let w = scale(bounds);
-    let scaled: Vec<Bounds> = bounds.iter().map(|b| b.times(w)).collect();
+    let scaled: Vec<Bounds> = bounds
+        .iter()
+        .map(|b| (b.lower * w, b.upper * w).into())
+        .collect();
     let (mut diagonal, mut off): (Vec<f64>, Vec<f64>) = (vec![1.0], vec![]);
     let mut pivot = 1.0;
     let mut growth = Growth::new();
@@ -216,15 +202,10 @@ impl Growth {
 /// and is well conditioned where P itself is not. Of long chains the states are
 /// eliminated instead; a number ≤ 0 may then also mean that (17) is not proved.
 pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
-    let entry = |i: usize, j: usize| S.get(i, j);
     let μ = match varying(bounds) > VERTICES {
         true => eliminated_decay(S, ρ, bounds),
         false => vertices(bounds)
-            .map(|a| {
-                -SymmetricEigen::new(inequality(S.size(), entry, ρ, &a))
-                    .eigenvalues
-                    .max()
-            })
+            .map(|a| -SymmetricEigen::new(inequality(S, ρ, &a)).eigenvalues.max())
             .fold(f64::INFINITY, f64::min),
     };
     let ends = |f: fn(f64, f64) -> f64, start| S.diagonal().iter().copied().fold(start, f);
@@ -239,67 +220,32 @@ pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
 fn eliminated_decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
     let columns = columns(S);
     let first = Interval::point(ρ) / Interval::point(S.get(0, 0));
-    let mut ends = (0.0, first.hi());
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (ends.0 + ends.1);
-        match elimination::positive(first, &columns, bounds, middle) {
-            true => ends.0 = middle,
-            false => ends.1 = middle,
-        }
-    }
-    ends.0
+    let proved = |μ: f64| elimination::positive(first, &columns, bounds, μ);
+    largest(first.hi(), proved).unwrap_or(0.0)
 }
 
 /// The columns of −D⁻¹PD⁻¹ from the second state on, D² = diag S.
 fn columns(S: &Tridiagonal) -> Vec<Column> {
-    let d = |i: usize| Interval::point(S.get(i, i)).sqrt();
-    let entry = |i: usize, j: usize, rows: (usize, usize)| {
-        Interval::point(S.get(i, j)) / (d(rows.0) * d(rows.1))
-    };
-    let column = |j: usize| Column {
-        far: match j {
-            1 => Interval::ZERO,
-            _ => entry(j - 2, j - 1, (j - 2, j)),
-        },
-        near: entry(j - 1, j - 1, (j - 1, j)),
-        own: Interval::point(-2.0) * entry(j, j - 1, (j, j)),
-    };
-    (1..S.size()).map(column).collect()
+    elimination::columns(S.size(), |i, j| Interval::point(S.get(i, j)))
 }
 
-fn varying(bounds: &[Bounds]) -> usize {
-    bounds.iter().filter(|b| b.lower < b.upper).count()
-}
-
-/// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S and (SA)_ij = S_{i,j−1} a_{j−1}.
-fn inequality(n: usize, S: impl Fn(usize, usize) -> f64, ρ: f64, a: &[f64]) -> DMatrix<f64> {
-    let sa = DMatrix::from_fn(n, n, |i, j| {
-        if j == 0 {
-            return 0.0;
-        }
-        S(i, j - 1) * a[j - 1] / (S(i, i).sqrt() * S(j, j).sqrt())
-    });
-    let mut p = &sa + sa.transpose();
-    p[(0, 0)] -= ρ / S(0, 0);
-    p
-}
-
-/// Every choice of one end per bound; ends that coincide count once.
-fn vertices(bounds: &[Bounds]) -> impl Iterator<Item = Vec<f64>> {
-    let open: Vec<usize> = (0..bounds.len())
-        .filter(|&i| bounds[i].lower < bounds[i].upper)
-        .collect();
-    let lower: Vec<f64> = bounds.iter().map(|b| b.lower).collect();
-    let bounds = bounds.to_vec();
-    (0..1usize << open.len()).map(move |choice| {
-        let mut a = lower.clone();
-        for (bit, &i) in open.iter().enumerate() {
-            if choice >> bit & 1 == 1 {
-                a[i] = bounds[i].upper;
-            }
-        }
-        a
+/// D⁻¹(AᵀS + SA − ρCᵀC)D⁻¹ with D² = diag S.
+fn inequality(S: &Tridiagonal, ρ: f64, a: &[f64]) -> DMatrix<f64> {
+    let mut P = unforced(S, a);
+    P[(0, 0)] -= ρ;
+    let weight = |i: usize| S.get(i, i).sqrt();
+    DMatrix::from_fn(S.size(), S.size(), |i, j| {
+        P[(i, j)] / (weight(i) * weight(j))
     })
+}
+
+/// A(a)ᵀS + S A(a), where (SA)_ij = S_{i,j−1} a_{j−1}.
+fn unforced(S: &Tridiagonal, a: &[f64]) -> DMatrix<f64> {
+    let SA = DMatrix::from_fn(S.size(), S.size(), |i, j| match j {
+        0 => 0.0,
+        _ => S.get(i, j - 1) * a[j - 1],
+    });
+    &SA + SA.transpose()
 }
 
 #[cfg(test)]
@@ -337,7 +283,7 @@ mod tests {
         }; 6];
         let unscaled = |ρ: f64| {
             let d = |i: usize| s.get(i, i).sqrt();
-            let p = inequality(7, |i, j| s.get(i, j), ρ, &[1.0; 6]);
+            let p = inequality(&s, ρ, &[1.0; 6]);
             let p = DMatrix::from_fn(7, 7, |i, j| d(i) * p[(i, j)] * d(j));
             SymmetricEigen::new(p).eigenvalues.max()
         };
@@ -392,7 +338,7 @@ mod tests {
                 if choice >> 63 == 0 { 0.95 } else { 1.05 }
             };
             let a: Vec<f64> = (0..19).map(|_| end()).collect();
-            let P = inequality(20, |i, j| found.S.get(i, j), found.ρ, &a);
+            let P = inequality(&found.S, found.ρ, &a);
             let smallest = found
                 .S
                 .diagonal()

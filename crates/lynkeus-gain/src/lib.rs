@@ -12,18 +12,13 @@
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-pub mod decay;
-pub mod definite;
-pub mod hurwitz;
 pub mod integrators;
 pub mod lemma1;
-pub mod lmi;
 pub mod low_power;
-pub mod riccati;
 mod tridiagonal;
 mod unit_factor;
 pub mod vandermonde;
 
-pub use lemma1::Bounds;
+pub use lynkeus_proof::Bounds;
 pub use tridiagonal::{Tridiagonal, TridiagonalError};
 pub use unit_factor::{FactorError, UnitFactor};

@@ -15,7 +15,10 @@
 //! last: κ_m = P(0), −k_m1 is a real root of (P − P(0))/s, which has odd degree, and
 //! (P − P(0))/(s(s + k_m1)) is the polynomial of the blocks before.
 
-use nalgebra::DMatrix;
+use lynkeus_proof::decay::{self, ErrorModel, Proof};
+use lynkeus_proof::matrix::points;
+use lynkeus_proof::{lyapunov, vertices};
+use nalgebra::{DMatrix, DVector};
 
 use crate::vandermonde;
 
@@ -136,37 +139,30 @@ const MOST: usize = 10;
 
 /// Is ε' = ℓM(t)ε proved to converge for partials that vary as they like within the ratios
 /// (smallest, largest) to those the gain is made for? Decided with the quadratic
-/// function of the constant M, MᵀP + PM = −I: M is affine in the ratios, so their vertices
-/// suffice. Where it is false convergence may hold all the same.
+/// function of the constant M, MᵀP + PM = −I, in interval arithmetic: M is affine in the
+/// ratios, so their vertices suffice. Where it is false convergence may hold all the same.
 pub fn tolerates(K: &[[f64; 2]], ratios: &[(f64, f64)]) -> bool {
     let m = K.len();
     if m > MOST || ratios.len() != m {
         return false;
     }
-    let Some(P) = lyapunov(&matrix(K, &vec![1.0; m])) else {
+    let M = matrix(K, &vec![1.0; m]);
+    let Some(P) = lyapunov::solve(&M, &DMatrix::identity(2 * m, 2 * m)) else {
         return false;
     };
-    let falls = |vertex: usize| {
-        let side = |(i, r): (usize, &(f64, f64))| if vertex >> i & 1 == 0 { r.0 } else { r.1 };
-        let ratios: Vec<f64> = ratios.iter().enumerate().map(side).collect();
-        let M = matrix(K, &ratios);
-        let Q = -(M.transpose() * &P + &P * M);
-        Q.cholesky().is_some()
+    let vertices = vertices(&ratios.iter().map(|&r| r.into()).collect::<Vec<_>>());
+    let models: Vec<ErrorModel> = vertices
+        .map(|ratios| ErrorModel {
+            constant: points(&matrix(K, &ratios)),
+            sectors: vec![],
+        })
+        .collect();
+    let proof = Proof {
+        rate: 0.0,
+        P,
+        multipliers: vec![DVector::zeros(0); models.len()],
     };
-    P.clone().cholesky().is_some() && (0..1 << m).all(falls)
-}
-
-/// P with MᵀP + PM = −I, as one linear system in the entries of P.
-fn lyapunov(M: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = M.nrows();
-    let I = DMatrix::identity(n, n);
-    let operator = I.kronecker(&M.transpose()) + M.transpose().kronecker(&I);
-    let right = DMatrix::from_column_slice(n * n, 1, (-&I).as_slice());
-    let entries = operator.lu().solve(&right)?;
-    let P = DMatrix::from_column_slice(n, n, entries.as_slice());
-    P.iter()
-        .all(|x| x.is_finite())
-        .then(|| (&P + P.transpose()) / 2.0)
+    decay::holds(&models, &proof)
 }
 
 #[cfg(test)]

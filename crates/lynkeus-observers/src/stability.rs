@@ -5,7 +5,7 @@
 //! sⁿ + k₁sⁿ⁻¹ + a₁k₂sⁿ⁻² + a₁a₂k₃sⁿ⁻³ + …
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::hurwitz::{self, Stability};
+use lynkeus_proof::hurwitz::{self, Stability};
 use lynkeus_structure::Point;
 
 use crate::proof::words::shown;
@@ -21,20 +21,20 @@ pub(crate) struct GainedChain<'a> {
 impl GainedChain<'_> {
     /// For every constant choice of the partials within their bounds.
     pub fn frozen(&self) -> Stability {
-        let sides = self
-            .partials
-            .iter()
-            .map(|&(low, high)| Interval::new(low, high).unwrap_or(Interval::ENTIRE));
+        let side = |&(low, high): &(f64, f64)| Interval::new(low, high).unwrap_or(Interval::ENTIRE);
+        hurwitz::decide(&self.coefficients(self.partials.iter().map(side)))
+    }
+
+    /// k₁, a₁k₂, a₁a₂k₃, …
+    fn coefficients(&self, partials: impl Iterator<Item = Interval>) -> Vec<Interval> {
         let mut product = Interval::ONE;
-        let products = std::iter::once(Interval::ONE).chain(sides.map(|a| {
+        let ahead = partials.chain([Interval::ONE]);
+        let term = |(&k, a): (&f64, Interval)| {
+            let coefficient = product * Interval::point(k);
             product = product * a;
-            product
-        }));
-        let coefficients: Vec<Interval> = products
-            .zip(self.K)
-            .map(|(product, &k)| product * Interval::point(k))
-            .collect();
-        hurwitz::decide(&coefficients)
+            coefficient
+        };
+        self.K.iter().zip(ahead).map(term).collect()
     }
 
     /// Partials in the middle of their bounds; none where these do not keep one sign or
@@ -49,13 +49,9 @@ impl GainedChain<'_> {
 
     /// The eigenvalues of A − KC for these partials, the rightmost first.
     pub fn eigenvalues(&self, a: &[f64]) -> Vec<(f64, f64)> {
-        let mut product = 1.0;
-        let products = std::iter::once(1.0).chain(a.iter().map(|a| {
-            product *= a;
-            product
-        }));
-        let coefficients: Vec<f64> = products.zip(self.K).map(|(p, k)| p * k).collect();
-        hurwitz::zeros(&coefficients)
+        let coefficients = self.coefficients(a.iter().map(|&a| Interval::point(a)));
+        let middles: Vec<f64> = coefficients.iter().map(|c| c.midpoint()).collect();
+        hurwitz::zeros(&middles)
     }
 
     /// The partials `a` as a witness, its value the largest real part there.

@@ -98,5 +98,6 @@ pub use lynkeus_gain as gain;
 pub use lynkeus_model as model;
 pub use lynkeus_observability as observability;
 pub use lynkeus_observers as observers;
+pub use lynkeus_proof as proof;
 pub use lynkeus_run as run;
 pub use lynkeus_structure as structure;

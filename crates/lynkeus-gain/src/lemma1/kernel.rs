@@ -11,9 +11,10 @@
 //! Both λ_max(P̂(a)) and pᵀ(−P̂)⁻¹p are convex in a: the vertices decide.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::{Bounds, elimination, varying, vertices};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
-use super::{BISECTIONS, Bounds, Error, VERTICES, check, columns, elimination, varying, vertices};
+use super::{BISECTIONS, Error, VERTICES, check, columns, unforced};
 use crate::Tridiagonal;
 
 /// What (17) asks of ρ.
@@ -55,7 +56,7 @@ pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
     }
     let (mut least, mut worst): (f64, Option<Breaking>) = (0.0, None);
     for a in vertices(bounds) {
-        let P = inequality(S, &a);
+        let P = unforced(S, &a);
         let Phat = P.view((1, 1), (n - 1, n - 1)).into_owned();
         let p = P.view((1, 0), (n - 1, 1)).into_owned();
         match Cholesky::new(-&Phat) {
@@ -116,7 +117,7 @@ fn eliminated(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
 fn ascended(S: &Tridiagonal, bounds: &[Bounds]) -> Breaking {
     let n = S.size();
     let at = |a: &[f64]| {
-        let Phat = inequality(S, a).view((1, 1), (n - 1, n - 1)).into_owned();
+        let Phat = unforced(S, a).view((1, 1), (n - 1, n - 1)).into_owned();
         breaking(a.to_vec(), Phat)
     };
     let mut best = at(&bounds.iter().map(|b| b.upper).collect::<Vec<f64>>());
@@ -136,16 +137,6 @@ fn ascended(S: &Tridiagonal, bounds: &[Bounds]) -> Breaking {
             _ => return best,
         }
     }
-}
-
-/// A(a)ᵀS + S A(a).
-fn inequality(S: &Tridiagonal, a: &[f64]) -> DMatrix<f64> {
-    let n = S.size();
-    let SA = DMatrix::from_fn(n, n, |i, j| match j {
-        0 => 0.0,
-        _ => S.get(i, j - 1) * a[j - 1],
-    });
-    &SA + SA.transpose()
 }
 
 fn breaking(a: Vec<f64>, Phat: DMatrix<f64>) -> Breaking {

@@ -1,10 +1,14 @@
 //! The paper's constants, and what the decay of ẽ says of the error itself.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::{Chain, Disturbance, Ultimate, ultimate};
+use lynkeus_proof::magnitude::{plus, product, times};
+use lynkeus_proof::matrix::{square, sum};
+use lynkeus_proof::metzler;
+use nalgebra::DMatrix;
 
 use super::theorem::{Facts, Study};
-use super::transformed::{Similar, Table, product};
-use crate::proof::{Chain, Disturbance, Ultimate, metzler, square, ultimate, upper};
+use super::transformed::{Similar, Table};
 use crate::{Constant, DesignError};
 
 impl Study<'_> {
@@ -12,13 +16,13 @@ impl Study<'_> {
     pub(super) fn paper_constants(
         &self,
         facts: &Facts,
-        P: &[Table],
+        P: &[DMatrix<f64>],
         constants: &mut Vec<Constant>,
     ) {
         let count = P.len();
         let λ: Vec<f64> = P
             .iter()
-            .map(|P| metzler::spectral_radius(&absolute(P)))
+            .map(|P| metzler::spectral_radius(&square(P.nrows(), |i, j| P[(i, j)].abs())))
             .collect();
         let mut μ = vec![vec![0.0; count]; count];
         for i in 0..count {
@@ -73,11 +77,7 @@ impl Study<'_> {
                 H[l][m] = (size * scale(self.θ[j], m) / scale(self.θ[i], l)).hi();
             }
         }
-        let transposed: Table = (0..columns.len())
-            .map(|m| H.iter().map(|row| row[m]).collect())
-            .collect();
-        let square = metzler::spectral_radius(&product(&transposed, &H));
-        Interval::point(square).sqrt().hi()
+        metzler::spectral_norm(&H)
     }
 
     /// The bounds of ē taken back to e = M⁻¹ ē.
@@ -118,11 +118,14 @@ impl Study<'_> {
         let squares = states
             .iter()
             .map(|&(_, b)| Interval::point(b) * Interval::point(b));
-        found.norm = crate::proof::sum(squares).sqrt().hi();
+        found.norm = sum(squares).sqrt().hi();
         found.states = states;
         // e(0) goes through M of that time, ē(t) back through M⁻¹ of another
         let norms = |table: fn(&Similar) -> &Table| {
-            let all = facts.similar.iter().map(|s| norm(table(s)));
+            let all = facts
+                .similar
+                .iter()
+                .map(|s| metzler::spectral_norm(table(s)));
             Interval::point(all.fold(1.0, f64::max))
         };
         let factor = norms(|s| &s.M) * norms(|s| &s.inverse);
@@ -153,24 +156,10 @@ impl Study<'_> {
                 None => (column, vec![0.0; chain.states.len()]),
             };
             for ((&state, d), l) in chain.states.iter().zip(column).zip(L) {
-                let noisy = product(&[vec![l]], &[vec![self.plant.noise[i]]])[0][0];
-                drift[state] = (d[0] + noisy).next_up();
+                let noisy = times(l, self.plant.noise[i]);
+                drift[state] = plus(d[0], noisy);
             }
         }
         Ok(drift)
     }
-}
-
-fn absolute(P: &Table) -> Table {
-    upper(&square(P.len(), |i, j| Interval::point(P[i][j].abs())))
-}
-
-/// ‖M‖ ≤ √ρ(|M|ᵀ|M|)
-fn norm(M: &Table) -> f64 {
-    let transposed: Table = (0..M.len())
-        .map(|j| M.iter().map(|row| row[j]).collect())
-        .collect();
-    Interval::point(metzler::spectral_radius(&product(&transposed, M)))
-        .sqrt()
-        .hi()
 }

@@ -6,13 +6,15 @@
 //! K unstable, and a K with the right signs stable.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::hurwitz::Stability;
+use lynkeus_proof::chain::Chain;
+use lynkeus_proof::hurwitz::Stability;
+use lynkeus_proof::lyapunov;
+use lynkeus_proof::matrix::points;
 use lynkeus_structure::{Check, Extended};
 
 use super::settings::{Correction, Settings};
 use crate::conditions::{Partial, names};
 use crate::proof::words::{proved, refuted, shown, undecided};
-use crate::proof::{self, lyapunov};
 use crate::stability::{GainedChain, listed};
 
 /// Whether K stabilises a chain; none where that is known: K by its poles for a chain of
@@ -88,14 +90,14 @@ fn advice(correction: Correction, K: &[f64], a: &[f64]) -> String {
 
 /// μ of the first inequality with the P of the partials `a`.
 fn decay(K: &[f64], a: &[f64], ranges: &[(f64, f64)]) -> Option<f64> {
-    let P = lyapunov::chain(K, a)?;
-    let chain = proof::Chain {
+    let P = lyapunov::of_chain(K, a)?;
+    let chain = Chain {
         states: (0..K.len()).collect(),
         speed: Interval::ONE,
         scales: vec![Interval::ONE; K.len()],
-        S: proof::square(K.len(), |i, j| Interval::point(P[i][j])),
+        S: points(&P),
         g: K.iter().map(|&k| Interval::point(k)).collect(),
-        partials: ranges.to_vec(),
+        partials: ranges.iter().map(|&range| range.into()).collect(),
     };
     chain.decay()
 }

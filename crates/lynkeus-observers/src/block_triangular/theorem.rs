@@ -6,18 +6,21 @@
 //! bounds of its entries. The paper's μ_ij are formed of the same bounds.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::{Chain, Comparison, Slope};
+use lynkeus_proof::lyapunov;
+use lynkeus_proof::matrix::square;
+use lynkeus_proof::search::{first, lightest};
 use lynkeus_structure::{Blocks, Check, Extended};
+use nalgebra::DMatrix;
 
 use super::form::form;
 use super::settings::{Correction, Settings};
-use super::transformed::{Plant, Similar, Table, Term};
+use super::transformed::{Plant, Similar, Term};
 use super::{chain_rule, coefficients, theta};
 use crate::conditions::{Partial, fit, names, output_slope, partials};
 use crate::peaking::Departure;
-use crate::proof::slopes::{Slope, slopes};
-use crate::proof::threshold::{first, lightest};
+use crate::proof::slopes::slopes;
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
-use crate::proof::{Chain, Comparison, lyapunov};
 use crate::stability::GainedChain;
 use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning, prolongation};
 
@@ -169,7 +172,7 @@ impl Study<'_> {
         &self,
         facts: &Facts,
         checks: &mut Vec<Check>,
-    ) -> Option<(Vec<Table>, Vec<f64>)> {
+    ) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
             let states = names(self.plant.extended, &chain.states).join(" → ");
@@ -178,7 +181,9 @@ impl Study<'_> {
                 K: &self.plant.K[i],
                 partials: &facts.partials[i],
             };
-            let middle = gained.middle().and_then(|a| lyapunov::chain(gained.K, &a));
+            let middle = gained
+                .middle()
+                .and_then(|a| lyapunov::of_chain(gained.K, &a));
             let found = middle.and_then(|P| {
                 let μ = self.chain(i, facts, &P, self.θ[i], 1.0).decay()?;
                 Some((P, μ))
@@ -199,29 +204,28 @@ impl Study<'_> {
         (all.len() == self.θ.len()).then_some((all, decays))
     }
 
-    fn chain(&self, i: usize, facts: &Facts, P: &Table, θ: f64, c: f64) -> Chain {
+    fn chain(&self, i: usize, facts: &Facts, P: &DMatrix<f64>, θ: f64, c: f64) -> Chain {
         let states = self.blocks().order[i].1.states.clone();
         let speed = Interval::point(θ);
-        let weighed = |row: &Vec<f64>| {
-            row.iter()
-                .map(|&p| Interval::point(c) * Interval::point(p))
-                .collect()
-        };
+        let weighed = |i, j| Interval::point(c) * Interval::point(P[(i, j)]);
         let error = Interval::new(1.0 - 1e-12, 1.0 + 1e-12).unwrap_or(Interval::ONE);
         Chain {
             scales: (1..=states.len()).map(|j| speed.powi(j as i32)).collect(),
             states,
             speed,
-            S: P.iter().map(weighed).collect(),
+            S: square(P.nrows(), weighed),
             g: self.plant.K[i]
                 .iter()
                 .map(|&k| Interval::point(k) * error)
                 .collect(),
-            partials: facts.partials[i].clone(),
+            partials: facts.partials[i]
+                .iter()
+                .map(|&range| range.into())
+                .collect(),
         }
     }
 
-    fn chains(&self, facts: &Facts, P: &[Table], θ: &[f64], c: &[f64]) -> Vec<Chain> {
+    fn chains(&self, facts: &Facts, P: &[DMatrix<f64>], θ: &[f64], c: &[f64]) -> Vec<Chain> {
         (0..P.len())
             .map(|i| self.chain(i, facts, &P[i], θ[i], c[i]))
             .collect()
@@ -230,7 +234,7 @@ impl Study<'_> {
     fn comparison(
         &self,
         facts: &Facts,
-        P: &[Table],
+        P: &[DMatrix<f64>],
         μ: &[f64],
         θ: &[f64],
         c: &[f64],
@@ -243,7 +247,7 @@ impl Study<'_> {
     fn second_inequality(
         &self,
         facts: &Facts,
-        P: &[Table],
+        P: &[DMatrix<f64>],
         μ: &[f64],
         checks: &mut Vec<Check>,
         constants: &mut Vec<Constant>,

@@ -13,12 +13,14 @@
 //! with powers of θ, and the terms here carry them.
 
 use lynkeus_expr::{Interval, Node, jacobian};
+use lynkeus_proof::chain::Slope;
+use lynkeus_proof::magnitude::{plus, product, times};
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{Blocks, Chain, Extended, Matrix, range};
 
 use super::lee::{Sparse, own_jacobian, transformation};
-use crate::DesignError;
-use crate::proof::slopes::{Slope, magnitude};
-use crate::{Assumptions, proof};
+use crate::proof::slopes::magnitude;
+use crate::{Assumptions, DesignError};
 
 /// A table of upper bounds, row by row.
 pub(super) type Table = Vec<Vec<f64>>;
@@ -37,7 +39,7 @@ impl Term {
         let grown = self.powers.iter().map(|&(c, k, coefficient)| {
             Interval::point(coefficient) * Interval::point(θ[c]).powi(k as i32)
         });
-        let size = (Interval::point(self.size) + proof::sum(grown)).hi();
+        let size = (Interval::point(self.size) + sum(grown)).hi();
         Slope {
             row: self.row,
             column: self.column,
@@ -63,18 +65,6 @@ pub(super) struct Plant<'a> {
     pub K: Vec<Vec<f64>>,
     /// bounds of the errors of the measured states, in the order of the blocks
     pub noise: Vec<f64>,
-}
-
-pub(super) fn product(A: &[Vec<f64>], B: &[Vec<f64>]) -> Table {
-    let columns = B.first().map_or(0, Vec::len);
-    let entry = |row: &Vec<f64>, j: usize| {
-        // zero times unbounded is zero: the entry is not there
-        let terms = row.iter().zip(B).filter(|(a, b)| **a != 0.0 && b[j] != 0.0);
-        proof::sum(terms.map(|(&a, b)| Interval::point(a) * Interval::point(b[j]))).hi()
-    };
-    A.iter()
-        .map(|row| (0..columns).map(|j| entry(row, j)).collect())
-        .collect()
 }
 
 impl Plant<'_> {
@@ -192,12 +182,8 @@ impl Plant<'_> {
                 let (steady, powers) = self.speed(c, place, i, similar)?;
                 for (p, &factor) in product.iter().flatten().enumerate() {
                     let term = &mut terms[p / n * n + p % n];
-                    let times = |x: f64| match factor == 0.0 || x == 0.0 {
-                        true => 0.0,
-                        false => (Interval::point(factor) * Interval::point(x)).hi(),
-                    };
-                    term.size += times(steady).next_up();
-                    let grown = powers.iter().map(|&(k, x)| (c, k, times(x)));
+                    term.size = plus(term.size, times(factor, steady));
+                    let grown = powers.iter().map(|&(k, x)| (c, k, times(factor, x)));
                     term.powers.extend(grown.filter(|g| g.2 != 0.0));
                 }
             }
@@ -209,11 +195,11 @@ impl Plant<'_> {
             for (p, &size) in product.iter().flatten().enumerate() {
                 // time itself has slope one; an input's derivative has no declared bound
                 let known = symbol == self.extended.plant.time;
-                terms[p].size += match (size == 0.0, known) {
-                    (true, _) => 0.0,
-                    (false, true) => size.next_up(),
-                    (false, false) => f64::INFINITY,
+                let size = match size == 0.0 || known {
+                    true => size,
+                    false => f64::INFINITY,
                 };
+                terms[p].size = plus(terms[p].size, size);
             }
         }
         Ok(())
@@ -268,8 +254,8 @@ impl Plant<'_> {
             .dimensions
             .iter()
             .find(|d| d.symbol == head.node);
-        let width = side.map_or(f64::INFINITY, |d| d.max - d.min);
-        let innovation = (width + self.noise[c]).next_up();
+        let width = side.map_or(f64::INFINITY, |d| plus(d.max, -d.min));
+        let innovation = plus(width, self.noise[c]);
         let row = &similar[c].inverse[place];
         let column = |x: &[f64]| x.iter().map(|&x| vec![x]).collect::<Table>();
         let steady = product(
@@ -277,10 +263,10 @@ impl Plant<'_> {
             &[vec![innovation]],
         );
         let power = |(k, &m): (usize, &f64)| {
-            let gain = product(&[vec![m]], &[vec![self.K[c][k].abs()]]);
-            (k + 1, product(&gain, &[vec![innovation]])[0][0])
+            let gain = times(m, self.K[c][k].abs());
+            (k + 1, times(gain, innovation))
         };
         let powers = row.iter().enumerate().map(power).collect();
-        Ok(((f + steady[0][0]).next_up(), powers))
+        Ok((plus(f, steady[0][0]), powers))
     }
 }

@@ -1,13 +1,13 @@
 //! The numbers of the gain, and the matrices that they make.
 
 use lynkeus_gain::vandermonde::{self, Lemma32, Pole};
+use lynkeus_proof::magnitude::{root, times};
 use lynkeus_structure::Extended;
 
 use super::form::Form;
 use super::keys::{self, Needed};
 use super::poles::spaced;
 use super::variant::Variant;
-use crate::enclosure::up;
 use crate::{Tuning, TuningError};
 
 /// Default ratio of the filter's slowest pole to that of the observer: that of the
@@ -108,9 +108,9 @@ pub(super) fn closed_loop(K: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// Columns √m s_k e_k for the m numbers s_k > 0.
 pub(super) fn spread(s: &[f64]) -> Vec<Vec<f64>> {
     let rows: Vec<usize> = (0..s.len()).filter(|&k| s[k] > 0.0).collect();
-    let root = (rows.len() as f64).sqrt();
+    let root = root(rows.len() as f64);
     let row = |k: usize| {
-        let entry = |&column: &usize| if column == k { up(root * s[k]) } else { 0.0 };
+        let entry = |&column: &usize| if column == k { times(root, s[k]) } else { 0.0 };
         rows.iter().map(entry).collect()
     };
     (0..s.len()).map(row).collect()

@@ -15,13 +15,14 @@
 //! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
 //! will do, also one with a smaller α₁, and the states are bounded one by one.
 
-use lynkeus_gain::riccati::Riccati;
+use lynkeus_expr::Interval;
+use lynkeus_proof::magnitude::{length, plus, size, times, total};
+use lynkeus_proof::riccati::Riccati;
 
 use super::gains::{closed_loop, slowest, spread};
 use super::lipschitz::Share;
 use super::proof::{Proof, Solutions, undecided};
 use super::variant::Variant;
-use crate::enclosure::{length, times, up};
 use crate::{Assumptions, Certificate, Constant, Verdict};
 
 /// Shares of the filter's slowest pole tried for α₂.
@@ -57,7 +58,7 @@ pub(super) fn conclude(
         },
         false => None,
     };
-    let peak = up((P.largest / P.smallest).sqrt());
+    let peak = P.peak();
     let α = filter.as_ref().map_or(P.α, |f| P.α.min(f.α));
     found.rate = Some(α);
     let φ = of_rows(P, &proof.lipschitz.unseen);
@@ -85,18 +86,20 @@ struct Left {
 impl Left {
     /// By P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and |e_z,j| ≤ √(P_jj ν).
     fn of(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Self {
-        let f = up(of_rows(P, &proof.lipschitz.unseen) + forces(proof, P, assumptions));
-        let root_ν = up((f + (f * f + 2.0 * P.α * a * a).sqrt()) / (2.0 * P.α));
-        let e_z = up(P.largest.sqrt() * root_ν);
-        let part = |j: usize| up(P.P[j][j].sqrt() * root_ν).min(e_z);
+        let f = size(of_rows(P, &proof.lipschitz.unseen)) + size(forces(proof, P, assumptions));
+        let twice = Interval::point(2.0) * Interval::point(P.α);
+        let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
+        let e_z = Interval::point(P.largest).sqrt() * root_ν;
+        let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
         let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+        let e_z = e_z.hi();
         let of_state = |share: &Share| {
-            let one_by_one = share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)).sum();
+            let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
             let together = times(length(&share.z), e_z);
-            up(f64::min(one_by_one, together) + times(share.through, a))
+            plus(one_by_one.min(together), times(share.through, a))
         };
         let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
-        let whole = up(proof.lipschitz.inverse * length(&[e_z, a])).min(length(&each));
+        let whole = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
         Self { each, whole }
     }
 }
@@ -113,10 +116,11 @@ fn filter(proof: &Proof<'_, '_>) -> Option<Filter> {
     let A = closed_loop(&gains.K2);
     let one = |share: f64| {
         let P = Riccati::solve(&A, &spread(&w), share * limit, 0.0)?;
-        let rest = up((P.largest / (2.0 * P.α)).sqrt());
+        let twice = Interval::point(2.0) * Interval::point(P.α);
+        let rest = (Interval::point(P.largest) / twice).sqrt().hi();
         Some(Filter {
             α: P.α,
-            peak: up((P.largest / P.smallest).sqrt()),
+            peak: P.peak(),
             rest: if driven { rest } else { 0.0 },
         })
     };
@@ -131,8 +135,8 @@ fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
         (0..size.len()).map(entry).collect::<Vec<_>>()
     };
     let each = size.iter().enumerate().filter(|(_, size)| **size > 0.0);
-    let one_by_one: f64 = each.map(|(k, size)| P.weight(&unit(k)) * size).sum();
-    up(one_by_one.min(length(size) / P.smallest.sqrt()))
+    let one_by_one = total(each.map(|(k, size)| times(P.weight(&unit(k)), *size)));
+    one_by_one.min(P.weight_of_length(length(size)))
 }
 
 /// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
@@ -140,7 +144,7 @@ fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 
     let n = proof.A.len();
     let pushed = |row: &Vec<f64>| {
         let terms = row.iter().zip(&assumptions.drift);
-        up(terms.map(|(q, d)| times(*q, *d)).sum())
+        total(terms.map(|(q, d)| times(*q, *d)))
     };
     let q: Vec<f64> = proof.lipschitz.Q.iter().map(pushed).collect();
     let mut sum = of_rows(P, &q);
@@ -150,11 +154,11 @@ fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 
         let mut column = vec![0.0; n];
         column[start..start + K.len()].copy_from_slice(K);
         if noise > 0.0 && !K.is_empty() {
-            sum += P.weight(&column) * noise;
+            sum = plus(sum, times(P.weight(&column), noise));
         }
         start += K.len();
     }
-    up(sum)
+    sum
 }
 
 fn print(
@@ -165,7 +169,7 @@ fn print(
     constants: &mut Vec<Constant>,
 ) {
     let (map, inverse) = (proof.lipschitz.map, proof.lipschitz.inverse);
-    let μ = up(peak * map * inverse);
+    let μ = times(times(peak, map), inverse);
     let mut add = |name: &str, value: f64, meaning: &str| {
         constants.push(Constant::new(name, value, meaning));
     };
@@ -193,19 +197,21 @@ fn print(
         );
         return;
     };
-    let spreading = P.largest.sqrt() * filter.peak;
-    let e_z = P.largest.sqrt() * (filter.rest / (2.0 * P.α).sqrt() + φ / P.α);
+    let (root, α) = (Interval::point(P.largest).sqrt(), Interval::point(P.α));
+    let spreading = (root * size(filter.peak)).hi();
+    let left = size(filter.rest) / (Interval::point(2.0) * α).sqrt();
+    let e_z = (root * (left + size(φ) / α)).hi();
     let n̄ = length(&proof.lipschitz.unseen);
     add("α2", filter.α, "the rate of the filter");
     add("c1", μ, "of (4.30): the factor of the initial errors");
     add(
         "c2",
-        up(inverse * spreading),
+        times(inverse, spreading),
         "of (4.30): the factor of √ε and the filter's initial error",
     );
     add(
         "c3",
-        up(inverse * length(&[e_z, filter.rest])),
+        times(inverse, length(&[e_z, filter.rest])),
         "of (4.30), corrected: what the filter and n̄w leave",
     );
     add(
@@ -215,7 +221,7 @@ fn print(
     );
     add(
         "c4",
-        up(inverse * filter.peak),
+        times(inverse, filter.peak),
         "missing in (4.30): the filter's initial error as x sees it",
     );
 }

@@ -17,6 +17,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
+use lynkeus_proof::magnitude::{length, norm, plus, product, times};
 use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
 
 use super::conditions::regular;
@@ -25,7 +26,7 @@ use super::derivative_name;
 use super::form::Form;
 use super::variant::Variant;
 use crate::DesignError;
-use crate::enclosure::{Enclosure, length, norm, product, times, up};
+use crate::enclosure::Enclosure;
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {
@@ -249,9 +250,10 @@ fn forced(unseen: &Unseen, box_: &Enclosure<'_>) -> Result<Vec<f64>, MissingInpu
         for (factor, &w) in row.iter().zip(&unseen.w) {
             let Some(factor) = factor else { continue };
             let (low, high) = box_.side(w);
-            sum += times(box_.magnitude(*factor)?, low.abs().max(high.abs()));
+            let bound = times(box_.magnitude(*factor)?, low.abs().max(high.abs()));
+            sum = plus(sum, bound);
         }
-        Ok(up(sum))
+        Ok(sum)
     };
     unseen.factors.iter().map(row).collect()
 }

@@ -1,14 +1,15 @@
 //! P for the study's gain, and hypothesis 4 of the theorems.
 
-use lynkeus_gain::riccati::Riccati;
 use lynkeus_gain::vandermonde::{self, Pole};
+use lynkeus_proof::magnitude::{length, plus, times};
+use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{Check, Condition, Extended};
 
 use super::form::Form;
 use super::gains::{Gains, closed_loop, spread};
 use super::lipschitz::Lipschitz;
 use crate::Constant;
-use crate::enclosure::{figures, length, up};
+use crate::enclosure::figures;
 
 /// Steps of a bisection on a logarithmic scale.
 const STEPS: usize = 40;
@@ -69,7 +70,13 @@ impl Proof<'_, '_> {
         let with_input = |u: f64| -> Vec<f64> {
             let pairs = drift.iter().zip(&self.lipschitz.input);
             pairs
-                .map(|(γ, H)| if *H > 0.0 { up(γ + u * H) } else { *γ })
+                .map(|(γ, H)| {
+                    if *H > 0.0 {
+                        plus(*γ, times(u, *H))
+                    } else {
+                        *γ
+                    }
+                })
                 .collect()
         };
         let γ = length(drift);

@@ -10,6 +10,7 @@
 //! not K for a P: the theorems only ask that there is one.
 
 use lynkeus_gain::vandermonde;
+use lynkeus_proof::magnitude::length;
 use lynkeus_structure::{Check, Condition, Extended};
 
 use super::form::Form;
@@ -19,7 +20,7 @@ use super::keys::{self, Needed, SLOPES};
 use super::lipschitz::{self, Lipschitz};
 use super::proof::{Proof, SLOW, check, undecided};
 use super::variant::Variant;
-use crate::enclosure::{figures, length};
+use crate::enclosure::figures;
 use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, TuningError};
 
 pub(super) fn certificate(

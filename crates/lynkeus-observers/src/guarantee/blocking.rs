@@ -1,6 +1,6 @@
 //! Why there is no proof, or no gain: which range stands in the way.
 
-use lynkeus_gain::decay::{self, ErrorModel, Request};
+use lynkeus_proof::decay::{self, ErrorModel, Request};
 use lynkeus_structure::{Slopes, short};
 
 use super::error_system::ErrorSystem;

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
-use lynkeus_gain::decay::ErrorModel;
-use lynkeus_gain::definite::IntervalMatrix;
+use lynkeus_proof::decay::ErrorModel;
+use lynkeus_proof::matrix::IntervalMatrix;
 use lynkeus_structure::{
     Check, Condition, Dimension, Extended, Region, Slopes, counted, range, range_within,
 };

@@ -3,7 +3,7 @@
 //! x̂' = f(x̂, u) − K (Cx̂ − y) with a full K: every output corrects every state. The
 //! form of the equations does not matter, only the slopes of their nonlinear terms.
 
-use lynkeus_gain::decay::{self, Aim, Gain, NoGain, Request};
+use lynkeus_proof::decay::{self, Aim, Gain, NoGain, Request};
 use lynkeus_structure::Extended;
 
 use super::blocking;
@@ -168,7 +168,7 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
     })
 }
 
-fn middles(model: &lynkeus_gain::decay::ErrorModel) -> Vec<f64> {
+fn middles(model: &lynkeus_proof::decay::ErrorModel) -> Vec<f64> {
     model.sectors.iter().map(|s| s.middle()).collect()
 }
 

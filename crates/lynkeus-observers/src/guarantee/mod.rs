@@ -9,7 +9,7 @@
 //! with the slopes θ of the nonlinear terms of F ([`lynkeus_structure::slopes`]). A
 //! common Lyapunov function eᵀPe for every θ on the box proves the decay, whatever
 //! family the observer is of. Linear matrix inequalities find P
-//! ([`lynkeus_gain::decay`]); interval arithmetic accepts or rejects it.
+//! ([`lynkeus_proof::decay`]); interval arithmetic accepts or rejects it.
 
 mod blocking;
 mod correction;
@@ -21,7 +21,7 @@ mod lmi;
 mod refute;
 mod ultimate;
 
-use lynkeus_gain::decay::{self, ErrorModel, Proof};
+use lynkeus_proof::decay::{self, ErrorModel, Proof};
 use lynkeus_structure::{Check, Condition, Extended, short};
 
 use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};

@@ -7,7 +7,7 @@
 //! certain where A is the same whatever the plant does, and where the plant can rest.
 
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
-use lynkeus_gain::decay::is_unstable;
+use lynkeus_proof::decay::is_unstable;
 use lynkeus_structure::{Check, Dimension, Extended, Point};
 use nalgebra::DMatrix;
 

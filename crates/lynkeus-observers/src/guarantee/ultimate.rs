@@ -6,14 +6,15 @@
 //! and |e_i| ≤ r·√(P⁻¹)_ii.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::decay::{Proof, is_below};
+use lynkeus_proof::decay::Proof;
+use lynkeus_proof::definite::is_below;
+use lynkeus_proof::magnitude::times;
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
 use super::error_system::ErrorSystem;
 use crate::Assumptions;
-use crate::enclosure::times;
-use crate::proof::sum;
 
 /// A guessed bound of a quadratic form is raised by this before it is tried.
 const RESERVE: f64 = 1e-6;

@@ -1,20 +1,10 @@
 //! How steep the equations are: upper bounds of |∂f_a/∂x_b| on a box.
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary, jacobian};
+use lynkeus_proof::chain::Slope;
 use lynkeus_structure::{Check, Condition, Extended, Region, range};
 
 use crate::DesignError;
-
-/// One entry of the Jacobian.
-#[derive(Clone, Debug)]
-pub(crate) struct Slope {
-    /// a
-    pub row: usize,
-    /// b
-    pub column: usize,
-    /// upper bound of |∂f_a/∂x_b|, infinite where none is known
-    pub size: f64,
-}
 
 /// Upper bounds of the entries of ∂f/∂x that can differ from zero, with the
 /// hypothesis that all are finite; `skip` leaves out entries that are not needed.

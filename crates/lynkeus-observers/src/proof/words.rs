@@ -1,9 +1,9 @@
 //! Phrases that the theorems of several families share.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::Ultimate;
 use lynkeus_structure::{Check, Condition, Extended, Point, Region, Witness, range};
 
-use super::Ultimate;
 use crate::{Certificate, Constant, DesignError, Verdict};
 
 /// A number for a sentence.

@@ -2,9 +2,9 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_gain::UnitFactor;
-
-use crate::proof::definite::{Matrix, positive};
-use crate::proof::{largest, metzler, square, sum, upper};
+use lynkeus_proof::definite::least_eigenvalue;
+use lynkeus_proof::matrix::{IntervalMatrix, square, sum, upper};
+use lynkeus_proof::metzler;
 
 /// After this many 1/θ the past is forgotten but for e^{−τ}.
 pub(super) const TAU: f64 = 10.0;
@@ -36,7 +36,7 @@ pub(super) fn above(
 }
 
 /// UᵀDU
-fn product(S0: &UnitFactor) -> Matrix {
+fn product(S0: &UnitFactor) -> IntervalMatrix {
     let n = S0.diagonal.len();
     let U = |k: usize, j: usize| match j.cmp(&k) {
         std::cmp::Ordering::Less => Interval::ZERO,
@@ -91,13 +91,7 @@ pub(super) fn below(C: &[Vec<f64>], F: &[Vec<f64>], blocks: usize) -> Option<f64
             integrals[a + b] * outer
         }))
     });
-    let limit = (0..n).map(|i| G[i][i].hi()).fold(f64::INFINITY, f64::min);
-    largest(limit, |m| {
-        positive(&square(n, |i, j| match i == j {
-            true => G[i][j] - Interval::point(m),
-            false => G[i][j],
-        }))
-    })
+    least_eigenvalue(&G, f64::INFINITY)
 }
 
 #[cfg(test)]

@@ -13,15 +13,16 @@
 //! the monitor `excitation` is above its alarm, λ_m is at least that.
 
 use lynkeus_expr::{Interval, Node};
+use lynkeus_proof::chain::Slope;
+use lynkeus_proof::matrix::sum;
+use lynkeus_proof::metzler::spectral_radius;
+use lynkeus_proof::search::first;
 use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
 
 use super::gramian::{TAU, above, below, largest_eigenvalue};
 use super::settings::Settings;
 use super::{alarm, form};
-use crate::proof::metzler::spectral_radius;
-use crate::proof::slopes::{Slope, magnitude, slopes, undeclared};
-use crate::proof::sum;
-use crate::proof::threshold::first;
+use crate::proof::slopes::{magnitude, slopes, undeclared};
 use crate::proof::words::{box_note, proved, shown, undecided};
 use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, Verdict};
 

@@ -1,7 +1,7 @@
 //! What an S of the study does by itself, and with the plant's own damping.
 
 use lynkeus_expr::{MissingInput, Tape, jacobian};
-use lynkeus_gain::hurwitz::Stability;
+use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 

@@ -1,12 +1,13 @@
 //! What the theorem needs to know of the plant on the box of the assumptions.
 
 use lynkeus_expr::Graph;
+use lynkeus_proof::chain::Slope;
 use lynkeus_structure::{Check, Extended, Region};
 
 use super::form::Form;
 use crate::DesignError;
 use crate::conditions::{output_slope, partials};
-use crate::proof::slopes::{Slope, slopes, undeclared};
+use crate::proof::slopes::{slopes, undeclared};
 use crate::proof::words::undecided;
 
 /// What is known of the plant on the box of the assumptions.

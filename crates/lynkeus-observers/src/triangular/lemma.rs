@@ -1,13 +1,14 @@
 //! Lemma 1 for one chain of an observer: does its S satisfy (17), with which ρ, η?
 
 use lynkeus_expr::Interval;
+use lynkeus_gain::Tridiagonal;
 use lynkeus_gain::lemma1::{self, Breaking, Kernel};
-use lynkeus_gain::{Bounds, Tridiagonal};
+use lynkeus_proof::chain::Chain;
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{Check, Point};
 
 use crate::Constant;
 use crate::proof::words::{proved, refuted, shown, undecided};
-use crate::proof::{Chain, sum};
 
 /// What Lemma 1 says of a chain.
 pub(super) struct Verified {
@@ -39,9 +40,8 @@ pub(super) fn verify(
         broken: false,
         constants: vec![],
     };
-    let bounds = |&(lower, upper): &(f64, f64)| Bounds { lower, upper };
-    let bounds: Vec<Bounds> = chain.partials.iter().map(bounds).collect();
-    let least = match lemma1::kernel(S, &bounds) {
+    let bounds = &chain.partials;
+    let least = match lemma1::kernel(S, bounds) {
         Ok(Kernel::Holds { ρ }) => ρ,
         Ok(Kernel::Breaks(found)) => {
             let (check, broken) = breaks(title, S, &found, names);
@@ -85,8 +85,8 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
     let (lower, upper) = chain
         .partials
         .iter()
-        .fold((f64::INFINITY, 0.0f64), |(l, u), &(a, b)| {
-            (l.min(a), u.max(b))
+        .fold((f64::INFINITY, 0.0f64), |(l, u), b| {
+            (l.min(b.lower), u.max(b.upper))
         });
     let mut list = vec![];
     let mut add = |name: &str, value: f64, meaning: &str| {

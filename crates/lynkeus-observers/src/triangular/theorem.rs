@@ -10,6 +10,8 @@
 //! first θ0 for which it is negative on the decay is proved, θ < 1 included.
 
 use lynkeus_expr::Interval;
+use lynkeus_proof::chain::{Chain, Comparison, Disturbance, ultimate};
+use lynkeus_proof::search::{first, lightest};
 use lynkeus_structure::{Check, Extended};
 
 use super::Triangular;
@@ -20,9 +22,8 @@ use super::lemma::verify;
 use crate::conditions::{fit, names};
 use crate::peaking::Departure;
 use crate::prolongation;
-use crate::proof::threshold::{first, lightest, reached};
+use crate::proof::threshold::reached;
 use crate::proof::words::{conclude, proved, shown, state_noise, undecided};
-use crate::proof::{Chain, Comparison, Disturbance, ultimate};
 use crate::{Assumptions, Certificate, Constant, DesignError, Family, Fit, Tuning};
 
 const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
@@ -155,8 +156,8 @@ impl Study<'_> {
             .into_iter()
             .map(|s| Interval::point(gains.r[i] * s) * error);
         let partials = match gains.divided {
-            true => vec![(1.0, 1.0); bounds.len()],
-            false => bounds.clone(),
+            true => vec![(1.0, 1.0).into(); bounds.len()],
+            false => bounds.iter().map(|&range| range.into()).collect(),
         };
         Chain {
             states,

@@ -1,9 +1,10 @@
 //! From norms over the box to the constants of (24).
 
+use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
+use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::Check;
-
-use crate::enclosure::{length, norm, product, times, up};
 
 /// Norms over the box of the matrices above.
 pub(super) struct Norms {
@@ -57,7 +58,7 @@ pub(super) fn inverse_triangle(Z: &[Vec<f64>], w: &[f64]) -> Vec<Vec<f64>> {
         W[k][k] = w[k];
         let through = |i: usize| {
             let terms = (i..k).map(|j| times(Z[k][j], W[j][i]));
-            up(times(w[k], terms.sum()))
+            times(w[k], total(terms))
         };
         let row: Vec<f64> = (0..k).map(through).collect();
         W[k][..k].copy_from_slice(&row);
@@ -69,55 +70,56 @@ impl Norms {
     /// c₁, c₂, c₄ and c₅ for every θ₂ ≥ 1.
     pub fn constants(&self) -> Constants {
         let q = self.W.len();
-        let (S2, root) = (Chain::new(q), f64::sqrt);
-        let at = |i: usize| root(S2.inverse_diagonal[i]);
+        let S2 = Chain::new(q);
+        let (two, root8) = (Interval::point(2.0), Interval::point(8.0).sqrt());
+        let at = |i: usize| Interval::point(S2.inverse_diagonal[i]).sqrt();
         // |e₁| ≤ √2 √V₁, |e¹₂| ≤ θ₁ √V₁; √(1, 0)S₁(1, 0)ᵀ = 1, √(0, 1)S₁(0, 1)ᵀ = √2
-        let c1 = up(8f64.sqrt() * (self.N0 + self.turning));
+        let c1 = root8 * (size(self.N0) + size(self.turning));
         let N = [self.N.to_vec()];
         let through = product(&N, &self.W[..q.min(2)]);
-        let sum: f64 = (0..q.min(2)).map(|i| times(through[0][i], at(i))).sum();
-        let c2 = up(2.0 * sum);
+        let c2 = two * sum((0..q.min(2)).map(|i| size(through[0][i]) * at(i)));
 
         let mut B = product(&self.Ψ, &self.W);
         let back: Vec<f64> = (0..q).map(|k| self.back(&S2, k)).collect();
-        for (row, back) in B.iter_mut().zip(&back) {
-            row[0] += back;
+        for (row, &back) in B.iter_mut().zip(&back) {
+            row[0] = plus(row[0], back);
         }
         let weighted = |k: usize| {
-            let terms = (0..q).map(|i| times(B[k][i], at(i)));
-            root(S2.diagonal[k]) * terms.sum::<f64>()
+            let terms = sum((0..q).map(|i| size(B[k][i]) * at(i)));
+            Interval::point(S2.diagonal[k]).sqrt() * terms
         };
-        let weighted: f64 = (0..q).map(weighted).sum();
-        let κ = up(root(S2.largest / S2.smallest));
-        let c4 = up(2.0 * weighted.min(κ * norm(&B)));
+        let κ = (Interval::point(S2.largest) / Interval::point(S2.smallest)).sqrt();
+        let c4 = two * sum((0..q).map(weighted)).min(κ * size(norm(&B)));
 
         let γ1 = self.γ[0];
-        let pushed = product(
-            &self.Z,
-            &self.Y.iter().map(|&y| vec![y]).collect::<Vec<_>>(),
-        );
-        let p: Vec<f64> = (0..q).map(|k| pushed[k][0] + times(back[k], γ1)).collect();
-        let c5 = up(8f64.sqrt() * (in_S(&S2, &p) + times(self.push(&S2), γ1)));
+        let Y: Vec<Vec<f64>> = self.Y.iter().map(|&y| vec![y]).collect();
+        let pushed = product(&self.Z, &Y);
+        let p = (0..q).map(|k| plus(pushed[k][0], times(back[k], γ1)));
+        let p = in_S(&S2, &p.collect::<Vec<_>>());
+        let c5 = root8 * size(plus(p, times(self.push(&S2), γ1)));
+        let [c1, c2, c4, c5] = [c1, c2, c4, c5].map(|c| c.hi());
         Constants { c1, c2, c4, c5 }
     }
 
     /// √V₂ for Δ₂ times the correction of an innovation of length one, divided by θ₂: √(CS₂⁻¹Cᵀ) = √q, and q
     /// for what a left inverse leaves out, of which V₂ sees the first layer alone.
     pub fn push(&self, S2: &Chain) -> f64 {
-        let q = S2.gain.len() as f64;
-        if self.tall { q } else { q.sqrt().next_up() }
+        let q = Interval::point(S2.gain.len() as f64);
+        if self.tall { q.hi() } else { q.sqrt().hi() }
     }
 
     /// Σ_{j<k} ‖∂Z_k/∂x^j P_j⁻¹‖ C^j_q: what Λ₂ leaves of the correction beside the
     /// constant gain.
     pub fn back(&self, S2: &Chain, k: usize) -> f64 {
-        let terms = (0..k).map(|j| times(self.Z[k][j], self.P_inverse[j]) * S2.gain[j]);
-        up(terms.sum())
+        let terms = (0..k).map(|j| times(times(self.Z[k][j], self.P_inverse[j]), S2.gain[j]));
+        total(terms)
     }
 }
 
 /// A bound of √(pᵀSp) for entries up to p.
 pub(super) fn in_S(S: &Chain, p: &[f64]) -> f64 {
-    let weighted: f64 = p.iter().zip(&S.diagonal).map(|(p, s)| p * s.sqrt()).sum();
-    up(weighted).min(up(S.largest.sqrt() * length(p) * (1.0 + 1e-9)))
+    let diagonal = S.diagonal.iter().map(|&s| Interval::point(s).sqrt());
+    let weighted = sum(p.iter().zip(diagonal).map(|(&p, s)| size(p) * s));
+    let whole = Interval::point(S.largest).sqrt() * size(length(p));
+    weighted.min(whole).hi()
 }

@@ -10,6 +10,8 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
+use lynkeus_proof::magnitude::{length, plus, size, times, total};
+use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{Check, Condition};
 
 use super::bound;
@@ -17,7 +19,7 @@ use super::constants;
 use super::form::Form;
 use super::norms::{Constants, Norms, in_S};
 use super::settings::{Settings, Thetas};
-use crate::enclosure::{figures, length, times, up};
+use crate::enclosure::figures;
 use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Verdict};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
@@ -141,8 +143,13 @@ impl Proof<'_, '_, '_> {
     /// What θ₁ has to exceed for this θ₂ > c₄.
     fn first(&self, θ2: f64) -> f64 {
         let Constants { c1, c2, c4, c5 } = self.c;
-        let c = times(c2 + c5, θ2);
-        up(up(c1 + times(c, c) / (4.0 * (θ2 - c4))))
+        if !c4.is_finite() {
+            return f64::INFINITY;
+        }
+        let θ2 = Interval::point(θ2);
+        let c = (size(c2) + size(c5)) * θ2;
+        let room = Interval::point(4.0) * (θ2 - size(c4));
+        (size(c1) + c.powi(2) / room).hi()
     }
 
     /// (θ₁*, θ₂) with the smallest θ₁* of all θ₂.
@@ -153,7 +160,7 @@ impl Proof<'_, '_, '_> {
 
     fn print_constants(&self, thetas: Option<&Thetas>, constants: &mut Vec<Constant>) {
         let Constants { c1, c2, c4, c5 } = self.c;
-        let c3 = up(8f64.sqrt() * self.norms.G11);
+        let c3 = (Interval::point(8.0).sqrt() * size(self.norms.G11)).hi();
         let (first, second) = self.smallest();
         let mut list = vec![
             ("c1", c1, "what f̃₁¹ and the turning of G₁¹ take from θ₁"),
@@ -200,7 +207,7 @@ impl Proof<'_, '_, '_> {
             return Ok(());
         }
         found.rate = Some(λ / 2.0);
-        let peak = up(self.root_V_of(θ) * length(&self.out_of_V(θ)));
+        let peak = times(self.root_V_of(θ), length(&self.out_of_V(θ)));
         let list = &mut found.constants;
         list.push(Constant::new(
             "μ",
@@ -220,8 +227,9 @@ impl Proof<'_, '_, '_> {
             found.notes.push("no ultimate bound: a disturbance or a measurement error has none; declare min and max of the disturbances".to_owned());
             return Ok(());
         }
-        let root_V = up(2.0 * δ / λ);
-        let sizes: Vec<f64> = self.out_of_V(θ).iter().map(|s| up(s * root_V)).collect();
+        let root_V = (Interval::point(2.0) * size(δ) / Interval::point(λ)).hi();
+        let out = self.out_of_V(θ).into_iter();
+        let sizes: Vec<f64> = out.map(|s| times(s, root_V)).collect();
         found.ultimate_bound = Some(length(&sizes));
         found.ultimate = self.per_state(&sizes);
         Ok(())
@@ -241,13 +249,15 @@ impl Proof<'_, '_, '_> {
     /// |e₁|, |v̂ − v| and the |X̂² − X²| of each block for √V = 1.
     fn out_of_V(&self, [θ1, θ2]: [f64; 2]) -> Vec<f64> {
         let S2 = Chain::new(self.form.q());
-        let mut sizes = vec![2f64.sqrt(), times(self.norms.left, θ1)];
-        for (row, γ) in self.norms.W.iter().zip(&self.norms.γ) {
-            let term = |(i, W): (usize, &f64)| {
-                times(*W, θ2.powi(i as i32) * S2.inverse_diagonal[i].sqrt())
+        let root2 = Interval::point(2.0).sqrt();
+        let mut sizes = vec![root2.hi(), times(self.norms.left, θ1)];
+        for (row, &γ) in self.norms.W.iter().zip(&self.norms.γ) {
+            let term = |(i, &W): (usize, &f64)| {
+                let root = Interval::point(S2.inverse_diagonal[i]).sqrt();
+                size(W) * Interval::point(θ2).powi(i as i32) * root
             };
-            let η: f64 = row.iter().enumerate().map(term).sum();
-            sizes.push(up(η + γ * 2f64.sqrt()));
+            let η = sum(row.iter().enumerate().map(term));
+            sizes.push((η + size(γ) * root2).hi());
         }
         sizes
     }
@@ -255,12 +265,13 @@ impl Proof<'_, '_, '_> {
     /// √V for an error of length one.
     fn root_V_of(&self, [θ1, θ2]: [f64; 2]) -> f64 {
         let (S1, S2) = (Chain::new(2), Chain::new(self.form.q()));
-        let largest = |S: &Chain| S.largest.sqrt() * CLEAR;
-        let V1 = largest(&S1) * (self.norms.G11 / θ1).max(1.0);
-        let γ = 1.0 + length(&self.norms.γ);
-        let row = |(k, row): (usize, &Vec<f64>)| length(row) / θ2.powi(k as i32);
+        let largest = |S: &Chain| Interval::point(S.largest).sqrt();
+        let first = (size(self.norms.G11) / Interval::point(θ1)).max(Interval::ONE);
+        let γ = size(plus(1.0, length(&self.norms.γ)));
+        let row = |(k, row): (usize, &Vec<f64>)| over(length(row), θ2, k);
         let rows: Vec<f64> = self.norms.Z.iter().enumerate().map(row).collect();
-        up(length(&[V1, largest(&S2) * length(&rows) * γ]))
+        let second = largest(&S2) * size(length(&rows)) * γ;
+        length(&[(largest(&S1) * first).hi(), second.hi()])
     }
 
     /// |(δ₁, δ₂)|; none where noise gets where the proof does not follow it.
@@ -278,11 +289,13 @@ impl Proof<'_, '_, '_> {
         let (S2, q) = (Chain::new(self.form.q()), self.form.q());
         let first = of(&self.form.x11());
         let ε = self.unknown_drift(assumptions);
-        let mut δ1 = first + up(2f64.sqrt() * self.norms.G11 * ε / θ1);
+        let root2 = Interval::point(2.0).sqrt();
+        let driven = root2 * size(self.norms.G11) * size(ε) / Interval::point(θ1);
+        let mut δ1 = plus(first, driven.hi());
         let pushed = |k: usize| -> f64 {
-            let force = |j: usize| of(&self.form.block(j + 1)) + self.norms.γ[j] * first;
-            let sum: f64 = (0..=k).map(|j| times(self.norms.Z[k][j], force(j))).sum();
-            sum / θ2.powi(k as i32)
+            let force = |j| plus(of(&self.form.block(j + 1)), times(self.norms.γ[j], first));
+            let forces = (0..=k).map(|j| times(self.norms.Z[k][j], force(j)));
+            over(total(forces), θ2, k)
         };
         let mut δ2 = in_S(&S2, &(0..q).map(pushed).collect::<Vec<_>>());
         let [n1, n2] = self.noise(assumptions)?;
@@ -292,11 +305,13 @@ impl Proof<'_, '_, '_> {
             }
             let square = self.form.first.len() == self.form.layers.factors.columns;
             // 2I − Π is I for a square G₁¹
-            δ1 += θ1 * 2f64.sqrt() * if square { n1 } else { 2.0 * n1 };
-            let back: Vec<f64> = (0..q).map(|k| self.norms.back(&S2, k) * n2).collect();
-            δ2 += θ2 * self.norms.push(&S2) * n2 + in_S(&S2, &back);
+            let n1 = size(if square { n1 } else { 2.0 * n1 });
+            δ1 = plus(δ1, (Interval::point(θ1) * root2 * n1).hi());
+            let back: Vec<f64> = (0..q).map(|k| times(self.norms.back(&S2, k), n2)).collect();
+            let pushed = times(times(θ2, self.norms.push(&S2)), n2);
+            δ2 = plus(δ2, plus(pushed, in_S(&S2, &back)));
         }
-        Ok(Some(up(length(&[δ1, δ2]))))
+        Ok(Some(length(&[δ1, δ2])))
     }
 
     /// Whether G or Λ₂ changes with the states.
@@ -323,7 +338,7 @@ impl Proof<'_, '_, '_> {
                 return Ok(0.0);
             };
             let inverse = (1.0 / graph.expr(slope)).node();
-            Ok(up(noise * box_.magnitude(inverse)?))
+            Ok(times(noise, box_.magnitude(inverse)?))
         };
         let of = |outputs: &[usize]| -> Result<f64, DesignError> {
             let sizes: Vec<f64> = outputs.iter().map(one).collect::<Result<_, _>>()?;
@@ -344,4 +359,9 @@ impl Proof<'_, '_, '_> {
             .filter_map(|(i, s)| Some((s.name.clone(), *sizes.get(place(i)?)?)))
             .collect()
     }
+}
+
+/// A bound divided by θᵏ.
+fn over(bound: f64, θ: f64, k: usize) -> f64 {
+    (size(bound) / Interval::point(θ).powi(k as i32)).hi()
 }

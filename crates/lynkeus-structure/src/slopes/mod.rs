@@ -23,7 +23,7 @@ mod linear;
 mod model;
 
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, jacobian};
-use lynkeus_gain::decay::ErrorModel;
+use lynkeus_proof::decay::ErrorModel;
 
 use crate::{Region, Regularity};
 pub(crate) use kinks::without_removable_jumps;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, jacobian};
-use lynkeus_gain::decay::{ErrorModel, Sector};
+use lynkeus_proof::decay::{ErrorModel, Sector};
 
 use super::linear::Splitter;
 use super::{Innovation, Slope};

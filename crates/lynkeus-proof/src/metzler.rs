@@ -1,4 +1,5 @@
-//! Comparison matrices: symmetric, nothing negative off the diagonal.
+//! Comparison matrices: symmetric, nothing negative off the diagonal (Berman and Plemmons
+//! 1979, *Nonnegative matrices in the mathematical sciences*, chapter 6).
 //!
 //! If |z|ᵀM|z| bounds a quadratic form from above and M v < 0 for one positive
 //! vector v, then M is negative definite (−M is an M-matrix), and so is the form.
@@ -7,18 +8,18 @@
 
 use lynkeus_expr::Interval;
 
-/// Upper bounds of the entries, row by row.
-pub(crate) type Bounds = Vec<Vec<f64>>;
+use crate::magnitude::{self, Magnitudes, root};
+use crate::matrix::sum;
 
 /// Proves that M is negative definite; `false` where it is not or nearly not.
-pub(crate) fn negative(M: &Bounds) -> bool {
+pub fn is_negative_definite(M: &Magnitudes) -> bool {
     let Some(v) = witness(M) else { return false };
     M.iter().all(|row| product(row, &v).hi() < 0.0)
 }
 
 /// A bound of the largest eigenvalue of a matrix without negative entries, not
 /// necessarily symmetric: max_i (M v)_i/v_i for a positive v (Collatz, Wielandt).
-pub(crate) fn spectral_radius(M: &Bounds) -> f64 {
+pub fn spectral_radius(M: &Magnitudes) -> f64 {
     let n = M.len();
     let scale = M.iter().flatten().fold(0.0, |m: f64, &x| m.max(x));
     if scale == 0.0 || !scale.is_finite() {
@@ -44,15 +45,22 @@ pub(crate) fn spectral_radius(M: &Bounds) -> f64 {
     least
 }
 
+/// A bound of the spectral norm of every matrix with entries up to those of M, which are
+/// not negative: ‖M‖² is the spectral radius of MᵀM.
+pub fn spectral_norm(M: &Magnitudes) -> f64 {
+    let columns = M.first().map_or(0, Vec::len);
+    let transposed = |j: usize| M.iter().map(|row| row[j]).collect();
+    let transposed: Magnitudes = (0..columns).map(transposed).collect();
+    root(spectral_radius(&magnitude::product(&transposed, M)))
+}
+
 fn product(row: &[f64], v: &[f64]) -> Interval {
     let terms = row.iter().zip(v);
-    terms.fold(Interval::ZERO, |sum, (&m, &v)| {
-        sum + Interval::point(m) * Interval::point(v)
-    })
+    sum(terms.map(|(&m, &v)| Interval::point(m) * Interval::point(v)))
 }
 
 /// v with M v = −1, by elimination; positive exactly where −M is an M-matrix.
-fn witness(M: &Bounds) -> Option<Vec<f64>> {
+fn witness(M: &Magnitudes) -> Option<Vec<f64>> {
     let n = M.len();
     let mut a: Vec<Vec<f64>> = M
         .iter()
@@ -86,7 +94,11 @@ mod tests {
     #[test]
     fn definite_up_to_rounding() {
         let with = |c: f64| vec![vec![-1.0, c], vec![c, -4.0]];
-        assert!(negative(&with(1.999_999)) && !negative(&with(2.0)) && !negative(&with(2.1)));
+        assert!(
+            is_negative_definite(&with(1.999_999))
+                && !is_negative_definite(&with(2.0))
+                && !is_negative_definite(&with(2.1))
+        );
     }
 
     #[test]

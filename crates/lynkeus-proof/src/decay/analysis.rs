@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::frame::{Frame, Seen};
 use super::{ErrorModel, Proof, check::holds};
 use crate::lmi::{Affine, Problem};
+use crate::lyapunov::symmetric;
 
 /// The rate is found to this relative accuracy: finer than the reserve with which gains
 /// are designed, so that a designed gain is found to reach its rate.
@@ -106,9 +107,4 @@ pub(super) fn inequality(
     let block = Affine::symmetric_blocks(&corner, &PB, &T.scaled(-1.0));
     problem.positive(block.scaled(-1.0));
     T
-}
-
-/// (P + Pᵀ)/2, symmetric to the last bit.
-pub(super) fn symmetric(P: &DMatrix<f64>) -> DMatrix<f64> {
-    (P + P.transpose()) * 0.5
 }

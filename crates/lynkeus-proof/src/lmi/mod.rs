@@ -2,7 +2,7 @@
 //! symmetric matrices that are affine in them and have to be positive definite.
 //!
 //! ```
-//! use lynkeus_gain::lmi::{Affine, Problem};
+//! use lynkeus_proof::lmi::{Affine, Problem};
 //! use nalgebra::DMatrix;
 //!
 //! // the smallest P ≥ I with AᵀP + PA ≤ −I

@@ -1,10 +1,12 @@
 //! The first inequality for chains whose partials have too many vertices to visit.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::Bounds;
-use lynkeus_gain::lemma1::elimination::{Column, positive};
 
-use super::{Chain, largest, sum};
+use crate::elimination::{columns, positive};
+
+use super::Chain;
+use crate::matrix::sum;
+use crate::search::largest;
 
 impl Chain {
     /// μ, state by state; none for an S that is not tridiagonal.
@@ -15,27 +17,15 @@ impl Chain {
             return None;
         }
         let D: Vec<Interval> = (0..n).map(|j| self.weight(j)).collect();
-        let Sg: Vec<Interval> = (0..n)
-            .map(|i| sum((0..n).map(|j| S[i][j] * self.g[j])))
-            .collect();
+        let Sg = self.pushed();
         let first = Interval::point(2.0) * Sg[0] / S[0][0];
         // g = rS⁻¹Cᵀ up to rounding: the rest of Sg is small, its arrow has this norm
         let rest = (1..n).map(|i| (Sg[i] / (D[0] * D[i])).powi(2));
         let stray = sum(rest).sqrt().hi();
-        let column = |j: usize| Column {
-            far: match j {
-                1 => Interval::ZERO,
-                _ => S[j - 2][j - 1] / (D[j - 2] * D[j]),
-            },
-            near: S[j - 1][j - 1] / (D[j - 1] * D[j]),
-            own: Interval::point(-2.0) * S[j][j - 1] / (D[j] * D[j]),
-        };
-        let columns: Vec<Column> = (1..n).map(column).collect();
-        let side = |&(lower, upper): &(f64, f64)| Bounds { lower, upper };
-        let bounds: Vec<Bounds> = self.partials.iter().map(side).collect();
+        let columns = columns(n, |i, j| S[i][j]);
         let proved = |μ: f64| {
             let shift = (Interval::point(μ) + Interval::point(stray)).hi();
-            positive(first, &columns, &bounds, shift)
+            positive(first, &columns, &self.partials, shift)
         };
         largest(first.hi(), proved)
     }

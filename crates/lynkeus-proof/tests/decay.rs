@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, non_upper_case_globals)]
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::decay::{self, Aim, ErrorModel, NoGain, Request, Sector};
+use lynkeus_proof::decay::{self, Aim, ErrorModel, NoGain, Request, Sector};
 use nalgebra::DMatrix;
 
 const TRAYS: usize = 12;

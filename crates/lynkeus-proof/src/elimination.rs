@@ -1,4 +1,4 @@
-//! (17) for chains of any length, at a cost that grows with the length and not with the
+//! (17) of Hammouri, Targui and Armanet (2002) for chains of any length, at a cost that grows with the length and not with the
 //! number of vertices of the bounds.
 //!
 //! −P(a) has in its column j, down to the diagonal, a_{j−1} times three numbers (S is
@@ -14,7 +14,7 @@
 
 use lynkeus_expr::Interval;
 
-use super::Bounds;
+use crate::Bounds;
 
 /// Lower bounds kept beside each other. A chain of nine is decided exactly.
 const MOST: usize = 64;
@@ -30,6 +30,22 @@ pub struct Column {
     pub near: Interval,
     /// on the diagonal
     pub own: Interval,
+}
+
+/// The columns of −D⁻¹PD⁻¹ from the second state on for a tridiagonal S, D² = diag S, where
+/// P = AᵀS + SA has (SA)_ij = S_{i,j−1} a_{j−1}.
+pub fn columns(n: usize, S: impl Fn(usize, usize) -> Interval) -> Vec<Column> {
+    let weight = |j: usize| S(j, j).sqrt();
+    let entry = |i: usize, j: usize, row: usize| S(i, j) / (weight(row) * weight(j + 1));
+    let column = |j: usize| Column {
+        far: match j {
+            1 => Interval::ZERO,
+            _ => entry(j - 2, j - 1, j - 2),
+        },
+        near: entry(j - 1, j - 1, j - 1),
+        own: Interval::point(-2.0) * entry(j, j - 1, j),
+    };
+    (1..n).map(column).collect()
 }
 
 /// [t11, t12; t12, t22], a lower bound of the Schur complement on the last two states.
@@ -129,7 +145,7 @@ fn smaller(A: [f64; 3], B: [f64; 3]) -> Tail {
 
 /// Lower bounds for all partials so far.
 #[derive(Clone, Debug)]
-pub(super) struct Tails(Vec<Tail>);
+pub struct Tails(Vec<Tail>);
 
 impl Tails {
     /// After the second state: [first, −a·near; ·, a·own − shift].

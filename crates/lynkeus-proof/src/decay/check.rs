@@ -5,7 +5,8 @@ use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, DVector};
 
 use super::{ErrorModel, Proof};
-use crate::definite::{IntervalMatrix, is_positive_definite};
+use crate::definite::is_positive_definite;
+use crate::matrix::{IntervalMatrix, points, sum};
 
 /// Whether the proof holds for every model: P > 0, every multiplier positive, and
 /// He(P A(θ)) + 2·rate·P < 0 for every θ in the ranges.
@@ -24,32 +25,12 @@ pub fn holds(models: &[ErrorModel], proof: &Proof) -> bool {
             .all(|(model, t)| model_holds(model, proof, t))
 }
 
-/// Whether P − βQ is positive definite for a symmetric Q: a bound of one quadratic form
-/// by another.
-pub fn is_below(Q: &DMatrix<f64>, β: f64, P: &DMatrix<f64>) -> bool {
-    let β = Interval::point(β);
-    let (P, Q) = (points(P), points(Q));
-    let rows = P.iter().zip(&Q);
-    let difference: IntervalMatrix = rows
-        .map(|(p, q)| p.iter().zip(q).map(|(p, q)| *p - β * *q).collect())
-        .collect();
-    is_positive_definite(&difference)
-}
-
 fn is_symmetric(P: &DMatrix<f64>) -> bool {
     P.is_square() && *P == P.transpose()
 }
 
-fn points(P: &DMatrix<f64>) -> IntervalMatrix {
-    let row = |i: usize| P.row(i).iter().map(|&x| Interval::point(x)).collect();
-    (0..P.nrows()).map(row).collect()
-}
-
 fn product(P: &IntervalMatrix, column: &[Interval]) -> Vec<Interval> {
-    let row = |row: &Vec<Interval>| {
-        let products = row.iter().zip(column).map(|(a, b)| *a * *b);
-        products.fold(Interval::ZERO, |sum, x| sum + x)
-    };
+    let row = |row: &Vec<Interval>| sum(row.iter().zip(column).map(|(a, b)| *a * *b));
     P.iter().map(row).collect()
 }
 

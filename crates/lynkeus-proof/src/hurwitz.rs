@@ -19,7 +19,7 @@ pub enum Stability {
 ///
 /// ```
 /// use lynkeus_expr::Interval;
-/// use lynkeus_gain::hurwitz::{Stability, decide};
+/// use lynkeus_proof::hurwitz::{Stability, decide};
 ///
 /// let point = |c: [f64; 3]| c.map(Interval::point);
 /// assert_eq!(decide(&point([3.0, 3.0, 1.0])), Stability::Stable);
@@ -30,19 +30,26 @@ pub fn decide(coefficients: &[Interval]) -> Stability {
     if coefficients.iter().any(|c| c.hi() <= 0.0) {
         return Stability::Unstable;
     }
-    let all: Vec<Interval> = [Interval::ONE]
-        .iter()
-        .chain(coefficients)
-        .copied()
-        .collect();
-    let every_other = |from: usize| all.iter().skip(from).step_by(2).copied().collect();
-    let (mut above, mut row): (Vec<Interval>, Vec<Interval>) = (every_other(0), every_other(1));
+    match first_column(coefficients).last() {
+        Some(last) if last.hi() <= 0.0 => Stability::Unstable,
+        Some(last) if !(last.is_positive() && last.is_defined()) => Stability::Unknown,
+        _ => Stability::Stable,
+    }
+}
+
+/// The first column of Routh's table of sⁿ + c₁sⁿ⁻¹ + … + cₙ below its 1, up to the first
+/// entry that is not proved to be positive.
+pub fn first_column(coefficients: &[Interval]) -> Vec<Interval> {
+    let all = std::iter::once(Interval::ONE).chain(coefficients.iter().copied());
+    let (mut above, mut row) = (vec![], vec![]);
+    for (i, c) in all.enumerate() {
+        if i % 2 == 0 { &mut above } else { &mut row }.push(c);
+    }
+    let mut found = vec![];
     while let Some(&pivot) = row.first() {
-        if pivot.hi() <= 0.0 {
-            return Stability::Unstable;
-        }
+        found.push(pivot);
         if !(pivot.is_positive() && pivot.is_defined()) {
-            return Stability::Unknown;
+            break;
         }
         let factor = above[0] / pivot;
         let entry = |k: usize| {
@@ -52,7 +59,7 @@ pub fn decide(coefficients: &[Interval]) -> Stability {
         let next = (1..above.len()).map(entry).collect();
         above = std::mem::replace(&mut row, next);
     }
-    Stability::Stable
+    found
 }
 
 /// The zeros of sⁿ + c₁sⁿ⁻¹ + … + cₙ as (real, imaginary), the rightmost first, in

@@ -3,7 +3,8 @@
 use lynkeus_expr::Interval;
 use nalgebra::DMatrix;
 
-use crate::definite::IntervalMatrix;
+use crate::matrix::IntervalMatrix;
+use crate::vertices::{Bounds, varying, vertices};
 
 /// θ b e_sᵀ with θ in a range: the slope of one nonlinear term in one state.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,36 +130,41 @@ impl ErrorModel {
         shrunk
     }
 
-    /// The models at the ends of every slope's range: without sectors.
-    fn vertices(&self) -> Vec<Self> {
-        let vertex = |ends: usize| {
-            let mut constant = self.constant.clone();
-            for (k, sector) in self.sectors.iter().enumerate() {
-                let end = match ends >> k & 1 {
-                    0 => sector.range.lo(),
-                    _ => sector.range.hi(),
-                };
-                for (row, weight) in constant.iter_mut().zip(&sector.direction) {
-                    row[sector.column] = row[sector.column] + Interval::point(end) * *weight;
-                }
-            }
-            let sectors = vec![];
-            Self { constant, sectors }
+    fn ranges(&self) -> Vec<Bounds> {
+        let range = |s: &Sector| Bounds {
+            lower: s.range.lo(),
+            upper: s.range.hi(),
         };
-        (0..1_usize << self.sectors.len()).map(vertex).collect()
+        self.sectors.iter().map(range).collect()
+    }
+
+    /// The model with these slopes, exactly enclosed: without sectors.
+    fn fixed(&self, θ: &[f64]) -> Self {
+        let mut constant = self.constant.clone();
+        for (sector, &θ) in self.sectors.iter().zip(θ) {
+            for (row, weight) in constant.iter_mut().zip(&sector.direction) {
+                row[sector.column] = row[sector.column] + Interval::point(θ) * *weight;
+            }
+        }
+        let sectors = vec![];
+        Self { constant, sectors }
     }
 }
 
 /// The same error systems by their vertices where these are at most `limit`: an
 /// inequality at every vertex asks for less than one with multipliers.
 pub fn expanded(models: &[ErrorModel], limit: usize) -> Vec<ErrorModel> {
-    let count = |m: &ErrorModel| 1_usize.checked_shl(m.sectors.len() as u32);
+    let count = |m: &ErrorModel| 1_usize.checked_shl(varying(&m.ranges()) as u32);
     let total = models
         .iter()
         .try_fold(0_usize, |sum, m| sum.checked_add(count(m)?));
     match total {
         Some(total) if total <= limit && models.iter().all(ErrorModel::is_bounded) => {
-            models.iter().flat_map(ErrorModel::vertices).collect()
+            let fixed = |m: &ErrorModel| {
+                let ends = vertices(&m.ranges());
+                ends.map(|θ| m.fixed(&θ)).collect::<Vec<_>>()
+            };
+            models.iter().flat_map(fixed).collect()
         }
         _ => models.to_vec(),
     }

@@ -23,7 +23,7 @@ mod scale;
 mod synthesis;
 
 pub use analysis::{fastest, prove};
-pub use check::{holds, is_below};
+pub use check::holds;
 pub use growth::is_unstable;
 pub use model::{ErrorModel, Sector, expanded};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};

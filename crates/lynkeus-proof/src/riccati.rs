@@ -10,7 +10,10 @@ use lynkeus_expr::Interval;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::definite::is_positive_definite;
+use crate::definite::{is_below, is_positive_definite};
+use crate::lyapunov;
+use crate::magnitude::{length, size};
+use crate::matrix::{square, sum};
 
 /// Newton steps; convergence is quadratic.
 const STEPS: usize = 40;
@@ -40,7 +43,7 @@ impl Riccati {
     /// A proved solution of the inequality; none where none was found.
     ///
     /// ```
-    /// use lynkeus_gain::riccati::Riccati;
+    /// use lynkeus_proof::riccati::Riccati;
     ///
     /// // −2·3 P + 1 + 2·0.5 P + 4 P² ≤ 0 has solutions, with 3 in place of 0.5 none
     /// let one = |x: f64| vec![vec![x]];
@@ -66,18 +69,16 @@ impl Riccati {
         let P = DMatrix::from_fn(n, n, |i, j| D[i] * P[(i, j)] * D[j]);
         let inverse = P.clone().cholesky()?.inverse();
         let top = |P: &DMatrix<f64>| SymmetricEigen::new(P.clone()).eigenvalues.max();
-        let bound = |s: f64, sign: f64| {
-            let shifted = |i: usize, j: usize| {
-                let entry = Interval::point(P[(i, j)]);
-                let shifted = entry - Interval::point(if i == j { s } else { 0.0 });
-                shifted * Interval::point(sign)
-            };
-            (s > 0.0 && is_positive_definite(&rows(n, shifted))).then_some(s)
-        };
+        let unit = DMatrix::identity(n, n);
+        let (largest, smallest) = (top(&P) * (1.0 + 1e-6), (1.0 - 1e-3) / top(&inverse));
+        let bounded = is_below(&P, 1.0, &(&unit * largest)) && is_below(&unit, smallest, &P);
+        if !(bounded && smallest > 0.0) {
+            return None;
+        }
         Some(Self {
             α,
-            largest: bound(top(&P) * (1.0 + 1e-6), -1.0)?,
-            smallest: bound((1.0 - 1e-3) / top(&inverse), 1.0)?,
+            largest,
+            smallest,
             P: (0..n).map(|i| P.row(i).iter().copied().collect()).collect(),
         })
     }
@@ -99,24 +100,34 @@ impl Riccati {
         Some(best)
     }
 
+    /// An upper bound of √cond(P): what |e| may grow by before it decays.
+    pub fn peak(&self) -> f64 {
+        let square = Interval::point(self.largest) / Interval::point(self.smallest);
+        square.sqrt().hi()
+    }
+
+    /// An upper bound of √(fᵀP⁻¹f) for every f up to this length.
+    pub fn weight_of_length(&self, length: f64) -> f64 {
+        (size(length) / Interval::point(self.smallest).sqrt()).hi()
+    }
+
     /// An upper bound of √(fᵀP⁻¹f): P − ffᵀ/t > 0 says fᵀP⁻¹f < t.
     pub fn weight(&self, f: &[f64]) -> f64 {
-        let n = self.P.len();
-        let size: f64 = f.iter().map(|x| x * x).sum();
-        let coarse = size / self.smallest * (1.0 + 1e-9);
+        let coarse = self.weight_of_length(length(f));
         let P = matrix(&self.P);
         let Some(inverse) = P.cholesky().map(|c| c.inverse()) else {
-            return coarse.sqrt();
+            return coarse;
         };
-        let f = DVector::from_column_slice(f);
-        let t = (f.transpose() * inverse * &f)[(0, 0)] * (1.0 + 1e-6) + f64::MIN_POSITIVE;
+        let column = DVector::from_column_slice(f);
+        let guess = (column.transpose() * inverse * &column)[(0, 0)];
+        let t = Interval::point(guess * (1.0 + 1e-6) + f64::MIN_POSITIVE);
         let rest = |i: usize, j: usize| {
             let product = Interval::point(f[i]) * Interval::point(f[j]);
-            Interval::point(self.P[i][j]) - product / Interval::point(t)
+            Interval::point(self.P[i][j]) - product / t
         };
-        match is_positive_definite(&rows(n, rest)) {
-            true => t.sqrt() * (1.0 + 1e-15),
-            false => coarse.sqrt(),
+        match is_positive_definite(&square(f.len(), rest)) {
+            true => t.sqrt().hi(),
+            false => coarse,
         }
     }
 }
@@ -126,11 +137,6 @@ fn matrix(rows: &Rows) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns, |i, j| rows[i][j])
 }
 
-fn rows(n: usize, entry: impl Fn(usize, usize) -> Interval) -> Vec<Vec<Interval>> {
-    let row = |i| (0..n).map(|j| entry(i, j)).collect();
-    (0..n).map(row).collect()
-}
-
 /// E Eᵀ with a little more in each direction, on the scale that P has there.
 fn raised(A: &DMatrix<f64>, E: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = A.nrows();
@@ -138,15 +144,15 @@ fn raised(A: &DMatrix<f64>, E: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let size = W.trace();
     let scale = if size > 0.0 { size } else { 1.0 };
     let W = W + DMatrix::identity(n, n) * (SLACK * scale);
-    let P = lyapunov(A, &W)?;
+    let P = dual(A, &W)?;
     Some(W + DMatrix::from_diagonal(&P.diagonal()) * (SHARE * A.amax()))
 }
 
 /// The smallest P with A P + P Aᵀ + W + P M P = 0.
 fn newton(A: &DMatrix<f64>, W: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let mut P = lyapunov(A, W)?;
+    let mut P = dual(A, W)?;
     for _ in 0..STEPS {
-        let next = lyapunov(&(A + &P * M), &(W - &P * M * &P))?;
+        let next = dual(&(A + &P * M), &(W - &P * M * &P))?;
         let change = (&next - &P).norm();
         P = next;
         if change <= 1e-13 * P.norm() {
@@ -157,13 +163,8 @@ fn newton(A: &DMatrix<f64>, W: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<DMatri
 }
 
 /// P > 0 with A P + P Aᵀ + W = 0; none where A is not Hurwitz, as far as P tells.
-fn lyapunov(A: &DMatrix<f64>, W: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = A.nrows();
-    let identity = DMatrix::identity(n, n);
-    let both = identity.kronecker(A) + A.kronecker(&identity);
-    let right = -DVector::from_column_slice(W.as_slice());
-    let P = DMatrix::from_column_slice(n, n, both.lu().solve(&right)?.as_slice());
-    let P = (&P + P.transpose()) / 2.0;
+fn dual(A: &DMatrix<f64>, W: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let P = lyapunov::solve(&A.transpose(), W)?;
     P.clone().cholesky().map(|_| P)
 }
 
@@ -179,7 +180,7 @@ fn holds(
     let product = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
         // row i of a times column j of bᵀ
         let terms = (0..a.ncols()).map(|k| Interval::point(a[(i, k)]) * Interval::point(b[(j, k)]));
-        terms.fold(Interval::point(0.0), |sum, term| sum + term)
+        sum(terms)
     };
     let scaled = DMatrix::from_fn(n, n, |i, j| P[(i, j)] * D[j]);
     let entry = |i: usize, j: usize| {
@@ -188,7 +189,7 @@ fn holds(
         let rate = Interval::point(2.0 * α) * Interval::point(P[(i, j)]);
         Interval::point(0.0) - (linear + product(E, i, E, j) + rate + square)
     };
-    is_positive_definite(&rows(n, entry))
+    is_positive_definite(&square(n, entry))
 }
 
 #[cfg(test)]

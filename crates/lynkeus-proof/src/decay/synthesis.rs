@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::analysis::{inequality, prove, symmetric};
+use super::analysis::{inequality, prove};
 use super::{ErrorModel, Proof, scale::Scale};
 use crate::lmi::{Affine, Failure, Problem, Solution};
+use crate::lyapunov::symmetric;
 
 /// Rounds of the alternation between K and P.
 const ROUNDS: usize = 6;
@@ -152,6 +153,14 @@ impl<'a> Scaled<'a> {
         DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * self.unit(i, j))
     }
 
+    /// The inequality of every model, where its middle matrix makes PA.
+    fn constrain(&self, problem: &mut Problem, P: &Affine, PA: impl Fn(&DMatrix<f64>) -> Affine) {
+        for model in &self.models {
+            let uncertain = (&model.spread(), &model.reads());
+            inequality(problem, P, &PA(&model.nominal()), uncertain, self.rate);
+        }
+    }
+
     /// P > 0 and the inequality of every model in P and Y = PK.
     fn inequalities(&self) -> (Problem, Affine, Affine) {
         let mut problem = Problem::new();
@@ -159,16 +168,7 @@ impl<'a> Scaled<'a> {
         let Y = problem.matrix(self.size(), self.request.measured.len());
         problem.positive(P.clone());
         let YC = Y.times(&self.selector());
-        for model in &self.models {
-            let PA = P.times(&model.nominal()).minus(&YC);
-            inequality(
-                &mut problem,
-                &P,
-                &PA,
-                (&model.spread(), &model.reads()),
-                self.rate,
-            );
-        }
+        self.constrain(&mut problem, &P, |A| P.times(A).minus(&YC));
         (problem, P, Y)
     }
 
@@ -241,16 +241,7 @@ impl<'a> Scaled<'a> {
         let P = problem.symmetric(n);
         problem.positive(P.clone());
         problem.positive(Affine::identity(n).minus(&P));
-        for model in &self.models {
-            let PA = P.times(&(model.nominal() - &KC));
-            inequality(
-                &mut problem,
-                &P,
-                &PA,
-                (&model.spread(), &model.reads()),
-                self.rate,
-            );
-        }
+        self.constrain(&mut problem, &P, |A| P.times(&(A - &KC)));
         let solution = problem.inside().ok()?;
         Some(symmetric(&solution.value(&P)))
     }
@@ -270,16 +261,7 @@ impl<'a> Scaled<'a> {
         }
         let PKC = K.after(P).times(&self.selector());
         let constant = Affine::constant(P);
-        for model in &self.models {
-            let PA = constant.times(&model.nominal()).minus(&PKC);
-            inequality(
-                &mut problem,
-                &constant,
-                &PA,
-                (&model.spread(), &model.reads()),
-                self.rate,
-            );
-        }
+        self.constrain(&mut problem, &constant, |A| constant.times(A).minus(&PKC));
         problem.minimise(&g);
         let solution = problem.solve().ok()?;
         Some(self.in_units(&solution.value(&K)))

@@ -1,0 +1,269 @@
+//! Decay of the error of chained high-gain observers, proved on a box.
+//!
+//! With ε_j = x̃_j/s_j, s_j = τ^j/|T_j|, the error of a chain obeys
+//!
+//! ε' = τ (A(a) − g C) ε + Δ⁻¹δf + Δ⁻¹d + g w, w the error of the measured state,
+//!
+//! A(a) with the partials a_j above its diagonal, g the gain in these coordinates, and
+//! |(Δ⁻¹δf)_a| ≤ Σ_b L_ab (s_b/s_a) |ε_b| with L_ab ≥ |∂f_a/∂x_b| on the box (mean
+//! value theorem: plant and estimate in the box). With V = Σ_chains εᵀSε and
+//! D² = diag S, z = Dε, two inequalities prove the decay:
+//!
+//! 1. AᵀS + SA − SgC − CᵀgᵀS ≤ −μD² at every vertex of the bounds of a, checked by
+//!    an elimination in interval arithmetic ([`definite`](crate::definite); for many vertices and a
+//!    tridiagonal S state by state, [`crate::elimination`]);
+//! 2. N = −τμ + |S̄|G + Gᵀ|S̄| < 0 with S̄ = D⁻¹SD⁻¹, G_ab = D_a L_ab (s_b/s_a)/D_b,
+//!    since V' ≤ |z|ᵀN|z|: off its diagonal N has nothing negative ([`metzler`]).
+//!
+//! The rate σ is the largest with N + 2σ|S̄| < 0: then V' ≤ −2σV. Entry by entry this
+//! is sharper than ‖S‖, λ_min(S) and one Lipschitz constant, and each number is an
+//! outward-rounded bound.
+
+mod elimination;
+
+use lynkeus_expr::Interval;
+
+use crate::definite::{is_positive_definite, least_eigenvalue};
+use crate::magnitude::Magnitudes;
+use crate::matrix::{IntervalMatrix, square, sum, upper};
+use crate::search::largest;
+use crate::vertices::{Bounds, varying, vertices};
+use crate::{inverse, metzler};
+
+/// One entry of the Jacobian.
+#[derive(Clone, Debug)]
+pub struct Slope {
+    /// a
+    pub row: usize,
+    /// b
+    pub column: usize,
+    /// upper bound of |∂f_a/∂x_b|, infinite where none is known
+    pub size: f64,
+}
+
+/// One chain of the observer in the coordinates of the proof.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// extended states, the measured one first
+    pub states: Vec<usize>,
+    /// τ: how fast the chain is
+    pub speed: Interval,
+    /// s_j: the error of state j is s_j ε_j
+    pub scales: Vec<Interval>,
+    /// S, symmetric
+    pub S: IntervalMatrix,
+    /// the gain: ε' holds −τ g ε_1, and g w for an error w of the measured state
+    pub g: Vec<Interval>,
+    /// the bounds of a_1, a_2, …
+    pub partials: Vec<Bounds>,
+}
+
+/// Partials that vary up to which all of their vertices are visited.
+const VERTICES: usize = 10;
+
+impl Chain {
+    fn size(&self) -> usize {
+        self.states.len()
+    }
+
+    /// μ of the first inequality: proved, and as large as the arithmetic proves.
+    pub fn decay(&self) -> Option<f64> {
+        if !is_positive_definite(&self.S) {
+            return None;
+        }
+        if varying(&self.partials) > VERTICES {
+            return self.eliminated_decay();
+        }
+        let mut μ = f64::INFINITY;
+        for a in vertices(&self.partials) {
+            let Q = self.scaled_form(&a);
+            μ = least_eigenvalue(&Q, μ)?;
+        }
+        (μ > 0.0 && μ.is_finite()).then_some(μ)
+    }
+
+    /// −D⁻¹(AᵀS + SA − SgC − CᵀgᵀS)D⁻¹
+    fn scaled_form(&self, a: &[f64]) -> IntervalMatrix {
+        let n = self.size();
+        let S = &self.S;
+        let Sg = self.pushed();
+        let SA = |i: usize, j: usize| match j {
+            0 => Interval::ZERO,
+            _ => S[i][j - 1] * Interval::point(a[j - 1]),
+        };
+        let column = |i: usize, j: usize| if j == 0 { Sg[i] } else { Interval::ZERO };
+        let entry = |i: usize, j: usize| column(i, j) + column(j, i) - SA(i, j) - SA(j, i);
+        square(n, |i, j| entry(i, j) / (S[i][i] * S[j][j]).sqrt())
+    }
+
+    /// Sg
+    fn pushed(&self) -> Vec<Interval> {
+        let products = |row: &Vec<Interval>| sum(row.iter().zip(&self.g).map(|(s, g)| *s * *g));
+        self.S.iter().map(products).collect()
+    }
+
+    /// D_j, the weight of ε_j.
+    fn weight(&self, j: usize) -> Interval {
+        self.S[j][j].sqrt()
+    }
+}
+
+/// The second inequality for chains whose first one holds with `μ`.
+pub struct Comparison {
+    /// N, upper bounds
+    N: Magnitudes,
+    /// |S̄|, upper bounds
+    S̄: Magnitudes,
+}
+
+impl Comparison {
+    /// The second inequality for chains of which the first one holds with `μ`, chain by
+    /// chain, and whose equations are as steep as `slopes`.
+    pub fn new(chains: &[Chain], μ: &[f64], slopes: &[Slope]) -> Self {
+        let places: Vec<(usize, usize)> = chains
+            .iter()
+            .enumerate()
+            .flat_map(|(i, c)| (0..c.size()).map(move |j| (i, j)))
+            .collect();
+        let n = places.len();
+        let blocks: Vec<IntervalMatrix> = chains.iter().map(normalised).collect();
+        let S̄ = square(n, |p, q| match (places[p], places[q]) {
+            ((i, j), (l, k)) if i == l => blocks[i][j][k].abs(),
+            _ => Interval::ZERO,
+        });
+        let G = couplings(chains, &places, slopes);
+        let H = square(n, |p, q| sum((0..n).map(|r| S̄[p][r] * G[r][q])));
+        let N = square(n, |p, q| {
+            let (i, _) = places[p];
+            let own = match p == q {
+                true => -(chains[i].speed * Interval::point(μ[i])),
+                false => Interval::ZERO,
+            };
+            own + H[p][q] + H[q][p]
+        });
+        Self {
+            N: upper(&N),
+            S̄: upper(&S̄),
+        }
+    }
+
+    /// Whether the decay is proved.
+    pub fn holds(&self) -> bool {
+        metzler::is_negative_definite(&self.N)
+    }
+
+    /// σ: V' ≤ −2σV is proved.
+    pub fn rate(&self) -> Option<f64> {
+        let diagonal = (0..self.N.len()).map(|i| -0.5 * self.N[i][i]);
+        let limit = diagonal.fold(f64::INFINITY, f64::min);
+        let σ = largest(limit, |σ| {
+            let shifted = square(self.N.len(), |p, q| {
+                let (N, S̄) = (Interval::point(self.N[p][q]), Interval::point(self.S̄[p][q]));
+                (N + Interval::point(2.0 * σ) * S̄).hi()
+            });
+            metzler::is_negative_definite(&shifted)
+        })?;
+        (σ > 0.0).then_some(σ)
+    }
+}
+
+/// G_ab = D_a L_ab (s_b/s_a)/D_b.
+fn couplings(chains: &[Chain], places: &[(usize, usize)], slopes: &[Slope]) -> IntervalMatrix {
+    let n = places.len();
+    let place = |state: usize| {
+        places
+            .iter()
+            .position(|&(i, j)| chains[i].states[j] == state)
+    };
+    let mut G = vec![vec![Interval::ZERO; n]; n];
+    for slope in slopes {
+        let (Some(p), Some(q)) = (place(slope.row), place(slope.column)) else {
+            continue;
+        };
+        let ((i, j), (l, k)) = (places[p], places[q]);
+        let scale = chains[l].scales[k] / chains[i].scales[j];
+        let weight = chains[i].weight(j) / chains[l].weight(k);
+        G[p][q] = Interval::point(slope.size) * scale * weight;
+    }
+    G
+}
+
+/// What acts on the chains from outside: per extended state a bound of the drift,
+/// per chain a bound of the error of its measured state.
+pub struct Disturbance<'a> {
+    /// per extended state
+    pub drift: &'a [f64],
+    /// per chain
+    pub noise: &'a [f64],
+}
+
+/// What a rate σ guarantees of the error in the plant's coordinates.
+pub struct Ultimate {
+    /// λ₁: |e(t)| ≤ λ₁ e^{−σt} |e(0)| without disturbance
+    pub overshoot: f64,
+    /// as t → ∞, the Euclidean norm
+    pub norm: f64,
+    /// as t → ∞: (extended state, bound)
+    pub states: Vec<(usize, f64)>,
+}
+
+/// Bounds from √V' ≤ −σ√V + β and |e_j| ≤ s_j √((S⁻¹)_jj V).
+pub fn ultimate(chains: &[Chain], σ: f64, outside: &Disturbance<'_>) -> Option<Ultimate> {
+    let mut β2 = Interval::ZERO;
+    let (mut widest, mut steepest): (f64, f64) = (0.0, 0.0);
+    let mut radii: Vec<(usize, Interval)> = vec![];
+    for (i, chain) in chains.iter().enumerate() {
+        let β = push(chain, outside.drift, *outside.noise.get(i)?)?;
+        β2 = β2 + β * β;
+        let steep = inverse::diagonal(&normalised(chain))?;
+        let mut trace = Interval::ZERO;
+        for (j, bound) in steep.into_iter().enumerate() {
+            let square = Interval::point(bound) / chain.S[j][j];
+            let radius = chain.scales[j] * square.sqrt();
+            trace = trace + radius * radius;
+            radii.push((chain.states[j], radius));
+        }
+        widest = widest.max(trace.hi());
+        let n = chain.size();
+        let weighted =
+            |j: usize, k: usize| chain.S[j][k].abs() / (chain.scales[j] * chain.scales[k]);
+        steepest = steepest.max(metzler::spectral_radius(&upper(&square(n, weighted))));
+    }
+    let level = β2.sqrt() / Interval::point(σ);
+    let states = radii
+        .into_iter()
+        .map(|(state, radius)| (state, (radius * level).hi()));
+    let widest = Interval::point(widest);
+    Some(Ultimate {
+        overshoot: (widest * Interval::point(steepest)).sqrt().hi(),
+        norm: (widest.sqrt() * level).hi(),
+        states: states.collect(),
+    })
+}
+
+/// β: what drift and noise add to the derivative of √V of one chain.
+fn push(chain: &Chain, drift: &[f64], noise: f64) -> Option<Interval> {
+    let n = chain.size();
+    let mut q = vec![];
+    for (j, &state) in chain.states.iter().enumerate() {
+        let d = *drift.get(state)?;
+        q.push(Interval::point(d) / chain.scales[j]);
+    }
+    let form = |x: &[Interval], S: &dyn Fn(usize, usize) -> Interval| {
+        let terms = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        sum(terms.map(|(i, j)| x[i] * S(i, j) * x[j]))
+    };
+    let drift = form(&q, &|i, j| chain.S[i][j].abs());
+    let noisy = form(&chain.g, &|i, j| chain.S[i][j]);
+    let β = drift.sqrt() + Interval::point(noise) * noisy.sqrt();
+    β.hi().is_finite().then_some(β)
+}
+
+/// S̄ = D⁻¹SD⁻¹
+fn normalised(chain: &Chain) -> IntervalMatrix {
+    let S = &chain.S;
+    square(chain.size(), |i, j| match i == j {
+        true => Interval::ONE,
+        false => S[i][j] / (S[i][i] * S[j][j]).sqrt(),
+    })
+}

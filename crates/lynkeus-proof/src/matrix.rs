@@ -1,0 +1,32 @@
+//! Matrices of intervals: every operation is outward rounded.
+
+use lynkeus_expr::Interval;
+use nalgebra::DMatrix;
+
+use crate::magnitude::Magnitudes;
+
+/// A matrix of intervals, row by row.
+pub type IntervalMatrix = Vec<Vec<Interval>>;
+
+/// The sum; zero of no terms.
+pub fn sum(terms: impl Iterator<Item = Interval>) -> Interval {
+    terms.fold(Interval::ZERO, |a, b| a + b)
+}
+
+/// The n×n table of the entries.
+pub fn square<T>(n: usize, entry: impl Fn(usize, usize) -> T) -> Vec<Vec<T>> {
+    let row = |i| (0..n).map(|j| entry(i, j)).collect();
+    (0..n).map(row).collect()
+}
+
+/// The matrix as intervals of one number each.
+pub fn points(matrix: &DMatrix<f64>) -> IntervalMatrix {
+    let row = |i| matrix.row(i).iter().map(|&x| Interval::point(x)).collect();
+    (0..matrix.nrows()).map(row).collect()
+}
+
+/// The upper ends of the entries.
+pub fn upper(matrix: &IntervalMatrix) -> Magnitudes {
+    let row = |row: &Vec<Interval>| row.iter().map(|x| x.hi()).collect();
+    matrix.iter().map(row).collect()
+}
