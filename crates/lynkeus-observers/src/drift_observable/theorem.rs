@@ -60,7 +60,7 @@ pub(super) fn certificate(
         Some(gains) => {
             let proof = Proof {
                 extended,
-                form: &form,
+                form,
                 gains,
                 lipschitz: &lipschitz,
                 A: closed_loop(&gains.K),
@@ -78,7 +78,7 @@ pub(super) fn certificate(
     }
     let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
-    certificate.notes = notes(extended, &form, assumptions);
+    certificate.notes = notes(extended, form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
         guarantee::conclude(&proof, &P, assumptions, &mut certificate);
     }
