@@ -6,7 +6,7 @@ use lynkeus_structure::{
     ChainRequest, Check, Condition, Dimension, Extended, Region, Regularity, has_value_at,
 };
 
-use crate::{DesignError, Fit, Tuning, TuningError};
+use crate::{DesignError, Fit, KeySpec, Shape, Tuning, TuningError};
 
 /// ∂f_row/∂x_column with the verdict on its sign.
 fn partial(
@@ -165,6 +165,15 @@ pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Chec
     })
 }
 
+/// The states of each chain, for the families that have chains.
+pub(crate) const CHAINS: KeySpec = KeySpec {
+    name: "chains",
+    kind: "list of lists of names",
+    shape: Shape::List(&Shape::NAMES),
+    default: "found",
+    meaning: "the states of each chain, from the sensor outward",
+};
+
 /// What the study says about the chains: their names, or the lengths of the
 /// lists under `key`.
 pub(crate) fn chain_request(
@@ -173,12 +182,16 @@ pub(crate) fn chain_request(
     key: &str,
     lengths: Option<Vec<usize>>,
 ) -> Result<ChainRequest, TuningError> {
-    let names = tuning.name_lists("chains")?;
+    let names = tuning.name_lists(CHAINS.name)?;
     let mut mentioned = names.iter().flatten().flatten();
     if let Some(name) = mentioned.find(|n| extended.state_index(n).is_none()) {
         let states: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
         let expected = format!("names of states and unknown inputs ({})", states.join(", "));
-        return Err(TuningError::new("chains", expected, format!("\"{name}\"")));
+        return Err(TuningError::new(
+            CHAINS.name,
+            expected,
+            format!("\"{name}\""),
+        ));
     }
     let count = extended.outputs.len();
     if let Some(lengths) = &lengths

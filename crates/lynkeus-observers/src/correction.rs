@@ -7,7 +7,7 @@ use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
 
 use crate::estimate::Copy;
-use crate::{ChainGain, Observer, Tuning, TuningError};
+use crate::{ChainGain, Observer, TuningError};
 
 /// Longest expression that is printed, in characters.
 const LONGEST: usize = 120;
@@ -79,12 +79,12 @@ pub(crate) struct Start<'a> {
 impl<'a> Start<'a> {
     /// Estimates at their starts, the outputs as they are there, inputs at their declared
     /// starts, time 0.
-    pub fn new(copy: &Copy<'a, '_>, tuning: &Tuning) -> Result<Self, TuningError> {
+    pub fn new(copy: &Copy<'a, '_>) -> Result<Self, TuningError> {
         let extended = copy.extended;
         let graph = extended.graph();
         let mut images = HashMap::new();
         images.insert(extended.plant.time, graph.constant(0.0).node());
-        for (state, (hat, start)) in extended.states.iter().zip(copy.states(tuning)?) {
+        for (state, (hat, start)) in extended.states.iter().zip(copy.states()?) {
             let start = graph.constant(start).node();
             images.insert(state.node, start);
             images.insert(hat.symbol, start);

@@ -6,7 +6,26 @@ use lynkeus_expr::{Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_structure::Extended;
 
-use crate::{Estimate, Observer, Signal, Tuning, TuningError, prolongation};
+use crate::{Estimate, Initial, Observer, Signal, Tuning, TuningError, prolongation};
+
+/// The keys of every observer, read.
+pub struct Common {
+    pub initial: Initial,
+    /// the plant's functions see the estimate limited to its range
+    pub clamp: bool,
+    /// outside of it they are continued (`prolongation`)
+    pub prolong: bool,
+}
+
+impl Common {
+    pub fn read(tuning: &Tuning) -> Result<Self, TuningError> {
+        Ok(Self {
+            initial: tuning.initial.clone(),
+            clamp: tuning.clamp,
+            prolong: tuning.flag(prolongation::PROLONG.name)?,
+        })
+    }
+}
 
 /// The plant's expressions over the estimate.
 pub(crate) struct Copy<'e, 'p> {
@@ -15,11 +34,11 @@ pub(crate) struct Copy<'e, 'p> {
     pub hats: Vec<Signal>,
     /// x ↦ x̂, limited to [min, max] if the tuning says so
     seen: HashMap<Node, Node>,
-    clamp: bool,
+    pub common: &'e Common,
 }
 
 impl<'e, 'p> Copy<'e, 'p> {
-    pub fn new(extended: &'e Extended<'p>, tuning: &Tuning) -> Self {
+    pub fn new(extended: &'e Extended<'p>, common: &'e Common) -> Self {
         let graph = extended.graph();
         let hats: Vec<Signal> = extended
             .states
@@ -30,7 +49,7 @@ impl<'e, 'p> Copy<'e, 'p> {
             extended,
             hats,
             seen: HashMap::new(),
-            clamp: tuning.clamp || prolongation::asked_for(tuning),
+            common,
         };
         let seen =
             |(i, hat): (usize, &Signal)| (extended.states[i].node, copy.seen_as(i, hat.symbol));
@@ -40,7 +59,7 @@ impl<'e, 'p> Copy<'e, 'p> {
 
     /// How the plant's functions see a state whose estimate is `hat`.
     pub fn seen_as(&self, state: usize, hat: Node) -> Node {
-        match self.clamp {
+        match self.common.clamp || self.common.prolong {
             true => limited(self.extended.graph(), hat, &self.extended.states[state]),
             false => hat,
         }
@@ -62,8 +81,8 @@ impl<'e, 'p> Copy<'e, 'p> {
 
     /// x̂ with its starts: the named value, else the default, else the plant's
     /// `start`, else the middle of its range, else 0.
-    pub fn states(&self, tuning: &Tuning) -> Result<Vec<(Signal, f64)>, TuningError> {
-        let initial = &tuning.initial;
+    pub fn states(&self) -> Result<Vec<(Signal, f64)>, TuningError> {
+        let initial = &self.common.initial;
         if let Some(name) = initial
             .values
             .keys()
@@ -130,7 +149,6 @@ impl Copy<'_, '_> {
     pub fn observer(
         &self,
         family: &'static str,
-        tuning: &Tuning,
         derivatives: Vec<Node>,
     ) -> Result<Observer, TuningError> {
         let signal = |v: &Variable| Signal {
@@ -140,7 +158,7 @@ impl Copy<'_, '_> {
         Ok(Observer {
             family,
             time: self.extended.plant.time,
-            states: self.states(tuning)?,
+            states: self.states()?,
             derivatives,
             inputs: self.extended.inputs.iter().map(signal).collect(),
             input_derivatives: vec![],

@@ -5,9 +5,9 @@ use lynkeus_structure::{Check, Condition, Extended, Region};
 
 use crate::conditions::fit;
 use crate::{
-    Assumptions, Certificate, Observer, Tuning, TuningError, block_triangular::BlockTriangular,
-    drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
-    unknown_input::UnknownInput,
+    Assumptions, Certificate, KeySpec, Observer, Tuning, TuningError,
+    block_triangular::BlockTriangular, drift_observable::DriftObservable,
+    state_affine::StateAffine, triangular::Triangular, unknown_input::UnknownInput,
 };
 
 /// Every family, in the order in which `auto` tries them.
@@ -34,7 +34,11 @@ pub trait Family: Sync {
     /// where it was published
     fn paper(&self) -> &'static str;
     /// the study keys it reads beside those of every family
-    fn keys(&self) -> &'static [&'static str];
+    fn keys(&self) -> Vec<&'static KeySpec>;
+    /// Whether a key is one of them.
+    fn owns(&self, key: &str) -> bool {
+        self.keys().iter().any(|spec| spec.name == key)
+    }
     /// Does the plant have the form, and do the conditions hold on the box?
     ///
     /// # Errors

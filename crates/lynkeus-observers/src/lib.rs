@@ -7,7 +7,8 @@
 //! and whatever the gain needs. Simulation, log replay and export are written
 //! once, for such systems.
 //!
-//! A new family is one file beside [`triangular`] and one line in [`FAMILIES`].
+//! A new family is one folder beside [`triangular`] with its stages (settings, form, design,
+//! theorem) and one line in [`FAMILIES`].
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod block_triangular;
@@ -19,12 +20,14 @@ mod enclosure;
 mod estimate;
 mod family;
 mod guarantee;
+mod keys;
 mod matrices;
 mod observer;
 mod peaking;
 mod prolongation;
 mod proof;
 mod stability;
+mod stages;
 pub mod state_affine;
 pub mod triangular;
 mod tuning;
@@ -33,5 +36,6 @@ pub mod unknown_input;
 pub use certificate::{Assumptions, Certificate, Constant, Verdict};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
 pub use guarantee::{Claim, Correction, Injection, certify};
+pub use keys::{KeySpec, REQUIRED, Shape};
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
-pub use tuning::{Initial, KeySpec, Tuning, TuningError, Value};
+pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -4,8 +4,8 @@
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 use lynkeus_structure::{Extended, Matrix};
 
+use crate::TuningError;
 use crate::estimate::{Copy, middle};
-use crate::{Tuning, TuningError};
 
 /// Characters of an entry that are shown.
 const SHOWN: usize = 60;
@@ -19,7 +19,7 @@ pub(crate) struct Start<'g> {
 }
 
 impl<'g> Start<'g> {
-    pub fn new(copy: &Copy<'_, 'g>, tuning: &Tuning) -> Result<Self, TuningError> {
+    pub fn new(copy: &Copy<'_, 'g>) -> Result<Self, TuningError> {
         let extended: &Extended<'g> = copy.extended;
         let (mut symbols, mut values) = (vec![extended.plant.time], vec![0.0]);
         for input in &extended.inputs {
@@ -27,7 +27,7 @@ impl<'g> Start<'g> {
             values.push(input.start.unwrap_or_else(|| middle(input)));
         }
         symbols.extend(extended.symbols());
-        values.extend(copy.states(tuning)?.iter().map(|(_, start)| start));
+        values.extend(copy.states()?.iter().map(|(_, start)| start));
         Ok(Self {
             graph: extended.graph(),
             symbols,

@@ -16,18 +16,19 @@ use lynkeus_model::Variable;
 use lynkeus_structure::{Extended, Region};
 
 use crate::conditions::Partial;
-use crate::estimate::{Copy, limited};
+use crate::estimate::{Common, Copy, limited};
 use crate::peaking::nominal;
 use crate::proof::words::box_note;
-use crate::{Tuning, TuningError, Value};
+use crate::{KeySpec, Shape, TuningError};
 
 /// The study's key.
-pub(crate) const KEY: &str = "prolong";
-
-/// Whether the study asks for it.
-pub(crate) fn asked_for(tuning: &Tuning) -> bool {
-    tuning.values.get(KEY) == Some(&Value::Flag(true))
-}
+pub(crate) const PROLONG: KeySpec = KeySpec {
+    name: "prolong",
+    kind: "true, false",
+    shape: Shape::Flag,
+    default: "false",
+    meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",
+};
 
 /// One equation of a chain.
 pub(crate) struct Continued {
@@ -61,11 +62,10 @@ impl Continued {
 /// A partial without bounds.
 pub(crate) fn prolong(
     copy: &Copy<'_, '_>,
-    tuning: &Tuning,
     rows: impl IntoIterator<Item = Continued>,
     derivatives: &mut [Node],
 ) -> Result<(), TuningError> {
-    if !tuning.flag(KEY)? {
+    if !copy.common.prolong {
         return Ok(());
     }
     let graph = copy.extended.graph();
@@ -83,7 +83,7 @@ pub(crate) fn prolong(
                 copy.extended.states[row].name, variable.name
             );
             let found = format!("bounds {} and {}", bounds.0, bounds.1);
-            return Err(TuningError::new(KEY, expected, found));
+            return Err(TuningError::new(PROLONG.name, expected, found));
         };
         let hat = copy.hats[next].symbol;
         let outside = graph.expr(hat) - graph.expr(limited(graph, hat, variable));
@@ -93,10 +93,10 @@ pub(crate) fn prolong(
 }
 
 /// Refuses the key where an observer has no such form.
-pub(crate) fn refuse(tuning: &Tuning, observer: &str) -> Result<(), TuningError> {
-    match tuning.flag(KEY)? {
+pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError> {
+    match common.prolong {
         true => Err(TuningError::new(
-            KEY,
+            PROLONG.name,
             format!("no prolongation with {observer}"),
             "true",
         )),
@@ -108,16 +108,16 @@ pub(crate) fn refuse(tuning: &Tuning, observer: &str) -> Result<(), TuningError>
 ///
 /// Everywhere only where the box of the proof is the one that the observer projects on and
 /// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
-pub(crate) fn note(tuning: &Tuning, extended: &Extended<'_>, region: &Region) -> String {
+pub(crate) fn note(common: &Common, extended: &Extended<'_>, region: &Region) -> String {
     let whole = |variable: &Variable| {
         let mut sides = region.dimensions.iter();
         let side = sides.find(|d| d.symbol == variable.node);
         side.is_none_or(|d| d.min <= variable.min && d.max >= variable.max)
     };
     let declared = extended.plant.states.iter().chain(&extended.plant.inputs);
-    match (asked_for(tuning), declared.into_iter().all(whole)) {
+    match (common.prolong, declared.into_iter().all(whole)) {
         (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with slopes along the chains between the same bounds ('prolong').".into(),
         (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
-        (false, _) => box_note(tuning.clamp),
+        (false, _) => box_note(common.clamp),
     }
 }

@@ -36,62 +36,6 @@ impl std::fmt::Display for Value {
     }
 }
 
-/// A key of a family: everything that messages, documentation and editors say of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct KeySpec {
-    /// the key
-    pub name: &'static str,
-    /// what may stand there
-    pub kind: &'static str,
-    /// what holds where it is absent
-    pub default: &'static str,
-    /// what it does
-    pub meaning: &'static str,
-}
-
-impl KeySpec {
-    /// The names of some keys, in their order.
-    #[must_use]
-    pub const fn names<const N: usize>(keys: &[Self; N]) -> [&'static str; N] {
-        let mut names = [""; N];
-        let mut i = 0;
-        while i < N {
-            names[i] = keys[i].name;
-            i += 1;
-        }
-        names
-    }
-
-    /// The error that `found` stands under this key.
-    pub fn wrong(&self, found: impl ToString) -> TuningError {
-        TuningError::new(self.name, self.kind, found)
-    }
-
-    /// A positive number.
-    ///
-    /// # Errors
-    /// Anything else.
-    pub fn positive(&self, tuning: &Tuning) -> Result<Option<f64>, TuningError> {
-        match tuning.values.get(self.name) {
-            None => Ok(None),
-            Some(Value::Number(x)) if *x > 0.0 && x.is_finite() => Ok(Some(*x)),
-            Some(other) => Err(TuningError::new(self.name, "a positive number", other)),
-        }
-    }
-
-    /// The key as a row of the table of keys in the family's page.
-    #[must_use]
-    pub fn row(&self) -> String {
-        let Self {
-            name,
-            kind,
-            default,
-            meaning,
-        } = self;
-        format!("| `{name}` | {kind} | {default} | {meaning} |")
-    }
-}
-
 /// A key of the study whose value cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{key}: expected {expected}, found {found}")]
@@ -124,7 +68,8 @@ pub struct Initial {
     pub values: BTreeMap<String, f64>,
 }
 
-/// The tuning of an observer: keys that belong to every family, and those of one.
+/// The tuning of an observer: keys that belong to every family, and those of one. A family
+/// reads it once into settings of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tuning {
     /// start of the estimate
@@ -188,6 +133,18 @@ impl Tuning {
                 format!("one number, or one per measured output ({count})"),
                 format!("{} numbers", found.len()),
             )),
+        }
+    }
+
+    /// A positive number.
+    ///
+    /// # Errors
+    /// Anything else.
+    pub fn positive(&self, key: &str) -> Result<Option<f64>, TuningError> {
+        match self.values.get(key) {
+            None => Ok(None),
+            Some(Value::Number(x)) if *x > 0.0 && x.is_finite() => Ok(Some(*x)),
+            Some(other) => Err(TuningError::new(key, "a positive number", other)),
         }
     }
 

@@ -87,7 +87,7 @@ pub use figure::figure;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use precision::precision;
 pub use simulate::simulate;
-pub use study::Study;
+pub use study::{Study, schema};
 pub use systems::observer as observer_system;
 pub use table::Table;
 #[cfg(feature = "tune")]

@@ -1,53 +1,49 @@
 //! The block-triangular form: chains, their order, and the conditions.
 
-use lynkeus_structure::{Blocks, Check, Extended, blocks};
+use lynkeus_structure::{Blocks, Check, Extended, Region, blocks};
 
-use super::gains::given;
 use super::settings::{Correction, Settings};
 use super::stable::stable;
-use super::{NAME, chain_rule, coefficients};
-use crate::conditions::{Partial, chain_request, lipschitz, output_slope, partials};
+use super::{NAME, chain_rule};
+use crate::conditions::{Partial, lipschitz, output_slope, partials};
 use crate::family;
-use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+use crate::stages::{Found, Searched};
+use crate::{DesignError, Examination, Fit, TuningError};
 
 /// Different chains that are examined before the first without a refuted condition is taken.
 const EXAMINED: usize = 16;
 
 /// The block-triangular form of a plant with the facts about its partials.
-pub(super) struct Form {
+pub struct Form {
     pub blocks: Blocks,
     /// per block
-    pub partials: Vec<Vec<Partial>>,
-    pub examination: Examination,
+    pub(crate) partials: Vec<Vec<Partial>>,
 }
 
 /// The first arrangement into blocks whose conditions are proved, else the first that no
 /// condition refutes, else the first with its refusal.
 pub(super) fn form(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-) -> Result<Result<Form, Examination>, DesignError> {
-    let settings = Settings::read(tuning)?;
-    let lengths = given(tuning)?.map(|k| k.iter().map(Vec::len).collect());
-    let request = chain_request(extended, tuning, "k", lengths)?;
+    settings: &Settings,
+    region: &Region,
+) -> Searched<Form> {
     let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
-    let order = order(extended, tuning)?;
-    let arrangements = match blocks::find(extended, &request, order.as_deref()) {
+    let arrangements = match blocks::find(extended, &settings.request, settings.order.as_deref()) {
         Ok(arrangements) => arrangements,
         Err(summary) => return Ok(Err(refusal(summary))),
     };
-    let mut best: Option<Form> = None;
-    for choice in distinct(extended, tuning, &arrangements)?
+    let mut best: Option<Found<Form>> = None;
+    for choice in distinct(extended, settings, &arrangements)?
         .into_iter()
         .take(EXAMINED)
     {
-        let form = examined(extended, tuning, &settings, choice)?;
+        let form = examined(extended, settings, region, choice)?;
         let rank = |fit: Fit| match fit {
             Fit::Fits => 0,
             Fit::Undecided => 1,
             Fit::DoesNotFit => 2,
         };
-        let better = |best: &Form| rank(form.examination.fit) < rank(best.examination.fit);
+        let better = |best: &Found<Form>| rank(form.examination.fit) < rank(best.examination.fit);
         if best.as_ref().is_none_or(better) {
             best = Some(form);
         }
@@ -62,27 +58,6 @@ pub(super) fn form(
         .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
 }
 
-/// The outputs in the order that the study asks for, by place.
-fn order(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<Vec<usize>>, TuningError> {
-    let Some(names) = tuning.names("order")? else {
-        return Ok(None);
-    };
-    let outputs: Vec<&str> = extended
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.as_str())
-        .collect();
-    let place = |name: &String| outputs.iter().position(|o| o == name);
-    let places: Option<Vec<usize>> = names.iter().map(place).collect();
-    let all = places.filter(|places| {
-        places.len() == outputs.len() && (0..outputs.len()).all(|i| places.contains(&i))
-    });
-    all.map(Some).ok_or_else(|| {
-        let expected = format!("every measured output once ({})", outputs.join(", "));
-        TuningError::new("order", expected, &tuning.values["order"])
-    })
-}
-
 /// One arrangement of those with the same chains.
 struct Choice {
     blocks: Blocks,
@@ -93,10 +68,10 @@ struct Choice {
 /// Per set of chains the first order for which θ satisfies the theorem's rule, else the first.
 fn distinct(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
     arrangements: &[Blocks],
 ) -> Result<Vec<Choice>, TuningError> {
-    let θ = tuning.positive_per_chain("theta", extended.outputs.len())?;
+    let θ = settings.θ.clone()?;
     let breaks = |blocks: &Blocks| θ.as_ref().is_some_and(|θ| chain_rule(blocks, θ).is_some());
     let mut found: Vec<(Vec<Vec<String>>, Choice)> = vec![];
     for blocks in arrangements {
@@ -119,17 +94,16 @@ fn distinct(
 
 fn examined(
     extended: &Extended<'_>,
-    tuning: &Tuning,
     settings: &Settings,
+    region: &Region,
     Choice { blocks, orders }: Choice,
-) -> Result<Form, DesignError> {
-    let region = extended.region();
+) -> Result<Found<Form>, DesignError> {
     let graph = extended.graph();
-    let K = coefficients(tuning, &blocks)?;
+    let K = settings.K(&blocks.lengths());
     let (mut checks, mut all): (Vec<Check>, Vec<Vec<Partial>>) = (vec![], vec![]);
     for (output, chain) in &blocks.order {
-        checks.extend(output_slope(extended, *output, &region)?);
-        let (found, signs) = partials(extended, &chain.states, &region)?;
+        checks.extend(output_slope(extended, *output, region)?);
+        let (found, signs) = partials(extended, &chain.states, region)?;
         checks.extend(signs);
         checks.extend(stable(
             extended,
@@ -140,7 +114,7 @@ fn examined(
         ));
         all.push(found);
     }
-    checks.push(lipschitz(extended, &region)?);
+    checks.push(lipschitz(extended, region)?);
     let integrators = all
         .iter()
         .flatten()
@@ -162,10 +136,10 @@ fn examined(
     }
     let chains = blocks.names(extended);
     let found = family::Form { summary, chains };
-    let examination = Examination::new(extended, &region, NAME, found, checks)?;
-    Ok(Form {
+    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let form = Form {
         blocks,
         partials: all,
-        examination,
-    })
+    };
+    Ok(Found { form, examination })
 }

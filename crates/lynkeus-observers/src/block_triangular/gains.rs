@@ -2,24 +2,6 @@
 
 use crate::{Tuning, TuningError, Value};
 
-/// K_i as the study gives them, or from the eigenvalues of A − KC, in the order
-/// of the measured outputs.
-pub(super) fn given(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
-    match (number_lists(tuning, "k")?, number_lists(tuning, "k_poles")?) {
-        (Some(_), Some(_)) => {
-            let expected = "k or k_poles, which both decide K";
-            Err(TuningError::new("k_poles", expected, "both"))
-        }
-        (k, None) => Ok(k),
-        (None, Some(poles)) => {
-            if let Some(pole) = poles.iter().flatten().find(|pole| **pole >= 0.0) {
-                return Err(TuningError::new("k_poles", "negative numbers", pole));
-            }
-            Ok(Some(poles.iter().map(|poles| placed(poles)).collect()))
-        }
-    }
-}
-
 /// K with the eigenvalues of A − KC at the poles: the coefficients of Π(s − pole).
 pub(super) fn placed(poles: &[f64]) -> Vec<f64> {
     let mut coefficients = vec![1.0];
@@ -34,7 +16,11 @@ pub(super) fn placed(poles: &[f64]) -> Vec<f64> {
     coefficients.split_off(1)
 }
 
-fn number_lists(tuning: &Tuning, key: &str) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+/// Lists of numbers, one per chain.
+pub(super) fn number_lists(
+    tuning: &Tuning,
+    key: &str,
+) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
     let Some(value) = tuning.values.get(key) else {
         return Ok(None);
     };

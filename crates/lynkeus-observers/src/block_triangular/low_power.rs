@@ -5,14 +5,13 @@ use lynkeus_expr::Node;
 use lynkeus_structure::Extended;
 
 use super::form::Form;
-use super::settings::{Correction, Settings};
-use super::{NAME, chain_rule, injected, theta};
+use super::settings::Settings;
+use super::{NAME, chain_rule, injected};
 use crate::conditions::Partial;
 use crate::estimate::Copy;
-use crate::peaking::{
-    InnovationLimit, LowPower, Part, Run, Transient, factor_rows, nominal, variation,
-};
-use crate::{Design, DesignError, Tuning, TuningError, prolongation};
+use crate::peaking::{Part, Run, Transient, factor_rows, nominal, variation};
+use crate::stages::Found;
+use crate::{Design, DesignError, TuningError, prolongation};
 
 /// Why there is no such form of the default observer.
 pub(super) const ONLY_CLASSICAL: &str =
@@ -20,25 +19,23 @@ pub(super) const ONLY_CLASSICAL: &str =
 
 pub(super) fn assemble(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-    form: Form,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
 ) -> Result<Design, DesignError> {
-    if Settings::read(tuning)?.correction == Correction::Lee {
-        return Err(TuningError::new("correction", ONLY_CLASSICAL, "lee").into());
-    }
-    prolongation::refuse(tuning, "form = \"low-power\"")?;
+    let Settings {
+        common, remedies, ..
+    } = settings;
+    prolongation::refuse(common, "form = \"low-power\"")?;
     let blocks = &form.blocks;
     let graph = extended.graph();
-    let copy = Copy::new(extended, tuning);
-    let count = blocks.order.len();
-    let θ = theta(tuning, count)?;
-    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
-    let transient = Transient::read(tuning, count)?;
-    let coefficients = LowPower::read(tuning, &blocks.lengths())?;
-    let mut run = Run::new(&copy, tuning, transient.as_ref())?;
+    let copy = Copy::new(extended, common);
+    let θ = settings.θ()?;
+    let transient = remedies.transient.as_ref();
+    let coefficients = remedies.coefficients(&blocks.lengths())?;
+    let mut run = Run::new(&copy, transient)?;
     let (mut notes, mut factors) = (vec![], vec![]);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
-        let Some(innovation) = limit.innovation(&copy, *output) else {
+        let Some(innovation) = remedies.limit.innovation(&copy, *output) else {
             continue;
         };
         let derivative = |&state: &usize| extended.derivatives[state];
@@ -64,14 +61,14 @@ pub(super) fn assemble(
     }
     let text: Vec<String> = θ.iter().map(f64::to_string).collect();
     let mut parameters = vec![("θ".to_owned(), text.join(", "))];
-    parameters.extend(transient.as_ref().map(Transient::parameter));
+    parameters.extend(transient.map(Transient::parameter));
     parameters.extend(coefficients.parameters());
     parameters.extend(factors);
     notes.extend(chain_rule(blocks, &θ));
     Ok(Design {
-        observer: run.finish(NAME, tuning)?,
+        observer: run.finish(NAME)?,
         notes,
-        examination: form.examination,
+        examination,
         gains: vec![],
         parameters,
     })

@@ -27,116 +27,91 @@ mod transformed;
 use std::collections::HashMap;
 
 use lynkeus_expr::Node;
-use lynkeus_structure::{Blocks, Extended};
+use lynkeus_structure::{Blocks, Extended, Region};
 
 use crate::correction::{self, Start};
 use crate::estimate::Copy;
-use crate::peaking::{InnovationLimit, LowPower, Transient, transient};
-use crate::prolongation::{self, Continued, prolong};
+use crate::peaking::{Remedies, Transient, transient};
+use crate::prolongation::{Continued, prolong};
+use crate::stages::{FormBox, Found, Searched, Stages};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
 };
-use form::{Form, form};
-use gains::{given, placed};
+use form::Form;
 use lee::{lee, transformation};
 use settings::{Correction, Settings};
 
 const NAME: &str = "block-triangular";
+const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
 
 /// The family `block-triangular`.
 #[derive(Clone, Copy, Debug)]
 pub struct BlockTriangular;
 
-impl Family for BlockTriangular {
-    fn name(&self) -> &'static str {
-        NAME
+impl Stages for BlockTriangular {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = Form;
+    const NAME: &'static str = NAME;
+    const PAPER: &'static str = "Lee, Yee, Park 2000, observers (3) and (7)";
+    const BASIS: &'static str = BASIS;
+    const FORM_BOX: FormBox = FormBox::Declared;
+    const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning)
     }
 
-    fn paper(&self) -> &'static str {
-        "Lee, Yee, Park 2000, observers (3) and (7)"
-    }
-
-    fn keys(&self) -> &'static [&'static str] {
-        &[
-            "theta",
-            "k",
-            "k_poles",
-            "correction",
-            "chains",
-            "order",
-            "prolong",
-            "gain",
-            "rate",
-            "gain_limit",
-            "minimise",
-            "innovation_limit",
-            "transient",
-            "form",
-            "low_power_poles",
-            "low_power_k",
-        ]
-    }
-
-    fn examine(
-        &self,
-        extended: &Extended<'_>,
-        tuning: &Tuning,
-    ) -> Result<Examination, DesignError> {
-        LowPower::refuse_unstable(tuning)?;
-        let Settings {
-            correction,
-            low_power,
-            ..
-        } = Settings::read(tuning)?;
-        if low_power && correction == Correction::Lee {
-            let summary = low_power::ONLY_CLASSICAL.to_owned();
-            return Ok(Examination::unfit(NAME, summary, vec![]));
+    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
+        match settings.impossible() {
+            true => {
+                let summary = low_power::ONLY_CLASSICAL.to_owned();
+                Ok(Err(Examination::unfit(NAME, summary, vec![])))
+            }
+            false => form::form(extended, settings, region),
         }
-        Ok(match form(extended, tuning)? {
-            Ok(Form { examination, .. }) | Err(examination) => examination,
-        })
+    }
+
+    fn design(
+        extended: &Extended<'_>,
+        settings: &Settings,
+        found: Found<Form>,
+    ) -> Result<Design, DesignError> {
+        match (settings.lmi.clone()?, settings.remedies.low_power) {
+            (Some(lmi), _) => {
+                let examination = found.examination;
+                guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination)
+            }
+            (None, true) => low_power::assemble(extended, settings, found),
+            (None, false) => observer(extended, settings, found),
+        }
     }
 
     fn theorem(
-        &self,
         extended: &Extended<'_>,
-        tuning: &Tuning,
+        settings: &Settings,
+        found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, tuning, assumptions)
-    }
-
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match form(extended, tuning)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
-                if guarantee::asked_for(tuning, &[])? {
-                    prolongation::refuse(tuning, "gain = \"lmi\"")?;
-                    return guarantee::design_lmi(extended, tuning, NAME, form.examination);
-                }
-                match Settings::read(tuning)?.low_power {
-                    true => low_power::assemble(extended, tuning, form),
-                    false => assemble(extended, tuning, form),
-                }
-            }
-            Ok(Form { examination, .. }) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
+        theorem::certificate(extended, settings, &found.form.blocks, assumptions)
     }
 }
 
 /// Observer (7) or (3).
-fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Design, DesignError> {
+fn observer(
+    extended: &Extended<'_>,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
+) -> Result<Design, DesignError> {
     let graph = extended.graph();
-    let copy = Copy::new(extended, tuning);
+    let copy = Copy::new(extended, &settings.common);
     let blocks = &form.blocks;
-    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
-    let transient = Transient::read(tuning, blocks.order.len())?;
-    let θ = theta(tuning, blocks.order.len())?;
-    let K = coefficients(tuning, blocks)?;
-    let correction = Settings::read(tuning)?.correction;
-    let start = Start::new(&copy, tuning)?;
+    let Remedies {
+        limit, transient, ..
+    } = &settings.remedies;
+    let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
+    let correction = settings.correction;
+    let start = Start::new(&copy)?;
     let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
     let mut parameters = vec![("θ".to_owned(), text(&θ))];
     parameters.extend(transient.as_ref().map(Transient::parameter));
@@ -188,11 +163,11 @@ fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Desi
             }
         }
     }
-    prolong(&copy, tuning, continued(&form), &mut derivatives)?;
+    prolong(&copy, continued(&form), &mut derivatives)?;
     Ok(Design {
-        observer: copy.observer(NAME, tuning, derivatives)?,
+        observer: copy.observer(NAME, derivatives)?,
         notes: chain_rule(blocks, &θ).into_iter().collect(),
-        examination: form.examination,
+        examination,
         gains,
         parameters,
     })
@@ -202,22 +177,6 @@ fn assemble(extended: &Extended<'_>, tuning: &Tuning, form: Form) -> Result<Desi
 fn continued(form: &Form) -> impl Iterator<Item = Continued> {
     let blocks = form.blocks.order.iter().zip(&form.partials);
     blocks.flat_map(|((_, chain), partials)| Continued::along(&chain.states, partials))
-}
-
-/// K, every eigenvalue of A − KC at −1 by default.
-fn coefficients(tuning: &Tuning, blocks: &Blocks) -> Result<Vec<Vec<f64>>, TuningError> {
-    Ok(given(tuning)?.unwrap_or_else(|| {
-        let all_at_one = |n: usize| placed(&vec![-1.0; n]);
-        blocks.lengths().into_iter().map(all_at_one).collect()
-    }))
-}
-
-/// θ, which has no default.
-fn theta(tuning: &Tuning, chains: usize) -> Result<Vec<f64>, TuningError> {
-    let missing = || TuningError::new("theta", "a positive number per chain", "nothing");
-    tuning
-        .positive_per_chain("theta", chains)?
-        .ok_or_else(missing)
 }
 
 /// y_{i+1}, …, y_p in place of the states they show.

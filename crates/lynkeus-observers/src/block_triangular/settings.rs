@@ -1,39 +1,177 @@
-//! What the study asks for.
+//! The study's keys.
 
-use crate::peaking;
-use crate::{Tuning, TuningError};
+use lynkeus_structure::{ChainRequest, Extended};
+
+use super::gains::{number_lists, placed};
+use crate::conditions::{CHAINS, chain_request};
+use crate::estimate::Common;
+use crate::guarantee::{LMI_KEYS, Lmi};
+use crate::peaking::{self, Remedies};
+use crate::prolongation::PROLONG;
+use crate::stages::Late;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError};
+
+const THETA: KeySpec = KeySpec {
+    name: "theta",
+    kind: "number > 0, or one per chain",
+    shape: Shape::POSITIVES,
+    default: REQUIRED,
+    meaning: "θᵢ",
+};
+
+const GIVEN: KeySpec = KeySpec {
+    name: "k",
+    kind: "list of lists of numbers, one per chain",
+    shape: Shape::ROWS,
+    default: "poles at −1",
+    meaning: "Kᵢ: the coefficients that place the poles of Aᵢ − KᵢCᵢ",
+};
+
+const POLES: KeySpec = KeySpec {
+    name: "k_poles",
+    kind: "list of lists of negative numbers, one per chain",
+    shape: Shape::ROWS,
+    default: "−1, −1, …",
+    meaning: "the eigenvalues of Aᵢ − KᵢCᵢ, instead of `k`",
+};
+
+const CORRECTION: KeySpec = KeySpec {
+    name: "correction",
+    kind: "`\"lee\"`, `\"classical\"`",
+    shape: Shape::Word(&["lee", "classical"]),
+    default: "`\"lee\"`",
+    meaning: "observer (7), or (3)",
+};
+
+const ORDER: KeySpec = KeySpec {
+    name: "order",
+    kind: "list of every measured output",
+    shape: Shape::NAMES,
+    default: "searched",
+    meaning: "the order of the blocks",
+};
+
+const GAIN: KeySpec = KeySpec {
+    name: "gain",
+    kind: "`\"lmi\"`",
+    shape: Shape::Word(&["lmi"]),
+    default: "by `k` or `k_poles`",
+    meaning: "[a certified gain](certificates.md) instead of the paper's",
+};
+
+/// Those of the paper and its extensions.
+const OWN: [KeySpec; 8] = [
+    THETA, GIVEN, POLES, CORRECTION, CHAINS, ORDER, PROLONG, GAIN,
+];
+
+/// Every key of the family.
+pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
 
 /// Which observer of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Correction {
+pub enum Correction {
     /// (7)
     Lee,
     /// (3)
     Classical,
 }
 
-/// The choices that decide which conditions there are.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Settings {
-    pub correction: Correction,
-    /// the form of Astolfi and Marconi
-    pub low_power: bool,
-    /// K comes from the study
+/// The keys, read.
+pub struct Settings {
+    pub common: Common,
+    /// per measured output, as in every list here
+    pub θ: Late<Option<Vec<f64>>>,
+    pub K: Option<Vec<Vec<f64>>>,
+    /// K comes from the study as it is, not by its poles
     pub given: bool,
+    pub correction: Correction,
+    /// the outputs, by place, in the order of the blocks
+    pub order: Option<Vec<usize>>,
+    pub request: ChainRequest,
+    pub lmi: Late<Option<Lmi>>,
+    pub remedies: Remedies,
 }
 
 impl Settings {
-    pub fn read(tuning: &Tuning) -> Result<Self, TuningError> {
-        let low_power = peaking::asked_for(tuning, &["k", "k_poles"])?;
-        let choice = tuning.choice("correction", &["lee", "classical"])?;
-        let correction = match choice.as_deref() {
+    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        let count = extended.outputs.len();
+        let remedies = Remedies::read(tuning, count, &[GIVEN, POLES])?;
+        let correction = match tuning
+            .choice(CORRECTION.name, &["lee", "classical"])?
+            .as_deref()
+        {
             Some("classical") => Correction::Classical,
             _ => Correction::Lee,
         };
+        let K = coefficients(tuning)?;
+        let lengths = K.as_ref().map(|k| k.iter().map(Vec::len).collect());
         Ok(Self {
+            common: Common::read(tuning)?,
+            θ: tuning.positive_per_chain(THETA.name, count),
+            K,
+            given: tuning.values.contains_key(GIVEN.name),
             correction,
-            low_power,
-            given: tuning.values.contains_key("k"),
+            request: chain_request(extended, tuning, GIVEN.name, lengths)?,
+            order: order(extended, tuning)?,
+            lmi: Lmi::read(tuning, &[]),
+            remedies,
         })
     }
+
+    /// θ, which has no default.
+    pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
+        let missing = || TuningError::new(THETA.name, "a positive number per chain", "nothing");
+        self.θ.clone()?.ok_or_else(missing)
+    }
+
+    /// K for chains of these lengths, every eigenvalue of A − KC at −1 by default.
+    pub fn K(&self, lengths: &[usize]) -> Vec<Vec<f64>> {
+        let all_at_one = |n: &usize| placed(&vec![-1.0; *n]);
+        let default = || lengths.iter().map(all_at_one).collect();
+        self.K.clone().unwrap_or_else(default)
+    }
+
+    /// Whether observer (7) is asked for in a form that it does not have.
+    pub fn impossible(&self) -> bool {
+        self.remedies.low_power && self.correction == Correction::Lee
+    }
+}
+
+/// K_i as the study gives them, or from the eigenvalues of A − KC.
+fn coefficients(tuning: &Tuning) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+    let (given, poles) = (
+        number_lists(tuning, GIVEN.name)?,
+        number_lists(tuning, POLES.name)?,
+    );
+    match (given, poles) {
+        (Some(_), Some(_)) => {
+            let expected = "k or k_poles, which both decide K";
+            Err(TuningError::new(POLES.name, expected, "both"))
+        }
+        (k, None) => Ok(k),
+        (None, Some(poles)) => {
+            if let Some(pole) = poles.iter().flatten().find(|pole| **pole >= 0.0) {
+                return Err(TuningError::new(POLES.name, "negative numbers", pole));
+            }
+            Ok(Some(poles.iter().map(|poles| placed(poles)).collect()))
+        }
+    }
+}
+
+/// The outputs in the order that the study asks for, by place.
+fn order(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<Vec<usize>>, TuningError> {
+    let Some(names) = tuning.names(ORDER.name)? else {
+        return Ok(None);
+    };
+    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
+    let outputs: Vec<&str> = outputs.collect();
+    let place = |name: &String| outputs.iter().position(|o| o == name);
+    let places: Option<Vec<usize>> = names.iter().map(place).collect();
+    let all = places.filter(|places| {
+        places.len() == outputs.len() && (0..outputs.len()).all(|i| places.contains(&i))
+    });
+    all.map(Some).ok_or_else(|| {
+        let expected = format!("every measured output once ({})", outputs.join(", "));
+        TuningError::new(ORDER.name, expected, &tuning.values[ORDER.name])
+    })
 }

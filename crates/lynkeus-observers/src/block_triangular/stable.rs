@@ -31,7 +31,7 @@ pub(super) fn stable(
         Correction::Classical => partials.iter().map(Partial::range).collect(),
     };
     let integrators = ranges.iter().all(|&a| a == (1.0, 1.0));
-    if settings.low_power || (integrators && !settings.given) {
+    if settings.remedies.low_power || (integrators && !settings.given) {
         return None;
     }
     let chain = GainedChain {

@@ -13,62 +13,53 @@ use lynkeus_proof::search::{first, lightest};
 use lynkeus_structure::{Blocks, Check, Extended};
 use nalgebra::DMatrix;
 
-use super::form::form;
 use super::settings::{Correction, Settings};
 use super::transformed::{Plant, Similar, Term};
-use super::{chain_rule, coefficients, theta};
+use super::{BASIS, chain_rule};
 use crate::conditions::{Partial, fit, names, output_slope, partials};
+use crate::estimate::Common;
 use crate::peaking::Departure;
 use crate::proof::slopes::slopes;
 use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
 use crate::stability::GainedChain;
-use crate::{Assumptions, Certificate, Constant, DesignError, Fit, Tuning, prolongation};
-
-const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
+use crate::{Assumptions, Certificate, Constant, DesignError, Fit, prolongation};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
+    blocks: &Blocks,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let blocks = match form(extended, tuning)? {
-        Ok(form) => form.blocks,
-        Err(examination) if examination.checks.is_empty() => {
-            return Err(DesignError::Refused(Box::new(examination)));
-        }
-        Err(examination) => {
-            return Ok(Certificate::new(BASIS, assumptions, examination.checks));
-        }
-    };
-    if let Some(departure) = Departure::of(tuning, &[])? {
+    let lmi = settings.lmi.clone()?;
+    if let Some(departure) = Departure::of(lmi.as_ref(), &settings.remedies) {
         let check = departure.check("the observer is (7) or (3) with a constant θ");
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
-    let by_output = theta(tuning, order.len())?;
-    let K = coefficients(tuning, &blocks)?;
+    let by_output = settings.θ()?;
+    let K = settings.K(&blocks.lengths());
     let noise = state_noise(extended, &assumptions.region, &assumptions.noise)?;
     let pick = |x: &[f64]| order.iter().map(|&o| x[o]).collect::<Vec<f64>>();
     let plant = Plant {
         extended,
-        blocks: &blocks,
+        blocks,
         assumptions,
         K: order.iter().map(|&o| K[o].clone()).collect(),
         noise: pick(&noise),
     };
     let study = Study {
-        classical: Settings::read(tuning)?.correction == Correction::Classical,
+        classical: settings.correction == Correction::Classical,
         θ: pick(&by_output),
-        rule: chain_rule(&blocks, &by_output),
+        rule: chain_rule(blocks, &by_output),
         plant: &plant,
-        tuning,
+        common: &settings.common,
     };
     study.certificate()
 }
 
 pub(super) struct Study<'a> {
     pub plant: &'a Plant<'a>,
-    tuning: &'a Tuning,
+    common: &'a Common,
     classical: bool,
     /// in the order of the blocks
     pub θ: Vec<f64>,
@@ -321,9 +312,9 @@ impl Study<'_> {
         match self.classical {
             true => {
                 let region = &self.plant.assumptions.region;
-                prolongation::note(self.tuning, self.plant.extended, region)
+                prolongation::note(self.common, self.plant.extended, region)
             }
-            false => box_note(self.tuning.clamp),
+            false => box_note(self.common.clamp),
         }
     }
 

@@ -11,8 +11,9 @@ use super::gains::Gains;
 use super::report::{Laid, notes};
 use super::variant::Variant;
 use super::{NAME, derivative_name};
-use crate::estimate::Copy;
-use crate::{Design, DesignError, InputDerivative, Monitor, Signal, Tuning};
+use crate::estimate::{Common, Copy};
+use crate::stages::Found;
+use crate::{Design, DesignError, InputDerivative, Monitor, Signal};
 
 /// Below this rcond of Q̄, with rows and columns scaled, the flag is raised.
 const ALARM: f64 = 1e-2;
@@ -25,12 +26,12 @@ pub(super) const WHOLE: f64 = 6.0 * WITHDRAWN;
 
 pub(super) fn design(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-    form: Form,
+    common: &Common,
+    Found { form, examination }: Found<Form>,
     gains: Gains,
 ) -> Result<Design, DesignError> {
     let graph = extended.graph();
-    let copy = Copy::new(extended, tuning);
+    let copy = Copy::new(extended, common);
     let filters = filters(extended, &form, &gains);
     let seen = filters.seen();
     // the plant and its map at x̂, and at x̂_a where (4.22) has it
@@ -44,7 +45,7 @@ pub(super) fn design(
         .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
         .collect();
     derivatives.extend(filters.derivatives(graph, &gains));
-    let mut observer = copy.observer(NAME, tuning, derivatives)?;
+    let mut observer = copy.observer(NAME, derivatives)?;
     observer.states.extend(filters.states(&gains));
     observer.monitors.push(Monitor {
         name: "rcond".into(),
@@ -71,7 +72,7 @@ pub(super) fn design(
         gains: laid.constant_gains()?,
         parameters: laid.parameters()?,
         observer,
-        examination: form.examination,
+        examination,
     })
 }
 

@@ -8,9 +8,10 @@ use lynkeus_structure::indices::Codistribution;
 use lynkeus_structure::{Condition, Extended, Region};
 
 use super::form::{Form, Map, blind};
-use super::keys::{self, Asked};
-use super::variant::Variant;
-use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+use super::keys::Asked;
+use super::settings::{POLES, Settings};
+use crate::stages::{Found, Searched};
+use crate::{DesignError, Fit, TuningError};
 
 /// Further index vectors that are examined.
 const EXAMINED: usize = 6;
@@ -20,15 +21,14 @@ const TOLD: usize = 4;
 /// The form of the plant on `region`, or why there is none.
 pub(super) fn form(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
     region: &Region,
-) -> Result<Result<Form, Examination>, DesignError> {
-    let asked = keys::indices(extended, tuning)?;
-    let map = match Map::new(extended, Variant::read(tuning)?, region)? {
+) -> Searched<Form> {
+    let map = match Map::new(extended, settings.variant, region)? {
         Ok(map) => map,
         Err(examination) => return Ok(Err(examination)),
     };
-    let lengths = match asked {
+    let lengths = match settings.asked.clone() {
         Asked::Indices(indices) => return Ok(Ok(Form::new(extended, &map, indices, region)?)),
         Asked::Lengths(lengths) => lengths,
     };
@@ -44,12 +44,12 @@ pub(super) fn form(
         rows,
     };
     let found = search.best(&first, &lengths)?;
-    let mut form = match search.region == *region {
+    let mut chosen = match search.region == *region {
         true => found.form,
-        false => Form::new(extended, &map, found.form.indices, region)?,
+        false => Form::new(extended, &map, found.form.form.indices, region)?,
     };
-    form.examination.summary += &told(&form.indices, &found.others);
-    Ok(Ok(form))
+    chosen.examination.summary += &told(&chosen.form.indices, &found.others);
+    Ok(Ok(chosen))
 }
 
 /// The region with the inputs' declared ranges.
@@ -82,7 +82,7 @@ enum Known {
 }
 
 struct Chosen {
-    form: Form,
+    form: Found<Form>,
     others: Vec<Other>,
 }
 
@@ -111,7 +111,7 @@ impl Search<'_, '_> {
             let expected =
                 format!("lists of lengths that make up a map of the state: {impossible}");
             let found = "lists of other lengths";
-            return Err(TuningError::new("poles", expected, found).into());
+            return Err(TuningError::new(POLES.name, expected, found).into());
         };
         let mut form = self.examined(first)?;
         let mut others = vec![];
@@ -130,7 +130,7 @@ impl Search<'_, '_> {
                     };
                     form = kept;
                     others.push(Other {
-                        indices: left.indices,
+                        indices: left.form.indices,
                         known: Known::Examined(left.examination.fit),
                     });
                     continue;
@@ -144,13 +144,13 @@ impl Search<'_, '_> {
         Ok(Chosen { form, others })
     }
 
-    fn examined(&self, indices: &[usize]) -> Result<Form, DesignError> {
+    fn examined(&self, indices: &[usize]) -> Result<Found<Form>, DesignError> {
         Form::new(self.extended, self.map, indices.to_vec(), &self.region)
     }
 }
 
 /// Smaller for what is closer to a proof.
-fn rank(form: &Form) -> (u8, usize, usize) {
+fn rank(form: &Found<Form>) -> (u8, usize, usize) {
     let count = |test: fn(&Condition) -> bool| {
         let checks = form.examination.checks.iter();
         checks.filter(|c| test(&c.verdict)).count()

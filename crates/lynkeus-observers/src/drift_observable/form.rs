@@ -9,6 +9,7 @@ use super::variant::Variant;
 use super::{NAME, degrees, derivative_name};
 use crate::conditions::{fit, lipschitz, names};
 use crate::family;
+use crate::stages::Found;
 use crate::{DesignError, Examination, Fit};
 
 /// What does not depend on how many derivatives of which output count.
@@ -54,7 +55,7 @@ impl Map {
 
 /// The conditions, each by what it is about.
 #[derive(Clone)]
-pub(super) struct Checks {
+pub struct Checks {
     /// Definition 2.2
     pub degree: Check,
     /// drift-observability: Q is regular
@@ -97,7 +98,7 @@ impl Checks {
 }
 
 /// The map of a plant with the facts about it.
-pub(super) struct Form {
+pub struct Form {
     pub variant: Variant,
     /// (output, order of the derivative) of each row, chain by chain
     pub rows: Vec<(usize, usize)>,
@@ -110,17 +111,16 @@ pub(super) struct Form {
     /// Q̄_a, columns in the order of `U`; empty for (3.1)
     pub Q_a: Rows,
     pub checks: Checks,
-    pub examination: Examination,
 }
 
 impl Form {
     /// With μ_i derivatives of output i, Σμ_i = n.
-    pub fn new(
+    pub(super) fn new(
         extended: &Extended<'_>,
         map: &Map,
         indices: Vec<usize>,
         region: &Region,
-    ) -> Result<Self, DesignError> {
+    ) -> Result<Found<Self>, DesignError> {
         let degrees = degrees::degrees(extended, map, &indices, region)?;
         let U = degrees::input_symbols(extended, &indices, &degrees);
         let variant = map.asked.unwrap_or_else(|| Variant::suited(&U));
@@ -173,7 +173,7 @@ impl Form {
         if examination.fit == Fit::DoesNotFit {
             examination.fit = checks.fit();
         }
-        Ok(Self {
+        let form = Self {
             variant,
             rows,
             indices,
@@ -181,8 +181,8 @@ impl Form {
             Q,
             Q_a,
             checks,
-            examination,
-        })
+        };
+        Ok(Found { form, examination })
     }
 }
 

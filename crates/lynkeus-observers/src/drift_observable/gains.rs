@@ -5,10 +5,11 @@ use lynkeus_proof::magnitude::{root, times};
 use lynkeus_structure::Extended;
 
 use super::form::Form;
-use super::keys::{self, Needed};
+use super::keys::Needed;
 use super::poles::spaced;
+use super::settings::Settings;
 use super::variant::Variant;
-use crate::{Tuning, TuningError};
+use crate::TuningError;
 
 /// Default ratio of the filter's slowest pole to that of the observer: that of the
 /// paper's example.
@@ -29,10 +30,14 @@ pub(super) struct Gains {
 }
 
 impl Gains {
-    pub fn new(extended: &Extended<'_>, tuning: &Tuning, form: &Form) -> Result<Self, TuningError> {
-        let (λ, lemma) = match keys::poles(tuning, &form.indices)? {
+    pub fn new(
+        extended: &Extended<'_>,
+        settings: &Settings,
+        form: &Form,
+    ) -> Result<Self, TuningError> {
+        let (λ, lemma) = match settings.poles(&form.indices)? {
             Some(λ) => (λ, vec![]),
-            None => by_lemma(tuning, &form.indices)?,
+            None => by_lemma(settings, &form.indices)?,
         };
         let filters: Vec<usize> = match form.variant {
             Variant::Practical => form.U.iter().map(Vec::len).collect(),
@@ -40,7 +45,7 @@ impl Gains {
         };
         let needed = Needed::new(extended, filters.clone());
         let filter_slowest = -FILTER_SPEED * slowest(&λ);
-        let filter_λ = keys::filter_poles(tuning, &needed)?.into_iter();
+        let filter_λ = settings.filter_poles(&needed)?.into_iter();
         let filter_λ: Vec<Vec<Pole>> = filter_λ
             .zip(&filters)
             .map(|(given, &order)| given.unwrap_or_else(|| spaced(filter_slowest, order)))
@@ -52,7 +57,7 @@ impl Gains {
             }
             start
         };
-        let filter_start = keys::filter_initial(tuning, &needed)?.into_iter();
+        let filter_start = settings.filter_initial(&needed)?.into_iter();
         let filter_start = filter_start
             .enumerate()
             .map(|(j, given)| given.unwrap_or_else(|| start(j)))
@@ -69,8 +74,11 @@ impl Gains {
     }
 }
 
-fn by_lemma(tuning: &Tuning, μ: &[usize]) -> Result<(Vec<Vec<Pole>>, Vec<Lemma32>), TuningError> {
-    let found = keys::lemma(tuning, μ)?;
+fn by_lemma(
+    settings: &Settings,
+    μ: &[usize],
+) -> Result<(Vec<Vec<Pole>>, Vec<Lemma32>), TuningError> {
+    let found = settings.lemma(μ)?;
     let poles = |lemma: &Option<Lemma32>| {
         let poles = lemma.iter().flat_map(|lemma| &lemma.poles);
         poles.map(|&λ| Pole::Real(λ)).collect()

@@ -4,13 +4,11 @@ use lynkeus_gain::vandermonde::{self, Lemma32, Pole};
 use lynkeus_structure::Extended;
 
 use super::poles::Poles;
-use crate::{Tuning, TuningError, Value};
-
-/// The key of [`slopes`].
-pub(super) const SLOPES: &str = "input_derivatives";
+use super::settings::{ALPHA, FILTER_POLES, GAMMA, INDICES, POLES, SLOPES, Settings};
+use crate::{KeySpec, Tuning, TuningError, Value};
 
 /// What is asked for of the known inputs: (name, how many numbers), in their order.
-pub(super) struct Needed<'a> {
+pub struct Needed<'a> {
     pub names: Vec<&'a str>,
     pub orders: Vec<usize>,
 }
@@ -25,44 +23,35 @@ impl<'a> Needed<'a> {
 /// `input_derivatives`: per input bounds of |u'|, |u''|, …, one more than the observer
 /// reads; for guarantees only. None where they are left out.
 pub(super) fn slopes(
-    tuning: &Tuning,
+    value: Option<&Value>,
     needed: &Needed<'_>,
 ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-    let found = numbers_per_input(tuning, SLOPES, "bounds of the derivatives of", needed)?;
+    let found = numbers_per_input(value, SLOPES, "bounds of the derivatives of", needed)?;
     match found.iter().flatten().flatten().find(|x| **x < 0.0) {
-        Some(x) => Err(TuningError::new(SLOPES, "bounds, no negative numbers", x)),
+        Some(x) => Err(TuningError::new(
+            SLOPES.name,
+            "bounds, no negative numbers",
+            x,
+        )),
         None => Ok(found),
     }
 }
 
-/// `filter_initial`: x̂_a(0) per input.
-pub(super) fn filter_initial(
-    tuning: &Tuning,
-    needed: &Needed<'_>,
-) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-    numbers_per_input(
-        tuning,
-        "filter_initial",
-        "numbers for the filter of",
-        needed,
-    )
-}
-
 /// `filter_poles`: the eigenvalues of the filter per input.
 pub(super) fn filter_poles(
-    tuning: &Tuning,
+    value: Option<&Value>,
     needed: &Needed<'_>,
 ) -> Result<Vec<Option<Vec<Pole>>>, TuningError> {
-    let key = "filter_poles";
-    let entries = PerInput::read(tuning, key, "numbers for the filter of", needed)?;
+    let entries = PerInput::read(value, FILTER_POLES, "numbers for the filter of", needed)?;
     entries.map(|value, order| {
-        let poles = Poles::read(key, value)?;
+        let poles = Poles::read(FILTER_POLES.name, value)?;
         Ok(poles.and_then(|poles| poles.of_length(order)))
     })
 }
 
 /// How many derivatives of which output the study asks for.
-pub(super) enum Asked {
+#[derive(Clone)]
+pub enum Asked {
     /// the key `indices`, or as many poles for every output
     Indices(Vec<usize>),
     /// per output, where its poles are listed
@@ -71,21 +60,25 @@ pub(super) enum Asked {
 
 /// `indices`: one whole number per measured output, n in sum; else the lengths of the lists
 /// under `poles`.
-pub(super) fn indices(extended: &Extended<'_>, tuning: &Tuning) -> Result<Asked, TuningError> {
+pub(super) fn indices(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    poles: Option<&Value>,
+) -> Result<Asked, TuningError> {
     let (p, n) = (extended.outputs.len(), extended.states.len());
-    if let Some(found) = tuning.numbers("indices")? {
+    if let Some(found) = tuning.numbers(INDICES.name)? {
         let whole = |x: &f64| *x >= 0.0 && x.fract() == 0.0 && *x <= n as f64;
         if found.len() != p || !found.iter().all(whole) || found.iter().sum::<f64>() != n as f64 {
             let expected = format!(
                 "one whole number per measured output ({p}), the number of states ({n}) in sum"
             );
             let found: Vec<String> = found.iter().map(f64::to_string).collect();
-            return Err(TuningError::new("indices", expected, found.join(", ")));
+            return Err(TuningError::new(INDICES.name, expected, found.join(", ")));
         }
         return Ok(Asked::Indices(found.iter().map(|&x| x as usize).collect()));
     }
     // one output has n derivatives whatever the list says
-    let Some(value) = tuning.values.get("poles").filter(|_| p > 1) else {
+    let Some(value) = poles.filter(|_| p > 1) else {
         return Ok(Asked::Lengths(vec![None; p]));
     };
     let given = per_output(value, p)?;
@@ -95,7 +88,7 @@ pub(super) fn indices(extended: &Extended<'_>, tuning: &Tuning) -> Result<Asked,
         Some(indices) if indices.iter().sum::<usize>() == n => Ok(Asked::Indices(indices)),
         Some(_) => {
             let expected = format!("as many poles as states ({n}) in all");
-            Err(TuningError::new("poles", expected, value))
+            Err(TuningError::new(POLES.name, expected, value))
         }
         None => Ok(Asked::Lengths(lengths)),
     }
@@ -103,10 +96,7 @@ pub(super) fn indices(extended: &Extended<'_>, tuning: &Tuning) -> Result<Asked,
 
 /// `poles`: for one output its n poles; for several a list or the slowest pole of each. A single
 /// number is the slowest pole of every output.
-pub(super) fn poles(tuning: &Tuning, μ: &[usize]) -> Result<Option<Vec<Vec<Pole>>>, TuningError> {
-    let Some(value) = tuning.values.get("poles") else {
-        return Ok(None);
-    };
+pub(super) fn poles(value: &Value, μ: &[usize]) -> Result<Vec<Vec<Pole>>, TuningError> {
     let given = per_output(value, μ.len())?;
     let pairs = given.iter().zip(μ);
     let lists: Option<Vec<Vec<Pole>>> = pairs.map(|(poles, &μ)| poles.of_length(μ)).collect();
@@ -118,10 +108,7 @@ pub(super) fn poles(tuning: &Tuning, μ: &[usize]) -> Result<Option<Vec<Vec<Pole
             lengths.join(", ")
         ),
     };
-    match lists {
-        Some(lists) => Ok(Some(lists)),
-        None => Err(TuningError::new("poles", expected, value)),
-    }
+    lists.ok_or_else(|| TuningError::new(POLES.name, expected, value))
 }
 
 /// The poles of each of p outputs.
@@ -133,9 +120,9 @@ fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
                 "a list of negative numbers, or the slowest pole, for each measured output ({p})"
             ),
         };
-        TuningError::new("poles", expected, value)
+        TuningError::new(POLES.name, expected, value)
     };
-    let of = |value: &Value| Poles::read("poles", value)?.ok_or_else(wrong);
+    let of = |value: &Value| Poles::read(POLES.name, value)?.ok_or_else(wrong);
     match value {
         Value::Number(_) => Ok(vec![of(value)?; p]),
         Value::List(entries) => {
@@ -153,49 +140,48 @@ fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
 }
 
 /// Lemma 3.2 with `alpha`, `beta`, `gamma`; none for an output that is not used.
-pub(super) fn lemma(tuning: &Tuning, μ: &[usize]) -> Result<Vec<Option<Lemma32>>, TuningError> {
-    let one = |key: &str| match tuning.positive_per_chain(key, 1)? {
-        Some(x) => Ok(x.first().copied()),
-        None => Ok(None),
-    };
-    let Some(α) = one("alpha")? else {
+pub(super) fn lemma(
+    settings: &Settings, μ: &[usize]
+) -> Result<Vec<Option<Lemma32>>, TuningError> {
+    let Some(α) = settings.α else {
         let expected = "the eigenvalues of the error, negative numbers, or alpha, beta and gamma for Lemma 3.2 to choose them";
-        return Err(TuningError::new("poles", expected, "nothing"));
+        return Err(TuningError::new(POLES.name, expected, "nothing"));
     };
     let missing = || {
         TuningError::new(
-            "gamma",
+            GAMMA.name,
             "the Lipschitz constant for Lemma 3.2, a positive number",
             "nothing",
         )
     };
-    let γ = one("gamma")?.ok_or_else(missing)?;
+    let γ = settings.γ.ok_or_else(missing)?;
     // (4.7) has β = 1
-    let β = one("beta")?.unwrap_or(1.0);
+    let β = settings.β.unwrap_or(1.0);
     let of = |&μ: &usize| match μ {
         0 => Ok(None),
         _ => vandermonde::lemma_3_2(μ, α, β, γ)
             .map(Some)
             .map_err(|error| {
-                TuningError::new("alpha", "numbers Lemma 3.2 can be used with", error)
+                TuningError::new(ALPHA.name, "numbers Lemma 3.2 can be used with", error)
             }),
     };
     μ.iter().map(of).collect()
 }
 
-fn numbers_per_input(
-    tuning: &Tuning,
-    key: &str,
+/// Numbers for each input that takes some; none where they are left out.
+pub(super) fn numbers_per_input(
+    value: Option<&Value>,
+    key: KeySpec,
     what: &str,
     needed: &Needed<'_>,
 ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-    let entries = PerInput::read(tuning, key, what, needed)?;
+    let entries = PerInput::read(value, key, what, needed)?;
     entries.map(|value, order| Ok(numbers(value).filter(|numbers| numbers.len() == order)))
 }
 
 /// A value for the only input that takes one, or a table of them by the inputs' names.
 struct PerInput<'a> {
-    key: &'a str,
+    key: &'static str,
     /// per input its value and how many numbers it takes
     entries: Vec<Option<(&'a Value, usize)>>,
     /// the key's value
@@ -205,8 +191,8 @@ struct PerInput<'a> {
 
 impl<'a> PerInput<'a> {
     fn read(
-        tuning: &'a Tuning,
-        key: &'a str,
+        all: Option<&'a Value>,
+        key: KeySpec,
         what: &str,
         needed: &Needed<'_>,
     ) -> Result<Self, TuningError> {
@@ -222,9 +208,9 @@ impl<'a> PerInput<'a> {
             }
         };
         let mut found = Self {
-            key,
+            key: key.name,
             entries: vec![None; names.len()],
-            all: tuning.values.get(key),
+            all,
             expected,
         };
         match (found.all, &some[..]) {

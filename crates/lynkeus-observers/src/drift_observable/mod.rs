@@ -28,84 +28,57 @@ mod lipschitz;
 mod poles;
 mod proof;
 mod report;
+mod settings;
 mod theorem;
 mod variant;
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Region};
 
-use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
+use form::Form;
+use settings::Settings;
 
 const NAME: &str = "drift-observable";
+const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
 
 /// The family `drift-observable`.
 #[derive(Clone, Copy, Debug)]
 pub struct DriftObservable;
 
-impl Family for DriftObservable {
-    fn name(&self) -> &'static str {
-        NAME
+impl Stages for DriftObservable {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = Form;
+    const NAME: &'static str = NAME;
+    const PAPER: &'static str = PAPER;
+    const BASIS: &'static str = PAPER;
+    const FORM_BOX: FormBox = FormBox::Assumed;
+    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning)
     }
 
-    fn paper(&self) -> &'static str {
-        "Germani, Manes 1999, http://dml.cz/dmlcz/135297"
+    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
+        choice::form(extended, settings, region)
     }
 
-    fn keys(&self) -> &'static [&'static str] {
-        &[
-            "variant",
-            "poles",
-            "alpha",
-            "beta",
-            "gamma",
-            "filter_poles",
-            "filter_initial",
-            "indices",
-            "input_derivatives",
-        ]
-    }
-
-    fn examine(
-        &self,
+    fn design(
         extended: &Extended<'_>,
-        tuning: &Tuning,
-    ) -> Result<Examination, DesignError> {
-        Ok(match choice::form(extended, tuning, &extended.region())? {
-            Ok(form) => form.examination,
-            Err(examination) => examination,
-        })
+        settings: &Settings,
+        found: Found<Form>,
+    ) -> Result<Design, DesignError> {
+        let gains = gains::Gains::new(extended, settings, &found.form)?;
+        assembly::design(extended, &settings.common, found, gains)
     }
 
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match choice::form(extended, tuning, &extended.region())? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
-                let gains = gains::Gains::new(extended, tuning, &form)?;
-                assembly::design(extended, tuning, form, gains)
-            }
-            Ok(form::Form { examination, .. }) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
-    }
     fn theorem(
-        &self,
         extended: &Extended<'_>,
-        tuning: &Tuning,
+        settings: &Settings,
+        found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        match choice::form(extended, tuning, &assumptions.region)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
-                theorem::certificate(extended, tuning, form, assumptions)
-            }
-            Ok(form::Form { examination, .. }) | Err(examination)
-                if examination.refuted().is_some() =>
-            {
-                let (basis, checks) = (self.paper(), examination.checks);
-                Ok(Certificate::new(basis, assumptions, checks))
-            }
-            Ok(form::Form { examination, .. }) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
+        theorem::certificate(extended, settings, &found.form, assumptions)
     }
 }
 

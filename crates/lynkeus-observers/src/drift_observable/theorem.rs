@@ -16,23 +16,24 @@ use lynkeus_structure::{Check, Condition, Extended};
 use super::form::Form;
 use super::gains::{Gains, closed_loop, slowest};
 use super::guarantee;
-use super::keys::{self, Needed, SLOPES};
+use super::keys::Needed;
 use super::lipschitz::{self, Lipschitz};
 use super::proof::{Proof, SLOW, check, undecided};
+use super::settings::{SLOPES, Settings};
 use super::variant::Variant;
 use crate::enclosure::figures;
-use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, TuningError};
+use crate::{Assumptions, Certificate, Constant, DesignError, TuningError};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-    form: Form,
+    settings: &Settings,
+    form: &Form,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let slopes = slopes(extended, tuning, &form, assumptions)?;
-    let lipschitz = lipschitz::bounds(extended, &form, &slopes, &assumptions.region)?;
+    let slopes = slopes(extended, settings, form, assumptions)?;
+    let lipschitz = lipschitz::bounds(extended, form, &slopes, &assumptions.region)?;
     let u_M = largest_input(extended, assumptions);
-    let gains = gains(extended, tuning, &form)?;
+    let gains = gains(extended, settings, form)?;
     // not that on inputs, which is about slopes without bounds
     let conditions = form.checks.clone();
     let mut hypotheses = vec![
@@ -43,7 +44,7 @@ pub(super) fn certificate(
         lipschitz.continuous.clone(),
     ];
     hypotheses.extend(of_what_acts(extended, assumptions));
-    hypotheses.extend(of_the_map(extended, &form, &slopes, &lipschitz));
+    hypotheses.extend(of_the_map(extended, form, &slopes, &lipschitz));
     let order = |jet: &Vec<_>, given: &Option<Vec<f64>>| match (jet.is_empty(), given) {
         (true, _) => 0.0,
         (_, Some(bounds)) => bounds.last().copied().unwrap_or(0.0),
@@ -54,13 +55,13 @@ pub(super) fn certificate(
         .iter()
         .zip(&slopes)
         .map(|(jet, given)| order(jet, given));
-    let mut constants = of_lipschitz(&form, &lipschitz, u_M);
+    let mut constants = of_lipschitz(form, &lipschitz, u_M);
     let mut found = None;
     match &gains {
         Some(gains) => {
             let proof = Proof {
                 extended,
-                form: &form,
+                form,
                 gains,
                 lipschitz: &lipschitz,
                 A: closed_loop(&gains.K),
@@ -78,7 +79,7 @@ pub(super) fn certificate(
     }
     let mut certificate = Certificate::new(basis(form.variant), assumptions, hypotheses);
     certificate.constants = constants;
-    certificate.notes = notes(extended, &form, assumptions);
+    certificate.notes = notes(extended, form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
         guarantee::conclude(&proof, &P, assumptions, &mut certificate);
     }
@@ -118,7 +119,7 @@ fn notes(extended: &Extended<'_>, form: &Form, assumptions: &Assumptions) -> Vec
 /// what holds for every family.
 fn slopes(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
     form: &Form,
     assumptions: &Assumptions,
 ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
@@ -126,7 +127,7 @@ fn slopes(
         Variant::Bounded => vec![0; form.U.len()],
         _ => form.U.iter().map(Vec::len).collect(),
     };
-    let own = keys::slopes(tuning, &Needed::new(extended, orders.clone()))?;
+    let own = settings.slopes(&Needed::new(extended, orders.clone()))?;
     let general = |j: usize| {
         let bounds = assumptions.input_derivatives.get(j)?;
         bounds.get(..orders[j]).map(<[f64]>::to_vec)
@@ -165,12 +166,11 @@ fn of_what_acts(extended: &Extended<'_>, assumptions: &Assumptions) -> Option<Ch
 /// None where the study has no pole yet.
 fn gains(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
     form: &Form,
 ) -> Result<Option<Gains>, TuningError> {
-    let has = |key: &str| tuning.values.contains_key(key);
-    match has("poles") || has("alpha") {
-        true => Gains::new(extended, tuning, form).map(Some),
+    match settings.has_poles() {
+        true => Gains::new(extended, settings, form).map(Some),
         false => Ok(None),
     }
 }
@@ -199,8 +199,9 @@ fn of_the_map(
         let detail = match names.is_empty() {
             true => "assumed, as the study gives them".to_owned(),
             false => format!(
-                "no bound of the derivatives of {}: give the key '{SLOPES}', in [observer] or in [certify]",
-                names.join(", ")
+                "no bound of the derivatives of {}: give the key '{}', in [observer] or in [certify]",
+                names.join(", "),
+                SLOPES.name
             ),
         };
         checks.push(check(

@@ -6,7 +6,7 @@ use crate::{Tuning, TuningError};
 
 /// Which of the three observers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Variant {
+pub enum Variant {
     /// (3.1)
     Bounded,
     /// (4.1)
@@ -36,10 +36,10 @@ impl Variant {
         }
     }
 
-    /// The key `variant`.
-    pub fn read(tuning: &Tuning) -> Result<Option<Self>, TuningError> {
+    /// The one that stands under a key.
+    pub fn read(tuning: &Tuning, key: &str) -> Result<Option<Self>, TuningError> {
         let words = Self::ALL.map(Self::word);
-        let word = tuning.choice("variant", &words)?;
+        let word = tuning.choice(key, &words)?;
         Ok(word.and_then(|word| Self::ALL.into_iter().find(|v| v.word() == word)))
     }
 }

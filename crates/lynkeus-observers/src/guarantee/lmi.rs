@@ -9,41 +9,84 @@ use lynkeus_structure::Extended;
 use super::blocking;
 use super::error_system::ErrorSystem;
 use crate::conditions::on_output;
-use crate::estimate::Copy;
-use crate::{ChainGain, Design, DesignError, Examination, Tuning, TuningError};
+use crate::estimate::{Common, Copy};
+use crate::{
+    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, prolongation,
+};
 
 /// Bisections of the rate where only the gain is limited.
 const HALVINGS: usize = 9;
 
-/// Whether the study asks for such a gain; `others` are the family's own words for
-/// `gain`.
-///
-/// # Errors
-/// Another word, or keys of this gain without it.
-pub(crate) fn asked_for(tuning: &Tuning, others: &[&str]) -> Result<bool, TuningError> {
-    let words: Vec<&str> = others.iter().copied().chain(["lmi"]).collect();
-    let asked = tuning.choice("gain", &words)?.as_deref() == Some("lmi");
-    let own = ["rate", "gain_limit", "minimise"];
-    match own
-        .iter()
-        .find(|key| !asked && tuning.values.contains_key(**key))
-    {
-        Some(key) => {
-            let expected = "this key only with gain = \"lmi\"";
-            Err(TuningError::new(key, expected, "another gain"))
+const RATE: KeySpec = KeySpec {
+    name: "rate",
+    kind: "number > 0",
+    shape: Shape::Positive,
+    default: "required with `\"lmi\"` unless `gain_limit` is given",
+    meaning: "the decay to be proved, in 1/(unit of time)",
+};
+
+const LIMIT: KeySpec = KeySpec {
+    name: "gain_limit",
+    kind: "number > 0",
+    shape: Shape::Positive,
+    default: "none",
+    meaning: "the largest entry of the gain, with `\"lmi\"`",
+};
+
+const MINIMISE: KeySpec = KeySpec {
+    name: "minimise",
+    kind: "`\"noise\"`, `\"gain\"`, `\"peak\"`",
+    shape: Shape::Word(&["noise", "gain", "peak"]),
+    default: "`\"noise\"`",
+    meaning: "what the gain makes small at that rate, with `\"lmi\"`",
+};
+
+/// The keys of this gain, for every family that has it.
+pub(crate) const KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];
+
+/// The gain that the study asks for.
+#[derive(Clone, Copy, Debug)]
+pub struct Lmi {
+    rate: Option<f64>,
+    limit: Option<f64>,
+    aim: Aim,
+}
+
+impl Lmi {
+    /// None where the key `gain` does not ask for it; `others` are the family's own words
+    /// for that key.
+    ///
+    /// # Errors
+    /// Another word, or keys of this gain without it.
+    pub fn read(tuning: &Tuning, others: &[&str]) -> Result<Option<Self>, TuningError> {
+        let words: Vec<&str> = others.iter().copied().chain(["lmi"]).collect();
+        let asked = tuning.choice("gain", &words)?.as_deref() == Some("lmi");
+        let given = |key: &&KeySpec| tuning.values.contains_key(key.name);
+        match (asked, KEYS.iter().find(given)) {
+            (false, Some(key)) => {
+                let expected = "this key only with gain = \"lmi\"";
+                Err(TuningError::new(key.name, expected, "another gain"))
+            }
+            (false, None) => Ok(None),
+            (true, _) => Ok(Some(Self {
+                rate: tuning.positive(RATE.name)?,
+                limit: tuning.positive(LIMIT.name)?,
+                aim: aim(tuning)?,
+            })),
         }
-        None => Ok(asked),
     }
 }
 
 /// The observer with a certified gain, under the name of the family that asked.
 pub(crate) fn design(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    common: &Common,
+    asked: Lmi,
     family: &'static str,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    let copy = Copy::new(extended, tuning);
+    prolongation::refuse(common, "gain = \"lmi\"")?;
+    let copy = Copy::new(extended, common);
     let measured = measured(extended, &copy)?;
     let system = ErrorSystem::open_loop(extended, &extended.region())?;
     if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
@@ -60,31 +103,23 @@ pub(crate) fn design(
         });
     }
     let request = Request {
-        rate: positive(tuning, "rate")?.unwrap_or(0.0),
+        rate: asked.rate.unwrap_or(0.0),
         noise: vec![1.0; measured.len()],
         measured,
         scale: system.scale.clone(),
-        aim: aim(tuning)?,
-        limit: positive(tuning, "gain_limit")?,
+        aim: asked.aim,
+        limit: asked.limit,
     };
-    let gain = match (tuning.values.contains_key("rate"), request.limit) {
-        (true, _) => decay::design(&system.models, &request)
+    let gain = match (asked.rate, asked.limit) {
+        (Some(_), _) => decay::design(&system.models, &request)
             .map_err(|error| refusal(&system, &request, error))?,
-        (false, Some(_)) => fastest(&system, request.clone())?,
-        (false, None) => {
+        (None, Some(_)) => fastest(&system, request.clone())?,
+        (None, None) => {
             let expected = "the required decay, 1/time unit (or gain_limit alone, for the fastest decay within it)";
-            return Err(TuningError::new("rate", expected, "nothing").into());
+            return Err(TuningError::new(RATE.name, expected, "nothing").into());
         }
     };
-    assemble(
-        extended,
-        tuning,
-        &copy,
-        family,
-        examination,
-        &request,
-        &gain,
-    )
+    assemble(extended, &copy, family, examination, &request, &gain)
 }
 
 fn measured(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Vec<usize>, TuningError> {
@@ -100,12 +135,8 @@ fn measured(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Vec<usize>, 
     (0..extended.outputs.len()).map(shown).collect()
 }
 
-fn positive(tuning: &Tuning, key: &str) -> Result<Option<f64>, TuningError> {
-    Ok(tuning.positive_per_chain(key, 1)?.map(|x| x[0]))
-}
-
 fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
-    let chosen = tuning.choice("minimise", &["noise", "peak", "gain"])?;
+    let chosen = tuning.choice(MINIMISE.name, &["noise", "peak", "gain"])?;
     Ok(match chosen.as_deref() {
         Some("peak") => Aim::Peak,
         Some("gain") => Aim::Gain,
@@ -174,7 +205,6 @@ fn middles(model: &lynkeus_proof::decay::ErrorModel) -> Vec<f64> {
 
 fn assemble(
     extended: &Extended<'_>,
-    tuning: &Tuning,
     copy: &Copy<'_, '_>,
     family: &'static str,
     examination: Examination,
@@ -207,7 +237,7 @@ fn assemble(
         ("slopes".to_owned(), format!("{slopes}")),
     ];
     Ok(Design {
-        observer: copy.observer(family, tuning, derivatives)?,
+        observer: copy.observer(family, derivatives)?,
         examination,
         gains,
         parameters,

@@ -27,7 +27,8 @@ use lynkeus_structure::{Check, Condition, Extended, short};
 use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};
 pub use correction::{Correction, Injection};
 use error_system::ErrorSystem;
-pub(crate) use lmi::{asked_for, design as design_lmi};
+pub(crate) use lmi::Lmi;
+pub(crate) use lmi::{KEYS as LMI_KEYS, design as design_lmi};
 use refute::Sample;
 
 const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";

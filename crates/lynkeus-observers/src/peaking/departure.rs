@@ -2,9 +2,9 @@
 
 use lynkeus_structure::Check;
 
-use super::{innovation, low_power, transient};
+use super::Remedies;
+use crate::guarantee::Lmi;
 use crate::proof::words::undecided;
-use crate::{Tuning, TuningError, guarantee};
 
 /// How a study's observer departs from the one that the theorem is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,28 +20,24 @@ pub(crate) enum Departure {
 }
 
 impl Departure {
-    /// The first one; `gains`: the words for `gain` that the paper covers.
-    pub fn of(tuning: &Tuning, gains: &[&str]) -> Result<Option<Self>, TuningError> {
-        let has = |key: &str| tuning.values.contains_key(key);
-        Ok(if guarantee::asked_for(tuning, gains)? {
-            Some(Self::Gain)
-        } else if low_power::asked_for(tuning, &[])? {
-            Some(Self::LowPower)
-        } else if has(transient::KEY) {
-            Some(Self::Transient)
-        } else if has(innovation::KEY) {
-            Some(Self::InnovationLimit)
-        } else {
-            None
-        })
+    /// The first one.
+    pub fn of(gain: Option<&Lmi>, remedies: &Remedies) -> Option<Self> {
+        let departures = [
+            (gain.is_some(), Self::Gain),
+            (remedies.low_power, Self::LowPower),
+            (remedies.transient.is_some(), Self::Transient),
+            (remedies.limit.is_set(), Self::InnovationLimit),
+        ];
+        let mut asked = departures.into_iter().filter(|(asked, _)| *asked);
+        asked.next().map(|(_, departure)| departure)
     }
 
     fn key(self) -> &'static str {
         match self {
             Self::Gain => "gain",
-            Self::LowPower => low_power::FORM,
-            Self::Transient => transient::KEY,
-            Self::InnovationLimit => innovation::KEY,
+            Self::LowPower => "form",
+            Self::Transient => "transient",
+            Self::InnovationLimit => "innovation_limit",
         }
     }
 

@@ -25,47 +25,45 @@ use lynkeus_gain::low_power::{self, Coefficients};
 
 use super::transient::{self, Transient};
 use crate::estimate::Copy;
-use crate::{Observer, Signal, Tuning, TuningError, Value};
+use crate::{KeySpec, Observer, Shape, Signal, Tuning, TuningError, Value};
 
-/// The choice of form.
-pub(crate) const FORM: &str = "form";
 /// Eigenvalues of M.
-pub(crate) const POLES: &str = "low_power_poles";
-/// The coefficients themselves.
-pub(crate) const GIVEN: &str = "low_power_k";
+pub(super) const POLES: KeySpec = KeySpec {
+    name: "low_power_poles",
+    kind: "one list per chain of 2n − 2 negative numbers",
+    shape: Shape::ROWS,
+    default: "−1, −1, …",
+    meaning: "with `form = \"low-power\"`: the eigenvalues of the form's error system",
+};
 
-/// Whether the study asks for this form. If so, the keys that belong to the standard one are
-/// refused; if not, those of this one.
-pub(crate) fn asked_for(tuning: &Tuning, of_standard: &[&str]) -> Result<bool, TuningError> {
-    let form = tuning.choice(FORM, &["standard", "low-power"])?;
-    let low_power = form.as_deref() == Some("low-power");
-    let foreign: &[&str] = if low_power {
-        of_standard
-    } else {
-        &[POLES, GIVEN]
-    };
-    match foreign.iter().find(|key| tuning.values.contains_key(**key)) {
-        None => Ok(low_power),
-        Some(key) => {
-            let asked = if low_power { "low-power" } else { "standard" };
-            let expected = format!("no such key with form = \"{asked}\", which does not read it");
-            Err(TuningError::new(key, expected, &tuning.values[*key]))
-        }
-    }
-}
+/// The coefficients themselves.
+pub(super) const GIVEN: KeySpec = KeySpec {
+    name: "low_power_k",
+    kind: "one list per chain of a pair `[k1, k2]` per state but the last",
+    shape: Shape::List(&Shape::ROWS),
+    default: "by `low_power_poles`",
+    meaning: "with `form = \"low-power\"`: its coefficients",
+};
 
 /// K_1, …, K_{n−1} of each chain.
-pub(crate) struct LowPower {
+pub struct LowPower {
     pub K: Vec<Coefficients>,
 }
 
 impl LowPower {
     /// Given, or by the eigenvalues of M, which are all −1 if nothing is given.
-    pub fn read(tuning: &Tuning, lengths: &[usize]) -> Result<Self, TuningError> {
-        let K = match (tuning.values.get(GIVEN), tuning.values.get(POLES)) {
+    pub fn of(
+        given: Option<&Value>,
+        poles: Option<&Value>,
+        lengths: &[usize],
+    ) -> Result<Self, TuningError> {
+        let K = match (given, poles) {
             (Some(_), Some(_)) => {
-                let expected = format!("{GIVEN} or {POLES}, which both decide the coefficients");
-                return Err(TuningError::new(POLES, expected, "both"));
+                let expected = format!(
+                    "{} or {}, which both decide the coefficients",
+                    GIVEN.name, POLES.name
+                );
+                return Err(TuningError::new(POLES.name, expected, "both"));
             }
             (Some(given), None) => explicit(given, lengths)?,
             (None, Some(poles)) => placed(poles, lengths)?,
@@ -76,14 +74,14 @@ impl LowPower {
 
     /// Refuses given coefficients or poles that no chain could have.
     pub fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
-        if let Some(poles) = tuning.values.get(POLES) {
-            let chains = chains(POLES, poles)?;
+        if let Some(poles) = tuning.values.get(POLES.name) {
+            let chains = chains(POLES.name, poles)?;
             chains
                 .iter()
                 .try_for_each(|chain| negative(chain, poles).map(drop))?;
         }
-        if let Some(given) = tuning.values.get(GIVEN) {
-            let chains = chains(GIVEN, given)?;
+        if let Some(given) = tuning.values.get(GIVEN.name) {
+            let chains = chains(GIVEN.name, given)?;
             chains
                 .iter()
                 .try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
@@ -108,10 +106,10 @@ const NUMBERS: &str = "one list per chain of 2n − 2 negative numbers, n being 
 
 /// Lists of pairs (k_i1, k_i2), one list per chain.
 fn explicit(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
-    let chains = rows(GIVEN, given, lengths.len(), PAIRS)?;
+    let chains = rows(GIVEN.name, given, lengths.len(), PAIRS)?;
     let mut found = vec![];
     for (chain, n) in chains.iter().zip(lengths) {
-        rows(GIVEN, chain, n - 1, PAIRS)?;
+        rows(GIVEN.name, chain, n - 1, PAIRS)?;
         found.push(stable_pairs(chain, given)?);
     }
     Ok(found)
@@ -119,7 +117,7 @@ fn explicit(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, Tunin
 
 /// The pairs of a chain, if M is stable with them.
 fn stable_pairs(chain: &Value, given: &Value) -> Result<Coefficients, TuningError> {
-    let wrong = || TuningError::new(GIVEN, PAIRS, given);
+    let wrong = || TuningError::new(GIVEN.name, PAIRS, given);
     let Value::List(pairs) = chain else {
         return Err(wrong());
     };
@@ -138,18 +136,19 @@ fn stable_pairs(chain: &Value, given: &Value) -> Result<Coefficients, TuningErro
     }
     let expected = "coefficients that make M stable, every eigenvalue with a negative real part";
     let found = format!("{chain}, with an eigenvalue of real part {abscissa:.4}");
-    Err(TuningError::new(GIVEN, expected, found))
+    Err(TuningError::new(GIVEN.name, expected, found))
 }
 
 /// Lists of 2n − 2 negative numbers, one list per chain.
 fn placed(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningError> {
-    let chains = rows(POLES, given, lengths.len(), NUMBERS)?;
+    let chains = rows(POLES.name, given, lengths.len(), NUMBERS)?;
     let mut found = vec![];
     for (chain, n) in chains.iter().zip(lengths) {
-        rows(POLES, chain, 2 * (n - 1), NUMBERS)?;
+        rows(POLES.name, chain, 2 * (n - 1), NUMBERS)?;
         let poles = negative(chain, given)?;
         let beyond = "poles whose coefficients stay in the range of numbers";
-        let K = low_power::place(&poles).ok_or_else(|| TuningError::new(POLES, beyond, chain))?;
+        let K =
+            low_power::place(&poles).ok_or_else(|| TuningError::new(POLES.name, beyond, chain))?;
         found.push(K);
     }
     Ok(found)
@@ -157,7 +156,7 @@ fn placed(given: &Value, lengths: &[usize]) -> Result<Vec<Coefficients>, TuningE
 
 /// The poles of a chain.
 fn negative(chain: &Value, given: &Value) -> Result<Vec<f64>, TuningError> {
-    let wrong = || TuningError::new(POLES, NUMBERS, given);
+    let wrong = || TuningError::new(POLES.name, NUMBERS, given);
     let Value::List(poles) = chain else {
         return Err(wrong());
     };
@@ -252,10 +251,9 @@ pub(crate) struct Run<'c, 'e, 'p> {
 impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
     pub fn new(
         copy: &'c Copy<'e, 'p>,
-        tuning: &Tuning,
         transient: Option<&'c Transient>,
     ) -> Result<Self, TuningError> {
-        let starts = copy.states(tuning)?.into_iter().map(|(_, start)| start);
+        let starts = copy.states()?.into_iter().map(|(_, start)| start);
         Ok(Self {
             copy,
             transient,
@@ -336,8 +334,8 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
     }
 
     /// The observer, dimension Σ max(1, 2n − 2).
-    pub fn finish(self, family: &'static str, tuning: &Tuning) -> Result<Observer, TuningError> {
-        let mut observer = self.copy.observer(family, tuning, self.derivatives)?;
+    pub fn finish(self, family: &'static str) -> Result<Observer, TuningError> {
+        let mut observer = self.copy.observer(family, self.derivatives)?;
         for (state, derivative) in self.copies {
             observer.states.push(state);
             observer.derivatives.push(derivative);

@@ -4,9 +4,12 @@
 mod departure;
 mod innovation;
 mod low_power;
+mod settings;
 pub(crate) mod transient;
 
 pub(crate) use departure::Departure;
 pub(crate) use innovation::InnovationLimit;
-pub(crate) use low_power::{LowPower, Part, Run, asked_for, factor_rows, nominal, variation};
+pub(crate) use low_power::{Part, Run, factor_rows, nominal, variation};
+pub(crate) use settings::KEYS;
+pub(crate) use settings::Remedies;
 pub(crate) use transient::Transient;

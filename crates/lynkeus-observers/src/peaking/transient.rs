@@ -5,14 +5,44 @@ use std::collections::BTreeMap;
 use lynkeus_expr::Node;
 
 use crate::estimate::Copy;
-use crate::{Tuning, TuningError, Value};
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
-pub(crate) const KEY: &str = "transient";
+pub(super) const TRANSIENT: KeySpec = KeySpec {
+    name: "transient",
+    kind: "`{ theta = …, until = …, fall = … }`",
+    shape: Shape::Section(&[&[THETA, UNTIL, FALL]]),
+    default: "none",
+    meaning: "another θ up to a time, then the study's; `fall` is the time constant of a smooth change",
+};
+
+const THETA: KeySpec = KeySpec {
+    name: "theta",
+    kind: "number > 0, or one per chain",
+    shape: Shape::POSITIVES,
+    default: REQUIRED,
+    meaning: "θ at the start",
+};
+
+const UNTIL: KeySpec = KeySpec {
+    name: "until",
+    kind: "number",
+    shape: Shape::Number,
+    default: REQUIRED,
+    meaning: "the time up to which it holds, on the axis of the study",
+};
+
+const FALL: KeySpec = KeySpec {
+    name: "fall",
+    kind: "number > 0",
+    shape: Shape::Positive,
+    default: "at once",
+    meaning: "the time constant of the change",
+};
 
 /// θ(t): one value up to `until`, the study's `theta` after it, at once or falling
 /// (or rising) to it exponentially.
-pub(crate) struct Transient {
+pub struct Transient {
     /// per chain
     pub θ: Vec<f64>,
     /// on the axis of time of the study
@@ -24,18 +54,16 @@ pub(crate) struct Transient {
 impl Transient {
     /// The key `transient`, for `count` chains.
     pub fn read(tuning: &Tuning, count: usize) -> Result<Option<Self>, TuningError> {
-        let Some(value) = tuning.values.get(KEY) else {
+        let Some(value) = tuning.values.get(TRANSIENT.name) else {
             return Ok(None);
         };
         let expected = "a table { theta = …, until = time }, and fall = time constant if the change is to be smooth";
-        let wrong = || TuningError::new(KEY, expected, value);
+        let wrong = || TuningError::new(TRANSIENT.name, expected, value);
         let Value::Table(table) = value else {
             return Err(wrong());
         };
-        if table
-            .keys()
-            .any(|k| !["theta", "until", "fall"].contains(&k.as_str()))
-        {
+        let known = |key: &String| [THETA, UNTIL, FALL].iter().any(|field| field.name == key);
+        if !table.keys().all(known) {
             return Err(wrong());
         }
         let (Some(_), Some(Value::Number(until))) = (table.get("theta"), table.get("until")) else {
@@ -51,8 +79,12 @@ impl Transient {
     }
 
     /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the steady `θ`.
-    pub fn gains(
-        &self, copy: &Copy<'_, '_>, i: usize, θ: f64, steady: &[(f64, f64)]
+    pub(crate) fn gains(
+        &self,
+        copy: &Copy<'_, '_>,
+        i: usize,
+        θ: f64,
+        steady: &[(f64, f64)],
     ) -> Vec<Node> {
         let graph = copy.extended.graph();
         let time = graph.expr(copy.extended.plant.time);
@@ -114,6 +146,10 @@ fn positive(
         ..Tuning::default()
     };
     inner.positive_per_chain(field, count).map_err(|error| {
-        TuningError::new(KEY, format!("{} for {field}", error.expected), error.found)
+        TuningError::new(
+            TRANSIENT.name,
+            format!("{} for {field}", error.expected),
+            error.found,
+        )
     })
 }

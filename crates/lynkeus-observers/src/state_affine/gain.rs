@@ -4,21 +4,20 @@
 use lynkeus_gain::UnitFactor;
 use lynkeus_structure::{Matrix, Superdiagonal};
 
-use super::settings::Settings;
+use super::settings::Numbers;
+use crate::DesignError;
 use crate::estimate::Copy;
 use crate::matrices::{Start, expressions, numbers};
-use crate::{DesignError, Tuning};
 
 pub(super) fn parameters(
     copy: &Copy<'_, '_>,
     form: &Superdiagonal,
     order: &[usize],
-    settings: &Settings,
-    tuning: &Tuning,
+    given: &Numbers,
     alarm: f64,
 ) -> Result<Vec<(String, String)>, DesignError> {
     let extended = copy.extended;
-    let start = Start::new(copy, tuning)?;
+    let start = Start::new(copy)?;
     let n = order.len();
     let place = |state: usize| order.iter().position(|&i| i == state);
     let factor = |k: usize, rows: usize, row: &dyn Fn(usize) -> Option<usize>| {
@@ -34,13 +33,13 @@ pub(super) fn parameters(
     let F = (1..form.factors.len())
         .map(|k| factor(k, n, &place))
         .reduce(|all, next| all.plus(&next));
-    let gain = gain(&start.values(&C)?, form, settings);
+    let gain = gain(&start.values(&C)?, form, given);
     let names: Vec<&str> = order
         .iter()
         .map(|&i| extended.states[i].name.as_str())
         .collect();
     let mut found: Vec<(String, String)> = vec![
-        ("θ".into(), settings.θ.to_string()),
+        ("θ".into(), given.θ.to_string()),
         ("blocks".into(), form.describe(extended)),
         ("alarm".into(), format!("excitation below {alarm:.3e}")),
         ("rows".into(), names.join(", ")),
@@ -49,7 +48,7 @@ pub(super) fn parameters(
     if let Some(F) = F {
         found.push(("F(u, x)".into(), expressions(&F)));
     }
-    found.push(("S(0)".into(), numbers(&product(&settings.S0))));
+    found.push(("S(0)".into(), numbers(&product(&given.S0))));
     found.push(("θΔ⁻¹S⁻¹Cᵀ at the start".into(), numbers(&gain)));
     Ok(found)
 }
@@ -75,8 +74,8 @@ fn U(S: &UnitFactor, k: usize, j: usize) -> f64 {
 }
 
 /// θ Δ_θ⁻¹ S(0)⁻¹ Cᵀ: by Uᵀv = Cᵀ and then Uz = D⁻¹v, as the observer has it.
-fn gain(C: &[Vec<f64>], form: &Superdiagonal, settings: &Settings) -> Vec<Vec<f64>> {
-    let (S, θ) = (&settings.S0, settings.θ);
+fn gain(C: &[Vec<f64>], form: &Superdiagonal, given: &Numbers) -> Vec<Vec<f64>> {
+    let (S, θ) = (&given.S0, given.θ);
     let n = S.diagonal.len();
     let column = |c: &Vec<f64>| {
         let mut v = c.clone();

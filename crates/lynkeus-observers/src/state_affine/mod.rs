@@ -24,19 +24,21 @@ mod settings;
 mod theorem;
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
-use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal};
+use lynkeus_structure::{Condition, Extended, Region, Superdiagonal, range, superdiagonal};
 
 use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
+use crate::stages::{FormBox, Found, Searched, Stages};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
-    Tuning,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Monitor, Observer, Tuning,
+    TuningError,
 };
 use excitation::least_eigenvalue;
 use lyapunov::{Factor, Sparse};
 use settings::Settings;
 
 const NAME: &str = "state-affine";
+const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
 
 /// The alarm is raised at this fraction of the information that the best
 /// excitation could leave in the least visible state.
@@ -46,68 +48,56 @@ const ALARM: f64 = 1e-6;
 #[derive(Clone, Copy, Debug)]
 pub struct StateAffine;
 
-impl Family for StateAffine {
-    fn name(&self) -> &'static str {
-        NAME
+impl Stages for StateAffine {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = Superdiagonal;
+    const NAME: &'static str = NAME;
+    const PAPER: &'static str = "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)";
+    const BASIS: &'static str = BASIS;
+    const FORM_BOX: FormBox = FormBox::Declared;
+    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning)
     }
 
-    fn paper(&self) -> &'static str {
-        "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)"
+    fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<Superdiagonal> {
+        form(extended, region)
     }
 
-    fn keys(&self) -> &'static [&'static str] {
-        &settings::NAMES
-    }
-
-    fn examine(
-        &self,
+    fn design(
         extended: &Extended<'_>,
-        _tuning: &Tuning,
-    ) -> Result<Examination, DesignError> {
-        Ok(match form(extended)? {
-            Ok((_, examination)) | Err(examination) => examination,
-        })
+        settings: &Settings,
+        found: Found<Superdiagonal>,
+    ) -> Result<Design, DesignError> {
+        assemble(extended, settings, &found.form, found.examination)
     }
 
     fn theorem(
-        &self,
         extended: &Extended<'_>,
-        tuning: &Tuning,
+        settings: &Settings,
+        found: Found<Superdiagonal>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, tuning, assumptions)
-    }
-
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        match form(extended)? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
-                assemble(extended, tuning, &form, examination)
-            }
-            Ok((_, examination)) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
+        theorem::certificate(extended, settings, found, assumptions)
     }
 }
 
 /// The blocks with what is known of A2 and A4.
-fn form(
-    extended: &Extended<'_>,
-) -> Result<Result<(Superdiagonal, Examination), Examination>, DesignError> {
+fn form(extended: &Extended<'_>, region: &Region) -> Searched<Superdiagonal> {
     let form = match superdiagonal::find(extended) {
         Ok(form) => form,
         Err(summary) => {
             return Ok(Err(Examination::unfit(NAME, summary, vec![])));
         }
     };
-    let region = extended.region();
     let mut checks = vec![];
     for (k, factor) in form.factors.iter().enumerate() {
-        checks.push(factor.column_rank(extended, k, &region)?);
+        checks.push(factor.column_rank(extended, k, region)?);
     }
     let rank = |c: &lynkeus_structure::Check| matches!(c.verdict, Condition::Undecided(_));
     let excited = checks.iter().any(rank);
-    checks.push(lipschitz(extended, &region)?);
+    checks.push(lipschitz(extended, region)?);
     let mut summary = form.describe(extended);
     if excited {
         summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
@@ -117,46 +107,46 @@ fn form(
         summary,
         chains: chains.collect(),
     };
-    let examination = Examination::new(extended, &region, NAME, found, checks)?;
-    Ok(Ok((form, examination)))
+    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    Ok(Ok(Found { form, examination }))
 }
 
 /// Observer (7)–(8).
 fn assemble(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
     form: &Superdiagonal,
     examination: Examination,
 ) -> Result<Design, DesignError> {
     let graph = extended.graph();
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let settings = Settings::read(tuning, &order)?;
-    let copy = Copy::new(extended, tuning);
+    let numbers = settings.numbers(&order)?;
+    let copy = Copy::new(extended, &settings.common);
     let Matrices { C, F } = Matrices::new(&copy, form, &order);
     let names: Vec<&str> = order
         .iter()
         .map(|&i| extended.states[i].name.as_str())
         .collect();
-    let factor = Factor::new(graph, &names, &settings.S0);
+    let factor = Factor::new(graph, &names, &numbers.S0);
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let powers = form
         .blocks()
         .enumerate()
-        .flat_map(|(k, block)| block.iter().map(move |_| settings.θ.powi(k as i32 + 1)));
+        .flat_map(|(k, block)| block.iter().map(move |_| numbers.θ.powi(k as i32 + 1)));
     let correction = factor.gain(&v, &innovations(&copy));
     for ((&state, power), z) in order.iter().zip(powers).zip(correction) {
         if let Some(z) = z {
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
-    derivatives.extend(factor.derivatives(settings.θ, &F, &v));
-    let alarm = alarm(extended, form, &settings)?;
-    let mut observer = copy.observer(NAME, tuning, derivatives)?;
+    derivatives.extend(factor.derivatives(numbers.θ, &F, &v));
+    let alarm = alarm(extended, form, settings)?;
+    let mut observer = copy.observer(NAME, derivatives)?;
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
-    let parameters = gain::parameters(&copy, form, &order, &settings, tuning, alarm)?;
+    let parameters = gain::parameters(&copy, form, &order, &numbers, alarm)?;
     Ok(Design {
         observer,
         notes: outside_last(extended, form).into_iter().collect(),
@@ -172,7 +162,7 @@ fn alarm(
     form: &Superdiagonal,
     settings: &Settings,
 ) -> Result<f64, DesignError> {
-    match settings.alarm {
+    match settings.alarm.clone()? {
         Some(alarm) => Ok(alarm),
         None => Ok(ALARM * least_reach(extended, form)?),
     }

@@ -1,19 +1,24 @@
 //! The study's keys.
 
 use lynkeus_gain::UnitFactor;
+use lynkeus_structure::Extended;
 
-use crate::{KeySpec, Tuning, TuningError, Value};
+use crate::estimate::Common;
+use crate::stages::Late;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
     kind: "number > 0",
-    default: "required",
+    shape: Shape::Positive,
+    default: REQUIRED,
     meaning: "the speed θ, in 1/(unit of time): the gain of block k grows like θ^k. Theorem 1 is stated for θ ≥ 1, so choose a unit of time in which the entries of F are of the order of 1",
 };
 
 const START: KeySpec = KeySpec {
     name: "S0",
     kind: "number s > 0, or a matrix as a list of rows",
+    shape: Shape::Either(&[Shape::Positive, Shape::ROWS]),
     default: "1",
     meaning: "S(0) = s·I, or the matrix; rows and columns in the order of the plant's states, then the unknown inputs",
 };
@@ -21,41 +26,55 @@ const START: KeySpec = KeySpec {
 const ALARM: KeySpec = KeySpec {
     name: "alarm",
     kind: "number > 0",
+    shape: Shape::Positive,
     default: "see below",
     meaning: "the flag is raised where `excitation` is below this",
 };
 
 /// Every key of the family.
 pub(super) const KEYS: [KeySpec; 3] = [THETA, START, ALARM];
-pub(super) static NAMES: [&str; 3] = KeySpec::names(&KEYS);
 
 /// The keys, read.
-pub(super) struct Settings {
-    pub θ: f64,
-    /// S(0) in the order of the blocks
-    pub S0: UnitFactor,
-    pub alarm: Option<f64>,
-    /// the plant's functions see the estimate limited to its range
-    pub clamp: bool,
+pub struct Settings {
+    pub common: Common,
+    θ: Late<Option<f64>>,
+    /// S(0) in the order of the plant's states
+    S0: Late<Vec<Vec<f64>>>,
+    pub alarm: Late<Option<f64>>,
 }
 
 impl Settings {
-    /// `order`: the states in the order of the blocks.
-    pub fn read(tuning: &Tuning, order: &[usize]) -> Result<Self, TuningError> {
+    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        Ok(Self {
+            common: Common::read(tuning)?,
+            θ: tuning.positive(THETA.name),
+            S0: start(tuning, extended.states.len()),
+            alarm: tuning.positive(ALARM.name),
+        })
+    }
+
+    /// The numbers of (7)–(8) with the states in this order.
+    pub(super) fn numbers(&self, order: &[usize]) -> Result<Numbers, TuningError> {
         let expected = "a positive number (the gain of block k grows like theta^k)";
         let missing = || TuningError::new(THETA.name, expected, "nothing");
-        Ok(Self {
-            θ: THETA.positive(tuning)?.ok_or_else(missing)?,
-            S0: start(tuning, order)?,
-            alarm: ALARM.positive(tuning)?,
-            clamp: tuning.clamp,
-        })
+        let θ = self.θ.clone()?.ok_or_else(missing)?;
+        let given = self.S0.as_ref().map_err(TuningError::clone)?;
+        let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
+        let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
+        let S0 = UnitFactor::new(&ordered).map_err(|error| START.wrong(error))?;
+        Ok(Numbers { θ, S0 })
     }
 }
 
+/// The numbers of (7)–(8).
+pub(super) struct Numbers {
+    pub θ: f64,
+    /// S(0) in the order of the blocks
+    pub S0: UnitFactor,
+}
+
 /// S(0): s·I for a number s, or a matrix in the order of the plant's states.
-fn start(tuning: &Tuning, order: &[usize]) -> Result<UnitFactor, TuningError> {
-    let n = order.len();
+fn start(tuning: &Tuning, n: usize) -> Late<Vec<Vec<f64>>> {
     let expected = format!(
         "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
     );
@@ -81,9 +100,7 @@ fn start(tuning: &Tuning, order: &[usize]) -> Result<UnitFactor, TuningError> {
     }
     // refused in the user's order, factored in that of the blocks
     UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
-    let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
-    let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
-    UnitFactor::new(&ordered).map_err(|error| wrong(error.to_string()))
+    Ok(given)
 }
 
 fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {

@@ -20,38 +20,35 @@ use lynkeus_proof::search::first;
 use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
 
 use super::gramian::{TAU, above, below, largest_eigenvalue};
-use super::settings::Settings;
-use super::{alarm, form};
+use super::settings::{Numbers, Settings};
+use super::{BASIS, alarm};
 use crate::proof::slopes::{magnitude, slopes, undeclared};
 use crate::proof::words::{box_note, proved, shown, undecided};
-use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, Verdict};
-
-const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
+use crate::stages::Found;
+use crate::{Assumptions, Certificate, Constant, DesignError, Verdict};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
+    Found { form, examination }: Found<Superdiagonal>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let (form, examination) = match form(extended)? {
-        Ok(found) => found,
-        Err(examination) => return Err(DesignError::Refused(Box::new(examination))),
-    };
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
-    let settings = Settings::read(tuning, &order)?;
+    let numbers = settings.numbers(&order)?;
     let block: Vec<usize> = form
         .blocks()
         .enumerate()
         .flat_map(|(k, b)| b.iter().map(move |_| k))
         .collect();
-    let alarm = alarm(extended, &form, &settings)?;
+    let alarm = alarm(extended, &form, settings)?;
     let study = Study {
         extended,
         assumptions,
         form: &form,
         order,
         block,
-        settings,
+        numbers,
+        clamp: settings.common.clamp,
         alarm,
     };
     // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
@@ -68,7 +65,8 @@ struct Study<'a> {
     order: Vec<usize>,
     /// the block of each place
     block: Vec<usize>,
-    settings: Settings,
+    numbers: Numbers,
+    clamp: bool,
     alarm: f64,
 }
 
@@ -120,7 +118,7 @@ impl Study<'_> {
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        certificate.notes.push(box_note(self.settings.clamp));
+        certificate.notes.push(box_note(self.clamp));
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, &spectrum);
         }
@@ -244,8 +242,7 @@ impl Study<'_> {
         excitation: Option<f64>,
         constants: &mut Vec<Constant>,
     ) -> Spectrum {
-        let largest =
-            largest_eigenvalue(&above(&self.settings.S0, &sizes.C, &sizes.F, &self.block));
+        let largest = largest_eigenvalue(&above(&self.numbers.S0, &sizes.C, &sizes.F, &self.block));
         let smallest = excitation.unwrap_or(self.alarm);
         let source = match excitation {
             Some(_) => "lower bound of the eigenvalues of S(t), t ≥ 10/θ",
@@ -308,7 +305,7 @@ impl Study<'_> {
             let loss = ratio * Interval::point(self.coupling(slopes, θ)) / Interval::point(θ);
             (Interval::point(0.5) - loss).lo()
         };
-        let θ = self.settings.θ;
+        let θ = self.numbers.θ;
         let θ0 = first(θ, |θ| μ(θ) > 0.0);
         let mut add = |name: &str, value: f64, meaning: &str| {
             constants.push(Constant::new(name, value, meaning));
@@ -347,7 +344,7 @@ impl Study<'_> {
     /// Rate and ultimate bounds: of the certificate where A4 is proved, else as
     /// constants that hold while the monitor raises no flag.
     fn conclude(&self, certificate: &mut Certificate, rate: f64, spectrum: &Spectrum) {
-        let θ = Interval::point(self.settings.θ);
+        let θ = Interval::point(self.numbers.θ);
         let scale = |p: usize| θ.powi(self.block[p] as i32);
         let drift = self.order.iter().enumerate().map(|(p, &state)| {
             let d = Interval::point(self.assumptions.drift[state]) / scale(p);

@@ -2,54 +2,57 @@
 
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Region};
 use nalgebra::DMatrix;
 
 use super::form::Form;
-use super::gains::{Gains, explicit};
+use super::gains::Gains;
+use super::settings::Settings;
 use crate::conditions::names;
 use crate::proof::words::undecided;
 use crate::stability::{GainedChain, listed};
-use crate::{DesignError, Fit, Tuning};
+use crate::stages::Found;
+use crate::{DesignError, Fit};
+
+/// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
+/// such a gain, as the paper's column does; where it does not even in the middle of the
+/// box, the gain is not called fit.
+pub(super) fn settle(
+    Found { form, examination }: &mut Found<Form>,
+    extended: &Extended<'_>,
+    settings: &Settings,
+    region: &Region,
+) -> Result<(), DesignError> {
+    let loose = form.loose(extended, settings);
+    if loose.is_empty() {
+        return Ok(());
+    }
+    let words = format!(
+        "with the S given A(a) − rS⁻¹CᵀC is not stable for {}; only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
+        loose.join(" and ")
+    );
+    if form.is_damped(extended, settings, region)? {
+        examination.summary += &format!("; {words}");
+        return Ok(());
+    }
+    let name = "the error decays where it is small, in the middle of the box";
+    examination.checks.push(undecided(name, words));
+    if examination.fit == Fit::Fits {
+        examination.fit = Fit::Undecided;
+    }
+    Ok(())
+}
 
 impl Form {
-    /// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
-    /// such a gain, as the paper's column does; where it does not even in the middle of the
-    /// box, the gain is not called fit.
-    pub(super) fn settle(
-        &mut self,
-        extended: &Extended<'_>,
-        tuning: &Tuning,
-    ) -> Result<(), DesignError> {
-        let loose = self.loose(extended, tuning)?;
-        if loose.is_empty() {
-            return Ok(());
-        }
-        let words = format!(
-            "with the S given A(a) − rS⁻¹CᵀC is not stable for {}; only a plant that is damped by itself converges with such a gain, Lemma 1's own S (leave the key S out) is stable",
-            loose.join(" and ")
-        );
-        if self.is_damped(extended, tuning)? {
-            self.examination.summary += &format!("; {words}");
-            return Ok(());
-        }
-        let name = "the error decays where it is small, in the middle of the box";
-        self.examination.checks.push(undecided(name, words));
-        if self.examination.fit == Fit::Fits {
-            self.examination.fit = Fit::Undecided;
-        }
-        Ok(())
-    }
-
     /// The chains that the gain does not stabilise by itself, with their eigenvalues.
-    fn loose(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Vec<String>, DesignError> {
-        let Some(S) = explicit(tuning)? else {
-            return Ok(vec![]);
+    fn loose(&self, extended: &Extended<'_>, settings: &Settings) -> Vec<String> {
+        let Some(S) = &settings.S else {
+            return vec![];
         };
         let chains = &self.assignment.chains;
-        let r = tuning.positive_per_chain("r", chains.len())?;
-        let r = r.unwrap_or(vec![1.0; chains.len()]);
-        let divided = tuning.flag("partials")?;
+        let ones = vec![1.0; chains.len()];
+        let r = settings.r.as_ref().unwrap_or(&ones);
+        let divided = settings.divided;
         let mut loose = vec![];
         for (i, chain) in chains.iter().enumerate() {
             let K: Vec<f64> = S[i].gain().into_iter().map(|s| r[i] * s).collect();
@@ -72,19 +75,23 @@ impl Form {
                 ));
             }
         }
-        Ok(loose)
+        loose
     }
 
     /// Whether the error's Jacobian at x̂ = x in the middle of the box is stable; false where
     /// the study has no θ yet.
-    fn is_damped(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<bool, MissingInput> {
-        let Ok(gains) = Gains::new(self, tuning) else {
+    fn is_damped(
+        &self,
+        extended: &Extended<'_>,
+        settings: &Settings,
+        region: &Region,
+    ) -> Result<bool, MissingInput> {
+        let Ok(gains) = Gains::new(self, settings) else {
             return Ok(false);
         };
         let n = extended.states.len();
         let graph = extended.graph();
         let jacobian = jacobian::forward(graph, &extended.derivatives, &extended.symbols());
-        let region = extended.region();
         let nodes: Vec<_> = jacobian.entries.iter().map(|e| e.2).collect();
         let mut values = vec![0.0; nodes.len()];
         Tape::new(graph, &region.symbols(), &nodes)?

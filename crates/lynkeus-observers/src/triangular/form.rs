@@ -1,55 +1,50 @@
 //! The triangular form: chains, the partials along them, condition H3.
 
-use lynkeus_gain::Tridiagonal;
-use lynkeus_structure::{Assignment, Extended, chains};
+use lynkeus_structure::{Assignment, Extended, Region, chains};
 
-use super::NAME;
-use super::gains::{Window, explicit};
-use crate::conditions::{Partial, chain_request, lipschitz, names, output_slope, partials};
+use super::gains::Window;
+use super::settings::Settings;
+use super::{NAME, damping};
+use crate::conditions::{Partial, lipschitz, names, output_slope, partials};
 use crate::family;
-use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+use crate::stages::{Found, Searched};
+use crate::{DesignError, Examination, Fit, TuningError};
 
 /// The triangular form of a plant with the facts about its partials.
-pub(super) struct Form {
+pub struct Form {
     pub assignment: Assignment,
     /// per chain, j = 1 … n−1
-    pub partials: Vec<Vec<Partial>>,
-    pub examination: Examination,
+    pub(crate) partials: Vec<Vec<Partial>>,
 }
 
 /// The first assignment whose conditions are proved, else the first that no condition
 /// refutes, else the first with its refusal; or the examination that says why there is none.
 pub(super) fn form(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-) -> Result<Result<Form, Examination>, DesignError> {
-    let given = explicit(tuning)?;
-    let sizes = given.map(|given| given.iter().map(Tridiagonal::size).collect());
-    let request = chain_request(extended, tuning, "S", sizes)?;
+    settings: &Settings,
+    region: &Region,
+) -> Searched<Form> {
     let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
-    let mut assignments = match chains::find(extended, &request) {
+    let mut assignments = match chains::find(extended, &settings.request) {
         Ok(assignments) => assignments,
         Err(summary) => return Ok(Err(refusal(summary))),
     };
-    if let Some(leading) = leading(extended, tuning)? {
+    if let Some(leading) = settings.leading {
         assignments.retain(|a| a.either || a.leading == leading);
         assignments.iter_mut().for_each(|a| a.leading = leading);
         if assignments.is_empty() {
             let summary = "the chain that 'leading' names cannot lead: beside its last equation it reads the other chain's hidden states";
             return Ok(Err(refusal(summary.into())));
         }
-    } else {
-        let count = extended.outputs.len();
-        if let Some(δ) = tuning.positive_per_chain("delta", count)? {
-            assignments
-                .iter_mut()
-                .for_each(|a| lead_within_window(a, &δ));
-        }
+    } else if let Some(δ) = &settings.δ {
+        assignments
+            .iter_mut()
+            .for_each(|a| lead_within_window(a, δ));
     }
     let choices = assignments.len();
-    let mut best: Option<Form> = None;
+    let mut best: Option<Found<Form>> = None;
     for assignment in assignments {
-        let form = examined(extended, tuning, assignment, choices)?;
+        let form = examined(extended, settings, region, assignment, choices)?;
         match form.examination.fit {
             Fit::Fits => return Ok(Ok(form)),
             Fit::Undecided
@@ -69,17 +64,6 @@ pub(super) fn form(
         .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
 }
 
-/// The chain that the study lets lead, by the place of its output.
-fn leading(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
-    let outputs: Vec<&str> = extended
-        .outputs
-        .iter()
-        .map(|o| o.variable.name.as_str())
-        .collect();
-    let name = tuning.choice("leading", &outputs)?;
-    Ok(name.and_then(|name| outputs.iter().position(|o| *o == name)))
-}
-
 /// Where either chain can lead, the one for which the given exponents lie in the window.
 fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
     let holds = |a: &Assignment| Window::of(a, δ).is_none_or(|w| w.holds());
@@ -95,19 +79,19 @@ fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
 /// Condition H3 for one assignment.
 fn examined(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
+    region: &Region,
     assignment: Assignment,
     choices: usize,
-) -> Result<Form, DesignError> {
-    let region = extended.region();
+) -> Result<Found<Form>, DesignError> {
     let (mut checks, mut all) = (vec![], vec![]);
     for (i, chain) in assignment.chains.iter().enumerate() {
-        checks.extend(output_slope(extended, i, &region)?);
-        let (found, signs) = partials(extended, &chain.states, &region)?;
+        checks.extend(output_slope(extended, i, region)?);
+        let (found, signs) = partials(extended, &chain.states, region)?;
         checks.extend(signs);
         all.push(found);
     }
-    checks.push(lipschitz(extended, &region)?);
+    checks.push(lipschitz(extended, region)?);
     let chains = assignment
         .chains
         .iter()
@@ -126,12 +110,12 @@ fn examined(
         );
     }
     let found = family::Form { summary, chains };
-    let examination = Examination::new(extended, &region, NAME, found, checks)?;
-    let mut form = Form {
+    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let form = Form {
         assignment,
         partials: all,
-        examination,
     };
-    form.settle(extended, tuning)?;
-    Ok(form)
+    let mut found = Found { form, examination };
+    damping::settle(&mut found, extended, settings, region)?;
+    Ok(found)
 }

@@ -5,43 +5,44 @@ use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
 use lynkeus_structure::Assignment;
 
 use super::form::Form;
+use super::settings::Settings;
+use crate::TuningError;
 use crate::conditions::Partial;
 use crate::estimate::Copy;
 use crate::peaking::{Transient, transient};
-use crate::{Tuning, TuningError};
 
 /// The numbers of the gain.
-pub(super) struct Gains {
+pub(super) struct Gains<'s> {
     pub θ: Vec<f64>,
     pub δ: Vec<f64>,
     pub r: Vec<f64>,
     pub S: Vec<Tridiagonal>,
     pub divided: bool,
-    pub transient: Option<Transient>,
+    pub transient: Option<&'s Transient>,
     pub notes: Vec<String>,
 }
 
-impl Gains {
-    pub fn new(form: &Form, tuning: &Tuning) -> Result<Self, TuningError> {
+impl<'s> Gains<'s> {
+    pub fn new(form: &Form, settings: &'s Settings) -> Result<Self, TuningError> {
         let count = form.assignment.chains.len();
-        let θ = theta(tuning, count)?;
-        let divided = tuning.flag("partials")?;
-        let (S, ρ) = match explicit(tuning)? {
-            Some(S) => (S, None),
+        let θ = settings.θ()?;
+        let divided = settings.divided;
+        let (S, ρ) = match &settings.S {
+            Some(S) => (S.clone(), None),
             None => lemma1_matrices(form, divided)?,
         };
-        let r = match tuning.positive_per_chain("r", count)? {
-            Some(r) => r,
+        let r = match &settings.r {
+            Some(r) => r.clone(),
             // (9) with r = ρ/2; an explicit S comes without its ρ: the example's r = 1
             None => vec![ρ.map_or(1.0, |ρ| ρ / 2.0); count],
         };
         let mut gains = Self {
             θ,
-            δ: exponents(form, tuning)?,
+            δ: exponents(form, settings),
             r,
             S,
             divided,
-            transient: Transient::read(tuning, count)?,
+            transient: settings.remedies.transient.as_ref(),
             notes: vec![],
         };
         let window = Window::of(&form.assignment, &gains.δ);
@@ -61,7 +62,7 @@ impl Gains {
         let exponent = |j: usize| self.δ[i] * (j + 1) as f64;
         let constants = self.chain(i).into_iter().enumerate();
         let steady: Vec<(f64, f64)> = constants.map(|(j, gain)| (gain, exponent(j))).collect();
-        transient::gains(self.transient.as_ref(), copy, i, self.θ[i], &steady)
+        transient::gains(self.transient, copy, i, self.θ[i], &steady)
     }
 
     /// The numbers, for the reader.
@@ -75,22 +76,13 @@ impl Gains {
             ("δ".to_owned(), list(&self.δ)),
             ("r".to_owned(), list(&self.r)),
         ];
-        rows.extend(self.transient.as_ref().map(Transient::parameter));
+        rows.extend(self.transient.map(Transient::parameter));
         for (i, s) in self.S.iter().enumerate() {
             rows.push((format!("S{} diagonal", i + 1), list(s.diagonal())));
             rows.push((format!("S{} beside it", i + 1), list(s.off_diagonal())));
         }
         rows
     }
-}
-
-/// θ, which has no default.
-pub(super) fn theta(tuning: &Tuning, chains: usize) -> Result<Vec<f64>, TuningError> {
-    let expected = "a positive number (the gain grows like theta^n)";
-    let missing = || TuningError::new("theta", expected, "nothing");
-    tuning
-        .positive_per_chain("theta", chains)?
-        .ok_or_else(missing)
 }
 
 fn lemma1_matrices(
@@ -128,17 +120,17 @@ fn lemma1_matrices(
 
 /// δ: given, or δ = 1 for the leading chain and 2n₁/(2n₂−1) for the other, the
 /// middle of Theorem 2's window.
-pub(super) fn exponents(form: &Form, tuning: &Tuning) -> Result<Vec<f64>, TuningError> {
-    let lengths = form.assignment.lengths();
-    if let Some(δ) = tuning.positive_per_chain("delta", lengths.len())? {
-        return Ok(δ);
+pub(super) fn exponents(form: &Form, settings: &Settings) -> Vec<f64> {
+    if let Some(δ) = &settings.δ {
+        return δ.clone();
     }
+    let lengths = form.assignment.lengths();
     let lead = form.assignment.leading;
     let exponent = |i: usize| match i == lead {
         true => 1.0,
         false => 2.0 * lengths[lead] as f64 / (2.0 * lengths[i] as f64 - 1.0),
     };
-    Ok((0..lengths.len()).map(exponent).collect())
+    (0..lengths.len()).map(exponent).collect()
 }
 
 /// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁.
@@ -175,30 +167,4 @@ impl Window {
             format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
         })
     }
-}
-
-/// S as the study gives it.
-pub(super) fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
-    let Some(tables) = tuning.number_tables("S", &["diag", "off"])? else {
-        return Ok(None);
-    };
-    let matrix = |(i, mut table): (usize, Vec<Vec<f64>>)| {
-        let (off, diagonal) = (
-            table.pop().unwrap_or_default(),
-            table.pop().unwrap_or_default(),
-        );
-        Tridiagonal::new(diagonal, off).map_err(|error| {
-            TuningError::new(
-                "S",
-                format!("a positive definite tridiagonal matrix as entry {}", i + 1),
-                error,
-            )
-        })
-    };
-    tables
-        .into_iter()
-        .enumerate()
-        .map(matrix)
-        .collect::<Result<_, _>>()
-        .map(Some)
 }

@@ -8,31 +8,33 @@ use lynkeus_structure::Extended;
 
 use super::NAME;
 use super::form::Form;
-use super::gains::{Window, exponents, theta};
+use super::gains::{Window, exponents};
+use super::settings::Settings;
 use crate::conditions::Partial;
 use crate::estimate::Copy;
-use crate::peaking::{
-    InnovationLimit, LowPower, Part, Run, Transient, factor_rows, nominal, variation,
-};
-use crate::{Design, Tuning, TuningError, prolongation};
+use crate::peaking::{Part, Run, Transient, factor_rows, nominal, variation};
+use crate::stages::Found;
+use crate::{Design, TuningError, prolongation};
 
 pub(super) fn assemble(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-    form: Form,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
 ) -> Result<Design, TuningError> {
-    prolongation::refuse(tuning, "form = \"low-power\"")?;
+    let Settings {
+        common, remedies, ..
+    } = settings;
+    prolongation::refuse(common, "form = \"low-power\"")?;
     let chains = &form.assignment.chains;
-    let (θ, δ) = (theta(tuning, chains.len())?, exponents(&form, tuning)?);
-    let transient = Transient::read(tuning, chains.len())?;
-    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
-    let coefficients = LowPower::read(tuning, &form.assignment.lengths())?;
-    let divided = tuning.flag("partials")?;
-    let copy = Copy::new(extended, tuning);
-    let mut run = Run::new(&copy, tuning, transient.as_ref())?;
+    let (θ, δ) = (settings.θ()?, exponents(&form, settings));
+    let transient = remedies.transient.as_ref();
+    let coefficients = remedies.coefficients(&form.assignment.lengths())?;
+    let divided = settings.divided;
+    let copy = Copy::new(extended, common);
+    let mut run = Run::new(&copy, transient)?;
     let (mut factors, mut notes) = (vec![], vec![]);
     for (i, chain) in chains.iter().enumerate() {
-        let Some(innovation) = limit.innovation(&copy, i) else {
+        let Some(innovation) = remedies.limit.innovation(&copy, i) else {
             continue;
         };
         let derivative = |&state: &usize| extended.derivatives[state];
@@ -63,12 +65,12 @@ pub(super) fn assemble(
             .join(", ")
     };
     let mut parameters = vec![("θ".to_owned(), list(&θ)), ("δ".to_owned(), list(&δ))];
-    parameters.extend(transient.as_ref().map(Transient::parameter));
+    parameters.extend(transient.map(Transient::parameter));
     parameters.extend(coefficients.parameters());
     parameters.extend(factors);
     Ok(Design {
-        observer: run.finish(NAME, tuning)?,
-        examination: form.examination,
+        observer: run.finish(NAME)?,
+        examination,
         gains: vec![],
         parameters,
         notes,

@@ -15,111 +15,88 @@ mod form;
 mod gains;
 mod lemma;
 mod low_power;
+mod settings;
 mod theorem;
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Region};
 
 use crate::conditions::Partial;
 use crate::correction::{Correction, Start};
 use crate::estimate::Copy;
-use crate::peaking::{self, InnovationLimit, LowPower};
-use crate::prolongation::{self, Continued, prolong};
+use crate::prolongation::{Continued, prolong};
+use crate::stages::{FormBox, Found, Searched, Stages};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
 };
-use form::{Form, form};
+use form::Form;
 use gains::Gains;
+use settings::Settings;
 
 const NAME: &str = "triangular";
+const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
 
 /// The family `triangular`.
 #[derive(Clone, Copy, Debug)]
 pub struct Triangular;
 
-impl Family for Triangular {
-    fn name(&self) -> &'static str {
-        NAME
+impl Stages for Triangular {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = Form;
+    const NAME: &'static str = NAME;
+    const PAPER: &'static str = "Hammouri, Targui, Armanet 2002, doi:10.1002/rnc.638";
+    const BASIS: &'static str = BASIS;
+    const FORM_BOX: FormBox = FormBox::Declared;
+    const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning)
     }
 
-    fn paper(&self) -> &'static str {
-        "Hammouri, Targui, Armanet 2002, doi:10.1002/rnc.638"
+    fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
+        form::form(extended, settings, region)
     }
 
-    fn keys(&self) -> &'static [&'static str] {
-        &[
-            "theta",
-            "delta",
-            "r",
-            "gain",
-            "S",
-            "partials",
-            "chains",
-            "leading",
-            "prolong",
-            "rate",
-            "gain_limit",
-            "minimise",
-            "innovation_limit",
-            "transient",
-            "form",
-            "low_power_poles",
-            "low_power_k",
-        ]
-    }
-
-    fn examine(
-        &self,
+    fn design(
         extended: &Extended<'_>,
-        tuning: &Tuning,
-    ) -> Result<Examination, DesignError> {
-        LowPower::refuse_unstable(tuning)?;
-        Ok(match form(extended, tuning)? {
-            Ok(form) => form.examination,
-            Err(examination) => examination,
-        })
-    }
-
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        let form = match form(extended, tuning)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => form,
-            Ok(Form { examination, .. }) | Err(examination) => {
-                return Err(DesignError::Refused(Box::new(examination)));
-            }
-        };
-        if guarantee::asked_for(tuning, &["lemma1"])? {
-            prolongation::refuse(tuning, "gain = \"lmi\"")?;
-            return guarantee::design_lmi(extended, tuning, NAME, form.examination);
+        settings: &Settings,
+        found: Found<Form>,
+    ) -> Result<Design, DesignError> {
+        if let Some(lmi) = settings.lmi {
+            let examination = found.examination;
+            return guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination);
         }
-        if peaking::asked_for(tuning, &["S", "r", "gain"])? {
-            return Ok(low_power::assemble(extended, tuning, form)?);
+        if settings.remedies.low_power {
+            return Ok(low_power::assemble(extended, settings, found)?);
         }
-        let gains = Gains::new(&form, tuning)?;
-        Ok(assemble(extended, tuning, form, &gains)?)
+        let Found { form, examination } = found;
+        let gains = Gains::new(&form, settings)?;
+        Ok(observer(extended, settings, &form, &gains, examination)?)
     }
 
     fn theorem(
-        &self,
         extended: &Extended<'_>,
-        tuning: &Tuning,
+        settings: &Settings,
+        found: Found<Form>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        theorem::certificate(extended, tuning, assumptions)
+        theorem::certificate(extended, settings, found, assumptions)
     }
 }
 
 /// Observer (9).
-fn assemble(
+fn observer(
     extended: &Extended<'_>,
-    tuning: &Tuning,
-    form: Form,
-    gains: &Gains,
+    settings: &Settings,
+    form: &Form,
+    gains: &Gains<'_>,
+    examination: Examination,
 ) -> Result<Design, TuningError> {
     let graph = extended.graph();
-    let copy = Copy::new(extended, tuning);
-    let limit = InnovationLimit::read(tuning, extended.outputs.len())?;
-    let start = Start::new(&copy, tuning)?;
+    let copy = Copy::new(extended, &settings.common);
+    let limit = &settings.remedies.limit;
+    let start = Start::new(&copy)?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let (mut table, mut parameters) = (vec![], gains.parameters());
     for (i, chain) in form.assignment.chains.iter().enumerate() {
@@ -147,13 +124,13 @@ fn assemble(
             }
         }
     }
-    prolong(&copy, tuning, continued(&form), &mut derivatives)?;
+    prolong(&copy, continued(form), &mut derivatives)?;
     Ok(Design {
-        observer: copy.observer(NAME, tuning, derivatives)?,
+        observer: copy.observer(NAME, derivatives)?,
         parameters,
         notes: gains.notes.clone(),
         gains: table,
-        examination: form.examination,
+        examination,
     })
 }
 

@@ -14,19 +14,19 @@ use lynkeus_proof::chain::{Chain, Comparison, Disturbance, ultimate};
 use lynkeus_proof::search::{first, lightest};
 use lynkeus_structure::{Check, Extended};
 
-use super::Triangular;
 use super::facts::{Facts, remainder, without_bounds};
-use super::form::{Form, form};
+use super::form::Form;
 use super::gains::{Gains, Window};
 use super::lemma::verify;
+use super::settings::Settings;
+use super::{BASIS, observer};
 use crate::conditions::{fit, names};
 use crate::peaking::Departure;
 use crate::prolongation;
 use crate::proof::threshold::reached;
 use crate::proof::words::{conclude, proved, shown, state_noise, undecided};
-use crate::{Assumptions, Certificate, Constant, DesignError, Family, Fit, Tuning};
-
-const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
+use crate::stages::Found;
+use crate::{Assumptions, Certificate, Constant, DesignError, Fit};
 
 /// How much the gain may differ from the computed one, relatively: rounding of
 /// the powers of θ in the observer.
@@ -34,17 +34,14 @@ const GAIN_ERROR: f64 = 1e-12;
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
-    tuning: &Tuning,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
-    let form = match form(extended, tuning)? {
-        Ok(form) => form,
-        Err(examination) => return Err(DesignError::Refused(Box::new(examination))),
-    };
     let region = &assumptions.region;
     let facts = Facts::new(extended, &form, region)?;
     let mut checks = facts.checks.clone();
-    if let Some(departure) = Departure::of(tuning, &["lemma1"])? {
+    if let Some(departure) = Departure::of(settings.lmi.as_ref(), &settings.remedies) {
         checks
             .push(departure.check("the observer is (9) with a constant gain from a tridiagonal S"));
         return Ok(Certificate::new(BASIS, assumptions, checks));
@@ -54,7 +51,7 @@ pub(super) fn certificate(
         .iter()
         .flatten()
         .any(|&(low, high)| !(low > 0.0 && high.is_finite()));
-    let given = tuning.values.contains_key("S") || tuning.flag("partials")?;
+    let given = settings.S.is_some() || settings.divided;
     if unbounded {
         checks.extend(without_bounds(extended, &form, &facts, region));
     }
@@ -64,11 +61,14 @@ pub(super) fn certificate(
         return Ok(certificate);
     }
     // the observer under study, for its refusals and its gain
-    Triangular.design(extended, tuning)?;
-    let gains = Gains::new(&form, tuning)?;
+    if examination.fit == Fit::DoesNotFit {
+        return Err(DesignError::Refused(Box::new(examination)));
+    }
+    let gains = Gains::new(&form, settings)?;
+    observer(extended, settings, &form, &gains, examination)?;
     Study {
         extended,
-        tuning,
+        settings,
         assumptions,
         form: &form,
         facts: &facts,
@@ -79,11 +79,11 @@ pub(super) fn certificate(
 
 struct Study<'a> {
     extended: &'a Extended<'a>,
-    tuning: &'a Tuning,
+    settings: &'a Settings,
     assumptions: &'a Assumptions,
     form: &'a Form,
     facts: &'a Facts,
-    gains: &'a Gains,
+    gains: &'a Gains<'a>,
 }
 
 impl Study<'_> {
@@ -120,7 +120,11 @@ impl Study<'_> {
         };
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        let place = prolongation::note(self.tuning, self.extended, &self.assumptions.region);
+        let place = prolongation::note(
+            &self.settings.common,
+            self.extended,
+            &self.assumptions.region,
+        );
         certificate.notes.push(place);
         certificate.notes.extend(broken.then(|| BROKEN.to_owned()));
         if let Some((σ, c)) = rate {

@@ -13,26 +13,25 @@ use super::matrices::Matrices;
 use super::settings::{Settings, Thetas};
 use crate::estimate::{Copy, limited};
 use crate::matrices::Start;
-use crate::{Design, DesignError, Examination, Tuning};
+use crate::{Design, DesignError, Examination};
 
 pub(super) fn design(
     extended: &Extended<'_>,
-    tuning: &Tuning,
     settings: &Settings,
     form: &Form<'_, '_>,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    let chosen = match settings.thetas {
+    let chosen = match settings.thetas.clone()? {
         Some(thetas) => Choice::given(thetas),
         None => bound::thetas(form)?,
     };
-    let copy = Copy::new(extended, tuning);
+    let copy = Copy::new(extended, &settings.common);
     let thetas = chosen.thetas;
     let derivatives = derivatives(form, &copy, settings, &thetas);
-    let start = Start::new(&copy, tuning)?;
+    let start = Start::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy.observer(NAME, tuning, derivatives)?,
+        observer: copy.observer(NAME, derivatives)?,
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
         notes: chosen.notes,
@@ -127,7 +126,7 @@ fn at_tilde<'p>(
             let hat = graph.expr(copy.hats[state].symbol);
             let tilde = (hat - graph.expr(D_e1[k - 1].node(row, 0))).node();
             let variable = &extended.states[state];
-            let image = match settings.clamp {
+            let image = match settings.common.clamp {
                 true => limited(graph, tilde, variable),
                 false => tilde,
             };

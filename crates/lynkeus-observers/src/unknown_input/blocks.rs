@@ -36,7 +36,7 @@ impl Form<'_, '_> {
         (1..=self.q()).map(|k| self.block(k).len()).collect()
     }
 
-    pub fn shape(&self) -> Shape {
+    pub(super) fn shape(&self) -> Shape {
         let sizes = self.sizes();
         match sizes[1..].windows(2).all(|pair| pair[0] == pair[1]) {
             false => Shape::Narrowing,

@@ -5,7 +5,7 @@ use lynkeus_structure::{Extended, Layers, Matrix};
 
 /// A plant in layers with its measured states split as (H4) asks.
 #[derive(Clone, Debug)]
-pub(super) struct Form<'e, 'p> {
+pub struct Form<'e, 'p> {
     pub extended: &'e Extended<'p>,
     pub layers: Layers<'p>,
     /// measured outputs of x₁¹

@@ -29,9 +29,10 @@ mod partition;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Region};
 
-use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use settings::Settings;
 
 const NAME: &str = "unknown-input";
@@ -40,61 +41,41 @@ const NAME: &str = "unknown-input";
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownInput;
 
-impl Family for UnknownInput {
-    fn name(&self) -> &'static str {
-        NAME
+impl Stages for UnknownInput {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = form::Form<'e, 'p>;
+    const NAME: &'static str = NAME;
+    const PAPER: &'static str = "Farza, M'Saad, Liu, Targui 2005, observer (14)";
+    const BASIS: &'static str = theorem::BASIS;
+    const FORM_BOX: FormBox = FormBox::Assumed;
+    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning)
     }
 
-    fn paper(&self) -> &'static str {
-        "Farza, M'Saad, Liu, Targui 2005, observer (14)"
+    fn form<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Settings,
+        region: &Region,
+    ) -> Searched<form::Form<'e, 'p>> {
+        partition::search(extended, settings, region)
     }
 
-    fn keys(&self) -> &'static [&'static str] {
-        &settings::NAMES
+    fn design<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Settings,
+        found: Found<form::Form<'e, 'p>>,
+    ) -> Result<Design, DesignError> {
+        assemble::design(extended, settings, &found.form, found.examination)
     }
 
-    fn examine(
-        &self,
-        extended: &Extended<'_>,
-        tuning: &Tuning,
-    ) -> Result<Examination, DesignError> {
-        let settings = Settings::of_form(tuning, extended)?;
-        let found = partition::search(extended, &settings, &extended.region())?;
-        Ok(match found {
-            Ok((_, examination)) | Err(examination) => examination,
-        })
-    }
-
-    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
-        let settings = Settings::read(tuning, extended)?;
-        match partition::search(extended, &settings, &extended.region())? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
-                assemble::design(extended, tuning, &settings, &form, examination)
-            }
-            Ok((_, examination)) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
-    }
-
-    fn theorem(
-        &self,
-        extended: &Extended<'_>,
-        tuning: &Tuning,
+    fn theorem<'e, 'p>(
+        _: &'e Extended<'p>,
+        settings: &Settings,
+        found: Found<form::Form<'e, 'p>>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        let settings = Settings::read(tuning, extended)?;
-        match partition::search(extended, &settings, &assumptions.region)? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
-                theorem::certificate(&form, examination, &settings, assumptions)
-            }
-            Ok((_, examination)) | Err(examination) if examination.refuted().is_some() => {
-                let checks = examination.checks;
-                Ok(Certificate::new(theorem::BASIS, assumptions, checks))
-            }
-            Ok((_, examination)) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
-        }
+        theorem::certificate(&found.form, found.examination, settings, assumptions)
     }
 }

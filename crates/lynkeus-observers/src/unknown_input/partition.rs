@@ -9,6 +9,7 @@ use super::form::Form;
 use super::settings::{Settings, wrong_size};
 use crate::conditions::{fit, lipschitz, names, output_slope};
 use crate::family;
+use crate::stages::{Found, Searched};
 use crate::{DesignError, Examination, Fit, TuningError};
 
 /// More partitions are not tried.
@@ -16,15 +17,13 @@ const MAX_PARTITIONS: usize = 500;
 /// Nor more only to advise one.
 const MAX_ADVISED: usize = 20;
 
-type Found<'e, 'p> = Result<(Form<'e, 'p>, Examination), Examination>;
-
 /// The first partition whose conditions are proved, else the first that nothing
 /// refutes; else the examination that says why there is none.
 pub(super) fn search<'e, 'p>(
     extended: &'e Extended<'p>,
     settings: &Settings,
     region: &Region,
-) -> Result<Found<'e, 'p>, DesignError> {
+) -> Searched<Form<'e, 'p>> {
     let layers = match layers::find(extended) {
         Ok(layers) => layers,
         Err(summary) => {
@@ -199,7 +198,7 @@ fn finish<'e, 'p>(
     region: &Region,
     shared: Vec<Check>,
     own: Vec<Check>,
-) -> Result<(Form<'e, 'p>, Examination), MissingInput> {
+) -> Result<Found<Form<'e, 'p>>, MissingInput> {
     let extended = form.extended;
     let checks = [shared, own].concat();
     let mut chains = vec![names(extended, &form.x11())];
@@ -214,7 +213,7 @@ fn finish<'e, 'p>(
     );
     let found = family::Form { summary, chains };
     let examination = Examination::new(extended, region, NAME, found, checks)?;
-    Ok((form, examination))
+    Ok(Found { form, examination })
 }
 
 /// No partition: the conditions of the one that went furthest.

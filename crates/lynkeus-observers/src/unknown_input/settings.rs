@@ -2,11 +2,14 @@
 
 use lynkeus_structure::Extended;
 
-use crate::{KeySpec, Tuning, TuningError, Value};
+use crate::estimate::Common;
+use crate::stages::Late;
+use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
     kind: "list of two numbers > 0, [θ1, θ2]",
+    shape: Shape::List(&Shape::Positive),
     default: "from the proof, where a bound exists",
     meaning: "θ1 for the unknown inputs and x₁¹, θ2 for the rest",
 };
@@ -14,46 +17,37 @@ const THETA: KeySpec = KeySpec {
 const PARTITION: KeySpec = KeySpec {
     name: "partition",
     kind: "list of measured outputs",
+    shape: Shape::NAMES,
     default: "found",
     meaning: "the outputs of x₁¹",
 };
 
 /// Every key of the family.
 pub(super) const KEYS: [KeySpec; 2] = [THETA, PARTITION];
-pub(super) static NAMES: [&str; 2] = KeySpec::names(&KEYS);
 
 /// θ₁ and θ₂.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Thetas {
+pub struct Thetas {
     pub θ1: f64,
     pub θ2: f64,
 }
 
 /// The keys, read.
-pub(super) struct Settings {
-    /// none where the proof is to choose them
-    pub thetas: Option<Thetas>,
+pub struct Settings {
+    pub common: Common,
+    /// none where the proof is to choose them; `theta` belongs to other families too, with
+    /// another shape
+    pub thetas: Late<Option<Thetas>>,
     /// places of the measured outputs of x₁¹ in ascending order; none to search them
     pub partition: Option<Vec<usize>>,
-    /// the plant's functions see the estimate limited to its range
-    pub clamp: bool,
 }
 
 impl Settings {
-    pub fn read(tuning: &Tuning, extended: &Extended<'_>) -> Result<Self, TuningError> {
+    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         Ok(Self {
-            thetas: thetas(tuning)?,
-            ..Self::of_form(tuning, extended)?
-        })
-    }
-
-    /// What the form depends on. `theta` belongs to other families too, with another
-    /// shape: where `auto` only examines the plant it is not read.
-    pub fn of_form(tuning: &Tuning, extended: &Extended<'_>) -> Result<Self, TuningError> {
-        Ok(Self {
-            thetas: None,
+            common: Common::read(tuning)?,
+            thetas: thetas(tuning),
             partition: partition(tuning, extended)?,
-            clamp: tuning.clamp,
         })
     }
 }

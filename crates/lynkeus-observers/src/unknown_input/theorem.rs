@@ -32,10 +32,11 @@ pub(super) fn certificate(
     settings: &Settings,
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
+    let given = settings.thetas.clone()?;
     let norms = constants::norms(form, assumptions)?;
     let c = norms.constants();
     let chosen = || bound::thetas(form).ok().map(|choice| choice.thetas);
-    let thetas = settings.thetas.or_else(chosen);
+    let thetas = given.or_else(chosen);
     let proof = Proof { form, norms, c };
     let mut hypotheses = examination.checks;
     hypotheses.push(proof.norms.blocks.clone());

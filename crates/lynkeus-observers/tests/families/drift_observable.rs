@@ -483,6 +483,6 @@ fn keys_that_cannot_be_used_are_named() {
         negative
             .unwrap_err()
             .to_string()
-            .contains("alpha: expected positive")
+            .contains("alpha: expected a positive number")
     );
 }

@@ -112,6 +112,8 @@ enum Command {
         #[command(flatten)]
         options: tune::Options,
     },
+    /// The JSON Schema of a study, for editors that complete and check TOML
+    Schema,
 }
 
 /// When `check` stops looking: what is decided by then is told.
@@ -221,5 +223,9 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             run::estimate(&Study::load(study)?, &log, &output)
         }
         Command::Tune { study, options } => tune::tune(&study, &options),
+        Command::Schema => {
+            output::print(&format!("{:#}\n", lynkeus::schema()))?;
+            Ok(ExitCode::SUCCESS)
+        }
     }
 }

@@ -1,10 +1,9 @@
 //! `[box]` and `[certify]`: where a guarantee is asked for, and against what.
 
 use super::Name;
+use super::keys::CERTIFY;
 use super::section::Entry;
 use crate::Error;
-
-const KEYS: &[&str] = &["tube", "slew", "input_derivatives"];
 
 /// Ranges narrower than the model's `min` and `max`: (name, smallest, largest). An array's
 /// name stands for every element.
@@ -22,7 +21,7 @@ pub struct CertifySettings {
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<CertifySettings, Error> {
-    let mut section = entry.section("[certify]", KEYS)?;
+    let mut section = entry.section("[certify]", &CERTIFY)?;
     Ok(CertifySettings {
         tube: section.optional("tube", Entry::positive)?,
         slew: section

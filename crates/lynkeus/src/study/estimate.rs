@@ -1,20 +1,10 @@
 //! `[estimate]`: how a log is replayed.
 
 use super::Name;
+use super::keys::{ESTIMATE, INTEGRATOR};
 use super::section::Entry;
 use super::simulate::{self, Method};
 use crate::Error;
-
-const KEYS: &[&str] = &[
-    "between_samples",
-    "method",
-    "step",
-    "substeps",
-    "rtol",
-    "atol",
-    "time",
-    "columns",
-];
 
 /// How a log is replayed.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +41,7 @@ impl Default for EstimateSettings {
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
-    let mut section = entry.section("[estimate]", KEYS)?;
+    let mut section = entry.section("[estimate]", &[&ESTIMATE[..], &INTEGRATOR].concat())?;
     let defaults = EstimateSettings::default();
     Ok(EstimateSettings {
         between_samples: section

@@ -21,7 +21,9 @@
 
 mod certify;
 mod estimate;
+mod keys;
 mod observer;
+mod schema;
 mod section;
 mod sensors;
 mod simulate;
@@ -37,6 +39,7 @@ use toml::de::DeTable;
 pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings};
 pub use observer::ObserverSettings;
+pub use schema::schema;
 pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
@@ -45,20 +48,6 @@ pub use tune::{Scale, TuneSettings, Values};
 use crate::Error;
 use section::Section;
 use source::Source;
-
-const KEYS: &[&str] = &[
-    "plant",
-    "model",
-    "parameters",
-    "sensors",
-    "observer",
-    "box",
-    "certify",
-    "simulate",
-    "estimate",
-    "tune",
-    "plot",
-];
 
 /// A study: everything beside the plant's equations.
 #[derive(Clone, Debug, Default)]
@@ -139,7 +128,8 @@ impl Study {
             text,
         };
         let table = DeTable::parse(text).map_err(|e| not_toml(&source, &e))?;
-        let mut top = Section::new(&source, "the study", table.into_inner(), KEYS)?;
+        let known = [&keys::KEYS[..], &keys::SECTIONS].concat();
+        let mut top = Section::new(&source, "the study", table.into_inner(), &known)?;
         let simulate = top.optional("simulate", simulate::read)?;
         let (show, time_unit) = top.optional("plot", plot)?.unwrap_or_default();
         Ok(Self {
@@ -187,7 +177,7 @@ fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error>
 
 /// `show` and `time_unit` of `[plot]`.
 fn plot(entry: section::Entry<'_>) -> Result<(Option<Vec<Name>>, Option<String>), Error> {
-    let mut section = entry.section("[plot]", &["show", "time_unit"])?;
+    let mut section = entry.section("[plot]", &keys::PLOT)?;
     let show = section.optional("show", |e| e.list_of(section::Entry::name))?;
     let unit = section.optional("time_unit", section::Entry::name)?;
     Ok((show, unit.map(|name| name.text)))

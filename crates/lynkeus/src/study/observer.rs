@@ -5,13 +5,14 @@
 
 use std::collections::BTreeMap;
 
-use lynkeus_observers::{DesignError, FAMILIES, Family, Initial, Tuning, TuningError, Value};
+use lynkeus_observers::{
+    DesignError, FAMILIES, Family, Initial, KeySpec, Tuning, TuningError, Value,
+};
 
+use super::keys::OBSERVER;
 use super::section::{Entry, Section};
 use super::{Name, Place};
 use crate::Error;
-
-const COMMON: &[&str] = &["family", "initial", "clamp"];
 
 /// The observer's family and tuning.
 #[derive(Clone, Debug, Default)]
@@ -32,11 +33,7 @@ impl ObserverSettings {
             .copied()
             .filter(|family| match &self.family {
                 Some(name) => family.name() == name.text,
-                None => self
-                    .tuning
-                    .values
-                    .keys()
-                    .all(|key| family.keys().contains(&key.as_str())),
+                None => self.tuning.values.keys().all(|key| family.owns(key)),
             })
     }
 
@@ -63,8 +60,8 @@ impl ObserverSettings {
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
-    let owned = FAMILIES.iter().flat_map(|family| family.keys());
-    let known: Vec<&str> = COMMON.iter().chain(owned).copied().collect();
+    let owned: Vec<KeySpec> = FAMILIES.iter().flat_map(|f| f.keys()).copied().collect();
+    let known: Vec<KeySpec> = OBSERVER.iter().chain(&owned).copied().collect();
     let mut section = entry.section("[observer]", &known)?;
     let family = section.optional("family", family)?.flatten();
     let mut settings = ObserverSettings {
@@ -78,13 +75,13 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
         places: BTreeMap::new(),
         family,
     };
-    for key in known {
+    for key in owned.iter().map(|spec| spec.name) {
         let Some(entry) = section.take(key) else {
             continue;
         };
         if let Some(family) = settings.families().next()
             && settings.family.is_some()
-            && !family.keys().contains(&key)
+            && !family.owns(key)
         {
             return Err(foreign(&entry, key, family));
         }
@@ -102,13 +99,14 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
 fn foreign(entry: &Entry<'_>, key: &str, asked: &dyn Family) -> Error {
     let owners: Vec<&str> = FAMILIES
         .iter()
-        .filter(|family| family.keys().contains(&key))
+        .filter(|family| family.owns(key))
         .map(|family| family.name())
         .collect();
     let (name, owners) = (asked.name(), owners.join(", "));
+    let taken: Vec<&str> = asked.keys().iter().map(|key| key.name).collect();
     entry
         .refuse_key(&format!("belongs to the family {owners}, not to {name}"))
-        .hint(format!("{name} takes {}", asked.keys().join(", ")))
+        .hint(format!("{name} takes {}", taken.join(", ")))
 }
 
 /// With `auto`, keys that no single family owns together.

@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use lynkeus_observers::KeySpec;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -23,7 +24,7 @@ impl<'a> Section<'a> {
         source: &'a Source<'a>,
         name: &str,
         table: DeTable<'a>,
-        known: &[&str],
+        known: &[KeySpec],
     ) -> Result<Self, Error> {
         let section = Self {
             source,
@@ -33,7 +34,7 @@ impl<'a> Section<'a> {
         let stranger = section
             .table
             .keys()
-            .filter(|key| !known.contains(&key.get_ref().as_ref()))
+            .filter(|key| known.iter().all(|spec| spec.name != key.get_ref().as_ref()))
             .min_by_key(|key| key.span().start);
         match stranger {
             None => Ok(section),
@@ -42,7 +43,7 @@ impl<'a> Section<'a> {
                 Err(
                     Error::input(format!("unknown key \"{word}\" in {}", section.name))
                         .at(source.place(&key.span()))
-                        .hint(suggest(word, known.iter().copied())),
+                        .hint(suggest(word, known.iter().map(|spec| spec.name))),
                 )
             }
         }
@@ -187,7 +188,7 @@ impl<'a> Entry<'a> {
     }
 
     /// A table with known keys, called `name` in messages.
-    pub fn section(self, name: &str, known: &[&str]) -> Result<Section<'a>, Error> {
+    pub fn section(self, name: &str, known: &[KeySpec]) -> Result<Section<'a>, Error> {
         let source = self.source;
         Section::new(source, name, self.table()?, known)
     }

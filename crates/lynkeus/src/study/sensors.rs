@@ -1,10 +1,9 @@
 //! `[sensors]`: what is measured, what is unknown, how noisy.
 
 use super::Name;
+use super::keys::{NOISE, SENSORS};
 use super::section::Entry;
 use crate::Error;
-
-const KEYS: &[&str] = &["measured", "unknown", "disturbances", "noise"];
 
 /// What the sensors see of the plant.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,7 +40,7 @@ impl Noise {
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
-    let mut section = entry.section("[sensors]", KEYS)?;
+    let mut section = entry.section("[sensors]", &SENSORS)?;
     Ok(Sensors {
         measured: section.optional("measured", |e| {
             let refusal = e.wrong("a list with at least one output");
@@ -74,7 +73,7 @@ fn noise(entry: Entry<'_>) -> Result<Noise, Error> {
         "a standard deviation >= 0, a share such as \"5%\", or a bound such as { uniform = 0.05 }",
     );
     if entry.is_table() {
-        let mut section = entry.section("noise of [sensors]", &["uniform"])?;
+        let mut section = entry.section("noise of [sensors]", &NOISE)?;
         let bound = section.take("uniform").ok_or(refusal)?;
         let wrong = bound.wrong("a bound >= 0, in the unit of the output");
         let bound = bound.number().ok().filter(|a| *a >= 0.0);

@@ -1,23 +1,9 @@
 //! `[simulate]`: how plant and observer are run together.
 
 use super::Name;
+use super::keys::{INTEGRATOR, SIMULATE};
 use super::section::{Entry, Section};
 use crate::Error;
-
-const KEYS: &[&str] = &[
-    "until",
-    "start",
-    "output_step",
-    "sample_step",
-    "inputs",
-    "initial",
-    "method",
-    "step",
-    "substeps",
-    "rtol",
-    "atol",
-    "seed",
-];
 
 /// How plant and observer are simulated.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,7 +98,7 @@ impl Default for Method {
 
 pub(super) fn read(entry: Entry<'_>) -> Result<SimulateSettings, Error> {
     let no_end = entry.refuse_key("needs the key `until`, the time at which the run ends");
-    let mut section = entry.section("[simulate]", KEYS)?;
+    let mut section = entry.section("[simulate]", &[&SIMULATE[..], &INTEGRATOR].concat())?;
     let start = section.optional("start", Entry::number)?.unwrap_or(0.0);
     let until = section.take("until").ok_or(no_end)?;
     let too_early = until.wrong(&format!("a time after the start, {start}"));

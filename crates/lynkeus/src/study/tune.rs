@@ -1,12 +1,10 @@
 //! `[tune]`: which keys are swept, and what a value is judged by.
 
 use super::Name;
+use super::keys::{RANGE, TUNE};
 use super::section::Entry;
 use super::simulate::{self, Expression};
 use crate::Error;
-
-const KEYS: &[&str] = &["keys", "tolerance", "disturbance", "held_out", "blocks"];
-const RANGE: &[&str] = &["from", "to", "points", "scale"];
 
 /// Values of a range whose study does not say how many.
 const POINTS: usize = 21;
@@ -80,7 +78,7 @@ pub enum Scale {
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<TuneSettings, Error> {
-    let mut section = entry.section("[tune]", KEYS)?;
+    let mut section = entry.section("[tune]", &TUNE)?;
     let defaults = TuneSettings::default();
     let keys = section.optional("keys", |table| {
         let pairs = table.pairs()?.into_iter();
@@ -132,7 +130,7 @@ fn values(entry: Entry<'_>) -> Result<Values, Error> {
 fn spread(entry: Entry<'_>) -> Result<Values, Error> {
     let order = entry.wrong("a range whose `from` is below its `to`");
     let positive = entry.wrong("a range of positive numbers, or one with scale = \"linear\"");
-    let mut range = entry.section("a range of `keys` of [tune]", RANGE)?;
+    let mut range = entry.section("a range of `keys` of [tune]", &RANGE)?;
     let from = range.optional("from", Entry::number)?;
     let to = range.optional("to", Entry::number)?;
     let scales = [("log", Scale::Log), ("linear", Scale::Linear)];

@@ -188,12 +188,13 @@ fn known(study: &Study, base: &str) -> Result<(), (String, String)> {
     let allowed: BTreeSet<&str> = study
         .observer
         .families()
-        .flat_map(|family| family.keys().iter().copied())
+        .flat_map(|family| family.keys())
+        .map(|key| key.name)
         .collect();
     if allowed.contains(base) {
         return Ok(());
     }
-    let elsewhere = FAMILIES.iter().any(|family| family.keys().contains(&base));
+    let elsewhere = FAMILIES.iter().any(|family| family.owns(base));
     let why = match elsewhere {
         true => format!("\"{base}\" belongs to another family than the study's"),
         false => format!("no family has a key \"{base}\""),

@@ -1,0 +1,136 @@
+//! A family in stages: settings read once, the form found once, the design and the theorem
+//! from both. What the [`Family`] trait offers is made of these, the same for all.
+
+use lynkeus_structure::{Extended, Region};
+
+use crate::keys::KeySpec;
+use crate::{
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+};
+
+/// A key whose wrong value is told by the stage that needs it: another family may own a key
+/// of that name with another shape, and `auto` examines a plant for both.
+pub(crate) type Late<T> = Result<T, TuningError>;
+
+/// A form with what is known of its conditions.
+pub struct Found<F> {
+    pub form: F,
+    pub examination: Examination,
+}
+
+/// A form, or the examination that says why there is none.
+pub type Searched<F> = Result<Result<Found<F>, Examination>, DesignError>;
+
+/// On which box the form of a theorem is sought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FormBox {
+    /// The declared one, for its conditions choose the observer. The theorem decides its
+    /// hypotheses on the box of its assumptions, whatever the form's conditions said.
+    Declared,
+    /// That of the assumptions: a refuted condition ends the proof.
+    Assumed,
+}
+
+/// A published observer design, stage by stage.
+pub trait Stages: Sync {
+    /// the keys, read
+    type Settings;
+    /// the canonical form in a plant
+    type Form<'e, 'p: 'e>;
+    /// name in studies
+    const NAME: &'static str;
+    /// where it was published
+    const PAPER: &'static str;
+    /// the theorem, in words
+    const BASIS: &'static str;
+    /// on which box the theorem's form is sought
+    const FORM_BOX: FormBox;
+    /// its keys, in groups
+    const KEYS: &'static [&'static [KeySpec]];
+
+    /// The settings of a study.
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self::Settings, TuningError>;
+
+    /// The form with its conditions on `region`.
+    fn form<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        region: &Region,
+    ) -> Searched<Self::Form<'e, 'p>>;
+
+    /// The observer; no condition of the form is refuted.
+    fn design<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        found: Found<Self::Form<'e, 'p>>,
+    ) -> Result<Design, DesignError>;
+
+    /// What the theorem guarantees.
+    fn theorem<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        found: Found<Self::Form<'e, 'p>>,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError>;
+}
+
+impl<S: Stages> Family for S {
+    fn name(&self) -> &'static str {
+        S::NAME
+    }
+
+    fn paper(&self) -> &'static str {
+        S::PAPER
+    }
+
+    fn keys(&self) -> Vec<&'static KeySpec> {
+        S::KEYS.iter().copied().flatten().collect()
+    }
+
+    fn examine(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+    ) -> Result<Examination, DesignError> {
+        let settings = S::read(extended, tuning)?;
+        Ok(match S::form(extended, &settings, &extended.region())? {
+            Ok(Found { examination, .. }) | Err(examination) => examination,
+        })
+    }
+
+    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
+        let settings = S::read(extended, tuning)?;
+        match S::form(extended, &settings, &extended.region())? {
+            Ok(found) if found.examination.fit != Fit::DoesNotFit => {
+                S::design(extended, &settings, found)
+            }
+            Ok(Found { examination, .. }) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        let settings = S::read(extended, tuning)?;
+        let (region, ends) = match S::FORM_BOX {
+            FormBox::Declared => (extended.region(), false),
+            FormBox::Assumed => (assumptions.region.clone(), true),
+        };
+        match S::form(extended, &settings, &region)? {
+            Ok(found) if !(ends && found.examination.fit == Fit::DoesNotFit) => {
+                S::theorem(extended, &settings, found, assumptions)
+            }
+            Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
+                Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
+            }
+            Ok(Found { examination, .. }) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The study's keys.
+
+use lynkeus_gain::Tridiagonal;
+use lynkeus_structure::{ChainRequest, Extended};
+
+use crate::conditions::{CHAINS, chain_request};
+use crate::estimate::Common;
+use crate::guarantee::{LMI_KEYS, Lmi};
+use crate::peaking::{self, Remedies};
+use crate::prolongation::PROLONG;
+use crate::stages::Late;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError};
+
+const THETA: KeySpec = KeySpec {
+    name: "theta",
+    kind: "number > 0, or one per chain",
+    shape: Shape::POSITIVES,
+    default: REQUIRED,
+    meaning: "the speed θ, in 1/(unit of time): larger converges faster, peaks higher and passes more noise",
+};
+
+const DELTA: KeySpec = KeySpec {
+    name: "delta",
+    kind: "number > 0, or one per chain",
+    shape: Shape::POSITIVES,
+    default: "1, and the middle of Theorem 2's window",
+    meaning: "the exponents δ of θ",
+};
+
+const FACTOR: KeySpec = KeySpec {
+    name: "r",
+    kind: "number > 0, or one per chain",
+    shape: Shape::POSITIVES,
+    default: "1",
+    meaning: "the factor r of the gain; with Lemma 1 its ρ/2",
+};
+
+const GAIN: KeySpec = KeySpec {
+    name: "gain",
+    kind: "`\"lemma1\"`, `\"lmi\"`",
+    shape: Shape::Word(&["lemma1", "lmi"]),
+    default: "`\"lemma1\"`",
+    meaning: "where the gain comes from: Lemma 1's S (unless `S` is given), or [a linear matrix inequality](certificates.md)",
+};
+
+const MATRICES: KeySpec = KeySpec {
+    name: "S",
+    kind: "list of `{ diag = […], off = […] }`, one per chain",
+    shape: Shape::List(&Shape::Section(&[&[DIAGONAL, BESIDE]])),
+    default: "Lemma 1's",
+    meaning: "explicit tridiagonal matrices: n numbers on the diagonal, n − 1 beside it",
+};
+
+const DIAGONAL: KeySpec = KeySpec {
+    name: "diag",
+    kind: "list of n numbers",
+    shape: Shape::List(&Shape::Number),
+    default: REQUIRED,
+    meaning: "on the diagonal",
+};
+
+const BESIDE: KeySpec = KeySpec {
+    name: "off",
+    kind: "list of n − 1 numbers",
+    shape: Shape::List(&Shape::Number),
+    default: REQUIRED,
+    meaning: "beside it",
+};
+
+const PARTIALS: KeySpec = KeySpec {
+    name: "partials",
+    kind: "true, false",
+    shape: Shape::Flag,
+    default: "false",
+    meaning: "divide the gain by the chain's partials at the estimate",
+};
+
+const LEADING: KeySpec = KeySpec {
+    name: "leading",
+    kind: "name of a measured output",
+    shape: Shape::Text,
+    default: "the first chain that can; with `delta`, one for which it lies in the window",
+    meaning: "which of two chains plays the first part in Theorem 2, where either can",
+};
+
+/// Those of the paper and its extensions.
+const OWN: [KeySpec; 9] = [
+    THETA, DELTA, FACTOR, GAIN, MATRICES, PARTIALS, CHAINS, LEADING, PROLONG,
+];
+
+/// Every key of the family.
+pub(super) const KEYS: &[&[KeySpec]] = &[&OWN, &LMI_KEYS, &peaking::KEYS];
+
+/// The keys, read.
+pub struct Settings {
+    pub common: Common,
+    /// per chain, as in every list here
+    θ: Late<Option<Vec<f64>>>,
+    pub δ: Option<Vec<f64>>,
+    pub r: Option<Vec<f64>>,
+    pub S: Option<Vec<Tridiagonal>>,
+    /// the gain is divided by the partials
+    pub divided: bool,
+    pub request: ChainRequest,
+    /// the output whose chain leads
+    pub leading: Option<usize>,
+    pub lmi: Option<Lmi>,
+    pub remedies: Remedies,
+}
+
+impl Settings {
+    pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
+        let count = extended.outputs.len();
+        let S = explicit(tuning)?;
+        let sizes = S
+            .as_ref()
+            .map(|S| S.iter().map(Tridiagonal::size).collect());
+        let lmi = Lmi::read(tuning, &["lemma1"])?;
+        let of_standard: &[KeySpec] = match lmi {
+            Some(_) => &[],
+            None => &[MATRICES, FACTOR, GAIN],
+        };
+        Ok(Self {
+            common: Common::read(tuning)?,
+            θ: tuning.positive_per_chain(THETA.name, count),
+            δ: tuning.positive_per_chain(DELTA.name, count)?,
+            r: tuning.positive_per_chain(FACTOR.name, count)?,
+            S,
+            divided: tuning.flag(PARTIALS.name)?,
+            request: chain_request(extended, tuning, MATRICES.name, sizes)?,
+            leading: leading(extended, tuning)?,
+            lmi,
+            remedies: Remedies::read(tuning, count, of_standard)?,
+        })
+    }
+
+    /// θ, which has no default.
+    pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
+        let expected = "a positive number (the gain grows like theta^n)";
+        let missing = || TuningError::new(THETA.name, expected, "nothing");
+        self.θ.clone()?.ok_or_else(missing)
+    }
+}
+
+/// The chain that the study lets lead, by the place of its output.
+fn leading(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<usize>, TuningError> {
+    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
+    let outputs: Vec<&str> = outputs.collect();
+    let name = tuning.choice(LEADING.name, &outputs)?;
+    Ok(name.and_then(|name| outputs.iter().position(|o| *o == name)))
+}
+
+/// S as the study gives it.
+fn explicit(tuning: &Tuning) -> Result<Option<Vec<Tridiagonal>>, TuningError> {
+    let fields = [DIAGONAL.name, BESIDE.name];
+    let Some(tables) = tuning.number_tables(MATRICES.name, &fields)? else {
+        return Ok(None);
+    };
+    let matrix = |(i, mut table): (usize, Vec<Vec<f64>>)| {
+        let (off, diagonal) = (
+            table.pop().unwrap_or_default(),
+            table.pop().unwrap_or_default(),
+        );
+        Tridiagonal::new(diagonal, off).map_err(|error| {
+            let place = i + 1;
+            let expected = format!("a positive definite tridiagonal matrix as entry {place}");
+            TuningError::new(MATRICES.name, expected, error)
+        })
+    };
+    let matrices = tables.into_iter().enumerate().map(matrix);
+    matrices.collect::<Result<_, _>>().map(Some)
+}

@@ -1,0 +1,409 @@
+//! Every key of a study but the families' own, in one place: refusals of unknown keys, the
+//! tables in `docs/study.md` and the schema for editors come from here.
+
+use lynkeus_observers::{KeySpec, REQUIRED, Shape};
+
+/// A number, or a Modelica expression of time.
+const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
+
+/// The keys of the top level.
+pub(super) const KEYS: [KeySpec; 3] = [
+    KeySpec {
+        name: "plant",
+        kind: "text",
+        shape: Shape::Text,
+        default: "required by the command",
+        meaning: "the Modelica file",
+    },
+    KeySpec {
+        name: "model",
+        kind: "text",
+        shape: Shape::Text,
+        default: "the file's only model",
+        meaning: "which model, where the file holds several",
+    },
+    KeySpec {
+        name: "parameters",
+        kind: "table: name = number",
+        shape: Shape::Table(&Shape::Number),
+        default: "none",
+        meaning: "values that replace those of the plant",
+    },
+];
+
+/// The sections.
+pub(super) const SECTIONS: [KeySpec; 8] = [
+    KeySpec {
+        name: "sensors",
+        kind: "table",
+        shape: Shape::Section(&[&SENSORS]),
+        default: "none",
+        meaning: "what is measured, what is unknown, how noisy",
+    },
+    KeySpec {
+        name: "observer",
+        kind: "table",
+        shape: Shape::Section(&[&OBSERVER]),
+        default: "none",
+        meaning: "the observer family and its tuning",
+    },
+    KeySpec {
+        name: "box",
+        kind: "table: name = number, or `[smallest, largest]`",
+        shape: Shape::Table(&Shape::Either(&[
+            Shape::Number,
+            Shape::List(&Shape::Number),
+        ])),
+        default: "none",
+        meaning: "ranges narrower than the model's `min` and `max`",
+    },
+    KeySpec {
+        name: "certify",
+        kind: "table",
+        shape: Shape::Section(&[&CERTIFY]),
+        default: "none",
+        meaning: "what a guarantee takes for granted",
+    },
+    KeySpec {
+        name: "simulate",
+        kind: "table",
+        shape: Shape::Section(&[&SIMULATE, &INTEGRATOR]),
+        default: "none",
+        meaning: "how the plant and its observer are run together",
+    },
+    KeySpec {
+        name: "estimate",
+        kind: "table",
+        shape: Shape::Section(&[&ESTIMATE, &INTEGRATOR]),
+        default: "none",
+        meaning: "how a log is replayed",
+    },
+    KeySpec {
+        name: "tune",
+        kind: "table",
+        shape: Shape::Section(&[&TUNE]),
+        default: "none",
+        meaning: "which keys are swept, and what a value is judged by",
+    },
+    KeySpec {
+        name: "plot",
+        kind: "table",
+        shape: Shape::Section(&[&PLOT]),
+        default: "none",
+        meaning: "what is drawn",
+    },
+];
+
+/// `[sensors]`
+pub(super) const SENSORS: [KeySpec; 4] = [
+    KeySpec {
+        name: "measured",
+        kind: "list of outputs",
+        shape: Shape::NAMES,
+        default: "every output of the model",
+        meaning: "what the sensors see. The order counts: the first entry of `theta`, `S`, … belongs to the chain of the first measured output",
+    },
+    KeySpec {
+        name: "unknown",
+        kind: "list of inputs",
+        shape: Shape::NAMES,
+        default: "none",
+        meaning: "inputs that nobody measures; estimated along with the state",
+    },
+    KeySpec {
+        name: "disturbances",
+        kind: "list of inputs",
+        shape: Shape::NAMES,
+        default: "none",
+        meaning: "inputs that act on the plant and that the observer takes as zero",
+    },
+    KeySpec {
+        name: "noise",
+        kind: "table: output = number, text `\"5%\"`, or `{ uniform = number }`",
+        shape: Shape::Table(&Shape::Either(&[
+            Shape::NotNegative,
+            Shape::Text,
+            Shape::Section(&[&NOISE]),
+        ])),
+        default: "no noise",
+        meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+    },
+];
+
+/// `{ uniform = … }` of `noise` in `[sensors]`
+pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
+    name: "uniform",
+    kind: "number ≥ 0",
+    shape: Shape::NotNegative,
+    default: REQUIRED,
+    meaning: "every error up to ± this, in the output's unit, is equally likely and none is larger",
+}];
+
+/// `[observer]`, for every family.
+pub(super) const OBSERVER: [KeySpec; 3] = [
+    KeySpec {
+        name: "family",
+        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`",
+        shape: Shape::Word(&[
+            "auto",
+            "triangular",
+            "block-triangular",
+            "state-affine",
+            "drift-observable",
+            "unknown-input",
+        ]),
+        default: "`\"auto\"`",
+        meaning: "the observer family; `auto` takes the first that fits and that knows all the keys given",
+    },
+    KeySpec {
+        name: "initial",
+        kind: "table: name = number, and `default`",
+        shape: Shape::Table(&Shape::Number),
+        default: "the plant's start values",
+        meaning: "where the estimate starts; `default` holds for everything not listed",
+    },
+    KeySpec {
+        name: "clamp",
+        kind: "true, false",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "the plant's functions see the estimate limited to `[min, max]`; the reported estimate is never altered",
+    },
+];
+
+/// `[certify]`
+pub(super) const CERTIFY: [KeySpec; 3] = [
+    KeySpec {
+        name: "tube",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "none",
+        meaning: "every state stays within this distance of its start value, too",
+    },
+    KeySpec {
+        name: "slew",
+        kind: "table: unknown input = number > 0",
+        shape: Shape::Table(&Shape::Positive),
+        default: "0: constant",
+        meaning: "bounds of the rates of change of unknown inputs",
+    },
+    KeySpec {
+        name: "input_derivatives",
+        kind: "table: known input = number ≥ 0, or a list of them",
+        shape: Shape::Table(&Shape::Either(&[
+            Shape::NotNegative,
+            Shape::List(&Shape::NotNegative),
+        ])),
+        default: "none",
+        meaning: "bounds of &#124;u'&#124;, &#124;u''&#124;, …, for theorems that need them",
+    },
+];
+
+/// The integrator, in `[simulate]` and `[estimate]`.
+pub(super) const INTEGRATOR: [KeySpec; 5] = [
+    KeySpec {
+        name: "method",
+        kind: "`\"adaptive\"`, `\"explicit\"`, `\"stiff\"`, `\"rk4\"`",
+        shape: Shape::Word(&["adaptive", "explicit", "stiff", "rk4"]),
+        default: "`\"adaptive\"`",
+        meaning: "step control with a solver chosen by the tool, with the explicit or the stiff one; or the classical Runge–Kutta method with fixed steps",
+    },
+    KeySpec {
+        name: "rtol",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "1e-9",
+        meaning: "relative tolerance of the adaptive methods",
+    },
+    KeySpec {
+        name: "atol",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "1e-12",
+        meaning: "absolute tolerance of the adaptive methods",
+    },
+    KeySpec {
+        name: "step",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "`substeps`",
+        meaning: "longest step of `rk4`",
+    },
+    KeySpec {
+        name: "substeps",
+        kind: "whole number ≥ 1",
+        shape: Shape::Whole(1),
+        default: "16",
+        meaning: "steps of `rk4` from one row to the next, where `step` is not given",
+    },
+];
+
+/// `[simulate]` without the integrator.
+pub(super) const SIMULATE: [KeySpec; 7] = [
+    KeySpec {
+        name: "until",
+        kind: "number > `start`",
+        shape: Shape::Number,
+        default: REQUIRED,
+        meaning: "the last instant",
+    },
+    KeySpec {
+        name: "start",
+        kind: "number",
+        shape: Shape::Number,
+        default: "0",
+        meaning: "the first instant",
+    },
+    KeySpec {
+        name: "output_step",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "500 rows",
+        meaning: "spacing of the rows of the result",
+    },
+    KeySpec {
+        name: "sample_step",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "`output_step`",
+        meaning: "spacing of the sensor's samples where there is noise",
+    },
+    KeySpec {
+        name: "inputs",
+        kind: "table: name = number, or Modelica expression of `time` as text",
+        shape: Shape::Table(&EXPRESSION),
+        default: "the inputs' start values",
+        meaning: "the plant's inputs, the unknown ones included; `pi` is known",
+    },
+    KeySpec {
+        name: "initial",
+        kind: "table: name = number",
+        shape: Shape::Table(&Shape::Number),
+        default: "the plant's start values",
+        meaning: "where the *plant* starts",
+    },
+    KeySpec {
+        name: "seed",
+        kind: "whole number ≥ 0",
+        shape: Shape::Whole(0),
+        default: "0",
+        meaning: "seed of the noise",
+    },
+];
+
+/// `[estimate]` without the integrator.
+pub(super) const ESTIMATE: [KeySpec; 3] = [
+    KeySpec {
+        name: "between_samples",
+        kind: "`\"hold\"`, `\"linear\"`",
+        shape: Shape::Word(&["hold", "linear"]),
+        default: "`\"hold\"`",
+        meaning: "what the observer sees between two rows: the latest row, as a live observer would, or the straight line to the next, which looks ahead one sample",
+    },
+    KeySpec {
+        name: "time",
+        kind: "text",
+        shape: Shape::Text,
+        default: "`\"t\"`",
+        meaning: "header of the log's time column",
+    },
+    KeySpec {
+        name: "columns",
+        kind: "table: name = text",
+        shape: Shape::Table(&Shape::Text),
+        default: "the plant's names",
+        meaning: "where the log's header names a signal differently",
+    },
+];
+
+/// `[tune]`
+pub(super) const TUNE: [KeySpec; 5] = [
+    KeySpec {
+        name: "keys",
+        kind: "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
+        shape: Shape::Table(&Shape::Either(&[
+            Shape::List(&Shape::Number),
+            Shape::Section(&[&RANGE]),
+        ])),
+        default: "see [tuning](tune.md)",
+        meaning: "what is swept; several keys make a grid. The values of a key that is a list are factors on all its numbers. `points` is 21, `scale` `\"log\"` (or `\"linear\"`)",
+    },
+    KeySpec {
+        name: "tolerance",
+        kind: "number between 0 and 1",
+        shape: Shape::Share,
+        default: "0.05",
+        meaning: "error, as a share of the range, below which an estimate is settled",
+    },
+    KeySpec {
+        name: "disturbance",
+        kind: "table: input = number, or expression of `time`",
+        shape: Shape::Table(&EXPRESSION),
+        default: "none",
+        meaning: "added to inputs of the plant, unseen by the observer, for the ultimate bound",
+    },
+    KeySpec {
+        name: "held_out",
+        kind: "number between 0 and 1",
+        shape: Shape::Share,
+        default: "0.25",
+        meaning: "on a log: share of each block that is held out",
+    },
+    KeySpec {
+        name: "blocks",
+        kind: "whole number ≥ 2",
+        shape: Shape::Whole(2),
+        default: "20",
+        meaning: "on a log: number of blocks",
+    },
+];
+
+/// A range of values in `keys` of `[tune]`.
+pub(super) const RANGE: [KeySpec; 4] = [
+    KeySpec {
+        name: "from",
+        kind: "number",
+        shape: Shape::Number,
+        default: "a quarter of the study's value",
+        meaning: "the first value",
+    },
+    KeySpec {
+        name: "to",
+        kind: "number",
+        shape: Shape::Number,
+        default: "four times the study's value",
+        meaning: "the last value",
+    },
+    KeySpec {
+        name: "points",
+        kind: "whole number ≥ 2",
+        shape: Shape::Whole(2),
+        default: "21",
+        meaning: "how many, ends included",
+    },
+    KeySpec {
+        name: "scale",
+        kind: "`\"log\"`, `\"linear\"`",
+        shape: Shape::Word(&["log", "linear"]),
+        default: "`\"log\"`",
+        meaning: "equal ratios, or equal differences",
+    },
+];
+
+/// `[plot]`
+pub(super) const PLOT: [KeySpec; 2] = [
+    KeySpec {
+        name: "show",
+        kind: "list of names",
+        shape: Shape::NAMES,
+        default: "unknown inputs, hidden states, then what is measured; six at most",
+        meaning: "the quantities to draw, one panel each",
+    },
+    KeySpec {
+        name: "time_unit",
+        kind: "text",
+        shape: Shape::Text,
+        default: "none",
+        meaning: "the unit on the time axis",
+    },
+];
