@@ -112,6 +112,25 @@ impl Graph {
         Expr::new(self, node)
     }
 
+    /// A free variable that is no other's: no name finds it, whatever it is called. The label
+    /// is for people, in messages and rendered expressions.
+    pub fn fresh(&self, label: impl Into<String>) -> Expr<'_> {
+        let mut inner = self.inner.borrow_mut();
+        let index = inner.names.len() as u32;
+        inner.names.push(label.into());
+        let node = inner.intern(Key::Symbol(index), Op::Symbol(index));
+        Expr::new(self, node)
+    }
+
+    /// Whether a node is the symbol that its name finds, and no [fresh](Graph::fresh) one.
+    pub(crate) fn is_named(&self, node: Node) -> bool {
+        let inner = self.inner.borrow();
+        match inner.ops[node.index()] {
+            Op::Symbol(index) => inner.by_name.get(&inner.names[index as usize]) == Some(&node),
+            _ => false,
+        }
+    }
+
     /// A number.
     pub fn constant(&self, value: f64) -> Expr<'_> {
         let key = Key::Constant(value.to_bits());
@@ -140,7 +159,7 @@ impl Graph {
         }
     }
 
-    /// The name, where the node is a symbol.
+    /// The name or the label, where the node is a symbol.
     pub fn symbol_name(&self, node: Node) -> Option<String> {
         match self.op(node) {
             Op::Symbol(index) => Some(self.inner.borrow().names[index as usize].clone()),
@@ -323,6 +342,23 @@ mod tests {
         let (first, size) = (build(), g.len());
         assert_eq!((build(), g.len()), (first, size));
         assert_eq!((2.0 * (g.symbol("y") + g.symbol("x")).sin()).node(), first);
+    }
+
+    #[test]
+    fn no_name_finds_a_fresh_symbol() {
+        let g = Graph::new();
+        let before = g.symbol("estimate of a");
+        let [first, second] = [g.fresh("estimate of a"), g.fresh("estimate of a")];
+        assert_ne!(first.node(), second.node());
+        assert_eq!(g.symbol("estimate of a").node(), before.node());
+        assert_eq!(g.render((first * 2.0).node(), 40), "estimate of a*2");
+        // not in another graph either
+        let other = Graph::new();
+        let sum = ((before + first) * second).node();
+        let copies = other.copied(&g, &[sum]);
+        assert_eq!(other.symbols_of(&[copies[&sum]]).len(), 3);
+        assert_eq!(copies[&before.node()], other.symbol("estimate of a").node());
+        assert_ne!(copies[&first.node()], copies[&before.node()]);
     }
 
     #[test]

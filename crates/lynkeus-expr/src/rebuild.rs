@@ -22,7 +22,7 @@ impl Graph {
     }
 
     /// Copies everything below `roots` of another graph into this one, symbols by their
-    /// names; the images of all nodes but linear systems.
+    /// names, fresh ones as fresh ones; the images of all nodes but linear systems.
     pub fn copied(&self, from: &Graph, roots: &[Node]) -> HashMap<Node, Node> {
         let mut images: HashMap<Node, Node> = HashMap::new();
         for node in from.reachable(roots) {
@@ -40,7 +40,13 @@ impl Graph {
         Some(match from.op(node) {
             Op::Constant(_) | Op::Symbol(_) if std::ptr::eq(self, from) => node,
             Op::Constant(value) => self.constant(value).node(),
-            Op::Symbol(_) => self.symbol(&from.symbol_name(node)?).node(),
+            Op::Symbol(_) => {
+                let name = from.symbol_name(node)?;
+                match from.is_named(node) {
+                    true => self.symbol(&name).node(),
+                    false => self.fresh(name).node(),
+                }
+            }
             Op::Unary(op, a) => self.unary(op, image(a)),
             Op::Powi(a, n) => self.powi(image(a), n),
             Op::Binary(op, a, b) => self.binary(op, image(a), image(b)),

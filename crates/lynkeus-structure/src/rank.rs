@@ -140,7 +140,7 @@ fn copies(
 ) -> std::collections::HashMap<Node, Node> {
     let copy = |side: &Dimension| {
         let name = format!("[{} in row {}]", side.name, row + 1);
-        let symbol = graph.symbol(&name).node();
+        let symbol = graph.fresh(&name).node();
         Dimension {
             name,
             symbol,

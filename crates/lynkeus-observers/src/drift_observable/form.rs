@@ -18,6 +18,8 @@ pub(super) struct Map {
     lie: Vec<Vec<Node>>,
     /// ∂L_f^k h_i/∂x
     pub gradients: Vec<Rows>,
+    /// symbols of u_j', u_j'', … for each known input, n of them
+    pub slopes: Vec<Vec<Node>>,
     /// the right-hand side is Lipschitz
     lipschitz: Check,
     /// the key `variant`
@@ -46,6 +48,7 @@ impl Map {
                 .map(|h| output_map::jacobian_rows(graph, h, &x))
                 .collect(),
             lie,
+            slopes: degrees::slopes(extended),
             lipschitz: lipschitz(extended, region)?,
             asked,
         }))
@@ -105,6 +108,8 @@ pub(super) struct Form {
     pub indices: Vec<usize>,
     /// symbols of u_j, u_j', … on which Φ̄ depends: n − r of them for one output
     pub U: Vec<Vec<Node>>,
+    /// the derivative of each input that is one order further
+    pub w: Vec<Node>,
     /// Q or, for (4.1) and (4.22), Q̄
     pub Q: Rows,
     /// Q̄_a, columns in the order of `U`; empty for (3.1)
@@ -122,7 +127,7 @@ impl Form {
         region: &Region,
     ) -> Result<Self, DesignError> {
         let degrees = degrees::degrees(extended, map, &indices, region)?;
-        let U = degrees::input_symbols(extended, &indices, &degrees);
+        let U = degrees::input_symbols(extended, map, &indices, &degrees);
         let variant = map.asked.unwrap_or_else(|| Variant::suited(&U));
         let rows: Vec<(usize, usize)> = indices
             .iter()
@@ -173,10 +178,14 @@ impl Form {
         if examination.fit == Fit::DoesNotFit {
             examination.fit = checks.fit();
         }
+        let next = map.slopes.iter().zip(&U);
         Ok(Self {
             variant,
             rows,
             indices,
+            w: next
+                .filter_map(|(slopes, U)| slopes.get(U.len().saturating_sub(1)).copied())
+                .collect(),
             U,
             Q,
             Q_a,

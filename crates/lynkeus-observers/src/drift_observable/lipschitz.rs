@@ -20,7 +20,6 @@ use lynkeus_expr::{MissingInput, Node};
 use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
 
 use super::conditions::regular;
-use super::degrees::slope_symbol;
 use super::derivative_name;
 use super::form::Form;
 use super::variant::Variant;
@@ -149,12 +148,12 @@ fn further(
     slopes: &[Option<Vec<f64>>],
     box_: &mut Enclosure<'_>,
 ) -> Vec<Vec<Node>> {
-    let graph = extended.graph();
     let mut U = vec![];
-    for ((input, jet), given) in extended.inputs.iter().zip(&form.U).zip(slopes) {
+    let jets = form.U.iter().zip(&form.w);
+    for ((input, (jet, &w)), given) in extended.inputs.iter().zip(jets).zip(slopes) {
         let mut symbols = vec![input.node];
         for k in 1..=jet.len() {
-            let symbol = graph.symbol(&slope_symbol(&input.name, k)).node();
+            let symbol = jet.get(k).copied().unwrap_or(w);
             let bound = given.as_ref().and_then(|b| b.get(k - 1).copied());
             let bound = bound.unwrap_or(f64::INFINITY);
             box_.add(derivative_name(&input.name, k), symbol, -bound, bound);

@@ -30,7 +30,7 @@ use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
-    Tuning,
+    Signal, Tuning,
 };
 use excitation::least_eigenvalue;
 use lyapunov::{Factor, Sparse};
@@ -227,12 +227,16 @@ fn innovations<'g>(copy: &Copy<'_, 'g>) -> Vec<Expr<'g>> {
     let graph: &'g Graph = extended.graph();
     let hats = extended.states.iter().zip(&copy.hats);
     let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
-    let innovation = |o: &lynkeus_structure::Measurement| {
-        let y = Observer::measurement(graph, &o.variable.name);
+    let innovation = |(o, y): (&lynkeus_structure::Measurement, &Signal)| {
         let h = graph.substitute(&[o.variable.node], &unlimited)[0];
         graph.expr(h) - graph.expr(y.symbol)
     };
-    extended.outputs.iter().map(innovation).collect()
+    extended
+        .outputs
+        .iter()
+        .zip(&copy.measured)
+        .map(innovation)
+        .collect()
 }
 
 /// How large the diagonal of S could be at best for the least visible state:

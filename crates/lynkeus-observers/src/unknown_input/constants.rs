@@ -146,11 +146,10 @@ impl<'e, 'p> Signals<'e, 'p> {
             let variable = &extended.states[state];
             let drift = assumptions.drift.get(state).copied().unwrap_or(0.0);
             let slope = slope(extended, state, drift, &mut box_)?;
-            let symbol = graph
-                .symbol(&format!("{} as measured", variable.name))
-                .node();
+            let label = format!("{} as measured", variable.name);
+            let symbol = graph.fresh(&label).node();
             let (min, max) = box_.side(variable.node);
-            box_.add(format!("{} as measured", variable.name), symbol, min, max);
+            box_.add(label, symbol, min, max);
             measured.insert(variable.node, symbol);
             slopes.push((symbol, slope));
             // x₁¹ is a signal wherever it stands
@@ -329,7 +328,7 @@ fn slope(
         true => format!("the slope of {name}"),
         false => open.join(", "),
     };
-    let symbol = extended.graph().symbol(&format!("slope of {name}")).node();
+    let symbol = extended.graph().fresh(format!("slope of {name}")).node();
     box_.add(label, symbol, low - drift, high + drift);
     Ok(symbol)
 }

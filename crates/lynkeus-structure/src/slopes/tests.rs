@@ -168,7 +168,7 @@ fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
     let [a, b] = extended.symbols()[..] else {
         panic!("two states")
     };
-    let error = graph.symbol("error of a");
+    let error = graph.fresh("error of a");
     region.dimensions.push(crate::Dimension {
         name: "error of a".into(),
         symbol: error.node(),
@@ -217,7 +217,7 @@ fn slopes_of_the_same_state_and_equation_are_added() {
     let extended = Extended::new(&plant, &Sensors::default()).unwrap();
     let mut region = extended.region();
     let symbols = extended.symbols();
-    let error = graph.symbol("error of a");
+    let error = graph.fresh("error of a");
     region.dimensions.push(crate::Dimension {
         name: "error of a".into(),
         symbol: error.node(),
