@@ -345,23 +345,6 @@ mod tests {
     }
 
     #[test]
-    fn no_name_finds_a_fresh_symbol() {
-        let g = Graph::new();
-        let before = g.symbol("estimate of a");
-        let [first, second] = [g.fresh("estimate of a"), g.fresh("estimate of a")];
-        assert_ne!(first.node(), second.node());
-        assert_eq!(g.symbol("estimate of a").node(), before.node());
-        assert_eq!(g.render((first * 2.0).node(), 40), "estimate of a*2");
-        // not in another graph either
-        let other = Graph::new();
-        let sum = ((before + first) * second).node();
-        let copies = other.copied(&g, &[sum]);
-        assert_eq!(other.symbols_of(&[copies[&sum]]).len(), 3);
-        assert_eq!(copies[&before.node()], other.symbol("estimate of a").node());
-        assert_ne!(copies[&first.node()], copies[&before.node()]);
-    }
-
-    #[test]
     fn unsafe_identities_do_not_fold() {
         let g = Graph::new();
         let x = g.symbol("x");

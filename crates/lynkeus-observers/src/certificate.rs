@@ -1,10 +1,12 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Dimension, Extended, Region};
+use lynkeus_structure::{Dimension, Extended, Region, Standing};
 use nalgebra::DMatrix;
 
-use crate::Fit;
+use crate::Check;
+use crate::statement::Statement;
+use crate::statement::{self};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -34,7 +36,7 @@ impl Assumptions {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
             input_derivatives: vec![],
-            regularity: extended.regularity(&region)?,
+            regularity: Statement::PlantIsRegular.with(extended.regularity(&region)?),
             region,
         })
     }
@@ -58,37 +60,6 @@ impl Assumptions {
     pub fn with_input_derivatives(mut self, bounds: Vec<Vec<f64>>) -> Self {
         self.input_derivatives = bounds;
         self
-    }
-}
-
-/// The verdict on a guarantee.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// the error decays at the stated rate, for everything in the box
-    Proved,
-    /// a point of the box shows that it does not
-    Refuted,
-    /// neither
-    Undecided,
-}
-
-impl Verdict {
-    /// One word: `proved`, `refuted` or `undecided`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Verdict::Proved => "proved",
-            Verdict::Refuted => "refuted",
-            Verdict::Undecided => "undecided",
-        }
-    }
-
-    /// Refuted if a hypothesis is, undecided if one is, else proved.
-    pub fn of(hypotheses: &[Check]) -> Self {
-        match crate::conditions::fit(hypotheses) {
-            Fit::Fits => Verdict::Proved,
-            Fit::Undecided => Verdict::Undecided,
-            Fit::DoesNotFit => Verdict::Refuted,
-        }
     }
 }
 
@@ -121,8 +92,6 @@ pub struct Certificate {
     /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
     /// `linear matrix inequality`
     pub basis: String,
-    /// the verdict
-    pub verdict: Verdict,
     /// guaranteed decay rate, 1/time unit; only where proved
     pub rate: Option<f64>,
     /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
@@ -160,7 +129,6 @@ impl Certificate {
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
             basis: basis.into(),
-            verdict: Verdict::of(&hypotheses),
             rate: None,
             ultimate_bound: None,
             ultimate: vec![],
@@ -173,9 +141,14 @@ impl Certificate {
         }
     }
 
+    /// Proved: the error decays at the stated rate, for everything in the box. Refuted: a point
+    /// of the box shows that a hypothesis fails.
+    pub fn verdict(&self) -> Standing {
+        statement::standing(&self.hypotheses)
+    }
+
     /// The first hypothesis that is not proved.
     pub fn weakest(&self) -> Option<&Check> {
-        let open = |check: &&Check| check.verdict != Condition::Proved;
-        self.hypotheses.iter().find(open)
+        self.hypotheses.iter().find(|check| !check.is_proved())
     }
 }

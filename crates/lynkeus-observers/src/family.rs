@@ -1,13 +1,13 @@
 //! What a family is, and the list of them.
 
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Extended, Region};
+use lynkeus_structure::{Extended, Region, Standing};
 
-use crate::conditions::fit;
+use crate::statement::{Statement, standing};
 use crate::{
-    Assumptions, Certificate, Observer, Tuning, TuningError, block_triangular::BlockTriangular,
-    drift_observable::DriftObservable, state_affine::StateAffine, triangular::Triangular,
-    unknown_input::UnknownInput,
+    Assumptions, Certificate, Check, Observer, Tuning, TuningError,
+    block_triangular::BlockTriangular, drift_observable::DriftObservable,
+    state_affine::StateAffine, triangular::Triangular, unknown_input::UnknownInput,
 };
 
 /// Every family, in the order in which `auto` tries them.
@@ -61,25 +61,13 @@ pub trait Family: Sync {
     ) -> Result<Certificate, DesignError>;
 }
 
-/// Whether a family fits a plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fit {
-    /// every condition is proved
-    Fits,
-    /// a condition is undecided, none is refuted
-    Undecided,
-    /// the form is another, or a condition is refuted
-    DoesNotFit,
-}
-
-impl Fit {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Fit::Fits => "fits",
-            Fit::Undecided => "undecided",
-            Fit::DoesNotFit => "does not fit",
-        }
+/// Whether a family fits, in the words of reports: it does where every condition is proved, and
+/// does not where the form is another or a condition is refuted.
+pub fn fit_word(fit: Standing) -> &'static str {
+    match fit {
+        Standing::Proved => "fits",
+        Standing::Undecided => "undecided",
+        Standing::Refuted => "does not fit",
     }
 }
 
@@ -88,8 +76,6 @@ impl Fit {
 pub struct Examination {
     /// name of the family
     pub family: &'static str,
-    /// verdict on the whole
-    pub fit: Fit,
     /// what was found, in one or two sentences: the chains, or what breaks the form
     pub summary: String,
     /// names of the states of each chain, where the form was found
@@ -111,11 +97,9 @@ impl Examination {
         form: Form,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
-        let regularity = extended.regularity(region)?;
-        let fit = fit(checks.iter().chain([&regularity]));
+        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
         Ok(Self {
             family,
-            fit,
             summary: form.summary,
             chains: form.chains,
             checks,
@@ -127,11 +111,19 @@ impl Examination {
     pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
         Self {
             family,
-            fit: Fit::DoesNotFit,
             summary,
             chains: vec![],
             checks,
             regularity: None,
+        }
+    }
+
+    /// Whether the family fits: proved where every condition is, refuted where the form is
+    /// another or a required condition is refuted.
+    pub fn fit(&self) -> Standing {
+        match self.regularity {
+            Some(_) => standing(self.conditions()),
+            None => Standing::Refuted,
         }
     }
 
@@ -140,10 +132,10 @@ impl Examination {
         self.regularity.iter().chain(&self.checks)
     }
 
-    /// The first condition that is refuted.
+    /// The first condition whose refutation refutes the whole.
     pub fn refuted(&self) -> Option<&Check> {
         self.conditions()
-            .find(|check| matches!(check.verdict, Condition::Refuted(_)))
+            .find(|check| check.standing() == Standing::Refuted)
     }
 }
 
@@ -207,7 +199,7 @@ fn refusal(examination: &Examination) -> String {
         examination.family, examination.summary
     );
     if let Some(check) = examination.refuted() {
-        text += &format!("\n  {}: {} ({})", check.name, check.verdict, check.detail);
+        text += &format!("\n  {check}");
     }
     text
 }

@@ -1,6 +1,6 @@
 //! The block-triangular form: chains, their order, and the conditions.
 
-use lynkeus_structure::{Blocks, Check, Extended, blocks};
+use lynkeus_structure::{Blocks, Extended, Standing, blocks};
 
 use super::gains::given;
 use super::settings::{Correction, Settings};
@@ -8,7 +8,7 @@ use super::stable::stable;
 use super::{NAME, chain_rule, coefficients};
 use crate::conditions::{Partial, chain_request, lipschitz, output_slope, partials};
 use crate::family;
-use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+use crate::{Check, DesignError, Examination, Tuning, TuningError};
 
 /// Different chains that are examined before the first without a refuted condition is taken.
 const EXAMINED: usize = 16;
@@ -42,18 +42,13 @@ pub(super) fn form(
         .take(EXAMINED)
     {
         let form = examined(extended, tuning, &settings, choice)?;
-        let rank = |fit: Fit| match fit {
-            Fit::Fits => 0,
-            Fit::Undecided => 1,
-            Fit::DoesNotFit => 2,
-        };
-        let better = |best: &Form| rank(form.examination.fit) < rank(best.examination.fit);
+        let better = |best: &Form| form.examination.fit() < best.examination.fit();
         if best.as_ref().is_none_or(better) {
             best = Some(form);
         }
         if best
             .as_ref()
-            .is_some_and(|b| b.examination.fit == Fit::Fits)
+            .is_some_and(|b| b.examination.fit() == Standing::Proved)
         {
             break;
         }

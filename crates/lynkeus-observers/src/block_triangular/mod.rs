@@ -27,14 +27,14 @@ mod transformed;
 use std::collections::HashMap;
 
 use lynkeus_expr::Node;
-use lynkeus_structure::{Blocks, Extended};
+use lynkeus_structure::{Blocks, Extended, Standing};
 
 use crate::correction::{self, Start};
 use crate::estimate::Copy;
 use crate::peaking::{InnovationLimit, LowPower, Transient, transient};
 use crate::prolongation::{self, Continued, prolong};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning, TuningError,
     guarantee,
 };
 use form::{Form, form};
@@ -109,7 +109,7 @@ impl Family for BlockTriangular {
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended, tuning)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
+            Ok(form) if form.examination.fit() != Standing::Refuted => {
                 if guarantee::asked_for(tuning, &[])? {
                     prolongation::refuse(tuning, "gain = \"lmi\"")?;
                     return guarantee::design_lmi(extended, tuning, NAME, form.examination);

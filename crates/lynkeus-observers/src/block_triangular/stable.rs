@@ -7,13 +7,15 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_gain::hurwitz::Stability;
-use lynkeus_structure::{Check, Extended};
+use lynkeus_structure::Extended;
 
 use super::settings::{Correction, Settings};
 use crate::conditions::{Partial, names};
-use crate::proof::words::{proved, refuted, shown, undecided};
+use crate::proof::words::shown;
 use crate::proof::{self, lyapunov};
 use crate::stability::{GainedChain, listed};
+use crate::statement::{proved, refuted, undecided};
+use crate::{Check, Lee};
 
 /// Whether K stabilises a chain; none where that is known: K by its poles for a chain of
 /// integrators, or the form whose gains are divided by the partials one at a time.
@@ -36,10 +38,10 @@ pub(super) fn stable(
         K,
         partials: &ranges,
     };
-    let states = names(extended, states).join(" → ");
+    let states = names(extended, states);
     let name = match integrators {
-        true => format!("A − KC is stable for ({states})"),
-        false => format!("A(a) − KC is stable for every partial a along ({states})"),
+        true => Lee::Stable { states },
+        false => Lee::StableAlong { states },
     };
     let Some(a) = chain.middle() else {
         let detail = "a partial is not known to keep one sign between finite bounds";

@@ -2,11 +2,13 @@
 
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, Degree, Rows};
-use lynkeus_structure::{Check, Condition, Dimension, Extended, Region};
+use lynkeus_structure::{Dimension, Extended, Region};
 
 use super::derivative_name;
 use super::form::Map;
 use crate::DesignError;
+use crate::statement::sufficient;
+use crate::{Check, Germani};
 
 /// r_ij of output i with respect to input j, for indices μ.
 pub(super) fn degrees(
@@ -119,12 +121,5 @@ pub(super) fn known(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<D
     if !proved {
         found.push("zeros before r are found at points, not proved".to_owned());
     }
-    Check {
-        name: "the observation relative degree r is known (Definition 2.2)".into(),
-        verdict: match proved {
-            true => Condition::Proved,
-            false => Condition::Undecided(vec![]),
-        },
-        detail: found.join("; "),
-    }
+    sufficient(Germani::Degree, proved, found.join("; "))
 }

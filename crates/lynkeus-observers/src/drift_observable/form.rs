@@ -2,14 +2,15 @@
 
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, AffineForm, Rows};
-use lynkeus_structure::{Check, Condition, Extended, Region, Regularity, visibility};
+use lynkeus_structure::{Extended, Region, Regularity, visibility};
 
 use super::conditions::{self, Inputs};
 use super::variant::Variant;
 use super::{NAME, degrees, derivative_name};
-use crate::conditions::{fit, lipschitz, names};
+use crate::conditions::{lipschitz, names};
 use crate::family;
-use crate::{DesignError, Examination, Fit};
+use crate::statement::Statement;
+use crate::{Check, DesignError, Examination, Germani};
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map {
@@ -66,28 +67,13 @@ pub(super) struct Checks {
     pub lipschitz: Check,
     /// the map has values and does not jump
     pub continuous: Check,
-    /// what the observer needs of the inputs, where the map reads them
+    /// what the observer needs of the inputs, where the map reads them. Advisory: Q̄ is
+    /// regular for small enough inputs whatever the box says (Theorem 2.4), and the observer
+    /// watches it
     pub inputs: Option<Check>,
 }
 
 impl Checks {
-    /// Theorem 2.4: Q̄ is regular for small enough inputs whatever the box says, and the
-    /// observer watches it. So the condition on the inputs never refuses.
-    fn fit(&self) -> Fit {
-        let first = fit(&[
-            self.degree.clone(),
-            self.regular.clone(),
-            self.lipschitz.clone(),
-            self.continuous.clone(),
-        ]);
-        match &self.inputs {
-            Some(check) if first == Fit::Fits && check.verdict != Condition::Proved => {
-                Fit::Undecided
-            }
-            _ => first,
-        }
-    }
-
     pub fn all(&self) -> Vec<Check> {
         let first = [
             &self.degree,
@@ -138,8 +124,7 @@ impl Form {
             .iter()
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
-        let name = "Q(x) is regular on the box (drift-observable)";
-        let regular = conditions::regular(extended, name, &Q, region)?;
+        let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => {
                 let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
@@ -161,11 +146,9 @@ impl Form {
             degree: degrees::known(extended, &indices, &degrees),
             regular,
             lipschitz: map.lipschitz.clone(),
-            continuous: continuous.check(
-                "the map to the outputs' derivatives has values on the box and does not jump",
-            ),
+            continuous: Statement::from(Germani::Continuous).with(continuous.finding()),
             inputs: match reads {
-                true => Some(inputs.check(variant)?),
+                true => Some(inputs.check(variant)?.advisory()),
                 false => None,
             },
         };
@@ -174,10 +157,7 @@ impl Form {
             summary: summary(extended, variant, &rows, &U),
             chains: vec![names(extended, &every)],
         };
-        let mut examination = Examination::new(extended, region, NAME, found, checks.all())?;
-        if examination.fit == Fit::DoesNotFit {
-            examination.fit = checks.fit();
-        }
+        let examination = Examination::new(extended, region, NAME, found, checks.all())?;
         let next = map.slopes.iter().zip(&U);
         Ok(Self {
             variant,

@@ -19,10 +19,11 @@ use lynkeus_gain::riccati::Riccati;
 
 use super::gains::{closed_loop, slowest, spread};
 use super::lipschitz::Share;
-use super::proof::{Proof, Solutions, undecided};
+use super::proof::{Proof, Solutions};
 use super::variant::Variant;
 use crate::enclosure::{length, times, up};
-use crate::{Assumptions, Certificate, Constant, Verdict};
+use crate::statement::undecided;
+use crate::{Assumptions, Certificate, Constant, Germani};
 
 /// Shares of the filter's slowest pole tried for α₂.
 const SHARES: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
@@ -48,10 +49,7 @@ pub(super) fn conclude(
             Some(filter) => Some(filter),
             None => {
                 let detail = "no P_a was found for the filter's poles";
-                found
-                    .hypotheses
-                    .push(undecided("K2 and P_a solve (4.27)", detail));
-                found.verdict = Verdict::Undecided;
+                found.hypotheses.push(undecided(Germani::Filter, detail));
                 return;
             }
         },

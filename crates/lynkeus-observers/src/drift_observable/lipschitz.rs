@@ -17,7 +17,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
-use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
+use lynkeus_structure::{Extended, Matrix, Region, Regularity, output_map};
 
 use super::conditions::regular;
 use super::derivative_name;
@@ -25,6 +25,8 @@ use super::form::Form;
 use super::variant::Variant;
 use crate::DesignError;
 use crate::enclosure::{Enclosure, length, norm, product, times, up};
+use crate::statement::Statement;
+use crate::{Check, Germani};
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {
@@ -121,7 +123,6 @@ pub(super) fn bounds(
     };
     let size_a = mixed(&size);
     let states = size.iter().zip(&size_a);
-    let name = "Q̄(x, U) is regular on the box for U within its bounds";
     Ok(Lipschitz {
         map: norm(&beside(&Q_size, &Q_a_size)),
         inverse: norm(&beside(&size, &size_a)),
@@ -135,8 +136,8 @@ pub(super) fn bounds(
             })
             .collect(),
         Q: Q_size,
-        regular: regular(extended, name, &form.Q, box_.region())?,
-        continuous: continuous.check("the last rows have values on the box and do not jump"),
+        regular: regular(extended, Germani::RegularWithin, &form.Q, box_.region())?,
+        continuous: Statement::from(Germani::ContinuousRows).with(continuous.finding()),
         open: box_.open(),
     })
 }

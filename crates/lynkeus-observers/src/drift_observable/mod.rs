@@ -31,9 +31,9 @@ mod report;
 mod theorem;
 mod variant;
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Standing};
 
-use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning};
 
 const NAME: &str = "drift-observable";
 
@@ -77,7 +77,7 @@ impl Family for DriftObservable {
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match choice::form(extended, tuning, &extended.region())? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
+            Ok(form) if form.examination.fit() != Standing::Refuted => {
                 let gains = gains::Gains::new(extended, tuning, &form)?;
                 assembly::design(extended, tuning, form, gains)
             }
@@ -93,7 +93,7 @@ impl Family for DriftObservable {
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
         match choice::form(extended, tuning, &assumptions.region)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => {
+            Ok(form) if form.examination.fit() != Standing::Refuted => {
                 theorem::certificate(extended, tuning, form, assumptions)
             }
             Ok(form::Form { examination, .. }) | Err(examination)

@@ -7,13 +7,14 @@ use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobia
 use lynkeus_gain::decay::ErrorModel;
 use lynkeus_gain::definite::IntervalMatrix;
 use lynkeus_structure::{
-    Check, Condition, Dimension, Extended, Region, Slopes, counted, range, range_within,
+    Dimension, Extended, Finding, Region, Slopes, Verdict, counted, range, range_within,
 };
 use nalgebra::DMatrix;
 
 use super::edges::edges;
 use super::{expanded, innovation};
-use crate::{Assumptions, InputDerivative, Observer};
+use crate::statement::{Statement, proved};
+use crate::{Assumptions, Check, Inequality, InputDerivative, Observer};
 
 /// Cells examined per end of the range of an injection.
 const CELLS: usize = 200;
@@ -125,15 +126,9 @@ impl ErrorSystem {
 
     /// The hypothesis that every slope is bounded.
     pub fn bounded(&self) -> Check {
-        let name = "every slope of a nonlinear term is bounded on the box".to_owned();
         let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
             let detail = format!("{} enclosed", counted(self.slopes.slopes.len(), "slope"));
-            let verdict = Condition::Proved;
-            return Check {
-                name,
-                verdict,
-                detail,
-            };
+            return proved(Inequality::SlopesAreBounded, detail);
         };
         let cure = match open.is_empty() {
             true => {
@@ -145,12 +140,11 @@ impl ErrorSystem {
         let sides = self.region.dimensions.iter();
         let left = sides
             .filter(|d| slope.variables.contains(&d.name))
-            .map(|d| (d.name.clone(), d.min, d.max));
-        Check {
-            name,
-            verdict: Condition::Undecided(left.collect()),
+            .map(Dimension::side);
+        Statement::from(Inequality::SlopesAreBounded).with(Finding {
+            verdict: Verdict::Undecided(left.collect()),
             detail: format!("the slope of {} has no bound; {cure}", slope.term),
-        }
+        })
     }
 
     /// A as an expression of estimate, known inputs, measurements and time, row by row.

@@ -24,13 +24,14 @@ mod settings;
 mod theorem;
 
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
-use lynkeus_structure::{Condition, Extended, Superdiagonal, range, superdiagonal};
+use lynkeus_structure::{Extended, Standing, Superdiagonal, range, superdiagonal};
 
 use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
+use crate::statement::{Statement, standing};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Monitor, Observer,
-    Signal, Tuning,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Ltaief, Monitor, Signal,
+    Tuning,
 };
 use excitation::least_eigenvalue;
 use lyapunov::{Factor, Sparse};
@@ -80,7 +81,7 @@ impl Family for StateAffine {
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         match form(extended)? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
+            Ok((form, examination)) if examination.fit() != Standing::Refuted => {
                 assemble(extended, tuning, &form, examination)
             }
             Ok((_, examination)) | Err(examination) => {
@@ -103,10 +104,16 @@ fn form(
     let region = extended.region();
     let mut checks = vec![];
     for (k, factor) in form.factors.iter().enumerate() {
-        checks.push(factor.column_rank(extended, k, &region)?);
+        let mut declared = factor.columns.clone();
+        declared.sort_unstable();
+        let statement = Ltaief::BlockShows {
+            factor: k,
+            states: names(extended, &declared),
+        };
+        let found = factor.column_rank(extended, k, &region)?;
+        checks.push(Statement::from(statement).with(found));
     }
-    let rank = |c: &lynkeus_structure::Check| matches!(c.verdict, Condition::Undecided(_));
-    let excited = checks.iter().any(rank);
+    let excited = standing(&checks) == Standing::Undecided;
     checks.push(lipschitz(extended, &region)?);
     let mut summary = form.describe(extended);
     if excited {

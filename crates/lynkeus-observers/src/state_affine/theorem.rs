@@ -13,7 +13,7 @@
 //! the monitor `excitation` is above its alarm, λ_m is at least that.
 
 use lynkeus_expr::{Interval, Node};
-use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
+use lynkeus_structure::{Extended, Region, Standing, Superdiagonal, Verdict};
 
 use super::gramian::{TAU, above, below, largest_eigenvalue};
 use super::settings::Settings;
@@ -22,8 +22,9 @@ use crate::proof::metzler::spectral_radius;
 use crate::proof::slopes::{Slope, magnitude, slopes, undeclared};
 use crate::proof::sum;
 use crate::proof::threshold::first;
-use crate::proof::words::{box_note, proved, shown, undecided};
-use crate::{Assumptions, Certificate, Constant, DesignError, Tuning, Verdict};
+use crate::proof::words::{box_note, shown};
+use crate::statement::{proved, standing, undecided};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Ltaief, Tuning};
 
 const BASIS: &str = "Theorem 1 of Ltaief, Maatoug, Farza, Ménard, M'Saad and Koubaa";
 
@@ -55,7 +56,7 @@ pub(super) fn certificate(
     };
     // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
     let hidden = examination.checks.into_iter();
-    let hidden = hidden.filter(|c| matches!(c.verdict, Condition::Refuted(_)));
+    let hidden = hidden.filter(|c| matches!(c.verdict, Verdict::Refuted(_)));
     study.certificate(hidden.collect())
 }
 
@@ -104,9 +105,7 @@ impl Study<'_> {
         };
         let (slopes, lipschitz) = slopes(self.extended, self.region(), next)?;
         let sizes = self.sizes()?;
-        let bounded = [&lipschitz, &sizes.check]
-            .iter()
-            .all(|c| c.verdict == Condition::Proved);
+        let bounded = [&lipschitz, &sizes.check].iter().all(|c| c.is_proved());
         checks.extend([lipschitz, sizes.check.clone(), self.uncertainty()]);
         let mut constants = vec![];
         let excitation = self.excitation(&sizes);
@@ -115,7 +114,7 @@ impl Study<'_> {
             let spectrum = self.spectrum(&sizes, excitation, &mut constants);
             found = self.decay(&slopes, &spectrum, &mut checks, &mut constants);
         }
-        let everything_else = Verdict::of(&checks) == Verdict::Proved;
+        let everything_else = standing(&checks) == Standing::Proved;
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
@@ -158,7 +157,7 @@ impl Study<'_> {
                 });
             }
         }
-        let name = "C(u) and F(u, x) are bounded on the box (A1)";
+        let name = Ltaief::A1;
         let check = match open.first() {
             None => proved(name, "every entry enclosed"),
             Some(&node) => {
@@ -183,7 +182,7 @@ impl Study<'_> {
 
     /// A3: the uncertainty is bounded.
     fn uncertainty(&self) -> Check {
-        let name = "what acts on the plant unknown to the observer is bounded (A3)";
+        let name = Ltaief::A3;
         let drift = &self.assumptions.drift;
         let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
         match self.order.iter().find(|state| !known(state)) {
@@ -221,7 +220,7 @@ impl Study<'_> {
     }
 
     fn a4(&self, excitation: Option<f64>) -> Check {
-        let name = "persistent excitation (A4): S(t) ≥ λ_m I";
+        let name = Ltaief::A4;
         match excitation {
             Some(λ) => proved(
                 name,
@@ -326,7 +325,7 @@ impl Study<'_> {
         if let Some(θ0) = θ0 {
             add("θ0", θ0, "μ_θ > 0 from here on, for this λ_m");
         }
-        let name = format!("θ = {} is large enough: μ_θ > 0", shown(θ));
+        let name = Ltaief::Theta { θ };
         let from = θ0.map_or_else(
             || "no θ0 was found".to_owned(),
             |θ0| format!("θ0 = {}", shown(θ0)),
@@ -369,7 +368,7 @@ impl Study<'_> {
         let bound = |p: usize| (scale(p) * radius).hi();
         let last = self.block.iter().copied().max().unwrap_or(0);
         let norm = (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
-        if certificate.verdict == Verdict::Proved {
+        if certificate.verdict() == Standing::Proved {
             certificate.rate = Some(rate);
             if norm.is_finite() {
                 certificate.ultimate_bound = Some(norm);

@@ -2,14 +2,14 @@
 
 use lynkeus_gain::Tridiagonal;
 use lynkeus_gain::hurwitz::Stability;
-use lynkeus_structure::{Assignment, Extended, chains};
+use lynkeus_structure::{Assignment, Extended, Standing, chains};
 
 use super::NAME;
 use super::gains::{Window, explicit};
 use crate::conditions::{Partial, chain_request, lipschitz, names, output_slope, partials};
 use crate::family;
 use crate::stability::{GainedChain, listed};
-use crate::{DesignError, Examination, Fit, Tuning, TuningError};
+use crate::{DesignError, Examination, Tuning, TuningError};
 
 /// The triangular form of a plant with the facts about its partials.
 pub(super) struct Form {
@@ -52,12 +52,12 @@ pub(super) fn form(
     let mut best: Option<Form> = None;
     for assignment in assignments {
         let form = examined(extended, tuning, assignment, choices)?;
-        match form.examination.fit {
-            Fit::Fits => return Ok(Ok(form)),
-            Fit::Undecided
+        match form.examination.fit() {
+            Standing::Proved => return Ok(Ok(form)),
+            Standing::Undecided
                 if best
                     .as_ref()
-                    .is_none_or(|b| b.examination.fit == Fit::DoesNotFit) =>
+                    .is_none_or(|b| b.examination.fit() == Standing::Refuted) =>
             {
                 best = Some(form);
             }
@@ -136,7 +136,7 @@ fn carried(
     Ok(words)
 }
 
-/// Condition H3 for one assignment.
+/// Verdict H3 for one assignment.
 fn examined(
     extended: &Extended<'_>,
     tuning: &Tuning,

@@ -3,11 +3,13 @@
 use lynkeus_expr::Interval;
 use lynkeus_gain::lemma1::{self, Breaking, Kernel};
 use lynkeus_gain::{Bounds, Tridiagonal};
-use lynkeus_structure::{Check, Point};
 
 use crate::Constant;
-use crate::proof::words::{proved, refuted, shown, undecided};
+use crate::proof::words::shown;
 use crate::proof::{Chain, sum};
+use crate::statement::{proved, refuted, undecided};
+use crate::{Check, Hammouri};
+use lynkeus_structure::Point;
 
 /// What Lemma 1 says of a chain.
 pub(super) struct Verified {
@@ -28,11 +30,10 @@ pub(super) fn verify(
     names: &[String],
     suffix: &str,
 ) -> Verified {
-    let title = format!(
-        "Lemma 1 for ({}): A(a)ᵀS + SA(a) − ρCᵀC < 0 for every a in its bounds, ρ = 2r = {}",
-        names.join(" → "),
-        shown(2.0 * r)
-    );
+    let title = Hammouri::Lemma1 {
+        states: names.to_vec(),
+        ρ: 2.0 * r,
+    };
     let open = |check: Check| Verified {
         check,
         μ: None,
@@ -112,7 +113,7 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
 }
 
 /// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
-fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
+fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
     let value = quotient(S, found);
     let direction: Vec<String> = names
         .iter()

@@ -17,7 +17,7 @@ mod low_power;
 mod theorem;
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Standing};
 
 use crate::conditions::Partial;
 use crate::correction::{Correction, Start};
@@ -25,7 +25,7 @@ use crate::estimate::Copy;
 use crate::peaking::{self, InnovationLimit, LowPower};
 use crate::prolongation::{self, Continued, prolong};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning, TuningError,
     guarantee,
 };
 use form::{Form, form};
@@ -82,7 +82,7 @@ impl Family for Triangular {
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         let form = match form(extended, tuning)? {
-            Ok(form) if form.examination.fit != Fit::DoesNotFit => form,
+            Ok(form) if form.examination.fit() != Standing::Refuted => form,
             Ok(Form { examination, .. }) | Err(examination) => {
                 return Err(DesignError::Refused(Box::new(examination)));
             }

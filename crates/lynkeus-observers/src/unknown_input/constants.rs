@@ -18,13 +18,14 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node, jacobian};
-use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, Regularity, rank, sign};
+use lynkeus_structure::{Extended, Layers, Matrix, Regularity, rank, sign};
 
 use super::blocks::{self, Shape};
 use super::form::Form;
 use super::norms::{Norms, inverse_triangle};
 use crate::enclosure::Enclosure;
-use crate::{Assumptions, DesignError};
+use crate::statement::{Statement, proved, undecided};
+use crate::{Assumptions, Check, DesignError, Farza};
 
 /// The form at the signals that the observer knows, and how these move.
 struct Signals<'e, 'p> {
@@ -241,37 +242,30 @@ impl<'e, 'p> Signals<'e, 'p> {
         let region = self.box_.region();
         let graph = self.form.extended.graph();
         let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
-        Ok(found.check("what the proof differentiates has values on the box and does not jump"))
+        Ok(Statement::from(Farza::Continuous).with(found.finding()))
     }
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
     /// signals. That it is singular there refutes the proof, not the observer.
     fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, DesignError> {
         let graph = self.form.extended.graph();
-        let name = "Λ₂ is regular for estimates that differ from the measured signals";
         for (k, P) in P.iter().enumerate().skip(1) {
             let region = self.box_.region();
             let found = match P.rows == P.columns {
                 true => {
                     let det = P.determinant();
                     let det = det.unwrap_or_else(|| graph.constant(0.0).node());
-                    sign::keeps_sign(graph, name.to_owned(), det, region)?.check
+                    sign::keeps_sign(graph, det, region)?.finding
                 }
-                false => rank::full_column_rank(name.to_owned(), P, region)?,
+                false => rank::full_column_rank(P, region)?,
             };
-            if found.verdict != Condition::Proved {
-                return Ok(Check {
-                    verdict: Condition::Undecided(vec![]),
-                    detail: format!("block {}: {} ({})", k + 1, found.detail, found.verdict),
-                    ..found
-                });
+            if !found.is_proved() {
+                let detail = format!("block {}: {} ({})", k + 1, found.detail, found.verdict);
+                return Ok(undecided(Farza::Regular, detail));
             }
         }
-        Ok(Check {
-            name: name.to_owned(),
-            verdict: Condition::Proved,
-            detail: "each block has full column rank on the box".to_owned(),
-        })
+        let detail = "each block has full column rank on the box";
+        Ok(proved(Farza::Regular, detail))
     }
 
     /// ψ_k = Z_k' − Z_{k+1}, where X² moves by f̄ + D x₁¹' and the signals by their slopes.

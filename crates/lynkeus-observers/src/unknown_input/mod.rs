@@ -29,9 +29,9 @@ mod partition;
 mod settings;
 mod theorem;
 
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Standing};
 
-use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning};
+use crate::{Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning};
 use settings::Settings;
 
 const NAME: &str = "unknown-input";
@@ -68,7 +68,7 @@ impl Family for UnknownInput {
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         let settings = Settings::read(tuning, extended)?;
         match partition::search(extended, &settings, &extended.region())? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
+            Ok((form, examination)) if examination.fit() != Standing::Refuted => {
                 assemble::design(extended, tuning, &settings, &form, examination)
             }
             Ok((_, examination)) | Err(examination) => {
@@ -85,7 +85,7 @@ impl Family for UnknownInput {
     ) -> Result<Certificate, DesignError> {
         let settings = Settings::read(tuning, extended)?;
         match partition::search(extended, &settings, &assumptions.region)? {
-            Ok((form, examination)) if examination.fit != Fit::DoesNotFit => {
+            Ok((form, examination)) if examination.fit() != Standing::Refuted => {
                 theorem::certificate(&form, examination, &settings, assumptions)
             }
             Ok((_, examination)) | Err(examination) if examination.refuted().is_some() => {

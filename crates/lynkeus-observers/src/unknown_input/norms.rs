@@ -1,8 +1,8 @@
 //! From norms over the box to the constants of (24).
 
 use lynkeus_gain::integrators::Chain;
-use lynkeus_structure::Check;
 
+use crate::Check;
 use crate::enclosure::{length, norm, product, times, up};
 
 /// Norms over the box of the matrices above.

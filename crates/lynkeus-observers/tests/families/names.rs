@@ -29,7 +29,10 @@ fn plant([a, b, u, y]: [&str; 4]) -> Plant {
         ..Attributes::default()
     };
     let model = Model::new("named");
-    let (a_, b_) = (model.state(a, within(-1.0, 1.0)), model.state(b, within(-1.0, 1.0)));
+    let (a_, b_) = (
+        model.state(a, within(-1.0, 1.0)),
+        model.state(b, within(-1.0, 1.0)),
+    );
     let u_ = model.input(u, within(-0.5, 0.5));
     let der = |x: Expr<'_>, value: Expr<'_>| model.der(x, value);
     der(a_, b_ * (u_ * 0.1 + 1.0) - a_);
@@ -55,7 +58,10 @@ fn families() -> [(&'static dyn Family, Tuning); 4] {
 #[test]
 fn no_name_meets_a_symbol_of_the_observer() {
     for (family, tuning) in families() {
-        let told: Vec<_> = NAMES.iter().map(|&names| told(family, &tuning, names)).collect();
+        let told: Vec<_> = NAMES
+            .iter()
+            .map(|&names| told(family, &tuning, names))
+            .collect();
         for (names, other) in NAMES.iter().zip(&told) {
             assert_eq!(other, &told[0], "{} {names:?}", family.name());
         }

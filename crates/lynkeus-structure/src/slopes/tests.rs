@@ -52,7 +52,10 @@ fn inputs_that_enter_affinely_become_vertices() {
         end P;",
     );
     let (found, _) = slopes(&plant);
-    assert_eq!(found.inputs, [("u".to_owned(), 1.0, 2.0)]);
+    let [side] = &found.inputs[..] else {
+        panic!("{:?}", found.inputs)
+    };
+    assert_eq!((side.name.as_str(), side.min, side.max), ("u", 1.0, 2.0));
     let corner: Vec<f64> = found
         .models
         .iter()
@@ -300,13 +303,13 @@ fn hull(found: &Slopes, region: &Region, inputs: &[f64]) -> Vec<Vec<Interval>> {
             .inputs
             .iter()
             .enumerate()
-            .map(|(bit, (name, low, high))| {
+            .map(|(bit, side)| {
                 let place = region
                     .dimensions
                     .iter()
-                    .position(|d| d.name == *name)
+                    .position(|d| d.name == side.name)
                     .unwrap();
-                let s = (inputs[place - 3] - low) / (high - low);
+                let s = (inputs[place - 3] - side.min) / (side.max - side.min);
                 if vertex >> bit & 1 == 1 { s } else { 1.0 - s }
             })
             .product();
