@@ -94,6 +94,8 @@ pub struct Certificate {
     pub basis: String,
     /// guaranteed decay rate, 1/time unit; only where proved
     pub rate: Option<f64>,
+    /// c of the bound above: the factor by which the error may peak; only where proved
+    pub overshoot: Option<f64>,
     /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
     /// assumed drift and noise; only where proved
     pub ultimate_bound: Option<f64>,
@@ -130,6 +132,7 @@ impl Certificate {
         Self {
             basis: basis.into(),
             rate: None,
+            overshoot: None,
             ultimate_bound: None,
             ultimate: vec![],
             region: sides.map(|d| (d.name.clone(), d.min, d.max)).collect(),

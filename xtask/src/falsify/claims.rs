@@ -147,23 +147,14 @@ impl Findings {
     }
 }
 
-/// How the proofs describe the factor c of c·e^(−rate·t)·|e(0)|; its letter is another
-/// in every paper, and the same letter is another number elsewhere.
-const OVERSHOOTS: &[&str] = &["overshoot", "at most this times", "may peak"];
-
 fn claim(certificate: &Certificate) -> Option<Claim> {
     if certificate.verdict() != Standing::Proved {
         return None;
     }
-    let is_overshoot = |meaning: &str| OVERSHOOTS.iter().any(|words| meaning.contains(words));
-    let mut constants = certificate.constants.iter();
-    let overshoot = constants
-        .find(|c| is_overshoot(&c.meaning))
-        .map(|c| c.value);
     Some(Claim {
         basis: certificate.basis.clone(),
         rate: certificate.rate.unwrap_or(0.0),
-        overshoot,
+        overshoot: certificate.overshoot,
         ultimate: certificate.ultimate_bound,
         each: certificate.ultimate.clone(),
         lyapunov: certificate.lyapunov.clone(),

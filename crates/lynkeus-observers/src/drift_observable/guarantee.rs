@@ -60,7 +60,10 @@ pub(super) fn conclude(
     found.rate = Some(α);
     let φ = of_rows(P, &proof.lipschitz.unseen);
     let parts = filter.as_ref().zip(Some(φ));
-    print(proof, P, peak, parts, &mut found.constants);
+    let μ = up(peak * proof.lipschitz.map * proof.lipschitz.inverse);
+    // with a filter the error peaks by what the filter's leaves as well
+    found.overshoot = filter.is_none().then_some(μ);
+    print(proof, P, μ, parts, &mut found.constants);
     let a = filter.map_or(0.0, |f| f.rest);
     let left = std::iter::once(P)
         .chain(&solutions.slower)
@@ -158,12 +161,11 @@ fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 
 fn print(
     proof: &Proof<'_, '_>,
     P: &Riccati,
-    peak: f64,
+    μ: f64,
     filter: Option<(&Filter, f64)>,
     constants: &mut Vec<Constant>,
 ) {
-    let (map, inverse) = (proof.lipschitz.map, proof.lipschitz.inverse);
-    let μ = up(peak * map * inverse);
+    let inverse = proof.lipschitz.inverse;
     let mut add = |name: &str, value: f64, meaning: &str| {
         constants.push(Constant::new(name, value, meaning));
     };

@@ -155,6 +155,7 @@ fn fill(
         "V' ≤ −2·rate·V for V = eᵀPe",
     )];
     if let Some(spread) = ultimate::spread(&proof.P) {
+        certificate.overshoot = Some(spread);
         certificate.constants.push(Constant::new(
             "√cond(P)",
             spread,

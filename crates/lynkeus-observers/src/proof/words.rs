@@ -68,6 +68,7 @@ pub(crate) fn conclude(
         );
     }
     certificate.rate = Some(σ);
+    certificate.overshoot = ultimate.as_ref().map(|found| found.overshoot);
     match ultimate {
         Some(found) if found.norm.is_finite() => {
             certificate.ultimate_bound = Some(found.norm);

@@ -183,6 +183,7 @@ impl Proof<'_, '_, '_> {
         }
         found.rate = Some(λ / 2.0);
         let peak = up(self.root_V_of(θ) * length(&self.out_of_V(θ)));
+        found.overshoot = Some(peak);
         let list = &mut found.constants;
         list.push(Constant::new(
             "μ",

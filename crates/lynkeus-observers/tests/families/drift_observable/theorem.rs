@@ -4,7 +4,7 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Check, Design, Family, Tuning, Value,
+    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, Value,
     drift_observable::DriftObservable,
 };
 use lynkeus_structure::{Extended, Sensors, Standing};
@@ -183,7 +183,7 @@ fn the_bounded_observer_needs_a_small_input() {
     let limit = value(&found, "u_M");
     let found = certificate(&early(1.1 * limit, 0.5), &poles, &[0.0; 2], &[0.0]);
     assert_eq!(found.verdict(), Standing::Undecided);
-    assert_eq!(found.weakest().unwrap().name, "|u| ≤ u_M");
+    assert_eq!(found.weakest().unwrap().statement, Germani::Input.into());
 }
 
 /// Errors at every row against c e^(−αt)|e(0)| + bound, from a random start.

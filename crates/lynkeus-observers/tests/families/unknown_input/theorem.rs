@@ -130,7 +130,7 @@ fn a_rank_that_is_lost_refutes() {
     let text = BENT.replace("c + 0.1*c^3", "c^2");
     let found = certificate(&plant(&text), &theta([60.0, 15.0]), &[0.0; 4], &[0.0; 2]);
     assert_eq!(found.verdict(), Standing::Refuted);
-    let refuted = |h: &&lynkeus_structure::Check| matches!(h.verdict, Verdict::Refuted(_));
+    let refuted = |h: &&lynkeus_observers::Check| matches!(h.verdict, Verdict::Refuted(_));
     assert!(found.hypotheses.iter().any(|h| refuted(&h)));
 }
 
