@@ -108,7 +108,7 @@ fn search(
     let lower = search.minimum(1.0);
     let upper = search.minimum(-1.0);
     let defined =
-        (lower.defined && upper.defined) || Regularity::of(graph, &[node], &[], &region)?.holds();
+        (lower.defined && upper.defined) || Regularity::of(graph, &[node], &[], region)?.holds();
     let values = Interval::new(lower.bound, -upper.bound).ok();
     Ok(Range {
         enclosure: values.filter(|_| defined).unwrap_or(Interval::UNKNOWN),

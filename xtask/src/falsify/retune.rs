@@ -154,7 +154,7 @@ pub fn diverges(
             sides: vec![],
         };
         let claims = [claim];
-        let mut attack = attack(&faster, &extended, &mut pair, &claims);
+        let mut attack = attack(&faster, extended, &mut pair, &claims);
         let mut grew = None;
         for _ in 0..4 {
             let plan = attack.rest(numbers, 1e-6 / peak);

@@ -65,11 +65,11 @@ impl<'f, 'e, 'p> Matrices<'f, 'e, 'p> {
         let unknown: Vec<usize> =
             (form.extended.plant_states()..form.extended.states.len()).collect();
         add(&unknown, &form.first, start.values(&self.left)?, θ1 * θ1);
-        for k in 0..form.q() {
+        for (k, c) in C.iter().enumerate().take(form.q()) {
             let states = form.block(k + 1);
             add(&states, &form.first, start.values(&self.D[k])?, 2.0 * θ1);
             let left = start.values(&self.Λ2_left(k))?;
-            add(&states, &form.second, left, θ2.powi(k as i32 + 1) * C[k]);
+            add(&states, &form.second, left, θ2.powi(k as i32 + 1) * c);
         }
         let state = |i: usize| form.extended.states[i].name.clone();
         let output = |j: usize| ChainGain {
