@@ -112,6 +112,25 @@ impl Graph {
         Expr::new(self, node)
     }
 
+    /// A free variable that is no other's: no name finds it, whatever it is called. The label
+    /// is for people, in messages and rendered expressions.
+    pub fn fresh(&self, label: impl Into<String>) -> Expr<'_> {
+        let mut inner = self.inner.borrow_mut();
+        let index = inner.names.len() as u32;
+        inner.names.push(label.into());
+        let node = inner.intern(Key::Symbol(index), Op::Symbol(index));
+        Expr::new(self, node)
+    }
+
+    /// Whether a node is the symbol that its name finds, and no [fresh](Graph::fresh) one.
+    pub(crate) fn is_named(&self, node: Node) -> bool {
+        let inner = self.inner.borrow();
+        match inner.ops[node.index()] {
+            Op::Symbol(index) => inner.by_name.get(&inner.names[index as usize]) == Some(&node),
+            _ => false,
+        }
+    }
+
     /// A number.
     pub fn constant(&self, value: f64) -> Expr<'_> {
         let key = Key::Constant(value.to_bits());
@@ -140,7 +159,7 @@ impl Graph {
         }
     }
 
-    /// The name, where the node is a symbol.
+    /// The name or the label, where the node is a symbol.
     pub fn symbol_name(&self, node: Node) -> Option<String> {
         match self.op(node) {
             Op::Symbol(index) => Some(self.inner.borrow().names[index as usize].clone()),

@@ -22,7 +22,7 @@ impl Graph {
     }
 
     /// Copies everything below `roots` of another graph into this one, symbols by their
-    /// names; the images of all nodes but linear systems.
+    /// names, fresh ones as fresh ones; the images of all nodes but linear systems.
     pub fn copied(&self, from: &Graph, roots: &[Node]) -> HashMap<Node, Node> {
         let mut images: HashMap<Node, Node> = HashMap::new();
         for node in from.reachable(roots) {
@@ -40,7 +40,13 @@ impl Graph {
         Some(match from.op(node) {
             Op::Constant(_) | Op::Symbol(_) if std::ptr::eq(self, from) => node,
             Op::Constant(value) => self.constant(value).node(),
-            Op::Symbol(_) => self.symbol(&from.symbol_name(node)?).node(),
+            Op::Symbol(_) => {
+                let name = from.symbol_name(node)?;
+                match from.is_named(node) {
+                    true => self.symbol(&name).node(),
+                    false => self.fresh(name).node(),
+                }
+            }
             Op::Unary(op, a) => self.unary(op, image(a)),
             Op::Powi(a, n) => self.powi(image(a), n),
             Op::Binary(op, a, b) => self.binary(op, image(a), image(b)),
@@ -78,5 +84,22 @@ mod tests {
         };
         let copied = value(&copy, [image[&x.node()], image[&y.node()]], image[&root]);
         assert_eq!(copied, value(&g, [x.node(), y.node()], root));
+    }
+
+    #[test]
+    fn no_name_finds_a_fresh_symbol() {
+        let g = Graph::new();
+        let before = g.symbol("estimate of a");
+        let [first, second] = [g.fresh("estimate of a"), g.fresh("estimate of a")];
+        assert_ne!(first.node(), second.node());
+        assert_eq!(g.symbol("estimate of a").node(), before.node());
+        assert_eq!(g.render((first * 2.0).node(), 40), "estimate of a*2");
+        // not in another graph either
+        let other = Graph::new();
+        let sum = ((before + first) * second).node();
+        let copies = other.copied(&g, &[sum]);
+        assert_eq!(other.symbols_of(&[copies[&sum]]).len(), 3);
+        assert_eq!(copies[&before.node()], other.symbol("estimate of a").node());
+        assert_ne!(copies[&first.node()], copies[&before.node()]);
     }
 }

@@ -1,10 +1,11 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Dimension, Extended, Region};
+use lynkeus_structure::{Dimension, Extended, Region, Standing};
 use nalgebra::DMatrix;
 
-use crate::Fit;
+use crate::Check;
+use crate::statement::{Statement, standing};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ impl Assumptions {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
             input_derivatives: vec![],
-            regularity: extended.regularity(&region)?,
+            regularity: Statement::PlantIsRegular.with(extended.regularity(&region)?),
             region,
         })
     }
@@ -58,37 +59,6 @@ impl Assumptions {
     pub fn with_input_derivatives(mut self, bounds: Vec<Vec<f64>>) -> Self {
         self.input_derivatives = bounds;
         self
-    }
-}
-
-/// The verdict on a guarantee.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// the error decays at the stated rate, for everything in the box
-    Proved,
-    /// a point of the box shows that it does not
-    Refuted,
-    /// neither
-    Undecided,
-}
-
-impl Verdict {
-    /// One word: `proved`, `refuted` or `undecided`.
-    pub fn word(self) -> &'static str {
-        match self {
-            Verdict::Proved => "proved",
-            Verdict::Refuted => "refuted",
-            Verdict::Undecided => "undecided",
-        }
-    }
-
-    /// Refuted if a hypothesis is, undecided if one is, else proved.
-    pub fn of(hypotheses: &[Check]) -> Self {
-        match crate::conditions::fit(hypotheses) {
-            Fit::Fits => Verdict::Proved,
-            Fit::Undecided => Verdict::Undecided,
-            Fit::DoesNotFit => Verdict::Refuted,
-        }
     }
 }
 
@@ -117,14 +87,18 @@ impl Constant {
 /// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
 /// while plant and estimate stay in the box.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::manual_non_exhaustive,
+    reason = "inside this crate, too, only `Certificate::new` makes one"
+)]
 pub struct Certificate {
     /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
     /// `linear matrix inequality`
     pub basis: String,
-    /// the verdict
-    pub verdict: Verdict,
     /// guaranteed decay rate, 1/time unit; only where proved
     pub rate: Option<f64>,
+    /// c of the bound above: the factor by which the error may peak; only where proved
+    pub overshoot: Option<f64>,
     /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
     /// assumed drift and noise; only where proved
     pub ultimate_bound: Option<f64>,
@@ -159,8 +133,8 @@ impl Certificate {
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
             basis: basis.into(),
-            verdict: Verdict::of(&hypotheses),
             rate: None,
+            overshoot: None,
             ultimate_bound: None,
             ultimate: vec![],
             region: sides.map(|d| (d.name.clone(), d.min, d.max)).collect(),
@@ -178,9 +152,14 @@ impl Certificate {
         &self.regularity
     }
 
+    /// Proved: the error decays at the stated rate, for everything in the box. Refuted: a point
+    /// of the box shows that a hypothesis fails.
+    pub fn verdict(&self) -> Standing {
+        standing(&self.hypotheses)
+    }
+
     /// The first hypothesis that is not proved.
     pub fn weakest(&self) -> Option<&Check> {
-        let open = |check: &&Check| check.verdict != Condition::Proved;
-        self.hypotheses.iter().find(open)
+        self.hypotheses.iter().find(|check| !check.is_proved())
     }
 }

@@ -1,12 +1,13 @@
 //! Conditions that several families share.
 
+use crate::Check;
+use crate::statement::{Statement, proved};
 use lynkeus_expr::Node;
 use lynkeus_structure::sign::{self, Sign};
-use lynkeus_structure::{
-    ChainRequest, Check, Condition, Dimension, Extended, Region, Regularity, has_value_at,
-};
+use lynkeus_structure::{ChainRequest, Extended, Region, Regularity, has_value_at};
+use lynkeus_structure::{Finding, Verdict};
 
-use crate::{DesignError, Fit, KeySpec, Shape, Tuning, TuningError};
+use crate::{DesignError, KeySpec, Shape, Tuning, TuningError};
 
 /// ∂f_row/∂x_column with the verdict on its sign.
 fn partial(
@@ -20,15 +21,15 @@ fn partial(
     let node = extended
         .partial(row, column)
         .unwrap_or_else(|| graph.constant(0.0).node());
-    let (f, x) = (&extended.states[row].name, &extended.states[column].name);
-    let name = format!("∂f({f})/∂{x} keeps its sign");
-    let mut found = sign::keeps_sign(graph, name, node, region)?;
+    let mut found = sign::keeps_sign(graph, node, region)?;
     // log(x) has a derivative at x < 0, where it has no value: no witness lies there
-    if let Condition::Refuted(witness) = &found.check.verdict
+    if let Verdict::Refuted(witness) = &found.finding.verdict
         && !has_value_at(graph, extended.derivatives[row], witness, region)?
     {
-        found.check.detail = format!("{}, but where f({f}) has no value", found.check.detail);
-        found.check.verdict = Condition::Undecided(region.sides(&graph.symbols_of(&[node])));
+        let f = &extended.states[row].name;
+        found.finding.detail = format!("{}, but where f({f}) has no value", found.finding.detail);
+        let place = region.restricted(&graph.symbols_of(&[node])).place();
+        found.finding.verdict = Verdict::Undecided(place);
     }
     Ok((node, found))
 }
@@ -68,7 +69,12 @@ pub(crate) fn partials(
             sign: verdict.sign,
             bounds: verdict.bounds,
         });
-        checks.push(verdict.check);
+        let name = |i: usize| extended.states[i].name.clone();
+        let statement = Statement::PartialKeepsSign {
+            of: name(pair[0]),
+            by: name(pair[1]),
+        };
+        checks.push(statement.with(verdict.finding));
     }
     Ok((found, checks))
 }
@@ -88,9 +94,12 @@ pub(crate) fn output_slope(
     if graph.constant_value(slope).is_some_and(|c| c != 0.0) {
         return Ok(None);
     }
-    let (y, x) = (&output.variable.name, &extended.states[state].name);
-    let name = format!("∂{y}/∂{x} keeps its sign");
-    Ok(Some(sign::keeps_sign(graph, name, slope, region)?.check))
+    let statement = Statement::OutputKeepsSign {
+        output: output.variable.name.clone(),
+        state: extended.states[state].name.clone(),
+    };
+    let found = sign::keeps_sign(graph, slope, region)?.finding;
+    Ok(Some(statement.with(found)))
 }
 
 pub(crate) fn names(extended: &Extended<'_>, states: &[usize]) -> Vec<String> {
@@ -114,30 +123,15 @@ pub(crate) fn on_output(
     names(extended, states).into_iter().zip(gains).collect()
 }
 
-pub(crate) fn fit<'a>(checks: impl IntoIterator<Item = &'a Check> + Clone) -> Fit {
-    let any = |test: fn(&Condition) -> bool| {
-        let mut checks = checks.clone().into_iter();
-        checks.any(|check| test(&check.verdict))
-    };
-    if any(|v| matches!(v, Condition::Refuted(_))) {
-        Fit::DoesNotFit
-    } else if any(|v| matches!(v, Condition::Undecided(_))) {
-        Fit::Undecided
-    } else {
-        Fit::Fits
-    }
-}
-
 /// H3 i): the right-hand side is Lipschitz on the box. Never a refusal: outside
 /// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
 pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
     let graph = extended.graph();
     let symbols = extended.symbols();
     let jacobian = lynkeus_expr::jacobian::forward(graph, &extended.derivatives, &symbols);
-    let name = "∂f/∂x is bounded on the box".to_owned();
     let regularity = Regularity::of(graph, &extended.derivatives, &symbols, region)?;
     if !regularity.holds() {
-        return Ok(regularity.check(name));
+        return Ok(Statement::Lipschitz.with(regularity.finding()));
     }
     for &(row, column, node) in &jacobian.entries {
         if sign::bounded(graph, node, region)? {
@@ -150,19 +144,11 @@ pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Chec
             graph.render(node, 60)
         );
         let used = region.restricted(&graph.symbols_of(&[node]));
-        let side = |d: &Dimension| (d.name.clone(), d.min, d.max);
-        let left = used.dimensions.iter().map(side).collect();
-        return Ok(Check {
-            name,
-            verdict: Condition::Undecided(left),
-            detail,
-        });
+        let verdict = Verdict::Undecided(used.place());
+        return Ok(Statement::Lipschitz.with(Finding { verdict, detail }));
     }
-    Ok(Check {
-        name,
-        verdict: Condition::Proved,
-        detail: format!("{} entries enclosed", jacobian.entries.len()),
-    })
+    let detail = format!("{} entries enclosed", jacobian.entries.len());
+    Ok(proved(Statement::Lipschitz, detail))
 }
 
 /// The states of each chain, for the families that have chains.

@@ -7,7 +7,7 @@ use lynkeus_expr::{Graph, Node};
 use lynkeus_structure::Extended;
 
 use crate::estimate::Copy;
-use crate::{ChainGain, Observer, TuningError};
+use crate::{ChainGain, TuningError};
 
 /// Longest expression that is printed, in characters.
 const LONGEST: usize = 120;
@@ -94,8 +94,7 @@ impl<'a> Start<'a> {
                 images.insert(input.node, graph.constant(start).node());
             }
         }
-        for output in &extended.outputs {
-            let signal = Observer::measurement(graph, &output.variable.name);
+        for (output, signal) in extended.outputs.iter().zip(&copy.measured) {
             let value = graph.substitute(&[output.variable.node], &images)[0];
             images.insert(signal.symbol, value);
         }

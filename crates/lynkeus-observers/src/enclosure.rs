@@ -37,7 +37,7 @@ impl<'g> Enclosure<'g> {
     /// A further variable, bounded by `size` in absolute value.
     pub fn within(&mut self, name: impl Into<String>, size: f64) -> Node {
         let name = name.into();
-        let symbol = self.graph.symbol(&name).node();
+        let symbol = self.graph.fresh(&name).node();
         self.add(name, symbol, -size, size);
         symbol
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, Node};
 use lynkeus_model::Variable;
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Measurement};
 
 use crate::{Estimate, Initial, Observer, Signal, Tuning, TuningError, prolongation};
 
@@ -32,6 +32,8 @@ pub(crate) struct Copy<'e, 'p> {
     pub extended: &'e Extended<'p>,
     /// x̂, one per extended state
     pub hats: Vec<Signal>,
+    /// y, one per measured output
+    pub measured: Vec<Signal>,
     /// x ↦ x̂, limited to [min, max] if the tuning says so
     seen: HashMap<Node, Node>,
     pub common: &'e Common,
@@ -40,14 +42,12 @@ pub(crate) struct Copy<'e, 'p> {
 impl<'e, 'p> Copy<'e, 'p> {
     pub fn new(extended: &'e Extended<'p>, common: &'e Common) -> Self {
         let graph = extended.graph();
-        let hats: Vec<Signal> = extended
-            .states
-            .iter()
-            .map(|state| Observer::hat(graph, &state.name))
-            .collect();
+        let hat = |state: &Variable| Signal::fresh(graph, "estimate of", &state.name);
+        let y = |o: &Measurement| Signal::fresh(graph, "measured", &o.variable.name);
         let mut copy = Self {
             extended,
-            hats,
+            hats: extended.states.iter().map(hat).collect(),
+            measured: extended.outputs.iter().map(y).collect(),
             seen: HashMap::new(),
             common,
         };
@@ -118,22 +118,13 @@ impl<'e, 'p> Copy<'e, 'p> {
 }
 
 impl Copy<'_, '_> {
-    /// The signals y, one per measured output.
-    pub fn measured(&self) -> Vec<Signal> {
-        let outputs = self.extended.outputs.iter();
-        outputs
-            .map(|o| Observer::measurement(self.extended.graph(), &o.variable.name))
-            .collect()
-    }
-
     /// The measured value of the state that output `i` shows: y = slope·x + offset
     /// solved for x. None where the output is no affine function of one state.
     pub fn measured_state(&self, i: usize) -> Option<(usize, Node)> {
         let graph = self.extended.graph();
         let output = &self.extended.outputs[i];
         let (state, slope, offset) = output.state?;
-        let y = Observer::measurement(graph, &output.variable.name);
-        let x = (graph.expr(y.symbol) - graph.expr(offset)) / graph.expr(slope);
+        let x = (graph.expr(self.measured[i].symbol) - graph.expr(offset)) / graph.expr(slope);
         Some((state, x.node()))
     }
 
@@ -162,7 +153,7 @@ impl Copy<'_, '_> {
             derivatives,
             inputs: self.extended.inputs.iter().map(signal).collect(),
             input_derivatives: vec![],
-            measured: self.measured(),
+            measured: self.measured.clone(),
             estimates: self.estimates(),
             monitors: vec![],
         })

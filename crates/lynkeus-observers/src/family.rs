@@ -1,9 +1,11 @@
 //! What a family is, and the list of them.
 
+use crate::Check;
+use crate::statement::{Statement, standing};
 use lynkeus_expr::MissingInput;
-use lynkeus_structure::{Check, Condition, Extended, Region};
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Extended, Region};
 
-use crate::conditions::fit;
 use crate::{
     Assumptions, Certificate, KeySpec, Observer, Tuning, TuningError,
     block_triangular::BlockTriangular, drift_observable::DriftObservable,
@@ -65,25 +67,13 @@ pub trait Family: Sync {
     ) -> Result<Certificate, DesignError>;
 }
 
-/// Whether a family fits a plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fit {
-    /// every condition is proved
-    Fits,
-    /// a condition is undecided, none is refuted
-    Undecided,
-    /// the form is another, or a condition is refuted
-    DoesNotFit,
-}
-
-impl Fit {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Fit::Fits => "fits",
-            Fit::Undecided => "undecided",
-            Fit::DoesNotFit => "does not fit",
-        }
+/// Whether a family fits, in the words of reports: it does where every condition is proved, and
+/// does not where the form is another or a condition is refuted.
+pub fn fit_word(fit: Standing) -> &'static str {
+    match fit {
+        Standing::Proved => "fits",
+        Standing::Undecided => "undecided",
+        Standing::Refuted => "does not fit",
     }
 }
 
@@ -92,8 +82,6 @@ impl Fit {
 pub struct Examination {
     /// name of the family
     pub family: &'static str,
-    /// verdict on the whole
-    pub fit: Fit,
     /// what was found, in one or two sentences: the chains, or what breaks the form
     pub summary: String,
     /// names of the states of each chain, where the form was found
@@ -115,11 +103,9 @@ impl Examination {
         form: Form,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
-        let regularity = extended.regularity(region)?;
-        let fit = fit(checks.iter().chain([&regularity]));
+        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
         Ok(Self {
             family,
-            fit,
             summary: form.summary,
             chains: form.chains,
             checks,
@@ -131,11 +117,19 @@ impl Examination {
     pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
         Self {
             family,
-            fit: Fit::DoesNotFit,
             summary,
             chains: vec![],
             checks,
             regularity: None,
+        }
+    }
+
+    /// Whether the family fits: proved where every condition is, refuted where the form is
+    /// another or a required condition is refuted.
+    pub fn fit(&self) -> Standing {
+        match self.regularity {
+            Some(_) => standing(self.conditions()),
+            None => Standing::Refuted,
         }
     }
 
@@ -144,10 +138,10 @@ impl Examination {
         self.regularity.iter().chain(&self.checks)
     }
 
-    /// The first condition that is refuted.
+    /// The first condition whose refutation refutes the whole.
     pub fn refuted(&self) -> Option<&Check> {
         self.conditions()
-            .find(|check| matches!(check.verdict, Condition::Refuted(_)))
+            .find(|check| check.standing() == Standing::Refuted)
     }
 }
 
@@ -211,7 +205,7 @@ fn refusal(examination: &Examination) -> String {
         examination.family, examination.summary
     );
     if let Some(check) = examination.refuted() {
-        text += &format!("\n  {}: {} ({})", check.name, check.verdict, check.detail);
+        text += &format!("\n  {check}");
     }
     text
 }

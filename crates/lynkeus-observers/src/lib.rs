@@ -29,13 +29,15 @@ mod proof;
 mod stability;
 mod stages;
 pub mod state_affine;
+mod statement;
 pub mod triangular;
 mod tuning;
 pub mod unknown_input;
 
-pub use certificate::{Assumptions, Certificate, Constant, Verdict};
-pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, Fit, find};
+pub use certificate::{Assumptions, Certificate, Constant};
+pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, find, fit_word};
 pub use guarantee::{Claim, Correction, Injection, certify};
 pub use keys::{KeySpec, REQUIRED, Shape};
 pub use observer::{Estimate, InputDerivative, Monitor, Observer, Signal};
+pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};
 pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -105,23 +105,14 @@ impl Observer {
         }
         Ok(found)
     }
+}
 
-    /// The symbol of an estimated quantity. The name cannot be a Modelica one, so
-    /// that it never meets a variable of the plant.
-    pub(crate) fn hat(graph: &Graph, name: &str) -> Signal {
-        let symbol = graph.symbol(&format!("estimate of {name}")).node();
-        Signal {
+impl Signal {
+    /// A signal called as the plant has it, with a symbol of its own: `label` of `name`.
+    pub(crate) fn fresh(graph: &Graph, label: &str, name: &str) -> Self {
+        Self {
             name: name.to_owned(),
-            symbol,
-        }
-    }
-
-    /// The symbol of a measured output.
-    pub(crate) fn measurement(graph: &Graph, name: &str) -> Signal {
-        let symbol = graph.symbol(&format!("measured {name}")).node();
-        Signal {
-            name: name.to_owned(),
-            symbol,
+            symbol: graph.fresh(format!("{label} {name}")).node(),
         }
     }
 }

@@ -6,9 +6,9 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_proof::hurwitz::{self, Stability};
-use lynkeus_structure::Point;
 
 use crate::proof::words::shown;
+use lynkeus_structure::Point;
 
 /// A chain with its gain.
 pub(crate) struct GainedChain<'a> {

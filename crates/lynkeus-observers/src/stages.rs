@@ -1,11 +1,12 @@
 //! A family in stages: settings read once, the form found once, the design and the theorem
 //! from both. What the [`Family`] trait offers is made of these, the same for all.
 
+use lynkeus_structure::Standing;
 use lynkeus_structure::{Extended, Region};
 
 use crate::keys::KeySpec;
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Fit, Tuning, TuningError,
+    Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning, TuningError,
 };
 
 /// A key whose wrong value is told by the stage that needs it: another family may own a key
@@ -101,7 +102,7 @@ impl<S: Stages> Family for S {
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         let settings = S::read(extended, tuning)?;
         match S::form(extended, &settings, &extended.region())? {
-            Ok(found) if found.examination.fit != Fit::DoesNotFit => {
+            Ok(found) if found.examination.fit() != Standing::Refuted => {
                 S::design(extended, &settings, found)
             }
             Ok(Found { examination, .. }) | Err(examination) => {
@@ -122,7 +123,7 @@ impl<S: Stages> Family for S {
             FormBox::Assumed => (assumptions.region.clone(), true),
         };
         match S::form(extended, &settings, &region)? {
-            Ok(found) if !(ends && found.examination.fit == Fit::DoesNotFit) => {
+            Ok(found) if !(ends && found.examination.fit() == Standing::Refuted) => {
                 S::theorem(extended, &settings, found, assumptions)
             }
             Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {

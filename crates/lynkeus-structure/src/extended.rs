@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use lynkeus_expr::{Graph, MissingInput, Node, jacobian};
 use lynkeus_model::{Plant, Variable};
 
-use crate::{Check, Dimension, Region, Regularity, steps};
+use crate::{Dimension, Finding, Region, Regularity, steps};
 
 /// Who measures what.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -243,11 +243,11 @@ impl<'p> Extended<'p> {
     ///
     /// # Errors
     /// [`MissingInput`] where the plant has parameters without value.
-    pub fn regularity(&self, region: &Region) -> Result<Check, MissingInput> {
+    pub fn regularity(&self, region: &Region) -> Result<Finding, MissingInput> {
         let outputs = self.outputs.iter().map(|o| o.variable.node);
         let all: Vec<Node> = self.derivatives.iter().copied().chain(outputs).collect();
         let found = Regularity::of(self.graph(), &all, &self.symbols(), region)?;
-        Ok(found.check("f and h have values on the whole box and do not jump"))
+        Ok(found.finding())
     }
 
     /// The box: declared ranges of the states, unknown and known inputs, time.

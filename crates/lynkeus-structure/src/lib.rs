@@ -4,13 +4,12 @@
 //! [`Extended`] is the plant as an observer sees it: unknown inputs are states,
 //! disturbances are zero. [`chains`] finds the triangular form of its equations,
 //! [`sign`] decides whether a partial derivative keeps its sign on the box
-//! — [`Condition`]: proved, refuted with a witness, or undecided with the box
+//! — [`Verdict`]: proved, refuted with a witness, or undecided with the box
 //! that is left — and [`visibility`] says which states leave a trace in the outputs.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod blocks;
 pub mod chains;
-mod condition;
 mod extended;
 pub mod indices;
 mod irreducible;
@@ -28,12 +27,12 @@ pub mod slopes;
 pub mod superdiagonal;
 pub mod uniform;
 mod vanish;
+mod verdict;
 pub mod visibility;
 mod words;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
-pub use condition::{Check, Condition, Point, Witness};
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
@@ -43,5 +42,6 @@ pub use regularity::{Regularity, Trouble, has_value_at, steps};
 pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, uniformity};
-pub use vanish::{Vanishing, vanishes};
+pub use vanish::vanishes;
+pub use verdict::{Finding, Place, Point, Side, Standing, Verdict, Witness};
 pub use words::{counted, figures, short};

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use lynkeus_expr::flow::{self, Flow, InputJet};
 use lynkeus_expr::{Expr, Graph, MissingInput, Node, jacobian};
 
-use crate::{Extended, Region, Vanishing, vanishes};
+use crate::{Extended, Region, Verdict, vanishes};
 
 /// A matrix row by row; none where an entry is zero everywhere.
 pub type Rows = Vec<Vec<Option<Node>>>;
@@ -38,7 +38,7 @@ pub fn affine_form(extended: &Extended<'_>) -> Result<Result<AffineForm, String>
     let slopes: Vec<Node> = g.entries.iter().map(|e| e.2).collect();
     let second = jacobian::forward(graph, &slopes, &u);
     for (entry, j, node) in second.entries {
-        if vanishes(graph, node, &region)? != Vanishing::Everywhere {
+        if vanishes(graph, node, &region)? != Verdict::Proved {
             let (state, input) = (g.entries[entry].0, &extended.inputs[j].name);
             return Ok(Err(format!(
                 "the equation of {} is not affine in the input {input}; the form is x' = f(x) + g(x)u",
@@ -169,12 +169,14 @@ pub fn relative_degree(
             continue;
         };
         match vanishes(graph, node, region)? {
-            Vanishing::Everywhere => {}
-            Vanishing::Undecided => proved = false,
-            Vanishing::NotAt(point) => {
+            Verdict::Proved => {}
+            Verdict::Undecided(_) => proved = false,
+            Verdict::Refuted(witness) => {
                 let order = k + 1;
-                let detail =
-                    format!("{input} appears in y^({order}): ∂y^({order})/∂{input} is {point}");
+                let detail = format!(
+                    "{input} appears in y^({order}): ∂y^({order})/∂{input} is {}",
+                    witness.told()
+                );
                 return Ok(Degree {
                     r: k + 1,
                     proved,

@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Region};
-use crate::{Dimension, Point, Regularity};
+use crate::{Dimension, Place, Point, Regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -28,7 +28,7 @@ pub struct Range {
     /// the largest value found at a point
     pub highest: Option<Point>,
     /// the cell that keeps the enclosure from being tighter at its lower end
-    pub weakest: Vec<(String, f64, f64)>,
+    pub weakest: Place,
 }
 
 /// Encloses the values of `node` for variables in `region`.
@@ -148,7 +148,7 @@ struct Minimum {
     bound: f64,
     best: Option<Point>,
     defined: bool,
-    weakest: Vec<(String, f64, f64)>,
+    weakest: Place,
 }
 
 struct Search<'a> {

@@ -2,9 +2,7 @@
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Tape, jacobian};
 
-use crate::{
-    Check, Condition, Dimension, Matrix, Point, Region, Regularity, Witness, regular, sign, steps,
-};
+use crate::{Dimension, Finding, Matrix, Point, Region, Regularity, Verdict, regular, sign, steps};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -20,58 +18,46 @@ const MAX_MINORS: usize = 250;
 ///
 /// # Errors
 /// [`MissingInput`] where an entry depends on a symbol outside the region.
-pub fn full_column_rank(
-    name: String,
-    matrix: &Matrix<'_>,
-    region: &Region,
-) -> Result<Check, MissingInput> {
+pub fn full_column_rank(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> {
     let graph = matrix.graph();
     if matrix.rows == matrix.columns && matrix.columns > MAX_COLUMNS {
-        return regular::regular(name, matrix, region);
+        return regular::regular(matrix, region);
     }
     let Some(mut minors) = minors(matrix) else {
         let detail = format!(
             "a {}×{} matrix has too many minors to decide",
             matrix.rows, matrix.columns
         );
-        let verdict = Condition::Undecided(vec![]);
-        return Ok(Check {
-            name,
-            verdict,
-            detail,
-        });
+        return Ok(Finding::undecided(detail));
     };
     if minors.is_empty() {
-        let points = vec![Point {
+        let zero = Point {
             coordinates: vec![],
             value: 0.0,
-        }];
-        return Ok(Check {
-            name,
-            verdict: Condition::Refuted(Witness { points }),
-            detail: format!(
-                "every {0}×{0} minor of the {1}×{0} matrix is zero",
-                matrix.columns, matrix.rows
-            ),
-        });
+        };
+        let detail = format!(
+            "every {0}×{0} minor of the {1}×{0} matrix is zero",
+            matrix.columns, matrix.rows
+        );
+        return Ok(Finding::refuted(zero, detail));
     }
     if matrix.rows == matrix.columns {
-        return Ok(sign::keeps_sign(graph, name, minors[0], region)?.check);
+        return Ok(sign::keeps_sign(graph, minors[0], region)?.finding);
     }
     minors.sort_by_key(|&minor| graph.reachable(&[minor]).len());
     for &minor in &minors {
         if !may_keep_sign(graph, minor, region)? {
             continue;
         }
-        let found = sign::keeps_sign(graph, name.clone(), minor, region)?.check;
-        if found.verdict == Condition::Proved {
+        let found = sign::keeps_sign(graph, minor, region)?.finding;
+        if found.is_proved() {
             return Ok(found);
         }
     }
     let squares = minors.iter().map(|&minor| graph.powi(minor, 2));
     let gram = squares.reduce(|a, b| graph.binary(Binary::Add, a, b));
     let gram = gram.unwrap_or_else(|| graph.constant(0.0).node());
-    Ok(sign::keeps_sign(graph, name, gram, region)?.check)
+    Ok(sign::keeps_sign(graph, gram, region)?.finding)
 }
 
 /// Decides whether `functions` are one-to-one in `variables` on the box, for any
@@ -86,11 +72,10 @@ pub fn full_column_rank(
 /// [`MissingInput`] where a function depends on a symbol outside the region.
 pub fn one_to_one(
     graph: &Graph,
-    name: String,
     functions: &[Node],
     variables: &[Node],
     region: &Region,
-) -> Result<Check, MissingInput> {
+) -> Result<Finding, MissingInput> {
     let local = Matrix::jacobian(graph, functions, variables);
     let entries = local.nonzero();
     let affine = jacobian::pattern(graph, &entries, variables)
@@ -99,14 +84,13 @@ pub fn one_to_one(
         && !functions.iter().any(|&f| steps(graph, f, variables));
     let regularity = Regularity::of(graph, functions, variables, region)?;
     if let Some(trouble) = regularity.trouble() {
-        return Ok(Check {
-            name,
+        return Ok(Finding {
             verdict: regularity.verdict(),
             detail: format!("the mean value theorem does not apply: {trouble}"),
         });
     }
     if affine {
-        return full_column_rank(name, &local, region);
+        return full_column_rank(&local, region);
     }
     let mut wider = region.clone();
     let size = (local.rows, local.columns);
@@ -121,14 +105,13 @@ pub fn one_to_one(
         })
         .collect();
     let mean = Matrix::from_fn(graph, size, |i, j| rows[i][j]);
-    let mut check = full_column_rank(name, &mean, &wider)?;
-    if let Condition::Refuted(_) = check.verdict {
-        check.verdict = Condition::Undecided(vec![]);
-        check.detail =
-            "the mean value theorem does not decide it: rows taken at different points can be dependent"
-                .into();
-    }
-    Ok(check)
+    let found = full_column_rank(&mean, &wider)?;
+    Ok(match found.verdict {
+        Verdict::Refuted(_) => Finding::undecided(
+            "the mean value theorem does not decide it: rows taken at different points can be dependent",
+        ),
+        _ => found,
+    })
 }
 
 /// Symbols for the variables at the mean value point of row `row`, with their sides.
@@ -140,7 +123,7 @@ fn copies(
 ) -> std::collections::HashMap<Node, Node> {
     let copy = |side: &Dimension| {
         let name = format!("[{} in row {}]", side.name, row + 1);
-        let symbol = graph.symbol(&name).node();
+        let symbol = graph.fresh(&name).node();
         Dimension {
             name,
             symbol,
@@ -216,11 +199,11 @@ mod tests {
         }
     }
 
-    fn rank(rows: &[&[Expr<'_>]], symbols: &[Expr<'_>]) -> Check {
+    fn rank(rows: &[&[Expr<'_>]], symbols: &[Expr<'_>]) -> Finding {
         let graph = rows[0][0].graph();
         let size = (rows.len(), rows[0].len());
         let matrix = Matrix::from_fn(graph, size, |i, j| Some(rows[i][j].node()));
-        full_column_rank("rank".into(), &matrix, &region(symbols)).unwrap()
+        full_column_rank(&matrix, &region(symbols)).unwrap()
     }
 
     #[test]
@@ -228,7 +211,7 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let check = rank(&[&[-x], &[1.0 - x]], &[x]);
-        assert_eq!(check.verdict, Condition::Proved, "{}", check.detail);
+        assert_eq!(check.verdict, Verdict::Proved, "{}", check.detail);
     }
 
     #[test]
@@ -236,7 +219,7 @@ mod tests {
         let g = Graph::new();
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x], &[y.sin()]], &[x, y]);
-        let Condition::Refuted(witness) = check.verdict else {
+        let Verdict::Refuted(witness) = check.verdict else {
             panic!("{}", check.detail)
         };
         let values: Vec<f64> = witness.points[0].coordinates.iter().map(|c| c.1).collect();
@@ -248,7 +231,7 @@ mod tests {
         let g = Graph::new();
         let (x, y) = (g.symbol("x"), g.symbol("y"));
         let check = rank(&[&[x, x * y], &[y, y * y], &[x + 1.0, y * x + y]], &[x, y]);
-        assert!(matches!(check.verdict, Condition::Refuted(_)));
+        assert!(matches!(check.verdict, Verdict::Refuted(_)));
         assert!(rank(&[&[x, y]], &[x, y]).detail.contains("minor"));
     }
 
@@ -271,14 +254,14 @@ mod tests {
         let decide = |f: [Expr<'_>; 2], region: &Region| {
             let functions = f.map(|f| f.node());
             let variables = [a.node(), b.node()];
-            one_to_one(&g, "map".into(), &functions, &variables, region).unwrap()
+            one_to_one(&g, &functions, &variables, region).unwrap()
         };
         let box_ = region(&[a, b]);
         let tame = decide([a + 0.2 * b.sin(), b - 0.1 * a * a], &box_);
-        assert_eq!(tame.verdict, Condition::Proved, "{}", tame.detail);
+        assert_eq!(tame.verdict, Verdict::Proved, "{}", tame.detail);
         let folded = decide([a * a - b * b, 2.0 * a * b], &box_);
-        assert!(matches!(folded.verdict, Condition::Undecided(_)));
+        assert!(matches!(folded.verdict, Verdict::Undecided(_)));
         let flat = decide([a + b, 2.0 * a + 2.0 * b], &box_);
-        assert!(matches!(flat.verdict, Condition::Refuted(_)));
+        assert!(matches!(flat.verdict, Verdict::Refuted(_)));
     }
 }

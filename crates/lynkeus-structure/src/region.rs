@@ -2,6 +2,8 @@
 
 use lynkeus_expr::{Interval, Node};
 
+use crate::{Place, Side};
+
 /// One side of the box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dimension {
@@ -15,6 +17,17 @@ pub struct Dimension {
     pub max: f64,
     /// only whole numbers count
     pub integer: bool,
+}
+
+impl Dimension {
+    /// Name and ends.
+    pub fn side(&self) -> Side {
+        Side {
+            name: self.name.clone(),
+            min: self.min,
+            max: self.max,
+        }
+    }
 }
 
 /// The box on which conditions are decided: the product of its dimensions.
@@ -43,10 +56,9 @@ impl Region {
         }
     }
 
-    /// Names and ends of the sides of some symbols.
-    pub fn sides(&self, symbols: &[Node]) -> Vec<(String, f64, f64)> {
-        let used = self.restricted(symbols);
-        used.named(&used.cell())
+    /// The sides by name.
+    pub fn place(&self) -> Place {
+        self.dimensions.iter().map(Dimension::side).collect()
     }
 
     /// The symbols, in order.
@@ -62,7 +74,7 @@ impl Region {
 
     /// Names and ends of a cell; beyond what points reach, an end that is not declared
     /// stands for itself.
-    pub(crate) fn named(&self, cell: &Cell) -> Vec<(String, f64, f64)> {
+    pub(crate) fn named(&self, cell: &Cell) -> Place {
         let sides = self.dimensions.iter().zip(cell);
         let ends = |(d, side): (&Dimension, &Interval)| {
             let (mut low, mut high) = (side.lo(), side.hi());
@@ -72,7 +84,11 @@ impl Region {
             if d.max == f64::INFINITY && high > d.min.max(0.0) + REACH {
                 (low, high) = (low.min(d.min.max(0.0) + REACH), d.max);
             }
-            (d.name.clone(), low, high)
+            Side {
+                name: d.name.clone(),
+                min: low,
+                max: high,
+            }
         };
         sides.map(ends).collect()
     }

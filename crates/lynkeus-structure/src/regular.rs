@@ -15,7 +15,7 @@ use crate::irreducible::blocks;
 use crate::output_map::determinant;
 use crate::region::Cell;
 use crate::words::short;
-use crate::{Check, Condition, Matrix, Point, Region, Witness, sign};
+use crate::{Finding, Matrix, Point, Region, Verdict, Witness, sign};
 
 /// Determinants of larger blocks are not expanded.
 const EXPANDED: usize = 5;
@@ -29,19 +29,14 @@ const CELLS: usize = 2000;
 ///
 /// # Errors
 /// [`MissingInput`] where an entry depends on a symbol outside the region.
-pub fn regular(name: String, matrix: &Matrix<'_>, region: &Region) -> Result<Check, MissingInput> {
-    let check = |verdict, detail| Check {
-        name: name.clone(),
-        verdict,
-        detail,
-    };
+pub fn regular(matrix: &Matrix<'_>, region: &Region) -> Result<Finding, MissingInput> {
     let Some(blocks) = blocks(matrix) else {
-        let points = vec![Point {
+        let zero = Point {
             coordinates: vec![],
             value: 0.0,
-        }];
-        let detail = "det is zero everywhere, by the zeros of the matrix".to_owned();
-        return Ok(check(Condition::Refuted(Witness { points }), detail));
+        };
+        let detail = "det is zero everywhere, by the zeros of the matrix";
+        return Ok(Finding::refuted(zero, detail));
     };
     let mut product = Some((1.0, 1.0));
     let mut parts = 0;
@@ -49,12 +44,12 @@ pub fn regular(name: String, matrix: &Matrix<'_>, region: &Region) -> Result<Che
     for block in blocks {
         let found = decide(&block, region)?;
         match found.verdict {
-            Condition::Refuted(witness) => {
-                let detail = "det vanishes or changes its sign".to_owned();
-                return Ok(check(Condition::Refuted(witness), detail));
+            Verdict::Refuted(witness) => {
+                let detail = "det vanishes or changes its sign";
+                return Ok(Finding::refuted(witness, detail));
             }
-            Condition::Undecided(_) => open = open.or(Some(found)),
-            Condition::Proved => {
+            Verdict::Undecided(_) => open = open.or(Some(found)),
+            Verdict::Proved => {
                 let pairs = product.zip(found.bounds);
                 product = pairs.map(|(all, one)| (all.0 * one.0, all.1 * one.1));
                 parts += found.parts;
@@ -62,7 +57,10 @@ pub fn regular(name: String, matrix: &Matrix<'_>, region: &Region) -> Result<Che
         }
     }
     if let Some(open) = open {
-        return Ok(check(open.verdict, open.detail));
+        return Ok(Finding {
+            verdict: open.verdict,
+            detail: open.detail,
+        });
     }
     let detail = match product {
         Some((low, high)) => format!("|det| lies in [{}, {}]", short(low), short(high)),
@@ -70,12 +68,12 @@ pub fn regular(name: String, matrix: &Matrix<'_>, region: &Region) -> Result<Che
             "the ranges of its entries keep it regular, on each of {parts} parts of the box"
         ),
     };
-    Ok(check(Condition::Proved, detail))
+    Ok(Finding::proved(detail))
 }
 
 /// What is known of an irreducible block.
 struct Block {
-    verdict: Condition,
+    verdict: Verdict,
     detail: String,
     /// of |det|, where it was expanded
     bounds: Option<(f64, f64)>,
@@ -92,18 +90,18 @@ fn decide(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> {
         .map(|i| (0..block.columns).map(|j| block.get(i, j)).collect())
         .collect();
     let det = determinant(graph, &rows).unwrap_or_else(|| graph.constant(0.0).node());
-    let found = sign::keeps_sign(graph, String::new(), det, region)?;
+    let found = sign::keeps_sign(graph, det, region)?;
     let (low, high) = found.bounds;
-    if let Condition::Undecided(_) = found.check.verdict
+    if let Verdict::Undecided(_) = found.finding.verdict
         && block.rows > 1
     {
         let second = by_parts(block, region)?;
-        if second.verdict == Condition::Proved {
+        if second.verdict == Verdict::Proved {
             return Ok(second);
         }
     }
     Ok(Block {
-        verdict: found.check.verdict,
+        verdict: found.finding.verdict,
         detail: format!(
             "|det| lies in [{}, {}] as far as can be proved",
             short(low),
@@ -142,8 +140,8 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         let halves = region.split(&cell).filter(|_| looked < CELLS);
         let Some((first, second)) = halves.filter(|_| signs.witness().is_none()) else {
             let verdict = match signs.witness() {
-                Some(witness) => Condition::Refuted(witness),
-                None => Condition::Undecided(region.named(&cell)),
+                Some(witness) => Verdict::Refuted(witness),
+                None => Verdict::Undecided(region.named(&cell)),
             };
             return Ok(Block {
                 verdict,
@@ -158,7 +156,7 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         open.extend([first, second]);
     }
     Ok(Block {
-        verdict: Condition::Proved,
+        verdict: Verdict::Proved,
         detail: String::new(),
         bounds: None,
         parts,
@@ -257,11 +255,11 @@ mod tests {
         let [x, y] = ["x", "y"].map(|n| g.symbol(n));
         let decide = |size: f64| {
             let matrix = cycle(&g, 8, x, y);
-            regular("Q".into(), &matrix, &region(&[x, y], size)).unwrap()
+            regular(&matrix, &region(&[x, y], size)).unwrap()
         };
         let found = decide(0.9);
-        assert_eq!(found.verdict, Condition::Proved, "{}", found.detail);
-        let Condition::Refuted(witness) = decide(1.5).verdict else {
+        assert_eq!(found.verdict, Verdict::Proved, "{}", found.detail);
+        let Verdict::Refuted(witness) = decide(1.5).verdict else {
             panic!()
         };
         for point in &witness.points {
@@ -288,8 +286,8 @@ mod tests {
             };
             Some(node.node())
         });
-        let found = regular("Q".into(), &matrix, &region(&[x], 3.0)).unwrap();
-        assert_eq!(found.verdict, Condition::Proved);
+        let found = regular(&matrix, &region(&[x], 3.0)).unwrap();
+        assert_eq!(found.verdict, Verdict::Proved);
         assert!(
             found.detail.starts_with("|det| lies in"),
             "{}",
@@ -307,8 +305,8 @@ mod tests {
                 .then(|| (x + 2.0).node())
                 .filter(|_| i < 4 || j < 2)
         });
-        let found = regular("Q".into(), &matrix, &region(&[x], 1.0)).unwrap();
-        assert!(matches!(found.verdict, Condition::Refuted(_)));
+        let found = regular(&matrix, &region(&[x], 1.0)).unwrap();
+        assert!(matches!(found.verdict, Verdict::Refuted(_)));
     }
 
     /// A determinant of 10⁻²⁰ is not printed as zero.
@@ -317,8 +315,8 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let matrix = Matrix::from_fn(&g, (1, 1), |_, _| Some((1e-20 * (x + 2.0)).node()));
-        let found = regular("Q".into(), &matrix, &region(&[x], 1.0)).unwrap();
-        assert_eq!(found.verdict, Condition::Proved);
+        let found = regular(&matrix, &region(&[x], 1.0)).unwrap();
+        assert_eq!(found.verdict, Verdict::Proved);
         assert!(!found.detail.contains("[0,"), "{}", found.detail);
     }
 
@@ -336,12 +334,12 @@ mod tests {
             };
             let matrix = Matrix::from_fn(&g, (7, 7), |i, j| Some(g.constant(value(i, j)).node()));
             let det = nalgebra::DMatrix::from_fn(7, 7, value).determinant();
-            let found = regular("Q".into(), &matrix, &Region::default()).unwrap();
+            let found = regular(&matrix, &Region::default()).unwrap();
             // whole numbers: a determinant is zero or at least one
             match found.verdict {
-                Condition::Proved => prop_assert!(det.abs() > 0.5),
-                Condition::Refuted(_) => prop_assert!(det.abs() < 0.5),
-                Condition::Undecided(_) => prop_assert!(det.abs() < 0.5),
+                Verdict::Proved => prop_assert!(det.abs() > 0.5),
+                Verdict::Refuted(_) => prop_assert!(det.abs() < 0.5),
+                Verdict::Undecided(_) => prop_assert!(det.abs() < 0.5),
             }
         }
     }

@@ -7,7 +7,9 @@ use crate::region::Cell;
 use crate::regularity::is_regular;
 use crate::slopes::without_removable_jumps;
 use crate::words::short;
-use crate::{Check, Condition, Point, Range, Region, Regularity, Witness, range, range_within};
+use crate::{
+    Finding, Point, Range, Region, Regularity, Side, Verdict, Witness, range, range_within,
+};
 
 /// Cells examined per end to see whether there is a bound.
 const GLANCE: usize = 20;
@@ -15,8 +17,8 @@ const GLANCE: usize = 20;
 /// The verdict on a sign, with the bounds that go with it.
 #[derive(Clone, Debug)]
 pub struct Sign {
-    /// the condition "never zero, one sign"
-    pub check: Check,
+    /// "never zero, one sign"
+    pub finding: Finding,
     /// +1 or −1: the sign where it is proved, else that of the first sample
     pub sign: f64,
     /// rigorous bounds of the absolute value: (α₁, α₂); α₂ may be infinite
@@ -30,26 +32,21 @@ pub struct Sign {
 ///
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
-pub fn keeps_sign(
-    graph: &Graph,
-    name: String,
-    node: Node,
-    region: &Region,
-) -> Result<Sign, MissingInput> {
+pub fn keeps_sign(graph: &Graph, node: Node, region: &Region) -> Result<Sign, MissingInput> {
     let found = range(graph, node, region)?;
     let (low, high) = (found.enclosure.lo(), found.enclosure.hi());
     let expression = graph.render(node, 80);
     let (verdict, detail) = if low > 0.0 || high < 0.0 {
         let detail = format!("{expression} lies in [{}, {}]", short(low), short(high));
-        (Condition::Proved, detail)
+        (Verdict::Proved, detail)
     } else if let Some(witness) = witness(graph, node, region, &found)? {
         (
-            Condition::Refuted(witness),
+            Verdict::Refuted(witness),
             format!("{expression} can vanish or change its sign"),
         )
     } else if let Some(trouble) = Regularity::of(graph, &[node], &[], region)?.trouble() {
         let place = trouble.place().to_vec();
-        (Condition::Undecided(place), trouble.to_string())
+        (Verdict::Undecided(place), trouble.to_string())
     } else {
         let detail = format!(
             "{expression} lies in [{}, {}] as far as can be proved{}",
@@ -57,7 +54,7 @@ pub fn keeps_sign(
             short(high),
             undeclared(&found)
         );
-        (Condition::Undecided(found.weakest.clone()), detail)
+        (Verdict::Undecided(found.weakest.clone()), detail)
     };
     let sample = found.highest.as_ref().map_or(1.0, |p| p.value);
     let sign = if high < 0.0 || (low <= 0.0 && sample < 0.0) {
@@ -73,11 +70,7 @@ pub fn keeps_sign(
         (0.0, high.max(-low))
     };
     Ok(Sign {
-        check: Check {
-            name,
-            verdict,
-            detail,
-        },
+        finding: Finding { verdict, detail },
         sign,
         bounds,
     })
@@ -95,12 +88,12 @@ pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, Missi
 
 /// A hint where the box has no declared end.
 fn undeclared(found: &Range) -> String {
-    let open = |&&(_, low, high): &&(String, f64, f64)| low.is_infinite() || high.is_infinite();
+    let open = |side: &&Side| side.min.is_infinite() || side.max.is_infinite();
     let names: Vec<&str> = found
         .weakest
         .iter()
         .filter(open)
-        .map(|(name, ..)| name.as_str())
+        .map(|side| side.name.as_str())
         .collect();
     match names.is_empty() {
         true => String::new(),
@@ -240,13 +233,7 @@ mod tests {
     }
 
     fn decide(f: Expr<'_>, sides: Vec<Dimension>) -> Sign {
-        keeps_sign(
-            f.graph(),
-            "f".into(),
-            f.node(),
-            &Region { dimensions: sides },
-        )
-        .unwrap()
+        keeps_sign(f.graph(), f.node(), &Region { dimensions: sides }).unwrap()
     }
 
     #[test]
@@ -254,7 +241,7 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let sign = decide(-0.07 / (2.0 * x.sqrt()), vec![side(x, 0.05, 10.0, false)]);
-        assert_eq!(sign.check.verdict, Condition::Proved);
+        assert_eq!(sign.finding.verdict, Verdict::Proved);
         assert_eq!(sign.sign, -1.0);
         let (low, high) = (0.035 / 10f64.sqrt(), 0.035 / 0.05f64.sqrt());
         assert!(sign.bounds.0 <= low && sign.bounds.0 > low * 0.998);
@@ -267,7 +254,7 @@ mod tests {
         let x = g.symbol("x");
         for (min, max) in [(-1.0, 1.0), (-1.0, 2.0), (-0.3, 7.0)] {
             let sign = decide(2.0 * x, vec![side(x, min, max, false)]);
-            let Condition::Refuted(witness) = sign.check.verdict else {
+            let Verdict::Refuted(witness) = sign.finding.verdict else {
                 panic!()
             };
             assert!(witness.points[0].coordinates[0].1.abs() < 1e-9);
@@ -279,7 +266,7 @@ mod tests {
         let g = Graph::new();
         let x = g.symbol("x");
         let sign = decide(x, vec![side(x, 0.0, 1.0, false)]);
-        assert!(matches!(sign.check.verdict, Condition::Refuted(_)));
+        assert!(matches!(sign.finding.verdict, Verdict::Refuted(_)));
     }
 
     /// u = 2s − 1 with a whole s in {0, 1}: never zero, yet of both signs.
@@ -288,7 +275,7 @@ mod tests {
         let g = Graph::new();
         let s = g.symbol("s");
         let sign = decide(2.0 * s - 1.0, vec![side(s, 0.0, 1.0, true)]);
-        let Condition::Refuted(witness) = sign.check.verdict else {
+        let Verdict::Refuted(witness) = sign.finding.verdict else {
             panic!()
         };
         let values: Vec<f64> = witness.points.iter().map(|p| p.value).collect();
@@ -303,12 +290,12 @@ mod tests {
         let sign = g.expr(g.unary(lynkeus_expr::Unary::Sign, x.node()));
         for f in [sign, 2.0 * sign + x / 10.0, 1.0 / x] {
             let sign = decide(f, vec![side(x, -1.0, 1.0, false)]);
-            if let Condition::Refuted(witness) = sign.check.verdict {
+            if let Verdict::Refuted(witness) = sign.finding.verdict {
                 assert_eq!(witness.zero(), None);
             }
         }
         let sign = decide(sign * x - 0.5, vec![side(x, -1.0, 1.0, false)]);
-        let Condition::Refuted(witness) = sign.check.verdict else {
+        let Verdict::Refuted(witness) = sign.finding.verdict else {
             panic!()
         };
         let zero = witness.zero().unwrap().coordinates[0].1;
@@ -323,7 +310,7 @@ mod tests {
         let all = (f64::NEG_INFINITY, f64::INFINITY);
         for f in [x, x * x * x - 7.0, x.exp() - 2.0, 1.0 - x * x] {
             let sign = decide(f, vec![side(x, all.0, all.1, false)]);
-            let Condition::Refuted(witness) = &sign.check.verdict else {
+            let Verdict::Refuted(witness) = &sign.finding.verdict else {
                 panic!("{sign:?}")
             };
             let far = |p: &Point| p.coordinates[0].1.abs() > 1e10;
@@ -331,8 +318,8 @@ mod tests {
         }
         // of one sign as far as anyone looks
         let sign = decide(x + 1e30, vec![side(x, all.0, all.1, false)]);
-        assert!(matches!(sign.check.verdict, Condition::Undecided(_)));
-        let text = format!("{} {}", sign.check.verdict, sign.check.detail);
+        assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
+        let text = format!("{} {}", sign.finding.verdict, sign.finding.detail);
         assert!(
             !text.contains("e30") || text.contains("declare min and max of x"),
             "{text}"
@@ -346,11 +333,11 @@ mod tests {
         let x = g.symbol("x");
         let all = (f64::NEG_INFINITY, f64::INFINITY);
         let sign = decide(x.exp(), vec![side(x, all.0, all.1, false)]);
-        assert!(matches!(sign.check.verdict, Condition::Undecided(_)));
+        assert!(matches!(sign.finding.verdict, Verdict::Undecided(_)));
         assert!(
-            sign.check.detail.contains("declare min and max of x"),
+            sign.finding.detail.contains("declare min and max of x"),
             "{}",
-            sign.check.detail
+            sign.finding.detail
         );
     }
 }

@@ -16,7 +16,7 @@ use crate::indices::Codistribution;
 use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
 use crate::region::Cell;
 use crate::visibility::inside;
-use crate::{Check, Condition, Extended, Region, Regularity, Vanishing, sign, vanishes};
+use crate::{Extended, Finding, Place, Region, Regularity, Side, Verdict, sign, vanishes};
 
 /// A determinant of more states has too many terms.
 const STATES: usize = 6;
@@ -25,16 +25,14 @@ const CHOICES: usize = 8;
 /// Cells of the subdivision that is told.
 const CELLS: usize = 256;
 
-/// A part of the box: (name, smallest, largest).
-pub type Part = Vec<(String, f64, f64)>;
-
 /// What constant inputs and which states do to observability.
 #[derive(Clone, Debug)]
 pub struct Uniformity {
-    /// the determinant keeps away from zero on the whole box
-    pub regular: Check,
+    /// the outputs' derivatives tell neighbouring states apart everywhere, for every constant
+    /// input: a determinant keeps away from zero on the whole box
+    pub regular: Finding,
     /// where it may be zero: cells of a subdivision, and their share of the box's volume
-    pub singular: Vec<Part>,
+    pub singular: Vec<Place>,
     /// the share; without meaning where a range is missing
     pub share: f64,
     /// variables of the determinant whose range is not declared
@@ -42,7 +40,7 @@ pub struct Uniformity {
     /// constant inputs for which the determinant is zero for every state
     pub blind: Vec<Blind>,
     /// ranges of the states
-    pub sides: Part,
+    pub sides: Place,
 }
 
 /// A constant input that blinds the outputs.
@@ -74,16 +72,16 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
     let Some(Map { node, regular }) = map(extended, &region)? else {
         return Ok(None);
     };
-    if vanishes(graph, node, &region)? == Vanishing::Everywhere {
+    if vanishes(graph, node, &region)? == Verdict::Proved {
         return Ok(None);
     }
     let (singular, share) = match regular.verdict {
-        Condition::Proved => (vec![], 0.0),
+        Verdict::Proved => (vec![], 0.0),
         _ => cells(graph, node, &region)?,
     };
     Ok(Some(Uniformity {
         blind: match regular.verdict {
-            Condition::Proved => vec![],
+            Verdict::Proved => vec![],
             _ => blind(extended, node, &region)?,
         },
         regular,
@@ -98,28 +96,31 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         sides: extended
             .states
             .iter()
-            .map(|s| (s.name.clone(), s.min, s.max))
+            .map(|s| Side {
+                name: s.name.clone(),
+                min: s.min,
+                max: s.max,
+            })
             .collect(),
     }))
 }
 
 /// Refuted only where the determinant is zero: where it changes its sign by a jump, as slopes
 /// do at a kink, or from one whole number to the next, no point is singular.
-fn without_jumps(check: Check, region: &Region) -> Check {
-    match &check.verdict {
-        Condition::Refuted(witness) if witness.zero().is_none() => Check {
-            verdict: Condition::Undecided(region.named(&region.cell())),
-            detail: format!("{}, but only by a jump", check.detail),
-            ..check
+fn without_jumps(found: Finding, region: &Region) -> Finding {
+    match &found.verdict {
+        Verdict::Refuted(witness) if witness.zero().is_none() => Finding {
+            verdict: Verdict::Undecided(region.named(&region.cell())),
+            detail: format!("{}, but only by a jump", found.detail),
         },
-        _ => check,
+        _ => found,
     }
 }
 
 /// A determinant of n rows of ∂(y, y', …)/∂x for constant inputs.
 struct Map {
     node: Node,
-    regular: Check,
+    regular: Finding,
 }
 
 /// The first choice of rows whose determinant is proved to keep its sign, else the
@@ -134,7 +135,7 @@ fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingI
     let Some(found) = examined(extended, &derivatives, &first, region)? else {
         return Ok(None);
     };
-    if found.regular.verdict == Condition::Proved {
+    if found.regular.verdict == Verdict::Proved {
         return Ok(Some(found));
     }
     let mut others = codistribution.alternatives(&first);
@@ -144,7 +145,7 @@ fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingI
             continue;
         }
         let other = examined(extended, &derivatives, &indices, region)?;
-        let other = other.filter(|map| map.regular.verdict == Condition::Proved);
+        let other = other.filter(|map| map.regular.verdict == Verdict::Proved);
         if other.is_some() {
             return Ok(other);
         }
@@ -166,7 +167,6 @@ fn examined(
     let Some(node) = determinant(graph, &chosen) else {
         return Ok(None);
     };
-    let name = "the outputs' derivatives tell neighbouring states apart everywhere, for every constant input";
     let pairs = derivatives.values.iter().zip(indices);
     let map: Vec<Node> = pairs
         .flat_map(|(y, &count)| y.iter().take(count).copied())
@@ -176,11 +176,8 @@ fn examined(
     moving.push(extended.plant.time);
     let regularity = Regularity::of(graph, &map, &moving, region)?;
     let regular = match regularity.holds() {
-        true => without_jumps(
-            sign::keeps_sign(graph, name.to_owned(), node, region)?.check,
-            region,
-        ),
-        false => regularity.check(name),
+        true => without_jumps(sign::keeps_sign(graph, node, region)?.finding, region),
+        false => regularity.finding(),
     };
     Ok(Some(Map { node, regular }))
 }
@@ -218,7 +215,7 @@ impl Derivatives {
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.
-fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Part>, f64), MissingInput> {
+fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64), MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut bounds = tape.evaluator_in(Intervals);
@@ -282,7 +279,7 @@ fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Bli
             tried.push(value);
             let fixed = HashMap::from([(input.node, graph.constant(value).node())]);
             let there = graph.substitute(&[node], &fixed)[0];
-            if vanishes(graph, there, region)? == Vanishing::Everywhere {
+            if vanishes(graph, there, region)? == Verdict::Proved {
                 let hidden = hidden(extended, &fixed, region)?;
                 found.push(Blind {
                     input: input.name.clone(),
@@ -330,7 +327,7 @@ fn hidden(
                 continue;
             };
             let there = graph.substitute(&[partial], fixed)[0];
-            if vanishes(graph, there, region)? != Vanishing::Everywhere {
+            if vanishes(graph, there, region)? != Verdict::Proved {
                 seen[state] = true;
                 open.push(first + state);
             }
@@ -367,14 +364,14 @@ mod tests {
     #[test]
     fn a_chain_is_seen_for_every_input() {
         let found = examined("der(a) = b + u; der(b) = -sin(a);").unwrap();
-        assert_eq!(found.regular.verdict, Condition::Proved);
+        assert_eq!(found.regular.verdict, Verdict::Proved);
         assert!(found.singular.is_empty() && found.blind.is_empty());
     }
 
     #[test]
     fn an_input_that_blinds_is_named() {
         let found = examined("der(a) = u*b; der(b) = -b;").unwrap();
-        assert!(matches!(found.regular.verdict, Condition::Refuted(_)));
+        assert!(matches!(found.regular.verdict, Verdict::Refuted(_)));
         let [blind] = &found.blind[..] else {
             panic!("{:?}", found.blind)
         };
@@ -391,8 +388,11 @@ mod tests {
         assert!(found.blind.is_empty());
         assert!(found.share < 0.05, "{}", found.share);
         for part in &found.singular {
-            let (_, low, high) = part.iter().find(|(name, ..)| name == "b").unwrap();
-            assert!(*low <= 0.0 && *high >= 0.0 && high - low < 0.1, "{part:?}");
+            let side = part.iter().find(|side| side.name == "b").unwrap();
+            assert!(
+                side.min <= 0.0 && side.max >= 0.0 && side.max - side.min < 0.1,
+                "{part:?}"
+            );
         }
     }
 
@@ -401,13 +401,13 @@ mod tests {
     fn a_jump_of_the_sensitivity_is_no_singular_point() {
         let found = examined("der(a) = abs(b); der(b) = -b;").unwrap();
         assert!(
-            matches!(found.regular.verdict, Condition::Undecided(_)),
+            matches!(found.regular.verdict, Verdict::Undecided(_)),
             "{:?}",
             found.regular
         );
         let found = examined("der(a) = abs(b)*b; der(b) = -b;").unwrap();
         assert!(
-            matches!(found.regular.verdict, Condition::Refuted(_)),
+            matches!(found.regular.verdict, Verdict::Refuted(_)),
             "{:?}",
             found.regular
         );
@@ -427,7 +427,7 @@ mod tests {
         let never = blind("(s - 0.5)");
         assert!(never.blind.is_empty());
         assert!(
-            !matches!(never.regular.verdict, Condition::Refuted(_)),
+            !matches!(never.regular.verdict, Verdict::Refuted(_)),
             "{:?}",
             never.regular
         );

@@ -4,27 +4,17 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::visibility::{inside, spread};
-use crate::{Point, Region};
+use crate::{Point, Region, Verdict, Witness};
 
 /// Points tried beside those on the edges of the box.
 const POINTS: usize = 12;
 
-/// Whether an expression is zero everywhere on a region.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Vanishing {
-    /// it is, by interval arithmetic
-    Everywhere,
-    /// it is not: the value at this point cannot be a rounding error
-    NotAt(Point),
-    /// it may be zero at every point tried, yet that is no proof
-    Undecided,
-}
-
-/// Decides whether `node` is zero on the whole region.
+/// Decides whether `node` is zero on the whole region. Refuted by a point where the value
+/// cannot be a rounding error; undecided where it may be zero at every point tried.
 ///
 /// # Errors
 /// [`MissingInput`] where the node depends on a symbol outside the region.
-pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Vanishing, MissingInput> {
+pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut bounds = tape.evaluator_in(Intervals);
@@ -36,7 +26,7 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Vanishing,
     let whole = region.cell();
     let enclosure = value(&whole);
     if enclosure.lo() == 0.0 && enclosure.hi() == 0.0 {
-        return Ok(Vanishing::Everywhere);
+        return Ok(Verdict::Proved);
     }
     let mut points: Vec<Vec<f64>> = (0..POINTS).map(|p| generic(&region, p)).collect();
     points.extend(region.samples(&whole));
@@ -46,13 +36,13 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Vanishing,
         let sure = enclosure.is_positive() || enclosure.is_negative();
         if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
             let names = region.dimensions.iter().map(|d| d.name.clone());
-            return Ok(Vanishing::NotAt(Point {
+            return Ok(Verdict::Refuted(Witness::from(Point {
                 coordinates: names.zip(point).collect(),
                 value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
-            }));
+            })));
         }
     }
-    Ok(Vanishing::Undecided)
+    Ok(Verdict::open())
 }
 
 /// A point inside the region on no particular surface.
@@ -84,10 +74,10 @@ mod tests {
             }],
         };
         let decide = |node| vanishes(&g, node, &region).unwrap();
-        assert_eq!(decide((0.0 * x).node()), Vanishing::Everywhere);
+        assert_eq!(decide((0.0 * x).node()), Verdict::Proved);
         // zero at the middle of the box, which is not enough
-        assert!(matches!(decide((x * x).node()), Vanishing::NotAt(_)));
+        assert!(matches!(decide((x * x).node()), Verdict::Refuted(_)));
         let one = x.sin().powi(2) + x.cos().powi(2) - 1.0;
-        assert_eq!(decide(one.node()), Vanishing::Undecided);
+        assert_eq!(decide(one.node()), Verdict::open());
     }
 }

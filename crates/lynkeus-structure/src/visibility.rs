@@ -73,7 +73,7 @@ impl<'e, 'p> Variational<'e, 'p> {
         let ξ: Vec<Node> = extended
             .states
             .iter()
-            .map(|s| graph.symbol(&format!("variation of {}", s.name)).node())
+            .map(|s| graph.fresh(format!("variation of {}", s.name)).node())
             .collect();
         let y: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
         let along = |functions: &[Node]| -> Vec<Node> {

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use lynkeus_observers::{Certificate, Claim, Design, Tuning, Verdict};
-use lynkeus_structure::Extended;
+use lynkeus_observers::{Certificate, Claim, Design, Tuning};
+use lynkeus_structure::{Extended, Standing};
 
 use crate::prepare::Prepared;
 use crate::{Correction, Error, Study, correction, prepare, words};
@@ -92,9 +92,9 @@ impl<'a> Task<'a> {
         let mut place = &declared;
         let mut certificate = self.certificate(&declared, &design, claim)?;
         if let Some(simulated) = &simulated
-            && certificate.verdict != Verdict::Proved
+            && certificate.verdict() != Standing::Proved
         {
-            let wide = certificate.verdict;
+            let wide = certificate.verdict();
             certificate = self.certificate(simulated, &design, claim)?;
             let note = self.reach(&design, &certificate, wide)?;
             certificate.notes.push(note);
@@ -161,7 +161,12 @@ impl<'a> Task<'a> {
     }
 
     /// How far the inputs may leave the study's, in words.
-    fn reach(&self, design: &Design, proved: &Certificate, wide: Verdict) -> Result<String, Error> {
+    fn reach(
+        &self,
+        design: &Design,
+        proved: &Certificate,
+        wide: Standing,
+    ) -> Result<String, Error> {
         let words = |ranges: &[(String, f64, f64)]| {
             let sides = ranges
                 .iter()
@@ -181,8 +186,8 @@ impl<'a> Task<'a> {
             let share = f64::midpoint(low, high);
             // a tenth of the rate may go
             let certificate = self.certificate(&self.on(share)?, design, Claim::At(0.9 * rate))?;
-            match certificate.verdict {
-                Verdict::Proved => low = share,
+            match certificate.verdict() {
+                Standing::Proved => low = share,
                 _ => high = share,
             }
         }
@@ -200,7 +205,7 @@ impl<'a> Task<'a> {
 impl CertifyReport {
     /// Whether the decay is proved, by the inequality or by the theorem.
     pub fn is_proved(&self) -> bool {
-        self.verdict() == Verdict::Proved
+        self.verdict() == Standing::Proved
     }
 
     /// The verdict in a sentence.
@@ -210,7 +215,7 @@ impl CertifyReport {
 
     /// Whether it is shown that there is no decay.
     pub fn is_refuted(&self) -> bool {
-        self.verdict() == Verdict::Refuted
+        self.verdict() == Standing::Refuted
     }
 
     /// The report for machines: the gain by state, then by measured output, or what takes
@@ -228,19 +233,19 @@ impl CertifyReport {
     /// Proved by either way; refuted where the error is shown not to decay; else undecided.
     /// A theorem whose hypothesis fails refutes nothing: it only does not apply. A proof
     /// and a refutation of the same leave neither.
-    pub fn verdict(&self) -> Verdict {
-        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict);
-        match (self.certificate.verdict, theorem) {
-            _ if self.is_contradiction() => Verdict::Undecided,
-            (_, Some(Verdict::Proved)) => Verdict::Proved,
+    pub fn verdict(&self) -> Standing {
+        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict());
+        match (self.certificate.verdict(), theorem) {
+            _ if self.is_contradiction() => Standing::Undecided,
+            (_, Some(Standing::Proved)) => Standing::Proved,
             (verdict, _) => verdict,
         }
     }
 
     /// Whether one way proves what the other refutes: a defect of this program.
     pub fn is_contradiction(&self) -> bool {
-        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict);
-        self.certificate.verdict == Verdict::Refuted && theorem == Some(Verdict::Proved)
+        let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict());
+        self.certificate.verdict() == Standing::Refuted && theorem == Some(Standing::Proved)
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

@@ -6,8 +6,8 @@ mod uniform;
 use std::fmt;
 
 use lynkeus_observability::{Answer, Limits, Verdict};
-use lynkeus_observers::{Examination, Fit};
-use lynkeus_structure::{Condition, Point, uniformity};
+use lynkeus_observers::{Check, Examination, fit_word};
+use lynkeus_structure::{self as structure, Point, Standing, uniformity};
 use serde_json::{Value, json};
 
 use crate::prepare::Prepared;
@@ -142,21 +142,21 @@ impl Report {
 }
 
 fn family(examination: &Examination) -> Value {
-    let check = |check: &lynkeus_structure::Check| {
+    let check = |check: &Check| {
         let mut entry = json!({
-            "name": check.name,
+            "name": check.statement.to_string(),
             "verdict": check.verdict.word(),
             "detail": check.detail,
         });
         match &check.verdict {
-            Condition::Proved => {}
-            Condition::Refuted(witness) => {
+            structure::Verdict::Proved => {}
+            structure::Verdict::Refuted(witness) => {
                 entry["witness"] = witness.points.iter().map(point).collect();
             }
-            Condition::Undecided(sides) => {
+            structure::Verdict::Undecided(sides) => {
                 let sides = sides
                     .iter()
-                    .map(|(name, low, high)| (name.clone(), json!([low, high])));
+                    .map(|side| (side.name.clone(), json!([side.min, side.max])));
                 entry["box"] = Value::Object(sides.collect());
             }
         }
@@ -164,7 +164,7 @@ fn family(examination: &Examination) -> Value {
     };
     json!({
         "family": examination.family,
-        "fit": examination.fit.words(),
+        "fit": fit_word(examination.fit()),
         "summary": examination.summary,
         "chains": examination.chains,
         "checks": examination.conditions().map(check).collect::<Vec<_>>(),
@@ -202,7 +202,12 @@ impl fmt::Display for Report {
             uniform::print(f, uniform)?;
         }
         for examination in &self.examinations {
-            writeln!(f, "\n{}: {}", examination.family, examination.fit.words())?;
+            writeln!(
+                f,
+                "\n{}: {}",
+                examination.family,
+                fit_word(examination.fit())
+            )?;
             writeln!(f, "  {}", examination.summary)?;
             conditions(f, examination.conditions(), "conditions on the whole box")?;
         }
@@ -224,14 +229,14 @@ impl Report {
         let others = self
             .examinations
             .iter()
-            .filter(|e| e.fit == Fit::Fits)
+            .filter(|e| e.fit() == Standing::Proved)
             .count()
             > 1;
-        match chosen.map(|e| (e.family, e.fit)) {
-            Some((family, Fit::Fits)) if others => {
+        match chosen.map(|e| (e.family, e.fit())) {
+            Some((family, Standing::Proved)) if others => {
                 format!("{family} comes first: of the families that fit, it has the simplest gain")
             }
-            Some((family, Fit::Fits)) => {
+            Some((family, Standing::Proved)) => {
                 format!("{family} is the one whose every condition is proved")
             }
             Some((family, _)) => format!(

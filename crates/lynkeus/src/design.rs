@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use lynkeus_observers::{Design, Fit};
-use lynkeus_structure::counted;
+use lynkeus_observers::{Design, fit_word};
+use lynkeus_structure::{Standing, counted};
 use serde_json::{Map, Value, json};
 
 use crate::certify::{self, certificate_json};
@@ -54,7 +54,7 @@ impl DesignReport {
         json!({
             "plant": self.plant,
             "family": observer.family,
-            "fit": examination.fit.words(),
+            "fit": fit_word(examination.fit()),
             "chains": examination.chains,
             "gain": self.certified.correction.gain_json(),
             "injection": self.certified.correction.injection_json(),
@@ -83,7 +83,7 @@ impl fmt::Display for DesignReport {
             counted(observer.states.len(), "state")
         )?;
         writeln!(f, "  {}", examination.summary)?;
-        if examination.fit == Fit::Undecided {
+        if examination.fit() == Standing::Undecided {
             writeln!(
                 f,
                 "  not every condition is decided on the box; `lynkeus check` shows them"

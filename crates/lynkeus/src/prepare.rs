@@ -3,8 +3,8 @@
 use std::cell::OnceCell;
 
 use lynkeus_model::{LoadError, LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Fit, Tuning, Value};
-use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value};
+use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, Standing, range};
 
 use crate::study::Name;
 use crate::{Error, Study, systems};
@@ -244,8 +244,8 @@ fn blame(study: &Study, error: SensorsError) -> Error {
 
 /// The family to use: the first that fits, else the first that is undecided.
 pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
-    let with = |fit: Fit| examinations.iter().find(move |e| e.fit == fit);
-    with(Fit::Fits).or_else(|| with(Fit::Undecided))
+    let with = |fit: Standing| examinations.iter().find(move |e| e.fit() == fit);
+    with(Standing::Proved).or_else(|| with(Standing::Undecided))
 }
 
 /// Whether the study asks for a certified gain.

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use lynkeus_structure::{Check, Condition, figures};
+use lynkeus_observers::Check;
+use lynkeus_structure::{Verdict, figures};
 
 /// Four significant digits.
 pub(crate) fn number(value: f64) -> String {
@@ -27,7 +28,7 @@ pub(crate) fn conditions<'a>(
     what: &str,
 ) -> fmt::Result {
     let checks: Vec<&Check> = checks.into_iter().collect();
-    let proved = |check: &&&Check| check.verdict == Condition::Proved;
+    let proved = |check: &&&Check| check.is_proved();
     let count = checks.iter().filter(proved).count();
     let brief = count > LISTED;
     if brief {
@@ -35,8 +36,8 @@ pub(crate) fn conditions<'a>(
     }
     for check in checks.iter().filter(|c| !(brief && proved(c))) {
         let word = check.verdict.word();
-        writeln!(f, "  {word:<10} {}: {}", check.name, check.detail)?;
-        if let Condition::Refuted(_) = check.verdict {
+        writeln!(f, "  {word:<10} {}: {}", check.statement, check.detail)?;
+        if let Verdict::Refuted(_) = check.verdict {
             writeln!(f, "             {}", check.verdict)?;
         }
     }

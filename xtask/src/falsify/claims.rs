@@ -1,9 +1,9 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
-use lynkeus::observers::{Certificate, Design, Examination, FAMILIES, Fit, Tuning, Verdict};
+use lynkeus::observers::{Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning};
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::{Check, Condition, Extended};
+use lynkeus::structure::{Extended, Standing, Verdict};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -29,7 +29,7 @@ pub struct Claim {
 /// A condition that is said to fail, with the points that are to show it.
 #[derive(Clone, Debug)]
 pub struct Refutation {
-    pub condition: String,
+    pub condition: Statement,
     pub points: Vec<lynkeus::structure::Point>,
     /// of the observer's error, not of the plant
     pub of_error: bool,
@@ -73,8 +73,8 @@ pub fn findings(prepared: &Prepared<'_>, thorough: bool) -> Findings {
     };
     found.gain = report.to_json()["gain"].take();
     let theorem = report.theorem.as_ref();
-    found.contradicts = report.certificate.verdict == Verdict::Refuted
-        && theorem.is_some_and(|theorem| theorem.verdict == Verdict::Proved);
+    found.contradicts = report.certificate.verdict() == Standing::Refuted
+        && theorem.is_some_and(|theorem| theorem.verdict() == Standing::Proved);
     found.certified(report.certificate, true);
     if let Some(theorem) = report.theorem {
         found.certified(theorem, false);
@@ -87,7 +87,7 @@ impl Findings {
     pub fn fits(&self) -> bool {
         self.examination
             .as_ref()
-            .is_some_and(|e| e.fit == Fit::Fits)
+            .is_some_and(|e| e.fit() == Standing::Proved)
     }
 
     fn new(prepared: &Prepared<'_>) -> Self {
@@ -108,9 +108,9 @@ impl Findings {
     }
 
     fn examined(&mut self, extended: &Extended<'_>, thorough: bool) {
-        match self.examination.as_ref().map(|e| e.fit) {
-            Some(Fit::Fits) => self.counts.fits += 1,
-            Some(Fit::Undecided) => self.counts.open_fits += 1,
+        match self.examination.as_ref().map(|e| e.fit()) {
+            Some(Standing::Proved) => self.counts.fits += 1,
+            Some(Standing::Undecided) => self.counts.open_fits += 1,
             _ => self.counts.misfits += 1,
         }
         let others = match thorough {
@@ -128,10 +128,10 @@ impl Findings {
     }
 
     fn certified(&mut self, certificate: Certificate, of_error: bool) {
-        match certificate.verdict {
-            Verdict::Proved => self.counts.proved += 1,
-            Verdict::Undecided => self.counts.undecided += 1,
-            Verdict::Refuted => self.counts.refuted += 1,
+        match certificate.verdict() {
+            Standing::Proved => self.counts.proved += 1,
+            Standing::Undecided => self.counts.undecided += 1,
+            Standing::Refuted => self.counts.refuted += 1,
         }
         self.refuted(&certificate.hypotheses, of_error);
         self.claims.extend(claim(&certificate));
@@ -140,13 +140,16 @@ impl Findings {
 
     fn refuted(&mut self, checks: &[Check], of_error: bool) {
         for check in checks {
-            let Condition::Refuted(witness) = &check.verdict else {
+            let Verdict::Refuted(witness) = &check.verdict else {
                 continue;
             };
-            let known = self.refutations.iter().any(|r| r.condition == check.name);
+            let known = self
+                .refutations
+                .iter()
+                .any(|r| r.condition == check.statement);
             if !known {
                 self.refutations.push(Refutation {
-                    condition: check.name.clone(),
+                    condition: check.statement.clone(),
                     points: witness.points.clone(),
                     of_error,
                 });
@@ -155,23 +158,14 @@ impl Findings {
     }
 }
 
-/// How the proofs describe the factor c of c·e^(−rate·t)·|e(0)|; its letter is another
-/// in every paper, and the same letter is another number elsewhere.
-const OVERSHOOTS: &[&str] = &["overshoot", "at most this times", "may peak"];
-
 fn claim(certificate: &Certificate) -> Option<Claim> {
-    if certificate.verdict != Verdict::Proved {
+    if certificate.verdict() != Standing::Proved {
         return None;
     }
-    let is_overshoot = |meaning: &str| OVERSHOOTS.iter().any(|words| meaning.contains(words));
-    let mut constants = certificate.constants.iter();
-    let overshoot = constants
-        .find(|c| is_overshoot(&c.meaning))
-        .map(|c| c.value);
     Some(Claim {
         basis: certificate.basis.clone(),
         rate: certificate.rate.unwrap_or(0.0),
-        overshoot,
+        overshoot: certificate.overshoot,
         ultimate: certificate.ultimate_bound,
         each: certificate.ultimate.clone(),
         lyapunov: certificate.lyapunov.clone(),

@@ -4,7 +4,7 @@
 
 use astro_float_num::BigFloat;
 use lynkeus::expr::{Node, Tape};
-use lynkeus::observers::{Design, Observer};
+use lynkeus::observers::{Design, Observer, Statement};
 use lynkeus::structure::{Extended, Point};
 
 use super::claims::Refutation;
@@ -41,24 +41,20 @@ struct Slope {
     of: Node,
 }
 
-/// The slope that a condition is about, by its name.
-fn slope_of(condition: &str, extended: &Extended<'_>) -> Option<Slope> {
-    let (value, of) = condition
-        .strip_suffix(" keeps its sign")?
-        .strip_prefix('∂')?
-        .split_once("/∂")?;
-    let of = extended.states[extended.state_index(of)?].node;
-    let value = match value.strip_prefix("f(").and_then(|v| v.strip_suffix(')')) {
-        Some(state) => extended.derivatives[extended.state_index(state)?],
-        None => {
-            extended
-                .outputs
-                .iter()
-                .find(|o| o.variable.name == value)?
-                .variable
-                .node
+/// The slope that a condition is about.
+fn slope_of(condition: &Statement, extended: &Extended<'_>) -> Option<Slope> {
+    let (value, by) = match condition {
+        Statement::PartialKeepsSign { of, by } => {
+            (extended.derivatives[extended.state_index(of)?], by)
         }
+        Statement::OutputKeepsSign { output, state } => {
+            let mut outputs = extended.outputs.iter();
+            let found = outputs.find(|o| o.variable.name == *output)?;
+            (found.variable.node, state)
+        }
+        _ => return None,
     };
+    let of = extended.states[extended.state_index(by)?].node;
     Some(Slope { value, of })
 }
 

@@ -220,7 +220,7 @@ impl Scope for Symbols<'_> {
         let slot = derivatives.get_mut(&variable)?;
         if slot.is_none() {
             let name = self.graph.symbol_name(variable)?;
-            *slot = Some(self.graph.symbol(&format!("der({name})")).node());
+            *slot = Some(self.graph.fresh(format!("der({name})")).node());
         }
         *slot
     }

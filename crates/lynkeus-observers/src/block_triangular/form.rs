@@ -1,6 +1,8 @@
 //! The block-triangular form: chains, their order, and the conditions.
 
-use lynkeus_structure::{Blocks, Check, Extended, Region, blocks};
+use crate::Check;
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Blocks, Extended, Region, blocks};
 
 use super::settings::{Correction, Settings};
 use super::stable::stable;
@@ -8,7 +10,7 @@ use super::{NAME, chain_rule};
 use crate::conditions::{Partial, lipschitz, output_slope, partials};
 use crate::family;
 use crate::stages::{Found, Searched};
-use crate::{DesignError, Examination, Fit, TuningError};
+use crate::{DesignError, Examination, TuningError};
 
 /// Different chains that are examined before the first without a refuted condition is taken.
 const EXAMINED: usize = 16;
@@ -38,18 +40,13 @@ pub(super) fn form(
         .take(EXAMINED)
     {
         let form = examined(extended, settings, region, choice)?;
-        let rank = |fit: Fit| match fit {
-            Fit::Fits => 0,
-            Fit::Undecided => 1,
-            Fit::DoesNotFit => 2,
-        };
-        let better = |best: &Found<Form>| rank(form.examination.fit) < rank(best.examination.fit);
+        let better = |best: &Found<Form>| form.examination.fit() < best.examination.fit();
         if best.as_ref().is_none_or(better) {
             best = Some(form);
         }
         if best
             .as_ref()
-            .is_some_and(|b| b.examination.fit == Fit::Fits)
+            .is_some_and(|b| b.examination.fit() == Standing::Proved)
         {
             break;
         }

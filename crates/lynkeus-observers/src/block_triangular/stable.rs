@@ -5,16 +5,18 @@
 //! A(a) − KC decides, for every a that they may take: one negative partial makes the default
 //! K unstable, and a K with the right signs stable.
 
+use crate::statement::{proved, refuted, undecided};
+use crate::{Check, Lee};
 use lynkeus_expr::Interval;
 use lynkeus_proof::chain::Chain;
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_proof::lyapunov;
 use lynkeus_proof::matrix::points;
-use lynkeus_structure::{Check, Extended};
+use lynkeus_structure::Extended;
 
 use super::settings::{Correction, Settings};
 use crate::conditions::{Partial, names};
-use crate::proof::words::{proved, refuted, shown, undecided};
+use crate::proof::words::shown;
 use crate::stability::{GainedChain, listed};
 
 /// Whether K stabilises a chain; none where that is known: K by its poles for a chain of
@@ -38,10 +40,10 @@ pub(super) fn stable(
         K,
         partials: &ranges,
     };
-    let states = names(extended, states).join(" → ");
+    let states = names(extended, states);
     let name = match integrators {
-        true => format!("A − KC is stable for ({states})"),
-        false => format!("A(a) − KC is stable for every partial a along ({states})"),
+        true => Lee::Stable { states },
+        false => Lee::StableAlong { states },
     };
     let Some(a) = chain.middle() else {
         let detail = "a partial is not known to keep one sign between finite bounds";

@@ -5,24 +5,27 @@
 //! comparison matrix of [`proof`](crate::proof) at the study's θ; `transformed` has the
 //! bounds of its entries. The paper's μ_ij are formed of the same bounds.
 
+use crate::statement::{proved, standing, undecided};
+use crate::{Check, Lee};
 use lynkeus_expr::Interval;
 use lynkeus_proof::chain::{Chain, Comparison, Slope};
 use lynkeus_proof::lyapunov;
 use lynkeus_proof::matrix::square;
 use lynkeus_proof::search::{first, lightest};
-use lynkeus_structure::{Blocks, Check, Extended};
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Blocks, Extended};
 use nalgebra::DMatrix;
 
 use super::settings::{Correction, Settings};
 use super::transformed::{Plant, Similar, Term};
 use super::{BASIS, chain_rule};
-use crate::conditions::{Partial, fit, names, output_slope, partials};
+use crate::conditions::{Partial, names, output_slope, partials};
 use crate::estimate::Common;
 use crate::peaking::Departure;
 use crate::proof::slopes::slopes;
-use crate::proof::words::{box_note, conclude, proved, shown, state_noise, undecided};
+use crate::proof::words::{box_note, conclude, shown, state_noise};
 use crate::stability::GainedChain;
-use crate::{Assumptions, Certificate, Constant, DesignError, Fit, prolongation};
+use crate::{Assumptions, Certificate, Constant, DesignError, prolongation};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -32,7 +35,7 @@ pub(super) fn certificate(
 ) -> Result<Certificate, DesignError> {
     let lmi = settings.lmi.clone()?;
     if let Some(departure) = Departure::of(lmi.as_ref(), &settings.remedies) {
-        let check = departure.check("the observer is (7) or (3) with a constant θ");
+        let check = departure.check(Lee::Observer);
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();
@@ -86,7 +89,7 @@ impl Study<'_> {
         let mut checks = facts.checks.clone();
         let mut constants = vec![];
         let mut found = None;
-        if fit(&checks) != Fit::DoesNotFit
+        if standing(&checks) != Standing::Refuted
             && let Some((P, μ)) = self.first_inequality(&facts, &mut checks)
         {
             self.paper_constants(&facts, &P, &mut constants);
@@ -129,7 +132,8 @@ impl Study<'_> {
             true => plain.into_iter().map(steady).collect(),
             false => self.plant.terms(&similar)?,
         };
-        if terms.iter().any(|t: &Term| !t.at(&self.θ).size.is_finite()) && fit(&checks) == Fit::Fits
+        if terms.iter().any(|t: &Term| !t.at(&self.θ).size.is_finite())
+            && standing(&checks) == Standing::Proved
         {
             checks.push(self.unbounded());
         }
@@ -153,7 +157,7 @@ impl Study<'_> {
 
     fn unbounded(&self) -> Check {
         undecided(
-            "M R M⁻¹ and Ṁ M⁻¹ have bounds on the box (Assumption 1)",
+            Lee::Assumption1,
             "they have none: M needs declared ranges of the states it depends on and of the heads of the chains (the correction moves M), and where it depends on an input, a bound of that input's derivative, which no key declares; correction = \"classical\" needs none of this",
         )
     }
@@ -166,8 +170,8 @@ impl Study<'_> {
     ) -> Option<(Vec<DMatrix<f64>>, Vec<f64>)> {
         let (mut all, mut decays) = (vec![], vec![]);
         for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
-            let states = names(self.plant.extended, &chain.states).join(" → ");
-            let name = format!("(A − KC)ᵀP + P(A − KC) < 0 for ({states})");
+            let states = names(self.plant.extended, &chain.states);
+            let name = Lee::Lyapunov { states };
             let gained = GainedChain {
                 K: &self.plant.K[i],
                 partials: &facts.partials[i],
@@ -272,14 +276,9 @@ impl Study<'_> {
             );
             constants.push(Constant::new("θ0", θ0, meaning));
         }
-        let name = format!(
-            "θ = ({}) is large enough",
-            self.θ
-                .iter()
-                .map(|&θ| shown(θ))
-                .collect::<Vec<_>>()
-                .join(", ")
-        );
+        let name = Lee::Theta {
+            θ: self.θ.clone()
+        };
         checks.push(match (σ, θ0) {
             (Some(_), _) => proved(name, "the comparison matrix is negative definite"),
             (None, Some(θ0)) => undecided(name, format!("proved from θ1 = θ0 = {} on (the others in proportion of their logarithms); the theorem is sufficient, not necessary", shown(θ0))),

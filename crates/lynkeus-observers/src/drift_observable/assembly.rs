@@ -87,7 +87,7 @@ fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Filters {
     let graph = extended.graph();
     let state = |input: &Variable, k: usize| {
         let name = format!("filter of {}", derivative_name(&input.name, k));
-        let symbol = graph.symbol(&name).node();
+        let symbol = graph.fresh(&name).node();
         Signal { name, symbol }
     };
     let pairs = extended.inputs.iter().zip(&gains.K2);
@@ -149,7 +149,7 @@ fn innovations(
     at: &dyn Fn(&[Node]) -> Vec<Node>,
 ) -> Vec<Node> {
     let graph = extended.graph();
-    let y = copy.measured();
+    let y = &copy.measured;
     let x̂: HashMap<Node, Node> = extended
         .symbols()
         .into_iter()
@@ -158,7 +158,7 @@ fn innovations(
     let e: Vec<Expr<'_>> = extended
         .outputs
         .iter()
-        .zip(&y)
+        .zip(y)
         .map(|(output, y)| {
             // the innovation sees the estimate itself, as in the other families,
             // except where h may leave its domain

@@ -4,14 +4,16 @@
 //! are examined, on the box of the states and the declared ranges of the inputs, so that a
 //! certificate on a smaller range of the inputs is about the same observer.
 
+use crate::fit_word;
 use lynkeus_structure::indices::Codistribution;
-use lynkeus_structure::{Condition, Extended, Region};
+use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{Standing, Verdict};
 
 use super::form::{Form, Map, blind};
 use super::keys::Asked;
 use super::settings::{POLES, Settings};
 use crate::stages::{Found, Searched};
-use crate::{DesignError, Fit, TuningError};
+use crate::{DesignError, TuningError};
 
 /// Further index vectors that are examined.
 const EXAMINED: usize = 6;
@@ -74,7 +76,7 @@ struct Other {
 /// What is known of it.
 enum Known {
     /// every condition was looked at
-    Examined(Fit),
+    Examined(Standing),
     /// det Q has both signs at points of the box
     Singular,
     /// nothing
@@ -117,7 +119,7 @@ impl Search<'_, '_> {
         let mut others = vec![];
         let mut examined = 0;
         for indices in rest {
-            let open = form.examination.fit != Fit::Fits && examined < EXAMINED;
+            let open = form.examination.fit() != Standing::Proved && examined < EXAMINED;
             let known = match open {
                 false => Known::Open,
                 true if self.rows.changes_sign(indices) => Known::Singular,
@@ -131,7 +133,7 @@ impl Search<'_, '_> {
                     form = kept;
                     others.push(Other {
                         indices: left.form.indices,
-                        known: Known::Examined(left.examination.fit),
+                        known: Known::Examined(left.examination.fit()),
                     });
                     continue;
                 }
@@ -150,20 +152,15 @@ impl Search<'_, '_> {
 }
 
 /// Smaller for what is closer to a proof.
-fn rank(form: &Found<Form>) -> (u8, usize, usize) {
-    let count = |test: fn(&Condition) -> bool| {
+fn rank(form: &Found<Form>) -> (Standing, usize, usize) {
+    let count = |test: fn(&Verdict) -> bool| {
         let checks = form.examination.checks.iter();
         checks.filter(|c| test(&c.verdict)).count()
     };
-    let fit = match form.examination.fit {
-        Fit::Fits => 0,
-        Fit::Undecided => 1,
-        Fit::DoesNotFit => 2,
-    };
     (
-        fit,
-        count(|v| matches!(v, Condition::Refuted(_))),
-        count(|v| matches!(v, Condition::Undecided(_))),
+        form.examination.fit(),
+        count(|v| matches!(v, Verdict::Refuted(_))),
+        count(|v| matches!(v, Verdict::Undecided(_))),
     )
 }
 
@@ -179,8 +176,8 @@ fn told(chosen: &[usize], others: &[Other]) -> String {
     }
     let one = |other: &Other| {
         let known = match other.known {
-            Known::Examined(Fit::Fits) => "fits, too",
-            Known::Examined(fit) => fit.words(),
+            Known::Examined(Standing::Proved) => "fits, too",
+            Known::Examined(fit) => fit_word(fit),
             Known::Singular => "det Q changes its sign",
             Known::Open => "not examined",
         };

@@ -1,11 +1,14 @@
 //! Regularity of Q and Q̄ on the box.
 
+use crate::statement::{Statement, undecided};
+use crate::{Check, Germani};
+use lynkeus_structure::Verdict;
 use std::collections::HashMap;
 
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::Rows;
 use lynkeus_structure::regular;
-use lynkeus_structure::{Check, Condition, Extended, Matrix, Region};
+use lynkeus_structure::{Extended, Matrix, Region};
 
 use super::degrees::with_slopes;
 use super::variant::Variant;
@@ -14,7 +17,7 @@ use crate::DesignError;
 /// Whether a square matrix is regular on the whole region.
 pub(super) fn regular(
     extended: &Extended<'_>,
-    name: &str,
+    statement: Germani,
     Q: &Rows,
     region: &Region,
 ) -> Result<Check, DesignError> {
@@ -22,7 +25,7 @@ pub(super) fn regular(
     let Q = Matrix::from_fn(extended.graph(), (n, n), |i, j| {
         Q.get(i).and_then(|row| *row.get(j)?)
     });
-    Ok(regular::regular(name.to_owned(), &Q, region)?)
+    Ok(Statement::from(statement).with(regular::regular(&Q, region)?))
 }
 
 /// The map where it reads inputs.
@@ -37,21 +40,20 @@ impl Inputs<'_, '_> {
     /// What the observer needs of the input where r < n.
     pub fn check(&self, variant: Variant) -> Result<Check, DesignError> {
         if variant == Variant::Bounded {
-            return Ok(Check {
-                name: "r = n, or the input is small (Theorem 3.3)".into(),
-                verdict: Condition::Undecided(vec![]),
-                detail: "the input appears before the n-th derivative of the output and (3.1) takes no account of it: it converges for u_M ≤ β λ_min(P) only; variant = \"theoretical\" or \"practical\" does not need that".into(),
-            });
+            return Ok(undecided(
+                Germani::SmallInput,
+                "the input appears before the n-th derivative of the output and (3.1) takes no account of it: it converges for u_M ≤ β λ_min(P) only; variant = \"theoretical\" or \"practical\" does not need that",
+            ));
         }
-        let name = "Q̄(x, U) is regular on the box for every U (uniformly observable)";
+        let name = || Germani::UniformlyObservable;
         // a singular point for a constant input is the better witness
         let still = self.still();
-        let mut check = regular(self.extended, name, &self.at_rest(&still), self.region)?;
-        if !matches!(check.verdict, Condition::Refuted(_)) && !still.is_empty() {
+        let mut check = regular(self.extended, name(), &self.at_rest(&still), self.region)?;
+        if !matches!(check.verdict, Verdict::Refuted(_)) && !still.is_empty() {
             let wider = with_slopes(self.extended, self.U, self.region);
-            check = regular(self.extended, name, self.Q̄, &wider)?;
+            check = regular(self.extended, name(), self.Q̄, &wider)?;
         }
-        if check.verdict != Condition::Proved {
+        if !check.is_proved() {
             check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
         }
         Ok(check)

@@ -1,8 +1,10 @@
 //! Which derivative of which output an input enters, and which of its derivatives the map reads.
 
+use crate::statement::sufficient;
+use crate::{Check, Germani};
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, Degree, Rows};
-use lynkeus_structure::{Check, Condition, Dimension, Extended, Region};
+use lynkeus_structure::{Dimension, Extended, Region};
 
 use super::derivative_name;
 use super::form::Map;
@@ -36,7 +38,7 @@ pub(super) fn degrees(
     // an input that enters early may bring another one along
     let order = μ.iter().copied().max().unwrap_or(0);
     let orders = vec![order; extended.inputs.len()];
-    let U = jets(extended, &orders);
+    let U = jets(extended, map, &orders);
     let y = output_map::output_derivatives(extended, &U, order.saturating_sub(1))?;
     let x = extended.symbols();
     let gradients: Vec<Rows> = y
@@ -49,6 +51,7 @@ pub(super) fn degrees(
 /// u_j, u_j', …, as many as Φ̄ depends on: for one output n − r.
 pub(super) fn input_symbols(
     extended: &Extended<'_>,
+    map: &Map,
     indices: &[usize],
     degrees: &[Vec<Degree>],
 ) -> Vec<Vec<Node>> {
@@ -58,25 +61,27 @@ pub(super) fn input_symbols(
         orders.max().unwrap_or(0)
     };
     let orders: Vec<usize> = (0..extended.inputs.len()).map(needed).collect();
-    jets(extended, &orders)
+    jets(extended, map, &orders)
 }
 
 /// The symbols of u_j, u_j', …, so many of each input.
-fn jets(extended: &Extended<'_>, orders: &[usize]) -> Vec<Vec<Node>> {
-    let graph = extended.graph();
-    let jet = |(input, &order): (&lynkeus_model::Variable, &usize)| {
-        let symbol = |k: usize| match k {
-            0 => input.node,
-            _ => graph.symbol(&slope_symbol(&input.name, k)).node(),
-        };
-        (0..order).map(symbol).collect()
-    };
-    extended.inputs.iter().zip(orders).map(jet).collect()
+fn jets(extended: &Extended<'_>, map: &Map, orders: &[usize]) -> Vec<Vec<Node>> {
+    let whole = extended.inputs.iter().zip(&map.slopes);
+    let whole = whole.map(|(input, slopes)| std::iter::once(input.node).chain(slopes.clone()));
+    whole
+        .zip(orders)
+        .map(|(jet, &order)| jet.take(order).collect())
+        .collect()
 }
 
-/// The symbol of the k-th derivative of an input.
-pub(super) fn slope_symbol(input: &str, k: usize) -> String {
-    format!("derivative {k} of {input}")
+/// Symbols of u_j', u_j'', …, as many as there are states, for each known input.
+pub(super) fn slopes(extended: &Extended<'_>) -> Vec<Vec<Node>> {
+    let graph = extended.graph();
+    let symbol = |name: &str, k: usize| graph.fresh(format!("derivative {k} of {name}")).node();
+    let orders = 1..=extended.states.len();
+    let one =
+        |input: &lynkeus_model::Variable| orders.clone().map(|k| symbol(&input.name, k)).collect();
+    extended.inputs.iter().map(one).collect()
 }
 
 /// The box with u', u'', … free.
@@ -116,12 +121,5 @@ pub(super) fn known(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<D
     if !proved {
         found.push("zeros before r are found at points, not proved".to_owned());
     }
-    Check {
-        name: "the observation relative degree r is known (Definition 2.2)".into(),
-        verdict: match proved {
-            true => Condition::Proved,
-            false => Condition::Undecided(vec![]),
-        },
-        detail: found.join("; "),
-    }
+    sufficient(Germani::Degree, proved, found.join("; "))
 }

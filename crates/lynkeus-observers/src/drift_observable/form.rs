@@ -1,16 +1,18 @@
 //! The form of the paper in a plant: the map Φ̄ with its Jacobians, and the conditions on it.
 
+use crate::statement::Statement;
+use crate::{Check, Germani};
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, AffineForm, Rows};
-use lynkeus_structure::{Check, Condition, Extended, Region, Regularity, visibility};
+use lynkeus_structure::{Extended, Region, Regularity, visibility};
 
 use super::conditions::{self, Inputs};
 use super::variant::Variant;
 use super::{NAME, degrees, derivative_name};
-use crate::conditions::{fit, lipschitz, names};
+use crate::conditions::{lipschitz, names};
 use crate::family;
 use crate::stages::Found;
-use crate::{DesignError, Examination, Fit};
+use crate::{DesignError, Examination};
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map {
@@ -19,6 +21,8 @@ pub(super) struct Map {
     lie: Vec<Vec<Node>>,
     /// ∂L_f^k h_i/∂x
     pub gradients: Vec<Rows>,
+    /// symbols of u_j', u_j'', … for each known input, n of them
+    pub slopes: Vec<Vec<Node>>,
     /// the right-hand side is Lipschitz
     lipschitz: Check,
     /// the key `variant`
@@ -47,6 +51,7 @@ impl Map {
                 .map(|h| output_map::jacobian_rows(graph, h, &x))
                 .collect(),
             lie,
+            slopes: degrees::slopes(extended),
             lipschitz: lipschitz(extended, region)?,
             asked,
         }))
@@ -64,28 +69,13 @@ pub struct Checks {
     pub lipschitz: Check,
     /// the map has values and does not jump
     pub continuous: Check,
-    /// what the observer needs of the inputs, where the map reads them
+    /// what the observer needs of the inputs, where the map reads them. Advisory: Q̄ is
+    /// regular for small enough inputs whatever the box says (Theorem 2.4), and the observer
+    /// watches it
     pub inputs: Option<Check>,
 }
 
 impl Checks {
-    /// Theorem 2.4: Q̄ is regular for small enough inputs whatever the box says, and the
-    /// observer watches it. So the condition on the inputs never refuses.
-    fn fit(&self) -> Fit {
-        let first = fit(&[
-            self.degree.clone(),
-            self.regular.clone(),
-            self.lipschitz.clone(),
-            self.continuous.clone(),
-        ]);
-        match &self.inputs {
-            Some(check) if first == Fit::Fits && check.verdict != Condition::Proved => {
-                Fit::Undecided
-            }
-            _ => first,
-        }
-    }
-
     pub fn all(&self) -> Vec<Check> {
         let first = [
             &self.degree,
@@ -106,6 +96,8 @@ pub struct Form {
     pub indices: Vec<usize>,
     /// symbols of u_j, u_j', … on which Φ̄ depends: n − r of them for one output
     pub U: Vec<Vec<Node>>,
+    /// the derivative of each input that is one order further
+    pub w: Vec<Node>,
     /// Q or, for (4.1) and (4.22), Q̄
     pub Q: Rows,
     /// Q̄_a, columns in the order of `U`; empty for (3.1)
@@ -122,7 +114,7 @@ impl Form {
         region: &Region,
     ) -> Result<Found<Self>, DesignError> {
         let degrees = degrees::degrees(extended, map, &indices, region)?;
-        let U = degrees::input_symbols(extended, &indices, &degrees);
+        let U = degrees::input_symbols(extended, map, &indices, &degrees);
         let variant = map.asked.unwrap_or_else(|| Variant::suited(&U));
         let rows: Vec<(usize, usize)> = indices
             .iter()
@@ -133,8 +125,7 @@ impl Form {
             .iter()
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
-        let name = "Q(x) is regular on the box (drift-observable)";
-        let regular = conditions::regular(extended, name, &Q, region)?;
+        let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => {
                 let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
@@ -156,11 +147,9 @@ impl Form {
             degree: degrees::known(extended, &indices, &degrees),
             regular,
             lipschitz: map.lipschitz.clone(),
-            continuous: continuous.check(
-                "the map to the outputs' derivatives has values on the box and does not jump",
-            ),
+            continuous: Statement::from(Germani::Continuous).with(continuous.finding()),
             inputs: match reads {
-                true => Some(inputs.check(variant)?),
+                true => Some(inputs.check(variant)?.advisory()),
                 false => None,
             },
         };
@@ -169,14 +158,15 @@ impl Form {
             summary: summary(extended, variant, &rows, &U),
             chains: vec![names(extended, &every)],
         };
-        let mut examination = Examination::new(extended, region, NAME, found, checks.all())?;
-        if examination.fit == Fit::DoesNotFit {
-            examination.fit = checks.fit();
-        }
+        let examination = Examination::new(extended, region, NAME, found, checks.all())?;
+        let next = map.slopes.iter().zip(&U);
         let form = Self {
             variant,
             rows,
             indices,
+            w: next
+                .filter_map(|(slopes, U)| slopes.get(U.len().saturating_sub(1)).copied())
+                .collect(),
             U,
             Q,
             Q_a,

@@ -15,15 +15,17 @@
 //! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
 //! will do, also one with a smaller α₁, and the states are bounded one by one.
 
+use crate::Germani;
+use crate::statement::undecided;
 use lynkeus_expr::Interval;
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
 
 use super::gains::{closed_loop, slowest, spread};
 use super::lipschitz::Share;
-use super::proof::{Proof, Solutions, undecided};
+use super::proof::{Proof, Solutions};
 use super::variant::Variant;
-use crate::{Assumptions, Certificate, Constant, Verdict};
+use crate::{Assumptions, Certificate, Constant};
 
 /// Shares of the filter's slowest pole tried for α₂.
 const SHARES: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
@@ -49,10 +51,7 @@ pub(super) fn conclude(
             Some(filter) => Some(filter),
             None => {
                 let detail = "no P_a was found for the filter's poles";
-                found
-                    .hypotheses
-                    .push(undecided("K2 and P_a solve (4.27)", detail));
-                found.verdict = Verdict::Undecided;
+                found.hypotheses.push(undecided(Germani::Filter, detail));
                 return;
             }
         },
@@ -63,7 +62,10 @@ pub(super) fn conclude(
     found.rate = Some(α);
     let φ = of_rows(P, &proof.lipschitz.unseen);
     let parts = filter.as_ref().zip(Some(φ));
-    print(proof, P, peak, parts, &mut found.constants);
+    let μ = times(times(peak, proof.lipschitz.map), proof.lipschitz.inverse);
+    // with a filter the error peaks by what the filter's leaves as well
+    found.overshoot = filter.is_none().then_some(μ);
+    print(proof, P, μ, parts, &mut found.constants);
     let a = filter.map_or(0.0, |f| f.rest);
     let left = std::iter::once(P)
         .chain(&solutions.slower)
@@ -164,12 +166,11 @@ fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 
 fn print(
     proof: &Proof<'_, '_>,
     P: &Riccati,
-    peak: f64,
+    μ: f64,
     filter: Option<(&Filter, f64)>,
     constants: &mut Vec<Constant>,
 ) {
-    let (map, inverse) = (proof.lipschitz.map, proof.lipschitz.inverse);
-    let μ = times(times(peak, map), inverse);
+    let inverse = proof.lipschitz.inverse;
     let mut add = |name: &str, value: f64, meaning: &str| {
         constants.push(Constant::new(name, value, meaning));
     };

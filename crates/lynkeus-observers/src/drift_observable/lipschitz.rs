@@ -14,14 +14,15 @@
 //! ẑ' = Aẑ + Bm̄(ẑ, x̂_a) + K₁(y − h(x̂)) without w, whatever (4.23) says: there only m̄ is
 //! compared, and n̄(x, x_a)w is left over as a force that does not vanish with the error.
 
+use crate::statement::Statement;
+use crate::{Check, Germani};
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
-use lynkeus_structure::{Check, Extended, Matrix, Region, Regularity, output_map};
+use lynkeus_structure::{Extended, Matrix, Region, Regularity, output_map};
 
 use super::conditions::regular;
-use super::degrees::slope_symbol;
 use super::derivative_name;
 use super::form::Form;
 use super::variant::Variant;
@@ -123,7 +124,6 @@ pub(super) fn bounds(
     };
     let size_a = mixed(&size);
     let states = size.iter().zip(&size_a);
-    let name = "Q̄(x, U) is regular on the box for U within its bounds";
     Ok(Lipschitz {
         map: norm(&beside(&Q_size, &Q_a_size)),
         inverse: norm(&beside(&size, &size_a)),
@@ -137,8 +137,8 @@ pub(super) fn bounds(
             })
             .collect(),
         Q: Q_size,
-        regular: regular(extended, name, &form.Q, box_.region())?,
-        continuous: continuous.check("the last rows have values on the box and do not jump"),
+        regular: regular(extended, Germani::RegularWithin, &form.Q, box_.region())?,
+        continuous: Statement::from(Germani::ContinuousRows).with(continuous.finding()),
         open: box_.open(),
     })
 }
@@ -150,12 +150,12 @@ fn further(
     slopes: &[Option<Vec<f64>>],
     box_: &mut Enclosure<'_>,
 ) -> Vec<Vec<Node>> {
-    let graph = extended.graph();
     let mut U = vec![];
-    for ((input, jet), given) in extended.inputs.iter().zip(&form.U).zip(slopes) {
+    let jets = form.U.iter().zip(&form.w);
+    for ((input, (jet, &w)), given) in extended.inputs.iter().zip(jets).zip(slopes) {
         let mut symbols = vec![input.node];
         for k in 1..=jet.len() {
-            let symbol = graph.symbol(&slope_symbol(&input.name, k)).node();
+            let symbol = jet.get(k).copied().unwrap_or(w);
             let bound = given.as_ref().and_then(|b| b.get(k - 1).copied());
             let bound = bound.unwrap_or(f64::INFINITY);
             box_.add(derivative_name(&input.name, k), symbol, -bound, bound);

@@ -1,9 +1,11 @@
 //! P for the study's gain, and hypothesis 4 of the theorems.
 
+use crate::statement::{sufficient, undecided};
+use crate::{Check, Germani};
 use lynkeus_gain::vandermonde::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, times};
 use lynkeus_proof::riccati::Riccati;
-use lynkeus_structure::{Check, Condition, Extended};
+use lynkeus_structure::Extended;
 
 use super::form::Form;
 use super::gains::{Gains, closed_loop, spread};
@@ -30,24 +32,6 @@ pub(super) struct Proof<'a, 'p> {
     pub slowest: f64,
     /// per input: the bound of the derivative that drives the filter
     pub w: Vec<f64>,
-}
-
-pub(super) fn undecided(name: &str, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.to_owned(),
-        verdict: Condition::Undecided(vec![]),
-        detail: detail.into(),
-    }
-}
-
-pub(super) fn check(name: &str, holds: bool, detail: String) -> Check {
-    Check {
-        verdict: match holds {
-            true => Condition::Proved,
-            false => Condition::Undecided(vec![]),
-        },
-        ..undecided(name, detail)
-    }
 }
 
 /// Solutions of the Riccati inequality; any of them proves something.
@@ -81,16 +65,16 @@ impl Proof<'_, '_> {
         };
         let γ = length(drift);
         let limit = self.largest(|s| drift.iter().map(|g| g * s).collect()) * γ;
-        let name = "γ ≤ γ*: K and some P > 0 solve the Riccati inequality";
+        let name = || Germani::Riccati;
         let holds = limit >= γ;
         if limit.is_finite() && γ.is_finite() && γ > 0.0 {
             constants.push(Constant::new("γ*", limit, "what these poles can bear"));
             let word = if holds { "≤" } else { ">" };
             let detail = format!("{} {word} {}", figures(γ), figures(limit));
-            checks.push(check(name, holds, detail));
+            checks.push(sufficient(name(), holds, detail));
             constants.extend(self.scale());
         } else if !γ.is_finite() {
-            checks.push(undecided(name, "γ has no bound"));
+            checks.push(undecided(name(), "γ has no bound"));
         }
         if !γ.is_finite() || (γ > 0.0 && !holds) {
             return (None, checks);
@@ -103,7 +87,7 @@ impl Proof<'_, '_> {
             }
             let word = if u_M <= limit { "≤" } else { ">" };
             let detail = format!("{} {word} {}", figures(u_M), figures(limit));
-            checks.push(check("|u| ≤ u_M", u_M <= limit, detail));
+            checks.push(sufficient(Germani::Input, u_M <= limit, detail));
         }
         let g = with_input(u_M);
         if !g.iter().all(|g| g.is_finite()) {
@@ -117,8 +101,8 @@ impl Proof<'_, '_> {
                 fastest,
             }
         });
-        if P.is_none() && checks.iter().all(|c| c.verdict == Condition::Proved) {
-            checks.push(undecided(name, "no P was found for these poles"));
+        if P.is_none() && checks.iter().all(Check::is_proved) {
+            checks.push(undecided(name(), "no P was found for these poles"));
         }
         (P, checks)
     }

@@ -9,16 +9,19 @@
 //! e_a is the error of the filter, zero for (3.1) and (4.1). P is sought for the study's K,
 //! not K for a P: the theorems only ask that there is one.
 
+use crate::statement::{sufficient, undecided};
+use crate::{Check, Germani};
 use lynkeus_gain::vandermonde;
 use lynkeus_proof::magnitude::length;
-use lynkeus_structure::{Check, Condition, Extended};
+use lynkeus_structure::Extended;
+use lynkeus_structure::Verdict;
 
 use super::form::Form;
 use super::gains::{Gains, closed_loop, slowest};
 use super::guarantee;
 use super::keys::Needed;
 use super::lipschitz::{self, Lipschitz};
-use super::proof::{Proof, SLOW, check, undecided};
+use super::proof::{Proof, SLOW};
 use super::settings::{SLOPES, Settings};
 use super::variant::Variant;
 use crate::enclosure::figures;
@@ -73,7 +76,7 @@ pub(super) fn certificate(
             found = P.map(|P| (proof, P));
         }
         None => hypotheses.push(undecided(
-            "K and P solve the Riccati inequality",
+            Germani::Gains,
             "the study gives neither poles nor alpha and gamma",
         )),
     }
@@ -159,8 +162,7 @@ fn of_what_acts(extended: &Extended<'_>, assumptions: &Assumptions) -> Option<Ch
             open.join(", ")
         ),
     };
-    let name = "disturbances and measurement errors are bounded";
-    (!all.is_empty()).then(|| check(name, open.is_empty(), detail))
+    (!all.is_empty()).then(|| sufficient(Germani::WhatActs, open.is_empty(), detail))
 }
 
 /// None where the study has no pole yet.
@@ -204,20 +206,19 @@ fn of_the_map(
                 SLOPES.name
             ),
         };
-        checks.push(check(
-            "the derivatives of the inputs are bounded",
+        checks.push(sufficient(
+            Germani::InputDerivatives,
             names.is_empty(),
             detail,
         ));
         let mut regular = found.regular.clone();
-        if let Condition::Refuted(_) = regular.verdict {
+        if let Verdict::Refuted(_) = regular.verdict {
             // the observer passes such a place, only the proof does not
             regular.detail = format!("{} ({})", regular.detail, regular.verdict);
-            regular.verdict = Condition::Undecided(vec![]);
+            regular.verdict = Verdict::open();
         }
         checks.push(regular);
     }
-    let name = "the map from x to the output's derivatives has a Lipschitz inverse on the box";
     let detail = match found.inverse.is_finite() {
         true => format!(
             "γ_Φ = {}, γ_Φ⁻¹ = {}",
@@ -229,8 +230,8 @@ fn of_the_map(
             open_or(found, "take a smaller box")
         ),
     };
-    checks.push(check(
-        name,
+    checks.push(sufficient(
+        Germani::Inverse,
         found.inverse.is_finite() && found.map.is_finite(),
         detail,
     ));
@@ -239,11 +240,7 @@ fn of_the_map(
         true => format!("γ = {}", figures(length(&found.drift))),
         false => open_or(found, "the inverse has no bound"),
     };
-    checks.push(check(
-        "the last rows are Lipschitz in these coordinates",
-        γ.is_finite(),
-        detail,
-    ));
+    checks.push(sufficient(Germani::LastRows, γ.is_finite(), detail));
     checks
 }
 

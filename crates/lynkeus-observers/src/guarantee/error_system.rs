@@ -1,14 +1,15 @@
 //! The error system of an observer on a box.
 
+use crate::statement::{Statement, proved};
+use crate::{Check, Inequality};
+use lynkeus_structure::{Finding, Verdict};
 use std::collections::HashMap;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::ErrorModel;
 use lynkeus_proof::matrix::IntervalMatrix;
-use lynkeus_structure::{
-    Check, Condition, Dimension, Extended, Region, Slopes, counted, range, range_within,
-};
+use lynkeus_structure::{Dimension, Extended, Region, Slopes, counted, range, range_within};
 use nalgebra::DMatrix;
 
 use super::edges::edges;
@@ -125,15 +126,9 @@ impl ErrorSystem {
 
     /// The hypothesis that every slope is bounded.
     pub fn bounded(&self) -> Check {
-        let name = "every slope of a nonlinear term is bounded on the box".to_owned();
         let Some((slope, open)) = self.slopes.unbounded(&self.region) else {
             let detail = format!("{} enclosed", counted(self.slopes.slopes.len(), "slope"));
-            let verdict = Condition::Proved;
-            return Check {
-                name,
-                verdict,
-                detail,
-            };
+            return proved(Inequality::SlopesAreBounded, detail);
         };
         let cure = match open.is_empty() {
             true => {
@@ -145,12 +140,11 @@ impl ErrorSystem {
         let sides = self.region.dimensions.iter();
         let left = sides
             .filter(|d| slope.variables.contains(&d.name))
-            .map(|d| (d.name.clone(), d.min, d.max));
-        Check {
-            name,
-            verdict: Condition::Undecided(left.collect()),
+            .map(Dimension::side);
+        Statement::from(Inequality::SlopesAreBounded).with(Finding {
+            verdict: Verdict::Undecided(left.collect()),
             detail: format!("the slope of {} has no bound; {cure}", slope.term),
-        }
+        })
     }
 
     /// A as an expression of estimate, known inputs, measurements and time, row by row.

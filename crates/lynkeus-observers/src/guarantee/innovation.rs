@@ -38,7 +38,7 @@ pub(super) fn of(
             continue;
         };
         let name = format!("error of {}", extended.states[state].name);
-        let symbol = graph.symbol(&name);
+        let symbol = graph.fresh(&name);
         let (y, slope, offset) = (
             graph.expr(signal.symbol),
             graph.expr(slope),

@@ -21,10 +21,13 @@ mod lmi;
 mod refute;
 mod ultimate;
 
+use crate::statement::{proved, undecided};
+use crate::{Check, Inequality};
 use lynkeus_proof::decay::{self, ErrorModel, Proof};
-use lynkeus_structure::{Check, Condition, Extended, short};
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Extended, short};
 
-use crate::{Assumptions, Certificate, Constant, DesignError, Observer, Verdict};
+use crate::{Assumptions, Certificate, Constant, DesignError, Observer};
 pub use correction::{Correction, Injection};
 use error_system::ErrorSystem;
 pub(crate) use lmi::Lmi;
@@ -84,11 +87,7 @@ pub fn certify(
 }
 
 fn not_covered(assumptions: &Assumptions, reason: String) -> Certificate {
-    let check = Check {
-        name: "the observer's states are the estimate".into(),
-        verdict: Condition::Undecided(vec![]),
-        detail: reason,
-    };
+    let check = undecided(Inequality::StatesAreTheEstimate, reason);
     Certificate::new(BASIS, assumptions, vec![check])
 }
 
@@ -98,27 +97,25 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
         1 => " for the one slope within its range".to_owned(),
         count => format!(" for all {count} slopes within their ranges"),
     };
-    let name = "one Lyapunov function eᵀPe for the whole box".to_owned();
+    let name = Inequality::OneLyapunovFunction;
     match proof.filter(|proof| proof.rate > 0.0) {
-        Some(proof) => Check {
+        Some(proof) => proved(
             name,
-            verdict: Condition::Proved,
-            detail: format!(
+            format!(
                 "He(P J) + 2·{}·P < 0{slopes}, by interval Cholesky factorisation",
                 short(proof.rate)
             ),
-        },
-        None => Check {
+        ),
+        None => undecided(
             name,
-            verdict: Condition::Undecided(vec![]),
-            detail: match sample.unstable {
+            match sample.unstable {
                 true => format!(
                     "there is none in these coordinates: the largest real part of an eigenvalue of the error's Jacobian is {}. This refutes no convergence: the plant is not seen to rest at such a point, and while it moves the Jacobian changes",
                     sample.worst
                 ),
                 false => format!("none was found{slopes}"),
             },
-        },
+        ),
     }
 }
 
@@ -150,7 +147,7 @@ fn fill(
     proof: &Proof,
     assumptions: &Assumptions,
 ) {
-    if certificate.verdict != Verdict::Proved {
+    if certificate.verdict() != Standing::Proved {
         return;
     }
     certificate.rate = Some(proof.rate);
@@ -161,6 +158,7 @@ fn fill(
         "V' ≤ −2·rate·V for V = eᵀPe",
     )];
     if let Some(spread) = ultimate::spread(&proof.P) {
+        certificate.overshoot = Some(spread);
         certificate.constants.push(Constant::new(
             "√cond(P)",
             spread,

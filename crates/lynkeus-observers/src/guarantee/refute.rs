@@ -6,16 +6,17 @@
 //! instants make a stable whole, nor unstable ones an unstable one. The error grows for
 //! certain where A is the same whatever the plant does, and where the plant can rest.
 
+use crate::statement::refuted;
+use crate::{Check, Inequality};
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
 use lynkeus_proof::decay::is_unstable;
-use lynkeus_structure::{Check, Dimension, Extended, Point};
+use lynkeus_structure::{Dimension, Extended, Point};
 use nalgebra::DMatrix;
 
 use super::edges::edges;
 use super::equilibrium;
 use super::error_system::ErrorSystem;
 use crate::Observer;
-use crate::proof::words::refuted;
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
@@ -91,16 +92,18 @@ pub(super) fn growing(
     }
     if sample.unstable && is_linear(extended, observer, system) {
         let detail = "whatever the plant does, the error obeys e' = A e; for the constant inputs of this point A has an eigenvalue with a positive real part, by interval arithmetic";
-        return Ok(Some(refuted(DECAYS, sample.worst.clone(), detail)));
+        return Ok(Some(refuted(
+            Inequality::SmallErrorsDecay,
+            sample.worst.clone(),
+            detail,
+        )));
     }
     let found = equilibrium::repelling(extended, observer, system)?;
     Ok(found.map(|point| {
         let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
-        refuted(DECAYS, point, detail)
+        refuted(Inequality::SmallErrorsDecay, point, detail)
     }))
 }
-
-const DECAYS: &str = "small errors decay wherever the plant stays in the box";
 
 /// Whether e' = A e with an A that depends on the known inputs alone.
 fn is_linear(extended: &Extended<'_>, observer: &Observer, system: &ErrorSystem) -> bool {

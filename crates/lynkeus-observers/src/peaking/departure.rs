@@ -1,10 +1,9 @@
 //! Keys that make another observer than the one of the family's paper.
 
-use lynkeus_structure::Check;
-
 use super::Remedies;
+use crate::Check;
 use crate::guarantee::Lmi;
-use crate::proof::words::undecided;
+use crate::statement::{Statement, undecided};
 
 /// How a study's observer departs from the one that the theorem is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +40,12 @@ impl Departure {
         }
     }
 
-    /// The hypothesis `name`, which is then open.
-    pub fn check(self, name: &str) -> Check {
+    /// The hypothesis that the observer is the paper's, which is then open.
+    pub fn check(self, statement: impl Into<Statement>) -> Check {
         let detail = format!(
             "the key '{}' makes another observer, which the theorem does not cover",
             self.key()
         );
-        undecided(name, detail)
+        undecided(statement, detail)
     }
 }

@@ -308,7 +308,7 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
             return hat.clone();
         }
         let name = format!("second estimate of {}", hat.name);
-        let symbol = self.copy.extended.graph().symbol(&name).node();
+        let symbol = self.copy.extended.graph().fresh(&name).node();
         Signal { name, symbol }
     }
 

@@ -1,8 +1,11 @@
 //! How steep the equations are: upper bounds of |∂f_a/∂x_b| on a box.
 
+use crate::Check;
+use crate::statement::{Statement, proved};
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary, jacobian};
 use lynkeus_proof::chain::Slope;
-use lynkeus_structure::{Check, Condition, Extended, Region, range};
+use lynkeus_structure::{Extended, Region, range};
+use lynkeus_structure::{Finding, Verdict};
 
 use crate::DesignError;
 
@@ -91,14 +94,9 @@ struct Open {
 }
 
 fn check(extended: &Extended<'_>, region: &Region, found: &[Slope], open: &[Open]) -> Check {
-    let name = "every ∂f/∂x of the proof has a bound on the box".to_owned();
     let Some(first) = open.first() else {
         let detail = format!("{} entries enclosed", found.len());
-        return Check {
-            name,
-            verdict: Condition::Proved,
-            detail,
-        };
+        return proved(Statement::SlopesOfTheProof, detail);
     };
     let graph = extended.graph();
     let nodes: Vec<Node> = open.iter().filter_map(|o| o.node).collect();
@@ -121,10 +119,8 @@ fn check(extended: &Extended<'_>, region: &Region, found: &[Slope], open: &[Open
         ),
     };
     let used = region.restricted(&graph.symbols_of(&nodes));
-    let sides = used.dimensions.into_iter().map(|d| (d.name, d.min, d.max));
-    Check {
-        name,
-        verdict: Condition::Undecided(sides.collect()),
+    Statement::SlopesOfTheProof.with(Finding {
+        verdict: Verdict::Undecided(used.place()),
         detail,
-    }
+    })
 }

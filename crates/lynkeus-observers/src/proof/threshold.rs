@@ -1,12 +1,12 @@
 //! θ0: from where on the decay is proved.
 
-use lynkeus_structure::Check;
-
-use super::words::{proved, shown, undecided};
+use super::words::shown;
+use crate::statement::{proved, undecided};
+use crate::{Check, Hammouri};
 
 /// The hypothesis θ ≥ θ0; `holds`: the inequality is proved at θ itself.
 pub(crate) fn reached(θ: f64, θ0: Option<f64>, holds: bool) -> Check {
-    let name = format!("θ = {} is at least θ0", shown(θ));
+    let name = Hammouri::Theta { θ };
     match (θ0, holds) {
         (Some(θ0), true) => proved(name, format!("θ0 = {}", shown(θ0))),
         (Some(θ0), false) => undecided(

@@ -2,39 +2,13 @@
 
 use lynkeus_expr::Interval;
 use lynkeus_proof::chain::Ultimate;
-use lynkeus_structure::{Check, Condition, Extended, Point, Region, Witness, range};
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Extended, Region, range};
 
-use crate::{Certificate, Constant, DesignError, Verdict};
+use crate::{Certificate, Constant, DesignError};
 
 /// A number for a sentence.
 pub(crate) use lynkeus_structure::short as shown;
-
-pub(crate) fn proved(name: impl Into<String>, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.into(),
-        verdict: Condition::Proved,
-        detail: detail.into(),
-    }
-}
-
-/// A hypothesis that could not be established, or that a sufficient condition misses.
-pub(crate) fn undecided(name: impl Into<String>, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.into(),
-        verdict: Condition::Undecided(vec![]),
-        detail: detail.into(),
-    }
-}
-
-pub(crate) fn refuted(name: impl Into<String>, point: Point, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.into(),
-        verdict: Condition::Refuted(Witness {
-            points: vec![point],
-        }),
-        detail: detail.into(),
-    }
-}
 
 /// Bounds of the error of the states that the outputs show: that of the output
 /// divided by the least slope.
@@ -68,7 +42,7 @@ pub(crate) fn conclude(
     σ: f64,
     ultimate: Option<Ultimate>,
 ) {
-    if certificate.verdict != Verdict::Proved {
+    if certificate.verdict() != Standing::Proved {
         return;
     }
     let mut constant = |name: &str, value: f64, meaning: &str| {
@@ -95,6 +69,7 @@ pub(crate) fn conclude(
         );
     }
     certificate.rate = Some(σ);
+    certificate.overshoot = ultimate.as_ref().map(|found| found.overshoot);
     match ultimate {
         Some(found) if found.norm.is_finite() => {
             certificate.ultimate_bound = Some(found.norm);

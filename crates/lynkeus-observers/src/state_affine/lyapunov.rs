@@ -73,7 +73,7 @@ impl<'g> Factor<'g> {
         let n = names.len();
         let mut states = vec![];
         let mut state = |name: String, start: f64| {
-            let expr = graph.symbol(&format!("factor {name}"));
+            let expr = graph.fresh(format!("factor {name}"));
             let symbol = expr.node();
             states.push((Signal { name, symbol }, start));
             expr

@@ -23,14 +23,17 @@ mod lyapunov;
 mod settings;
 mod theorem;
 
+use crate::statement::{Statement, standing};
+use crate::{Ltaief, Signal};
 use lynkeus_expr::{Expr, Graph, Node, jacobian};
-use lynkeus_structure::{Condition, Extended, Region, Superdiagonal, range, superdiagonal};
+use lynkeus_structure::Standing;
+use lynkeus_structure::{Extended, Region, Superdiagonal, range, superdiagonal};
 
 use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
 use crate::stages::{FormBox, Found, Searched, Stages};
 use crate::{
-    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Monitor, Observer, Tuning,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Monitor, Tuning,
     TuningError,
 };
 use excitation::least_eigenvalue;
@@ -93,10 +96,16 @@ fn form(extended: &Extended<'_>, region: &Region) -> Searched<Superdiagonal> {
     };
     let mut checks = vec![];
     for (k, factor) in form.factors.iter().enumerate() {
-        checks.push(factor.column_rank(extended, k, region)?);
+        let mut declared = factor.columns.clone();
+        declared.sort_unstable();
+        let statement = Ltaief::BlockShows {
+            factor: k,
+            states: names(extended, &declared),
+        };
+        let found = factor.column_rank(extended, k, region)?;
+        checks.push(Statement::from(statement).with(found));
     }
-    let rank = |c: &lynkeus_structure::Check| matches!(c.verdict, Condition::Undecided(_));
-    let excited = checks.iter().any(rank);
+    let excited = standing(&checks) == Standing::Undecided;
     checks.push(lipschitz(extended, region)?);
     let mut summary = form.describe(extended);
     if excited {
@@ -217,12 +226,16 @@ fn innovations<'g>(copy: &Copy<'_, 'g>) -> Vec<Expr<'g>> {
     let graph: &'g Graph = extended.graph();
     let hats = extended.states.iter().zip(&copy.hats);
     let unlimited = hats.map(|(state, hat)| (state.node, hat.symbol)).collect();
-    let innovation = |o: &lynkeus_structure::Measurement| {
-        let y = Observer::measurement(graph, &o.variable.name);
+    let innovation = |(o, y): (&lynkeus_structure::Measurement, &Signal)| {
         let h = graph.substitute(&[o.variable.node], &unlimited)[0];
         graph.expr(h) - graph.expr(y.symbol)
     };
-    extended.outputs.iter().map(innovation).collect()
+    extended
+        .outputs
+        .iter()
+        .zip(&copy.measured)
+        .map(innovation)
+        .collect()
 }
 
 /// How large the diagonal of S could be at best for the least visible state:

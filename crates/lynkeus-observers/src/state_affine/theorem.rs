@@ -12,20 +12,23 @@
 //! No box decides A4 where F moves with the inputs, but the observer watches it: while
 //! the monitor `excitation` is above its alarm, λ_m is at least that.
 
+use crate::statement::{proved, standing, undecided};
+use crate::{Check, Ltaief};
 use lynkeus_expr::{Interval, Node};
 use lynkeus_proof::chain::Slope;
 use lynkeus_proof::matrix::sum;
 use lynkeus_proof::metzler::spectral_radius;
 use lynkeus_proof::search::first;
-use lynkeus_structure::{Check, Condition, Extended, Region, Superdiagonal};
+use lynkeus_structure::{Extended, Region, Superdiagonal};
+use lynkeus_structure::{Standing, Verdict};
 
 use super::gramian::{TAU, above, below, largest_eigenvalue};
 use super::settings::{Numbers, Settings};
 use super::{BASIS, alarm};
 use crate::proof::slopes::{magnitude, slopes, undeclared};
-use crate::proof::words::{box_note, proved, shown, undecided};
+use crate::proof::words::{box_note, shown};
 use crate::stages::Found;
-use crate::{Assumptions, Certificate, Constant, DesignError, Verdict};
+use crate::{Assumptions, Certificate, Constant, DesignError};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -53,7 +56,7 @@ pub(super) fn certificate(
     };
     // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
     let hidden = examination.checks.into_iter();
-    let hidden = hidden.filter(|c| matches!(c.verdict, Condition::Refuted(_)));
+    let hidden = hidden.filter(|c| matches!(c.verdict, Verdict::Refuted(_)));
     study.certificate(hidden.collect())
 }
 
@@ -103,9 +106,7 @@ impl Study<'_> {
         };
         let (slopes, lipschitz) = slopes(self.extended, self.region(), next)?;
         let sizes = self.sizes()?;
-        let bounded = [&lipschitz, &sizes.check]
-            .iter()
-            .all(|c| c.verdict == Condition::Proved);
+        let bounded = [&lipschitz, &sizes.check].iter().all(|c| c.is_proved());
         checks.extend([lipschitz, sizes.check.clone(), self.uncertainty()]);
         let mut constants = vec![];
         let excitation = self.excitation(&sizes);
@@ -114,7 +115,7 @@ impl Study<'_> {
             let spectrum = self.spectrum(&sizes, excitation, &mut constants);
             found = self.decay(&slopes, &spectrum, &mut checks, &mut constants);
         }
-        let everything_else = Verdict::of(&checks) == Verdict::Proved;
+        let everything_else = standing(&checks) == Standing::Proved;
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
@@ -157,7 +158,7 @@ impl Study<'_> {
                 });
             }
         }
-        let name = "C(u) and F(u, x) are bounded on the box (A1)";
+        let name = Ltaief::A1;
         let check = match open.first() {
             None => proved(name, "every entry enclosed"),
             Some(&node) => {
@@ -182,7 +183,7 @@ impl Study<'_> {
 
     /// A3: the uncertainty is bounded.
     fn uncertainty(&self) -> Check {
-        let name = "what acts on the plant unknown to the observer is bounded (A3)";
+        let name = Ltaief::A3;
         let drift = &self.assumptions.drift;
         let known = |&state: &usize| drift.get(state).is_some_and(|d| d.is_finite());
         match self.order.iter().find(|state| !known(state)) {
@@ -220,7 +221,7 @@ impl Study<'_> {
     }
 
     fn a4(&self, excitation: Option<f64>) -> Check {
-        let name = "persistent excitation (A4): S(t) ≥ λ_m I";
+        let name = Ltaief::A4;
         match excitation {
             Some(λ) => proved(
                 name,
@@ -324,7 +325,7 @@ impl Study<'_> {
         if let Some(θ0) = θ0 {
             add("θ0", θ0, "μ_θ > 0 from here on, for this λ_m");
         }
-        let name = format!("θ = {} is large enough: μ_θ > 0", shown(θ));
+        let name = Ltaief::Theta { θ };
         let from = θ0.map_or_else(
             || "no θ0 was found".to_owned(),
             |θ0| format!("θ0 = {}", shown(θ0)),
@@ -367,7 +368,7 @@ impl Study<'_> {
         let bound = |p: usize| (scale(p) * radius).hi();
         let last = self.block.iter().copied().max().unwrap_or(0);
         let norm = (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
-        if certificate.verdict == Verdict::Proved {
+        if certificate.verdict() == Standing::Proved {
             certificate.rate = Some(rate);
             if norm.is_finite() {
                 certificate.ultimate_bound = Some(norm);

@@ -1,5 +1,7 @@
 //! What an S of the study does by itself, and with the plant's own damping.
 
+use crate::Hammouri;
+use crate::statement::undecided;
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
 use lynkeus_structure::{Extended, Region};
@@ -8,11 +10,10 @@ use nalgebra::DMatrix;
 use super::form::Form;
 use super::gains::Gains;
 use super::settings::Settings;
+use crate::DesignError;
 use crate::conditions::names;
-use crate::proof::words::undecided;
 use crate::stability::{GainedChain, listed};
 use crate::stages::Found;
-use crate::{DesignError, Fit};
 
 /// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
 /// such a gain, as the paper's column does; where it does not even in the middle of the
@@ -35,11 +36,7 @@ pub(super) fn settle(
         examination.summary += &format!("; {words}");
         return Ok(());
     }
-    let name = "the error decays where it is small, in the middle of the box";
-    examination.checks.push(undecided(name, words));
-    if examination.fit == Fit::Fits {
-        examination.fit = Fit::Undecided;
-    }
+    examination.checks.push(undecided(Hammouri::Damped, words));
     Ok(())
 }
 

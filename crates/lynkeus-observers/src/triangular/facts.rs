@@ -1,14 +1,15 @@
 //! What the theorem needs to know of the plant on the box of the assumptions.
 
+use crate::statement::undecided;
+use crate::{Check, Hammouri};
 use lynkeus_expr::Graph;
 use lynkeus_proof::chain::Slope;
-use lynkeus_structure::{Check, Extended, Region};
+use lynkeus_structure::{Extended, Region};
 
 use super::form::Form;
 use crate::DesignError;
 use crate::conditions::{output_slope, partials};
 use crate::proof::slopes::{slopes, undeclared};
-use crate::proof::words::undecided;
 
 /// What is known of the plant on the box of the assumptions.
 pub(super) struct Facts {
@@ -73,10 +74,7 @@ pub(super) fn without_bounds(
         "{} has no positive lower and finite upper bound on the box: {advice}",
         graph.render(*first, 60)
     );
-    Some(undecided(
-        "Lemma 1: every partial along the chains lies in some [α1, α2], α1 > 0",
-        detail,
-    ))
+    Some(undecided(Hammouri::PartialsAreBounded, detail))
 }
 
 pub(super) fn remainder(facts: &Facts) -> String {

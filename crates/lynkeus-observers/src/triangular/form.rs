@@ -1,5 +1,6 @@
 //! The triangular form: chains, the partials along them, condition H3.
 
+use lynkeus_structure::Standing;
 use lynkeus_structure::{Assignment, Extended, Region, chains};
 
 use super::gains::Window;
@@ -8,7 +9,7 @@ use super::{NAME, damping};
 use crate::conditions::{Partial, lipschitz, names, output_slope, partials};
 use crate::family;
 use crate::stages::{Found, Searched};
-use crate::{DesignError, Examination, Fit, TuningError};
+use crate::{DesignError, Examination, TuningError};
 
 /// The triangular form of a plant with the facts about its partials.
 pub struct Form {
@@ -45,12 +46,12 @@ pub(super) fn form(
     let mut best: Option<Found<Form>> = None;
     for assignment in assignments {
         let form = examined(extended, settings, region, assignment, choices)?;
-        match form.examination.fit {
-            Fit::Fits => return Ok(Ok(form)),
-            Fit::Undecided
+        match form.examination.fit() {
+            Standing::Proved => return Ok(Ok(form)),
+            Standing::Undecided
                 if best
                     .as_ref()
-                    .is_none_or(|b| b.examination.fit == Fit::DoesNotFit) =>
+                    .is_none_or(|b| b.examination.fit() == Standing::Refuted) =>
             {
                 best = Some(form);
             }

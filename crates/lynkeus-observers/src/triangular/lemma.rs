@@ -1,14 +1,16 @@
 //! Lemma 1 for one chain of an observer: does its S satisfy (17), with which ρ, η?
 
+use crate::statement::{proved, refuted, undecided};
+use crate::{Check, Hammouri};
 use lynkeus_expr::Interval;
 use lynkeus_gain::Tridiagonal;
 use lynkeus_gain::lemma1::{self, Breaking, Kernel};
 use lynkeus_proof::chain::Chain;
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{Check, Point};
+use lynkeus_structure::Point;
 
 use crate::Constant;
-use crate::proof::words::{proved, refuted, shown, undecided};
+use crate::proof::words::shown;
 
 /// What Lemma 1 says of a chain.
 pub(super) struct Verified {
@@ -29,11 +31,10 @@ pub(super) fn verify(
     names: &[String],
     suffix: &str,
 ) -> Verified {
-    let title = format!(
-        "Lemma 1 for ({}): A(a)ᵀS + SA(a) − ρCᵀC < 0 for every a in its bounds, ρ = 2r = {}",
-        names.join(" → "),
-        shown(2.0 * r)
-    );
+    let title = Hammouri::Lemma1 {
+        states: names.to_vec(),
+        ρ: 2.0 * r,
+    };
     let open = |check: Check| Verified {
         check,
         μ: None,
@@ -112,7 +113,7 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
 }
 
 /// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
-fn breaks(title: String, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
+fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
     let value = quotient(S, found);
     let direction: Vec<String> = names
         .iter()

@@ -9,10 +9,13 @@
 //! the window of Theorem 2. So its largest eigenvalue falls with θ, and from the
 //! first θ0 for which it is negative on the decay is proved, θ < 1 included.
 
+use crate::statement::{proved, standing, undecided};
+use crate::{Check, Hammouri};
 use lynkeus_expr::Interval;
 use lynkeus_proof::chain::{Chain, Comparison, Disturbance, ultimate};
 use lynkeus_proof::search::{first, lightest};
-use lynkeus_structure::{Check, Extended};
+use lynkeus_structure::Extended;
+use lynkeus_structure::Standing;
 
 use super::facts::{Facts, remainder, without_bounds};
 use super::form::Form;
@@ -20,13 +23,13 @@ use super::gains::{Gains, Window};
 use super::lemma::verify;
 use super::settings::Settings;
 use super::{BASIS, observer};
-use crate::conditions::{fit, names};
+use crate::conditions::names;
 use crate::peaking::Departure;
 use crate::prolongation;
 use crate::proof::threshold::reached;
-use crate::proof::words::{conclude, proved, shown, state_noise, undecided};
+use crate::proof::words::{conclude, shown, state_noise};
 use crate::stages::Found;
-use crate::{Assumptions, Certificate, Constant, DesignError, Fit};
+use crate::{Assumptions, Certificate, Constant, DesignError};
 
 /// How much the gain may differ from the computed one, relatively: rounding of
 /// the powers of θ in the observer.
@@ -42,8 +45,7 @@ pub(super) fn certificate(
     let facts = Facts::new(extended, &form, region)?;
     let mut checks = facts.checks.clone();
     if let Some(departure) = Departure::of(settings.lmi.as_ref(), &settings.remedies) {
-        checks
-            .push(departure.check("the observer is (9) with a constant gain from a tridiagonal S"));
+        checks.push(departure.check(Hammouri::Observer));
         return Ok(Certificate::new(BASIS, assumptions, checks));
     }
     let unbounded = facts
@@ -55,13 +57,13 @@ pub(super) fn certificate(
     if unbounded {
         checks.extend(without_bounds(extended, &form, &facts, region));
     }
-    if fit(&checks) == Fit::DoesNotFit || (unbounded && !given) {
+    if standing(&checks) == Standing::Refuted || (unbounded && !given) {
         let mut certificate = Certificate::new(BASIS, assumptions, checks);
         certificate.notes.push(remainder(&facts));
         return Ok(certificate);
     }
     // the observer under study, for its refusals and its gain
-    if examination.fit == Fit::DoesNotFit {
+    if examination.fit() == Standing::Refuted {
         return Err(DesignError::Refused(Box::new(examination)));
     }
     let gains = Gains::new(&form, settings)?;
@@ -112,7 +114,7 @@ impl Study<'_> {
             lipschitz,
             "upper bound of every |∂f/∂x| beside the chains' own partials",
         ));
-        let ready = known && μ.len() == count && fit(&checks) != Fit::DoesNotFit;
+        let ready = known && μ.len() == count && standing(&checks) != Standing::Refuted;
         let rate = if ready {
             self.rate(&μ, window, &mut checks, &mut constants)
         } else {
@@ -198,7 +200,7 @@ impl Study<'_> {
             .any(|(low, high)| low != high);
         (self.gains.divided && varies).then(|| {
             undecided(
-                "the gain is constant",
+                Hammouri::ConstantGain,
                 "partials = true divides it by the partials at the estimate, which vary on the box: the theorem covers a constant gain, and of this one only the case of constant partials. What is missing is a bound of how fast they change along the estimate and of how much they differ between plant and estimate",
             )
         })
@@ -288,7 +290,7 @@ fn windowed(window: &Window, constants: &mut Vec<Constant>) -> Check {
     );
     add("δ2/δ1", ratio, "ratio of the exponents");
     add("(2n1+1)/(2n2−1)", high, "upper end of the window");
-    let name = "δ2/δ1 lies in the window of Theorem 2";
+    let name = Hammouri::Window;
     let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
     match window.holds() {
         true => proved(name, text),
@@ -303,7 +305,7 @@ fn windowed(window: &Window, constants: &mut Vec<Constant>) -> Check {
 
 /// One θ per chain: there is no common θ0.
 fn at_these(holds: bool) -> Check {
-    let name = "the comparison matrix is negative definite at the study's θ";
+    let name = Hammouri::Comparison;
     match holds {
         true => proved(name, "one θ per chain has no common θ0: checked at these"),
         false => undecided(

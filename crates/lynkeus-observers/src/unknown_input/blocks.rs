@@ -12,9 +12,12 @@
 //! as in (24). Between 1 and q the S₂ of the paper need not decrease (it does not for k = 2 of
 //! q = 3), and for k ≥ 5 the chain itself may be unstable.
 
+use crate::statement::{Statement, proved, undecided};
+use crate::{Check, Farza};
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::shortened_stability;
-use lynkeus_structure::{Check, Condition, Point, Region, Witness};
+use lynkeus_structure::Finding;
+use lynkeus_structure::{Point, Region};
 
 use super::form::Form;
 use super::partition;
@@ -74,35 +77,25 @@ pub(super) fn shortened(form: &Form<'_, '_>) -> Option<Check> {
 }
 
 fn shortened_check(q: usize, k: usize, least: Interval) -> Check {
-    let (verdict, detail) = if least.is_positive() {
-        (Condition::Proved, "they are stable")
+    let found = if least.is_positive() {
+        Finding::proved("they are stable")
     } else if least.is_negative() {
-        let coordinates = vec![];
-        let value = least.midpoint();
-        let points = vec![Point { coordinates, value }];
+        let point = Point {
+            coordinates: vec![],
+            value: least.midpoint(),
+        };
         let detail = "poles to the right of the imaginary axis: the error grows for every large θ2";
-        (Condition::Refuted(Witness { points }), detail)
+        Finding::refuted(point, detail)
     } else {
-        (Condition::Undecided(vec![]), "hidden by rounding")
+        Finding::undecided("hidden by rounding")
     };
-    Check {
-        name: format!(
-            "the chain that ends in layer {k} is stable with the first {k} of the gains of {q}: Routh's numbers are positive"
-        ),
-        verdict,
-        detail: detail.to_owned(),
-    }
+    Statement::from(Farza::ShortenedChain { layer: k, gains: q }).with(found)
 }
 
 /// Whether the proof covers the blocks; `form` with the signals apart from the states.
 pub(super) fn covered(form: &Form<'_, '_>, region: &Region) -> Result<Check, DesignError> {
     let sizes = form.sizes();
-    let name = "Λ₂Λ₂⁺ = I, or it leaves whole chains: the step to (24)".to_owned();
-    let proved = |detail: String| Check {
-        name: name.clone(),
-        verdict: Condition::Proved,
-        detail,
-    };
+    let proved = |detail: String| proved(Farza::LeftInverse, detail);
     let reason = match (form.shape(), form.bends()) {
         (Shape::Square, _) => {
             return Ok(proved(format!(
@@ -124,11 +117,8 @@ pub(super) fn covered(form: &Form<'_, '_>, region: &Region) -> Result<Check, Des
         Some(outputs) => format!("; the blocks are square with partition = [{outputs}]"),
         None => String::new(),
     };
-    Ok(Check {
-        name,
-        verdict: Condition::Undecided(vec![]),
-        detail: format!("blocks of {sizes:?} states: Λ₂Λ₂⁺ is a projection, and {reason}{advice}"),
-    })
+    let detail = format!("blocks of {sizes:?} states: Λ₂Λ₂⁺ is a projection, and {reason}{advice}");
+    Ok(undecided(Farza::LeftInverse, detail))
 }
 
 #[cfg(test)]

@@ -15,10 +15,12 @@
 //! η_k = P̄_k⁻¹ (e²_k − Σ_{j<k} ∂Z_k/∂x^j η_j), bounds of the entries bound everything.
 //! Π projects on the range of G₁¹; it only adds −2θ₁|e₁ − Πe₁|² to V̇₁.
 
+use crate::statement::{Statement, proved, undecided};
+use crate::{Check, Farza};
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node, jacobian};
-use lynkeus_structure::{Check, Condition, Extended, Layers, Matrix, Regularity, rank, sign};
+use lynkeus_structure::{Extended, Layers, Matrix, Regularity, rank, sign};
 
 use super::blocks::{self, Shape};
 use super::form::Form;
@@ -146,11 +148,10 @@ impl<'e, 'p> Signals<'e, 'p> {
             let variable = &extended.states[state];
             let drift = assumptions.drift.get(state).copied().unwrap_or(0.0);
             let slope = slope(extended, state, drift, &mut box_)?;
-            let symbol = graph
-                .symbol(&format!("{} as measured", variable.name))
-                .node();
+            let label = format!("{} as measured", variable.name);
+            let symbol = graph.fresh(&label).node();
             let (min, max) = box_.side(variable.node);
-            box_.add(format!("{} as measured", variable.name), symbol, min, max);
+            box_.add(label, symbol, min, max);
             measured.insert(variable.node, symbol);
             slopes.push((symbol, slope));
             // x₁¹ is a signal wherever it stands
@@ -242,37 +243,30 @@ impl<'e, 'p> Signals<'e, 'p> {
         let region = self.box_.region();
         let graph = self.form.extended.graph();
         let found = Regularity::of(graph, &nodes, &region.symbols(), region)?;
-        Ok(found.check("what the proof differentiates has values on the box and does not jump"))
+        Ok(Statement::from(Farza::Continuous).with(found.finding()))
     }
 
     /// (11) asks for Λ₂ at one x; the proof needs it where x̃ has left the measured
     /// signals. That it is singular there refutes the proof, not the observer.
     fn regular(&self, P: &[Matrix<'p>]) -> Result<Check, DesignError> {
         let graph = self.form.extended.graph();
-        let name = "Λ₂ is regular for estimates that differ from the measured signals";
         for (k, P) in P.iter().enumerate().skip(1) {
             let region = self.box_.region();
             let found = match P.rows == P.columns {
                 true => {
                     let det = P.determinant();
                     let det = det.unwrap_or_else(|| graph.constant(0.0).node());
-                    sign::keeps_sign(graph, name.to_owned(), det, region)?.check
+                    sign::keeps_sign(graph, det, region)?.finding
                 }
-                false => rank::full_column_rank(name.to_owned(), P, region)?,
+                false => rank::full_column_rank(P, region)?,
             };
-            if found.verdict != Condition::Proved {
-                return Ok(Check {
-                    verdict: Condition::Undecided(vec![]),
-                    detail: format!("block {}: {} ({})", k + 1, found.detail, found.verdict),
-                    ..found
-                });
+            if !found.is_proved() {
+                let detail = format!("block {}: {} ({})", k + 1, found.detail, found.verdict);
+                return Ok(undecided(Farza::Regular, detail));
             }
         }
-        Ok(Check {
-            name: name.to_owned(),
-            verdict: Condition::Proved,
-            detail: "each block has full column rank on the box".to_owned(),
-        })
+        let detail = "each block has full column rank on the box";
+        Ok(proved(Farza::Regular, detail))
     }
 
     /// ψ_k = Z_k' − Z_{k+1}, where X² moves by f̄ + D x₁¹' and the signals by their slopes.
@@ -329,7 +323,7 @@ fn slope(
         true => format!("the slope of {name}"),
         false => open.join(", "),
     };
-    let symbol = extended.graph().symbol(&format!("slope of {name}")).node();
+    let symbol = extended.graph().fresh(format!("slope of {name}")).node();
     box_.add(label, symbol, low - drift, high + drift);
     Ok(symbol)
 }

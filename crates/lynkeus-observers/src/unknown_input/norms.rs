@@ -1,10 +1,10 @@
 //! From norms over the box to the constants of (24).
 
+use crate::Check;
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, norm, plus, product, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::Check;
 
 /// Norms over the box of the matrices above.
 pub(super) struct Norms {

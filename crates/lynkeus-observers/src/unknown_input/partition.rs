@@ -1,16 +1,19 @@
 //! The partition of the measured outputs, and every condition on the box.
 
+use crate::statement::{Statement, standing};
+use crate::{Check, Farza};
 use lynkeus_expr::{MissingInput, Node};
-use lynkeus_structure::{Check, Condition, Extended, Layers, Region, layers, rank};
+use lynkeus_structure::{Extended, Layers, Region, layers, rank};
+use lynkeus_structure::{Finding, Standing};
 
 use super::NAME;
 use super::blocks::{self, Shape};
 use super::form::Form;
 use super::settings::{Settings, wrong_size};
-use crate::conditions::{fit, lipschitz, names, output_slope};
+use crate::conditions::{lipschitz, names, output_slope};
 use crate::family;
 use crate::stages::{Found, Searched};
-use crate::{DesignError, Examination, Fit, TuningError};
+use crate::{DesignError, Examination, TuningError};
 
 /// More partitions are not tried.
 const MAX_PARTITIONS: usize = 500;
@@ -40,12 +43,12 @@ pub(super) fn search<'e, 'p>(
     for first in candidates {
         let form = form(extended, &layers, first);
         let own = conditions(&form, region)?;
-        match fit(&own) {
-            Fit::Fits => return Ok(Ok(finish(form, region, shared, own)?)),
-            Fit::Undecided => {
+        match standing(&own) {
+            Standing::Proved => return Ok(Ok(finish(form, region, shared, own)?)),
+            Standing::Undecided => {
                 undecided.get_or_insert((form, own));
             }
-            Fit::DoesNotFit => refuted.push((form, own)),
+            Standing::Refuted => refuted.push((form, own)),
         }
     }
     if let Some((form, own)) = undecided {
@@ -114,7 +117,7 @@ pub(super) fn square(form: &Form<'_, '_>, region: &Region) -> Result<Option<Stri
     let all = rank::subsets(extended.outputs.len(), size, MAX_PARTITIONS).unwrap_or_default();
     for first in all.into_iter().take(MAX_ADVISED) {
         let candidate = self::form(extended, &form.layers, first);
-        if fit(&conditions(&candidate, region)?) == Fit::Fits {
+        if standing(&conditions(&candidate, region)?) == Standing::Proved {
             let name = |&i: &usize| format!("\"{}\"", extended.outputs[i].variable.name);
             let outputs: Vec<String> = candidate.first.iter().map(name).collect();
             return Ok(Some(outputs.join(", ")));
@@ -138,56 +141,35 @@ fn shared(
         let f: Vec<Node> = pair[0].iter().map(|&i| layers.drift[i]).collect();
         let x: Vec<Node> = pair[1].iter().map(|&i| extended.states[i].node).collect();
         let jacobian = lynkeus_structure::Matrix::jacobian(graph, &f, &x);
-        let (this, next) = (superscript(k + 1), superscript(k + 2));
-        let name = format!("(H1) rank ∂f{this}/∂x{next} = {}", x.len());
-        checks.push(rank::full_column_rank(name, &jacobian, region)?);
-        let name = format!("(H2) x{next} ↦ f{this} is one to one");
-        checks.push(rank::one_to_one(graph, name, &f, &x, region)?);
+        let (layer, rank) = (k + 1, x.len());
+        let h1 = Statement::from(Farza::H1 { layer, rank });
+        checks.push(h1.with(rank::full_column_rank(&jacobian, region)?));
+        let h2 = Statement::from(Farza::H2 { layer });
+        checks.push(h2.with(rank::one_to_one(graph, &f, &x, region)?));
     }
     checks.push(lipschitz(extended, region)?);
     Ok(checks)
 }
 
-fn superscript(k: usize) -> String {
-    let digit = |c: char| match c {
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        '9' => '⁹',
-        _ => '⁰',
-    };
-    k.to_string().chars().map(digit).collect()
-}
-
 /// (H4) for one partition. The first refuted condition ends it.
 fn conditions(form: &Form<'_, '_>, region: &Region) -> Result<Vec<Check>, DesignError> {
     let m = form.layers.factors.columns;
-    let name = format!("(H4) (i) rank G₁¹ = {m}");
-    let i = rank::full_column_rank(name, &form.G11(), region)?;
-    if form.q() == 1 || matches!(i.verdict, Condition::Refuted(_)) {
+    let found = rank::full_column_rank(&form.G11(), region)?;
+    let i = Statement::from(Farza::H4i { rank: m }).with(found);
+    if form.q() == 1 || i.standing() == Standing::Refuted {
         return Ok(vec![i]);
     }
     let n2 = form.block(2).len();
-    let name = format!("(11) rank ∂f̄₁²/∂x² = {n2}");
-    let eleven = rank::full_column_rank(name, &form.eleven(), region)?;
-    if matches!(eleven.verdict, Condition::Refuted(_)) {
+    let found = rank::full_column_rank(&form.eleven(), region)?;
+    let eleven = Statement::from(Farza::Eleven { rank: n2 }).with(found);
+    if eleven.standing() == Standing::Refuted {
         return Ok(vec![i, eleven]);
     }
-    let name = format!("(H4) (ii) rank (∂f̃¹/∂x² G¹) = {}", n2 + m);
-    let proved = [&i, &eleven].iter().all(|c| c.verdict == Condition::Proved);
-    let ii = match proved {
-        true => Check {
-            name,
-            verdict: Condition::Proved,
-            detail: "follows from (i) and (11)".into(),
-        },
-        false => rank::full_column_rank(name, &form.ii(), region)?,
+    let ii = match standing([&i, &eleven]) {
+        Standing::Proved => Finding::proved("follows from (i) and (11)"),
+        _ => rank::full_column_rank(&form.ii(), region)?,
     };
+    let ii = Statement::from(Farza::H4ii { rank: n2 + m }).with(ii);
     let mut checks = vec![i, eleven, ii];
     checks.extend(blocks::shortened(form));
     Ok(checks)
@@ -224,7 +206,9 @@ fn none(
     refuted: Vec<(Form<'_, '_>, Vec<Check>)>,
 ) -> Examination {
     let count = refuted.len();
-    let furthest = refuted.into_iter().rev().max_by_key(|(_, own)| own.len());
+    let fails = |check: &Check| check.standing() == Standing::Refuted;
+    let met = |own: &[Check]| own.iter().take_while(|check| !fails(check)).count();
+    let furthest = refuted.into_iter().rev().max_by_key(|(_, own)| met(own));
     let mut summary = format!("layers {}", layers.describe(extended));
     let own = match furthest {
         Some((form, own)) => {
@@ -237,7 +221,9 @@ fn none(
             summary += &format!(
                 "; {which} x₁¹ = ({}) fails {}",
                 names(extended, &form.x11()).join(", "),
-                own.last().map_or("", |check| check.name.as_str())
+                own.iter()
+                    .find(|check| fails(check))
+                    .map_or(String::new(), |c| c.statement.to_string())
             );
             own
         }

@@ -8,11 +8,13 @@
 //! quadratic form is at most −λ V, λ > 0 where θ₂ > c₄ and
 //! θ₁ > c₁ + (c₂ + c₅)²θ₂²/(4(θ₂ − c₄)), so √V falls at the rate λ/2 down to 2|δ|/λ.
 
+use crate::statement::{sufficient, undecided};
+use crate::{Check, Farza};
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::{Check, Condition};
+use lynkeus_structure::Verdict;
 
 use super::bound;
 use super::constants;
@@ -20,7 +22,7 @@ use super::form::Form;
 use super::norms::{Constants, Norms, in_S};
 use super::settings::{Settings, Thetas};
 use crate::enclosure::figures;
-use crate::{Assumptions, Certificate, Constant, DesignError, Examination, Verdict};
+use crate::{Assumptions, Certificate, Constant, DesignError, Examination};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
 /// Numbers that have to be exceeded are by this factor at least.
@@ -62,18 +64,6 @@ struct Proof<'f, 'e, 'p> {
     c: Constants,
 }
 
-fn check(name: impl Into<String>, holds: bool, detail: impl Into<String>) -> Check {
-    Check {
-        name: name.into(),
-        verdict: match holds {
-            true => Condition::Proved,
-            // sufficient conditions: that they fail refutes nothing
-            false => Condition::Undecided(vec![]),
-        },
-        detail: detail.into(),
-    }
-}
-
 impl Proof<'_, '_, '_> {
     fn finite(&self) -> Check {
         let Constants { c1, c2, c4, c5 } = self.c;
@@ -87,12 +77,12 @@ impl Proof<'_, '_, '_> {
                 shown.join(", "),
                 if further { ", and so on" } else { "" }
             ),
-            (false, true) if self.norms.blocks.verdict != Condition::Proved => {
+            (false, true) if self.norms.blocks.verdict != Verdict::Proved => {
                 "Λ₂ has no inverse but a left one".to_owned()
             }
             (false, true) => "Λ₂ has no bounded inverse as far as interval arithmetic can tell on a box this large: declare a smaller one".to_owned(),
         };
-        check("c1, c2, c4 and c5 are finite on the box", finite, detail)
+        sufficient(Farza::Constants, finite, detail)
     }
 
     /// (H5)
@@ -102,7 +92,7 @@ impl Proof<'_, '_, '_> {
             true => "assumed constant".to_owned(),
             false => format!("assumed: |v'| ≤ {}", figures(ε)),
         };
-        check("(H5) v' is bounded", ε.is_finite(), detail)
+        sufficient(Farza::H5, ε.is_finite(), detail)
     }
 
     /// θ₂ and θ₁ against what they have to exceed.
@@ -117,11 +107,10 @@ impl Proof<'_, '_, '_> {
                 ),
                 false => "no theta is given, and the proof gives none on this box".to_owned(),
             };
-            return vec![check("θ1 ≥ θ1*", false, detail)];
+            return vec![sufficient(Farza::ThetaGiven, false, detail)];
         };
         if !self.c.c4.is_finite() {
-            let name = "θ2 ≥ θ2* = max(1, c4)";
-            return vec![check(name, false, "c4 has no bound")];
+            return vec![undecided(Farza::Theta2, "c4 has no bound")];
         }
         let second = self.c.c4.max(1.0) * CLEAR;
         let first = self.first(θ2) * CLEAR;
@@ -129,14 +118,9 @@ impl Proof<'_, '_, '_> {
             let word = if found >= least { "≥" } else { "<" };
             format!("{} {word} {}", figures(found), figures(least))
         };
-        let mut checks = vec![check(
-            "θ2 ≥ θ2* = max(1, c4)",
-            θ2 >= second,
-            against(θ2, second),
-        )];
+        let mut checks = vec![sufficient(Farza::Theta2, θ2 >= second, against(θ2, second))];
         if θ2 >= second {
-            let name = "θ1 ≥ θ1* = c1 + (c2 + c5)²θ2²/(4(θ2 − c4))";
-            checks.push(check(name, θ1 >= first, against(θ1, first)));
+            checks.push(sufficient(Farza::Theta1, θ1 >= first, against(θ1, first)));
         }
         checks
     }
@@ -203,8 +187,7 @@ impl Proof<'_, '_, '_> {
         let λ = self.λ(θ);
         if λ.is_nan() || λ <= 0.0 {
             // θ₁ exceeds θ₁* by less than rounding
-            found.hypotheses.push(check("λ > 0", false, figures(λ)));
-            found.verdict = Verdict::of(&found.hypotheses);
+            found.hypotheses.push(undecided(Farza::Rate, figures(λ)));
             return Ok(());
         }
         found.rate = Some(λ / 2.0);

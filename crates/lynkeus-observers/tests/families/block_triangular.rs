@@ -1,7 +1,8 @@
 //! The family `block-triangular` against the formulas of its paper.
 
 use crate::common::{assert_close, design_with, plant, refused, slope};
-use lynkeus_observers::{Fit, Tuning, Value, block_triangular::BlockTriangular};
+use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
+use lynkeus_structure::Standing;
 
 /// System (14), states declared in another order than they are chained.
 const EXAMPLE: &str = "model Lee
@@ -128,7 +129,7 @@ fn an_equation_with_two_new_states_is_named() {
          equation der(a) = b + c; der(b) = 0; der(c) = 0; end No;",
     );
     let examination = refused(&BlockTriangular, &plant, &Tuning::from([("theta", 1.0)]));
-    assert_eq!(examination.fit, Fit::DoesNotFit);
+    assert_eq!(examination.fit(), Standing::Refuted);
     assert!(
         examination
             .summary

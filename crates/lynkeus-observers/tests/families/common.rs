@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{LoadOptions, Plant};
 use lynkeus_observers::{
-    Assumptions, Certificate, Design, DesignError, Examination, Family, Tuning,
+    Assumptions, Certificate, Check, Design, DesignError, Examination, Family, Tuning,
 };
-use lynkeus_structure::{Check, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors};
 
 /// A plant from its text.
 pub fn plant(text: &str) -> Plant {
@@ -242,7 +242,7 @@ pub fn hypothesis<'c>(certificate: &'c Certificate, part: &str) -> &'c Check {
     let found = certificate
         .hypotheses
         .iter()
-        .find(|c| c.name.contains(part));
+        .find(|c| c.statement.to_string().contains(part));
     found.unwrap_or_else(|| panic!("no {part} in {:?}", certificate.hypotheses))
 }
 

@@ -10,9 +10,9 @@ use crate::common::{assert_follows, design_with, plant, reference, refused, run,
 use lynkeus_expr::{Tape, jacobian};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Fit, Initial, Tuning, Value, drift_observable::DriftObservable,
+    Design, DesignError, Initial, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Condition, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
 const PLANT: &str = include_str!("../../../../examples/germani-manes/germani_manes.mo");
 const INPUT: &[(&str, &str)] = &[("u", "5 + 2*sin(2*pi*time)")];
@@ -297,7 +297,7 @@ fn the_examination_tells_the_degree_and_the_singular_surface() {
     let extended = Extended::new(&plant, &Sensors::default()).unwrap();
     let family = lynkeus_observers::find("drift-observable").unwrap();
     let found = family.examine(&extended, &Tuning::default()).unwrap();
-    assert_eq!(found.fit, Fit::Undecided);
+    assert_eq!(found.fit(), Standing::Undecided);
     assert!(
         found.summary.contains("variant practical"),
         "{}",
@@ -310,7 +310,7 @@ fn the_examination_tells_the_degree_and_the_singular_surface() {
         "{}",
         found.checks[0].detail
     );
-    let Condition::Refuted(witness) = &found.checks[4].verdict else {
+    let Verdict::Refuted(witness) = &found.checks[4].verdict else {
         panic!()
     };
     // already for a constant input: u' does not appear
@@ -338,7 +338,7 @@ fn a_maximal_relative_degree_needs_nothing_of_the_input() {
         ..Tuning::default()
     };
     let design = design_with(&DriftObservable, &plant, &[], &poles).unwrap();
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     assert_eq!(design.parameters[0].1, "bounded");
     let found = slope(&plant, &design, &[0.4, 0.2], &[0.3], &[0.5]);
     let expected = [0.2 + 5.0 * 0.1, 0.3 - 0.4f64.sin() + 6.0 * 0.1];

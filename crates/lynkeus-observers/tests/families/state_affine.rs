@@ -7,10 +7,10 @@ use lynkeus_expr::Tape;
 use lynkeus_gain::UnitFactor;
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, Family, Fit, Initial, Tuning, Value, state_affine::StateAffine,
+    Design, DesignError, Family, Initial, Tuning, Value, state_affine::StateAffine,
     triangular::Triangular,
 };
-use lynkeus_structure::{Condition, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
 /// System (29).
 const EXAMPLE: &str = "model Ltaief
@@ -386,7 +386,7 @@ fn a_coupling_of_either_sign_fits() {
     );
     refused(&Triangular, &plant, &Tuning::from([("theta", 1.0)]));
     let design = design(&plant, &[], &Tuning::from([("theta", 2.0)]));
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     let inputs = [("s", "if sin(3*time) > 0 then 1 else 0")];
     let found = run(
         &plant,
@@ -407,7 +407,7 @@ fn a_coupling_of_either_sign_fits() {
 fn what_the_input_must_excite_is_undecided_and_says_so() {
     let (_, design) = example(1.0);
     let examination = &design.examination;
-    assert_eq!(examination.fit, Fit::Undecided);
+    assert_eq!(examination.fit(), Standing::Undecided);
     assert!(
         examination.summary.starts_with("(x1) → (x2, x3)"),
         "{}",
@@ -444,7 +444,8 @@ fn plants_of_another_form_are_refused() {
     let examination = refused(&StateAffine, &same, &Tuning::from([("theta", 1.0)]));
     let check = examination.refuted().unwrap();
     assert!(
-        matches!(check.verdict, Condition::Refuted(_)) && check.name.contains("(b, c)"),
+        matches!(check.verdict, Verdict::Refuted(_))
+            && check.statement.to_string().contains("(b, c)"),
         "{check:?}"
     );
 }

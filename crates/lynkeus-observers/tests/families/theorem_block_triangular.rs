@@ -4,7 +4,8 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Tuning, Value, Verdict, block_triangular::BlockTriangular};
+use lynkeus_observers::{Tuning, Value, block_triangular::BlockTriangular};
+use lynkeus_structure::Standing;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -41,8 +42,8 @@ fn the_example_of_the_paper() {
     let plant = lee();
     let classical = study(&plant, tuning(&[3.0, 9.0], "classical")).certificate();
     assert_eq!(
-        (classical.verdict, classical.rate),
-        (Verdict::Undecided, None)
+        (classical.verdict(), classical.rate),
+        (Standing::Undecided, None)
     );
     let close = |found: f64, exact: f64| {
         assert!(
@@ -55,7 +56,7 @@ fn the_example_of_the_paper() {
     close(constant(&classical, "μ21"), 0.756_834_466_383_139_7);
     close(constant(&classical, "μ22"), 125.036_255_847_102_35);
     let seven = study(&plant, tuning(&[3.0, 9.0], "lee")).certificate();
-    assert_eq!(seven.verdict, Verdict::Undecided);
+    assert_eq!(seven.verdict(), Standing::Undecided);
     close(constant(&seven, "θ0"), 1_373.924_083_437_994_3);
     assert!(
         seven
@@ -65,7 +66,7 @@ fn the_example_of_the_paper() {
     );
     // from θ0 on the decay is proved
     let fast = study(&plant, tuning(&[115.0, 115.0 * 115.0], "classical")).certificate();
-    assert_eq!(fast.verdict, Verdict::Proved, "{fast:#?}");
+    assert_eq!(fast.verdict(), Standing::Proved, "{fast:#?}");
     assert!(fast.rate.unwrap() > 0.0);
 }
 
@@ -87,7 +88,7 @@ fn a_pendulum_by_hand() {
         study.certificate()
     };
     let classical = certificate("classical");
-    assert_eq!(classical.verdict, Verdict::Proved);
+    assert_eq!(classical.verdict(), Standing::Proved);
     assert_safely(constant(&classical, "θ0"), 1.5, true);
     assert_safely(classical.rate.unwrap(), 0.734_728_701_687_525_7, false);
     assert_safely(
@@ -109,14 +110,14 @@ fn an_input_in_m_needs_a_bound_of_its_derivative() {
          output Real y = a; equation der(a) = b; der(b) = -u*b; end U;",
     );
     let found = study(&plant, tuning(&[50.0], "lee")).certificate();
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
         hypothesis(&found, "Ṁ M⁻¹")
             .detail
             .contains("input's derivative")
     );
     let classical = study(&plant, tuning(&[50.0], "classical")).certificate();
-    assert_eq!(classical.verdict, Verdict::Proved);
+    assert_eq!(classical.verdict(), Standing::Proved);
 }
 
 /// Without a box the classical observer of a plant with bounded slopes is covered,
@@ -130,7 +131,7 @@ fn without_a_box() {
     };
     let bounded = plant(&text("sin(a) + cos(b)"));
     let found = study(&bounded, tuning(&[20.0], "classical")).certificate();
-    assert_eq!(found.verdict, Verdict::Proved);
+    assert_eq!(found.verdict(), Standing::Proved);
     let cubic = plant(&text("-b^3"));
     let found = study(&cubic, tuning(&[20.0], "classical")).certificate();
     assert!(
@@ -149,7 +150,7 @@ fn a_transformation_that_moves_too_fast() {
          equation der(a) = b; der(b) = -b^3; end F;",
     );
     let found = study(&plant, tuning(&[50.0], "lee")).certificate();
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     assert!(hypothesis(&found, "large enough").detail.contains("no θ0"));
     assert!(found.constants.iter().all(|c| c.name != "θ0"));
 }
@@ -175,7 +176,7 @@ fn simulations_keep_the_guarantee() {
         let hats = ["a", "b", "c", "d"].map(|n| (n.to_owned(), start(random())));
         tuning.initial.values = hats.into_iter().collect();
         let found = study(&plant, tuning.clone()).certificate();
-        assert_eq!(found.verdict, Verdict::Proved, "{found:#?}");
+        assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
         let (σ, λ1) = (found.rate.unwrap(), constant(&found, "λ1"));
         let design = design_with(&BlockTriangular, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..4).map(|_| start(random())).collect();

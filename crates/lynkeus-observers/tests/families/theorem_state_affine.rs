@@ -4,7 +4,8 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Initial, Tuning, Verdict, state_affine::StateAffine};
+use lynkeus_observers::{Initial, Ltaief, Tuning, state_affine::StateAffine};
+use lynkeus_structure::Standing;
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -32,14 +33,14 @@ fn a_pendulum_by_hand() {
     study.drift = vec![0.0, 0.1];
     study.noise = vec![0.01];
     let found = study.certificate();
-    assert_eq!(found.verdict, Verdict::Proved, "{found:#?}");
+    assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
     assert_safely(constant(&found, "λ_M"), 2.618_033_988_749_895, true);
     assert_safely(constant(&found, "λ_m"), 0.3808467174576985, false);
     assert_safely(constant(&found, "θ0"), 1.6192215156133203, true);
     assert_safely(found.rate.unwrap(), 1.6722652104218627, false);
     assert_safely(found.ultimate_bound.unwrap(), 0.18408116959964893, true);
     let below = study_at(&plant, 1.0);
-    assert_eq!((below.verdict, below.rate), (Verdict::Undecided, None));
+    assert_eq!((below.verdict(), below.rate), (Standing::Undecided, None));
 }
 
 fn study_at(plant: &Plant, θ: f64) -> lynkeus_observers::Certificate {
@@ -66,7 +67,7 @@ fn the_example_of_the_paper() {
     for (alarm, θ0) in [(1e-6, 1328208.743255971), (0.005, 18783.708184359228)] {
         let tuning = Tuning::from([("theta", 10.0), ("alarm", alarm)]);
         let found = study(&plant, tuning).certificate();
-        assert_eq!((found.verdict, found.rate), (Verdict::Undecided, None));
+        assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
         close(constant(&found, "λ_M"), 544.5004595584355);
         close(constant(&found, "L"), 28.463402635597934);
         close(constant(&found, "θ0"), θ0);
@@ -78,8 +79,8 @@ fn the_example_of_the_paper() {
         );
         let tuning = Tuning::from([("theta", 1.01 * θ0), ("alarm", alarm)]);
         let fast = study(&plant, tuning).certificate();
-        assert!(constant(&fast, "θμ_θ") > 0.0 && fast.verdict == Verdict::Undecided);
-        assert_eq!(fast.weakest().unwrap().name, hypothesis(&fast, "A4").name);
+        assert!(constant(&fast, "θμ_θ") > 0.0 && fast.verdict() == Standing::Undecided);
+        assert_eq!(fast.weakest().unwrap().statement, Ltaief::A4.into());
     }
 }
 
@@ -90,7 +91,7 @@ fn what_is_missing_is_said() {
          equation der(a) = u*b; der(b) = -b; end Free;",
     );
     let found = study_at(&free, 5.0);
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
         hypothesis(&found, "A1")
             .detail
@@ -131,7 +132,7 @@ fn simulations_keep_the_guarantee() {
             values,
         };
         let found = study(&plant, tuning.clone()).certificate();
-        assert_eq!(found.verdict, Verdict::Proved);
+        assert_eq!(found.verdict(), Standing::Proved);
         let (σ, ratio) = (found.rate.unwrap(), constant(&found, "η√α(θ)"));
         let design = design_with(&StateAffine, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..n).map(|_| 4.0 * random() - 2.0).collect();
@@ -168,7 +169,7 @@ fn an_unknown_input_is_said_to_be_constant() {
         study.certificate()
     };
     let still = of(0.0);
-    assert_eq!(still.verdict, Verdict::Proved);
+    assert_eq!(still.verdict(), Standing::Proved);
     let bounded = hypothesis(&still, "(A3)");
     assert!(
         bounded.detail.contains("takes force as constant"),

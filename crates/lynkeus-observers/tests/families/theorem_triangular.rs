@@ -6,8 +6,8 @@ use crate::common::{
     Guaranteed, assert_safely, constant, design_with, hypothesis, numbers, plant, run,
 };
 use lynkeus_model::{LoadOptions, Plant};
-use lynkeus_observers::{Certificate, Initial, Tuning, Value, Verdict, triangular::Triangular};
-use lynkeus_structure::Condition;
+use lynkeus_observers::{Certificate, Initial, Tuning, Value, triangular::Triangular};
+use lynkeus_structure::{Standing, Verdict};
 
 fn study<'a>(plant: &'a Plant, tuning: Tuning) -> Guaranteed<'a> {
     Guaranteed {
@@ -52,7 +52,7 @@ fn a_pendulum_by_hand() {
     study.drift = vec![0.0, 0.1];
     study.noise = vec![0.01];
     let found = study.certificate();
-    assert_eq!(found.verdict, Verdict::Proved, "{found:#?}");
+    assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
     assert_safely(constant(&found, "η"), 0.078_899_853_457_099_75, false);
     assert_safely(constant(&found, "θ0"), 1.399_243_184_057_801, true);
     assert_safely(constant(&found, "ρ_min"), 1.0 / 0.65, true);
@@ -76,11 +76,11 @@ fn a_pendulum_by_hand() {
 fn below_θ0_the_theorem_is_silent() {
     let plant = plant(PENDULUM);
     let found = study(&plant, Tuning::from([("theta", 1.3)])).certificate();
-    assert_eq!((found.verdict, found.rate), (Verdict::Undecided, None));
+    assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     let check = hypothesis(&found, "at least θ0");
     assert!(check.detail.contains("θ0 = 1.39924"), "{}", check.detail);
     let above = study(&plant, Tuning::from([("theta", 1.3993)])).certificate();
-    assert_eq!(above.verdict, Verdict::Proved);
+    assert_eq!(above.verdict(), Standing::Proved);
 }
 
 fn integrators(n: usize) -> Plant {
@@ -105,9 +105,9 @@ fn the_printed_matrix_is_refuted_with_its_direction() {
     let mut tuning = Tuning::from([("theta", 3.5), ("r", 1.0)]);
     tuning.values.insert("S".into(), matrices(&[PRINTED]));
     let found = study(&plant, tuning).certificate();
-    assert_eq!((found.verdict, found.rate), (Verdict::Refuted, None));
+    assert_eq!((found.verdict(), found.rate), (Standing::Refuted, None));
     let check = hypothesis(&found, "Lemma 1");
-    let Condition::Refuted(witness) = &check.verdict else {
+    let Verdict::Refuted(witness) = &check.verdict else {
         panic!("{check:?}")
     };
     let point = &witness.points[0];
@@ -135,8 +135,8 @@ fn linear_chains_need_no_box() {
     let plant = integrators(5);
     let found = study(&plant, Tuning::from([("theta", 1.0)])).certificate();
     assert_eq!(
-        (found.verdict, constant(&found, "θ0")),
-        (Verdict::Proved, 0.0)
+        (found.verdict(), constant(&found, "θ0")),
+        (Standing::Proved, 0.0)
     );
 }
 
@@ -148,7 +148,7 @@ fn other_gains_are_not_covered() {
     let gain = Value::Text("lmi".into());
     tuning.values.insert("gain".into(), gain);
     let found = study(&plant, tuning).certificate();
-    assert_eq!((found.verdict, found.rate), (Verdict::Undecided, None));
+    assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     assert!(
         hypothesis(&found, "constant gain")
             .detail
@@ -164,7 +164,7 @@ fn a_missing_box_is_named() {
          equation der(a) = b + b^3; der(b) = c; der(c) = -a*b; end Free;",
     );
     let found = study(&free, Tuning::from([("theta", 1.0)])).certificate();
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let lemma = hypothesis(&found, "Lemma 1");
     assert!(
         lemma.detail.contains("declare min and max of b"),
@@ -196,7 +196,7 @@ fn a_varying_gain_is_not_covered_a_scaled_one_is() {
     tuning.values.insert("partials".into(), Value::Flag(true));
     let varying = plant(&text("b + b^2"));
     let found = study(&varying, tuning.clone()).certificate();
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
         hypothesis(&found, "gain is constant")
             .detail
@@ -204,8 +204,8 @@ fn a_varying_gain_is_not_covered_a_scaled_one_is() {
     );
     let scaled = plant(&text("-3*b"));
     assert_eq!(
-        study(&scaled, tuning).certificate().verdict,
-        Verdict::Proved
+        study(&scaled, tuning).certificate().verdict(),
+        Standing::Proved
     );
 }
 
@@ -234,12 +234,12 @@ fn column(own: bool) -> Certificate {
 #[test]
 fn the_column_of_the_paper() {
     let found = column(false);
-    assert_eq!(found.verdict, Verdict::Refuted);
+    assert_eq!(found.verdict(), Standing::Refuted);
     let broken: Vec<f64> = found
         .hypotheses
         .iter()
         .filter_map(|c| match &c.verdict {
-            Condition::Refuted(witness) => Some(witness.points[0].value),
+            Verdict::Refuted(witness) => Some(witness.points[0].value),
             _ => None,
         })
         .collect();
@@ -258,7 +258,7 @@ fn the_column_of_the_paper() {
     ];
     assert_eq!(window, [13.0 / 11.0, 14.0 / 11.0, 15.0 / 11.0]);
     let own = column(true);
-    assert_eq!(own.verdict, Verdict::Undecided);
+    assert_eq!(own.verdict(), Standing::Undecided);
     assert!(constant(&own, "η of chain 1") > 7e-6 && constant(&own, "η of chain 2") > 1.9e-3);
     let θ0 = constant(&own, "θ0");
     assert!((1e7..3e7).contains(&θ0), "{θ0}");
@@ -304,7 +304,7 @@ fn simulations_keep_the_guarantee() {
             values,
         };
         let found = study(&plant, tuning.clone()).certificate();
-        assert_eq!(found.verdict, Verdict::Proved);
+        assert_eq!(found.verdict(), Standing::Proved);
         let (σ, λ1) = (found.rate.unwrap(), constant(&found, "λ1"));
         let design = design_with(&Triangular, &plant, &[], &tuning).unwrap();
         let x0: Vec<f64> = (0..n).map(|_| 4.0 * random() - 2.0).collect();
@@ -341,7 +341,7 @@ fn two_chains_against_numpy() {
          equation der(a) = b; der(b) = 0.3*sin(c) + 0.2*d; der(c) = d + 0.1*sin(b); der(d) = -0.4*a; end Two;",
     );
     let found = study(&plant, Tuning::from([("theta", 50.0)])).certificate();
-    assert_eq!(found.verdict, Verdict::Proved, "{found:#?}");
+    assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
     assert!((constant(&found, "c of V") - 1.154_781_984_689_458_3).abs() < 1e-12);
     assert_safely(constant(&found, "θ0"), 2.5862169279122824, true);
 }

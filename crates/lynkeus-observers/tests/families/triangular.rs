@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use crate::common::{assert_close, design_with, plant, slope};
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, DesignError, Fit, Initial, Tuning, Value, triangular::Triangular};
-use lynkeus_structure::Condition;
+use lynkeus_observers::{Design, DesignError, Initial, Tuning, Value, triangular::Triangular};
+use lynkeus_structure::{Standing, Verdict};
 
 fn design(plant: &Plant, unknown: &[&str], tuning: &Tuning) -> Result<Design, DesignError> {
     design_with(&Triangular, plant, unknown, tuning)
@@ -98,7 +98,7 @@ fn negative_partials_flip_the_gains() {
          equation der(a) = -b; der(b) = -c; der(c) = 0; end Flip;",
     );
     let design = design(&plant, &[], &with_poles(2.0)).unwrap();
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     let found = slope(&plant, &design, &[1.0, 0.0, 0.0], &[], &[0.0]);
     assert_close(&found, &[-3.0 * 2.0, 3.0 * 4.0, -8.0]);
 }
@@ -127,7 +127,7 @@ fn the_counter_example_is_refused_with_its_witness() {
     else {
         panic!("a constant gain was found where none exists")
     };
-    let Condition::Refuted(witness) = &examination.refuted().unwrap().verdict else {
+    let Verdict::Refuted(witness) = &examination.refuted().unwrap().verdict else {
         panic!()
     };
     let found: Vec<(f64, f64)> = witness

@@ -9,10 +9,9 @@ use crate::common::{
 };
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Design, DesignError, FAMILIES, Family, Fit, Tuning, TuningError, Value,
-    unknown_input::UnknownInput,
+    Design, DesignError, FAMILIES, Family, Tuning, TuningError, Value, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Condition, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
 /// System (15) with a = 1, which the paper leaves open.
 const EXAMPLE: &str = "model Farza
@@ -88,7 +87,12 @@ fn the_observer_of_the_example() {
     let plant = plant(EXAMPLE);
     let design = design(&plant, &tuning(6.0, 3.0)).unwrap();
     let examination = &design.examination;
-    assert_eq!(examination.fit, Fit::Fits, "{:#?}", examination.checks);
+    assert_eq!(
+        examination.fit(),
+        Standing::Proved,
+        "{:#?}",
+        examination.checks
+    );
     let [first, second, ..] = &examination.chains[..] else {
         panic!()
     };
@@ -111,10 +115,17 @@ fn the_only_possible_partition() {
             panic!("{outputs:?}")
         };
         let refuted = examination.refuted().unwrap();
-        assert!(refuted.name.contains("(i)"), "{}", refuted.name);
+        assert!(
+            refuted.statement.to_string().contains("(i)"),
+            "{}",
+            refuted.statement
+        );
     }
     let tuning = with_partition(tuning(60.0, 15.0), &["y2", "y1"]);
-    assert_eq!(design(&plant, &tuning).unwrap().examination.fit, Fit::Fits);
+    assert_eq!(
+        design(&plant, &tuning).unwrap().examination.fit(),
+        Standing::Proved
+    );
 }
 
 fn followed(plant: &Plant, tuning: &Tuning, rows: &[f64], step: f64) -> Vec<Vec<f64>> {
@@ -212,7 +223,7 @@ fn the_error_of_a_linear_plant_has_the_poles_of_the_paper() {
     let (θ1, θ2) = (2.0, 3.0);
     let tuning = with_partition(tuning(θ1, θ2), &["y1", "y3"]);
     let design = design_with(&UnknownInput, &plant, &["v1", "v2"], &tuning).unwrap();
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     let rest = slope(&plant, &design, &[0.0; 7], &[], &[1.0, 0.0, 0.0]);
     assert_close(&rest, &[0.0; 7]);
     let column = |i: usize| {
@@ -252,10 +263,17 @@ fn a_counter_example_to_lemma_1() {
     let Err(DesignError::Refused(examination)) = design(&plant, &given) else {
         panic!()
     };
-    assert!(examination.refuted().unwrap().name.starts_with("(11)"));
+    assert!(
+        examination
+            .refuted()
+            .unwrap()
+            .statement
+            .to_string()
+            .starts_with("(11)")
+    );
     // the search finds x₁¹ = (a), with x₂¹ = (b, c) taller than x² = (d)
     let found = design(&plant, &tuning(10.0, 5.0)).unwrap();
-    assert_eq!(found.examination.fit, Fit::Fits);
+    assert_eq!(found.examination.fit(), Standing::Proved);
     assert_eq!(found.examination.chains[..2], [vec!["a"], vec!["b", "c"]]);
     let slope = slope(&plant, &found, &[0.0, 1.0, 2.0, 0.0, 0.0], &[], &[0.0; 3]);
     assert_close(&slope, &[0.0, -10.0, -2.0 - 20.0, -25.0, 0.0]);
@@ -381,8 +399,12 @@ fn a_rank_that_is_lost_is_refuted() {
         panic!()
     };
     let refuted = examination.refuted().unwrap();
-    assert!(refuted.name.starts_with("(H1)"), "{}", refuted.name);
-    assert!(matches!(refuted.verdict, Condition::Refuted(_)));
+    assert!(
+        refuted.statement.to_string().starts_with("(H1)"),
+        "{}",
+        refuted.statement
+    );
+    assert!(matches!(refuted.verdict, Verdict::Refuted(_)));
 }
 
 /// `auto` takes the first family that fits: of this plant no other does for sure.
@@ -396,7 +418,7 @@ fn no_family_before_it_fits_the_example() {
     let extended = Extended::new(&plant, &sensors).unwrap();
     let fits = |family: &&&dyn Family| {
         let found = family.examine(&extended, &Tuning::default()).unwrap();
-        found.fit == Fit::Fits
+        found.fit() == Standing::Proved
     };
     let first = FAMILIES.iter().find(fits).unwrap();
     assert_eq!(first.name(), "unknown-input");

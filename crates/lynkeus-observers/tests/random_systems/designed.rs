@@ -1,10 +1,10 @@
 //! Gains that come with a promise: `gain = "lmi"` on random chains.
 
 use lynkeus_observers::{
-    Claim as Sought, Design, DesignError, Family, Tuning, Value, Verdict,
-    block_triangular::BlockTriangular, triangular::Triangular,
+    Claim as Sought, Design, DesignError, Family, Tuning, Value, block_triangular::BlockTriangular,
+    triangular::Triangular,
 };
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Standing};
 
 use crate::judge::{self, Claim, Sides};
 use crate::numbers::Numbers;
@@ -88,7 +88,7 @@ fn kept(seed: u64) -> bool {
         fastest.rate
     );
     let certificate = certified(Sought::At(rate));
-    assert_eq!(certificate.verdict, Verdict::Proved);
+    assert_eq!(certificate.verdict(), Standing::Proved);
     let claim = Claim::new(&certificate);
     assert_eq!(claim.rate, rate);
     let sides = Sides::new(&certificate, random.states.len());

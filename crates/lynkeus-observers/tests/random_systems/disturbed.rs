@@ -1,7 +1,8 @@
 //! Ultimate bounds: what acts on the plant, and measurement errors, within their bounds
 //! and always in the worst direction.
 
-use lynkeus_observers::{Certificate, Claim as Sought, Verdict};
+use lynkeus_observers::{Certificate, Claim as Sought};
+use lynkeus_structure::Standing;
 use nalgebra::{DMatrix, DVector};
 
 use crate::gains::{self, Middle};
@@ -83,7 +84,7 @@ fn followed(seed: u64) -> Option<bool> {
     let noise: Vec<f64> = (0..p).map(|_| numbers.size(1e-6, 1e-3)).collect();
     let observer = pair::observer(&extended, &K);
     let certificate = certificate(&extended, &observer, [&drift, &noise], Sought::Fastest);
-    if certificate.verdict != Verdict::Proved {
+    if certificate.verdict() != Standing::Proved {
         return None;
     }
     let context = Context(format!("system {seed}\n{}K = {K}", random.text()));

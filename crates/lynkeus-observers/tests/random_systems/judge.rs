@@ -2,7 +2,7 @@
 //! them.
 
 use lynkeus_observers::Certificate;
-use lynkeus_structure::{Condition, Point};
+use lynkeus_structure::{Point, Verdict};
 use nalgebra::{DMatrix, DVector};
 
 use crate::numbers::Numbers;
@@ -117,7 +117,7 @@ pub fn witness(pair: &mut Pair, certificate: &Certificate, sides: &Sides) {
         .hypotheses
         .iter()
         .filter_map(|c| match &c.verdict {
-            Condition::Refuted(witness) => Some(witness),
+            Verdict::Refuted(witness) => Some(witness),
             _ => None,
         });
     let found: Vec<&Point> = refuted.flat_map(|w| &w.points).collect();

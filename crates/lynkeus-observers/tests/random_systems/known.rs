@@ -1,20 +1,21 @@
 //! Small systems that once were judged wrongly, or well might be.
 
-use lynkeus_observers::{Certificate, Claim as Sought, Verdict};
+use lynkeus_observers::{Certificate, Claim as Sought};
+use lynkeus_structure::Standing;
 use nalgebra::DMatrix;
 
 use crate::judge::{self, Sides};
 use crate::pair::{self, Pair};
 
 /// The certificate of a copy of the plant with gains −K on the outputs' errors.
-fn certified(text: &str, K: &[f64], look: impl Fn(&mut Pair, &Certificate)) -> Verdict {
+fn certified(text: &str, K: &[f64], look: impl Fn(&mut Pair, &Certificate)) -> Standing {
     let plant = pair::plant(text);
     let extended = pair::extended(&plant);
     let K = DMatrix::from_row_slice(plant.states.len(), plant.outputs.len(), K);
     let observer = pair::observer(&extended, &K);
     let certificate = crate::certificate(&extended, &observer, [&[], &[]], Sought::Fastest);
     look(&mut Pair::new(&extended, &observer), &certificate);
-    certificate.verdict
+    certificate.verdict()
 }
 
 /// The equation has the same slope −5 + u at both ends of the input, but 4 + u between.
@@ -29,7 +30,7 @@ fn a_step_of_an_input_is_not_covered_by_the_ends_of_its_range() {
              equation der(x) = -5*x + u*x + ({step})*x; end P;"
         );
         let verdict = certified(&text, &[0.0], |_, _| ());
-        assert_ne!(verdict, Verdict::Proved, "{step}");
+        assert_ne!(verdict, Standing::Proved, "{step}");
     }
 }
 
@@ -42,7 +43,7 @@ fn a_kink_at_the_edge_of_the_box_refutes_nothing() {
              equation der(x) = 0.5*x - {term}; end P;"
         );
         let verdict = certified(&text, &[0.0], |_, _| ());
-        assert_ne!(verdict, Verdict::Refuted, "{term}");
+        assert_ne!(verdict, Standing::Refuted, "{term}");
     }
 }
 
@@ -52,7 +53,7 @@ fn a_kink_inside_the_box_is_no_obstacle() {
     let text = "model P Real x(min = -1, max = 1); Real z(min = -1, max = 1); output Real y = x;
          equation der(x) = -x + z; der(z) = -2*z - abs(z); end P;";
     let verdict = certified(text, &[0.0, 0.0], |_, _| ());
-    assert_eq!(verdict, Verdict::Proved);
+    assert_eq!(verdict, Standing::Proved);
 }
 
 /// The error of x' = (3 sin t − 1) x decays like exp(−t − 3 cos t), though its Jacobian is
@@ -64,7 +65,7 @@ fn an_instant_refutes_nothing() {
             "model P Real x(min = -1, max = 1); output Real y = x;
              equation der(x) = ({rate})*x; end P;"
         );
-        assert_eq!(certified(&text, &[0.0], |_, _| ()), Verdict::Undecided);
+        assert_eq!(certified(&text, &[0.0], |_, _| ()), Standing::Undecided);
     }
 }
 
@@ -77,20 +78,20 @@ fn a_linear_error_that_grows_is_refuted_without_a_time() {
         let text = format!("{:?}", certificate.hypotheses);
         assert!(text.contains("Refuted") && !text.contains("time"), "{text}");
     });
-    assert_eq!(verdict, Verdict::Refuted);
+    assert_eq!(verdict, Standing::Refuted);
 }
 
 /// The largest eigenvalue of the error's Jacobian is about b² − 1 where b is large: that
 /// refutes where the plant can rest there, at b = √3, and nothing where it only passes.
 #[test]
 fn an_unstable_jacobian_refutes_where_the_plant_can_rest() {
-    for (fall, expected) in [("b", Verdict::Refuted), ("0", Verdict::Undecided)] {
+    for (fall, expected) in [("b", Standing::Refuted), ("0", Standing::Undecided)] {
         let text = format!(
             "model P Real a(min = -3, max = 3); Real b(min = 0.5, max = 2); output Real y = a;
              equation der(a) = b - a; der(b) = b^3/3 - {fall}; end P;"
         );
         let verdict = certified(&text, &[0.3, 0.01], |pair, certificate| {
-            if certificate.verdict == Verdict::Refuted {
+            if certificate.verdict() == Standing::Refuted {
                 judge::witness(pair, certificate, &Sides::new(certificate, 2));
             }
         });
@@ -103,7 +104,7 @@ fn an_unstable_jacobian_refutes_where_the_plant_can_rest() {
 fn a_rest_on_the_edge_refutes_nothing() {
     let text = "model P Real x(min = 0, max = 1); output Real y = x;
          equation der(x) = x*(1 - x)*(1 - x)/(1 + x); end P;";
-    assert_ne!(certified(text, &[0.5], |_, _| ()), Verdict::Refuted);
+    assert_ne!(certified(text, &[0.5], |_, _| ()), Standing::Refuted);
 }
 
 /// At 0 alone the written derivative is +0.5; on either side of it the slope is −0.5.
@@ -116,7 +117,7 @@ fn a_rest_where_the_derivative_jumps_refutes_nothing() {
         );
         assert_ne!(
             certified(&text, &[0.0], |_, _| ()),
-            Verdict::Refuted,
+            Standing::Refuted,
             "{term}"
         );
     }
@@ -139,7 +140,7 @@ fn jumps_are_never_proved() {
              equation der(x) = -4*x + {jump}; end P;"
         );
         let verdict = certified(&text, &[1.0], |_, _| ());
-        assert_ne!(verdict, Verdict::Proved, "{jump}");
+        assert_ne!(verdict, Standing::Proved, "{jump}");
     }
 }
 
@@ -176,6 +177,6 @@ fn a_proof_stands_in_any_units() {
                 "{constant} {least}"
             );
         });
-        assert_eq!(verdict, Verdict::Proved, "first {}", order(0));
+        assert_eq!(verdict, Standing::Proved, "first {}", order(0));
     }
 }

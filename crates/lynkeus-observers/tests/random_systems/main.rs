@@ -14,8 +14,8 @@ mod published;
 mod simulate;
 mod terms;
 
-use lynkeus_observers::{Assumptions, Certificate, Claim as Sought, Observer, Verdict};
-use lynkeus_structure::Extended;
+use lynkeus_observers::{Assumptions, Certificate, Claim as Sought, Observer};
+use lynkeus_structure::{Extended, Standing};
 use nalgebra::DMatrix;
 
 use judge::{Claim, Sides};
@@ -67,8 +67,8 @@ fn judged(seed: u64, tally: &mut Tally) {
     let sides = Sides::new(&certificate, states.len());
     let mut pair = Pair::new(&extended, &observer);
     let context = Context(format!("system {seed}\n{}K ={K}", random.text()));
-    match certificate.verdict {
-        Verdict::Proved => {
+    match certificate.verdict() {
+        Standing::Proved => {
             assert!(!random.jumps, "a right-hand side that jumps");
             let claim = Claim::new(&certificate);
             judge::secants(&mut pair, &claim, &sides, &mut numbers);
@@ -77,11 +77,11 @@ fn judged(seed: u64, tally: &mut Tally) {
             tally.proved += 1;
             tally.seen += usize::from(steps >= 60);
         }
-        Verdict::Refuted => {
+        Standing::Refuted => {
             judge::witness(&mut pair, &certificate, &sides);
             tally.refuted += 1;
         }
-        Verdict::Undecided => tally.undecided += 1,
+        Standing::Undecided => tally.undecided += 1,
     }
     drop(context);
 }

@@ -2,9 +2,10 @@
 //! limited errors: the same judgement.
 
 use lynkeus_observers::{
-    Claim as Sought, Family, Tuning, Value, Verdict, block_triangular::BlockTriangular,
+    Claim as Sought, Family, Tuning, Value, block_triangular::BlockTriangular,
     triangular::Triangular,
 };
+use lynkeus_structure::Standing;
 
 use crate::designed::chain;
 use crate::judge::{self, Claim, Sides};
@@ -44,7 +45,7 @@ fn tuned(numbers: &mut Numbers) -> (&'static dyn Family, Tuning) {
 }
 
 /// The verdict on an observer, judged; none where the family does not take the plant.
-fn judged(seed: u64) -> Option<Verdict> {
+fn judged(seed: u64) -> Option<Standing> {
     let mut numbers = Numbers(seed.wrapping_mul(0xD6E8_FEB8_6659_FD93));
     let random = chain(&mut numbers).at_rest();
     let (family, tuning) = tuned(&mut numbers);
@@ -59,23 +60,23 @@ fn judged(seed: u64) -> Option<Verdict> {
     let certificate = crate::certificate(&extended, observer, [&[], &[]], Sought::Fastest);
     let sides = Sides::new(&certificate, random.states.len());
     let mut pair = Pair::new(&extended, observer);
-    match certificate.verdict {
-        Verdict::Proved => {
+    match certificate.verdict() {
+        Standing::Proved => {
             let claim = Claim::new(&certificate);
             judge::secants(&mut pair, &claim, &sides, &mut numbers);
             simulate::decay(&mut pair, &claim, &sides, &mut numbers);
         }
-        Verdict::Refuted => judge::witness(&mut pair, &certificate, &sides),
-        Verdict::Undecided => {}
+        Standing::Refuted => judge::witness(&mut pair, &certificate, &sides),
+        Standing::Undecided => {}
     }
     drop(context);
-    Some(certificate.verdict)
+    Some(certificate.verdict())
 }
 
 #[test]
 fn verdicts_on_observers_of_the_papers_stand() {
-    let verdicts: Vec<Verdict> = (1..=OBSERVERS).filter_map(judged).collect();
+    let verdicts: Vec<Standing> = (1..=OBSERVERS).filter_map(judged).collect();
     let count = |verdict| verdicts.iter().filter(|v| **v == verdict).count();
-    let counts = [Verdict::Proved, Verdict::Refuted, Verdict::Undecided].map(count);
+    let counts = [Standing::Proved, Standing::Refuted, Standing::Undecided].map(count);
     assert!(counts[0] >= 30 && counts[1] >= 1, "{counts:?}");
 }

@@ -1,13 +1,13 @@
 //! Which nodes jump or have kinks with time, and the functions that decide when.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
 
 use super::indicator::{Indicator, Parts};
 use super::{Extracted, Switches};
 
-/// Characters of an expression in a message or a mode's name.
+/// Characters of an expression in a mode's label.
 const SHOWN: usize = 80;
 
 /// Replaces what jumps with `time` in `roots` by modes.
@@ -17,7 +17,6 @@ pub(super) fn extract(
     roots: &[Node],
 ) -> Result<Extracted, MissingInput> {
     let of_time = functions_of_time(graph, time, roots);
-    let mut symbols = Symbols::new(graph, roots);
     let (mut outer, mut inner) = (HashMap::new(), HashMap::new());
     let (mut jumps, mut modes, mut found, mut indicators) = (vec![], vec![], vec![], vec![]);
     for node in graph.reachable(roots) {
@@ -25,7 +24,8 @@ pub(super) fn extract(
         let Some(switch) = known.then(|| Switch::of(graph, node)).flatten() else {
             continue;
         };
-        let symbol = symbols.fresh(node);
+        let label = format!("({})", graph.render(node, SHOWN));
+        let symbol = graph.fresh(label).node();
         let switch = switch.within(graph, &inner);
         indicators.push(switch.indicator(graph, time, &found, node)?);
         inner.insert(node, switch.replacement(graph, symbol));
@@ -63,31 +63,6 @@ fn functions_of_time(graph: &Graph, time: Node, roots: &[Node]) -> HashMap<Node,
         }
     }
     uses
-}
-
-/// Makes symbols, named as what they stand for reads, for messages.
-struct Symbols<'g> {
-    graph: &'g Graph,
-    taken: HashSet<String>,
-}
-
-impl<'g> Symbols<'g> {
-    fn new(graph: &'g Graph, roots: &[Node]) -> Self {
-        let symbols = graph.symbols_of(roots);
-        let names = symbols.iter().filter_map(|&s| graph.symbol_name(s));
-        Self {
-            graph,
-            taken: names.collect(),
-        }
-    }
-
-    fn fresh(&mut self, node: Node) -> Node {
-        let mut name = format!("({})", self.graph.render(node, SHOWN));
-        while !self.taken.insert(name.clone()) {
-            name.push('\'');
-        }
-        self.graph.symbol(&name).node()
-    }
 }
 
 /// A node that jumps or has a kink, by what decides it.

@@ -159,9 +159,10 @@ mod tests {
         let g = Graph::new();
         let time = g.symbol("time");
         let relation = time.less(g.constant(2.0));
-        let root = (g.symbol("(time < 2)") + relation).node();
-        let extracted = Switches::extract(&g, time.node(), &[root]).unwrap();
-        let name = g.symbol_name(extracted.modes[0]).unwrap();
-        assert_eq!(name, "(time < 2)'");
+        let taken = g.symbol("(time < 2)");
+        let extracted = Switches::extract(&g, time.node(), &[(taken + relation).node()]).unwrap();
+        assert_ne!(extracted.modes[0], taken.node());
+        let expected = (taken + g.expr(extracted.modes[0])).node();
+        assert_eq!(extracted.roots, [expected]);
     }
 }

@@ -14,7 +14,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
 use crate::region::Cell;
 use crate::words::short;
-use crate::{Check, Condition, Region, Witness};
+use crate::{Finding, Place, Region, Side, Verdict, Witness};
 use walk::Walk;
 
 /// Cells looked at.
@@ -36,7 +36,7 @@ pub enum Trouble {
         /// the operation as a person would write it
         operation: String,
         /// the part of the box
-        place: Vec<(String, f64, f64)>,
+        place: Place,
         /// it certainly has none on that part
         certain: bool,
     },
@@ -45,7 +45,7 @@ pub enum Trouble {
         /// the operation as a person would write it
         operation: String,
         /// the part of the box
-        place: Vec<(String, f64, f64)>,
+        place: Place,
     },
 }
 
@@ -82,11 +82,10 @@ impl Regularity {
         self.trouble.as_ref()
     }
 
-    /// The verdict as a condition of that name.
-    pub fn check(&self, name: impl Into<String>) -> Check {
+    /// The verdict with what was found.
+    pub fn finding(&self) -> Finding {
         let examined = || "every operation examined".to_owned();
-        Check {
-            name: name.into(),
+        Finding {
             verdict: self.verdict(),
             detail: self
                 .trouble
@@ -97,17 +96,17 @@ impl Regularity {
 
     /// Proved, or undecided with the place. Never refuted: a jump or a missing value in a
     /// part of an expression need not be one of the whole, and the plant need not go there.
-    pub fn verdict(&self) -> Condition {
+    pub fn verdict(&self) -> Verdict {
         match &self.trouble {
-            None => Condition::Proved,
-            Some(trouble) => Condition::Undecided(trouble.place().to_vec()),
+            None => Verdict::Proved,
+            Some(trouble) => Verdict::Undecided(trouble.place().to_vec()),
         }
     }
 }
 
 impl Trouble {
     /// The part of the box in question.
-    pub fn place(&self) -> &[(String, f64, f64)] {
+    pub fn place(&self) -> &[Side] {
         match self {
             Trouble::Undefined { place, .. } | Trouble::Jumps { place, .. } => place,
         }
@@ -126,12 +125,13 @@ impl std::fmt::Display for Trouble {
             Trouble::Jumps { operation, .. } => (operation, "jumps"),
         };
         write!(f, "{operation} {word}")?;
-        for (i, (name, low, high)) in self.place().iter().enumerate() {
+        for (i, side) in self.place().iter().enumerate() {
+            let (name, low, high) = (&side.name, side.min, side.max);
             let joint = if i == 0 { " at" } else { "," };
             let narrow = (high - low).abs() <= 1e-3 * low.abs().max(high.abs()).max(1.0);
             match narrow {
-                true => write!(f, "{joint} {name} = {}", short(nearest(*low, *high)))?,
-                false => write!(f, "{joint} {name} in [{}, {}]", short(*low), short(*high))?,
+                true => write!(f, "{joint} {name} = {}", short(nearest(low, high)))?,
+                false => write!(f, "{joint} {name} in [{}, {}]", short(low), short(high))?,
             }
         }
         Ok(())

@@ -25,7 +25,7 @@ mod model;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, jacobian};
 use lynkeus_proof::decay::ErrorModel;
 
-use crate::{Region, Regularity};
+use crate::{Place, Region, Regularity};
 pub(crate) use kinks::without_removable_jumps;
 use model::model;
 
@@ -38,7 +38,7 @@ pub struct Slopes {
     /// one model per vertex of the inputs below
     pub models: Vec<ErrorModel>,
     /// inputs that are affine in every equation, with the ends of their ranges
-    pub inputs: Vec<(String, f64, f64)>,
+    pub inputs: Place,
     /// what each sector of the models is
     pub slopes: Vec<Slope>,
 }
@@ -202,12 +202,11 @@ fn at_vertex(region: &Region, inputs: &[usize], vertex: usize) -> Region {
     fixed
 }
 
-fn named(region: &Region, inputs: &[usize]) -> Vec<(String, f64, f64)> {
-    let side = |&i: &usize| {
-        let d = &region.dimensions[i];
-        (d.name.clone(), d.min, d.max)
-    };
-    inputs.iter().map(side).collect()
+fn named(region: &Region, inputs: &[usize]) -> Place {
+    inputs
+        .iter()
+        .map(|&i| region.dimensions[i].side())
+        .collect()
 }
 
 #[cfg(test)]

@@ -52,7 +52,10 @@ fn inputs_that_enter_affinely_become_vertices() {
         end P;",
     );
     let (found, _) = slopes(&plant);
-    assert_eq!(found.inputs, [("u".to_owned(), 1.0, 2.0)]);
+    let [side] = &found.inputs[..] else {
+        panic!("{:?}", found.inputs)
+    };
+    assert_eq!((side.name.as_str(), side.min, side.max), ("u", 1.0, 2.0));
     let corner: Vec<f64> = found
         .models
         .iter()
@@ -168,7 +171,7 @@ fn a_gain_times_an_innovation_costs_the_range_of_the_gain() {
     let [a, b] = extended.symbols()[..] else {
         panic!("two states")
     };
-    let error = graph.symbol("error of a");
+    let error = graph.fresh("error of a");
     region.dimensions.push(crate::Dimension {
         name: "error of a".into(),
         symbol: error.node(),
@@ -217,7 +220,7 @@ fn slopes_of_the_same_state_and_equation_are_added() {
     let extended = Extended::new(&plant, &Sensors::default()).unwrap();
     let mut region = extended.region();
     let symbols = extended.symbols();
-    let error = graph.symbol("error of a");
+    let error = graph.fresh("error of a");
     region.dimensions.push(crate::Dimension {
         name: "error of a".into(),
         symbol: error.node(),
@@ -300,13 +303,13 @@ fn hull(found: &Slopes, region: &Region, inputs: &[f64]) -> Vec<Vec<Interval>> {
             .inputs
             .iter()
             .enumerate()
-            .map(|(bit, (name, low, high))| {
+            .map(|(bit, side)| {
                 let place = region
                     .dimensions
                     .iter()
-                    .position(|d| d.name == *name)
+                    .position(|d| d.name == side.name)
                     .unwrap();
-                let s = (inputs[place - 3] - low) / (high - low);
+                let s = (inputs[place - 3] - side.min) / (side.max - side.min);
                 if vertex >> bit & 1 == 1 { s } else { 1.0 - s }
             })
             .product();

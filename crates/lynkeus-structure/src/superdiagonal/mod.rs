@@ -214,7 +214,7 @@ impl Factor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Condition, Sensors};
+    use crate::{Sensors, Verdict};
     use lynkeus_model::{LoadOptions, Plant};
 
     fn examined<T>(text: &str, look: impl Fn(&Extended<'_>) -> T) -> T {
@@ -226,7 +226,7 @@ mod tests {
         examined(text, |e| Ok(find(e)?.describe(e)))
     }
 
-    fn verdicts(text: &str) -> Vec<Condition> {
+    fn verdicts(text: &str) -> Vec<Verdict> {
         examined(text, |e| {
             let form = find(e).unwrap();
             let check = |(k, f): (usize, &Factor)| f.column_rank(e, k, &e.region()).unwrap();
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn constant_columns_that_coincide_hide_a_direction() {
         let text = "model P Real a; Real b; Real c; output Real y = a; equation der(a) = b + c; der(b) = -b; der(c) = b; end P;";
-        let Condition::Refuted(witness) = &verdicts(text)[1] else {
+        let Verdict::Refuted(witness) = &verdicts(text)[1] else {
             panic!()
         };
         let ξ: Vec<f64> = witness.points[0].coordinates.iter().map(|c| c.1).collect();
@@ -287,9 +287,9 @@ mod tests {
         };
         // det F_1 = 5u − 1
         let found = verdicts(&plant(0.3));
-        assert_eq!(found, [Condition::Proved, Condition::Proved]);
-        assert!(matches!(verdicts(&plant(0.1))[1], Condition::Undecided(_)));
+        assert_eq!(found, [Verdict::Proved, Verdict::Proved]);
+        assert!(matches!(verdicts(&plant(0.1))[1], Verdict::Undecided(_)));
         let wide = "model P input Real u; Real a; Real b; Real c; output Real y = a; equation der(a) = b + u*c; der(b) = 0; der(c) = 0; end P;";
-        assert!(matches!(verdicts(wide)[1], Condition::Undecided(_)));
+        assert!(matches!(verdicts(wide)[1], Verdict::Undecided(_)));
     }
 }

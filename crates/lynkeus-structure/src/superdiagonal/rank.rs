@@ -4,9 +4,8 @@ use lynkeus_expr::{Graph, MissingInput, Node};
 use nalgebra::DMatrix;
 
 use super::Factor;
-use crate::chains::names;
 use crate::rank::subsets;
-use crate::{Check, Condition, Extended, Matrix, Point, Region, Witness, sign};
+use crate::{Extended, Finding, Matrix, Point, Region, Verdict, sign};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -26,51 +25,38 @@ impl Factor {
         extended: &Extended<'_>,
         k: usize,
         region: &Region,
-    ) -> Result<Check, MissingInput> {
+    ) -> Result<Finding, MissingInput> {
         let graph = extended.graph();
-        let mut declared = self.columns.clone();
-        declared.sort_unstable();
-        let states = names(extended, declared);
-        let name = format!("F_{k} ξ ≠ 0 for every direction ξ of ({states})");
         let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
         if let Some(direction) = self.hidden(extended) {
-            let witness = Witness {
-                points: vec![direction],
-            };
             let detail = format!(
                 "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
             );
-            return Ok(Check {
-                name,
-                verdict: Condition::Refuted(witness),
-                detail,
-            });
+            return Ok(Finding::refuted(direction, detail));
         }
         let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
         let used = region.restricted(&graph.symbols_of(&entries));
-        let sides: Vec<(String, f64, f64)> = used.named(&used.cell());
+        let sides = used.named(&used.cell());
         let Some(minors) = self.minors(graph) else {
             let detail = format!(
                 "{shape}: it shows these states only while its entries move, so convergence rests on the excitation (A4)"
             );
-            return Ok(Check {
-                name,
-                verdict: Condition::Undecided(sides),
+            return Ok(Finding {
+                verdict: Verdict::Undecided(sides),
                 detail,
             });
         };
-        let found = sign::keeps_sign(graph, name, minors, region)?.check;
+        let found = sign::keeps_sign(graph, minors, region)?.finding;
         Ok(match found.verdict {
-            Condition::Refuted(witness) => Check {
+            Verdict::Refuted(witness) => Finding {
                 detail: format!(
                     "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
                 ),
-                verdict: Condition::Undecided(sides),
-                ..found
+                verdict: Verdict::Undecided(sides),
             },
-            _ => Check {
+            verdict => Finding {
                 detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
-                ..found
+                verdict,
             },
         })
     }

@@ -1,7 +1,7 @@
 //! Certificates for machines.
 
-use lynkeus_observers::Certificate;
-use lynkeus_structure::{Check, Condition};
+use lynkeus_observers::{Certificate, Check};
+use lynkeus_structure::Verdict;
 use serde_json::{Map, Value, json};
 
 use super::CertifyReport;
@@ -56,7 +56,7 @@ fn summary(certificate: &Certificate) -> Value {
         .map(|c| json!({ "name": c.name, "value": c.value, "meaning": c.meaning }));
     json!({
         "basis": certificate.basis,
-        "verdict": certificate.verdict.word(),
+        "verdict": certificate.verdict().word(),
         "rate": certificate.rate,
         "ultimate_bound": certificate.ultimate_bound,
         "ultimate_bounds": bounds.collect::<Map<_, _>>(),
@@ -67,11 +67,11 @@ fn summary(certificate: &Certificate) -> Value {
 
 fn hypothesis(check: &Check) -> Value {
     let mut entry = json!({
-        "name": check.name,
+        "name": check.statement.to_string(),
         "verdict": check.verdict.word(),
         "detail": check.detail,
     });
-    if let Condition::Refuted(witness) = &check.verdict {
+    if let Verdict::Refuted(witness) = &check.verdict {
         entry["witness"] = witness.points.iter().map(point).collect();
     }
     entry

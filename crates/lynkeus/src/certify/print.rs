@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use lynkeus_observers::{Certificate, Verdict};
+use lynkeus_observers::Certificate;
+use lynkeus_structure::Standing;
 
 use super::CertifyReport;
 use crate::words::{conditions, number, side};
@@ -24,13 +25,13 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .collect();
     writeln!(f, "box: {}", abbreviated(&sides))?;
     writeln!(f)?;
-    let verdict = report.certificate.verdict.word();
+    let verdict = report.certificate.verdict().word();
     certificate(f, report, &report.certificate, verdict)?;
     if let Some(theorem) = &report.theorem {
         writeln!(f)?;
         // the observer may converge all the same
-        let verdict = match theorem.verdict {
-            Verdict::Refuted => "does not apply",
+        let verdict = match theorem.verdict() {
+            Standing::Refuted => "does not apply",
             verdict => verdict.word(),
         };
         certificate(f, report, theorem, verdict)?;
@@ -50,16 +51,16 @@ pub(super) fn conclusion(report: &CertifyReport) -> String {
         return "undecided: one way proves and the other refutes it, which is a defect of this program; believe neither and report it".to_owned();
     }
     match (report.verdict(), best.rate) {
-        (Verdict::Proved, Some(rate)) => {
+        (Standing::Proved, Some(rate)) => {
             format!(
                 "proved: the error decays at {} or faster{}",
                 number(rate),
                 left(report, best)
             )
         }
-        (Verdict::Proved, None) => "proved: the error decays".to_owned(),
-        (Verdict::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
-        (Verdict::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
+        (Standing::Proved, None) => "proved: the error decays".to_owned(),
+        (Standing::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
+        (Standing::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
     }
 }
 

@@ -2,14 +2,15 @@
 
 use std::fmt;
 
-use lynkeus_structure::uniform::Part;
-use lynkeus_structure::{Blind, Condition, Uniformity};
+use lynkeus_structure::{self as structure, Blind, Place, Uniformity};
 use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};
 #[cfg(feature = "plot")]
 use crate::{Error, plot::Plane};
 use lynkeus_observability::{Answer, Quantity, Verdict};
+#[cfg(feature = "plot")]
+use lynkeus_structure::Side;
 
 /// Parts of the singular set listed for machines.
 const LISTED: usize = 256;
@@ -65,13 +66,13 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Resul
     };
     let assumption = uniform.assumption();
     match &uniformity.regular.verdict {
-        Condition::Proved => {
+        structure::Verdict::Proved => {
             return writeln!(
                 f,
                 "for every constant input{assumption} and everywhere on the box: proved"
             );
         }
-        Condition::Refuted(witness) => {
+        structure::Verdict::Refuted(witness) => {
             let place = witness.zero().map(|p| {
                 let sides = p.coordinates.iter().map(|(n, x)| side(n, *x, *x));
                 sides.collect::<Vec<_>>().join(", ")
@@ -82,7 +83,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Resul
                 place.unwrap_or_default()
             )?;
         }
-        Condition::Undecided(_) => {
+        structure::Verdict::Undecided(_) => {
             writeln!(f, "not decided everywhere on the box{assumption}")?;
         }
     }
@@ -129,27 +130,28 @@ fn told(blind: &Blind) -> String {
 }
 
 /// The smallest box around the parts.
-fn hull(parts: &[Part]) -> String {
+fn hull(parts: &[Place]) -> String {
     let Some(first) = parts.first() else {
         return String::new();
     };
-    let sides = first.iter().enumerate().map(|(i, (name, ..))| {
-        let low = parts.iter().map(|p| p[i].1).fold(f64::INFINITY, f64::min);
-        let high = parts
-            .iter()
-            .map(|p| p[i].2)
-            .fold(f64::NEG_INFINITY, f64::max);
-        side(name, low, high)
+    let sides = first.iter().enumerate().map(|(i, first)| {
+        let low = parts.iter().map(|p| p[i].min);
+        let high = parts.iter().map(|p| p[i].max);
+        side(
+            &first.name,
+            low.fold(f64::INFINITY, f64::min),
+            high.fold(f64::NEG_INFINITY, f64::max),
+        )
     });
     sides.collect::<Vec<_>>().join(", ")
 }
 
 /// `{verdict, detail, share, singular, blind}`
 pub(super) fn json(uniformity: &Uniformity) -> Value {
-    let part = |part: &Part| {
+    let part = |part: &Place| {
         let sides = part
             .iter()
-            .map(|(name, low, high)| (name.clone(), json!([low, high])));
+            .map(|side| (side.name.clone(), json!([side.min, side.max])));
         Value::Object(sides.collect::<Map<_, _>>())
     };
     let blind = uniformity
@@ -168,29 +170,26 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
 /// The singular set of a plant with two states.
 #[cfg(feature = "plot")]
 pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
-    let [(x, x_low, x_high), (y, y_low, y_high)] = &uniformity.sides[..] else {
+    let [x, y] = &uniformity.sides[..] else {
         let message = format!(
             "{plant} has {} states and unknown inputs: a picture of the singular set needs two; --json lists its parts",
             uniformity.sides.len()
         );
         return Err(Error::input(message));
     };
-    let side = |part: &Part, name: &str, all: std::ops::Range<f64>| {
-        let found = part.iter().find(|(n, ..)| n == name);
-        found.map_or(all, |(_, low, high)| *low..*high)
+    let along = |part: &Place, whole: &Side| {
+        let side = part.iter().find(|side| side.name == whole.name);
+        let Side { min, max, .. } = side.unwrap_or(whole);
+        *min..*max
     };
-    let parts = uniformity.singular.iter().map(|part| {
-        (
-            side(part, x, *x_low..*x_high),
-            side(part, y, *y_low..*y_high),
-        )
-    });
+    let parts = uniformity.singular.iter();
+    let parts = parts.map(|part| (along(part, x), along(part, y)));
     Ok(Plane {
         title: format!(
             "{plant}: where the outputs' derivatives may not tell neighbouring states apart"
         ),
-        across: (x.clone(), *x_low..*x_high),
-        upwards: (y.clone(), *y_low..*y_high),
+        across: (x.name.clone(), x.min..x.max),
+        upwards: (y.name.clone(), y.min..y.max),
         parts: parts.collect(),
     })
 }

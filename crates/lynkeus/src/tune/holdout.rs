@@ -25,7 +25,7 @@ pub(super) fn predicted(name: &str) -> String {
 pub(super) fn switchable(plant: &Plant, observer: &Observer) -> Observer {
     let graph = &plant.graph;
     let predictions = predictions(plant, observer);
-    let switch = graph.symbol(HELD_OUT);
+    let switch = graph.fresh(HELD_OUT);
     let is_out = switch.greater(graph.constant(0.0)).node();
     let pairs = observer.measured.iter().zip(&predictions);
     let replaced: HashMap<Node, Node> = pairs

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, Value, Verdict, drift_observable::DriftObservable,
+    Assumptions, Certificate, Family, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing};
 
 use super::list;
 
@@ -79,7 +79,7 @@ impl Driven<'_> {
     fn kept(&self, slack: f64) {
         let plant = plant(self.text);
         let found = self.certificate(&plant);
-        assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+        assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
         let (each, all) = self.left(&plant);
         let bound = found.ultimate_bound.unwrap();
         assert!(all > 1e-4, "{}: nothing is left", self.text);
@@ -110,7 +110,7 @@ fn a_moving_input_leaves_an_error() {
     };
     let plant = plant(driven.text);
     let found = driven.certificate(&plant);
-    assert_eq!(found.verdict, Verdict::Proved);
+    assert_eq!(found.verdict(), Standing::Proved);
     assert!(found.ultimate[0].1 >= 0.0866 && found.ultimate[1].1 >= 0.2596);
     let bound = found.ultimate_bound.unwrap();
     assert!((0.2596..1.5).contains(&bound), "{bound}");

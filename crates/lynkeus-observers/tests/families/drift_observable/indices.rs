@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 
 use crate::common::{design_with, plant, run, slope};
 use lynkeus_observers::{
-    DesignError, Examination, Family, Fit, Tuning, Value, drift_observable::DriftObservable,
+    DesignError, Examination, Family, Tuning, Value, drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Condition, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
 use super::{assert_near, list, parameter};
 
@@ -69,7 +69,7 @@ fn indices_2_3_against_substitution_by_hand() {
         Value::List(vec![Value::Number(-5.0), pair(-3.0, -1.0)]),
     ]);
     let design = design_with(&DriftObservable, &plant, &[], &with(&[("poles", poles)])).unwrap();
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     let summary = &design.examination.summary;
     assert!(summary.contains("y, y', z, z', z''"), "{summary}");
     assert_eq!(parameter(&design, "λ of z"), "-5, -3 ± 1i");
@@ -111,7 +111,7 @@ const SINGULAR: &str = "model L input Real u(min = -1, max = 1); Real a1(start =
 fn indices_that_are_regular_everywhere_are_preferred() {
     let slowest = with(&[("poles", list(&[-3.0, -3.5]))]);
     let found = examine(SINGULAR, &slowest).unwrap();
-    assert_eq!(found.fit, Fit::Fits, "{:#?}", found);
+    assert_eq!(found.fit(), Standing::Proved, "{:#?}", found);
     assert!(
         found.summary.contains("ya, ya', ya'', yb,"),
         "{}",
@@ -137,8 +137,8 @@ fn given_indices_are_not_overruled() {
         with(&[("indices", list(&[2.0, 2.0]))]),
     ] {
         let found = examine(SINGULAR, &tuning).unwrap();
-        assert_eq!(found.fit, Fit::DoesNotFit);
-        assert!(matches!(found.checks[1].verdict, Condition::Refuted(_)));
+        assert_eq!(found.fit(), Standing::Refuted);
+        assert!(matches!(found.checks[1].verdict, Verdict::Refuted(_)));
     }
     // one of them is enough, where the other chain has its slowest pole
     let partly = Value::List(vec![Value::Number(-2.0), list(&[-3.0])]);
@@ -211,7 +211,7 @@ fn long_chains_are_proved_regular() {
         "model Long {declared} output Real y = x1; equation {equations} der(x{n}) = -x1; end Long;"
     );
     let found = examine(&text, &Tuning::default()).unwrap();
-    assert_eq!(found.fit, Fit::Fits, "{:#?}", found.checks);
+    assert_eq!(found.fit(), Standing::Proved, "{:#?}", found.checks);
     assert!(
         found.checks[1].detail.contains("|det| lies in [1, 1]"),
         "{}",

@@ -4,10 +4,10 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Design, Family, Tuning, Value, Verdict,
+    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, Value,
     drift_observable::DriftObservable,
 };
-use lynkeus_structure::{Check, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing};
 
 use super::{PLANT, list};
 
@@ -64,7 +64,7 @@ fn value(found: &Certificate, name: &str) -> f64 {
 
 fn hypothesis<'c>(found: &'c Certificate, name: &str) -> &'c Check {
     let mut all = found.hypotheses.iter();
-    all.find(|h| h.name.contains(name))
+    all.find(|h| h.statement.to_string().contains(name))
         .unwrap_or_else(|| panic!("{name} in {:#?}", found.hypotheses))
 }
 
@@ -78,7 +78,7 @@ const PENDULUM: &str = "model Pendulum input Real u(min = -1, max = 1);
 fn the_rate_is_that_of_the_bounded_real_lemma() {
     let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
     let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     let near = |name: &str, expected: f64, tolerance: f64| {
         let value = value(&found, name);
         assert!(
@@ -102,20 +102,20 @@ fn the_rate_is_that_of_the_bounded_real_lemma() {
 fn slow_poles_are_undecided_with_both_numbers() {
     let poles = tuning("bounded", &[("poles", &[-1.0, -1.2])]);
     let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let open = found.weakest().unwrap();
-    assert!(open.name.starts_with("γ ≤ γ*"), "{open:?}");
+    assert!(open.statement.to_string().starts_with("γ ≤ γ*"), "{open:?}");
     assert!(open.detail.starts_with("1.11803 > 0."), "{}", open.detail); // √5/2
     // and what would do: checked with a hundredth more
     let s = 1.01 * value(&found, "s0");
     let poles = tuning("bounded", &[("poles", &[-s, -1.2 * s])]);
     let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Proved);
+    assert_eq!(found.verdict(), Standing::Proved);
     // Lemma 3.2's own poles, the stricter way
     let σ = 1.01 * value(&found, "σ0");
     let poles = tuning("bounded", &[("poles", &[-σ, -σ * σ])]);
     let found = certificate(&plant(PENDULUM), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Proved);
+    assert_eq!(found.verdict(), Standing::Proved);
 }
 
 #[test]
@@ -128,7 +128,7 @@ fn the_papers_plant_is_undecided_and_says_where() {
         &[0.0; 3],
         &[0.0],
     );
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "derivatives of the inputs");
     assert!(
         open.detail
@@ -139,7 +139,7 @@ fn the_papers_plant_is_undecided_and_says_where() {
         &[("poles", poles), ("input_derivatives", &[12.6, 79.0])],
     );
     let found = certificate(&plant, &given, &[0.0; 3], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "Q̄(x, U) is regular");
     assert!(open.detail.contains("x3 = "), "{}", open.detail);
     assert_eq!((found.rate, found.ultimate_bound), (None, None));
@@ -179,11 +179,11 @@ fn early(u_M: f64, c: f64) -> Plant {
 fn the_bounded_observer_needs_a_small_input() {
     let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
     let found = certificate(&early(1.0, 0.5), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     let limit = value(&found, "u_M");
     let found = certificate(&early(1.1 * limit, 0.5), &poles, &[0.0; 2], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Undecided);
-    assert_eq!(found.weakest().unwrap().name, "|u| ≤ u_M");
+    assert_eq!(found.verdict(), Standing::Undecided);
+    assert_eq!(found.weakest().unwrap().statement, Germani::Input.into());
 }
 
 /// Errors at every row against c e^(−αt)|e(0)| + bound, from a random start.
@@ -191,7 +191,7 @@ fn kept(plant: &Plant, mut tuning: Tuning, peak: &str, start: [f64; 2]) {
     let names = ["a", "b"].map(str::to_owned);
     tuning.initial.values = names.into_iter().zip(start).collect();
     let found = certificate(plant, &tuning, &[0.0, 0.1], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     let design = design(plant, &tuning);
     let times: Vec<f64> = (0..=60).map(|i| 0.05 * f64::from(i)).collect();
     let inputs = [("u", "0.5*sin(2*time)"), ("d", "0.1*sin(5*time)")];
@@ -256,7 +256,7 @@ fn what_the_filter_and_the_inputs_derivative_leave() {
         &[0.0; 2],
         &[0.0],
     );
-    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     assert!((value(&found, "|n̄w|") - 1.0).abs() < 2e-3);
     let (largest, smallest) = (value(&found, "‖P‖"), value(&found, "λmin(P)"));
     let (α, a) = (value(&found, "α"), 1.0 / 80.0);
@@ -275,7 +275,7 @@ fn what_the_filter_and_the_inputs_derivative_leave() {
 fn disturbances_without_range_are_undecided_by_name() {
     let poles = tuning("bounded", &[("poles", &[-6.0, -8.0])]);
     let found = certificate(&plant(PENDULUM), &poles, &[0.0, f64::INFINITY], &[0.0]);
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "disturbances and measurement errors are bounded");
     assert!(open.detail.contains("acts on b:"), "{}", open.detail);
     assert_eq!((found.rate, found.ultimate_bound), (None, None));
@@ -305,7 +305,7 @@ fn bounds_of_slopes_may_come_from_the_assumptions() {
     assert_eq!(general.ultimate_bound, own.ultimate_bound);
     assert!(general.ultimate_bound.is_some());
     let none = theorem(&tuning("practical", &lists), &[]);
-    assert_eq!(none.verdict, Verdict::Undecided);
+    assert_eq!(none.verdict(), Standing::Undecided);
 }
 
 #[test]

@@ -3,10 +3,8 @@
 
 use crate::common::{constant, plant, run};
 use lynkeus_model::Plant;
-use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, Verdict, unknown_input::UnknownInput,
-};
-use lynkeus_structure::{Extended, Sensors};
+use lynkeus_observers::{Assumptions, Certificate, Family, Tuning, unknown_input::UnknownInput};
+use lynkeus_structure::{Extended, Sensors, Standing};
 
 use super::shapes::{TALL, sensors};
 use super::{tuning, with_partition};
@@ -37,7 +35,7 @@ impl Promise<'_> {
 
     fn kept(&self, tuning: &Tuning, inputs: &[(&str, &str)], step: f64) {
         let found = self.certificate(tuning);
-        assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+        assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
         let extended = Extended::new(self.plant, &self.sensors).unwrap();
         let design = UnknownInput.design(&extended, tuning).unwrap();
         let times: Vec<f64> = (0..=100).map(|i| 0.05 * f64::from(i)).collect();

@@ -4,10 +4,9 @@
 use crate::common::{assert_close, constant, design_with, hypothesis, plant, slope};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, DesignError, Family, Fit, Tuning, Verdict,
-    unknown_input::UnknownInput,
+    Assumptions, Certificate, DesignError, Family, Tuning, unknown_input::UnknownInput,
 };
-use lynkeus_structure::{Condition, Extended, Sensors};
+use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
 use super::{tuning, with_partition};
 
@@ -28,7 +27,7 @@ fn two_unknown_inputs_with_four_outputs() {
     let given = with_partition(tuning(6.0, 3.0), &["y1", "y2"]);
     let design = design_with(&UnknownInput, &plant, &["v1", "v2"], &given).unwrap();
     let chosen = &design.examination;
-    assert_eq!(chosen.fit, Fit::Fits, "{:#?}", chosen.checks);
+    assert_eq!(chosen.fit(), Standing::Proved, "{:#?}", chosen.checks);
     let state = [0.3, -0.2, 0.5, 0.1, 0.7, -0.4, 0.6, -0.8];
     let found = slope(&plant, &design, &state, &[], &[0.1, 0.2, 0.4, -0.1]);
     let expected = [
@@ -61,7 +60,7 @@ fn more_outputs_in_x11_than_unknown_inputs() {
     );
     let given = with_partition(tuning(5.0, 2.0), &["ya", "yb"]);
     let design = design_with(&UnknownInput, &plant, &["v"], &given).unwrap();
-    assert_eq!(design.examination.fit, Fit::Fits);
+    assert_eq!(design.examination.fit(), Standing::Proved);
     let state = [0.3, -0.2, 0.5, 0.1, 0.7, 0.6];
     let found = slope(&plant, &design, &state, &[], &[0.1, 1.4, 0.4]);
     let expected = [
@@ -152,7 +151,7 @@ fn a_left_inverse_in_the_gain() {
 #[test]
 fn the_constants_of_a_left_inverse() {
     let found = certificate(&plant(TALL), &tuning(300.0, 15.0), 0.0, 0.0);
-    assert_eq!(found.verdict, Verdict::Proved, "{:#?}", found.hypotheses);
+    assert_eq!(found.verdict(), Standing::Proved, "{:#?}", found.hypotheses);
     let P = (0.96f64 * 0.96 + 0.25).sqrt();
     let W = P / (0.96 * 0.96 + 0.25);
     let Y1 = (0.4f64 + 0.08 + 0.96 * 0.2).hypot(0.1);
@@ -180,7 +179,7 @@ fn where_a_left_inverse_is_not_covered_it_is_undecided() {
         .replace("der(b) = d +", "der(b) = d + 0.1*d^3 +")
         .replace("der(c) = -0.5*d - c", "der(c) = -0.5*d - c + 2*v");
     let found = certificate(&plant(&bent), &tuning(300.0, 15.0), 0.0, 0.0);
-    assert_eq!((found.verdict, found.rate), (Verdict::Undecided, None));
+    assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
     let open = hypothesis(&found, "Λ₂Λ₂⁺");
     assert!(
         open.detail.contains("Λ₂ changes with X²"),
@@ -195,7 +194,7 @@ fn where_a_left_inverse_is_not_covered_it_is_undecided() {
     );
     let given = with_partition(tuning(300.0, 15.0), &["ya", "yb"]);
     let found = certificate(&plant(&bent), &given, 0.0, 0.0);
-    assert_eq!(hypothesis(&found, "Λ₂Λ₂⁺").verdict, Condition::Proved);
+    assert_eq!(hypothesis(&found, "Λ₂Λ₂⁺").verdict, Verdict::Proved);
 }
 
 /// A chain that ends early has the first gains of a longer one.
@@ -230,7 +229,11 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
         panic!()
     };
     let refuted = examination.refuted().unwrap();
-    assert!(refuted.name.contains("ends in layer 7"), "{}", refuted.name);
+    assert!(
+        refuted.statement.to_string().contains("ends in layer 7"),
+        "{}",
+        refuted.statement
+    );
     let fine = design_with(
         &UnknownInput,
         &plant(&narrowing(4, 2)),
@@ -238,7 +241,7 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
         &tuning(10.0, 2.0),
     );
     let fine = fine.unwrap();
-    assert_eq!(fine.examination.fit, Fit::Fits);
+    assert_eq!(fine.examination.fit(), Standing::Proved);
     // f − K(ŷ − y): C(4, 1)θ₂ and C(4, 2)θ₂² on the short chain
     let short = fine.gains.iter().find(|g| g.output == "yc").unwrap();
     let entries = [("c1".to_owned(), 8.0), ("c2".to_owned(), 24.0)];
@@ -256,7 +259,7 @@ fn shortened_chains_that_the_papers_gains_make_unstable_are_refused() {
     let found = UnknownInput
         .theorem(&extended, &tuning(1e4, 20.0), &assumptions)
         .unwrap();
-    assert_eq!(found.verdict, Verdict::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided);
     let open = hypothesis(&found, "Λ₂Λ₂⁺");
     assert!(
         open.detail.contains("chains that end early"),
@@ -275,7 +278,7 @@ fn what_has_no_bound_gives_none() {
         assert!(found.ultimate.is_empty());
     }
     let open = certificate(&plant, &tuning(300.0, 15.0), f64::INFINITY, 0.0);
-    assert_eq!(open.verdict, Verdict::Undecided);
+    assert_eq!(open.verdict(), Standing::Undecided);
 }
 
 /// The matrices that the paper names, for a gain that is no constant: at x̂ = (0.5, 0.5, 0.5)

@@ -3,9 +3,10 @@
 use lynkeus::Study;
 use lynkeus::expr::Node;
 use lynkeus::model::Plant;
-use lynkeus::observers::{Certificate, Design, Verdict};
+use lynkeus::observers::{Certificate, Design};
 use lynkeus::prepare::{self, Prepared};
 use lynkeus::run::{Simulation, System};
+use lynkeus::structure::Standing;
 
 use super::column;
 
@@ -106,7 +107,7 @@ fn the_certified_decay_is_seen_from_random_starts() {
     let study = Study::load(folder.path.path().join("lmi.toml")).unwrap();
     let report = lynkeus::design(&study).unwrap().certified;
     let certificate = &report.certificate;
-    assert_eq!(certificate.verdict, Verdict::Proved);
+    assert_eq!(certificate.verdict(), Standing::Proved);
     let rate = certificate.rate.unwrap();
     assert!(rate >= RATE, "{rate}");
     assert_eq!(side(certificate, "L"), (3.0, 6.0));
