@@ -87,10 +87,6 @@ impl Constant {
 /// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
 /// while plant and estimate stay in the box.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::manual_non_exhaustive,
-    reason = "inside this crate, too, only `Certificate::new` makes one"
-)]
 pub struct Certificate {
     /// what proves it, e.g. `Theorem 2 of Hammouri, Targui and Armanet` or
     /// `linear matrix inequality`

@@ -240,7 +240,7 @@ impl Report {
                 format!("{family} is the one whose every condition is proved")
             }
             Some((family, _)) => format!(
-                "{family} is not proved to fit, but nothing refutes it; watch its monitors, or tighten min and max"
+                "{family} is not proved to fit, but nothing refutes it: what is undecided above says what would settle it"
             ),
             None => String::new(),
         }

@@ -321,9 +321,9 @@ fn an_s_that_rests_on_damping_is_told() {
     let check = wrong.checks.last().unwrap();
     // s² + 4s/3 − 2/3
     assert!(
-        wrong.summary.contains("eigenvalues 0.387426, -1.72076"),
+        check.detail.contains("eigenvalues 0.387426, -1.72076"),
         "{}",
-        wrong.summary
+        check.detail
     );
 }
 
