@@ -141,7 +141,7 @@ impl fmt::Display for Statement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PlantIsRegular => {
-                f.write_str("f and h have values everywhere on the box and do not jump")
+                f.write_str("f and h have values on the whole box and do not jump")
             }
             Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
             Self::OutputKeepsSign { output, state } => {
