@@ -5,7 +5,7 @@ use lynkeus_structure::{Dimension, Extended, Region, Standing};
 use nalgebra::DMatrix;
 
 use crate::Check;
-use crate::statement::{Statement, standing};
+use crate::statement::{Statement, standing, sufficient};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -21,6 +21,8 @@ pub struct Assumptions {
     pub input_derivatives: Vec<Vec<f64>>,
     /// f and h have values on that box and do not jump
     regularity: Check,
+    /// of the extended states, then of the measured outputs
+    names: Vec<String>,
 }
 
 impl Assumptions {
@@ -35,9 +37,36 @@ impl Assumptions {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
             input_derivatives: vec![],
+            names: extended
+                .states
+                .iter()
+                .chain(extended.outputs.iter().map(|o| &o.variable))
+                .map(|v| v.name.clone())
+                .collect(),
             regularity: Statement::PlantIsRegular.with(extended.regularity(&region)?),
             region,
         })
+    }
+
+    /// That what acts on the plant and on its sensors has bounds; nothing where nothing acts.
+    fn what_acts(&self) -> Option<Check> {
+        let sizes = self.drift.iter().chain(&self.noise);
+        let acting = self
+            .names
+            .iter()
+            .zip(sizes)
+            .filter(|(_, size)| **size != 0.0);
+        let (bounded, open): (Vec<_>, Vec<_>) = acting.partition(|(_, size)| size.is_finite());
+        let open: Vec<&str> = open.iter().map(|(name, _)| name.as_str()).collect();
+        let detail = match open.is_empty() {
+            true => "assumed, by the declared ranges and deviations".to_owned(),
+            false => format!(
+                "no bound of what acts on {}: declare min and max of the disturbances and of the states that they meet",
+                open.join(", ")
+            ),
+        };
+        let any = !(bounded.is_empty() && open.is_empty());
+        any.then(|| sufficient(Statement::WhatActs, open.is_empty(), detail))
     }
 
     /// With bounds of what acts on the plant, one per extended state.
@@ -125,7 +154,7 @@ impl Certificate {
     ) -> Self {
         let bounded = |d: &&Dimension| d.name != "time" || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
-        let first = std::iter::once(assumptions.regularity.clone());
+        let first = std::iter::once(assumptions.regularity.clone()).chain(assumptions.what_acts());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
             basis: basis.into(),

@@ -95,8 +95,11 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
     let region = extended.region();
     let symbols = region.symbols();
     let mut place = vec![];
-    // what the slope does not depend on is in the middle of its range
+    // what the slope does not depend on is beside the middle of its range, where models
+    // like to switch
     for (side, centre) in region.dimensions.iter().zip(&region.centre()) {
+        let width = (side.max - side.min).min(1e6);
+        let centre = centre + 0.1234 * width;
         let given = point
             .coordinates
             .iter()
@@ -105,7 +108,7 @@ fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64
         if given.is_some_and(|x| !(side.min <= x && x <= side.max)) {
             return Err(format!("{} = {given:?} is outside of the box", side.name));
         }
-        place.push(Precise::from(given.unwrap_or(*centre)));
+        place.push(Precise::from(given.unwrap_or(centre)));
     }
     let moved = symbols
         .iter()

@@ -138,7 +138,12 @@ pub fn diverges(
         let Ok(mut pair) = Pair::new(&plant, extended, &design.observer) else {
             return Ok(None);
         };
-        if pair.estimates() != extended.states.len() || pair.held.iter().any(Option::is_none) {
+        // states beside the estimate have a start of their own to forget
+        let more = design.observer.states.len() != extended.states.len();
+        if more
+            || pair.estimates() != extended.states.len()
+            || pair.held.iter().any(Option::is_none)
+        {
             return Ok(None);
         }
         let n = extended.states.len() as i32;

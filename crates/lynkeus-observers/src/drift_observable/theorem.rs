@@ -46,7 +46,6 @@ pub(super) fn certificate(
         conditions.continuous,
         lipschitz.continuous.clone(),
     ];
-    hypotheses.extend(of_what_acts(extended, assumptions));
     hypotheses.extend(of_the_map(extended, form, &slopes, &lipschitz));
     let order = |jet: &Vec<_>, given: &Option<Vec<f64>>| match (jet.is_empty(), given) {
         (true, _) => 0.0,
@@ -139,30 +138,6 @@ fn slopes(
     Ok(own
         .map(|(j, bounds)| bounds.or_else(|| general(j)))
         .collect())
-}
-
-/// What acts on the plant and on the sensors has bounds, where anything does.
-fn of_what_acts(extended: &Extended<'_>, assumptions: &Assumptions) -> Option<Check> {
-    let states = extended.states.iter().zip(&assumptions.drift);
-    let outputs = extended.outputs.iter().zip(&assumptions.noise);
-    let all: Vec<(&str, f64)> = states
-        .map(|(x, drift)| (x.name.as_str(), *drift))
-        .chain(outputs.map(|(y, noise)| (y.variable.name.as_str(), *noise)))
-        .filter(|(_, size)| *size != 0.0)
-        .collect();
-    let open: Vec<&str> = all
-        .iter()
-        .filter(|(_, size)| !size.is_finite())
-        .map(|(name, _)| *name)
-        .collect();
-    let detail = match open.is_empty() {
-        true => "assumed, by the declared ranges and deviations".to_owned(),
-        false => format!(
-            "no bound of what acts on {}: declare min and max of the disturbances and of the states that they meet",
-            open.join(", ")
-        ),
-    };
-    (!all.is_empty()).then(|| sufficient(Germani::WhatActs, open.is_empty(), detail))
 }
 
 /// None where the study has no pole yet.

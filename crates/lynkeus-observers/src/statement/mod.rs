@@ -18,6 +18,8 @@ pub use papers::{Farza, Germani, Hammouri, Lee, Ltaief};
 pub enum Statement {
     /// f and h have values on the box and do not jump: asked of every plant
     PlantIsRegular,
+    /// what a certificate counts has bounds: asked where anything acts
+    WhatActs,
     /// a partial derivative along a chain keeps its sign
     PartialKeepsSign {
         /// the state whose equation it is of
@@ -143,6 +145,7 @@ impl fmt::Display for Statement {
             Self::PlantIsRegular => {
                 f.write_str("f and h have values on the whole box and do not jump")
             }
+            Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
             Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
             Self::OutputKeepsSign { output, state } => {
                 write!(f, "∂{output}/∂{state} keeps its sign")

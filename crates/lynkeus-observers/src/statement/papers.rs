@@ -302,8 +302,6 @@ pub enum Germani {
     RegularWithin,
     /// the remainder
     ContinuousRows,
-    /// disturbances and noise
-    WhatActs,
     /// u, u', …
     InputDerivatives,
     /// hypothesis 1
@@ -346,7 +344,6 @@ impl fmt::Display for Germani {
             Self::ContinuousRows => {
                 f.write_str("the last rows have values on the box and do not jump")
             }
-            Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
             Self::InputDerivatives => f.write_str("the derivatives of the inputs are bounded"),
             Self::Inverse => f.write_str(
                 "the map from x to the output's derivatives has a Lipschitz inverse on the box",
