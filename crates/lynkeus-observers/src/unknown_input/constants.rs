@@ -159,10 +159,13 @@ impl<'e, 'p> Signals<'e, 'p> {
                 slopes.push((variable.node, slope));
             }
         }
-        for input in &extended.inputs {
+        // (H3): inputs whose derivative the study bounds
+        for (j, input) in extended.inputs.iter().enumerate() {
             let name = format!("the derivative of {}", input.name);
-            // (H3) wants a bound of |u'|; the assumptions have none
-            slopes.push((input.node, box_.within(name, f64::INFINITY)));
+            let given = assumptions.input_derivatives.get(j);
+            let bound = given.and_then(|bounds| bounds.first().copied());
+            let slope = box_.within(name, bound.unwrap_or(f64::INFINITY));
+            slopes.push((input.node, slope));
         }
         let factors = &form.layers.factors;
         let factors = factors.map(|node| graph.substitute(&[node], &measured)[0]);

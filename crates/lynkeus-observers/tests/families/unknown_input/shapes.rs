@@ -308,3 +308,30 @@ fn the_matrices_of_the_paper_are_shown() {
     assert_eq!(value("Λ₂⁺ at the start, 2"), "[[0.930233]]");
     assert!(value("Λ₂ 2").contains("c^2"), "{}", value("Λ₂ 2"));
 }
+
+/// (H3): G₁¹ = 2 + u turns with u, whose derivative the assumptions bound or do not.
+#[test]
+fn a_moving_input_needs_a_bound_of_its_derivative() {
+    let plant = plant(
+        "model Moving input Real v(min = -1, max = 1); input Real u(min = -0.5, max = 0.5);
+         Real a(min = -1, max = 1); Real b(min = -1, max = 1); Real c(min = -1, max = 1);
+         output Real ya = a; output Real yb = b;
+         equation der(a) = (2 + u)*v; der(b) = c; der(c) = -b; end Moving;",
+    );
+    let sensors = Sensors {
+        unknown: vec!["v".into()],
+        ..Sensors::default()
+    };
+    let extended = Extended::new(&plant, &sensors).unwrap();
+    let finite = |bounds: Vec<Vec<f64>>| {
+        let assumptions = Assumptions::new(&extended, extended.region())
+            .unwrap()
+            .with_input_derivatives(bounds);
+        let found = UnknownInput
+            .theorem(&extended, &tuning(50.0, 10.0), &assumptions)
+            .unwrap();
+        hypothesis(&found, "c1, c2, c4 and c5").is_proved()
+    };
+    assert!(!finite(vec![]));
+    assert!(finite(vec![vec![0.3]]));
+}
