@@ -156,3 +156,24 @@ fn a_step_hides_from_derivatives_only() {
     let node = (2.0 * x - x.sign() + y).node();
     assert!(steps(&g, node, &[x.node()]) && !steps(&g, node, &[y.node()]));
 }
+
+/// A jump on either side of a linear system is one of its solution; a singular matrix leaves
+/// it without one.
+#[test]
+fn jumps_go_through_linear_systems() {
+    let solved = |a: fn(Expr<'_>) -> Expr<'_>, b: fn(Expr<'_>) -> Expr<'_>| {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let region = Region {
+            dimensions: vec![side(x, -1.0, 2.0)],
+        };
+        let (one, half) = (g.constant(1.0).node(), g.constant(0.5).node());
+        let matrix = [one, half, half, a(x).node()];
+        let solution = g.solve(&matrix, &[b(x).node(), one]).x[0];
+        Regularity::of(&g, &[solution], &[x.node()], &region).unwrap()
+    };
+    assert!(solved(|x| x.powi(2) + 3.0, |x| x.sin()).holds());
+    assert!(jumps(&solved(|x| x.powi(2) + 3.0, |x| x.sign())));
+    assert!(jumps(&solved(|x| x.floor() + 5.0, |x| x.sin())));
+    assert!(undefined(&solved(|x| x, |x| x.sin())));
+}

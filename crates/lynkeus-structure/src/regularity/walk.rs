@@ -140,8 +140,8 @@ impl<'g> Walk<'g> {
             Op::Powi(a, n) => Intervals.powi(&of(a), n),
             Op::Binary(op, a, b) => Intervals.binary(op, &of(a), &of(b)),
             Op::Select(c, a, b) => Intervals.select(&of(c), &of(a), &of(b)),
-            // a system has no value of its own
-            Op::Solve(_) => Interval::ZERO,
+            // a system has no value of its own, and must not pass for a constant
+            Op::Solve(_) => Interval::ENTIRE,
             Op::Entry(system, i) => self.entry(system, i as usize),
         }
     }
