@@ -149,10 +149,14 @@ impl<'g> Walk<'g> {
     fn entry(&self, system: Node, i: usize) -> Interval {
         let arguments = self.graph.arguments(system);
         let values: Vec<Interval> = arguments.iter().map(|&a| self.of(a).values).collect();
-        let n = (0..values.len()).find(|n| n * (n + 1) >= values.len());
-        let (A, b) = values.split_at(n.map_or(0, |n| n * n));
+        let n = self.unknowns(system);
+        let (A, b) = values.split_at(n * n);
         let (x, condition) = Intervals.solve(A, b);
         x.get(i).copied().unwrap_or(condition)
+    }
+
+    fn unknowns(&self, system: Node) -> usize {
+        self.graph.system(system).map_or(0, |system| system.size())
     }
 
     fn continuous(&self, op: Op, node: Node, values: Interval) -> bool {
@@ -186,8 +190,7 @@ impl<'g> Walk<'g> {
             },
             // the condition estimate steps with the pivots
             Op::Entry(system, i) => {
-                let n = self.graph.arguments(system).len();
-                let last = (i as usize) * (i as usize + 1) == n;
+                let last = i as usize == self.unknowns(system);
                 of(system).continuous && values.is_defined() && !last
             }
             Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::Solve(_) => {
