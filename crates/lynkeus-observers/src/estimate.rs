@@ -6,6 +6,7 @@ use lynkeus_expr::{Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_structure::{Extended, Measurement};
 
+use crate::kalman::is_or_has;
 use crate::{Estimate, Initial, Observer, Signal, Tuning, TuningError, prolongation};
 
 /// The keys of every observer, read.
@@ -86,14 +87,16 @@ impl<'e, 'p> Copy<'e, 'p> {
         if let Some(name) = initial
             .values
             .keys()
-            .find(|n| self.extended.state_index(n).is_none())
+            .find(|n| !self.hats.iter().any(|hat| is_or_has(n, &hat.name)))
         {
             let names: Vec<&str> = self.hats.iter().map(|h| h.name.as_str()).collect();
             let expected = format!("names of estimated quantities ({})", names.join(", "));
             return Err(TuningError::new("initial", expected, format!("\"{name}\"")));
         }
         let start = |variable: &Variable| {
-            let named = initial.values.get(&variable.name).copied();
+            let array = variable.name.split('[').next().unwrap_or_default();
+            let exact = initial.values.get(&variable.name);
+            let named = exact.or_else(|| initial.values.get(array)).copied();
             named
                 .or(initial.default)
                 .or(variable.start)
@@ -156,6 +159,7 @@ impl Copy<'_, '_> {
             measured: self.measured.clone(),
             estimates: self.estimates(),
             monitors: vec![],
+            filter: None,
         })
     }
 }

@@ -8,8 +8,12 @@ use lynkeus_structure::{Extended, Region};
 
 use crate::{
     Assumptions, Certificate, KeySpec, Observer, Tuning, TuningError,
-    block_triangular::BlockTriangular, drift_observable::DriftObservable,
-    state_affine::StateAffine, triangular::Triangular, unknown_input::UnknownInput,
+    block_triangular::BlockTriangular,
+    drift_observable::DriftObservable,
+    kalman::{Ekf, Ukf},
+    state_affine::StateAffine,
+    triangular::Triangular,
+    unknown_input::UnknownInput,
 };
 
 /// Every family, in the order in which `auto` tries them.
@@ -19,6 +23,8 @@ pub const FAMILIES: &[&dyn Family] = &[
     &StateAffine,
     &UnknownInput,
     &DriftObservable,
+    &Ekf,
+    &Ukf,
 ];
 
 /// The family of that name.
@@ -88,8 +94,18 @@ pub struct Examination {
     pub chains: Vec<Vec<String>>,
     /// every condition of the family with its verdict
     pub checks: Vec<Check>,
-    /// f and h have values and do not jump; none where the form is another anyway
-    regularity: Option<Check>,
+    plant: PlantFit,
+}
+
+/// What a family makes of the plant before its own conditions.
+#[derive(Clone, Debug)]
+enum PlantFit {
+    /// the form is another
+    Unfit,
+    /// it has the form; f and h have values and do not jump, or not
+    Form(Check),
+    /// any plant will do
+    Any,
 }
 
 impl Examination {
@@ -109,7 +125,7 @@ impl Examination {
             summary: form.summary,
             chains: form.chains,
             checks,
-            regularity: Some(regularity),
+            plant: PlantFit::Form(regularity),
         })
     }
 
@@ -120,22 +136,42 @@ impl Examination {
             summary,
             chains: vec![],
             checks,
-            regularity: None,
+            plant: PlantFit::Unfit,
         }
+    }
+
+    /// Of a family that asks nothing of a plant, and promises nothing.
+    pub(crate) fn of_any_plant(family: &'static str, form: Form) -> Self {
+        Self {
+            family,
+            summary: form.summary,
+            chains: form.chains,
+            checks: vec![],
+            plant: PlantFit::Any,
+        }
+    }
+
+    /// Whether a theorem stands behind the family, whose conditions are told here.
+    pub fn has_theorem(&self) -> bool {
+        !matches!(self.plant, PlantFit::Any)
     }
 
     /// Whether the family fits: proved where every condition is, refuted where the form is
     /// another or a required condition is refuted.
     pub fn fit(&self) -> Standing {
-        match self.regularity {
-            Some(_) => standing(self.conditions()),
-            None => Standing::Refuted,
+        match self.plant {
+            PlantFit::Unfit => Standing::Refuted,
+            PlantFit::Form(_) | PlantFit::Any => standing(self.conditions()),
         }
     }
 
     /// Every condition: that the plant is regular on the box, then those of the family.
     pub fn conditions(&self) -> impl Iterator<Item = &Check> {
-        self.regularity.iter().chain(&self.checks)
+        let regularity = match &self.plant {
+            PlantFit::Form(regularity) => Some(regularity),
+            PlantFit::Unfit | PlantFit::Any => None,
+        };
+        regularity.into_iter().chain(&self.checks)
     }
 
     /// The first condition whose refutation refutes the whole.

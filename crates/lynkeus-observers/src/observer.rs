@@ -3,6 +3,7 @@
 use lynkeus_expr::flow::{self, Flow};
 use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Variable;
+use lynkeus_run::filter::FilterKind;
 
 /// A named symbol.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +76,22 @@ pub struct Observer {
     pub estimates: Vec<Estimate>,
     /// how far it can be trusted; empty for most families
     pub monitors: Vec<Monitor>,
+    /// the filter that corrects the estimate when sensors report; none where the correction
+    /// is part of the derivatives
+    pub filter: Option<FilterTuning>,
+}
+
+/// A Kalman filter over the observer's flow. The noises are the study's, not the family's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FilterTuning {
+    /// which filter
+    pub kind: FilterKind,
+    /// a reading further from what is expected, in standard deviations, is rejected
+    pub gate: Option<f64>,
+    /// h(t, x̂, u), one per measured output
+    pub outputs: Vec<Node>,
+    /// variance of the first estimate, one per state
+    pub initial_variance: Vec<f64>,
 }
 
 impl Observer {

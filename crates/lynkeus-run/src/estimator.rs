@@ -1,7 +1,8 @@
 //! An observer fed sample by sample.
 
 use crate::divergence::Bound;
-use crate::{Dynamics, Error, Evaluation, Integrator, Method, Step, StepAdvice, System};
+use crate::driven::Driven;
+use crate::{Dynamics, Error, Integrator, Method, Step, StepAdvice, System};
 
 /// What a signal is between two samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -165,81 +166,5 @@ impl Estimator {
             return Err(evaluation.not_finite(t, &self.x));
         }
         Ok(&self.estimates)
-    }
-}
-
-/// The observer with its signals between two samples.
-#[derive(Clone, Debug)]
-struct Driven {
-    evaluation: Evaluation,
-    between: BetweenSamples,
-    from: f64,
-    to: f64,
-    last: Vec<f64>,
-    next: Vec<f64>,
-}
-
-impl Driven {
-    fn new(observer: &System, between: BetweenSamples) -> Self {
-        let count = observer.signals().len();
-        Self {
-            evaluation: observer.evaluation(),
-            between,
-            from: 0.0,
-            to: 1.0,
-            last: vec![0.0; count],
-            next: vec![0.0; count],
-        }
-    }
-
-    /// The first sample.
-    fn start(&mut self, signals: &[f64]) {
-        self.next.copy_from_slice(signals);
-        self.arrive();
-    }
-
-    /// The sample at the end of the interval to come.
-    fn aim(&mut self, from: f64, to: f64, signals: &[f64]) {
-        (self.from, self.to) = (from, to);
-        self.next.copy_from_slice(signals);
-    }
-
-    /// The interval is over: its last sample is the present one.
-    fn arrive(&mut self) {
-        self.last.copy_from_slice(&self.next);
-        self.evaluation.signals_mut().copy_from_slice(&self.last);
-    }
-}
-
-impl Dynamics for Driven {
-    fn dimension(&self) -> usize {
-        self.evaluation.dimension()
-    }
-
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        if self.between == BetweenSamples::Linear {
-            let s = (t - self.from) / (self.to - self.from);
-            let ends = self.last.iter().zip(&self.next);
-            for (signal, (last, next)) in self.evaluation.signals_mut().iter_mut().zip(ends) {
-                *signal = last + s * (next - last);
-            }
-        }
-        self.evaluation.derivatives(t, x, dx);
-    }
-
-    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.evaluation.switches(from, to, times)
-    }
-
-    fn enter(&mut self, t: f64) {
-        self.evaluation.enter(t);
-    }
-
-    fn names(&self) -> Vec<String> {
-        self.evaluation.names()
-    }
-
-    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        self.evaluation.not_finite(t, x)
     }
 }

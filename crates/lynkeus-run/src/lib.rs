@@ -84,10 +84,12 @@
 mod adaptive;
 mod closed_loop;
 mod divergence;
+mod driven;
 mod dynamics;
 mod error;
 mod estimate;
 mod estimator;
+pub mod filter;
 mod integrator;
 mod method;
 mod noise;

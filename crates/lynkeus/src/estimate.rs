@@ -6,6 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
+use crate::filter::{self, Samples};
 use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
 use crate::prepare::Prepared;
 use crate::study::{BetweenSamples, EstimateSettings};
@@ -24,10 +25,14 @@ pub fn estimate(
 ) -> Result<Outcome, Error> {
     let settings = &study.estimate;
     let plant = prepare::plant(study)?;
-    let design = Prepared::new(study, &plant)?.design()?;
+    let prepared = Prepared::new(study, &plant)?;
+    let design = prepared.design()?;
+    refuse_stray_columns(&plant, settings)?;
+    if design.observer.filter.is_some() {
+        return filtered(&prepared, design, table, watch);
+    }
     refuse_derivatives(study, &design)?;
     let observer = systems::observer(&plant, &design.observer)?;
-    refuse_stray_columns(&plant, settings)?;
     let log = log(table, settings, &observer)?;
     let run = run_settings(settings);
     let between = run.between;
@@ -62,6 +67,63 @@ pub fn estimate(
         quantities,
         measurements,
         watches,
+        notes,
+    })
+}
+
+/// The same by a filter, which takes readings when they are there.
+fn filtered(
+    prepared: &Prepared<'_>,
+    design: Design,
+    table: &Table,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let settings = &study.estimate;
+    let column = |name: &str| {
+        let header = header(settings, name);
+        match table.get(header) {
+            Some(values) => Ok(values),
+            // its error says what is missing
+            None => table.column(header),
+        }
+    };
+    let columns = |signals: &[lynkeus_observers::Signal]| {
+        let found = signals.iter().map(|s| column(&s.name));
+        found.collect::<Result<Vec<_>, Error>>()
+    };
+    let samples = Samples {
+        time: table.time(&settings.time)?,
+        readings: columns(&design.observer.measured)?,
+        inputs: columns(&design.observer.inputs)?,
+    };
+    let run = run_settings(settings);
+    let found = filter::run(study, prepared.extended(), &design, &samples, run, watch)?;
+    if let Some(error) = found.ended {
+        return Err(interrupted(error, table.file()));
+    }
+    let logged = |name: &str| logged(table, settings, name);
+    let mut quantities = quantities(&design, &logged, &|_| None);
+    let smoothed = |i: usize| {
+        let rows = found.smoothed.as_ref()?.iter();
+        Some(rows.map(|row| row.estimate[i]).collect())
+    };
+    for (i, quantity) in quantities.iter_mut().enumerate() {
+        quantity.estimate = Some(found.estimates[i].clone());
+        quantity.deviation = settings.deviations.then(|| found.deviations[i].clone());
+        quantity.smoothed = smoothed(i);
+    }
+    let measurements = measurements(&design, logged);
+    show_measurements(plant, &measurements, &mut quantities);
+    let mut notes = design.notes.clone();
+    notes.extend(found.notes);
+    Ok(Outcome {
+        plant: plant.name.clone(),
+        time: samples.time.to_vec(),
+        design,
+        quantities,
+        measurements,
+        watches: vec![],
         notes,
     })
 }
@@ -159,6 +221,8 @@ fn quantities(
         truth: logged(&e.variable.name),
         measured: None,
         estimate: estimate(&e.variable.name),
+        deviation: None,
+        smoothed: None,
         unknown_input: e.unknown_input,
         is_input: e.unknown_input,
     };

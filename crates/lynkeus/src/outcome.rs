@@ -22,6 +22,10 @@ pub struct Quantity {
     pub measured: Option<Vec<f64>>,
     /// what the observer makes of it
     pub estimate: Option<Vec<f64>>,
+    /// its standard deviation, where it is known
+    pub deviation: Option<Vec<f64>>,
+    /// the estimate given later rows, too
+    pub smoothed: Option<Vec<f64>>,
     /// an input that nobody measures
     pub unknown_input: bool,
     /// an input of the plant
@@ -85,6 +89,17 @@ impl Outcome {
                 columns.push((hat(&quantity.name), estimate));
             }
         }
+        let extras = |of: fn(&Quantity) -> &Option<Vec<f64>>, ending: &str| {
+            let found = self
+                .quantities
+                .iter()
+                .filter_map(move |q| Some((&q.name, of(q).as_ref()?)));
+            found
+                .map(|(name, values)| (format!("{name}_{ending}"), &values[..]))
+                .collect::<Vec<_>>()
+        };
+        columns.extend(extras(|q| &q.deviation, "sd"));
+        columns.extend(extras(|q| &q.smoothed, "smooth"));
         let watches = self.watches.iter();
         columns.extend(watches.map(|w| (w.monitor.name.clone(), &w.values[..])));
         columns

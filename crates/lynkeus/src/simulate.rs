@@ -108,6 +108,8 @@ fn outcome(plant: &Plant, design: Design, trajectory: &Trajectory) -> Outcome {
         truth: column(&variable.name),
         measured: None,
         estimate: column(&hat(&variable.name)),
+        deviation: None,
+        smoothed: None,
         unknown_input: design
             .observer
             .estimates

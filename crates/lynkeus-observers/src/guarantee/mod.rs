@@ -21,7 +21,8 @@ mod lmi;
 mod refute;
 mod ultimate;
 
-use crate::statement::{proved, undecided};
+use crate::kalman::NO_THEOREM;
+use crate::statement::{Statement, proved, undecided};
 use crate::{Check, Inequality};
 use lynkeus_proof::decay::{self, ErrorModel, Proof};
 use lynkeus_structure::Standing;
@@ -58,6 +59,10 @@ pub fn certify(
     assumptions: &Assumptions,
     claim: Claim,
 ) -> Result<Certificate, DesignError> {
+    if observer.filter.is_some() {
+        let check = undecided(Statement::FilterConverges, NO_THEOREM);
+        return Ok(Certificate::new(BASIS, assumptions, vec![check]));
+    }
     let system = match ErrorSystem::new(extended, observer, assumptions)? {
         Ok(system) => system,
         Err(reason) => return Ok(not_covered(assumptions, reason)),

@@ -40,6 +40,8 @@ pub enum Statement {
     SlopesOfTheProof,
     /// of the certificate by linear matrix inequalities
     Inequality(Inequality),
+    /// the error of a Kalman filter decays: no theorem says so
+    FilterConverges,
     /// of the family `triangular`
     Hammouri(Hammouri),
     /// of the family `block-triangular`
@@ -154,6 +156,7 @@ impl fmt::Display for Statement {
             Self::SlopesOfTheProof => {
                 f.write_str("every ∂f/∂x of the proof has a bound on the box")
             }
+            Self::FilterConverges => f.write_str("the filter's error decays"),
             Self::Inequality(part) => part.fmt(f),
             Self::Hammouri(part) => part.fmt(f),
             Self::Lee(part) => part.fmt(f),

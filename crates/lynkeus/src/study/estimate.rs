@@ -17,6 +17,19 @@ pub struct EstimateSettings {
     pub time: String,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
+    /// Estimates given later rows, too.
+    pub smoothing: Option<Smoothing>,
+    /// Standard deviations beside the estimates.
+    pub deviations: bool,
+}
+
+/// Which later rows an estimate may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Smoothing {
+    /// All of the log.
+    Interval,
+    /// So many.
+    Lag(usize),
 }
 
 /// What the observer sees between two rows of a log.
@@ -36,6 +49,8 @@ impl Default for EstimateSettings {
             method: Method::default(),
             time: "t".to_owned(),
             columns: Vec::new(),
+            smoothing: None,
+            deviations: false,
         }
     }
 }
@@ -43,6 +58,10 @@ impl Default for EstimateSettings {
 pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
     let mut section = entry.section("[estimate]", &[&ESTIMATE[..], &INTEGRATOR].concat())?;
     let defaults = EstimateSettings::default();
+    let smooth = section
+        .optional("smooth", Entry::boolean)?
+        .unwrap_or_default();
+    let lag = section.optional("lag", |e| e.whole(1))?;
     Ok(EstimateSettings {
         between_samples: section
             .optional("between_samples", |e| {
@@ -53,6 +72,12 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
             })?
             .unwrap_or_default(),
         method: simulate::method(&mut section)?,
+        smoothing: match (lag, smooth) {
+            (Some(lag), _) => Some(Smoothing::Lag(lag as usize)),
+            (None, true) => Some(Smoothing::Interval),
+            (None, false) => None,
+        },
+        deviations: section.optional("sd", Entry::boolean)?.unwrap_or_default(),
         time: section
             .optional("time", Entry::name)?
             .map_or(defaults.time, |name| name.text),

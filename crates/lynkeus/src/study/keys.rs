@@ -32,13 +32,20 @@ pub(super) const KEYS: [KeySpec; 3] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 8] = [
+pub(super) const SECTIONS: [KeySpec; 9] = [
     KeySpec {
         name: "sensors",
         kind: "table",
         shape: Shape::Section(&[&SENSORS]),
         default: "none",
         meaning: "what is measured, what is unknown, how noisy",
+    },
+    KeySpec {
+        name: "process_noise",
+        kind: "table: name = number ≥ 0",
+        shape: Shape::Table(&Shape::NotNegative),
+        default: "0; for an unknown input, from its range and the log's length",
+        meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](kalman.md)",
     },
     KeySpec {
         name: "observer",
@@ -95,7 +102,14 @@ pub(super) const SECTIONS: [KeySpec; 8] = [
 ];
 
 /// `[sensors]`
-pub(super) const SENSORS: [KeySpec; 4] = [
+pub(super) const SENSORS: [KeySpec; 5] = [
+    KeySpec {
+        name: "limits",
+        kind: "table: output = `[lowest, highest]`",
+        shape: Shape::Table(&Shape::List(&Shape::Number)),
+        default: "none",
+        meaning: "the range that a sensor can show: a reading at an end only says \"at most\" or \"at least\", and corrects a filter only where it expects less than that",
+    },
     KeySpec {
         name: "measured",
         kind: "list of outputs",
@@ -126,7 +140,7 @@ pub(super) const SENSORS: [KeySpec; 4] = [
             Shape::Section(&[&NOISE]),
         ])),
         default: "no noise",
-        meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+        meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](kalman.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
     },
 ];
 
@@ -143,7 +157,7 @@ pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
 pub(super) const OBSERVER: [KeySpec; 3] = [
     KeySpec {
         name: "family",
-        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`",
+        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`, `\"ekf\"`, `\"ukf\"`",
         shape: Shape::Word(&[
             "auto",
             "triangular",
@@ -151,9 +165,11 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
             "state-affine",
             "drift-observable",
             "unknown-input",
+            "ekf",
+            "ukf",
         ]),
         default: "`\"auto\"`",
-        meaning: "the observer family; `auto` takes the first that fits and that knows all the keys given",
+        meaning: "the observer family; `auto` takes the first that fits and that knows all the keys given, else `ekf`",
     },
     KeySpec {
         name: "initial",
@@ -292,7 +308,28 @@ pub(super) const SIMULATE: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 3] = [
+pub(super) const ESTIMATE: [KeySpec; 6] = [
+    KeySpec {
+        name: "smooth",
+        kind: "true, false",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "also `<name>_smooth`, the estimate given all rows, later ones included ([filters](kalman.md) only)",
+    },
+    KeySpec {
+        name: "lag",
+        kind: "whole number ≥ 1",
+        shape: Shape::Whole(1),
+        default: "none",
+        meaning: "also `<name>_smooth`, the estimate given so many later rows: causal with that delay",
+    },
+    KeySpec {
+        name: "sd",
+        kind: "true, false",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "also `<name>_sd`, the standard deviation of each estimate",
+    },
     KeySpec {
         name: "between_samples",
         kind: "`\"hold\"`, `\"linear\"`",

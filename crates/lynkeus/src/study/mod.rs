@@ -7,7 +7,9 @@
 //! [sensors]
 //! measured = ["level"]              # default: every output of the plant
 //! unknown = ["pump"]                # inputs nobody measures
-//! noise = { level = "5%" }          # or a standard deviation; used by simulate
+//! noise = { level = "5%" }          # or a standard deviation
+//! [process_noise]                   # spectral densities: how fast an unknown input wanders
+//! pump = 0.01
 //! [observer]
 //! theta = 0.03
 //! initial = { default = 0.5, "x[1]" = 0.9 }
@@ -37,7 +39,7 @@ use std::sync::Arc;
 use toml::de::DeTable;
 
 pub use certify::{Box, CertifySettings};
-pub use estimate::{BetweenSamples, EstimateSettings};
+pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Noise, Sensors};
@@ -62,6 +64,9 @@ pub struct Study {
     pub parameters: BTreeMap<String, f64>,
     /// What is measured and what is not.
     pub sensors: Sensors,
+    /// White noise on states' derivatives: (name, spectral density), in the square of the state's
+    /// unit per unit of time; for an unknown input, how fast it wanders.
+    pub process_noise: Vec<(Name, f64)>,
     /// The observer family and its tuning.
     pub observer: ObserverSettings,
     /// Ranges narrower than the model's.
@@ -142,6 +147,7 @@ impl Study {
                 .map(|name| name.text),
             parameters: top.optional("parameters", parameters)?.unwrap_or_default(),
             sensors: top.optional("sensors", sensors::read)?.unwrap_or_default(),
+            process_noise: simulate::pairs(top.take("process_noise"), density)?,
             observer: top
                 .optional("observer", observer::read)?
                 .unwrap_or_default(),
@@ -156,6 +162,12 @@ impl Study {
             time_unit,
         })
     }
+}
+
+/// A spectral density.
+fn density(entry: section::Entry<'_>) -> Result<f64, Error> {
+    let refusal = entry.wrong("a spectral density >= 0: variance per unit of time");
+    entry.number().ok().filter(|q| *q >= 0.0).ok_or(refusal)
 }
 
 fn not_toml(source: &Source<'_>, error: &toml::de::Error) -> Error {

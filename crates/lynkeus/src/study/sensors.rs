@@ -14,8 +14,10 @@ pub struct Sensors {
     pub unknown: Vec<Name>,
     /// Inputs that act on the plant and that the observer takes as zero.
     pub disturbances: Vec<Name>,
-    /// Measurement noise added by `simulate`, per measured output.
+    /// Measurement noise per measured output: added by `simulate`, counted by the filters.
     pub noise: Vec<(Name, Noise)>,
+    /// The range that a sensor can show: (output, lowest, highest reading).
+    pub limits: Vec<(Name, f64, f64)>,
 }
 
 /// White measurement noise.
@@ -53,6 +55,10 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
         })?,
         unknown: names(section.take("unknown"))?,
         disturbances: names(section.take("disturbances"))?,
+        limits: super::simulate::pairs(section.take("limits"), limits)?
+            .into_iter()
+            .map(|(name, (low, high))| (name, low, high))
+            .collect(),
         noise: match section.take("noise") {
             None => Vec::new(),
             Some(table) => table
@@ -62,6 +68,14 @@ pub(super) fn read(entry: Entry<'_>) -> Result<Sensors, Error> {
                 .collect::<Result<_, Error>>()?,
         },
     })
+}
+
+fn limits(entry: Entry<'_>) -> Result<(f64, f64), Error> {
+    let refusal = entry.wrong("[lowest, highest reading]");
+    match entry.list_of(Entry::number)?[..] {
+        [low, high] if low < high => Ok((low, high)),
+        _ => Err(refusal),
+    }
 }
 
 fn names(entry: Option<Entry<'_>>) -> Result<Vec<Name>, Error> {

@@ -33,6 +33,12 @@ pub struct Name {
 }
 
 impl Name {
+    /// Whether it is the name of a variable, or of the array it is an element of.
+    pub(crate) fn is_or_has(&self, variable: &str) -> bool {
+        let element = variable.strip_prefix(self.text.as_str());
+        element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+    }
+
     /// Puts this name's place on an error about it.
     pub(crate) fn blame(&self, error: crate::Error) -> crate::Error {
         match &self.place {

@@ -1,0 +1,184 @@
+//! A plant with its sensors and noises, compiled for filters.
+
+use lynkeus_expr::{Graph, Node, jacobian};
+
+use crate::{Error, Level, System};
+
+/// What a filter has to know: x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i.
+#[derive(Clone, Debug)]
+pub struct FilterPlant<'g> {
+    /// the graph of all expressions
+    pub graph: &'g Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// name, symbol and first estimate of each state
+    pub states: Vec<(String, Node, f64)>,
+    /// f, one per state
+    pub derivatives: Vec<Node>,
+    /// known inputs u: name and symbol
+    pub inputs: Vec<(String, Node)>,
+    /// what is measured
+    pub sensors: Vec<Sensor>,
+    /// spectral density of the white noise w on each derivative, (unit of the state)² per unit
+    /// of time
+    pub process_noise: Vec<f64>,
+    /// variance of the first estimate
+    pub initial_variance: Vec<f64>,
+}
+
+/// A measured output.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensor {
+    /// name of the output
+    pub name: String,
+    /// h(t, x, u)
+    pub output: Node,
+    /// how strong the noise v is; a share is one of the value that the model predicts
+    pub noise: Level,
+    /// a reading at one of them only says "at most" or "at least"
+    pub limits: Option<Limits>,
+}
+
+/// The range that a sensor can show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// its lower end
+    pub low: f64,
+    /// its upper end
+    pub high: f64,
+}
+
+/// A [`FilterPlant`], compiled: cheap to clone, independent of its graph.
+#[derive(Clone, Debug)]
+pub struct FilterModel {
+    /// x' = f; its outputs are the entries of F = ∂f/∂x
+    pub(super) flow: System,
+    /// no states; signals x, u; outputs h, then the entries of C = ∂h/∂x
+    pub(super) output_map: System,
+    /// places (row, column) of the entries of F
+    pub(super) flow_entries: Vec<(usize, usize)>,
+    /// places of the entries of C
+    pub(super) output_entries: Vec<(usize, usize)>,
+    pub(super) sensors: Vec<Sensor>,
+    pub(super) process_noise: Vec<f64>,
+    pub(super) initial_variance: Vec<f64>,
+}
+
+impl FilterModel {
+    /// Compiles a plant with its Jacobians.
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`] for an expression that reads another symbol; [`Error::Setting`]
+    /// for a noise or a variance that is negative or not finite, and for wrong numbers of them.
+    pub fn new(plant: &FilterPlant<'_>) -> Result<Self, Error> {
+        check(plant)?;
+        let graph = plant.graph;
+        let symbols: Vec<Node> = plant.states.iter().map(|s| s.1).collect();
+        let F = jacobian::forward(graph, &plant.derivatives, &symbols);
+        let h: Vec<Node> = plant.sensors.iter().map(|s| s.output).collect();
+        let C = jacobian::forward(graph, &h, &symbols);
+        let entry = |(i, j, node): &(usize, usize, Node)| (format!("{i},{j}"), *node);
+        let flow_outputs: Vec<(String, Node)> = F.entries.iter().map(entry).collect();
+        let flow = System::new(
+            graph,
+            plant.time,
+            &plant.states,
+            &plant.inputs,
+            &plant.derivatives,
+            &flow_outputs,
+        )?;
+        let states = plant
+            .states
+            .iter()
+            .map(|(name, node, _)| (name.clone(), *node));
+        let signals: Vec<(String, Node)> = states.chain(plant.inputs.iter().cloned()).collect();
+        let outputs = plant.sensors.iter().map(|s| (s.name.clone(), s.output));
+        let outputs: Vec<(String, Node)> = outputs.chain(C.entries.iter().map(entry)).collect();
+        let output_map = System::new(graph, plant.time, &[], &signals, &[], &outputs)?;
+        let places =
+            |entries: &[(usize, usize, Node)]| entries.iter().map(|e| (e.0, e.1)).collect();
+        Ok(Self {
+            flow,
+            output_map,
+            flow_entries: places(&F.entries),
+            output_entries: places(&C.entries),
+            sensors: plant.sensors.clone(),
+            process_noise: plant.process_noise.clone(),
+            initial_variance: plant.initial_variance.clone(),
+        })
+    }
+
+    /// Number of states.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.flow.states().len()
+    }
+
+    /// Names of the states.
+    #[must_use]
+    pub fn states(&self) -> &[String] {
+        self.flow.states()
+    }
+
+    /// What is measured.
+    #[must_use]
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.sensors
+    }
+
+    /// Names of the known inputs.
+    #[must_use]
+    pub fn inputs(&self) -> &[String] {
+        self.flow.signals()
+    }
+
+    /// The same plant from other first estimates.
+    ///
+    /// # Errors
+    /// As [`System::with_start`].
+    pub fn with_start(mut self, start: Vec<f64>) -> Result<Self, Error> {
+        self.flow = self.flow.with_start(start)?;
+        Ok(self)
+    }
+}
+
+fn check(plant: &FilterPlant<'_>) -> Result<(), Error> {
+    let n = plant.states.len();
+    let lists = [
+        ("process noise", &plant.process_noise),
+        ("initial variance", &plant.initial_variance),
+    ];
+    for (what, values) in lists {
+        if values.len() != n {
+            return Err(Error::setting(
+                what,
+                format!("{n} numbers, one per state"),
+                values.len(),
+            ));
+        }
+        for ((name, ..), value) in plant.states.iter().zip(values) {
+            if !(*value >= 0.0 && value.is_finite()) {
+                let what = format!("{what} of '{name}'");
+                return Err(Error::setting(what, "a finite number, 0 or above", value));
+            }
+        }
+    }
+    for sensor in &plant.sensors {
+        let size = sensor.noise.size();
+        if !(size >= 0.0 && size.is_finite()) {
+            let what = format!("noise of '{}'", sensor.name);
+            return Err(Error::setting(what, "a finite number, 0 or above", size));
+        }
+        if let Some(Limits { low, high }) = sensor.limits
+            && (low.is_nan() || high.is_nan() || low >= high)
+        {
+            let what = format!("limits of '{}'", sensor.name);
+            return Err(Error::setting(
+                what,
+                "a lower and a higher number",
+                format!("[{low}, {high}]"),
+            ));
+        }
+    }
+    Ok(())
+}

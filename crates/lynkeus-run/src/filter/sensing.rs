@@ -1,0 +1,132 @@
+//! The sensors: what the model expects of them, and which readings are believed.
+
+use super::health::{Health, Innovation, Reading, SensorHealth};
+use super::model::{FilterModel, Limits, Sensor};
+use super::smooth::Correction;
+use crate::{Dynamics, Error, Evaluation, Level};
+
+/// After so many rejections in a row the next reading is believed: a gate must not lock the
+/// filter out for ever.
+const LOCKED_OUT: usize = 10;
+
+#[derive(Clone, Debug)]
+pub(super) struct Sensing {
+    output_map: Evaluation,
+    states: Vec<String>,
+    inputs: Vec<String>,
+    sensors: Vec<Sensor>,
+    output_entries: Vec<(usize, usize)>,
+    /// h, then the entries of C
+    values: Vec<f64>,
+    gate: Option<f64>,
+    pub innovations: Vec<Innovation>,
+    pub health: Health,
+    /// of this sample, for the smoother
+    pub corrections: Vec<Correction>,
+}
+
+impl Sensing {
+    pub fn new(model: &FilterModel, gate: Option<f64>) -> Self {
+        let count = model.sensors.len();
+        Self {
+            output_map: model.output_map.evaluation(),
+            states: model.states().to_vec(),
+            inputs: model.inputs().to_vec(),
+            sensors: model.sensors.clone(),
+            output_entries: model.output_entries.clone(),
+            values: vec![0.0; count + model.output_entries.len()],
+            gate,
+            innovations: vec![Innovation::default(); count],
+            health: Health {
+                sensors: vec![SensorHealth::default(); count],
+                inputs_held: 0,
+            },
+            corrections: vec![],
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.sensors.len()
+    }
+
+    pub fn states(&self) -> &[String] {
+        &self.states
+    }
+
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    pub fn take_corrections(&mut self) -> Vec<Correction> {
+        std::mem::take(&mut self.corrections)
+    }
+
+    /// h(t, x, u), and the entries of C there.
+    pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+        let signals = self.output_map.signals_mut();
+        let (own, known) = signals.split_at_mut(x.len());
+        own.copy_from_slice(x);
+        known.copy_from_slice(u);
+        self.output_map.enter(t);
+        self.output_map.outputs(t, &[], &mut self.values);
+        match self.values.iter().all(|v| v.is_finite()) {
+            true => Ok(&self.values[..self.sensors.len()]),
+            false => Err(self.output_map.not_finite(t, &[])),
+        }
+    }
+
+    /// Row i of C where it was evaluated last.
+    pub fn slopes(&self, i: usize) -> Vec<f64> {
+        let mut row = vec![0.0; self.states.len()];
+        let values = &self.values[self.sensors.len()..];
+        for (&(output, state), value) in self.output_entries.iter().zip(values) {
+            if output == i {
+                row[state] = *value;
+            }
+        }
+        row
+    }
+
+    /// The variance of a sensor's noise where the model predicts a value.
+    pub fn noise(&self, i: usize, predicted: f64) -> f64 {
+        match self.sensors[i].noise {
+            Level::Absolute(deviation) => deviation.powi(2),
+            Level::Relative(share) => (share * predicted).powi(2),
+            Level::Uniform(bound) => bound.powi(2) / 3.0,
+        }
+    }
+
+    /// Decides what becomes of a reading whose innovation has the given variance.
+    pub fn judge(&mut self, i: usize, reading: f64, predicted: f64, variance: f64) -> Innovation {
+        let deviation = variance.sqrt();
+        let mut innovation = Innovation {
+            value: 0.0,
+            deviation,
+            predicted,
+            reading: Reading::Missing,
+        };
+        if reading.is_finite() {
+            innovation.value = reading - predicted;
+            innovation.reading = match self.sensors[i].limits {
+                Some(limits) if says_nothing(limits, reading, predicted) => Reading::AtLimit,
+                _ if self.is_outlier(i, innovation.value, deviation) => Reading::Rejected,
+                _ => Reading::Taken,
+            };
+        }
+        self.health.sensors[i].count(&innovation);
+        self.innovations[i] = innovation;
+        innovation
+    }
+
+    fn is_outlier(&self, i: usize, innovation: f64, deviation: f64) -> bool {
+        let Some(gate) = self.gate else { return false };
+        self.health.sensors[i].locked_out < LOCKED_OUT && innovation.abs() > gate * deviation
+    }
+}
+
+/// A reading at a limit says that the output is there or beyond; nothing new where the model
+/// expects just that.
+fn says_nothing(limits: Limits, reading: f64, predicted: f64) -> bool {
+    (reading <= limits.low && predicted <= limits.low)
+        || (reading >= limits.high && predicted >= limits.high)
+}

@@ -1,0 +1,181 @@
+//! Smoothers: the estimate at a sample given later ones.
+
+use super::root::{Root, dot};
+
+/// What one reading did.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Correction {
+    /// its row of C
+    pub slopes: Vec<f64>,
+    /// its innovation after the readings before it
+    pub innovation: f64,
+    /// the innovation's variance α
+    pub variance: f64,
+    /// k
+    pub gain: Vec<f64>,
+}
+
+/// What one sample did.
+#[derive(Clone, Debug)]
+pub(super) struct Step {
+    /// Φ from the sample before, row by row; none at the first and at repeated times
+    pub transition: Option<Vec<f64>>,
+    /// x̂⁺ and a root of P⁺
+    pub x: Vec<f64>,
+    pub root: Root,
+    pub corrections: Vec<Correction>,
+}
+
+/// The estimate at a sample given later ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothed {
+    /// x̂ˢ
+    pub estimate: Vec<f64>,
+    /// its standard deviations
+    pub deviations: Vec<f64>,
+}
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct History {
+    steps: Vec<Step>,
+}
+
+/// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
+struct Adjoint {
+    vector: Vec<f64>,
+    /// Λ, row by row
+    matrix: Vec<f64>,
+}
+
+impl History {
+    pub fn push(&mut self, step: Step) {
+        self.steps.push(step);
+    }
+
+    /// By the recursion of Bryson and Frazier, backward from the last sample or from `lag`
+    /// samples later: λ = 0, Λ = 0 there, and over each reading y = cᵀx + v with gain k
+    /// λ ← (I − k cᵀ)ᵀλ − c ν/α, Λ ← (I − k cᵀ)ᵀΛ(I − k cᵀ) + c cᵀ/α, then over the flow
+    /// λ ← Φᵀλ, Λ ← ΦᵀΛΦ. It equals the smoother of Rauch, Tung and Striebel,
+    /// x̂ˢ = x̂⁺ + P⁺Φᵀ(P⁻)⁻¹(x̂ˢ' − x̂⁻'), and never inverts P⁻.
+    pub fn smoothed(&self, lag: Option<usize>) -> Vec<Smoothed> {
+        let count = self.steps.len();
+        let mut result = vec![];
+        match lag {
+            None => {
+                let mut adjoint = self.nothing();
+                for k in (0..count).rev() {
+                    result.push(self.at(k, &adjoint));
+                    self.back(k, &mut adjoint);
+                }
+                result.reverse();
+            }
+            Some(lag) => {
+                for k in 0..count {
+                    let mut adjoint = self.nothing();
+                    for later in (k + 1..=(k + lag).min(count - 1)).rev() {
+                        self.back(later, &mut adjoint);
+                    }
+                    result.push(self.at(k, &adjoint));
+                }
+            }
+        }
+        result
+    }
+
+    fn nothing(&self) -> Adjoint {
+        let n = self.steps.first().map_or(0, |s| s.x.len());
+        Adjoint {
+            vector: vec![0.0; n],
+            matrix: vec![0.0; n * n],
+        }
+    }
+
+    fn at(&self, k: usize, adjoint: &Adjoint) -> Smoothed {
+        let Step { x, root, .. } = &self.steps[k];
+        let n = x.len();
+        let shift = root.covariance_times(&adjoint.vector);
+        let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
+        let deviations = (0..n).map(|i| {
+            let mut unit = vec![0.0; n];
+            unit[i] = 1.0;
+            let column = root.covariance_times(&unit);
+            let less = quadratic(&adjoint.matrix, &column);
+            (column[i] - less).max(0.0).sqrt()
+        });
+        Smoothed {
+            estimate,
+            deviations: deviations.collect(),
+        }
+    }
+
+    /// From after sample k to after the sample before it.
+    fn back(&self, k: usize, adjoint: &mut Adjoint) {
+        let step = &self.steps[k];
+        for correction in step.corrections.iter().rev() {
+            adjoint.over(correction);
+        }
+        if let Some(transition) = &step.transition {
+            adjoint.through(transition);
+        }
+    }
+}
+
+fn quadratic(matrix: &[f64], v: &[f64]) -> f64 {
+    let rows = matrix.chunks_exact(v.len().max(1));
+    rows.zip(v).map(|(row, x)| x * dot(row, v)).sum()
+}
+
+impl Adjoint {
+    fn over(&mut self, correction: &Correction) {
+        let Correction {
+            slopes: c,
+            innovation,
+            variance,
+            gain: k,
+        } = correction;
+        let n = c.len();
+        let pull = dot(k, &self.vector) + innovation / variance;
+        for (l, c) in self.vector.iter_mut().zip(c) {
+            *l -= c * pull;
+        }
+        // Λ − c (Λk)ᵀ − (Λk) cᵀ + c cᵀ (kᵀΛk + 1/α)
+        let along: Vec<f64> = self.matrix.chunks_exact(n).map(|row| dot(row, k)).collect();
+        let both = dot(k, &along) + 1.0 / variance;
+        for (i, row) in self.matrix.chunks_exact_mut(n).enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry += c[i] * c[j] * both - c[i] * along[j] - along[i] * c[j];
+            }
+        }
+    }
+
+    fn through(&mut self, transition: &[f64]) {
+        let n = self.vector.len();
+        let mut vector = vec![0.0; n];
+        // ΛΦ, then Φᵀ(ΛΦ)
+        let mut half = vec![0.0; n * n];
+        for (i, row) in transition.chunks_exact(n).enumerate() {
+            for (into, phi) in vector.iter_mut().zip(row) {
+                *into += self.vector[i] * phi;
+            }
+            for (from, into) in self.matrix.chunks_exact(n).zip(half.chunks_exact_mut(n)) {
+                for (into, phi) in into.iter_mut().zip(row) {
+                    *into += from[i] * phi;
+                }
+            }
+        }
+        let mut matrix = vec![0.0; n * n];
+        for (row, half) in transition.chunks_exact(n).zip(half.chunks_exact(n)) {
+            for (phi, into) in row
+                .iter()
+                .zip(matrix.chunks_exact_mut(n))
+                .filter(|(phi, _)| **phi != 0.0)
+            {
+                for (into, h) in into.iter_mut().zip(half) {
+                    *into += phi * h;
+                }
+            }
+        }
+        self.vector = vector;
+        self.matrix = matrix;
+    }
+}

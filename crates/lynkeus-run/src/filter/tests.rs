@@ -1,0 +1,148 @@
+//! Filters against formulas by hand.
+
+use super::*;
+use crate::{Level, Method, Tolerances};
+use lynkeus_expr::Graph;
+
+/// x' = a x + w, y = x + v.
+fn scalar(a: f64, q: f64, r: f64) -> FilterModel {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+    FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 1.0)],
+        derivatives: vec![(x * a).node()],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: x.node(),
+            noise: Level::Absolute(r.sqrt()),
+            limits: None,
+        }],
+        process_noise: vec![q],
+        initial_variance: vec![0.5],
+    })
+    .unwrap()
+}
+
+fn exact() -> EstimatorSettings {
+    EstimatorSettings {
+        method: Method::Adaptive(Tolerances {
+            relative: 1e-12,
+            absolute: 1e-14,
+            ..Tolerances::default()
+        }),
+        ..EstimatorSettings::default()
+    }
+}
+
+/// P⁻ = e^{2aΔ}P + q (e^{2aΔ} − 1)/(2a).
+#[test]
+fn the_variance_of_a_scalar_follows_its_formula() {
+    let (a, q, r, step) = (-0.7, 0.3, 0.2, 0.4);
+    for kind in [
+        FilterKind::Extended,
+        FilterKind::Unscented(SigmaPoints::default()),
+    ] {
+        let mut filter = Filter::new(&scalar(a, q, r), FilterSettings::of(kind), exact()).unwrap();
+        let (mut x, mut p) = (1.0, 0.5);
+        for k in 0..20 {
+            let y = (k as f64).sin();
+            if k > 0 {
+                let grown = (2.0 * a * step).exp();
+                x *= (a * step).exp();
+                p = match kind {
+                    FilterKind::Extended => grown * p + q * (grown - 1.0) / (2.0 * a),
+                    FilterKind::Unscented(_) => grown * p + q * step,
+                };
+            }
+            let gain = p / (p + r);
+            x += gain * (y - x);
+            p *= 1.0 - gain;
+            filter.push(step * f64::from(k), &[y], &[]).unwrap();
+            assert!((filter.estimate()[0] - x).abs() < 1e-10, "{kind:?} {k}");
+            assert!(
+                (filter.deviations()[0] - p.sqrt()).abs() < 1e-10,
+                "{kind:?} {k}"
+            );
+        }
+    }
+}
+
+/// Given everything, a constant's estimate is the same at every sample.
+#[test]
+fn the_smoother_of_a_constant_is_its_last_estimate() {
+    let settings = FilterSettings {
+        keep_history: true,
+        ..FilterSettings::of(FilterKind::Extended)
+    };
+    let mut filter = Filter::new(&scalar(0.0, 0.0, 0.2), settings, exact()).unwrap();
+    for k in 0..10 {
+        filter.push(f64::from(k), &[f64::from(k % 3)], &[]).unwrap();
+    }
+    let (last, deviation) = (filter.estimate()[0], filter.deviations()[0]);
+    for smoothed in filter.smoothed().unwrap() {
+        assert!((smoothed.estimate[0] - last).abs() < 1e-12);
+        assert!((smoothed.deviations[0] - deviation).abs() < 1e-12);
+    }
+    let lagged = filter.smoothed_with_lag(3).unwrap();
+    assert!((lagged[6].estimate[0] - last).abs() < 1e-12);
+    assert!((lagged[0].estimate[0] - last).abs() > 1e-3);
+}
+
+#[test]
+fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
+    let settings = FilterSettings {
+        gate: Some(4.0),
+        ..FilterSettings::of(FilterKind::Extended)
+    };
+    let mut filter = Filter::new(&scalar(0.0, 0.0, 0.01), settings, exact()).unwrap();
+    for k in 0..5 {
+        filter.push(f64::from(k), &[1.0], &[]).unwrap();
+    }
+    for k in 5..15 {
+        filter.push(f64::from(k), &[9.0], &[]).unwrap();
+        assert_eq!(filter.innovations()[0].reading, Reading::Rejected);
+    }
+    assert!((filter.estimate()[0] - 1.0).abs() < 1e-12);
+    filter.push(15.0, &[9.0], &[]).unwrap();
+    assert!(filter.estimate()[0] > 1.5);
+    let health = filter.health().sensors[0];
+    assert_eq!((health.taken, health.rejected, health.missing), (6, 10, 0));
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let model = scalar(0.0, 1.0, 1.0);
+    let new = |settings| Filter::new(&model, settings, exact());
+    let gate = FilterSettings {
+        gate: Some(-1.0),
+        ..FilterSettings::of(FilterKind::Extended)
+    };
+    assert!(new(gate).unwrap_err().to_string().contains("gate"));
+    let points = SigmaPoints {
+        kappa: -1.0,
+        ..SigmaPoints::default()
+    };
+    let unscented = FilterSettings::of(FilterKind::Unscented(points));
+    assert!(new(unscented).unwrap_err().to_string().contains("kappa"));
+    let mut filter = new(FilterSettings::of(FilterKind::Extended)).unwrap();
+    filter.push(1.0, &[0.0], &[]).unwrap();
+    assert!(matches!(
+        filter.push(0.5, &[0.0], &[]),
+        Err(Error::TimeOrder { row: 2, .. })
+    ));
+    assert!(matches!(
+        filter.push(f64::NAN, &[0.0], &[]),
+        Err(Error::NotANumber { .. })
+    ));
+    assert!(matches!(
+        filter.push(2.0, &[], &[]),
+        Err(Error::Setting { .. })
+    ));
+    assert!(matches!(
+        filter.push(2.0, &[0.0], &[1.0]),
+        Err(Error::Setting { .. })
+    ));
+}

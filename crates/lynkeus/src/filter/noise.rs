@@ -1,0 +1,166 @@
+//! The noises of a filter: as the study declares them, else from the log and the ranges.
+
+use lynkeus_model::Variable;
+use lynkeus_run::Level;
+use lynkeus_structure::{Extended, short};
+
+use super::Samples;
+use crate::study::Noise;
+use crate::{Error, Study};
+
+/// The noise of each measured output; without `noise` in the study, how much the log's own
+/// readings scatter.
+pub(super) fn levels(
+    study: &Study,
+    extended: &Extended<'_>,
+    samples: &Samples<'_>,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Level>, Error> {
+    let mut levels = vec![];
+    for (i, output) in extended.outputs.iter().enumerate() {
+        let name = &output.variable.name;
+        let declared = study.sensors.noise.iter().find(|(n, _)| n.text == *name);
+        levels.push(match declared.map(|(_, noise)| *noise) {
+            Some(Noise::Absolute(deviation)) => Level::Absolute(deviation),
+            Some(Noise::Relative(share)) => Level::Relative(share),
+            Some(Noise::Uniform(bound)) => Level::Uniform(bound),
+            None => {
+                let Some(found) = scatter(samples.time, samples.readings[i]) else {
+                    let message = format!(
+                        "a filter needs the standard deviation of the noise of \"{name}\", and its readings are too few or too even to tell it"
+                    );
+                    let hint = format!("write noise = {{ {name} = … }} under [sensors]");
+                    return Err(Error::input(message).at(&study.file).hint(hint));
+                };
+                notes.push(format!(
+                    "noise of {name}: {} (standard deviation), from the scatter of its readings; noise = {{ {name} = … }} under [sensors] says better",
+                    short(found)
+                ));
+                Level::Absolute(found)
+            }
+        });
+    }
+    Ok(levels)
+}
+
+/// The standard deviation of white noise on a smooth signal, from the distance of each reading
+/// to the line between its neighbours: robust, by the median. None for fewer than five
+/// readings, or readings that lie on one line.
+pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
+    let points: Vec<(f64, f64)> = time
+        .iter()
+        .zip(readings)
+        .filter(|(_, y)| y.is_finite())
+        .map(|(t, y)| (*t, *y))
+        .collect();
+    if points.len() < 5 {
+        return None;
+    }
+    let mut residuals: Vec<f64> = points
+        .windows(3)
+        .filter(|w| w[2].0 > w[0].0)
+        .map(|w| {
+            let share = (w[1].0 - w[0].0) / (w[2].0 - w[0].0);
+            let line = w[0].1 + share * (w[2].1 - w[0].1);
+            let weight = 1.0 + share.powi(2) + (1.0 - share).powi(2);
+            (w[1].1 - line).abs() / weight.sqrt()
+        })
+        .collect();
+    residuals.sort_unstable_by(f64::total_cmp);
+    // 1.4826 times the median of |normal deviates| is their standard deviation
+    let median = 1.4826 * residuals.get(residuals.len() / 2)?;
+    // readings in steps: most of them on a line, and the step's own error
+    let mut values: Vec<f64> = points.iter().map(|p| p.1).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let steps = values.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0);
+    let step = steps.fold(f64::INFINITY, f64::min);
+    let quantised = if step.is_finite() {
+        step / 12_f64.sqrt()
+    } else {
+        0.0
+    };
+    let found = median.max(quantised);
+    (found > 0.0).then_some(found)
+}
+
+/// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
+/// unknown input without one, a wander over a quarter of its range in a tenth of the log.
+pub(super) fn densities(
+    study: &Study,
+    extended: &Extended<'_>,
+    span: f64,
+    notes: &mut Vec<String>,
+) -> Result<Vec<f64>, Error> {
+    let states = &extended.states;
+    let mut densities = vec![None; states.len()];
+    for (name, density) in &study.process_noise {
+        let mut meant = 0;
+        for (found, _) in densities
+            .iter_mut()
+            .zip(states)
+            .filter(|(_, s)| name.is_or_has(&s.name))
+        {
+            *found = Some(*density);
+            meant += 1;
+        }
+        if meant == 0 {
+            let names = states.iter().map(|s| s.name.as_str());
+            let message =
+                format!("[process_noise]: nothing that is estimated is called \"{name}\"");
+            let refusal = Error::input(message).hint(crate::near::suggest(&name.text, names));
+            return Err(name.blame(refusal));
+        }
+    }
+    let chosen = densities.into_iter().zip(states).enumerate();
+    Ok(chosen
+        .map(|(i, (density, state))| match density {
+            Some(density) => density,
+            None if i < extended.plant_states() || span <= 0.0 => 0.0,
+            None => wander(state, span, notes),
+        })
+        .collect())
+}
+
+fn wander(state: &Variable, span: f64, notes: &mut Vec<String>) -> f64 {
+    let width = state.max - state.min;
+    let (reach, from) = match width.is_finite() && width > 0.0 {
+        true => (width / 4.0, "a quarter of its range"),
+        false => (
+            state.start.unwrap_or(0.0).abs().max(1.0),
+            "its start value, or 1,",
+        ),
+    };
+    let density = 10.0 * reach.powi(2) / span;
+    notes.push(format!(
+        "{} wanders with a spectral density of {}: {from} in a tenth of the log; {} = … under [process_noise] says better",
+        state.name,
+        short(density),
+        state.name
+    ));
+    density
+}
+
+#[cfg(test)]
+mod tests {
+    use super::scatter;
+
+    #[test]
+    fn noise_is_told_from_a_signal_by_its_scatter() {
+        // a slow wave with alternating errors of ±0.1 and one outlier
+        let time: Vec<f64> = (0..200).map(|k| 0.1 * f64::from(k)).collect();
+        let mut y: Vec<f64> = time
+            .iter()
+            .enumerate()
+            .map(|(k, t)| t.sin() + if k % 2 == 0 { 0.1 } else { -0.1 })
+            .collect();
+        y[77] = 50.0;
+        y[10] = f64::NAN;
+        let found = scatter(&time, &y).unwrap();
+        assert!(0.1 < found && found < 0.4, "{found}");
+        assert_eq!(scatter(&time, &vec![3.0; 200]), None);
+        assert_eq!(scatter(&time[..3], &y[..3]), None);
+        // whole numbers: the error of rounding
+        let counted: Vec<f64> = time.iter().map(|t| (0.2 * t).floor()).collect();
+        assert!((scatter(&time, &counted).unwrap() - 1.0 / 12_f64.sqrt()).abs() < 1e-12);
+    }
+}
