@@ -67,6 +67,14 @@ fn binary(graph: &Graph, op: Binary, a: Node, b: Node, f: Expr<'_>) -> Variation
             let norm = x.powi(2) + y.powi(2);
             (y / norm, -(x / norm))
         }
+        // where both are equal the slope is that of the one that is no constant: a limit that
+        // is just reached hides nothing yet
+        Binary::Min if graph.constant_value(a).is_some() => {
+            return Variation::Choice(x.less(y).node(), a, b);
+        }
+        Binary::Max if graph.constant_value(a).is_some() => {
+            return Variation::Choice(y.less(x).node(), a, b);
+        }
         Binary::Min => return Variation::Choice(x.less_eq(y).node(), a, b),
         Binary::Max => return Variation::Choice(y.less_eq(x).node(), a, b),
         Binary::Less | Binary::LessEq | Binary::Equal | Binary::And | Binary::Or => {

@@ -27,7 +27,8 @@ const UNARY: [(&str, Unary); 14] = [
 ];
 
 /// The other functions, for suggestions.
-const OTHERS: [&str; 29] = [
+const OTHERS: [&str; 30] = [
+    "Modelica.Math.Vectors.interpolate",
     "der",
     "log10",
     "floor",
@@ -120,6 +121,7 @@ impl<'a> Evaluator<'a> {
                 })
             }
             "min" | "max" => self.extreme(name, call, span),
+            "Vectors.interpolate" => self.interpolate(call, span),
             "noEvent" => self.only_argument(call),
             "smooth" => Ok(self.two_arguments(call)?.1),
             _ => match self.array_function(name, call, span)? {

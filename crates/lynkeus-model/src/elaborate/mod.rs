@@ -15,6 +15,7 @@ mod parameters;
 mod scope;
 mod subscripts;
 mod symbols;
+mod tables;
 mod value;
 
 use lynkeus_expr::Graph;

@@ -1,0 +1,82 @@
+//! Tables: `Modelica.Math.Vectors.interpolate`.
+
+use lynkeus_expr::Node;
+
+use super::evaluate::Evaluator;
+use super::value::{Scalar, Value};
+use crate::syntax::ast::{Call, ExprId};
+use crate::syntax::{Problem, Result, Span};
+
+impl<'a> Evaluator<'a> {
+    /// `Vectors.interpolate(x, y, xi)`: linear between the points (x[i], y[i]) and, as the
+    /// Modelica library has it, along the first and the last piece outside of them.
+    pub(super) fn interpolate(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        let [abscissas, ordinates, at] = match call.arguments.len() {
+            // the index of the piece found last is a hint for the library's search
+            4 => [call.arguments[0], call.arguments[1], call.arguments[2]],
+            _ => self.arguments(call)?,
+        };
+        let x = self.points(abscissas)?;
+        let y = self.points(ordinates)?;
+        if x.is_empty() || x.len() != y.len() {
+            let message = format!(
+                "a table needs as many values as points, at least one: found {} points and {} values",
+                x.len(),
+                y.len()
+            );
+            return Err(Problem::new(span, message));
+        }
+        self.increasing(&x, abscissas)?;
+        self.budget.charge(x.len() as u64, span)?;
+        let at = self.value(at)?;
+        self.map(at, span, |evaluator, at, span| {
+            let at = evaluator.real(at, span)?;
+            Ok(Scalar::Real(evaluator.piecewise_linear(&x, &y, at)))
+        })
+    }
+
+    fn points(&mut self, argument: ExprId) -> Result<Vec<Node>> {
+        let span = self.span(argument);
+        let elements = self.value(argument)?.into_array().elements;
+        elements.into_iter().map(|e| self.real(e, span)).collect()
+    }
+
+    fn increasing(&self, x: &[Node], argument: ExprId) -> Result<()> {
+        let known = |node: Node| self.graph.constant_value(node);
+        for (i, pair) in x.windows(2).enumerate() {
+            if let (Some(a), Some(b)) = (known(pair[0]), known(pair[1]))
+                && a >= b
+            {
+                let message = format!(
+                    "the points of a table must increase: [{}] = {a}, [{}] = {b}",
+                    i + 1,
+                    i + 2
+                );
+                return Err(Problem::new(self.span(argument), message)
+                    .hint("sort them; a jump takes two points a little apart"));
+            }
+        }
+        Ok(())
+    }
+
+    /// y₁ + s₁(u − x₁) + Σ (sᵢ − sᵢ₋₁) max(u − xᵢ, 0), sᵢ the slopes: every kink is there
+    /// once, so that the slope at a point of the table is that of one of its sides.
+    fn piecewise_linear(&self, x: &[Node], y: &[Node], u: Node) -> Node {
+        let graph = self.graph;
+        let expr = |node: Node| graph.expr(node);
+        let u = expr(u);
+        let mut sum = expr(y[0]);
+        let mut before = graph.constant(0.0);
+        for (i, (x, y)) in x.windows(2).zip(y.windows(2)).enumerate() {
+            let [x0, x1, y0, y1] = [x[0], x[1], y[0], y[1]].map(expr);
+            let slope = (y1 - y0) / (x1 - x0);
+            let beyond = u - x0;
+            sum = match i {
+                0 => sum + slope * beyond,
+                _ => sum + (slope - before) * beyond.max(graph.constant(0.0)),
+            };
+            before = slope;
+        }
+        sum.node()
+    }
+}
