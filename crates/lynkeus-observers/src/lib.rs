@@ -27,6 +27,7 @@ mod observer;
 mod peaking;
 mod prolongation;
 mod proof;
+mod sampled;
 mod stability;
 mod stages;
 pub mod state_affine;
@@ -40,5 +41,6 @@ pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, 
 pub use guarantee::{Claim, Correction, Injection, certify};
 pub use keys::{KeySpec, REQUIRED, Shape};
 pub use observer::{Estimate, FilterTuning, InputDerivative, Monitor, Observer, Signal};
+pub use sampled::Sampled;
 pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};
 pub use tuning::{Initial, Tuning, TuningError, Value};

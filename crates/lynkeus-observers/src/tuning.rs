@@ -46,6 +46,8 @@ pub struct TuningError {
     pub expected: String,
     /// what stands there
     pub found: String,
+    /// nothing stands there: the key is required
+    pub absent: bool,
 }
 
 impl TuningError {
@@ -55,6 +57,15 @@ impl TuningError {
             key: key.to_owned(),
             expected: expected.into(),
             found: found.to_string(),
+            absent: false,
+        }
+    }
+
+    /// The error that a required `key` is not there.
+    pub fn absent(key: &str, expected: impl Into<String>) -> Self {
+        Self {
+            absent: true,
+            ..Self::new(key, expected, "nothing")
         }
     }
 }

@@ -48,6 +48,16 @@ impl Level {
             Level::Absolute(size) | Level::Relative(size) | Level::Uniform(size) => size,
         }
     }
+
+    /// The variance of the noise where the output has a value.
+    #[must_use]
+    pub fn variance(self, value: f64) -> f64 {
+        match self {
+            Level::Absolute(deviation) => deviation.powi(2),
+            Level::Relative(share) => (share * value).powi(2),
+            Level::Uniform(bound) => bound.powi(2) / 3.0,
+        }
+    }
 }
 
 /// The noise of all outputs of a plant, in their order.

@@ -92,9 +92,18 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
 }
 
 impl Report {
-    /// True if an observer exists, or where none was asked for.
+    /// True if a family with a theorem fits or is undecided, if everything asked for can be known
+    /// (then a filter estimates it), or where no observer was asked for.
     pub fn is_positive(&self) -> bool {
-        self.examinations.is_empty() || self.recommended.is_some()
+        let chosen = self
+            .examinations
+            .iter()
+            .find(|e| Some(e.family) == self.recommended);
+        let with_theorem = chosen.is_some_and(Examination::has_theorem);
+        let hidden = |q: &(lynkeus_observability::Asked, _)| q.0.verdict == Verdict::Unobservable;
+        self.examinations.is_empty()
+            || with_theorem
+            || (chosen.is_some() && !self.answer.quantities.iter().any(hidden))
     }
 
     /// The singular set inside the box, for a plant with two states.
@@ -229,9 +238,28 @@ impl Report {
         let others = self
             .examinations
             .iter()
-            .filter(|e| e.fit() == Standing::Proved)
+            .filter(|e| e.has_theorem() && e.fit() == Standing::Proved)
             .count()
             > 1;
+        let named: Vec<&str> = self
+            .examinations
+            .iter()
+            .filter(|e| e.has_theorem() && e.fit() == Standing::Undecided)
+            .map(|e| e.family)
+            .collect();
+        if let Some(filter) = chosen.filter(|e| !e.has_theorem()) {
+            let open = match named.is_empty() {
+                true => "no family with a theorem fits".to_owned(),
+                false => format!(
+                    "no family with a theorem is proved to fit ({} undecided)",
+                    named.join(", ")
+                ),
+            };
+            return format!(
+                "{open}: {} runs on any plant, and nothing is proved of its error",
+                filter.family
+            );
+        }
         match chosen.map(|e| (e.family, e.fit())) {
             Some((family, Standing::Proved)) if others => {
                 format!("{family} comes first: of the families that fit, it has the simplest gain")

@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use lynkeus_model::{LoadError, LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, TuningError, Value};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, Standing, range};
 
 use crate::study::Name;
@@ -128,16 +128,48 @@ impl<'a> Prepared<'a> {
         let Some(chosen) = recommended(examinations) else {
             return Err(none_fits(self.study, examinations));
         };
-        let family = lynkeus_observers::find(chosen.family)
-            .ok_or_else(|| Error::input(format!("no family is called {}", chosen.family)))?;
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
             true => Some(self.narrowed(&self.simulated_inputs()?)?),
             false => None,
         };
-        family
-            .design(simulated.as_ref().unwrap_or(&self.extended), tuning)
-            .map_err(|error| self.refusal(error))
+        let place = simulated.as_ref().unwrap_or(&self.extended);
+        let mut design = match design_by(chosen, place, tuning) {
+            Err(DesignError::Tuning(error)) if error.absent => {
+                self.without(chosen, &error, tuning)?
+            }
+            design => design.map_err(|error| self.refusal(error))?,
+        };
+        let by_itself =
+            self.study.observer.family.is_none() && chosen.family == design.observer.family;
+        if by_itself && design.observer.filter.is_some() {
+            let lost = examinations.iter().filter(|e| e.has_theorem());
+            design.notes.push(fallback(lost));
+        }
+        Ok(design)
+    }
+
+    /// Where the chosen family lacks a key, and no family was asked for: the next one that
+    /// needs none.
+    fn without(
+        &self,
+        chosen: &Examination,
+        error: &TuningError,
+        tuning: &Tuning,
+    ) -> Result<Design, Error> {
+        let refusal = || self.refusal(DesignError::Tuning(error.clone()));
+        if self.study.observer.family.is_some() {
+            return Err(refusal());
+        }
+        let next = self.examinations()?.iter().find(|e| !e.has_theorem());
+        let next = next.ok_or_else(refusal)?;
+        let mut design =
+            design_by(next, &self.extended, tuning).map_err(|error| self.refusal(error))?;
+        design.notes.push(format!(
+            "{} fits, and what it estimates comes with a theorem; it needs `{}` in [observer]: {}",
+            chosen.family, error.key, error.expected
+        ));
+        Ok(design)
     }
 
     /// The plant on a smaller box.
@@ -242,15 +274,45 @@ fn blame(study: &Study, error: SensorsError) -> Error {
     }
 }
 
-/// The family to use: the first that fits, else the first that is undecided.
+/// The family to use: the first with a theorem that fits, else the first that asks nothing of
+/// the plant, else the first that is undecided.
 pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
-    let with = |fit: Standing| examinations.iter().find(move |e| e.fit() == fit);
-    with(Standing::Proved).or_else(|| with(Standing::Undecided))
+    let with = |fit: Standing| examinations.iter().filter(move |e| e.fit() == fit);
+    let proved = with(Standing::Proved).find(|e| e.has_theorem());
+    proved
+        .or_else(|| with(Standing::Proved).next())
+        .or_else(|| with(Standing::Undecided).next())
 }
 
 /// Whether the study asks for a certified gain.
 pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
     tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
+}
+
+fn design_by(
+    chosen: &Examination,
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+) -> Result<Design, DesignError> {
+    match lynkeus_observers::find(chosen.family) {
+        Some(family) => family.design(extended, tuning),
+        None => Err(DesignError::Refused(Box::new(chosen.clone()))),
+    }
+}
+
+/// What is lost where a filter takes the place of the families with a theorem.
+fn fallback<'e>(lost: impl Iterator<Item = &'e Examination>) -> String {
+    let undecided: Vec<&str> = lost
+        .filter(|e| e.fit() == Standing::Undecided)
+        .map(|e| e.family)
+        .collect();
+    match undecided.is_empty() {
+        true => "no family with a theorem fits this plant and these sensors (`lynkeus check` says why): a filter estimates all the same, and nothing is proved of its error".to_owned(),
+        false => format!(
+            "no family with a theorem is proved to fit ({} undecided, see `lynkeus check`): a filter estimates all the same, and nothing is proved of its error",
+            undecided.join(", ")
+        ),
+    }
 }
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {

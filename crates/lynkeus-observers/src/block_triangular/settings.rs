@@ -120,7 +120,7 @@ impl Settings {
 
     /// θ, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
-        let missing = || TuningError::new(THETA.name, "a positive number per chain", "nothing");
+        let missing = || TuningError::absent(THETA.name, "a positive number per chain");
         self.θ.clone()?.ok_or_else(missing)
     }
 

@@ -145,13 +145,12 @@ pub(super) fn lemma(
 ) -> Result<Vec<Option<Lemma32>>, TuningError> {
     let Some(α) = settings.α else {
         let expected = "the eigenvalues of the error, negative numbers, or alpha, beta and gamma for Lemma 3.2 to choose them";
-        return Err(TuningError::new(POLES.name, expected, "nothing"));
+        return Err(TuningError::absent(POLES.name, expected));
     };
     let missing = || {
-        TuningError::new(
+        TuningError::absent(
             GAMMA.name,
             "the Lipschitz constant for Lemma 3.2, a positive number",
-            "nothing",
         )
     };
     let γ = settings.γ.ok_or_else(missing)?;

@@ -116,7 +116,7 @@ pub(crate) fn design(
         (None, Some(_)) => fastest(&system, request.clone())?,
         (None, None) => {
             let expected = "the required decay, 1/time unit (or gain_limit alone, for the fastest decay within it)";
-            return Err(TuningError::new(RATE.name, expected, "nothing").into());
+            return Err(TuningError::absent(RATE.name, expected).into());
         }
     };
     assemble(extended, &copy, family, examination, &request, &gain)

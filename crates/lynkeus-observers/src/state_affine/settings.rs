@@ -56,7 +56,7 @@ impl Settings {
     /// The numbers of (7)–(8) with the states in this order.
     pub(super) fn numbers(&self, order: &[usize]) -> Result<Numbers, TuningError> {
         let expected = "a positive number (the gain of block k grows like theta^k)";
-        let missing = || TuningError::new(THETA.name, expected, "nothing");
+        let missing = || TuningError::absent(THETA.name, expected);
         let θ = self.θ.clone()?.ok_or_else(missing)?;
         let given = self.S0.as_ref().map_err(TuningError::clone)?;
         let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();

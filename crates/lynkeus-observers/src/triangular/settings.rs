@@ -137,7 +137,7 @@ impl Settings {
     /// θ, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let expected = "a positive number (the gain grows like theta^n)";
-        let missing = || TuningError::new(THETA.name, expected, "nothing");
+        let missing = || TuningError::absent(THETA.name, expected);
         self.θ.clone()?.ok_or_else(missing)
     }
 }

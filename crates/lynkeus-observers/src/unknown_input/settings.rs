@@ -114,7 +114,7 @@ pub(super) fn wrong_size(
 /// No θ is given, and `reason` says why the proof gives none.
 pub(super) fn no_theta(reason: &str) -> TuningError {
     let expected = format!("two positive numbers [θ1, θ2]; {reason}");
-    TuningError::new(THETA.name, expected, "nothing")
+    TuningError::absent(THETA.name, expected)
 }
 
 #[cfg(test)]

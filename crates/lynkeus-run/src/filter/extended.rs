@@ -3,15 +3,14 @@
 use super::Belief;
 use super::flow::Linearised;
 use super::health::Reading;
-use super::model::FilterModel;
 use super::root::{dot, factor};
 use super::sensing::Sensing;
 use super::smooth::Correction;
 use crate::driven::Driven;
-use crate::{Error, EstimatorSettings, Integrator};
+use crate::{Error, EstimatorSettings, Integrator, System};
 
 #[derive(Clone, Debug)]
-pub(super) struct Extended {
+pub(crate) struct Extended {
     pub driven: Driven,
     integrator: Integrator,
     entries: Vec<(usize, usize)>,
@@ -27,19 +26,26 @@ pub(super) struct Extended {
 }
 
 impl Extended {
-    pub fn new(model: &FilterModel, run: EstimatorSettings) -> Result<Self, Error> {
-        let n = model.dimension();
-        let scale = model.process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
+    /// Of a flow whose first outputs are the entries of its Jacobian, and the densities of the
+    /// noise on its states.
+    pub fn new(
+        flow: &System,
+        entries: &[(usize, usize)],
+        process_noise: &[f64],
+        run: EstimatorSettings,
+    ) -> Result<Self, Error> {
+        let n = flow.states().len();
+        let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
         let noise = match scale > 0.0 {
-            true => model.process_noise.iter().map(|q| q / scale).collect(),
+            true => process_noise.iter().map(|q| q / scale).collect(),
             false => vec![],
         };
         let dimension = n + n * Linearised::width(n, scale > 0.0);
         Ok(Self {
-            driven: Driven::new(&model.flow, run.between),
+            driven: Driven::new(flow, run.between),
             integrator: Integrator::new(run.method, dimension)?,
-            entries: model.flow_entries.clone(),
-            slopes: vec![0.0; model.flow_entries.len()],
+            entries: entries.to_vec(),
+            slopes: vec![0.0; flow.outputs().len()],
             noise,
             scale,
             z: vec![],

@@ -34,11 +34,11 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
-mod extended;
+pub(crate) mod extended;
 mod flow;
 mod health;
 mod model;
-mod root;
+pub(crate) mod root;
 mod sensing;
 mod smooth;
 mod unscented;
@@ -91,9 +91,9 @@ impl FilterSettings {
 
 /// What is believed of the state: its mean and a root of its covariance.
 #[derive(Clone, Debug)]
-struct Belief {
-    x: Vec<f64>,
-    root: Root,
+pub(crate) struct Belief {
+    pub(crate) x: Vec<f64>,
+    pub(crate) root: Root,
 }
 
 #[derive(Clone, Debug)]
@@ -136,7 +136,12 @@ impl Filter {
             ));
         }
         let engine = match settings.kind {
-            FilterKind::Extended => Engine::Extended(Extended::new(model, run)?),
+            FilterKind::Extended => Engine::Extended(Extended::new(
+                &model.flow,
+                &model.flow_entries,
+                &model.process_noise,
+                run,
+            )?),
             FilterKind::Unscented(points) => Engine::Unscented(Unscented::new(model, points, run)?),
         };
         let x = model.flow.start().to_vec();

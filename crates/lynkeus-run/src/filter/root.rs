@@ -2,7 +2,7 @@
 
 /// A root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Root {
+pub(crate) struct Root {
     pub n: usize,
     pub entries: Vec<f64>,
 }
@@ -80,7 +80,7 @@ impl Root {
     }
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -124,7 +124,7 @@ fn triangularise(rows: &mut [f64], n: usize) {
 
 /// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
 /// pivot that rounding cannot tell from zero has none.
-pub(super) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
+pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
     let mut lower = vec![0.0; n * n];
     for j in 0..n {
         let own = &lower[j * n..j * n + j];

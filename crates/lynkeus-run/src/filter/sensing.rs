@@ -3,7 +3,7 @@
 use super::health::{Health, Innovation, Reading, SensorHealth};
 use super::model::{FilterModel, Limits, Sensor};
 use super::smooth::Correction;
-use crate::{Dynamics, Error, Evaluation, Level};
+use crate::{Dynamics, Error, Evaluation};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
 /// filter out for ever.
@@ -89,11 +89,7 @@ impl Sensing {
 
     /// The variance of a sensor's noise where the model predicts a value.
     pub fn noise(&self, i: usize, predicted: f64) -> f64 {
-        match self.sensors[i].noise {
-            Level::Absolute(deviation) => deviation.powi(2),
-            Level::Relative(share) => (share * predicted).powi(2),
-            Level::Uniform(bound) => bound.powi(2) / 3.0,
-        }
+        self.sensors[i].noise.variance(predicted)
     }
 
     /// Decides what becomes of a reading whose innovation has the given variance.
