@@ -10,7 +10,7 @@ use crate::{
     Assumptions, Certificate, KeySpec, Observer, Tuning, TuningError,
     block_triangular::BlockTriangular,
     drift_observable::DriftObservable,
-    kalman::{Ekf, Ukf},
+    kalman::{Ekf, Mhe, Ukf},
     state_affine::StateAffine,
     triangular::Triangular,
     unknown_input::UnknownInput,
@@ -25,6 +25,7 @@ pub const FAMILIES: &[&dyn Family] = &[
     &DriftObservable,
     &Ekf,
     &Ukf,
+    &Mhe,
 ];
 
 /// The family of that name.

@@ -4,41 +4,16 @@ use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Filter, FilterModel, FilterPlant, FilterSettings, Health, Limits, Sensor, Smoothed,
+    Filter, FilterModel, FilterPlant, FilterSettings, Limits, Sensor, SensorHealth, Smoothed,
 };
 use lynkeus_run::{Error as RunError, EstimatorSettings};
 use lynkeus_structure::Extended;
 
+use crate::course::{Course, Samples, add_row};
 use crate::study::{Name, Smoothing};
 use crate::{Error, Study};
 
-mod noise;
-
-/// Samples for a filter: what each sensor and each known input reads, NaN where it does not.
-pub(crate) struct Samples<'a> {
-    pub time: &'a [f64],
-    /// one per measured output
-    pub readings: Vec<&'a [f64]>,
-    /// one per known input
-    pub inputs: Vec<&'a [f64]>,
-}
-
-/// What a filter makes of its samples.
-pub(crate) struct Filtered {
-    /// by estimate, then by row
-    pub estimates: Vec<Vec<f64>>,
-    /// their standard deviations
-    pub deviations: Vec<Vec<f64>>,
-    /// the smoother's, where it was asked for
-    pub smoothed: Option<Vec<Smoothed>>,
-    /// what the model expects of each sensor, before the correction
-    pub predicted: Vec<Vec<f64>>,
-    pub health: Health,
-    /// what was chosen for the user
-    pub notes: Vec<String>,
-    /// why the run ended early, with the rows before
-    pub ended: Option<RunError>,
-}
+pub(crate) mod noise;
 
 /// Runs the design's filter over samples; `watch` is told the fraction done.
 ///
@@ -51,65 +26,70 @@ pub(crate) fn run(
     samples: &Samples<'_>,
     settings: EstimatorSettings,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Filtered, Error> {
+) -> Result<Course, Error> {
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
     let mut notes = vec![];
     let model = model(study, extended, design, tuning, samples, &mut notes)?;
     let settings_of_filter = FilterSettings {
-        kind: tuning.kind,
+        kind: tuning.kind.clone(),
         gate: tuning.gate,
         keep_history: study.estimate.smoothing.is_some(),
     };
     let mut filter =
         Filter::new(&model, settings_of_filter, settings).map_err(Error::from_source)?;
     let n = model.dimension();
-    let mut found = Filtered {
+    let mut course = Course {
         estimates: vec![vec![]; n],
-        deviations: vec![vec![]; n],
-        smoothed: None,
-        predicted: vec![vec![]; model.sensors().len()],
-        health: Health::default(),
+        deviations: Some(vec![vec![]; n]),
         notes,
-        ended: None,
+        ..Course::default()
     };
-    found.ended = replay(&mut filter, samples, &mut found, watch).err();
-    found.health = filter.health().clone();
-    found.smoothed = match study.estimate.smoothing {
+    course.ended = replay(&mut filter, samples, &mut course, watch).err();
+    course.inputs_held = filter.health().inputs_held;
+    let smoothed = match study.estimate.smoothing {
         None => None,
         Some(Smoothing::Interval) => filter.smoothed(),
         Some(Smoothing::Lag(lag)) => filter.smoothed_with_lag(lag),
     };
-    Ok(found)
+    course.smoothed = smoothed.map(|rows| columns(n, &rows));
+    Ok(course)
+}
+
+fn columns(count: usize, rows: &[Smoothed]) -> Vec<Vec<f64>> {
+    let column = |i: usize| rows.iter().map(|row| row.estimate[i]).collect();
+    (0..count).map(column).collect()
 }
 
 fn replay(
     filter: &mut Filter,
     samples: &Samples<'_>,
-    found: &mut Filtered,
+    course: &mut Course,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<(), RunError> {
-    let row = |columns: &[&[f64]], k: usize| columns.iter().map(|c| c[k]).collect::<Vec<f64>>();
-    for (k, &t) in samples.time.iter().enumerate() {
-        filter.push(t, &row(&samples.readings, k), &row(&samples.inputs, k))?;
-        let push = |into: &mut [Vec<f64>], values: &mut dyn Iterator<Item = f64>| {
-            into.iter_mut()
-                .zip(values)
-                .for_each(|(column, x)| column.push(x));
-        };
-        push(&mut found.estimates, &mut filter.estimate().iter().copied());
-        push(
-            &mut found.deviations,
-            &mut filter.deviations().iter().copied(),
-        );
-        let expected = filter.innovations().iter().map(|i| i.predicted);
-        push(&mut found.predicted, &mut expected.into_iter());
-        if watch((k + 1) as f64 / samples.time.len() as f64).is_break() {
-            return Err(RunError::Cancelled { time: t });
+    let mut half = vec![];
+    let result = samples.time.iter().enumerate().try_for_each(|(k, &t)| {
+        let readings = Samples::row(&samples.readings, k);
+        filter.push(t, &readings, &Samples::row(&samples.inputs, k))?;
+        add_row(&mut course.estimates, filter.estimate().iter().copied());
+        if let Some(columns) = &mut course.deviations {
+            add_row(columns, filter.deviations().iter().copied());
         }
-    }
-    Ok(())
+        if k == samples.time.len() / 2 {
+            half = filter.health().sensors.clone();
+        }
+        match watch((k + 1) as f64 / samples.time.len() as f64).is_break() {
+            true => Err(RunError::Cancelled { time: t }),
+            false => Ok(()),
+        }
+    });
+    course.sensors = filter.health().sensors.clone();
+    let late = course.sensors.iter().zip(&half);
+    course.late = late
+        .map(|(all, half): (&SensorHealth, _)| all.since(half))
+        .collect();
+    result
 }
 
 /// The plant with the study's noises.

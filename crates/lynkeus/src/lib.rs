@@ -56,6 +56,7 @@
 mod certify;
 mod check;
 mod correction;
+mod course;
 mod design;
 mod error;
 mod estimate;
@@ -69,6 +70,7 @@ mod outcome;
 pub mod plot;
 pub mod precision;
 pub mod prepare;
+mod sampled;
 mod simulate;
 pub mod study;
 mod systems;

@@ -8,11 +8,14 @@
 //! Filtering Theory*, 1970). `ukf`: the unscented Kalman filter (Julier and Uhlmann 1997; with
 //! its default weights the cubature filter of Arasaratnam and Haykin 2009).
 //!
+//! `mhe`: moving-horizon estimation (Rao, Rawlings and Mayne, *IEEE Transactions on Automatic
+//! Control* 48 (2003) 246–258), whose states stay within their declared ranges.
+//!
 //! Nothing is required of the plant, and nothing is proved of the error.
 
 mod settings;
 
-use lynkeus_run::filter::{FilterKind, SigmaPoints};
+use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
 use lynkeus_structure::{Extended, Region, Standing};
 
 use crate::estimate::Copy;
@@ -35,14 +38,18 @@ pub struct Ekf;
 #[derive(Clone, Copy, Debug)]
 pub struct Ukf;
 
-/// What the two have of their own.
+/// The family `mhe`.
+#[derive(Clone, Copy, Debug)]
+pub struct Mhe;
+
+/// What each has of its own.
 trait Kalman: Sync {
     const NAME: &'static str;
     const PAPER: &'static str;
     const WORDS: &'static str;
     const KEYS: &'static [&'static [KeySpec]];
 
-    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError>;
+    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError>;
 }
 
 impl Kalman for Ekf {
@@ -51,7 +58,7 @@ impl Kalman for Ekf {
     const WORDS: &'static str = "extended Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
-    fn kind(_: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(_: &Extended<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
         Ok(FilterKind::Extended)
     }
 }
@@ -62,7 +69,7 @@ impl Kalman for Ukf {
     const WORDS: &'static str = "unscented Kalman filter";
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS, &settings::POINTS];
 
-    fn kind(tuning: &Tuning) -> Result<FilterKind, TuningError> {
+    fn kind(_: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
         let [own_alpha, own_beta, own_kappa] = &settings::POINTS;
         Ok(FilterKind::Unscented(SigmaPoints {
@@ -70,6 +77,27 @@ impl Kalman for Ukf {
             beta: settings::number(tuning, own_beta)?.unwrap_or(beta),
             kappa: settings::number(tuning, own_kappa)?.unwrap_or(kappa),
         }))
+    }
+}
+
+impl Kalman for Mhe {
+    const NAME: &'static str = "mhe";
+    const PAPER: &'static str = "Rao, Rawlings and Mayne 2003, moving-horizon estimation";
+    const WORDS: &'static str = "moving-horizon estimator";
+    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS, &settings::WINDOW];
+
+    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+        let [horizon] = &settings::WINDOW;
+        let length = match settings::number(tuning, horizon)? {
+            None => settings::HORIZON,
+            Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
+            Some(x) => return Err(horizon.wrong(x)),
+        };
+        let bounds = extended.states.iter().map(|state| Bounds {
+            low: state.min,
+            high: state.max,
+        });
+        Ok(FilterKind::MovingHorizon(length, bounds.collect()))
     }
 }
 
@@ -83,7 +111,7 @@ impl<K: Kalman> Stages for K {
     const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
-        Settings::read(extended, tuning, K::kind(tuning)?)
+        Settings::read(extended, tuning, K::kind(extended, tuning)?)
     }
 
     fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<()> {
@@ -121,7 +149,7 @@ impl<K: Kalman> Stages for K {
         let mut observer = copy.observer(K::NAME, derivatives)?;
         let variance = settings.variances(extended, &observer.states);
         observer.filter = Some(FilterTuning {
-            kind: settings.kind,
+            kind: settings.kind.clone(),
             gate: settings.gate,
             outputs: copy.at_estimate(&outputs),
             initial_variance: variance.iter().map(|v| v.value).collect(),

@@ -51,6 +51,18 @@ pub(super) const POINTS: [KeySpec; 3] = [
     },
 ];
 
+/// Samples in the window where the study does not say.
+pub(super) const HORIZON: usize = 10;
+
+/// That of the moving-horizon estimator.
+pub(super) const WINDOW: [KeySpec; 1] = [KeySpec {
+    name: "horizon",
+    kind: "whole number ≥ 1",
+    shape: Shape::Whole(1),
+    default: "10",
+    meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
+}];
+
 /// The keys, read.
 pub struct Settings {
     pub common: Common,

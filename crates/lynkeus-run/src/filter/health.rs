@@ -52,6 +52,19 @@ impl SensorHealth {
         (self.taken > 0).then(|| self.squares / self.taken as f64)
     }
 
+    /// The counts after those of an earlier moment.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            taken: self.taken - earlier.taken,
+            missing: self.missing - earlier.missing,
+            rejected: self.rejected - earlier.rejected,
+            at_limit: self.at_limit - earlier.at_limit,
+            squares: self.squares - earlier.squares,
+            locked_out: self.locked_out,
+        }
+    }
+
     pub(super) fn count(&mut self, innovation: &Innovation) {
         match innovation.reading {
             Reading::Missing => self.missing += 1,

@@ -37,6 +37,7 @@
 pub(crate) mod extended;
 mod flow;
 mod health;
+mod horizon;
 mod model;
 pub(crate) mod root;
 mod sensing;
@@ -51,23 +52,36 @@ pub use unscented::SigmaPoints;
 use crate::divergence::Bound;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
+use horizon::Horizon;
 use root::Root;
 use sensing::Sensing;
 use smooth::{History, Step};
 use unscented::Unscented;
 
 /// Which filter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum FilterKind {
     /// the extended Kalman filter, continuous-discrete: the covariance follows the plant's
     /// linearisation along the estimate
     Extended,
     /// the unscented Kalman filter: sigma points follow the plant
     Unscented(SigmaPoints),
+    /// moving-horizon estimation over so many samples, the states within bounds (one pair per
+    /// state)
+    MovingHorizon(usize, Vec<Bounds>),
+}
+
+/// Where a state can be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// smallest value
+    pub low: f64,
+    /// largest value
+    pub high: f64,
 }
 
 /// How a filter works.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FilterSettings {
     /// which filter
     pub kind: FilterKind,
@@ -100,6 +114,7 @@ pub(crate) struct Belief {
 enum Engine {
     Extended(Extended),
     Unscented(Unscented),
+    MovingHorizon(Box<Horizon>),
 }
 
 /// A filter that takes one sample after the other, live or from a log.
@@ -143,6 +158,9 @@ impl Filter {
                 run,
             )?),
             FilterKind::Unscented(points) => Engine::Unscented(Unscented::new(model, points, run)?),
+            FilterKind::MovingHorizon(length, bounds) => {
+                Engine::MovingHorizon(Box::new(Horizon::new(model, length, bounds, run)?))
+            }
         };
         let x = model.flow.start().to_vec();
         Ok(Self {
@@ -287,6 +305,7 @@ impl Filter {
         match &mut self.engine {
             Engine::Extended(engine) => engine.driven.start(inputs),
             Engine::Unscented(engine) => engine.driven.start(inputs),
+            Engine::MovingHorizon(horizon) => horizon.engine.driven.start(inputs),
         }
     }
 
@@ -294,6 +313,7 @@ impl Filter {
         match &mut self.engine {
             Engine::Extended(engine) => engine.driven.arrive(),
             Engine::Unscented(engine) => engine.driven.arrive(),
+            Engine::MovingHorizon(horizon) => horizon.engine.driven.arrive(),
         }
     }
 
@@ -309,6 +329,10 @@ impl Filter {
                 engine.driven.aim(from, to, inputs);
                 engine.predict(&mut self.belief, from, to, keep)
             }
+            Engine::MovingHorizon(horizon) => {
+                horizon.engine.driven.aim(from, to, inputs);
+                horizon.engine.predict(&mut self.belief, from, to, keep)
+            }
         }
     }
 
@@ -323,6 +347,7 @@ impl Filter {
         match engine {
             Engine::Extended(_) => extended::correct(sensing, belief, t, readings, inputs),
             Engine::Unscented(engine) => engine.correct(sensing, belief, t, readings, inputs),
+            Engine::MovingHorizon(horizon) => horizon.correct(sensing, belief, t, readings, inputs),
         }
     }
 

@@ -41,8 +41,8 @@ pub(super) struct History {
 }
 
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
-struct Adjoint {
-    vector: Vec<f64>,
+pub(super) struct Adjoint {
+    pub vector: Vec<f64>,
     /// Λ, row by row
     matrix: Vec<f64>,
 }
@@ -83,11 +83,7 @@ impl History {
     }
 
     fn nothing(&self) -> Adjoint {
-        let n = self.steps.first().map_or(0, |s| s.x.len());
-        Adjoint {
-            vector: vec![0.0; n],
-            matrix: vec![0.0; n * n],
-        }
+        Adjoint::nothing(self.steps.first().map_or(0, |s| s.x.len()))
     }
 
     fn at(&self, k: usize, adjoint: &Adjoint) -> Smoothed {
@@ -126,18 +122,47 @@ fn quadratic(matrix: &[f64], v: &[f64]) -> f64 {
 }
 
 impl Adjoint {
-    fn over(&mut self, correction: &Correction) {
-        let Correction {
-            slopes: c,
-            innovation,
-            variance,
-            gain: k,
-        } = correction;
-        let n = c.len();
-        let pull = dot(k, &self.vector) + innovation / variance;
-        for (l, c) in self.vector.iter_mut().zip(c) {
+    pub fn nothing(n: usize) -> Self {
+        Self {
+            vector: vec![0.0; n],
+            matrix: vec![0.0; n * n],
+        }
+    }
+
+    /// λ over a reading; returns how hard the reading pushes along its row of C.
+    pub fn over_vector(&mut self, correction: &Correction) -> f64 {
+        let pull =
+            dot(&correction.gain, &self.vector) + correction.innovation / correction.variance;
+        for (l, c) in self.vector.iter_mut().zip(&correction.slopes) {
             *l -= c * pull;
         }
+        pull
+    }
+
+    /// Φᵀλ.
+    pub fn vector_through(&mut self, transition: &[f64]) {
+        let mut vector = vec![0.0; self.vector.len()];
+        for (l, row) in self
+            .vector
+            .iter()
+            .zip(transition.chunks_exact(vector.len().max(1)))
+        {
+            for (into, phi) in vector.iter_mut().zip(row) {
+                *into += l * phi;
+            }
+        }
+        self.vector = vector;
+    }
+
+    fn over(&mut self, correction: &Correction) {
+        self.over_vector(correction);
+        let Correction {
+            slopes: c,
+            variance,
+            gain: k,
+            ..
+        } = correction;
+        let n = c.len();
         // Λ − c (Λk)ᵀ − (Λk) cᵀ + c cᵀ (kᵀΛk + 1/α)
         let along: Vec<f64> = self.matrix.chunks_exact(n).map(|row| dot(row, k)).collect();
         let both = dot(k, &along) + 1.0 / variance;
@@ -150,13 +175,10 @@ impl Adjoint {
 
     fn through(&mut self, transition: &[f64]) {
         let n = self.vector.len();
-        let mut vector = vec![0.0; n];
+        self.vector_through(transition);
         // ΛΦ, then Φᵀ(ΛΦ)
         let mut half = vec![0.0; n * n];
         for (i, row) in transition.chunks_exact(n).enumerate() {
-            for (into, phi) in vector.iter_mut().zip(row) {
-                *into += self.vector[i] * phi;
-            }
             for (from, into) in self.matrix.chunks_exact(n).zip(half.chunks_exact_mut(n)) {
                 for (into, phi) in into.iter_mut().zip(row) {
                     *into += from[i] * phi;
@@ -175,7 +197,6 @@ impl Adjoint {
                 }
             }
         }
-        self.vector = vector;
         self.matrix = matrix;
     }
 }

@@ -45,7 +45,8 @@ fn the_variance_of_a_scalar_follows_its_formula() {
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
     ] {
-        let mut filter = Filter::new(&scalar(a, q, r), FilterSettings::of(kind), exact()).unwrap();
+        let mut filter =
+            Filter::new(&scalar(a, q, r), FilterSettings::of(kind.clone()), exact()).unwrap();
         let (mut x, mut p) = (1.0, 0.5);
         for k in 0..20 {
             let y = (k as f64).sin();
@@ -53,7 +54,9 @@ fn the_variance_of_a_scalar_follows_its_formula() {
                 let grown = (2.0 * a * step).exp();
                 x *= (a * step).exp();
                 p = match kind {
-                    FilterKind::Extended => grown * p + q * (grown - 1.0) / (2.0 * a),
+                    FilterKind::Extended | FilterKind::MovingHorizon(..) => {
+                        grown * p + q * (grown - 1.0) / (2.0 * a)
+                    }
                     FilterKind::Unscented(_) => grown * p + q * step,
                 };
             }
@@ -145,4 +148,33 @@ fn what_cannot_be_is_refused() {
         filter.push(2.0, &[0.0], &[1.0]),
         Err(Error::Setting { .. })
     ));
+}
+
+/// A level that cannot be below zero, read as −1 again and again: the estimate stays at zero
+/// where the filter goes below, and leaves it when the readings do.
+#[test]
+fn the_moving_horizon_keeps_to_the_bounds() {
+    let model = scalar(0.0, 0.05, 0.1);
+    let bounds = vec![Bounds {
+        low: 0.0,
+        high: 10.0,
+    }];
+    let settings = FilterSettings::of(FilterKind::MovingHorizon(5, bounds));
+    let mut horizon = Filter::new(&model, settings, exact()).unwrap();
+    let mut filter =
+        Filter::new(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
+    for k in 0..60 {
+        let y = if k < 40 { -1.0 } else { 2.0 };
+        let x = horizon.push(f64::from(k), &[y], &[]).unwrap()[0];
+        let free = filter.push(f64::from(k), &[y], &[]).unwrap()[0];
+        assert!(x >= 0.0, "{k}: {x}");
+        if (20..40).contains(&k) {
+            assert!(x < 1e-9 && free < -0.9, "{k}: {x} {free}");
+        }
+    }
+    assert!(
+        (horizon.estimate()[0] - 2.0).abs() < 0.05,
+        "{:?}",
+        horizon.estimate()
+    );
 }

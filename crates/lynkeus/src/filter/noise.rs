@@ -4,13 +4,13 @@ use lynkeus_model::Variable;
 use lynkeus_run::Level;
 use lynkeus_structure::{Extended, short};
 
-use super::Samples;
+use crate::course::Samples;
 use crate::study::Noise;
 use crate::{Error, Study};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own
 /// readings scatter.
-pub(super) fn levels(
+pub(crate) fn levels(
     study: &Study,
     extended: &Extended<'_>,
     samples: &Samples<'_>,
@@ -25,13 +25,8 @@ pub(super) fn levels(
             Some(Noise::Relative(share)) => Level::Relative(share),
             Some(Noise::Uniform(bound)) => Level::Uniform(bound),
             None => {
-                let Some(found) = scatter(samples.time, samples.readings[i]) else {
-                    let message = format!(
-                        "a filter needs the standard deviation of the noise of \"{name}\", and its readings are too few or too even to tell it"
-                    );
-                    let hint = format!("write noise = {{ {name} = … }} under [sensors]");
-                    return Err(Error::input(message).at(&study.file).hint(hint));
-                };
+                let readings = samples.readings[i];
+                let found = scatter(samples.time, readings).unwrap_or_else(|| even(readings));
                 notes.push(format!(
                     "noise of {name}: {} (standard deviation), from the scatter of its readings; noise = {{ {name} = … }} under [sensors] says better",
                     short(found)
@@ -43,10 +38,25 @@ pub(super) fn levels(
     Ok(levels)
 }
 
+/// Readings that do not scatter: a thousandth of their range, or of their size.
+fn even(readings: &[f64]) -> f64 {
+    let finite = || readings.iter().copied().filter(|y| y.is_finite());
+    let (low, high) = (
+        finite().fold(f64::INFINITY, f64::min),
+        finite().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let size = if high > low { high - low } else { high.abs() };
+    1e-3 * if size > 0.0 && size.is_finite() {
+        size
+    } else {
+        1.0
+    }
+}
+
 /// The standard deviation of white noise on a smooth signal, from the distance of each reading
 /// to the line between its neighbours: robust, by the median. None for fewer than five
 /// readings, or readings that lie on one line.
-pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
+fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
     let points: Vec<(f64, f64)> = time
         .iter()
         .zip(readings)
@@ -85,7 +95,7 @@ pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
 
 /// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
 /// unknown input without one, a wander over a quarter of its range in a tenth of the log.
-pub(super) fn densities(
+pub(crate) fn densities(
     study: &Study,
     extended: &Extended<'_>,
     span: f64,

@@ -38,6 +38,8 @@ pub enum BetweenSamples {
     /// The latest row: what a live observer sees.
     #[default]
     Hold,
+    /// From each reading on what the model makes of it: the inter-sample predictor.
+    Predict,
     /// The straight line to the next row: looks ahead one sample, so only off-line.
     Linear,
 }
@@ -67,6 +69,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
             .optional("between_samples", |e| {
                 e.choice(&[
                     ("hold", BetweenSamples::Hold),
+                    ("predict", BetweenSamples::Predict),
                     ("linear", BetweenSamples::Linear),
                 ])
             })?

@@ -45,7 +45,7 @@ pub(super) const SECTIONS: [KeySpec; 9] = [
         kind: "table: name = number ≥ 0",
         shape: Shape::Table(&Shape::NotNegative),
         default: "0; for an unknown input, from its range and the log's length",
-        meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](kalman.md)",
+        meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md)",
     },
     KeySpec {
         name: "observer",
@@ -140,7 +140,7 @@ pub(super) const SENSORS: [KeySpec; 5] = [
             Shape::Section(&[&NOISE]),
         ])),
         default: "no noise",
-        meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](kalman.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
+        meaning: "white measurement noise: its standard deviation, in the output's unit or as a share of its present value; or uniform noise, every error up to ± the number (in the output's unit) equally likely and none larger. Used by `simulate`, `tune`, the [filters](ekf.md), [`check --how-well`](precision.md) and [`certify`](certificates.md)",
     },
 ];
 
@@ -157,7 +157,7 @@ pub(super) const NOISE: [KeySpec; 1] = [KeySpec {
 pub(super) const OBSERVER: [KeySpec; 3] = [
     KeySpec {
         name: "family",
-        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`, `\"ekf\"`, `\"ukf\"`",
+        kind: "`\"auto\"`, `\"triangular\"`, `\"block-triangular\"`, `\"state-affine\"`, `\"drift-observable\"`, `\"unknown-input\"`, `\"ekf\"`, `\"ukf\"`, `\"mhe\"`",
         shape: Shape::Word(&[
             "auto",
             "triangular",
@@ -167,6 +167,7 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
             "unknown-input",
             "ekf",
             "ukf",
+            "mhe",
         ]),
         default: "`\"auto\"`",
         meaning: "the observer family; `auto` takes the first that fits and that knows all the keys given, else `ekf`",
@@ -314,7 +315,7 @@ pub(super) const ESTIMATE: [KeySpec; 6] = [
         kind: "true, false",
         shape: Shape::Flag,
         default: "false",
-        meaning: "also `<name>_smooth`, the estimate given all rows, later ones included ([filters](kalman.md) only)",
+        meaning: "also `<name>_smooth`, the estimate given all rows, later ones included ([filters](ekf.md) only)",
     },
     KeySpec {
         name: "lag",
@@ -332,10 +333,10 @@ pub(super) const ESTIMATE: [KeySpec; 6] = [
     },
     KeySpec {
         name: "between_samples",
-        kind: "`\"hold\"`, `\"linear\"`",
-        shape: Shape::Word(&["hold", "linear"]),
+        kind: "`\"hold\"`, `\"predict\"`, `\"linear\"`",
+        shape: Shape::Word(&["hold", "predict", "linear"]),
         default: "`\"hold\"`",
-        meaning: "what the observer sees between two rows: the latest row, as a live observer would, or the straight line to the next, which looks ahead one sample",
+        meaning: "what the observer sees between two rows: the latest row, as a live observer would; what the model makes of the latest reading (`w' = L_f h(x̂)`, the inter-sample predictor); or the straight line to the next, which looks ahead one sample",
     },
     KeySpec {
         name: "time",

@@ -3,6 +3,7 @@
 
 mod certify;
 mod families;
+mod filters;
 mod how_well;
 mod messages;
 mod observability;

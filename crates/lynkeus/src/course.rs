@@ -1,0 +1,61 @@
+//! What an observer makes of samples, whatever kind of observer it is.
+
+use lynkeus_run::Error as RunError;
+use lynkeus_run::filter::SensorHealth;
+
+/// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
+#[derive(Clone, Debug)]
+pub(crate) struct Samples<'a> {
+    pub time: &'a [f64],
+    /// one per measured output
+    pub readings: Vec<&'a [f64]>,
+    /// one per known input
+    pub inputs: Vec<&'a [f64]>,
+}
+
+impl Samples<'_> {
+    /// Values of row k, column by column.
+    pub fn row(columns: &[&[f64]], k: usize) -> Vec<f64> {
+        columns.iter().map(|c| c[k]).collect()
+    }
+
+    /// Whether a reading is missing somewhere.
+    pub fn have_gaps(&self) -> bool {
+        let mut all = self
+            .readings
+            .iter()
+            .chain(&self.inputs)
+            .flat_map(|c| c.iter());
+        all.any(|x| !x.is_finite())
+    }
+}
+
+/// The estimates of a run, and what is known of how good they are.
+#[derive(Debug, Default)]
+pub(crate) struct Course {
+    /// by estimate, then by row
+    pub estimates: Vec<Vec<f64>>,
+    /// by monitor, then by row
+    pub monitors: Vec<Vec<f64>>,
+    /// standard deviations of the estimates
+    pub deviations: Option<Vec<Vec<f64>>>,
+    /// estimates given later rows, too
+    pub smoothed: Option<Vec<Vec<f64>>>,
+    /// how readings and model went together, by sensor; none where it was not followed
+    pub sensors: Vec<SensorHealth>,
+    /// the same over the last half of the rows
+    pub late: Vec<SensorHealth>,
+    /// values of known inputs that were missing, where the last one held
+    pub inputs_held: usize,
+    /// what was chosen for the user
+    pub notes: Vec<String>,
+    /// why the run ended early, with the rows before
+    pub ended: Option<RunError>,
+}
+
+/// Adds a row to columns.
+pub(crate) fn add_row(columns: &mut [Vec<f64>], row: impl IntoIterator<Item = f64>) {
+    for (column, x) in columns.iter_mut().zip(row) {
+        column.push(x);
+    }
+}
