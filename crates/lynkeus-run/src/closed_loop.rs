@@ -1,7 +1,7 @@
 //! Inputs, plant, sensors and observer as one system.
 
 use crate::noise::Sensors;
-use crate::{Dynamics, Error, Evaluation, Simulation};
+use crate::{Dynamics, Error, Evaluation, Role, Simulation, Trajectory};
 
 /// Where a signal of the observer comes from.
 #[derive(Clone, Copy, Debug)]
@@ -10,6 +10,48 @@ enum Source {
     Sensor(usize),
     /// an input
     Input(usize),
+}
+
+/// What the signals of a system can come from.
+struct Sources<'a> {
+    sensors: &'a [String],
+    inputs: &'a [String],
+}
+
+impl Sources<'_> {
+    /// The input of a name.
+    fn input(&self, name: &str) -> Result<usize, Error> {
+        let found = places(self.inputs, name).collect::<Vec<_>>();
+        self.only("plant", name, &found)
+    }
+
+    /// The sensor or the input of a name.
+    fn any(&self, name: &str) -> Result<Source, Error> {
+        let sensors = places(self.sensors, name).map(Source::Sensor);
+        let inputs = places(self.inputs, name).map(Source::Input);
+        let found: Vec<Source> = sensors.chain(inputs).collect();
+        self.only("observer", name, &found)
+    }
+
+    fn only<T: Copy>(&self, reader: &'static str, name: &str, found: &[T]) -> Result<T, Error> {
+        match found {
+            [one] => Ok(*one),
+            [] => Err(Error::Unconnected {
+                reader,
+                name: name.to_owned(),
+                available: [self.sensors, self.inputs].concat().join(", "),
+            }),
+            _ => Err(Error::Ambiguous {
+                reader,
+                name: name.to_owned(),
+            }),
+        }
+    }
+}
+
+fn places<'a>(names: &'a [String], name: &'a str) -> impl Iterator<Item = usize> + 'a {
+    let named = names.iter().enumerate().filter(move |(_, n)| *n == name);
+    named.map(|(place, _)| place)
 }
 
 /// The joint system; its state is the plant's, then the observer's.
@@ -41,24 +83,13 @@ impl Loop {
                 available: "time alone".to_owned(),
             });
         }
-        let place = |names: &[String], name: &String| names.iter().position(|n| n == name);
-        let unconnected = |reader, name: &String| Error::Unconnected {
-            reader,
-            name: name.clone(),
-            available: [plant.outputs(), inputs.outputs()].concat().join(", "),
+        let sources = Sources {
+            sensors: plant.outputs(),
+            inputs: inputs.outputs(),
         };
-        let plant_wires = plant
-            .signals()
-            .iter()
-            .map(|name| place(inputs.outputs(), name).ok_or_else(|| unconnected("plant", name)));
+        let plant_wires = plant.signals().iter().map(|name| sources.input(name));
         let read = observer.as_ref().map_or(&[][..], |o| o.signals());
-        let observer_wires = read.iter().map(|name| {
-            let sensor = place(plant.outputs(), name).map(Source::Sensor);
-            let input = || place(inputs.outputs(), name).map(Source::Input);
-            sensor
-                .or_else(input)
-                .ok_or_else(|| unconnected("observer", name))
-        });
+        let observer_wires = read.iter().map(|name| sources.any(name));
         Ok(Self {
             plant_wires: plant_wires.collect::<Result<_, _>>()?,
             observer_wires: observer_wires.collect::<Result<_, _>>()?,
@@ -81,23 +112,21 @@ impl Loop {
         x
     }
 
-    /// Names of the recorded columns.
-    pub(crate) fn columns(&self) -> Vec<String> {
+    /// A table with the recorded columns.
+    pub(crate) fn table(&self) -> Trajectory {
         let plant = self.plant.system();
-        let mut names = [plant.states(), plant.signals()].concat();
+        let mut table = Trajectory::default()
+            .with(Role::State, plant.states())
+            .with(Role::Input, plant.signals());
         if self.record_outputs {
-            names.extend(plant.outputs().iter().cloned());
-            names.extend(
-                plant
-                    .outputs()
-                    .iter()
-                    .map(|name| format!("{name}_measured")),
-            );
+            table = table
+                .with(Role::Output, plant.outputs())
+                .with(Role::Measured, plant.outputs());
         }
-        if let Some(observer) = &self.observer {
-            names.extend(observer.system().estimates().iter().cloned());
+        match &self.observer {
+            Some(observer) => table.with(Role::Estimate, observer.system().estimates()),
+            None => table,
         }
-        names
     }
 
     /// Columns that are not estimates.
@@ -130,7 +159,7 @@ impl Loop {
         self.sensors.are_exact()
     }
 
-    /// Appends the recorded values at (t, x).
+    /// Appends the recorded values at (t, x), in the order of [`Loop::table`].
     pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
         let (plant_x, observer_x) = x.split_at(self.plant.dimension());
         self.connect(t, plant_x, true);

@@ -34,6 +34,15 @@ pub enum Error {
         available: String,
     },
 
+    /// A signal that a system reads could come from several places.
+    #[error("the {reader} reads '{name}', which two columns are called; rename one")]
+    Ambiguous {
+        /// the system that reads it
+        reader: &'static str,
+        /// name of the signal
+        name: String,
+    },
+
     /// The right-hand side or an output is NaN or infinite.
     #[error("at t = {time}: {operation}; the state there is {state}")]
     NotFinite {

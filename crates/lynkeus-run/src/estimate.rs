@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use crate::{Error, Estimator, EstimatorSettings, Interrupted, StepAdvice, System, Trajectory};
+use crate::{
+    Error, Estimator, EstimatorSettings, Interrupted, Role, StepAdvice, System, Trajectory,
+};
 
 /// Measured signals over strictly increasing, possibly uneven times.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +59,7 @@ impl Log {
         &self.times
     }
 
-    /// The values of one column.
+    /// The values of one column, the first of that name.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         let place = self.names.iter().position(|n| n == name)?;
         Some(&self.columns[place])
@@ -66,6 +68,13 @@ impl Log {
     /// The columns of the observer's signals, in their order.
     fn signals(&self, observer: &System) -> Result<Vec<&[f64]>, Error> {
         let column = |name: &String| {
+            let mut named = self.names.iter().filter(|n| *n == name);
+            if named.next().is_some() && named.next().is_some() {
+                return Err(Error::Ambiguous {
+                    reader: "observer",
+                    name: name.clone(),
+                });
+            }
             self.column(name).ok_or_else(|| Error::Unconnected {
                 reader: "observer",
                 name: name.clone(),
@@ -97,7 +106,7 @@ fn check_times(times: &[f64]) -> Result<(), Error> {
 /// The result of [`estimate`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimates {
-    /// the estimates at the log's times, columns as [`System::estimates`]
+    /// the estimates at the log's times, columns ([`Role::Estimate`]) as [`System::estimates`]
     pub trajectory: Trajectory,
     /// for fixed steps: the step in use beside the step that the observer needs
     pub advice: Option<StepAdvice>,
@@ -108,8 +117,8 @@ pub struct Estimates {
 /// values at the log's first time.
 ///
 /// # Errors
-/// With the rows made before: [`Error::Unconnected`] for a column that is
-/// missing, [`Error::NotANumber`] for a cell, and those of [`Estimator::push`].
+/// With the rows made before: [`Error::Unconnected`] or [`Error::Ambiguous`] for a column
+/// that is missing or there twice, [`Error::NotANumber`] for a cell, and those of [`Estimator::push`].
 pub fn estimate(
     observer: &System,
     log: &Log,
@@ -130,7 +139,7 @@ pub fn estimate_watched(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Estimates, Box<Interrupted>> {
     let mut result = Estimates {
-        trajectory: Trajectory::new(observer.estimates().to_vec()),
+        trajectory: Trajectory::default().with(Role::Estimate, observer.estimates()),
         advice: None,
     };
     match replay(observer, log, settings, watch, &mut result) {

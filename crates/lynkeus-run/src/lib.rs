@@ -7,7 +7,7 @@
 //!
 //! ```
 //! use lynkeus_expr::Graph;
-//! use lynkeus_run::{EstimatorSettings, Log, Simulation, System, estimate};
+//! use lynkeus_run::{EstimatorSettings, Log, Role, Simulation, System, estimate};
 //!
 //! let g = Graph::new();
 //! let [time, x, u, y, x̂] = ["time", "x", "u", "y", "x_hat"].map(|name| g.symbol(name));
@@ -31,12 +31,14 @@
 //! simulation.record_outputs = true;
 //! let table = simulation.run()?;
 //! let (_, last) = table.row(table.len() - 1).unwrap();
-//! assert_eq!(table.names(), ["x", "u", "y", "y_measured", "x_hat"]);
+//! let roles = [Role::State, Role::Input, Role::Output, Role::Measured, Role::Estimate];
+//! let names: Vec<&str> = roles.iter().flat_map(|role| table.names(*role)).collect();
+//! assert_eq!(names, ["x", "u", "y", "y", "x_hat"]);
 //! assert!((last[0] - last[4]).abs() < 1e-6);
 //!
 //! // the same observer on what was recorded
-//! let columns = ["u", "y"].map(|name| table.column(name).unwrap()).to_vec();
-//! let log = Log::new(vec!["u".into(), "y".into()], table.times().to_vec(), columns)?;
+//! let columns = [Role::Input, Role::Measured].map(|role| table.column(role.at(0)).unwrap().to_vec());
+//! let log = Log::new(vec!["u".into(), "y".into()], table.times().to_vec(), columns.to_vec())?;
 //! let estimates = estimate(&observer, &log, EstimatorSettings::default())?.trajectory;
 //! let (_, replayed) = estimates.row(estimates.len() - 1).unwrap();
 //! assert!((replayed[0] - last[0]).abs() < 0.02); // held samples lag behind
@@ -115,4 +117,4 @@ pub use simulate::Simulation;
 pub use spectral::spectral_radius;
 pub use spread::{ErrorModel, ErrorNoise};
 pub use system::{Evaluation, System};
-pub use trajectory::Trajectory;
+pub use trajectory::{Column, Role, Trajectory};

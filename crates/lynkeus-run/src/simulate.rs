@@ -14,8 +14,8 @@ const MOST_CELLS: f64 = 4e8;
 /// outputs.
 ///
 /// The plant and the observer are integrated as one system. The observer's
-/// signals are found by name: outputs of the plant (as measured, noise
-/// included), then inputs. The integration stops at every output point, at every
+/// signals are found by name among the outputs of the plant (as measured, noise
+/// included) and the inputs. The integration stops at every output point, at every
 /// noise sample, and at every instant where an expression of time jumps.
 #[derive(Clone, Debug)]
 pub struct Simulation {
@@ -36,7 +36,7 @@ pub struct Simulation {
     pub method: Method,
     /// noise on the plant's outputs
     pub noise: Noise,
-    /// also record the plant's outputs, exact (`y`) and as measured (`y_measured`)
+    /// also record the plant's outputs, exact and as measured
     pub record_outputs: bool,
 }
 
@@ -58,9 +58,12 @@ impl Simulation {
 
     /// Runs to the end.
     ///
-    /// The columns are the plant's states, its inputs, its outputs if recorded,
-    /// and the observer's outputs (its states if it has no outputs), each under
-    /// its name.
+    /// The columns are the plant's states, its inputs, its outputs if recorded
+    /// ([`Role::Output`], [`Role::Measured`]), and what the observer reports
+    /// ([`System::estimates`]), each in the order of its system.
+    ///
+    /// [`Role::Output`]: crate::Role::Output
+    /// [`Role::Measured`]: crate::Role::Measured
     ///
     /// # Errors
     /// With the rows made before: any of [`Error`]'s settings, integration and
@@ -160,7 +163,7 @@ impl<'a> Run<'a> {
         Ok(Self {
             intervals,
             integrator: Integrator::new(simulation.method, x.len())?,
-            table: Trajectory::new(system.columns()),
+            table: system.table(),
             row: vec![],
             bound: Bound::new(&x),
             sample_step,

@@ -1,38 +1,82 @@
 //! Tables of values over time.
 
-/// Named columns over time; runs add their rows, tables and pictures take the columns.
+/// What a column of a run holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// a state of the plant
+    State,
+    /// an input, as the plant has it
+    Input,
+    /// an output of the plant, exact
+    Output,
+    /// an output as its sensor shows it
+    Measured,
+    /// what an observer reports
+    Estimate,
+}
+
+impl Role {
+    /// The column of this role that is at `index`, from 0, in the order of its system.
+    pub const fn at(self, index: usize) -> Column {
+        Column { role: self, index }
+    }
+}
+
+/// Which column of a run: names are for people and may repeat, this is unique.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// what it holds
+    pub role: Role,
+    /// its place among the columns of that role, from 0
+    pub index: usize,
+}
+
+/// Columns over time, known by role and place; runs add their rows, tables and pictures take
+/// the columns.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    names: Vec<String>,
     times: Vec<f64>,
-    columns: Vec<Vec<f64>>,
+    series: Vec<Series>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Series {
+    column: Column,
+    name: String,
+    values: Vec<f64>,
 }
 
 impl Trajectory {
-    /// An empty table with these columns beside time.
-    pub fn new(names: Vec<String>) -> Self {
-        Self {
-            columns: vec![vec![]; names.len()],
-            names,
-            times: vec![],
-        }
+    /// The same table with further columns of a role, in the order of `names`; to be called
+    /// before the first row.
+    #[must_use]
+    pub fn with(mut self, role: Role, names: &[String]) -> Self {
+        let first = self.names(role).count();
+        let series = names.iter().zip(first..).map(|(name, index)| Series {
+            column: role.at(index),
+            name: name.clone(),
+            values: vec![],
+        });
+        self.series.extend(series);
+        self
     }
 
-    /// Adds a row.
+    /// Adds a row, its values in the order in which the columns were added.
     ///
     /// # Panics
     /// If `values` has not one entry per column.
     pub fn push(&mut self, time: f64, values: &[f64]) {
-        assert_eq!(values.len(), self.names.len(), "one value per column");
+        assert_eq!(values.len(), self.series.len(), "one value per column");
         self.times.push(time);
-        for (column, value) in self.columns.iter_mut().zip(values) {
-            column.push(*value);
+        for (series, value) in self.series.iter_mut().zip(values) {
+            series.values.push(*value);
         }
     }
 
-    /// Names of the columns, without time.
-    pub fn names(&self) -> &[String] {
-        &self.names
+    /// Names of the columns of a role, in order.
+    pub fn names(&self, role: Role) -> impl Iterator<Item = &str> {
+        let named = self.series.iter().filter(move |s| s.column.role == role);
+        named.map(|s| s.name.as_str())
     }
 
     /// Number of rows.
@@ -53,7 +97,7 @@ impl Trajectory {
     /// Time and values of row `index`.
     pub fn row(&self, index: usize) -> Option<(f64, Vec<f64>)> {
         let time = *self.times.get(index)?;
-        let values = self.columns.iter().map(|column| column[index]);
+        let values = self.series.iter().map(|series| series.values[index]);
         Some((time, values.collect()))
     }
 
@@ -62,10 +106,10 @@ impl Trajectory {
         (0..self.len()).filter_map(|index| self.row(index))
     }
 
-    /// The values of one column.
-    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let place = self.names.iter().position(|n| n == name)?;
-        Some(self.columns[place].clone())
+    /// The values of one column; none where the run has no such column.
+    pub fn column(&self, column: Column) -> Option<&[f64]> {
+        let mut found = self.series.iter().filter(|s| s.column == column);
+        found.next().map(|series| series.values.as_slice())
     }
 }
 
@@ -74,13 +118,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_are_found_by_name() {
-        let mut table = Trajectory::new(vec!["a".into(), "b".into()]);
-        table.push(0.0, &[1.0, 2.0]);
-        table.push(0.5, &[3.0, 4.0]);
-        assert_eq!(table.column("b"), Some(vec![2.0, 4.0]));
-        assert_eq!(table.column("c"), None);
-        assert_eq!(table.row(1), Some((0.5, vec![3.0, 4.0])));
+    fn columns_of_one_name_are_told_apart_by_role_and_place() {
+        let names = ["a".to_owned(), "a".to_owned()];
+        let mut table = Trajectory::default()
+            .with(Role::State, &names)
+            .with(Role::Estimate, &names[..1]);
+        table.push(0.0, &[1.0, 2.0, 3.0]);
+        table.push(0.5, &[4.0, 5.0, 6.0]);
+        assert_eq!(table.column(Role::State.at(1)), Some(&[2.0, 5.0][..]));
+        assert_eq!(table.column(Role::Estimate.at(0)), Some(&[3.0, 6.0][..]));
+        assert_eq!(table.column(Role::Estimate.at(1)), None);
+        assert_eq!(table.column(Role::Input.at(0)), None);
+        assert_eq!(table.names(Role::State).collect::<Vec<_>>(), ["a", "a"]);
+        assert_eq!(table.row(1), Some((0.5, vec![4.0, 5.0, 6.0])));
         assert_eq!(table.row(2), None);
     }
 

@@ -5,8 +5,8 @@ mod common;
 use common::system;
 use lynkeus_expr::Graph;
 use lynkeus_run::{
-    BetweenSamples, Error, Estimator, EstimatorSettings, Log, Method, Step, System, Tolerances,
-    estimate,
+    BetweenSamples, Error, Estimator, EstimatorSettings, Log, Method, Role, Step, System,
+    Tolerances, estimate,
 };
 
 const GAIN: f64 = 3.0;
@@ -74,7 +74,8 @@ fn uneven_logs_follow_the_closed_form() {
             let found = estimate(&observer(&g), &log(), settings)
                 .unwrap()
                 .trajectory;
-            assert_eq!(found.names(), ["x_hat", "twice"]);
+            let names: Vec<&str> = found.names(Role::Estimate).collect();
+            assert_eq!(names, ["x_hat", "twice"]);
             assert_eq!(found.times(), TIMES);
             for ((_, row), x) in found.rows().zip(closed_form(between)) {
                 let error = (row[0] - x).abs();
@@ -137,6 +138,24 @@ fn bad_cells_and_missing_columns_are_named() {
     assert!(error.to_string().contains("reads 'u'"), "{error}");
 }
 
+/// Of two columns of one name neither is taken; where nobody reads them they may be there.
+#[test]
+fn a_column_that_is_there_twice_is_refused_where_it_is_read() {
+    let g = Graph::new();
+    let with = |names: [&str; 4]| {
+        let names = names.map(String::from).to_vec();
+        let columns = vec![U.to_vec(), Y.to_vec(), U.to_vec(), Y.to_vec()];
+        let log = Log::new(names, TIMES.to_vec(), columns).unwrap();
+        estimate(&observer(&g), &log, EstimatorSettings::default())
+    };
+    let error = with(["u", "y", "z", "y"]).unwrap_err();
+    assert!(
+        matches!(&error.error, Error::Ambiguous { name, .. } if name == "y"),
+        "{error}"
+    );
+    assert!(with(["u", "y", "z", "z"]).is_ok());
+}
+
 #[test]
 fn a_step_that_is_too_large_is_blamed() {
     let g = Graph::new();
@@ -153,7 +172,12 @@ fn a_step_that_is_too_large_is_blamed() {
     assert!(matches!(error.error, Error::Diverged { .. }), "{error}");
     assert!(!error.partial.is_empty());
     let fine = estimate(&stiff, &log, with(Step::Auto)).unwrap();
-    let last = *fine.trajectory.column("x").unwrap().last().unwrap();
+    let last = *fine
+        .trajectory
+        .column(Role::Estimate.at(0))
+        .unwrap()
+        .last()
+        .unwrap();
     assert!((last - 1.0).abs() < 1e-9, "{last}");
     let advice = fine.advice.unwrap();
     assert!((advice.needed * 800.0 - 1.0).abs() < 0.01, "{advice:?}");

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use common::system;
 use lynkeus_expr::{Expr, Graph};
-use lynkeus_run::{Error, Level, Method, Noise, Simulation, Step, System, Tolerances};
+use lynkeus_run::{Error, Level, Method, Noise, Role, Simulation, Step, System, Tolerances};
 
 fn tight() -> Method {
     Method::Adaptive(Tolerances {
@@ -41,7 +41,7 @@ fn piecewise(times: &[f64], values: &[f64], until: f64) -> f64 {
 
 fn final_x(simulation: &Simulation) -> f64 {
     let table = simulation.run().expect("a simulation that ends");
-    let x = table.column("x").expect("the state");
+    let x = table.column(Role::State.at(0)).expect("the state");
     x[x.len() - 1]
 }
 
@@ -109,8 +109,15 @@ fn rows_show_the_input_from_the_right() {
         .run()
         .unwrap();
     assert_eq!(table.times(), [0.0, 0.25, 0.5, 0.75, 0.9]);
-    assert_eq!(table.column("u").unwrap(), [1.0, 1.0, 2.0, 2.0, 2.0]);
-    assert_eq!(table.names(), ["x", "u"]);
+    assert_eq!(
+        table.column(Role::Input.at(0)).unwrap(),
+        [1.0, 1.0, 2.0, 2.0, 2.0]
+    );
+    let names = |role| table.names(role).collect::<Vec<_>>();
+    assert_eq!(
+        (names(Role::State), names(Role::Input)),
+        (vec!["x"], vec!["u"])
+    );
 }
 
 /// The lag with an observer x̂' = 2(u − x̂) + 5(y − x̂).
@@ -129,11 +136,66 @@ fn an_observer_runs_along() {
     let mut simulation = observed(&g);
     simulation.method = tight();
     let table = simulation.run().unwrap();
-    let (x, x_hat) = (table.column("x").unwrap(), table.column("x_hat").unwrap());
+    let (x, x_hat) = (
+        table.column(Role::State.at(0)).unwrap(),
+        table.column(Role::Estimate.at(0)).unwrap(),
+    );
     for ((t, x), x_hat) in table.times().iter().zip(x).zip(x_hat) {
         // e' = −7e
         assert!((x_hat - x + 1.5 * (-7.0 * t).exp()).abs() < 1e-11);
     }
+}
+
+/// Whatever a state is called, it is neither the estimate nor the measurement.
+#[test]
+fn names_that_repeat_change_no_number() {
+    let g = Graph::new();
+    let run = |name: &str| {
+        let (x, u) = (g.symbol("x"), g.symbol("u"));
+        let mut simulation = observed(&g);
+        let states = [(name.to_string(), x.node(), 0.5)];
+        let signals = [("u".to_string(), u.node())];
+        let dx = ((u - x) * 2.0).node();
+        let outputs = [("y".to_string(), x.node())];
+        let time = g.symbol("time").node();
+        simulation.plant = System::new(&g, time, &states, &signals, &[dx], &outputs).unwrap();
+        simulation.record_outputs = true;
+        simulation.noise.levels = [("y".to_string(), Level::Absolute(0.3))].into();
+        simulation.run().unwrap()
+    };
+    let usual = run("x");
+    for name in ["x_hat", "y_measured", "y", "u", "t"] {
+        let renamed = run(name);
+        assert_eq!(
+            renamed.names(Role::State).collect::<Vec<_>>(),
+            [name],
+            "the name is the user's"
+        );
+        for role in [Role::State, Role::Input, Role::Output, Role::Measured] {
+            assert_eq!(renamed.column(role.at(0)), usual.column(role.at(0)));
+        }
+        let hat = Role::Estimate.at(0);
+        assert_eq!(renamed.column(hat), usual.column(hat), "{name}");
+    }
+}
+
+#[test]
+fn a_signal_that_two_columns_provide_is_refused() {
+    let g = Graph::new();
+    let mut simulation = observed(&g);
+    let x = g.symbol("x");
+    // the output is called as the input is
+    simulation.plant = system(
+        &g,
+        &[("x", 0.5, (g.symbol("u") - x) * 2.0)],
+        &["u"],
+        &[("y", x), ("u", x)],
+    );
+    let error = simulation.run().unwrap_err();
+    assert!(
+        matches!(&error.error, Error::Ambiguous { reader: "observer", name } if name == "u"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -150,11 +212,11 @@ fn noise_is_held_recorded_and_repeatable() {
     let table = simulation.run().unwrap();
     assert_eq!(table, simulation.run().unwrap());
     let (y, measured) = (
-        table.column("y").unwrap(),
-        table.column("y_measured").unwrap(),
+        table.column(Role::Output.at(0)).unwrap(),
+        table.column(Role::Measured.at(0)).unwrap(),
     );
-    let noise: Vec<f64> = measured.iter().zip(&y).map(|(m, y)| m - y).collect();
-    let x_hat = table.column("x_hat").unwrap();
+    let noise: Vec<f64> = measured.iter().zip(y).map(|(m, y)| m - y).collect();
+    let x_hat = table.column(Role::Estimate.at(0)).unwrap();
     let mut error = x_hat[0] - y[0];
     for k in 0..20 {
         if k % 2 == 0 {
@@ -213,7 +275,7 @@ fn an_undefined_operation_is_named_with_its_time_and_state() {
         assert!(
             error
                 .partial
-                .column("h")
+                .column(Role::State.at(0))
                 .unwrap()
                 .iter()
                 .all(|h| h.is_finite())
@@ -294,7 +356,10 @@ fn a_plant_may_have_no_states() {
     for method in [Method::default(), Method::Rk4(Step::Auto)] {
         simulation.method = method;
         let table = simulation.run().unwrap();
-        assert_eq!(table.column("y").unwrap(), [0.0, 0.5, 1.0, 1.5, 2.0]);
+        assert_eq!(
+            table.column(Role::Output.at(0)).unwrap(),
+            [0.0, 0.5, 1.0, 1.5, 2.0]
+        );
     }
 }
 

@@ -11,8 +11,10 @@ use crate::{Correction, Error, Study, correction, prepare, words};
 mod assumptions;
 mod json;
 mod print;
+mod strays;
 
 pub(crate) use json::certificate as certificate_json;
+pub use strays::Strays;
 
 /// The answer of `lynkeus certify`.
 #[derive(Debug)]
@@ -29,6 +31,8 @@ pub struct CertifyReport {
     pub correction: Correction,
     /// what both take for granted of disturbances and unknown inputs, in words
     pub assumed: Vec<String>,
+    /// where the study itself is not in the box of the proof
+    pub strays: Strays,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -117,6 +121,7 @@ impl<'a> Task<'a> {
             correction::of(self.study, self.prepared.plant(), place, &design.observer)?;
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
+            strays: Strays::of(&self.prepared, place, &design),
             design,
             certificate,
             theorem,
@@ -246,6 +251,12 @@ impl CertifyReport {
     pub fn is_contradiction(&self) -> bool {
         let theorem = self.theorem.as_ref().map(|theorem| theorem.verdict());
         self.certificate.verdict() == Standing::Refuted && theorem == Some(Standing::Proved)
+    }
+
+    /// Whether a certificate of this report is the theorem's.
+    fn is_theorem(&self, certificate: &Certificate) -> bool {
+        let theorem = self.theorem.as_ref();
+        theorem.is_some_and(|theorem| std::ptr::eq(theorem, certificate))
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

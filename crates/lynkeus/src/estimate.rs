@@ -6,11 +6,11 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
-use crate::filter::{self, Samples};
-use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::headers::time_of;
+use crate::outcome::{Raw, interrupted, measurements};
 use crate::prepare::Prepared;
 use crate::study::{BetweenSamples, EstimateSettings};
-use crate::systems::{self, hat, method};
+use crate::systems::{self, Reported, method};
 use crate::{Error, Outcome, Quantity, Study, Table, prepare};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
@@ -27,13 +27,12 @@ pub fn estimate(
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let design = prepared.design()?;
-    refuse_stray_columns(&plant, settings)?;
-    if design.observer.filter.is_some() {
-        return filtered(&prepared, design, table, watch);
-    }
     refuse_derivatives(study, &design)?;
     let observer = systems::observer(&plant, &design.observer)?;
-    let log = log(table, settings, &observer)?;
+    refuse_stray_columns(&plant, settings)?;
+    let read = observer.signals().iter().map(String::as_str);
+    let time = time_of(table, &plant, settings, read)?;
+    let log = log(table, &time, settings, &observer)?;
     let run = run_settings(settings);
     let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
@@ -53,79 +52,36 @@ pub fn estimate(
             advice.used, advice.needed
         ));
     }
-    let trajectory = &estimates.trajectory;
-    let logged = |name: &str| logged(table, settings, name);
-    let mut quantities = quantities(&design, &logged, &|name| trajectory.column(&hat(name)));
-    let measurements = measurements(&design, logged);
-    show_measurements(&plant, &measurements, &mut quantities);
-    let watches = watches(&design, trajectory);
-    notes.extend(alarms(&watches));
-    Ok(Outcome {
-        plant: plant.name.clone(),
-        time: trajectory.times().to_vec(),
-        design,
-        quantities,
-        measurements,
-        watches,
+    let run = &estimates.trajectory;
+    let reported = Reported::new(&design.observer, run);
+    let logged = |name: &str| logged(table, settings, &time, name);
+    let estimated = design.observer.estimates.iter().enumerate();
+    let estimated = estimated.map(|(i, e)| Quantity {
+        name: e.variable.name.clone(),
+        unit: e.variable.unit.clone(),
+        description: e.variable.description.clone(),
+        truth: logged(&e.variable.name),
+        estimate: reported.estimate(i).map(<[f64]>::to_vec),
+        unknown_input: e.unknown_input,
+        is_input: e.unknown_input,
+        ..Quantity::default()
+    });
+    let known = design.observer.inputs.iter().map(|signal| Quantity {
+        name: signal.name.clone(),
+        truth: logged(&signal.name),
+        is_input: true,
+        ..Quantity::default()
+    });
+    let raw = Raw {
+        time: run.times(),
+        quantities: estimated.chain(known).collect(),
+        measurements: measurements(&design, |signal| logged(&signal.name)),
         notes,
-    })
-}
-
-/// The same by a filter, which takes readings when they are there.
-fn filtered(
-    prepared: &Prepared<'_>,
-    design: Design,
-    table: &Table,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Outcome, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
-    let settings = &study.estimate;
-    let column = |name: &str| {
-        let header = header(settings, name);
-        match table.get(header) {
-            Some(values) => Ok(values),
-            // its error says what is missing
-            None => table.column(header),
-        }
-    };
-    let columns = |signals: &[lynkeus_observers::Signal]| {
-        let found = signals.iter().map(|s| column(&s.name));
-        found.collect::<Result<Vec<_>, Error>>()
-    };
-    let samples = Samples {
-        time: table.time(&settings.time)?,
-        readings: columns(&design.observer.measured)?,
-        inputs: columns(&design.observer.inputs)?,
-    };
-    let run = run_settings(settings);
-    let found = filter::run(study, prepared.extended(), &design, &samples, run, watch)?;
-    if let Some(error) = found.ended {
-        return Err(interrupted(error, table.file()));
-    }
-    let logged = |name: &str| logged(table, settings, name);
-    let mut quantities = quantities(&design, &logged, &|_| None);
-    let smoothed = |i: usize| {
-        let rows = found.smoothed.as_ref()?.iter();
-        Some(rows.map(|row| row.estimate[i]).collect())
-    };
-    for (i, quantity) in quantities.iter_mut().enumerate() {
-        quantity.estimate = Some(found.estimates[i].clone());
-        quantity.deviation = settings.deviations.then(|| found.deviations[i].clone());
-        quantity.smoothed = smoothed(i);
-    }
-    let measurements = measurements(&design, logged);
-    show_measurements(plant, &measurements, &mut quantities);
-    let mut notes = design.notes.clone();
-    notes.extend(found.notes);
-    Ok(Outcome {
-        plant: plant.name.clone(),
-        time: samples.time.to_vec(),
+        reported,
+        prepared: &prepared,
         design,
-        quantities,
-        measurements,
-        watches: vec![],
-        notes,
-    })
+    };
+    Ok(raw.finish())
 }
 
 /// The study's settings as the runner has them.
@@ -188,8 +144,13 @@ pub(crate) fn refuse_stray_columns(
     }
 }
 
-fn log(table: &Table, settings: &EstimateSettings, observer: &System) -> Result<Log, Error> {
-    let time = table.time(&settings.time)?.to_vec();
+fn log(
+    table: &Table,
+    time: &str,
+    settings: &EstimateSettings,
+    observer: &System,
+) -> Result<Log, Error> {
+    let time = table.time(time)?.to_vec();
     let names = observer.signals().to_vec();
     let column = |name: &String| Ok(table.column(header(settings, name))?.to_vec());
     let columns = names
@@ -199,32 +160,12 @@ fn log(table: &Table, settings: &EstimateSettings, observer: &System) -> Result<
     Log::new(names, time, columns).map_err(|error| Error::from_source(error).at(table.file()))
 }
 
-/// A column of the log, if it has one with numbers.
-fn logged(table: &Table, settings: &EstimateSettings, name: &str) -> Option<Vec<f64>> {
-    let values = table.get(header(settings, name))?;
+/// A column of the log, if it has one with numbers that is not the one of time.
+fn logged(table: &Table, settings: &EstimateSettings, time: &str, name: &str) -> Option<Vec<f64>> {
+    let header = header(settings, name);
+    let values = table.get(header).filter(|_| header != time)?;
     values
         .iter()
         .any(|x| x.is_finite())
         .then(|| values.to_vec())
-}
-
-/// Everything estimated, with its true value where the log happens to have it.
-fn quantities(
-    design: &Design,
-    logged: &dyn Fn(&str) -> Option<Vec<f64>>,
-    estimate: &dyn Fn(&str) -> Option<Vec<f64>>,
-) -> Vec<Quantity> {
-    let quantity = |e: &lynkeus_observers::Estimate| Quantity {
-        name: e.variable.name.clone(),
-        unit: e.variable.unit.clone(),
-        description: e.variable.description.clone(),
-        truth: logged(&e.variable.name),
-        measured: None,
-        estimate: estimate(&e.variable.name),
-        deviation: None,
-        smoothed: None,
-        unknown_input: e.unknown_input,
-        is_input: e.unknown_input,
-    };
-    design.observer.estimates.iter().map(quantity).collect()
 }

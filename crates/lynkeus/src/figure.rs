@@ -28,7 +28,7 @@ pub fn figure(
     panels.extend(outcome.watches.iter().map(|watch| Panel {
         caption: format!(
             "{} (alarm below {})",
-            watch.monitor.name, watch.monitor.alarm_below
+            watch.header, watch.monitor.alarm_below
         ),
         curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
     }));

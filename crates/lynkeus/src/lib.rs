@@ -57,6 +57,7 @@ mod certify;
 mod check;
 mod correction;
 mod course;
+mod credible;
 mod design;
 mod error;
 mod estimate;
@@ -64,8 +65,10 @@ mod estimate;
 mod figure;
 mod files;
 mod filter;
+mod headers;
 mod near;
 mod outcome;
+mod outside;
 #[cfg(feature = "plot")]
 pub mod plot;
 pub mod precision;
@@ -79,15 +82,17 @@ pub mod table;
 pub mod tune;
 mod words;
 
-pub use certify::{CertifyReport, certify};
+pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
 pub use correction::{Correction, GainEntry, InjectionEntry};
+pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use outcome::{Outcome, Quantity, Watch};
+pub use outside::{Excursion, Outside};
 pub use precision::precision;
 pub use simulate::simulate;
 pub use study::{Study, schema};

@@ -1,11 +1,16 @@
 //! What a simulation or a replay gives.
 
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Monitor};
-use lynkeus_run::{Error as RunError, Trajectory};
+use lynkeus_observers::{Design, Monitor, Signal};
+use lynkeus_run::Error as RunError;
 
-use crate::Error;
-use crate::systems::hat;
+use crate::credible::{self, Doubt};
+use crate::headers::{Headers, log_time};
+use crate::outside::{self, Outside, outside};
+use crate::prepare::Prepared;
+use crate::study::EstimateSettings;
+use crate::systems::{Reported, hat};
+use crate::{Error, estimate};
 
 /// One quantity of the result with everything that is known of it.
 #[derive(Clone, Debug, Default)]
@@ -22,10 +27,8 @@ pub struct Quantity {
     pub measured: Option<Vec<f64>>,
     /// what the observer makes of it
     pub estimate: Option<Vec<f64>>,
-    /// its standard deviation, where it is known
-    pub deviation: Option<Vec<f64>>,
-    /// the estimate given later rows, too
-    pub smoothed: Option<Vec<f64>>,
+    /// header of the estimate's column: `<name>_hat` unless the model has that name
+    pub estimate_header: String,
     /// an input that nobody measures
     pub unknown_input: bool,
     /// an input of the plant
@@ -49,6 +52,8 @@ impl Quantity {
 pub struct Watch {
     /// the monitor
     pub monitor: Monitor,
+    /// header of its column: the monitor's name unless the model has that name
+    pub header: String,
     /// its values
     pub values: Vec<f64>,
     /// first time at which it was below its alarm
@@ -64,21 +69,32 @@ pub struct Outcome {
     pub design: Design,
     /// times of the rows
     pub time: Vec<f64>,
+    /// header of their column: `t` unless the model has that name
+    pub time_header: String,
+    /// header of the column of times in a log
+    log_time: String,
     /// every state, input and measured output
     pub quantities: Vec<Quantity>,
     /// the measured outputs by name, noise included, where they are known
     pub measurements: Vec<(String, Vec<f64>)>,
     /// the observer's monitors
     pub watches: Vec<Watch>,
+    /// where the plant, as far as it is known, leaves the box of the study
+    pub plant_outside: Option<Outside>,
+    /// where the estimate leaves it
+    pub estimate_outside: Option<Outside>,
+    /// the estimates that are not credible
+    pub doubts: Vec<Doubt>,
     /// what the user should know
     pub notes: Vec<String>,
 }
 
 impl Outcome {
     /// The columns of the CSV: `t`; true states and inputs where they were
-    /// simulated; `<name>_hat` for everything estimated; monitors.
+    /// simulated; `<name>_hat` for everything estimated; monitors. No two have the same
+    /// header: what the model calls so itself keeps its name, and the others give way.
     pub fn columns(&self, with_truth: bool) -> Vec<(String, &[f64])> {
-        let mut columns: Vec<(String, &[f64])> = vec![("t".to_owned(), &self.time)];
+        let mut columns: Vec<(String, &[f64])> = vec![(self.time_header.clone(), &self.time)];
         for quantity in self.quantities.iter().filter(|_| with_truth) {
             if let Some(truth) = &quantity.truth {
                 columns.push((quantity.name.clone(), truth));
@@ -86,52 +102,147 @@ impl Outcome {
         }
         for quantity in &self.quantities {
             if let Some(estimate) = &quantity.estimate {
-                columns.push((hat(&quantity.name), estimate));
+                columns.push((quantity.estimate_header.clone(), estimate));
             }
         }
-        let extras = |of: fn(&Quantity) -> &Option<Vec<f64>>, ending: &str| {
-            let found = self
-                .quantities
-                .iter()
-                .filter_map(move |q| Some((&q.name, of(q).as_ref()?)));
-            found
-                .map(|(name, values)| (format!("{name}_{ending}"), &values[..]))
-                .collect::<Vec<_>>()
-        };
-        columns.extend(extras(|q| &q.deviation, "sd"));
-        columns.extend(extras(|q| &q.smoothed, "smooth"));
         let watches = self.watches.iter();
-        columns.extend(watches.map(|w| (w.monitor.name.clone(), &w.values[..])));
+        columns.extend(watches.map(|w| (w.header.clone(), &w.values[..])));
         columns
+    }
+
+    /// What a logger would have seen: time, the measured outputs and the inputs, under the
+    /// headers under which [`estimate()`](crate::estimate()) looks for them.
+    ///
+    /// # Errors
+    /// The study's `[estimate]` gives two of them the same header.
+    pub fn log(&self, settings: &EstimateSettings) -> Result<Vec<(String, &[f64])>, Error> {
+        let header = |name: &str| estimate::header(settings, name).to_owned();
+        let inputs = self.quantities.iter().filter(|q| q.is_input);
+        let inputs = inputs.filter_map(|q| Some((&q.name, &q.truth.as_ref()?[..])));
+        let measured = self.measurements.iter().map(|(n, values)| (n, &values[..]));
+        let mut columns = vec![(self.log_time.clone(), &self.time[..])];
+        for (name, values) in measured.chain(inputs) {
+            let header = header(name);
+            if columns.iter().any(|(known, _)| *known == header) {
+                return Err(Error::input(format!(
+                    "the log would have two columns \"{header}\", and \"{name}\" is one of them"
+                ))
+                .hint("give each a header of its own: `time` and `columns` of [estimate]"));
+            }
+            columns.push((header, values));
+        }
+        Ok(columns)
+    }
+
+    /// The answer "no" where an estimate is not credible: it ends far outside of what the model
+    /// declares, and not because the plant is there.
+    pub fn refusal(&self) -> Option<Error> {
+        credible::refusal(&self.doubts)
+    }
+}
+
+/// A run before its columns have headers.
+pub(crate) struct Raw<'r> {
+    pub prepared: &'r Prepared<'r>,
+    pub design: Design,
+    /// times of the rows
+    pub time: &'r [f64],
+    pub reported: Reported<'r>,
+    pub quantities: Vec<Quantity>,
+    pub measurements: Vec<(String, Vec<f64>)>,
+    pub notes: Vec<String>,
+}
+
+impl Raw<'_> {
+    /// The outcome: headers, alarms, and what is to be said of it.
+    pub fn finish(self) -> Outcome {
+        let Self {
+            prepared,
+            design,
+            time,
+            mut quantities,
+            measurements,
+            mut notes,
+            ..
+        } = self;
+        let plant = prepared.plant();
+        let mut headers = Headers::beside(plant);
+        let time_header = headers.time();
+        for quantity in quantities.iter_mut().filter(|q| q.estimate.is_some()) {
+            let what = format!("the estimate of {}", quantity.name);
+            quantity.estimate_header = headers.free(&hat(&quantity.name), &what);
+        }
+        let watches = watches(&design, &self.reported, time, &mut headers);
+        show_measurements(plant, &measurements, &mut quantities);
+        let sides = outside::sides(prepared.extended());
+        let itself = outside::time_itself(time);
+        let all = || quantities.iter().chain([&itself]);
+        let plant_outside = outside(time, all(), outside::PLANT, &sides);
+        let estimate_outside = outside(time, all(), outside::ESTIMATE, &sides);
+        notes.extend(headers.notes);
+        notes.extend(alarms(&watches));
+        let left = [("plant", &plant_outside), ("estimate", &estimate_outside)];
+        notes.extend(left.iter().filter_map(|(who, outside)| {
+            let words = outside.as_ref()?.words();
+            Some(format!(
+                "the {who} is outside of the declared box {words}: nothing is proved there"
+            ))
+        }));
+        Outcome {
+            plant: plant.name.clone(),
+            log_time: log_time(plant, &prepared.study().estimate),
+            doubts: credible::doubts(plant, &quantities),
+            time: time.to_vec(),
+            time_header,
+            design,
+            quantities,
+            measurements,
+            watches,
+            plant_outside,
+            estimate_outside,
+            notes,
+        }
     }
 }
 
 /// The observer's monitors as they went.
-pub(crate) fn watches(design: &Design, trajectory: &Trajectory) -> Vec<Watch> {
-    let watch = |monitor: &Monitor| {
-        let values = trajectory.column(&monitor.name).unwrap_or_default();
+fn watches(
+    design: &Design,
+    reported: &Reported<'_>,
+    time: &[f64],
+    headers: &mut Headers,
+) -> Vec<Watch> {
+    let watch = |(i, monitor): (usize, &Monitor)| {
+        let values = reported.monitor(i).unwrap_or_default().to_vec();
         let low = values.iter().position(|x| *x < monitor.alarm_below);
-        let alarm = low.and_then(|row| trajectory.times().get(row).copied());
+        let what = format!("the monitor {}", monitor.name);
         Watch {
+            alarm: low.and_then(|row| time.get(row).copied()),
+            header: headers.free(&monitor.name, &what),
             monitor: monitor.clone(),
             values,
-            alarm,
         }
     };
-    design.observer.monitors.iter().map(watch).collect()
+    design
+        .observer
+        .monitors
+        .iter()
+        .enumerate()
+        .map(watch)
+        .collect()
 }
 
 /// Alarms in words.
-pub(crate) fn alarms(watches: &[Watch]) -> Vec<String> {
+fn alarms(watches: &[Watch]) -> Vec<String> {
     let raised = watches.iter().filter_map(|w| Some((w, w.alarm?)));
     raised
         .map(|(w, t)| {
             let Monitor {
-                name,
                 alarm_below,
                 meaning,
                 ..
             } = &w.monitor;
+            let name = &w.header;
             format!("{meaning}: {name} fell below {alarm_below} first at t = {t}")
         })
         .collect()
@@ -153,17 +264,17 @@ pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
 /// The measured outputs of which `values` knows the values.
 pub(crate) fn measurements(
     design: &Design,
-    values: impl Fn(&str) -> Option<Vec<f64>>,
+    values: impl Fn(&Signal) -> Option<Vec<f64>>,
 ) -> Vec<(String, Vec<f64>)> {
     let measured = design.observer.measured.iter();
     measured
-        .filter_map(|signal| Some((signal.name.clone(), values(&signal.name)?)))
+        .filter_map(|signal| Some((signal.name.clone(), values(signal)?)))
         .collect()
 }
 
 /// Puts each measurement beside the state it shows; one that shows none becomes
 /// a quantity of its own.
-pub(crate) fn show_measurements(
+fn show_measurements(
     plant: &Plant,
     measurements: &[(String, Vec<f64>)],
     quantities: &mut Vec<Quantity>,

@@ -5,12 +5,12 @@ use std::ops::ControlFlow;
 
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
-use lynkeus_run::{Level, Simulation, Trajectory};
+use lynkeus_run::{Level, Role, Simulation, Trajectory};
 
-use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::outcome::{Raw, interrupted, measurements};
 use crate::prepare::Prepared;
 use crate::study::{Noise, SimulateSettings};
-use crate::systems::{self, hat, method};
+use crate::systems::{self, Reported, method};
 use crate::{Error, Outcome, Quantity, Study, prepare};
 
 /// Rows of a result whose study does not say how many.
@@ -25,18 +25,28 @@ pub fn simulate(
     study: &Study,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let settings = settings(study)?;
+    settings(study)?;
     let plant = prepare::plant(study)?;
-    let design = Prepared::new(study, &plant)?.design()?;
+    simulated(&Prepared::new(study, &plant)?, watch)
+}
+
+/// The same of a study that is prepared.
+pub(crate) fn simulated(
+    prepared: &Prepared<'_>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let settings = settings(study)?;
+    let design = prepared.design()?;
     let simulation = Simulation {
-        observer: Some(systems::observer(&plant, &design.observer)?),
-        inputs: systems::inputs(study, &plant, settings, &design.observer)?,
-        ..open_loop(study, settings, &plant)?
+        observer: Some(systems::observer(plant, &design.observer)?),
+        inputs: systems::inputs(study, plant, settings, &design.observer)?,
+        ..open_loop(study, settings, plant)?
     };
-    let trajectory = simulation
+    let run = simulation
         .run_watched(watch)
         .map_err(|error| interrupted(error.error, &study.file))?;
-    Ok(outcome(&plant, design, &trajectory))
+    Ok(outcome(prepared, design, &run))
 }
 
 /// The study's `[simulate]`.
@@ -99,48 +109,41 @@ fn noise(
     })
 }
 
-fn outcome(plant: &Plant, design: Design, trajectory: &Trajectory) -> Outcome {
-    let column = |name: &str| trajectory.column(name);
-    let quantity = |variable: &Variable| Quantity {
-        name: variable.name.clone(),
-        unit: variable.unit.clone(),
-        description: variable.description.clone(),
-        truth: column(&variable.name),
-        measured: None,
-        estimate: column(&hat(&variable.name)),
-        deviation: None,
-        smoothed: None,
-        unknown_input: design
-            .observer
-            .estimates
-            .iter()
-            .any(|e| e.unknown_input && e.variable.name == variable.name),
-        is_input: plant.inputs.iter().any(|i| i.name == variable.name),
+fn outcome(prepared: &Prepared<'_>, design: Design, run: &Trajectory) -> Outcome {
+    let plant = prepared.plant();
+    let reported = Reported::new(&design.observer, run);
+    let quantity = |variable: &Variable, role: Role, place: usize| {
+        let estimates = &design.observer.estimates;
+        let own = |e: &lynkeus_observers::Estimate| e.variable.node == variable.node;
+        let estimated = estimates.iter().position(own);
+        Quantity {
+            name: variable.name.clone(),
+            unit: variable.unit.clone(),
+            description: variable.description.clone(),
+            truth: run.column(role.at(place)).map(<[f64]>::to_vec),
+            estimate: estimated.and_then(|i| Some(reported.estimate(i)?.to_vec())),
+            unknown_input: estimated.is_some_and(|i| estimates[i].unknown_input),
+            is_input: role == Role::Input,
+            ..Quantity::default()
+        }
     };
-    let mut quantities: Vec<Quantity> = plant
-        .states
-        .iter()
-        .chain(&plant.inputs)
-        .map(quantity)
-        .collect();
-    let measurements = measurements(&design, |name| {
-        column(&format!("{name}_measured")).or_else(|| column(name))
-    });
-    show_measurements(plant, &measurements, &mut quantities);
-    let watches = watches(&design, trajectory);
-    let notes = design
-        .notes
-        .iter()
-        .cloned()
-        .chain(alarms(&watches))
-        .collect();
-    Outcome {
-        plant: plant.name.clone(),
-        time: trajectory.times().to_vec(),
+    let states = plant.states.iter().enumerate();
+    let states = states.map(|(i, v)| quantity(v, Role::State, i));
+    let inputs = plant.inputs.iter().enumerate();
+    let inputs = inputs.map(|(i, v)| quantity(v, Role::Input, i));
+    let measured = |signal: &lynkeus_observers::Signal| {
+        let output = systems::output_of(plant, signal)?;
+        let values = run.column(Role::Measured.at(output))?;
+        Some(values.to_vec())
+    };
+    Raw {
+        time: run.times(),
+        quantities: states.chain(inputs).collect(),
+        measurements: measurements(&design, measured),
+        notes: design.notes.clone(),
+        reported,
+        prepared,
         design,
-        quantities,
-        measurements,
-        watches,
-        notes,
     }
+    .finish()
 }

@@ -2,15 +2,58 @@
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
-use lynkeus_observers::Observer;
-use lynkeus_run::{Method, Step, System, Tolerances};
+use lynkeus_observers::{Observer, Signal};
+use lynkeus_run::{Column, Method, Role, Step, System, Tolerances, Trajectory};
 
 use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
 
-/// The column of an estimate.
+/// What the column of an estimate is called, where the model has not that name itself.
 pub(crate) fn hat(name: &str) -> String {
     format!("{name}_hat")
+}
+
+/// The column of a run that holds a state, an input or an output of the plant, by its node.
+pub(crate) fn column_of(plant: &Plant, variable: &Variable) -> Option<Column> {
+    let among = |variables: &[Variable], role: Role| {
+        let place = variables.iter().position(|v| v.node == variable.node);
+        place.map(|place| role.at(place))
+    };
+    among(&plant.states, Role::State)
+        .or_else(|| among(&plant.inputs, Role::Input))
+        .or_else(|| among(&plant.outputs, Role::Output))
+}
+
+/// The place among the plant's outputs of the one that a signal measures.
+pub(crate) fn output_of(plant: &Plant, signal: &Signal) -> Option<usize> {
+    plant.outputs.iter().position(|o| o.name == signal.name)
+}
+
+/// What an observer, made by [`observer`], reported in a run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reported<'r> {
+    run: &'r Trajectory,
+    estimates: usize,
+}
+
+impl<'r> Reported<'r> {
+    pub fn new(observer: &Observer, run: &'r Trajectory) -> Self {
+        Self {
+            run,
+            estimates: observer.estimates.len(),
+        }
+    }
+
+    /// The course of an estimate, by its place among the observer's.
+    pub fn estimate(&self, place: usize) -> Option<&'r [f64]> {
+        let is_one = place < self.estimates;
+        is_one.then(|| self.run.column(Role::Estimate.at(place)))?
+    }
+
+    /// The course of a monitor, by its place among the observer's.
+    pub fn monitor(&self, place: usize) -> Option<&'r [f64]> {
+        self.run.column(Role::Estimate.at(self.estimates + place))
+    }
 }
 
 /// An observer as a system that can be run: its signals are the measured outputs,

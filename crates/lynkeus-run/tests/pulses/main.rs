@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use common::system;
 use lynkeus_expr::{Expr, Graph};
-use lynkeus_run::{Error, Method, Simulation, Step, Tolerances};
+use lynkeus_run::{Error, Method, Role, Simulation, Step, Tolerances};
 
 /// ∫u dt from 0 to `until`, in rows of `output_step`.
 fn integral(
@@ -26,7 +26,7 @@ fn integral(
     let mut simulation = Simulation::new(plant, inputs, until, output_step);
     simulation.method = method;
     let table = simulation.run().map_err(|interrupted| interrupted.error)?;
-    let x = table.column("x").expect("the state");
+    let x = table.column(Role::State.at(0)).expect("the state");
     Ok(x[x.len() - 1])
 }
 

@@ -25,7 +25,10 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     let mut object = summary(&best);
     object["verdict"] = json!(report.verdict().word());
     object["hypotheses"] = json!(hypotheses);
+    object["outside_box"] = report.strays.to_json();
     let notes = report.theorem.iter().flat_map(|t| &t.notes);
+    let strays = report.strays.words(false);
+    let strays = strays.map(|words| format!("the certificate is for the box only, and {words}"));
     object["notes"] = json!(
         report
             .certificate
@@ -33,6 +36,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
             .iter()
             .chain(notes)
             .chain(&report.assumed)
+            .chain(&strays)
             .collect::<Vec<_>>()
     );
     if let Some(theorem) = &report.theorem {

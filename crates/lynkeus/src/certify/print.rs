@@ -25,24 +25,51 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .collect();
     writeln!(f, "box: {}", abbreviated(&sides))?;
     writeln!(f)?;
-    let verdict = report.certificate.verdict().word();
-    certificate(f, report, &report.certificate, verdict)?;
+    certificate(
+        f,
+        report,
+        &report.certificate,
+        word(report, &report.certificate),
+    )?;
     if let Some(theorem) = &report.theorem {
         writeln!(f)?;
         // the observer may converge all the same
         let verdict = match theorem.verdict() {
             Standing::Refuted => "does not apply",
-            verdict => verdict.word(),
+            _ => word(report, theorem),
         };
         certificate(f, report, theorem, verdict)?;
     }
-    if !report.assumed.is_empty() {
+    // where something is proved, the first line says it
+    let strays = report.strays.words(false).filter(|_| !report.is_proved());
+    let strays = strays.map(|words| format!("the study leaves the box: {words}"));
+    let unseen = report.strays.failure.iter();
+    let unseen = unseen.map(|why| {
+        format!("whether the study stays in the box is not known, its run failed: {why}")
+    });
+    let notes: Vec<String> = report
+        .assumed
+        .iter()
+        .cloned()
+        .chain(strays)
+        .chain(unseen)
+        .collect();
+    if !notes.is_empty() {
         writeln!(f)?;
     }
-    for note in &report.assumed {
+    for note in &notes {
         writeln!(f, "note: {note}")?;
     }
     Ok(())
+}
+
+/// The verdict in a word or two: never "proved" alone where the study is not in the box.
+fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
+    let strays = |certificate| report.strays.words(report.is_theorem(certificate));
+    match certificate.verdict() {
+        Standing::Proved if strays(certificate).is_some() => "proved inside the box",
+        verdict => verdict.word(),
+    }
 }
 
 pub(super) fn conclusion(report: &CertifyReport) -> String {
@@ -53,14 +80,25 @@ pub(super) fn conclusion(report: &CertifyReport) -> String {
     match (report.verdict(), best.rate) {
         (Standing::Proved, Some(rate)) => {
             format!(
-                "proved: the error decays at {} or faster{}",
+                "proved: the error decays at {} or faster{}{}",
                 number(rate),
-                left(report, best)
+                left(report, best),
+                inside_only(report)
             )
         }
-        (Standing::Proved, None) => "proved: the error decays".to_owned(),
+        (Standing::Proved, None) => {
+            format!("proved: the error decays{}", inside_only(report))
+        }
         (Standing::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
         (Standing::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
+    }
+}
+
+/// What a proof is worth for a study that is not in its box.
+fn inside_only(report: &CertifyReport) -> String {
+    match report.strays.words(report.is_theorem(report.best())) {
+        Some(words) => format!("; but only inside the box, and {words}"),
+        None => String::new(),
     }
 }
 

@@ -77,7 +77,8 @@ pub(super) fn simulate(
     let outcome = lynkeus::simulate(study, &mut progress.watch())?;
     progress.finish();
     if let Some(path) = log {
-        output::write_table(path, &logged(&outcome))?;
+        let columns = outcome.log(&study.estimate);
+        output::write_table(path, &columns.map_err(|e| e.at(&study.file))?)?;
     }
     finish(study, output, &outcome, true)
 }
@@ -88,20 +89,6 @@ pub(super) fn estimate(study: &Study, log: &Path, output: &Output) -> Result<Exi
     let outcome = lynkeus::estimate(study, &table, &mut progress.watch())?;
     progress.finish();
     finish(study, output, &outcome, false)
-}
-
-/// `t`, the measured outputs and the inputs.
-fn logged(outcome: &Outcome) -> Vec<(String, &[f64])> {
-    let mut columns: Vec<(String, &[f64])> = vec![("t".to_owned(), &outcome.time)];
-    columns.extend(
-        outcome
-            .measurements
-            .iter()
-            .map(|(name, values)| (name.clone(), &values[..])),
-    );
-    let inputs = outcome.quantities.iter().filter(|q| q.is_input);
-    columns.extend(inputs.filter_map(|q| Some((q.name.clone(), &q.truth.as_ref()?[..]))));
-    columns
 }
 
 /// Everything is computed before the first file is written.
@@ -136,7 +123,13 @@ fn finish(
     if output.json && !to_stdout {
         print(&format!("{:#}\n", summary(outcome, &columns)))?;
     }
-    Ok(ExitCode::SUCCESS)
+    match outcome.refusal() {
+        None => Ok(ExitCode::SUCCESS),
+        Some(refusal) => {
+            output::complain(&refusal);
+            Ok(ExitCode::from(1))
+        }
+    }
 }
 
 fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
@@ -151,10 +144,16 @@ fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
             .map(|(state, k)| (state.clone(), json!(k)));
         (gain.output.clone(), object(entries.collect()))
     });
-    let watches = outcome
-        .watches
-        .iter()
-        .map(|w| (w.monitor.name.clone(), json!({ "alarm_at": w.alarm })));
+    let watches = outcome.watches.iter().map(|w| {
+        let entry = json!({ "alarm_at": w.alarm, "column": w.header });
+        (w.monitor.name.clone(), entry)
+    });
+    let headers = estimated().map(|q| (q.name.clone(), json!(q.estimate_header)));
+    let doubts = outcome.doubts.iter().map(|d| {
+        let entry = json!({ "rows": d.rows, "widths": d.widths });
+        (d.name.clone(), entry)
+    });
+    let outside = |outside: &Option<lynkeus::Outside>| json!(outside.as_ref().map(|o| o.to_json()));
     json!({
         "plant": outcome.plant,
         "family": outcome.design.observer.family,
@@ -162,9 +161,16 @@ fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
         "gains": object(gains.collect()),
         "rows": outcome.time.len(),
         "columns": columns.iter().map(|(name, _)| name).collect::<Vec<_>>(),
+        "estimates": object(headers.collect()),
         "final": object(estimated().map(|q| (q.name.clone(), last(q))).collect()),
         "rms_error_last_half": object(estimated().filter_map(settled).collect()),
         "monitors": object(watches.collect()),
+        "outside_box": {
+            "plant": outside(&outcome.plant_outside),
+            "estimate": outside(&outcome.estimate_outside),
+        },
+        "credible": outcome.doubts.is_empty(),
+        "doubts": object(doubts.collect()),
         "notes": outcome.notes,
     })
 }

@@ -43,7 +43,7 @@ impl<'p> Setup<'p> {
         let trajectory = run
             .run()
             .map_err(|error| interrupted(error.error, &study.file))?;
-        let reach = Reach { trajectory };
+        let reach = Reach { plant, trajectory };
         let measured: Vec<Variable> = extended
             .outputs
             .iter()
@@ -123,14 +123,17 @@ fn candidates(plant: &Plant, measured: &[Variable], asked: Option<Candidates>) -
 }
 
 /// How far values go along the run.
-struct Reach {
+struct Reach<'p> {
+    plant: &'p Plant,
     trajectory: Trajectory,
 }
 
-impl Reach {
-    /// The greatest magnitude.
-    fn magnitude(&self, name: &str) -> f64 {
-        let values = self.trajectory.column(name).unwrap_or_default();
+impl Reach<'_> {
+    /// The greatest magnitude of a state, an input or an output.
+    fn magnitude(&self, variable: &Variable) -> f64 {
+        let column = systems::column_of(self.plant, variable);
+        let values = column.and_then(|column| self.trajectory.column(column));
+        let values = values.unwrap_or_default();
         values.iter().map(|v| v.abs()).fold(0.0, f64::max)
     }
 
@@ -140,7 +143,7 @@ impl Reach {
         if range.is_finite() && range > 0.0 {
             return range;
         }
-        match self.magnitude(&variable.name) {
+        match self.magnitude(variable) {
             0.0 => 1.0,
             magnitude => magnitude,
         }
@@ -156,7 +159,7 @@ fn deviation_of_uniform(bound: f64) -> f64 {
 struct Sensors<'a> {
     study: &'a Study,
     states: &'a [Variable],
-    reach: &'a Reach,
+    reach: &'a Reach<'a>,
     /// of a sensor that the study says nothing of
     usual: Noise,
 }
@@ -168,7 +171,7 @@ impl<'a> Sensors<'a> {
         study: &'a Study,
         extended: &'a Extended<'_>,
         measured: &[Variable],
-        reach: &'a Reach,
+        reach: &'a Reach<'a>,
     ) -> Self {
         let mut sensors = Self {
             study,
@@ -231,7 +234,7 @@ impl<'a> Sensors<'a> {
                 (Deviation::Absolute(deviation), words)
             }
             Noise::Relative(share) => {
-                let greatest = match self.reach.magnitude(&variable.name) {
+                let greatest = match self.reach.magnitude(variable) {
                     0.0 => self.scale(variable),
                     magnitude => magnitude,
                 };

@@ -4,6 +4,7 @@ use lynkeus_observability::precision::{Advice, SensorSet};
 use serde_json::{Map, Value, json};
 
 use super::Report;
+use crate::headers::Headers;
 
 impl Report {
     /// The report as one JSON object; what is not seen is `null`.
@@ -51,7 +52,7 @@ impl Report {
 
     fn over_horizon(&self) -> Value {
         let mut object = Map::new();
-        object.insert("horizon".into(), json!(self.horizons));
+        object.insert(self.horizon_header(), json!(self.horizons));
         for (i, name) in self.names.iter().enumerate() {
             let values = self.deviations.iter().map(|d| finite(d.present[i]));
             object.insert(name.clone(), values.collect());
@@ -81,11 +82,17 @@ impl Report {
         })
     }
 
-    /// `horizon`, then the present standard error of every quantity at it.
+    /// `horizon`, unless a quantity is called so.
+    fn horizon_header(&self) -> String {
+        Headers::beside_names(self.names.iter().cloned()).free("horizon", "the horizon")
+    }
+
+    /// `horizon` (`horizon_2` where a quantity is called so), then the present standard error
+    /// of every quantity at it.
     pub fn columns(&self) -> Vec<(String, Vec<f64>)> {
         let curve = |i: usize| self.deviations.iter().map(|d| d.present[i]).collect();
         let curves = self.names.iter().enumerate();
-        std::iter::once(("horizon".to_owned(), self.horizons.clone()))
+        std::iter::once((self.horizon_header(), self.horizons.clone()))
             .chain(curves.map(|(i, name)| (name.clone(), curve(i))))
             .collect()
     }

@@ -7,14 +7,15 @@ use super::simulate::{self, Method};
 use crate::Error;
 
 /// How a log is replayed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EstimateSettings {
     /// What the observer sees between two rows of the log.
     pub between_samples: BetweenSamples,
     /// The integrator and its steps or tolerances.
     pub method: Method,
-    /// The header of the time column.
-    pub time: String,
+    /// The header of the time column; `None` is `t`, or `time` where an output or an input of the
+    /// plant is called `t` in the log.
+    pub time: Option<String>,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
     /// Estimates given later rows, too.
@@ -44,22 +45,8 @@ pub enum BetweenSamples {
     Linear,
 }
 
-impl Default for EstimateSettings {
-    fn default() -> Self {
-        Self {
-            between_samples: BetweenSamples::default(),
-            method: Method::default(),
-            time: "t".to_owned(),
-            columns: Vec::new(),
-            smoothing: None,
-            deviations: false,
-        }
-    }
-}
-
 pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
     let mut section = entry.section("[estimate]", &[&ESTIMATE[..], &INTEGRATOR].concat())?;
-    let defaults = EstimateSettings::default();
     let smooth = section
         .optional("smooth", Entry::boolean)?
         .unwrap_or_default();
@@ -81,9 +68,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
             (None, false) => None,
         },
         deviations: section.optional("sd", Entry::boolean)?.unwrap_or_default(),
-        time: section
-            .optional("time", Entry::name)?
-            .map_or(defaults.time, |name| name.text),
+        time: section.optional("time", Entry::name)?.map(|name| name.text),
         columns: match section.take("columns") {
             None => Vec::new(),
             Some(table) => table

@@ -342,7 +342,7 @@ pub(super) const ESTIMATE: [KeySpec; 6] = [
         name: "time",
         kind: "text",
         shape: Shape::Text,
-        default: "`\"t\"`",
+        default: "`\"t\"`; `\"time\"` where the log has an output or an input called `t`",
         meaning: "header of the log's time column",
     },
     KeySpec {

@@ -8,20 +8,25 @@ use lynkeus_observers::{Monitor, Observer, Signal};
 
 use super::speed::transparent;
 use crate::study::TuneSettings;
+use crate::systems::Reported;
 use crate::{Error, Study};
 
-/// The signal that is above zero where the measurements are held out.
+/// The signal that is above zero where the measurements are held out; no name in a model's text
+/// has a blank, unless it is in quotes.
 pub(super) const HELD_OUT: &str = "held out";
 
-/// The column of a predicted measurement.
-pub(super) fn predicted(name: &str) -> String {
-    // no name of a plant has a blank
-    format!("predicted {name}")
+/// The course of a predicted measurement, by its place among the observer's measured outputs.
+pub(super) fn predicted<'r>(
+    observer: &Observer,
+    reported: Reported<'r>,
+    place: usize,
+) -> Option<&'r [f64]> {
+    reported.monitor(observer.states.len() + place)
 }
 
 /// The observer with a switch: where [`HELD_OUT`] is above zero, it reads its own prediction
 /// h(x̂) in the place of every measurement, so that its innovation is zero and it runs as a
-/// model. Its predictions and its states are among its outputs.
+/// model. Its monitors are its states, then its predictions.
 pub(super) fn switchable(plant: &Plant, observer: &Observer) -> Observer {
     let graph = &plant.graph;
     let predictions = predictions(plant, observer);
@@ -44,7 +49,7 @@ pub(super) fn switchable(plant: &Plant, observer: &Observer) -> Observer {
     switchable
         .monitors
         .extend(pairs.map(|(signal, node)| Monitor {
-            name: predicted(&signal.name),
+            name: signal.name.clone(),
             node,
             alarm_below: f64::NEG_INFINITY,
             meaning: String::new(),

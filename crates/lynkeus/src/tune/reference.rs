@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Dynamics, Level, Noise, Trajectory};
+use lynkeus_run::{Column, Dynamics, Level, Noise, Role, Trajectory};
 
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
@@ -15,11 +15,18 @@ use crate::{Error, Study};
 /// Noise where the study states none, as a share of what the output spans in the run.
 const DEFAULT_NOISE: f64 = 0.01;
 
+/// By state, input and output: what an error of 1 is, in the quantity's unit.
+#[derive(Clone, Debug)]
+struct Scales {
+    states: Vec<f64>,
+    inputs: Vec<f64>,
+    outputs: Vec<f64>,
+}
+
 /// The same for every value of the sweep.
 #[derive(Clone, Debug)]
 pub(super) struct Reference {
-    /// by state, input and output: what an error of 1 is, in the quantity's unit
-    pub scales: BTreeMap<String, f64>,
+    scales: Scales,
     /// the start, and every instant at which an input that the observer does not read jumps
     pub starts: Vec<f64>,
     /// from here on, nothing of a start or a jump should be left
@@ -50,8 +57,8 @@ impl Reference {
         let last = starts.last().copied().unwrap_or(settings.start);
         let mut notes = vec![];
         let measured = prepared.extended().outputs.iter();
-        let measured: Vec<String> = measured.map(|o| o.variable.name.clone()).collect();
-        let noise = noise(stated, &measured, &truth, &mut notes);
+        let measured: Vec<&str> = measured.map(|o| o.variable.name.as_str()).collect();
+        let noise = noise(stated, plant, &measured, &truth, &mut notes);
         Ok(Self {
             tail: (last + settings.until) / 2.0,
             sample_step: noise.sample_step.unwrap_or(alone.output_step),
@@ -62,33 +69,42 @@ impl Reference {
         })
     }
 
-    /// What an error of 1 is.
-    pub fn scale(&self, name: &str) -> f64 {
-        self.scales.get(name).copied().unwrap_or(1.0)
+    /// What an error of 1 is, of what a column of a run of the plant holds.
+    pub fn scale(&self, column: Column) -> f64 {
+        let scales = match column.role {
+            Role::State => &self.scales.states,
+            Role::Input => &self.scales.inputs,
+            _ => &self.scales.outputs,
+        };
+        scales.get(column.index).copied().unwrap_or(1.0)
     }
 }
 
 /// The declared range, else the largest magnitude in the run, else 1. An output that shows a
 /// state takes that state's.
-fn scales(plant: &Plant, truth: &Trajectory) -> BTreeMap<String, f64> {
-    let scale = |variable: &Variable, name: &str| {
+fn scales(plant: &Plant, truth: &Trajectory) -> Scales {
+    let scale = |variable: &Variable, column: Column| {
         let range = variable.max - variable.min;
         if range.is_finite() && range > 0.0 {
             return range;
         }
-        let values = truth.column(name).unwrap_or_default();
+        let values = truth.column(column).unwrap_or_default();
         let largest = values.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         if largest > 0.0 { largest } else { 1.0 }
     };
-    let shown = |output: &Variable| {
+    let shown = |output: &Variable, column: Column| {
         let state = plant.states.iter().find(|s| s.node == output.node);
-        scale(state.unwrap_or(output), &output.name)
+        scale(state.unwrap_or(output), column)
     };
-    let own = plant.states.iter().chain(&plant.inputs);
-    let own = own.map(|v| (v.name.clone(), scale(v, &v.name)));
-    let outputs = plant.outputs.iter().map(|o| (o.name.clone(), shown(o)));
-    // a state and the output that shows it may share a name
-    outputs.chain(own).collect()
+    let of = |variables: &[Variable], role: Role, scale: &dyn Fn(&Variable, Column) -> f64| {
+        let places = variables.iter().enumerate();
+        places.map(|(i, v)| scale(v, role.at(i))).collect()
+    };
+    Scales {
+        states: of(&plant.states, Role::State, &scale),
+        inputs: of(&plant.inputs, Role::Input, &scale),
+        outputs: of(&plant.outputs, Role::Output, &shown),
+    }
 }
 
 /// The start, and where unknown inputs and disturbances jump or have a kink.
@@ -112,22 +128,30 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
 }
 
 /// The study's noise, or 1 % of what each measured output spans.
-fn noise(stated: Noise, measured: &[String], truth: &Trajectory, notes: &mut Vec<String>) -> Noise {
-    let is_noisy = |name: &String| {
-        let level = stated.levels.get(name);
+fn noise(
+    stated: Noise,
+    plant: &Plant,
+    measured: &[&str],
+    truth: &Trajectory,
+    notes: &mut Vec<String>,
+) -> Noise {
+    let is_noisy = |name: &&str| {
+        let level = stated.levels.get(*name);
         level.is_some_and(|level| level.size() > 0.0)
     };
     if measured.iter().any(is_noisy) {
         return stated;
     }
-    let level = |name: &String| {
-        let values = truth.column(name).unwrap_or_default();
+    let outputs = plant.outputs.iter().enumerate();
+    let outputs = outputs.filter(|(_, o)| measured.contains(&o.name.as_str()));
+    let level = |(place, output): (usize, &Variable)| {
+        let values = truth.column(Role::Output.at(place)).unwrap_or_default();
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let span = if high > low { high - low } else { high.abs() };
-        (name.clone(), Level::Absolute(DEFAULT_NOISE * span))
+        (output.name.clone(), Level::Absolute(DEFAULT_NOISE * span))
     };
-    let levels: BTreeMap<String, Level> = measured.iter().map(level).collect();
+    let levels: BTreeMap<String, Level> = outputs.map(level).collect();
     let words: Vec<String> = levels
         .iter()
         .map(|(name, level)| format!("{name} {:.2e}", level.size()))

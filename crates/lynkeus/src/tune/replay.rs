@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::Design;
+use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, System, Trajectory, estimate_watched};
 
 use super::crew::{Watch, part};
@@ -14,9 +14,11 @@ use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::estimate::{header, refuse_derivatives, refuse_stray_columns, run_settings};
+use crate::headers::time_of;
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
-use crate::{Error, Study, Table, systems};
+use crate::systems::{self, Reported};
+use crate::{Error, Study, Table};
 
 /// Judges the tuning of a study on a log; an estimate that diverges is a row without figures.
 ///
@@ -38,12 +40,14 @@ pub(super) fn logged(
 
 /// One value on a log.
 struct Replay<'a> {
+    switchable: Observer,
+    /// the same, compiled
     observer: System,
     time: &'a [f64],
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
-    /// measured outputs: name and values
-    measured: Vec<(String, Vec<f64>)>,
+    /// values of the measured outputs
+    measured: Vec<Vec<f64>>,
     plan: Plan,
     settings: EstimatorSettings,
     file: &'a str,
@@ -58,7 +62,6 @@ impl<'a> Replay<'a> {
         let run = run_settings(settings);
         refuse_derivatives(study, design)?;
         refuse_stray_columns(plant, settings)?;
-        let time = table.time(&settings.time)?;
         let column = |name: &str| Ok(table.column(header(settings, name))?.to_vec());
         let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
             signals.iter().map(|s| s.name.clone()).collect()
@@ -66,17 +69,19 @@ impl<'a> Replay<'a> {
         let measured = names(&design.observer.measured);
         let mut read = names(&design.observer.inputs);
         read.extend(measured.iter().cloned());
+        let header_of_time = time_of(table, plant, settings, read.iter().map(String::as_str))?;
+        let time = table.time(&header_of_time)?;
         let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
-        let measured = measured.into_iter();
-        let measured = measured.map(|name| Ok((column(&name)?, name)));
-        let measured: Result<Vec<_>, Error> = measured.collect();
+        let measured: Result<Vec<_>, Error> = measured.iter().map(|n| column(n)).collect();
+        let switchable = switchable(plant, &design.observer);
         Ok(Self {
-            observer: systems::observer(plant, &switchable(plant, &design.observer))?,
+            observer: systems::observer(plant, &switchable)?,
+            switchable,
             plan: Plan::new(study, time.len())?,
             time,
             names: read,
             columns: columns?,
-            measured: measured?.into_iter().map(|(v, n)| (n, v)).collect(),
+            measured: measured?,
             settings: EstimatorSettings {
                 method: thrifty(run.method, time.len() as f64),
                 ..run
@@ -128,31 +133,42 @@ impl<'a> Replay<'a> {
         }
     }
 
+    /// What the observer predicts of a measured output.
+    fn predicted<'r>(&self, run: &'r Trajectory, place: usize) -> Option<&'r [f64]> {
+        let reported = Reported::new(&self.switchable, run);
+        predicted(&self.switchable, reported, place)
+    }
+
     /// The root mean square over outputs of each one's error on the scored rows, over the span
     /// of its values on the whole log.
     fn held_out_error(&self, run: &Trajectory) -> Option<f64> {
-        let error = |(name, values): &(String, Vec<f64>)| {
-            let prediction = run.column(&predicted(name))?;
+        let error = |(place, values): (usize, &Vec<f64>)| {
+            let prediction = self.predicted(run, place)?;
             let rows = self.plan.scored();
             let errors: Option<Vec<f64>> = rows
                 .map(|row| Some(values.get(row)? - prediction.get(row)?))
                 .collect();
             Some(rms(&errors?) / span(values))
         };
-        let errors: Option<Vec<f64>> = self.measured.iter().map(error).collect();
+        let errors: Option<Vec<f64>> = self.measured.iter().enumerate().map(error).collect();
         Some(rms(&errors?))
     }
 
     /// The innovation of a replay that looks at no later sample, past the first block.
     fn judge_innovation(&self, row: &mut Row, run: &Trajectory) {
-        let innovation = |(name, values): &(String, Vec<f64>)| -> Option<Vec<f64>> {
-            let prediction = run.column(&predicted(name))?;
-            let pairs = values.iter().zip(&prediction).skip(self.plan.first);
+        let innovation = |(place, values): (usize, &Vec<f64>)| -> Option<Vec<f64>> {
+            let prediction = self.predicted(run, place)?;
+            let pairs = values.iter().zip(prediction).skip(self.plan.first);
             // over all rows: not within the loop over them
             let span = span(values);
             Some(pairs.map(|(y, hat)| (y - hat) / span).collect())
         };
-        let all: Vec<Vec<f64>> = self.measured.iter().filter_map(innovation).collect();
+        let all: Vec<Vec<f64>> = self
+            .measured
+            .iter()
+            .enumerate()
+            .filter_map(innovation)
+            .collect();
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
         row.set(measures::INNOVATION, Some(rms(&sizes)));
         let white: Vec<Whiteness> = all.iter().filter_map(|series| whiteness(series)).collect();
@@ -169,14 +185,20 @@ impl<'a> Replay<'a> {
         let names = self.observer.signals().to_vec();
         let place = |name: &String| self.names.iter().position(|n| n == name);
         let places: Vec<Option<usize>> = names.iter().map(place).collect();
-        let step = longest_step(&self.observer, run, &mut |row, _, signals| {
-            for (signal, place) in signals.iter_mut().zip(&places) {
-                let column = place.and_then(|place| self.columns.get(place));
-                // the one signal that is no column is the switch, which is off
-                *signal = column.and_then(|c| c.get(row).copied()).unwrap_or(0.0);
-            }
-            ControlFlow::Continue(())
-        })?;
+        let reported = Reported::new(&self.switchable, run);
+        let step = longest_step(
+            &self.observer,
+            run.times(),
+            reported,
+            &mut |row, _, signals| {
+                for (signal, place) in signals.iter_mut().zip(&places) {
+                    let column = place.and_then(|place| self.columns.get(place));
+                    // the one signal that is no column is the switch, which is off
+                    *signal = column.and_then(|c| c.get(row).copied()).unwrap_or(0.0);
+                }
+                ControlFlow::Continue(())
+            },
+        )?;
         let steps = self.time.windows(2).map(|pair| pair[1] - pair[0]);
         let longest = steps.fold(0.0, f64::max);
         (longest > 0.0).then(|| step / longest)

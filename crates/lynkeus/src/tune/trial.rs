@@ -4,8 +4,10 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
-use lynkeus_run::{Dynamics, Error as RunError, Method, Noise, Simulation, Tolerances, Trajectory};
+use lynkeus_observers::{Design, Estimate, Observer, Signal};
+use lynkeus_run::{
+    Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
+};
 
 use super::crew::{Watch, part};
 use super::errors::{Errors, rms};
@@ -15,7 +17,7 @@ use super::{Peak, Row, measures};
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
-use crate::systems::{self, hat, named};
+use crate::systems::{self, Reported, named};
 use crate::{Error, Study};
 
 /// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
@@ -40,7 +42,7 @@ pub(super) fn simulated(
         observer: transparent(&design.observer),
         reference,
     };
-    match trial.judge(design, &mut row, watch)? {
+    match trial.judge(&mut row, watch)? {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
     }
@@ -59,12 +61,7 @@ type Ran = Result<Trajectory, String>;
 
 impl Trial<'_> {
     /// Fills the row in; the reason where a run failed.
-    fn judge(
-        &self,
-        design: &Design,
-        row: &mut Row,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<String>, Error> {
+    fn judge(&self, row: &mut Row, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
         let disturbed = !self.study.tune.disturbance.is_empty();
         let runs = if disturbed { 3 } else { 2 };
         let simulation = self.simulation()?;
@@ -72,8 +69,8 @@ impl Trial<'_> {
             Ok(run) => run,
             Err(reason) => return Ok(Some(reason)),
         };
-        let exact = self.errors(design, &exact_run, &exact_run);
-        self.judge_exact(design, row, &exact, &exact_run);
+        let exact = self.errors(&exact_run);
+        self.judge_exact(row, &exact, &exact_run);
         row.set(
             measures::SAMPLING_MARGIN,
             self.margin(&simulation, &exact_run),
@@ -85,13 +82,13 @@ impl Trial<'_> {
         };
         let mut failure = None;
         match self.run(&noisy, &mut part(watch, 1, runs))? {
-            Ok(run) => self.judge_noisy(row, &exact, &self.errors(design, &run, &run), &run),
+            Ok(run) => self.judge_noisy(row, &exact, &self.errors(&run), &run),
             Err(reason) => failure = Some(format!("with noise: {reason}")),
         }
         if disturbed {
             match self.run(&self.disturbed(noisy)?, &mut part(watch, 2, runs))? {
                 Ok(run) => {
-                    let bound = self.errors(design, &run, &run).from(self.reference.tail);
+                    let bound = self.errors(&run).from(self.reference.tail);
                     row.set(measures::ULTIMATE_BOUND, largest(&bound));
                 }
                 Err(reason) => {
@@ -160,25 +157,25 @@ impl Trial<'_> {
         }
     }
 
-    /// Scaled errors of what `design` estimates.
-    fn errors(&self, design: &Design, run: &Trajectory, truth: &Trajectory) -> Errors {
-        let error = |name: &str| {
-            let estimate = run.column(&hat(name))?;
-            let truth = truth
-                .column(&disturbed(name))
-                .or_else(|| truth.column(name))?;
-            let scale = self.reference.scale(name);
-            let pairs = estimate.iter().zip(&truth);
+    /// Scaled errors of the estimates, in the observer's order; an input is what the plant has
+    /// of it, disturbance included.
+    fn errors(&self, run: &Trajectory) -> Errors {
+        let reported = Reported::new(&self.observer, run);
+        let error = |(place, estimate): (usize, &Estimate)| {
+            let column = systems::column_of(self.plant, &estimate.variable)?;
+            let (estimate, truth) = (reported.estimate(place)?, run.column(column)?);
+            let scale = self.reference.scale(column);
+            let pairs = estimate.iter().zip(truth);
             Some(pairs.map(|(hat, x)| (hat - x) / scale).collect())
         };
-        let estimates = design.observer.estimates.iter();
+        let estimates = self.observer.estimates.iter().enumerate();
         Errors {
             time: run.times().to_vec(),
-            scaled: estimates.filter_map(|e| error(&e.variable.name)).collect(),
+            scaled: estimates.filter_map(error).collect(),
         }
     }
 
-    fn judge_exact(&self, design: &Design, row: &mut Row, exact: &Errors, run: &Trajectory) {
+    fn judge_exact(&self, row: &mut Row, exact: &Errors, run: &Trajectory) {
         let Reference { starts, tail, .. } = self.reference;
         let settling = exact.settling(starts, self.study.tune.tolerance);
         row.set(measures::SETTLING_TIME, settling);
@@ -188,15 +185,13 @@ impl Trial<'_> {
             return;
         };
         row.set(measures::PEAK_ERROR, Some(size));
-        let name = design.observer.estimates.get(quantity);
-        row.peak = name.and_then(|e| {
-            let name = e.variable.name.clone();
-            let estimate = *run.column(&hat(&name))?.get(at)?;
-            let time = *run.times().get(at)?;
+        let estimate = self.observer.estimates.get(quantity);
+        let course = Reported::new(&self.observer, run).estimate(quantity);
+        row.peak = estimate.and_then(|estimate| {
             Some(Peak {
-                name,
-                estimate,
-                time,
+                name: estimate.variable.name.clone(),
+                estimate: *course?.get(at)?,
+                time: *run.times().get(at)?,
             })
         });
     }
@@ -213,16 +208,17 @@ impl Trial<'_> {
 
     /// The root mean square of the scaled noise of the measured outputs, as drawn, in the tail.
     fn noise_level(&self, run: &Trajectory) -> f64 {
-        let drawn = |name: &String| {
-            let (exact, measured) = (run.column(name)?, run.column(&format!("{name}_measured"))?);
-            let scale = self.reference.scale(name);
-            let pairs = exact.iter().zip(&measured);
+        let drawn = |signal: &Signal| {
+            let place = systems::output_of(self.plant, signal)?;
+            let (exact, measured) = (Role::Output.at(place), Role::Measured.at(place));
+            let scale = self.reference.scale(exact);
+            let pairs = run.column(exact)?.iter().zip(run.column(measured)?);
             Some(pairs.map(|(y, m)| (m - y) / scale).collect::<Vec<f64>>())
         };
         let measured = self.observer.measured.iter();
         let noise = Errors {
             time: run.times().to_vec(),
-            scaled: measured.filter_map(|s| drawn(&s.name)).collect(),
+            scaled: measured.filter_map(drawn).collect(),
         };
         let squares: Vec<f64> = noise
             .from(self.reference.tail)
@@ -239,16 +235,28 @@ impl Trial<'_> {
         let mut inputs = simulation.inputs.evaluation();
         let mut u = vec![0.0; simulation.inputs.outputs().len()];
         let names = observer.signals().to_vec();
-        let columns: Vec<Option<Vec<f64>>> = names.iter().map(|n| run.column(n)).collect();
-        let step = longest_step(observer, run, &mut |row, t, signals| {
+        // the first signals of an observer are its measured outputs
+        let measured = self.observer.measured.iter();
+        let outputs: Vec<Option<&[f64]>> = measured
+            .map(|signal| {
+                let place = systems::output_of(self.plant, signal)?;
+                run.column(Role::Output.at(place))
+            })
+            .collect();
+        let column = |signal: usize| outputs.get(signal).copied().flatten();
+        let inputs_of_time = simulation.inputs.outputs();
+        let input = |signal: usize| inputs_of_time.iter().position(|n| *n == names[signal]);
+        let reported = Reported::new(&self.observer, run);
+        let step = longest_step(observer, run.times(), reported, &mut |row, t, signals| {
             inputs.enter(t);
             inputs.outputs(t, &[], &mut u);
-            for ((signal, name), column) in signals.iter_mut().zip(&names).zip(&columns) {
-                let place = simulation.inputs.outputs().iter().position(|n| n == name);
-                let input = place.and_then(|i| u.get(i).copied());
-                let logged = column.as_ref().and_then(|c| c.get(row).copied());
-                match input.or(logged) {
-                    Some(value) => *signal = value,
+            for (i, signal) in signals.iter_mut().enumerate() {
+                let value = match column(i) {
+                    Some(values) => values.get(row),
+                    None => input(i).and_then(|place| u.get(place)),
+                };
+                match value {
+                    Some(value) => *signal = *value,
                     None => return ControlFlow::Break(()),
                 }
             }
@@ -260,7 +268,7 @@ impl Trial<'_> {
 
 /// The name of an input as the plant has it while the observer reads the undisturbed one.
 fn disturbed(name: &str) -> String {
-    // no name of a plant has a blank
+    // no name in a model's text has a blank, unless it is in quotes
     format!("{name} disturbed")
 }
 

@@ -5,7 +5,7 @@ use lynkeus::expr::Node;
 use lynkeus::model::Plant;
 use lynkeus::observers::{Certificate, Design};
 use lynkeus::prepare::{self, Prepared};
-use lynkeus::run::{Simulation, System};
+use lynkeus::run::{Role, Simulation, System};
 use lynkeus::structure::Standing;
 
 use super::column;
@@ -71,14 +71,18 @@ fn pairs(
     let mut simulation = Simulation::new(system, constant, UNTIL, ROWS);
     simulation.observer = Some(observer.with_start(estimate.to_vec()).unwrap());
     let table = simulation.run().unwrap();
-    let place = |name: String| table.names().iter().position(|n| *n == name).unwrap();
-    let extended = design.observer.estimates.iter();
-    let columns: Vec<(usize, usize)> = extended
-        .map(|e| &e.variable.name)
-        .map(|name| (place(name.clone()), place(format!("{name}_hat"))))
+    // the extended state, in the order of the estimates
+    let states = (0..plant.states.len()).map(|i| Role::State.at(i));
+    let zf = plant.inputs.iter().position(|i| i.name == "Zf").unwrap();
+    let extended = states.chain([Role::Input.at(zf)]).enumerate();
+    let columns: Vec<(&[f64], &[f64])> = extended
+        .map(|(i, column)| {
+            let estimate = table.column(Role::Estimate.at(i)).unwrap();
+            (table.column(column).unwrap(), estimate)
+        })
         .collect();
-    let row = |(_, row): (f64, Vec<f64>)| columns.iter().map(|&(i, j)| (row[i], row[j])).unzip();
-    table.rows().map(row).collect()
+    let row = |k: usize| columns.iter().map(|(x, hat)| (x[k], hat[k])).unzip();
+    (0..table.len()).map(row).collect()
 }
 
 /// V = eᵀPe of a row; none outside the box, where nothing is promised.

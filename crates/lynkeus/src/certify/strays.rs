@@ -1,0 +1,115 @@
+//! Where a study is not in the box for which its observer is certified.
+
+use std::ops::ControlFlow;
+
+use lynkeus_model::Variable;
+use lynkeus_observers::Design;
+use lynkeus_structure::Extended;
+use serde_json::{Value, json};
+
+use crate::outside::{self, Outside, outside};
+use crate::prepare::Prepared;
+use crate::{Quantity, simulate};
+
+/// Where the study's own plant and estimate are outside of the box.
+#[derive(Clone, Debug, Default)]
+pub struct Strays {
+    /// the plant: along the study's `[simulate]`, or where it starts
+    pub plant: Option<Outside>,
+    /// the estimate likewise
+    pub estimate: Option<Outside>,
+    /// with `prolong`, the theorem asks nothing of where the estimate is
+    prolonged: bool,
+    /// it is the simulated run that was looked at, not only the start
+    pub simulated: bool,
+    /// why the study's run could not be looked at
+    pub failure: Option<String>,
+}
+
+impl Strays {
+    /// Runs the study, where it has a `[simulate]`, and looks where that leaves the box.
+    pub(super) fn of(prepared: &Prepared<'_>, place: &Extended<'_>, design: &Design) -> Self {
+        let found = Self::looked(prepared, place, design);
+        Self {
+            prolonged: prepared.study().observer.tuning.flag("prolong") == Ok(true),
+            ..found
+        }
+    }
+
+    fn looked(prepared: &Prepared<'_>, place: &Extended<'_>, design: &Design) -> Self {
+        if prepared.study().simulate.is_none() {
+            return Self::at_start(place, design);
+        }
+        match simulate::simulated(prepared, &mut |_| ControlFlow::Continue(())) {
+            Ok(run) => Self {
+                simulated: true,
+                ..Self::along(&run.time, &run.quantities, place)
+            },
+            Err(error) => Self {
+                failure: Some(error.to_string()),
+                ..Self::at_start(place, design)
+            },
+        }
+    }
+
+    fn along(time: &[f64], quantities: &[Quantity], place: &Extended<'_>) -> Self {
+        let sides = outside::sides(place);
+        let itself = outside::time_itself(time);
+        let of = |of| outside(time, quantities.iter().chain([&itself]), of, &sides);
+        Self {
+            plant: of(outside::PLANT),
+            estimate: of(outside::ESTIMATE),
+            ..Self::default()
+        }
+    }
+
+    /// The start values that are given, of quantities whose estimate is a state of the observer.
+    fn at_start(place: &Extended<'_>, design: &Design) -> Self {
+        let observer = &design.observer;
+        let estimated = |variable: &Variable| {
+            let mut estimates = observer.estimates.iter();
+            let own = estimates.find(|e| e.variable.node == variable.node)?;
+            let mut states = observer.states.iter();
+            states.find(|(signal, _)| signal.symbol == own.node)
+        };
+        let variables = place.states.iter().chain(&place.inputs);
+        let quantities: Vec<Quantity> = variables
+            .map(|variable| Quantity {
+                name: variable.name.clone(),
+                truth: variable.start.map(|x| vec![x]),
+                estimate: estimated(variable).map(|(_, start)| vec![*start]),
+                ..Quantity::default()
+            })
+            .collect();
+        Self::along(&[0.0], &quantities, place)
+    }
+
+    /// What the reader of a certificate has to know; none where all that it asks for is in
+    /// the box.
+    pub fn words(&self, is_theorem: bool) -> Option<String> {
+        let estimate = match is_theorem && self.prolonged {
+            true => &None,
+            false => &self.estimate,
+        };
+        let parts = [("plant", &self.plant), ("estimate", estimate)];
+        let said = |(who, outside): &(&str, &Option<Outside>)| {
+            let outside = outside.as_ref()?;
+            Some(match self.simulated {
+                true => format!("the simulated {who} is outside of it {}", outside.words()),
+                false => format!("the {who} starts outside of it, {}", outside.starts()),
+            })
+        };
+        let said: Vec<String> = parts.iter().filter_map(said).collect();
+        (!said.is_empty()).then(|| said.join(", and "))
+    }
+
+    /// For machines: null where nothing is outside.
+    pub(super) fn to_json(&self) -> Value {
+        let outside = |outside: &Option<Outside>| json!(outside.as_ref().map(Outside::to_json));
+        json!({
+            "simulated": self.simulated,
+            "plant": outside(&self.plant),
+            "estimate": outside(&self.estimate),
+        })
+    }
+}

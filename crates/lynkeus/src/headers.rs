@@ -1,0 +1,148 @@
+//! Headers of columns that differ, whatever the model's variables are called.
+//!
+//! The model's own names keep theirs; what the tool derives gives way (`docs/study.md`).
+
+use std::collections::HashSet;
+
+use lynkeus_model::{Plant, Variable};
+
+use crate::estimate::header;
+use crate::study::EstimateSettings;
+use crate::{Error, Table};
+
+/// The header of time, and what it is where a column of data is called so.
+const TIME: &str = "t";
+const OTHER_TIME: &str = "time";
+
+/// Gives out headers, each once.
+#[derive(Clone, Debug)]
+pub(crate) struct Headers {
+    taken: HashSet<String>,
+    /// what became of the headers that were taken, in words
+    pub notes: Vec<String>,
+}
+
+impl Headers {
+    /// Headers beside those of a plant's states, inputs and outputs, in the table or not: so
+    /// that a column is called the same in every table.
+    pub fn beside(plant: &Plant) -> Self {
+        let own = plant.states.iter().chain(&plant.inputs);
+        Self::beside_names(own.chain(&plant.outputs).map(|v| v.name.clone()))
+    }
+
+    /// Headers beside these.
+    pub fn beside_names(names: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            taken: names.into_iter().collect(),
+            notes: vec![],
+        }
+    }
+
+    /// The header of time.
+    pub fn time(&mut self) -> String {
+        match self.taken.contains(TIME) {
+            true => self.free(OTHER_TIME, "time"),
+            false => self.free(TIME, "time"),
+        }
+    }
+
+    /// `wanted`, or, where that is taken, the first of `wanted_2`, `wanted_3`, … that is not;
+    /// `what` the column holds is for people.
+    pub fn free(&mut self, wanted: &str, what: &str) -> String {
+        let numbered = (2..).map(|k| format!("{wanted}_{k}"));
+        let mut headers = std::iter::once(wanted.to_owned()).chain(numbered);
+        let header = headers.find(|header| !self.taken.contains(header));
+        let header = header.unwrap_or_else(|| wanted.to_owned());
+        if header != wanted {
+            self.notes.push(format!(
+                "the column of {what} is called {header}: another one is called {wanted}"
+            ));
+        }
+        self.taken.insert(header.clone());
+        header
+    }
+}
+
+/// The header of a log's time column.
+pub(crate) fn log_time(plant: &Plant, settings: &EstimateSettings) -> String {
+    let is_taken = || signals(plant).any(|v| header(settings, &v.name) == TIME);
+    match &settings.time {
+        Some(time) => time.clone(),
+        None if is_taken() => OTHER_TIME.to_owned(),
+        None => TIME.to_owned(),
+    }
+}
+
+/// What a log can hold.
+fn signals(plant: &Plant) -> impl Iterator<Item = &Variable> {
+    plant.outputs.iter().chain(&plant.inputs)
+}
+
+/// The header of the time column of this log.
+///
+/// # Errors
+/// One of the signals that are read is in that column as well; there is no such column.
+pub(crate) fn time_of<'s>(
+    table: &Table,
+    plant: &Plant,
+    settings: &EstimateSettings,
+    read: impl IntoIterator<Item = &'s str>,
+) -> Result<String, Error> {
+    let time = log_time(plant, settings);
+    let mut read = read.into_iter();
+    if let Some(name) = read.find(|name| header(settings, name) == time) {
+        return Err(Error::input(format!(
+            "the column \"{time}\" cannot be both time and \"{name}\""
+        ))
+        .at(table.file())
+        .hint("say which columns they are: `time` and `columns` of [estimate]"));
+    }
+    if table.get(&time).is_none() && settings.time.is_none() {
+        let why = match time.as_str() {
+            OTHER_TIME => " (the model has a variable called t)",
+            _ => "",
+        };
+        return Err(Error::input(format!(
+            "no column \"{time}\" of times{why}; the columns found are: {}",
+            crate::near::list(table.names())
+        ))
+        .at(table.file())
+        .hint("set `time` of [estimate] to the header of the time column"));
+    }
+    Ok(time)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn headers(names: &[&str]) -> Headers {
+        Headers::beside_names(names.iter().map(ToString::to_string))
+    }
+
+    #[test]
+    fn what_is_free_is_kept() {
+        let mut free = headers(&["x", "y"]);
+        assert_eq!(
+            (free.time(), free.free("x_hat", "x")),
+            ("t".into(), "x_hat".into())
+        );
+        assert!(free.notes.is_empty());
+    }
+
+    #[test]
+    fn what_is_taken_gives_way_and_says_so() {
+        let mut free = headers(&["t", "lower", "lower_hat", "lower_hat_2"]);
+        assert_eq!(free.time(), "time");
+        assert_eq!(
+            free.free("lower_hat", "the estimate of lower"),
+            "lower_hat_3"
+        );
+        assert_eq!(free.free("lower_hat", "a monitor"), "lower_hat_4");
+        assert_eq!(free.notes.len(), 2);
+        assert_eq!(
+            free.notes[0],
+            "the column of the estimate of lower is called lower_hat_3: another one is called lower_hat"
+        );
+    }
+}
