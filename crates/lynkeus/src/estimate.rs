@@ -1,9 +1,10 @@
 //! A log through the study's observer.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::Design;
+use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
 use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
@@ -28,7 +29,7 @@ pub fn estimate(
     refuse_derivatives(study, &design)?;
     let observer = systems::observer(&plant, &design.observer)?;
     refuse_stray_columns(&plant, settings)?;
-    let log = log(table, settings, &observer)?;
+    let log = log(table, settings, &design, &observer)?;
     let run = run_settings(settings);
     let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
@@ -39,6 +40,7 @@ pub fn estimate(
             "between_samples = \"linear\" looks ahead one sample: the estimate at a row is that of an off-line replay".to_owned(),
         );
     }
+    notes.extend(gaps(table, settings, &design));
     if let Some(advice) = estimates
         .advice
         .filter(lynkeus_run::StepAdvice::is_unstable)
@@ -126,15 +128,63 @@ pub(crate) fn refuse_stray_columns(
     }
 }
 
-fn log(table: &Table, settings: &EstimateSettings, observer: &System) -> Result<Log, Error> {
+fn log(
+    table: &Table,
+    settings: &EstimateSettings,
+    design: &Design,
+    observer: &System,
+) -> Result<Log, Error> {
     let time = table.time(&settings.time)?.to_vec();
     let names = observer.signals().to_vec();
-    let column = |name: &String| Ok(table.column(header(settings, name))?.to_vec());
+    let column = |name: &String| Ok(signal(table, settings, &design.observer, name)?.into_owned());
     let columns = names
         .iter()
         .map(column)
         .collect::<Result<Vec<_>, Error>>()?;
     Log::new(names, time, columns).map_err(|error| Error::from_source(error).at(table.file()))
+}
+
+/// What the observer reads under a plant's name: an input's last value stands where its cell is
+/// missing, unless the study is strict.
+pub(crate) fn signal<'t>(
+    table: &'t Table,
+    settings: &EstimateSettings,
+    observer: &Observer,
+    name: &str,
+) -> Result<Cow<'t, [f64]>, Error> {
+    let header = header(settings, name);
+    let is_input = observer.inputs.iter().any(|input| input.name == name);
+    match is_input && !settings.strict {
+        true => table.held(header),
+        false => table.column(header).map(Cow::Borrowed),
+    }
+}
+
+/// What the log lacks in words, and where its times count from.
+fn gaps(table: &Table, settings: &EstimateSettings, design: &Design) -> Vec<String> {
+    let origin = table.origin(&settings.time);
+    let mut notes: Vec<String> = origin
+        .map(|origin| format!("times are seconds since {origin}"))
+        .into_iter()
+        .collect();
+    let observer = &design.observer;
+    for signal in observer.inputs.iter().chain(&observer.measured) {
+        let header = header(settings, &signal.name);
+        let places: Vec<String> = table
+            .faults(header)
+            .iter()
+            .map(|fault| format!("{fault} in line {}", fault.line))
+            .collect();
+        if !places.is_empty() {
+            notes.push(format!(
+                "column \"{header}\": {} of {} cells are missing, first {}",
+                table.missing(header),
+                table.rows(),
+                places.join(", ")
+            ));
+        }
+    }
+    notes
 }
 
 /// A column of the log, if it has one with numbers.

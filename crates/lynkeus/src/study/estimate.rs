@@ -17,6 +17,8 @@ pub struct EstimateSettings {
     pub time: String,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
+    /// A log with missing cells in a column that is read is refused.
+    pub strict: bool,
 }
 
 /// What the observer sees between two rows of a log.
@@ -36,6 +38,7 @@ impl Default for EstimateSettings {
             method: Method::default(),
             time: "t".to_owned(),
             columns: Vec::new(),
+            strict: false,
         }
     }
 }
@@ -64,5 +67,6 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
                 .map(|(name, header)| Ok((name, header.name()?.text)))
                 .collect::<Result<_, Error>>()?,
         },
+        strict: section.optional("strict", Entry::boolean)?.unwrap_or(false),
     })
 }

@@ -292,7 +292,7 @@ pub(super) const SIMULATE: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 3] = [
+pub(super) const ESTIMATE: [KeySpec; 4] = [
     KeySpec {
         name: "between_samples",
         kind: "`\"hold\"`, `\"linear\"`",
@@ -313,6 +313,13 @@ pub(super) const ESTIMATE: [KeySpec; 3] = [
         shape: Shape::Table(&Shape::Text),
         default: "the plant's names",
         meaning: "where the log's header names a signal differently",
+    },
+    KeySpec {
+        name: "strict",
+        kind: "`true`, `false`",
+        shape: Shape::Flag,
+        default: "`false`",
+        meaning: "refuse a log in which a cell that is read has no number",
     },
 ];
 
