@@ -1,7 +1,11 @@
 //! What an observer makes of samples, whatever kind of observer it is.
 
+use lynkeus_observers::Observer;
 use lynkeus_run::Error as RunError;
 use lynkeus_run::filter::SensorHealth;
+
+use crate::Quantity;
+use crate::systems::Reported;
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
 #[derive(Clone, Debug)]
@@ -51,6 +55,33 @@ pub(crate) struct Course {
     pub notes: Vec<String>,
     /// why the run ended early, with the rows before
     pub ended: Option<RunError>,
+}
+
+impl Course {
+    /// Of a run of the observer's own system.
+    pub fn of_run(observer: &Observer, reported: &Reported<'_>) -> Self {
+        let column = |values: Option<&[f64]>| values.unwrap_or_default().to_vec();
+        let estimates = (0..observer.estimates.len()).map(|i| column(reported.estimate(i)));
+        let monitors = (0..observer.monitors.len()).map(|i| column(reported.monitor(i)));
+        Self {
+            estimates: estimates.collect(),
+            monitors: monitors.collect(),
+            ..Self::default()
+        }
+    }
+
+    /// What was found of estimate `i`, to the quantity that it is of.
+    pub fn give(&mut self, i: usize, with_deviation: bool, quantity: &mut Quantity) {
+        quantity.estimate = self.estimates.get_mut(i).map(std::mem::take);
+        let of = |columns: &mut Option<Vec<Vec<f64>>>| {
+            columns
+                .as_mut()
+                .and_then(|c| c.get_mut(i))
+                .map(std::mem::take)
+        };
+        quantity.deviation = of(&mut self.deviations).filter(|_| with_deviation);
+        quantity.smoothed = of(&mut self.smoothed);
+    }
 }
 
 /// Adds a row to columns.

@@ -3,6 +3,7 @@
 use lynkeus_model::{Plant, Variable};
 use lynkeus_structure::figures;
 
+use crate::innovations::Innovations;
 use crate::words::{number, side};
 use crate::{Error, Quantity};
 
@@ -160,6 +161,45 @@ pub(crate) fn refusal(doubts: &[Doubt]) -> Option<Error> {
     Some(Error::refused(message).hint(
         "see whether `lynkeus certify` proves this tuning, try another `theta` or `clamp = true`, compare the model with the log; if the plant really goes there, declare a wider min and max (the result is written all the same)",
     ))
+}
+
+/// Innovations so many times larger than declared, in the mean over the last half of a run,
+/// contradict the model.
+const CONTRADICTION: f64 = 3.0;
+/// Readings on which such a mean rests.
+const ENOUGH: usize = 20;
+
+/// Where innovations contradict the declared noise, in words.
+pub(crate) fn contradictions(innovations: &[Innovations]) -> Vec<String> {
+    let words = |i: &Innovations| {
+        let late = &i.late;
+        let offered = late.taken + late.rejected;
+        if offered < ENOUGH {
+            return None;
+        }
+        if 2 * late.rejected > offered {
+            return Some(format!(
+                "{} of the last {offered} readings of {} are rejected by the gate",
+                late.rejected, i.output
+            ));
+        }
+        let ratio = late.consistency()?.sqrt();
+        (ratio > CONTRADICTION).then(|| {
+            format!(
+                "the innovations of {} are {} times as large as its noise and the process noise explain",
+                i.output,
+                figures(ratio, 2)
+            )
+        })
+    };
+    innovations.iter().filter_map(words).collect()
+}
+
+/// The answer where they do.
+pub(crate) fn contradicted(first: &str) -> Error {
+    Error::refused(format!("the estimate is not credible: {first}")).hint(
+        "declare larger densities under [process_noise] for what the model does not know, or a larger noise of the sensor; compare the model with the log (the result is written all the same)",
+    )
 }
 
 #[cfg(test)]

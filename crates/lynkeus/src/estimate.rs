@@ -1,94 +1,212 @@
 //! A log through the study's observer.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::Design;
-use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
+use lynkeus_observers::{Design, Observer};
+use lynkeus_run::{EstimatorSettings, Log, estimate_watched};
 
+use crate::course::{Course, Samples};
 use crate::headers::time_of;
 use crate::outcome::{Raw, interrupted, measurements};
 use crate::prepare::Prepared;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, Table, prepare};
+use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
 /// # Errors
 /// A study that does not fit the plant, a log without the columns that the
-/// observer reads, conditions that are refuted, an estimate that diverges.
+/// observer reads, conditions that are refuted, an estimate that has no first row.
 pub fn estimate(
     study: &Study,
     table: &Table,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let settings = &study.estimate;
     let plant = prepare::plant(study)?;
-    let prepared = Prepared::new(study, &plant)?;
+    estimated(&Prepared::new(study, &plant)?, table, watch)
+}
+
+/// The same of a study that is prepared.
+pub(crate) fn estimated(
+    prepared: &Prepared<'_>,
+    table: &Table,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let settings = &study.estimate;
     let design = prepared.design()?;
     refuse_derivatives(study, &design)?;
-    let observer = systems::observer(&plant, &design.observer)?;
-    refuse_stray_columns(&plant, settings)?;
-    let read = observer.signals().iter().map(String::as_str);
-    let time = time_of(table, &plant, settings, read)?;
-    let log = log(table, &time, settings, &observer)?;
-    let run = run_settings(settings);
-    let between = run.between;
-    let estimates = estimate_watched(&observer, &log, run, watch)
-        .map_err(|error| interrupted(error.error, table.file()))?;
-    let mut notes = design.notes.clone();
-    if between == lynkeus_run::BetweenSamples::Linear {
-        notes.push(
-            "between_samples = \"linear\" looks ahead one sample: the estimate at a row is that of an off-line replay".to_owned(),
-        );
-    }
-    if let Some(advice) = estimates
-        .advice
-        .filter(lynkeus_run::StepAdvice::is_unstable)
+    refuse_stray_columns(plant, settings)?;
+    let signals = Signals::of(table, plant, settings, &design.observer)?;
+    let mut course = course(prepared, &design, &signals.samples(), watch)?;
+    let rows = course.estimates.first().map_or(0, Vec::len);
+    if let Some(error) = &course.ended
+        && (rows == 0 || !is_answer(error))
     {
-        notes.push(format!(
-            "the step {} is too long for this observer: its fastest mode needs {:.3e} or less",
-            advice.used, advice.needed
-        ));
+        return Err(interrupted(error.clone(), table.file()));
     }
-    let run = &estimates.trajectory;
-    let reported = Reported::new(&design.observer, run);
-    let logged = |name: &str| logged(table, settings, &time, name);
+    let logged = |name: &str| {
+        let values = logged(table, settings, &signals.time_header, name)?;
+        Some(values[..rows].to_vec())
+    };
     let estimated = design.observer.estimates.iter().enumerate();
-    let estimated = estimated.map(|(i, e)| Quantity {
-        name: e.variable.name.clone(),
-        unit: e.variable.unit.clone(),
-        description: e.variable.description.clone(),
-        truth: logged(&e.variable.name),
-        estimate: reported.estimate(i).map(<[f64]>::to_vec),
-        unknown_input: e.unknown_input,
-        is_input: e.unknown_input,
-        ..Quantity::default()
+    let estimated = estimated.map(|(i, e)| {
+        let mut quantity = Quantity {
+            name: e.variable.name.clone(),
+            unit: e.variable.unit.clone(),
+            description: e.variable.description.clone(),
+            truth: logged(&e.variable.name),
+            unknown_input: e.unknown_input,
+            is_input: e.unknown_input,
+            ..Quantity::default()
+        };
+        course.give(i, settings.deviations, &mut quantity);
+        quantity
     });
+    let estimated: Vec<Quantity> = estimated.collect();
     let known = design.observer.inputs.iter().map(|signal| Quantity {
         name: signal.name.clone(),
         truth: logged(&signal.name),
         is_input: true,
         ..Quantity::default()
     });
+    let mut notes = design.notes.clone();
+    notes.extend(gaps(table, settings, &signals.time_header, &design));
     let raw = Raw {
-        time: run.times(),
-        quantities: estimated.chain(known).collect(),
+        time: &signals.time[..rows],
+        quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
         notes,
-        reported,
-        prepared: &prepared,
+        course,
+        prepared,
         design,
     };
     Ok(raw.finish())
+}
+
+/// Whether the end of a run is an answer about the estimate: then the rows before it are worth
+/// having.
+fn is_answer(error: &lynkeus_run::Error) -> bool {
+    use lynkeus_run::Error as Run;
+    matches!(
+        error,
+        Run::Diverged { .. } | Run::NotFinite { .. } | Run::StepUnderflow { .. }
+    )
+}
+
+/// The columns of a log that an observer reads.
+struct Signals<'t> {
+    time_header: String,
+    time: &'t [f64],
+    readings: Vec<&'t [f64]>,
+    inputs: Vec<Cow<'t, [f64]>>,
+}
+
+impl<'t> Signals<'t> {
+    fn of(
+        table: &'t Table,
+        plant: &Plant,
+        settings: &EstimateSettings,
+        observer: &Observer,
+    ) -> Result<Self, Error> {
+        let read = observer.measured.iter().chain(&observer.inputs);
+        let names = read.map(|signal| signal.name.as_str());
+        let time_header = time_of(table, plant, settings, names)?;
+        let reading = |name: &str| match settings.strict {
+            true => table.column(header(settings, name)),
+            false => table.readings(header(settings, name)),
+        };
+        let readings = observer.measured.iter().map(|s| reading(&s.name));
+        let inputs = observer.inputs.iter();
+        let inputs = inputs.map(|s| signal(table, settings, observer, &s.name));
+        Ok(Self {
+            time: table.time(&time_header)?,
+            readings: readings.collect::<Result<_, _>>()?,
+            inputs: inputs.collect::<Result<_, _>>()?,
+            time_header,
+        })
+    }
+
+    fn samples(&self) -> Samples<'_> {
+        Samples {
+            time: self.time,
+            readings: self.readings.clone(),
+            inputs: self.inputs.iter().map(|u| &**u).collect(),
+        }
+    }
+}
+
+/// The observer's run over samples: a filter takes readings when they are there; an observer
+/// whose correction is in its flow needs a stand-in for those that are not.
+pub(crate) fn course(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Course, Error> {
+    let study = prepared.study();
+    let settings = &study.estimate;
+    let run = run_settings(settings);
+    if design.observer.filter.is_some() {
+        return filter::run(study, prepared.extended(), design, samples, run, watch);
+    }
+    if settings.smoothing.is_some() {
+        return Err(Error::input("`smooth` and `lag` of [estimate] need family = \"ekf\": this observer has no covariance to smooth with").at(&study.file));
+    }
+    let stands_in = samples.have_gaps() || settings.deviations;
+    if stands_in || settings.between_samples == BetweenSamples::Predict {
+        return sampled::run(prepared, design, samples, run.method, watch);
+    }
+    plain(prepared, design, samples, run, watch)
+}
+
+fn plain(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    run: EstimatorSettings,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Course, Error> {
+    let observer = systems::observer(prepared.plant(), &design.observer)?;
+    let columns = samples.readings.iter().chain(&samples.inputs);
+    let log = Log::new(
+        observer.signals().to_vec(),
+        samples.time.to_vec(),
+        columns.map(|c| c.to_vec()).collect(),
+    )
+    .map_err(Error::from_source)?;
+    let (trajectory, advice, ended) = match estimate_watched(&observer, &log, run, watch) {
+        Ok(estimates) => (estimates.trajectory, estimates.advice, None),
+        Err(interrupted) => (interrupted.partial, None, Some(interrupted.error)),
+    };
+    let mut course = Course::of_run(
+        &design.observer,
+        &Reported::new(&design.observer, &trajectory),
+    );
+    course.ended = ended;
+    if run.between == lynkeus_run::BetweenSamples::Linear {
+        course.notes.push(
+            "between_samples = \"linear\" looks ahead one sample: the estimate at a row is that of an off-line replay".to_owned(),
+        );
+    }
+    if let Some(advice) = advice.filter(lynkeus_run::StepAdvice::is_unstable) {
+        course.notes.push(format!(
+            "the step {} is too long for this observer: its fastest mode needs {:.3e} or less",
+            advice.used, advice.needed
+        ));
+    }
+    Ok(course)
 }
 
 /// The study's settings as the runner has them.
 pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
     EstimatorSettings {
         between: match settings.between_samples {
-            BetweenSamples::Hold => lynkeus_run::BetweenSamples::Hold,
+            // the inter-sample predictor is not the integrator's business
+            BetweenSamples::Hold | BetweenSamples::Predict => lynkeus_run::BetweenSamples::Hold,
             BetweenSamples::Linear => lynkeus_run::BetweenSamples::Linear,
         },
         method: method(&settings.method),
@@ -144,28 +262,57 @@ pub(crate) fn refuse_stray_columns(
     }
 }
 
-fn log(
-    table: &Table,
-    time: &str,
+/// What the observer reads under a plant's name: an input's last value stands where its cell is
+/// missing, unless the study is strict.
+pub(crate) fn signal<'t>(
+    table: &'t Table,
     settings: &EstimateSettings,
-    observer: &System,
-) -> Result<Log, Error> {
-    let time = table.time(time)?.to_vec();
-    let names = observer.signals().to_vec();
-    let column = |name: &String| Ok(table.column(header(settings, name))?.to_vec());
-    let columns = names
-        .iter()
-        .map(column)
-        .collect::<Result<Vec<_>, Error>>()?;
-    Log::new(names, time, columns).map_err(|error| Error::from_source(error).at(table.file()))
+    observer: &Observer,
+    name: &str,
+) -> Result<Cow<'t, [f64]>, Error> {
+    let header = header(settings, name);
+    let is_input = observer.inputs.iter().any(|input| input.name == name);
+    match is_input && !settings.strict {
+        true => table.held(header),
+        false => table.column(header).map(Cow::Borrowed),
+    }
+}
+
+/// What the log lacks in words, and where its times count from.
+fn gaps(table: &Table, settings: &EstimateSettings, time: &str, design: &Design) -> Vec<String> {
+    let origin = table.origin(time);
+    let mut notes: Vec<String> = origin
+        .map(|origin| format!("times are seconds since {origin}"))
+        .into_iter()
+        .collect();
+    let observer = &design.observer;
+    for signal in observer.inputs.iter().chain(&observer.measured) {
+        let header = header(settings, &signal.name);
+        let places: Vec<String> = table
+            .faults(header)
+            .iter()
+            .map(|fault| format!("{fault} in line {}", fault.line))
+            .collect();
+        if !places.is_empty() {
+            notes.push(format!(
+                "column \"{header}\": {} of {} cells are missing, first {}",
+                table.missing(header),
+                table.rows(),
+                places.join(", ")
+            ));
+        }
+    }
+    notes
 }
 
 /// A column of the log, if it has one with numbers that is not the one of time.
-fn logged(table: &Table, settings: &EstimateSettings, time: &str, name: &str) -> Option<Vec<f64>> {
+fn logged<'t>(
+    table: &'t Table,
+    settings: &EstimateSettings,
+    time: &str,
+    name: &str,
+) -> Option<&'t [f64]> {
     let header = header(settings, name);
     let values = table.get(header).filter(|_| header != time)?;
-    values
-        .iter()
-        .any(|x| x.is_finite())
-        .then(|| values.to_vec())
+    values.iter().any(|x| x.is_finite()).then_some(values)
 }

@@ -1,5 +1,6 @@
 //! Reading whole text files, with errors that name the file.
 
+use std::fs::File;
 use std::io;
 use std::path::Path;
 
@@ -27,6 +28,19 @@ pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Error> {
         Some(rest) => rest.to_owned(),
         None => text,
     })
+}
+
+/// A file or a stream opened for reading; a folder is refused.
+pub(crate) fn open(path: &Path, what: &str) -> Result<File, Error> {
+    let file = File::open(path).map_err(|e| unreadable(path, what, &e))?;
+    match file.metadata() {
+        Ok(data) if data.is_dir() => Err(Error::input(format!(
+            "expected a {what} file, found the folder {}",
+            path.display()
+        ))
+        .hint("name a file in it")),
+        _ => Ok(file),
+    }
 }
 
 /// Refuses a path that names no file; `named_in` is the file that names it.

@@ -66,6 +66,7 @@ mod figure;
 mod files;
 mod filter;
 mod headers;
+mod innovations;
 mod near;
 mod outcome;
 mod outside;
@@ -91,6 +92,7 @@ pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
 #[cfg(feature = "plot")]
 pub use figure::figure;
+pub use innovations::Innovations;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;

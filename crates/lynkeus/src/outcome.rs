@@ -4,12 +4,14 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 
+use crate::course::Course;
 use crate::credible::{self, Doubt};
 use crate::headers::{Headers, log_time};
+use crate::innovations::{Innovations, innovations};
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
-use crate::systems::{Reported, hat};
+use crate::systems::hat;
 use crate::{Error, estimate};
 
 /// One quantity of the result with everything that is known of it.
@@ -27,8 +29,16 @@ pub struct Quantity {
     pub measured: Option<Vec<f64>>,
     /// what the observer makes of it
     pub estimate: Option<Vec<f64>>,
+    /// its standard deviation, where it is asked for
+    pub deviation: Option<Vec<f64>>,
+    /// the estimate given later rows, too
+    pub smoothed: Option<Vec<f64>>,
     /// header of the estimate's column: `<name>_hat` unless the model has that name
     pub estimate_header: String,
+    /// header of the standard deviation's column
+    pub deviation_header: String,
+    /// header of the column of the estimate given later rows
+    pub smoothed_header: String,
     /// an input that nobody measures
     pub unknown_input: bool,
     /// an input of the plant
@@ -85,6 +95,13 @@ pub struct Outcome {
     pub estimate_outside: Option<Outside>,
     /// the estimates that are not credible
     pub doubts: Vec<Doubt>,
+    /// how the readings went together with a filter's model, by measured output; none for other
+    /// observers
+    pub innovations: Vec<Innovations>,
+    /// where these contradict the declared noise, in words
+    pub contradictions: Vec<String>,
+    /// why the run ended before its last row
+    pub ended: Option<String>,
     /// what the user should know
     pub notes: Vec<String>,
 }
@@ -103,6 +120,16 @@ impl Outcome {
         for quantity in &self.quantities {
             if let Some(estimate) = &quantity.estimate {
                 columns.push((quantity.estimate_header.clone(), estimate));
+            }
+        }
+        for quantity in &self.quantities {
+            if let Some(deviation) = &quantity.deviation {
+                columns.push((quantity.deviation_header.clone(), deviation));
+            }
+        }
+        for quantity in &self.quantities {
+            if let Some(smoothed) = &quantity.smoothed {
+                columns.push((quantity.smoothed_header.clone(), smoothed));
             }
         }
         let watches = self.watches.iter();
@@ -135,9 +162,22 @@ impl Outcome {
     }
 
     /// The answer "no" where an estimate is not credible: it ends far outside of what the model
-    /// declares, and not because the plant is there.
+    /// declares, and not because the plant is there; its innovations contradict the declared
+    /// noise; or the run ended early.
     pub fn refusal(&self) -> Option<Error> {
-        credible::refusal(&self.doubts)
+        if let Some(ended) = &self.ended {
+            let message = format!("{ended} (the {} rows before are written)", self.time.len());
+            return Some(Error::refused(message));
+        }
+        credible::refusal(&self.doubts).or_else(|| {
+            let first = self.contradictions.first()?;
+            Some(credible::contradicted(first))
+        })
+    }
+
+    /// Whether nothing speaks against the estimates.
+    pub fn is_credible(&self) -> bool {
+        self.refusal().is_none()
     }
 }
 
@@ -147,7 +187,7 @@ pub(crate) struct Raw<'r> {
     pub design: Design,
     /// times of the rows
     pub time: &'r [f64],
-    pub reported: Reported<'r>,
+    pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Vec<f64>)>,
     pub notes: Vec<String>,
@@ -160,19 +200,31 @@ impl Raw<'_> {
             prepared,
             design,
             time,
+            mut course,
             mut quantities,
             measurements,
             mut notes,
-            ..
         } = self;
+        notes.append(&mut course.notes);
+        let innovations = innovations(&design, &course, &mut notes);
         let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
         let time_header = headers.time();
         for quantity in quantities.iter_mut().filter(|q| q.estimate.is_some()) {
             let what = format!("the estimate of {}", quantity.name);
             quantity.estimate_header = headers.free(&hat(&quantity.name), &what);
+            if quantity.deviation.is_some() {
+                let wanted = format!("{}_sd", quantity.name);
+                quantity.deviation_header =
+                    headers.free(&wanted, &format!("the deviation of {what}"));
+            }
+            if quantity.smoothed.is_some() {
+                let wanted = format!("{}_smooth", quantity.name);
+                quantity.smoothed_header =
+                    headers.free(&wanted, &format!("{what} given later rows"));
+            }
         }
-        let watches = watches(&design, &self.reported, time, &mut headers);
+        let watches = watches(&design, &mut course.monitors, time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
         let sides = outside::sides(prepared.extended());
         let itself = outside::time_itself(time);
@@ -192,6 +244,9 @@ impl Raw<'_> {
             plant: plant.name.clone(),
             log_time: log_time(plant, &prepared.study().estimate),
             doubts: credible::doubts(plant, &quantities),
+            contradictions: credible::contradictions(&innovations),
+            ended: course.ended.map(|error| error.to_string()),
+            innovations,
             time: time.to_vec(),
             time_header,
             design,
@@ -208,12 +263,12 @@ impl Raw<'_> {
 /// The observer's monitors as they went.
 fn watches(
     design: &Design,
-    reported: &Reported<'_>,
+    monitors: &mut [Vec<f64>],
     time: &[f64],
     headers: &mut Headers,
 ) -> Vec<Watch> {
     let watch = |(i, monitor): (usize, &Monitor)| {
-        let values = reported.monitor(i).unwrap_or_default().to_vec();
+        let values = monitors.get_mut(i).map(std::mem::take).unwrap_or_default();
         let low = values.iter().position(|x| *x < monitor.alarm_below);
         let what = format!("the monitor {}", monitor.name);
         Watch {

@@ -7,11 +7,12 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::{Level, Role, Simulation, Trajectory};
 
+use crate::course::{Course, Samples};
 use crate::outcome::{Raw, interrupted, measurements};
 use crate::prepare::Prepared;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, prepare};
+use crate::{Error, Outcome, Quantity, Study, estimate, prepare};
 
 /// Rows of a result whose study does not say how many.
 const ROWS: f64 = 500.0;
@@ -38,6 +39,9 @@ pub(crate) fn simulated(
     let (study, plant) = (prepared.study(), prepared.plant());
     let settings = settings(study)?;
     let design = prepared.design()?;
+    if design.observer.filter.is_some() {
+        return sampled(prepared, design, settings, watch);
+    }
     let simulation = Simulation {
         observer: Some(systems::observer(plant, &design.observer)?),
         inputs: systems::inputs(study, plant, settings, &design.observer)?,
@@ -46,7 +50,46 @@ pub(crate) fn simulated(
     let run = simulation
         .run_watched(watch)
         .map_err(|error| interrupted(error.error, &study.file))?;
-    Ok(outcome(prepared, design, &run))
+    let reported = Reported::new(&design.observer, &run);
+    let course = Course::of_run(&design.observer, &reported);
+    Ok(outcome(prepared, design, &run, course))
+}
+
+/// The plant alone, then a filter on what its sensors show: every row is a sample.
+fn sampled(
+    prepared: &Prepared<'_>,
+    design: Design,
+    settings: &SimulateSettings,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let mut simulation = open_loop(study, settings, plant)?;
+    simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
+    let run = simulation
+        .run_watched(&mut |done| watch(0.5 * done))
+        .map_err(|error| interrupted(error.error, &study.file))?;
+    let observer = &design.observer;
+    let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
+    let column =
+        |role: Role, at: Option<usize>| at.and_then(|i| run.column(role.at(i))).unwrap_or_default();
+    let readings = observer.measured.iter();
+    let inputs = observer.inputs.iter();
+    let samples = Samples {
+        time: run.times(),
+        readings: readings
+            .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
+            .collect(),
+        inputs: inputs
+            .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
+            .collect(),
+    };
+    let course = estimate::course(prepared, &design, &samples, &mut |done| {
+        watch(0.5 + 0.5 * done)
+    })?;
+    if let Some(error) = course.ended {
+        return Err(interrupted(error, &study.file));
+    }
+    Ok(outcome(prepared, design, &run, course))
 }
 
 /// The study's `[simulate]`.
@@ -109,28 +152,36 @@ fn noise(
     })
 }
 
-fn outcome(prepared: &Prepared<'_>, design: Design, run: &Trajectory) -> Outcome {
+fn outcome(
+    prepared: &Prepared<'_>,
+    design: Design,
+    run: &Trajectory,
+    mut course: Course,
+) -> Outcome {
     let plant = prepared.plant();
-    let reported = Reported::new(&design.observer, run);
-    let quantity = |variable: &Variable, role: Role, place: usize| {
+    let deviations = prepared.study().estimate.deviations;
+    let mut quantity = |variable: &Variable, role: Role, place: usize| {
         let estimates = &design.observer.estimates;
         let own = |e: &lynkeus_observers::Estimate| e.variable.node == variable.node;
         let estimated = estimates.iter().position(own);
-        Quantity {
+        let mut quantity = Quantity {
             name: variable.name.clone(),
             unit: variable.unit.clone(),
             description: variable.description.clone(),
             truth: run.column(role.at(place)).map(<[f64]>::to_vec),
-            estimate: estimated.and_then(|i| Some(reported.estimate(i)?.to_vec())),
             unknown_input: estimated.is_some_and(|i| estimates[i].unknown_input),
             is_input: role == Role::Input,
             ..Quantity::default()
+        };
+        if let Some(i) = estimated {
+            course.give(i, deviations, &mut quantity);
         }
+        quantity
     };
     let states = plant.states.iter().enumerate();
-    let states = states.map(|(i, v)| quantity(v, Role::State, i));
+    let mut quantities: Vec<Quantity> = states.map(|(i, v)| quantity(v, Role::State, i)).collect();
     let inputs = plant.inputs.iter().enumerate();
-    let inputs = inputs.map(|(i, v)| quantity(v, Role::Input, i));
+    quantities.extend(inputs.map(|(i, v)| quantity(v, Role::Input, i)));
     let measured = |signal: &lynkeus_observers::Signal| {
         let output = systems::output_of(plant, signal)?;
         let values = run.column(Role::Measured.at(output))?;
@@ -138,10 +189,10 @@ fn outcome(prepared: &Prepared<'_>, design: Design, run: &Trajectory) -> Outcome
     };
     Raw {
         time: run.times(),
-        quantities: states.chain(inputs).collect(),
+        quantities,
         measurements: measurements(&design, measured),
         notes: design.notes.clone(),
-        reported,
+        course,
         prepared,
         design,
     }

@@ -8,6 +8,17 @@ use crate::{Dynamics, Error, Evaluation};
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
 /// filter out for ever.
 const LOCKED_OUT: usize = 10;
+/// Of them so many have to differ from the reading before: a sensor that hangs, or shows an end
+/// of its range, is no reason to doubt the estimate.
+const MOVED: usize = 5;
+
+/// The readings of a sensor that were rejected in a row.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lockout {
+    /// readings that differ from the one before
+    moved: usize,
+    last: f64,
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Sensing {
@@ -19,6 +30,7 @@ pub(super) struct Sensing {
     /// h, then the entries of C
     values: Vec<f64>,
     gate: Option<f64>,
+    lockouts: Vec<Lockout>,
     pub innovations: Vec<Innovation>,
     pub health: Health,
     /// of this sample, for the smoother
@@ -36,6 +48,7 @@ impl Sensing {
             output_entries: model.output_entries.clone(),
             values: vec![0.0; count + model.output_entries.len()],
             gate,
+            lockouts: vec![Lockout::default(); count],
             innovations: vec![Innovation::default(); count],
             health: Health {
                 sensors: vec![SensorHealth::default(); count],
@@ -109,6 +122,7 @@ impl Sensing {
                 _ => Reading::Taken,
             };
         }
+        self.follow(i, reading, innovation.reading);
         self.health.sensors[i].count(&innovation);
         self.innovations[i] = innovation;
         innovation
@@ -116,7 +130,19 @@ impl Sensing {
 
     fn is_outlier(&self, i: usize, innovation: f64, deviation: f64) -> bool {
         let Some(gate) = self.gate else { return false };
-        self.health.sensors[i].locked_out < LOCKED_OUT && innovation.abs() > gate * deviation
+        let relieved =
+            self.health.sensors[i].locked_out >= LOCKED_OUT && self.lockouts[i].moved >= MOVED;
+        !relieved && innovation.abs() > gate * deviation
+    }
+
+    fn follow(&mut self, i: usize, reading: f64, became: Reading) {
+        let lockout = &mut self.lockouts[i];
+        match became {
+            Reading::Missing => return,
+            Reading::Rejected => lockout.moved += usize::from(reading != lockout.last),
+            Reading::Taken | Reading::AtLimit => lockout.moved = 0,
+        }
+        lockout.last = reading;
     }
 }
 

@@ -104,8 +104,11 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
     for k in 0..5 {
         filter.push(f64::from(k), &[1.0], &[]).unwrap();
     }
+    let mut hanging = filter.clone();
     for k in 5..15 {
-        filter.push(f64::from(k), &[9.0], &[]).unwrap();
+        filter
+            .push(f64::from(k), &[9.0 + 0.01 * f64::from(k)], &[])
+            .unwrap();
         assert_eq!(filter.innovations()[0].reading, Reading::Rejected);
     }
     assert!((filter.estimate()[0] - 1.0).abs() < 1e-12);
@@ -113,6 +116,11 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
     assert!(filter.estimate()[0] > 1.5);
     let health = filter.health().sensors[0];
     assert_eq!((health.taken, health.rejected, health.missing), (6, 10, 0));
+    // a sensor that shows the same number for ever has not seen a new level
+    for k in 5..60 {
+        hanging.push(f64::from(k), &[9.0], &[]).unwrap();
+    }
+    assert_eq!(hanging.health().sensors[0].rejected, 55);
 }
 
 #[test]

@@ -169,7 +169,8 @@ fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
             "plant": outside(&outcome.plant_outside),
             "estimate": outside(&outcome.estimate_outside),
         },
-        "credible": outcome.doubts.is_empty(),
+        "innovations": object(outcome.innovations.iter().map(|i| (i.output.clone(), i.to_json())).collect()),
+        "credible": outcome.is_credible(),
         "doubts": object(doubts.collect()),
         "notes": outcome.notes,
     })

@@ -18,6 +18,8 @@ pub struct EstimateSettings {
     pub time: Option<String>,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
+    /// A log with missing cells in a column that is read is refused.
+    pub strict: bool,
     /// Estimates given later rows, too.
     pub smoothing: Option<Smoothing>,
     /// Standard deviations beside the estimates.
@@ -77,5 +79,6 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
                 .map(|(name, header)| Ok((name, header.name()?.text)))
                 .collect::<Result<_, Error>>()?,
         },
+        strict: section.optional("strict", Entry::boolean)?.unwrap_or(false),
     })
 }

@@ -309,7 +309,7 @@ pub(super) const SIMULATE: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 6] = [
+pub(super) const ESTIMATE: [KeySpec; 7] = [
     KeySpec {
         name: "smooth",
         kind: "true, false",
@@ -351,6 +351,13 @@ pub(super) const ESTIMATE: [KeySpec; 6] = [
         shape: Shape::Table(&Shape::Text),
         default: "the plant's names",
         meaning: "where the log's header names a signal differently",
+    },
+    KeySpec {
+        name: "strict",
+        kind: "`true`, `false`",
+        shape: Shape::Flag,
+        default: "`false`",
+        meaning: "refuse a log in which a cell that is read has no number",
     },
 ];
 

@@ -1,40 +1,44 @@
-//! Tables of numbers: measured logs read from CSV, estimates written to CSV.
+//! Tables of numbers: measured logs as they are, estimates as they are written.
+//!
+//! A cell without a value (empty, NaN, infinite, a word) is *missing*: it is NaN in the column,
+//! counted, and the first few are kept with their line. What a cell says is never guessed: a
+//! comma that may be a decimal comma or group thousands is decided by the rest of the column and
+//! of the file, or the column is refused with the cell that leaves it open.
 
+mod cell;
+mod column;
+mod instant;
+mod lines;
+mod marks;
+mod number;
 mod read;
+mod row;
 mod write;
+
+use std::borrow::Cow;
 
 use crate::Error;
 use crate::near::{list, nearest};
+use column::Column;
+use lines::Lines;
 
-pub use write::{significant, write_csv};
+pub use column::Fault;
+pub use number::{exact, significant};
+pub use write::write_csv;
 
 /// A table of named columns of equal length, all numbers.
 ///
-/// A cell that is empty or no number is remembered with its line; asking for its column is then
-/// an error that names the cell, so that columns nobody asks for may hold anything.
+/// Asking for a column is an error where its cells cannot be told, so that columns nobody asks
+/// for may hold anything.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     file: String,
     columns: Vec<Column>,
-    lines: Vec<u64>,
-}
-
-#[derive(Clone, Debug)]
-struct Column {
-    name: String,
-    values: Vec<f64>,
-    flaw: Option<Flaw>,
-}
-
-/// The first cell of a column that is not a finite number.
-#[derive(Clone, Debug)]
-struct Flaw {
-    line: u64,
-    text: String,
+    lines: Lines,
 }
 
 impl Table {
-    /// A table from columns computed in Rust.
+    /// A table from columns computed in Rust; a value that is not finite is missing.
     ///
     /// # Errors
     /// The columns differ in length.
@@ -46,23 +50,19 @@ impl Table {
                 values.len()
             )));
         }
+        let columns = columns.into_iter();
         Ok(Self {
             file: String::new(),
             columns: columns
-                .into_iter()
-                .map(|(name, values)| Column {
-                    name,
-                    values,
-                    flaw: None,
-                })
+                .map(|(name, values)| Column::computed(name, values))
                 .collect(),
-            lines: (1..).take(rows).collect(),
+            lines: Lines::counted(rows),
         })
     }
 
     /// The number of rows.
     pub fn rows(&self) -> usize {
-        self.lines.len()
+        self.lines.rows()
     }
 
     /// The headers, in order.
@@ -75,43 +75,92 @@ impl Table {
         &self.file
     }
 
-    /// A column if there is one of that name; cells that are no numbers are NaN.
+    /// A column if there is one of that name whose cells can be told; missing ones are NaN.
     pub fn get(&self, name: &str) -> Option<&[f64]> {
-        self.columns
-            .iter()
-            .find(|c| c.name == name)
-            .map(|c| c.values.as_slice())
+        let column = self.columns.iter().find(|c| c.name == name)?;
+        column.refusal.is_none().then_some(&column.values)
     }
 
-    /// A column all of whose cells are finite numbers.
+    /// How many cells of a column are missing; 0 where there is no such column.
+    pub fn missing(&self, name: &str) -> usize {
+        let column = self.columns.iter().find(|c| c.name == name);
+        column.map_or(0, |c| c.missing)
+    }
+
+    /// The first few missing cells of a column, in order.
+    pub fn faults(&self, name: &str) -> &[Fault] {
+        let column = self.columns.iter().find(|c| c.name == name);
+        column.map_or(&[], |c| &c.faults)
+    }
+
+    /// What the log writes for zero where a column holds dates and times: it counts seconds since
+    /// the first of them.
+    pub fn origin(&self, name: &str) -> Option<&str> {
+        let column = self.columns.iter().find(|c| c.name == name)?;
+        column.origin.as_ref().map(|origin| origin.text.as_str())
+    }
+
+    /// A column in which cells may be missing: those are NaN.
     ///
     /// # Errors
-    /// There is no such column (the message lists those found), there are two, or a cell is
-    /// empty, NaN, infinite or no number (the message gives its line).
-    pub fn column(&self, name: &str) -> Result<&[f64], Error> {
-        let mut matching = self.columns.iter().filter(|c| c.name == name);
-        let Some(column) = matching.next() else {
-            return Err(self.missing(name));
-        };
-        if matching.next().is_some() {
+    /// There is no such column (the message lists those found), there are two, a cell begins like
+    /// a number and is none, a decimal mark cannot be told (the message gives the line), or every
+    /// cell is missing.
+    pub fn readings(&self, name: &str) -> Result<&[f64], Error> {
+        let column = self.find(name)?;
+        if let Some(refusal) = &column.refusal {
             return Err(
-                Error::input(format!("two columns are called \"{name}\", expected one"))
-                    .at(&self.file),
+                Error::input(format!("column \"{name}\": {}", refusal.message))
+                    .at(format!("{}:{}", self.file, refusal.line))
+                    .hint(refusal.hint),
             );
         }
-        match &column.flaw {
-            None => Ok(&column.values),
-            Some(flaw) => Err(Error::input(format!(
-                "column \"{name}\" must hold a finite number in every row, found {}",
-                if flaw.text.is_empty() {
-                    "an empty cell".to_owned()
-                } else {
-                    format!("\"{}\"", flaw.text)
+        match column.faults.first() {
+            Some(fault) if column.missing == column.values.len() => Err(Error::input(format!(
+                "column \"{name}\" has no number, found {fault}"
+            ))
+            .at(format!("{}:{}", self.file, fault.line))
+            .hint("name another column under [estimate] columns, or mend this one")),
+            _ => Ok(&column.values),
+        }
+    }
+
+    /// A column in which the last value stands where a cell is missing, and the first one before it.
+    ///
+    /// # Errors
+    /// As [`Table::readings`].
+    pub fn held(&self, name: &str) -> Result<Cow<'_, [f64]>, Error> {
+        let values = self.readings(name)?;
+        if self.find(name)?.missing == 0 {
+            return Ok(Cow::Borrowed(values));
+        }
+        let mut last = values.iter().copied().find(|x| x.is_finite());
+        let held = values.iter().map(|&x| {
+            last = Some(x).filter(|x| x.is_finite()).or(last);
+            last.unwrap_or(f64::NAN)
+        });
+        Ok(Cow::Owned(held.collect()))
+    }
+
+    /// A column without missing cells.
+    ///
+    /// # Errors
+    /// As [`Table::readings`], or a cell is missing (the message gives the first one's line).
+    pub fn column(&self, name: &str) -> Result<&[f64], Error> {
+        let values = self.readings(name);
+        let column = self.find(name)?;
+        if let (None, Some(fault)) = (&column.refusal, column.faults.first()) {
+            return Err(Error::input(format!(
+                "column \"{name}\" must hold a finite number in every row, found {fault}{}",
+                match column.missing {
+                    1 => String::new(),
+                    more => format!(" and {} more such cells", more - 1),
                 }
             ))
-            .at(format!("{}:{}", self.file, flaw.line))
-            .hint("remove the row or fill the cell")),
+            .at(format!("{}:{}", self.file, fault.line))
+            .hint("remove the row or fill the cell"));
         }
+        values
     }
 
     /// The time column: strictly increasing.
@@ -123,7 +172,7 @@ impl Table {
         let back = time.windows(2).position(|pair| pair[1] <= pair[0]);
         let Some(i) = back else { return Ok(time) };
         let (at, before) = (&time[i + 1], &time[i]);
-        let line = |row: usize| self.lines.get(row).copied().unwrap_or_default();
+        let line = |row: usize| self.lines.of(row);
         Err(Error::input(format!(
             "time must increase from row to row, found \"{name}\" = {at} after {before} in line {}",
             line(i)
@@ -132,7 +181,21 @@ impl Table {
         .hint("sort the rows by time and remove doubles"))
     }
 
-    fn missing(&self, name: &str) -> Error {
+    fn find(&self, name: &str) -> Result<&Column, Error> {
+        let mut matching = self.columns.iter().filter(|c| c.name == name);
+        let Some(column) = matching.next() else {
+            return Err(self.absent(name));
+        };
+        match matching.next() {
+            None => Ok(column),
+            Some(_) => Err(Error::input(format!(
+                "two columns are called \"{name}\", expected one"
+            ))
+            .at(&self.file)),
+        }
+    }
+
+    fn absent(&self, name: &str) -> Error {
         let found = format!(
             "no column \"{name}\"; the columns found are: {}",
             list(self.names())

@@ -2,27 +2,59 @@
 
 use std::io::{self, Write};
 
-/// A number with 12 significant digits, written as briefly as that allows.
-pub fn significant(x: f64) -> String {
-    let rounded: f64 = format!("{x:.11e}").parse().unwrap_or(x);
-    let text = format!("{rounded:?}");
-    match text.strip_suffix(".0") {
-        Some(whole) => whole.to_owned(),
-        None => text,
-    }
-}
+use super::number::{write_exact, write_significant};
 
-/// Writes named columns as CSV: a header row, then one row per index, 12 significant digits.
+/// Bytes that are gathered before they are written.
+const BLOCK: usize = 1 << 16;
+
+/// Writes named columns as CSV: a header row, then one row per index.
+///
+/// The first column, the time, has as many digits as it takes to read the same number back; the
+/// others have 12 significant digits. A NaN is an empty cell. Rows are written as they are made,
+/// so a table takes no room but its own.
 ///
 /// # Errors
 /// What the writer reports.
 pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<()> {
-    let mut writer = csv::Writer::from_writer(to);
-    writer.write_record(columns.iter().map(|(name, _)| name))?;
+    let mut text = Vec::with_capacity(2 * BLOCK);
+    for (place, (name, _)) in columns.iter().enumerate() {
+        if place > 0 {
+            text.push(b',');
+        }
+        write_name(&mut text, name);
+    }
+    text.push(b'\n');
     let rows = columns.iter().map(|(_, v)| v.len()).min().unwrap_or(0);
     for row in 0..rows {
-        let cells = columns.iter().filter_map(|(_, values)| values.get(row));
-        writer.write_record(cells.map(|x| significant(*x)))?;
+        for (place, (_, values)) in columns.iter().enumerate() {
+            let value = values.get(row).copied().unwrap_or(f64::NAN);
+            match place {
+                0 => write_exact(&mut text, value),
+                _ => {
+                    text.push(b',');
+                    if !value.is_nan() {
+                        write_significant(&mut text, value);
+                    }
+                }
+            }
+        }
+        text.push(b'\n');
+        if text.len() >= BLOCK {
+            to.write_all(&text)?;
+            text.clear();
+        }
     }
-    writer.flush()
+    to.write_all(&text)?;
+    to.flush()
+}
+
+/// A header, in quotes where it needs them.
+fn write_name(text: &mut Vec<u8>, name: &str) {
+    let is_plain = !name.contains(['"', ',', ';', '\t', '\n', '\r']) && name.trim() == name;
+    if is_plain && !name.is_empty() {
+        return text.extend_from_slice(name.as_bytes());
+    }
+    text.push(b'"');
+    text.extend_from_slice(name.replace('"', "\"\"").as_bytes());
+    text.push(b'"');
 }

@@ -13,7 +13,7 @@ use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
-use crate::estimate::{header, refuse_derivatives, refuse_stray_columns, run_settings};
+use crate::estimate::{refuse_derivatives, refuse_stray_columns, run_settings, signal};
 use crate::headers::time_of;
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
@@ -62,7 +62,7 @@ impl<'a> Replay<'a> {
         let run = run_settings(settings);
         refuse_derivatives(study, design)?;
         refuse_stray_columns(plant, settings)?;
-        let column = |name: &str| Ok(table.column(header(settings, name))?.to_vec());
+        let column = |name: &str| Ok(signal(table, settings, &design.observer, name)?.into_owned());
         let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
             signals.iter().map(|s| s.name.clone()).collect()
         };

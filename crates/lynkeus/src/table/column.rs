@@ -1,0 +1,217 @@
+//! A column while it is read, and as it stays.
+
+use std::fmt;
+
+use super::cell::{self, Cell, Mark};
+use super::instant::Instant;
+use super::marks::{FileMarks, Marks, Refusal, ShortComma};
+
+/// Missing cells that are kept with their line.
+const KEPT: usize = 5;
+
+/// What to do about times of several kinds.
+const ALIKE: &str = "write every time in the same way";
+
+/// A cell that holds no finite number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// line of the file, from 1
+    pub line: u64,
+    /// header of the column
+    pub column: String,
+    /// what stands there, trimmed
+    pub found: String,
+}
+
+/// What was found, in words.
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.found.as_str() {
+            "" => f.write_str("an empty cell"),
+            found => write!(f, "\"{found}\""),
+        }
+    }
+}
+
+/// The first date of a column.
+#[derive(Clone, Debug)]
+pub(super) struct Origin {
+    pub text: String,
+    instant: Instant,
+}
+
+/// A column of a table.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Column {
+    pub name: String,
+    /// NaN where missing
+    pub values: Vec<f64>,
+    pub missing: usize,
+    /// the first missing cells
+    pub faults: Vec<Fault>,
+    pub refusal: Option<Refusal>,
+    pub origin: Option<Origin>,
+    marks: Marks,
+    /// rows that say `1,234`, which waits for another cell to tell what that is
+    open: Vec<usize>,
+    /// a plain number was seen
+    has_number: bool,
+}
+
+/// No room for another value.
+#[derive(Debug)]
+pub(super) struct OutOfMemory;
+
+impl Column {
+    pub(super) fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// Of values that are not read from a file.
+    pub(super) fn computed(name: String, mut values: Vec<f64>) -> Self {
+        let mut column = Self::new(&name);
+        for (row, value) in values.iter_mut().enumerate() {
+            if !value.is_finite() {
+                column.miss(row as u64 + 1, &value.to_string());
+                *value = f64::NAN;
+            }
+        }
+        Self { values, ..column }
+    }
+
+    /// Makes room for so many values in all.
+    pub(super) fn reserve(&mut self, rows: usize) -> Result<(), OutOfMemory> {
+        let more = rows.saturating_sub(self.values.len());
+        self.values.try_reserve_exact(more).map_err(|_| OutOfMemory)
+    }
+
+    /// Takes the next row's cell.
+    pub(super) fn push(&mut self, text: &str, line: u64) -> Result<(), OutOfMemory> {
+        if self.values.len() == self.values.capacity() {
+            self.reserve(self.values.len() / 2 * 3 + 1024)?;
+        }
+        let value = match cell::read(text) {
+            Cell::Number(value) => {
+                self.marks.see_plain(value);
+                self.number(value, line, text)
+            }
+            Cell::Marked(value, mark) => {
+                let value = self.marked(value, mark, line, text)?;
+                self.number(value, line, text)
+            }
+            Cell::Instant(instant) => self.instant(instant, line, text),
+            Cell::Missing => {
+                self.miss(line, text);
+                f64::NAN
+            }
+            Cell::Garbled => {
+                self.refuse(
+                    line,
+                    format!("expected a number, found \"{text}\""),
+                    "write numbers without units and blanks, and times as numbers or as 2026-11-22T01:02:03Z",
+                );
+                f64::NAN
+            }
+        };
+        self.values.push(value);
+        Ok(())
+    }
+
+    fn number(&mut self, value: f64, line: u64, text: &str) -> f64 {
+        self.has_number = true;
+        if let Some(origin) = &self.origin {
+            let message = format!("expected a date like \"{}\", found \"{text}\"", origin.text);
+            self.refuse(line, message, ALIKE);
+        }
+        value
+    }
+
+    /// The value that a marked cell has as far as the column tells.
+    fn marked(
+        &mut self,
+        value: f64,
+        mark: Mark,
+        line: u64,
+        text: &str,
+    ) -> Result<f64, OutOfMemory> {
+        self.marks.see(mark, line, text);
+        match (mark, self.marks.own()) {
+            (Mark::ShortComma, Some(meaning)) => return Ok(meaning.of(value)),
+            (Mark::ShortComma, None) => {
+                self.open.try_reserve(1).map_err(|_| OutOfMemory)?;
+                self.open.push(self.values.len());
+            }
+            (_, Some(meaning)) => self.settle(meaning),
+            (_, None) => {}
+        }
+        Ok(value)
+    }
+
+    /// Gives the cells that waited for it their meaning.
+    fn settle(&mut self, meaning: ShortComma) {
+        for row in std::mem::take(&mut self.open) {
+            if let Some(value) = self.values.get_mut(row) {
+                *value = meaning.of(*value);
+            }
+        }
+    }
+
+    fn instant(&mut self, instant: Instant, line: u64, text: &str) -> f64 {
+        if self.has_number {
+            let message = format!("expected a number, found the date \"{text}\"");
+            self.refuse(line, message, ALIKE);
+        }
+        let origin = self.origin.get_or_insert_with(|| Origin {
+            text: text.to_owned(),
+            instant,
+        });
+        let seconds = instant.seconds_since(origin.instant);
+        if origin.instant.zoned != instant.zoned {
+            let message = format!(
+                "expected a zone in all times or in none, found \"{text}\" after \"{}\"",
+                origin.text
+            );
+            self.refuse(line, message, ALIKE);
+        }
+        seconds
+    }
+
+    fn miss(&mut self, line: u64, text: &str) {
+        self.missing += 1;
+        if self.faults.len() < KEPT {
+            self.faults.push(Fault {
+                line,
+                column: self.name.clone(),
+                found: text.to_owned(),
+            });
+        }
+    }
+
+    /// Only the first refusal is kept.
+    fn refuse(&mut self, line: u64, message: String, hint: &'static str) {
+        self.refusal.get_or_insert(Refusal {
+            line,
+            message,
+            hint,
+        });
+    }
+
+    /// Adds what this column says of point and comma.
+    pub(super) fn tell(&self, file: &mut FileMarks) {
+        self.marks.tell(file);
+    }
+
+    /// All rows are read, and the file has spoken.
+    pub(super) fn finish(&mut self, file: FileMarks) {
+        match self.marks.decide(file) {
+            Ok(meaning) => self.settle(meaning),
+            Err(refusal) => {
+                self.refusal.get_or_insert(refusal);
+            }
+        }
+        self.values.shrink_to_fit();
+    }
+}

@@ -1,0 +1,196 @@
+//! Dates and times of RFC 3339, and its relaxations that leave no doubt.
+
+/// A point in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Instant {
+    /// since 1970-01-01T00:00:00, UTC or local
+    nanoseconds: i128,
+    /// it says how far its clock is from UTC
+    pub zoned: bool,
+}
+
+/// Nanoseconds in a second.
+const SECOND: i128 = 1_000_000_000;
+
+impl Instant {
+    /// From `origin` to here, rounded once where that is less than 104 days.
+    pub(super) fn seconds_since(self, origin: Self) -> f64 {
+        let nanoseconds = self.nanoseconds - origin.nanoseconds;
+        if nanoseconds.unsigned_abs() < 1 << 53 {
+            return nanoseconds as f64 / SECOND as f64;
+        }
+        let part = nanoseconds.rem_euclid(SECOND) as f64 / SECOND as f64;
+        nanoseconds.div_euclid(SECOND) as f64 + part
+    }
+}
+
+/// `2026-11-22`, `2026-11-22T01:02:03.456+01:00`; a blank in the place of T, a comma before the
+/// fraction, and no seconds or no zone are understood.
+pub(super) fn read(text: &str) -> Option<Instant> {
+    let mut scan = Scan {
+        bytes: text.as_bytes(),
+    };
+    let year = scan.number(4, 0..=9999)?;
+    scan.one_of(b"-")?;
+    let month = scan.number(2, 1..=12)?;
+    scan.one_of(b"-")?;
+    let day = scan.number(2, 1..=days(year, month))?;
+    let date = i128::from(days_since_1970(year, month, day)) * 86_400 * SECOND;
+    if scan.bytes.is_empty() {
+        let zoned = false;
+        return Some(Instant {
+            nanoseconds: date,
+            zoned,
+        });
+    }
+    scan.one_of(b"Tt ")?;
+    let time = scan.clock()?;
+    let offset = scan.offset()?;
+    scan.bytes.is_empty().then_some(Instant {
+        nanoseconds: date + time - offset.unwrap_or(0),
+        zoned: offset.is_some(),
+    })
+}
+
+/// What is left of a text.
+struct Scan<'a> {
+    bytes: &'a [u8],
+}
+
+impl Scan<'_> {
+    fn one_of(&mut self, set: &[u8]) -> Option<u8> {
+        let (first, rest) = self.bytes.split_first()?;
+        set.contains(first).then(|| self.bytes = rest)?;
+        Some(*first)
+    }
+
+    /// A number of so many digits.
+    fn number(&mut self, digits: usize, within: std::ops::RangeInclusive<i64>) -> Option<i64> {
+        let (text, rest) = self.bytes.split_at_checked(digits)?;
+        let digit = |b: &u8| b.is_ascii_digit().then(|| i64::from(b - b'0'));
+        let number = text.iter().try_fold(0, |n, b| Some(10 * n + digit(b)?))?;
+        self.bytes = rest;
+        within.contains(&number).then_some(number)
+    }
+
+    /// Nanoseconds since midnight.
+    fn clock(&mut self) -> Option<i128> {
+        let hour = self.number(2, 0..=23)?;
+        self.one_of(b":")?;
+        let minute = self.number(2, 0..=59)?;
+        // 60 is a leap second
+        let second = match self.one_of(b":") {
+            Some(_) => self.number(2, 0..=60)?,
+            None => 0,
+        };
+        let fraction = match self.one_of(b".,") {
+            Some(_) => self.fraction()?,
+            None => 0,
+        };
+        Some(i128::from((hour * 60 + minute) * 60 + second) * SECOND + fraction)
+    }
+
+    /// Digits after the second, as nanoseconds; what is finer is dropped.
+    fn fraction(&mut self) -> Option<i128> {
+        let (mut value, mut unit, mut digits) = (0, SECOND, 0);
+        while let Some(digit) = self.one_of(b"0123456789") {
+            unit /= 10;
+            value += unit * i128::from(digit - b'0');
+            digits += 1;
+        }
+        (digits > 0).then_some(value)
+    }
+
+    /// Nanoseconds by which the clock is ahead of UTC; an inner none where that is not said.
+    fn offset(&mut self) -> Option<Option<i128>> {
+        if self.bytes.is_empty() {
+            return Some(None);
+        }
+        let sign = match self.one_of(b"Zz+-")? {
+            b'+' => 1,
+            b'-' => -1,
+            _ => return Some(Some(0)),
+        };
+        let hours = self.number(2, 0..=23)?;
+        let _ = self.one_of(b":");
+        let minutes = self.number(2, 0..=59)?;
+        Some(Some(
+            i128::from(sign * (hours * 60 + minutes) * 60) * SECOND,
+        ))
+    }
+}
+
+fn days(year: i64, month: i64) -> i64 {
+    let leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    match month {
+        2 => 28 + i64::from(leap),
+        4 | 6 | 9 | 11 => 30,
+        _ => 31,
+    }
+}
+
+/// Days of the Gregorian calendar (Howard Hinnant, `days_from_civil`).
+fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
+    // years that start in March, so that the leap day is their last
+    let year = if month <= 2 { year - 1 } else { year };
+    let era = year.div_euclid(400);
+    let of_era = year.rem_euclid(400);
+    let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+    era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seconds(text: &str) -> f64 {
+        let origin = Instant {
+            nanoseconds: 0,
+            zoned: false,
+        };
+        read(text).unwrap().seconds_since(origin)
+    }
+
+    #[test]
+    fn epochs_of_known_times() {
+        // GNU date -d … +%s
+        assert_eq!(seconds("1970-01-01"), 0.0);
+        assert_eq!(seconds("2000-02-29T12:00:00Z"), 951_825_600.0);
+        assert_eq!(seconds("2026-11-22T01:02:03.25+01:00"), 1_795_305_723.25);
+        assert_eq!(seconds("1969-12-31 23:59:59.5Z"), -0.5);
+        assert_eq!(seconds("2016-12-31T23:59:60Z"), seconds("2017-01-01"));
+        assert_eq!(seconds("2026-11-22 01:02"), seconds("2026-11-22t01:02:00z"));
+        assert_eq!(
+            seconds("2026-11-22T01:02:03,5-0330"),
+            seconds("2026-11-22T04:32:03.5Z")
+        );
+    }
+
+    #[test]
+    fn nanoseconds_are_kept() {
+        let at = |text| read(text).unwrap();
+        let (a, b) = (
+            at("2026-11-22T00:00:00.000000001Z"),
+            at("2026-11-22T00:00:00Z"),
+        );
+        assert_eq!(a.seconds_since(b), 1e-9);
+        assert!(a.zoned && !at("2026-11-22").zoned);
+    }
+
+    #[test]
+    fn what_is_no_time_is_refused() {
+        for text in [
+            "2026-13-01",
+            "2026-02-29",
+            "2026-11-22T24:00:00Z",
+            "2026-11-22T01:02:03.Z",
+            "26-11-22",
+            "2026-11-22T01:02:03+1",
+            "2026-11-22x",
+            "22.11.2026",
+            "2026-11-22 ",
+        ] {
+            assert_eq!(read(text), None, "{text}");
+        }
+    }
+}
