@@ -17,7 +17,8 @@ use crate::{Error, Outcome, Quantity, Study, Table, prepare};
 ///
 /// # Errors
 /// A study that does not fit the plant, a log without the columns that the
-/// observer reads, conditions that are refuted, an estimate that diverges.
+/// observer reads, conditions that are refuted, an estimate that diverges. One that is not
+/// credible is a result: [`Outcome::refusal`].
 pub fn estimate(
     study: &Study,
     table: &Table,
@@ -160,10 +161,12 @@ fn log(
     Log::new(names, time, columns).map_err(|error| Error::from_source(error).at(table.file()))
 }
 
-/// A column of the log, if it has one with numbers that is not the one of time.
+/// A column of the log, if it has one with numbers, and only one, that is not the one of time.
 fn logged(table: &Table, settings: &EstimateSettings, time: &str, name: &str) -> Option<Vec<f64>> {
     let header = header(settings, name);
-    let values = table.get(header).filter(|_| header != time)?;
+    let mut named = table.names().filter(|name| *name == header);
+    let is_own = named.next().is_some() && named.next().is_none() && header != time;
+    let values = table.get(header).filter(|_| is_own)?;
     values
         .iter()
         .any(|x| x.is_finite())
