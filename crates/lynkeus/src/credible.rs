@@ -15,10 +15,13 @@ struct Limit {
     widths: f64,
 }
 
+/// In widths of its range: no estimate that ends so far from the truth is worth a figure.
+pub(crate) const RUN_AWAY: f64 = 100.0;
+
 const LIMITS: [Limit; 3] = [
     Limit {
         last: 0.0,
-        widths: 100.0,
+        widths: RUN_AWAY,
     },
     Limit {
         last: 0.1,
