@@ -16,10 +16,13 @@ struct Limit {
     widths: f64,
 }
 
+/// In widths of its range: no estimate that ends so far from the truth is worth a figure.
+pub(crate) const RUN_AWAY: f64 = 100.0;
+
 const LIMITS: [Limit; 3] = [
     Limit {
         last: 0.0,
-        widths: 100.0,
+        widths: RUN_AWAY,
     },
     Limit {
         last: 0.1,
@@ -136,20 +139,20 @@ fn distance(declared: &Variable, quantity: &Quantity, row: usize) -> f64 {
 /// The answer where an estimate is not credible; none where all are.
 pub(crate) fn refusal(doubts: &[Doubt]) -> Option<Error> {
     let worst = doubts.iter().max_by(|a, b| a.widths.total_cmp(&b.widths))?;
-    let rows = match worst.rows {
-        1 => "there".to_owned(),
-        rows => format!("over the last {rows} rows"),
-    };
     let others = match doubts.len() - 1 {
         0 => String::new(),
         1 => ", and another quantity likewise".to_owned(),
         count => format!(", and {count} other quantities likewise"),
     };
     let times = figures(worst.widths, 2);
+    let range = side(&worst.name, worst.min, worst.max);
     let why = match (worst.max - worst.min).is_finite() {
+        true if worst.rows == 1 => {
+            format!("that is {times} times the width of its declared range away from it ({range})")
+        }
         true => format!(
-            "{rows} it is {times} times the width of its declared range or more away from it ({})",
-            side(&worst.name, worst.min, worst.max)
+            "over its last {} rows it is at least {times} times the width of its declared range away from it ({range})",
+            worst.rows
         ),
         false => format!("that is {times} times the largest number among starts and signals"),
     };
@@ -290,7 +293,7 @@ mod tests {
         let error = refusal(&doubted(BOX, values())).unwrap().to_string();
         assert!(
             error.starts_with(
-                "the estimate is not credible: x ends at 1e9, and there it is 5e8 times"
+                "the estimate is not credible: x ends at 1e9, and that is 5e8 times the width"
             ),
             "{error}"
         );

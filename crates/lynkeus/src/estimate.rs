@@ -19,7 +19,8 @@ use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
 ///
 /// # Errors
 /// A study that does not fit the plant, a log without the columns that the
-/// observer reads, conditions that are refuted, an estimate that has no first row.
+/// observer reads, conditions that are refuted, an estimate that has no first row. One that is
+/// not credible, or ends early, is a result: [`Outcome::refusal`].
 pub fn estimate(
     study: &Study,
     table: &Table,
@@ -305,7 +306,7 @@ fn gaps(table: &Table, settings: &EstimateSettings, time: &str, design: &Design)
     notes
 }
 
-/// A column of the log, if it has one with numbers that is not the one of time.
+/// A column of the log, if it has one with numbers, and only one, that is not the one of time.
 fn logged<'t>(
     table: &'t Table,
     settings: &EstimateSettings,
@@ -313,6 +314,8 @@ fn logged<'t>(
     name: &str,
 ) -> Option<&'t [f64]> {
     let header = header(settings, name);
-    let values = table.get(header).filter(|_| header != time)?;
+    let mut named = table.names().filter(|name| *name == header);
+    let is_own = named.next().is_some() && named.next().is_none() && header != time;
+    let values = table.get(header).filter(|_| is_own)?;
     values.iter().any(|x| x.is_finite()).then_some(values)
 }

@@ -21,7 +21,8 @@ const ROWS: f64 = 500.0;
 /// and may stop the run.
 ///
 /// # Errors
-/// A study that cannot be run, conditions that are refuted, an estimate that diverges.
+/// A study that cannot be run, conditions that are refuted, an estimate that diverges. One that
+/// is not credible is a result: [`Outcome::refusal`].
 pub fn simulate(
     study: &Study,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,

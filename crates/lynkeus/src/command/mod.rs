@@ -33,7 +33,8 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
 
-Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence), 2 bad input.";
+Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence, an estimate that is not
+credible: the table is written all the same), 2 bad input.";
 
 #[derive(Debug, Subcommand)]
 enum Command {

@@ -1,5 +1,7 @@
 //! Errors of an estimate over time, each as a share of its quantity's scale, and what is read off them.
 
+use crate::credible::RUN_AWAY;
+
 /// Scaled errors: estimate minus truth, divided by the quantity's scale.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Errors {
@@ -17,6 +19,14 @@ impl Errors {
             values.fold(0.0, |m: f64, e| m.max(e.abs()))
         };
         (0..self.time.len()).map(worst).collect()
+    }
+
+    /// Why these are the errors of no estimate: it ends too far away.
+    pub fn run_away(&self) -> Option<String> {
+        let ends = self.scaled.iter().filter_map(|errors| errors.last());
+        let end = ends.fold(0.0, |m: f64, e| m.max(e.abs()));
+        (end > RUN_AWAY)
+            .then(|| format!("the estimate runs away: its error ends at {end:.1e} times the range"))
     }
 
     /// The mean magnitude over quantities and time (trapezoidal over the rows).
@@ -138,6 +148,18 @@ mod tests {
             None,
             "not before t = 1"
         );
+    }
+
+    #[test]
+    fn a_peak_is_no_run_away_and_an_end_is() {
+        let ends = |values: [f64; 3]| {
+            let errors = Errors {
+                time: vec![0.0, 1.0, 2.0],
+                scaled: vec![vec![0.0; 3], values.to_vec()],
+            };
+            errors.run_away().is_some()
+        };
+        assert!(!ends([1e9, 1e9, -100.0]) && ends([0.0, 0.0, -101.0]));
     }
 
     #[test]

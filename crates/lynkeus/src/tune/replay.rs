@@ -7,7 +7,7 @@ use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, System, Trajectory, estimate_watched};
 
 use super::crew::{Watch, part};
-use super::errors::rms;
+use super::errors::{Errors, rms};
 use super::holdout::{HELD_OUT, Plan, predicted, switchable};
 use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
@@ -99,7 +99,9 @@ impl<'a> Replay<'a> {
         let nothing = vec![0.0; self.time.len()];
         match self.run(nothing, causal, &mut part(watch, 0, 2))? {
             Ok(run) => {
-                self.judge_innovation(row, &run);
+                if let Some(reason) = self.judge_innovation(row, &run) {
+                    return Ok(Some(reason));
+                }
                 row.set(measures::LOG_MARGIN, self.margin(&run));
             }
             Err(reason) => return Ok(Some(reason)),
@@ -154,8 +156,9 @@ impl<'a> Replay<'a> {
         Some(rms(&errors?))
     }
 
-    /// The innovation of a replay that looks at no later sample, past the first block.
-    fn judge_innovation(&self, row: &mut Row, run: &Trajectory) {
+    /// The innovation of a replay that looks at no later sample, past the first block; the
+    /// reason where it shows that the estimate runs away.
+    fn judge_innovation(&self, row: &mut Row, run: &Trajectory) -> Option<String> {
         let innovation = |(place, values): (usize, &Vec<f64>)| -> Option<Vec<f64>> {
             let prediction = self.predicted(run, place)?;
             let pairs = values.iter().zip(prediction).skip(self.plan.first);
@@ -163,12 +166,16 @@ impl<'a> Replay<'a> {
             let span = span(values);
             Some(pairs.map(|(y, hat)| (y - hat) / span).collect())
         };
-        let all: Vec<Vec<f64>> = self
-            .measured
-            .iter()
-            .enumerate()
-            .filter_map(innovation)
-            .collect();
+        let measured = self.measured.iter().enumerate();
+        let innovations = Errors {
+            time: self.time.iter().copied().skip(self.plan.first).collect(),
+            scaled: measured.filter_map(innovation).collect(),
+        };
+        let reason = innovations.run_away();
+        if reason.is_some() {
+            return reason;
+        }
+        let all = innovations.scaled;
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
         row.set(measures::INNOVATION, Some(rms(&sizes)));
         let white: Vec<Whiteness> = all.iter().filter_map(|series| whiteness(series)).collect();
@@ -178,6 +185,7 @@ impl<'a> Replay<'a> {
         };
         row.set(measures::LJUNG_BOX, mean(|w| w.ljung_box));
         row.set(measures::OUTSIDE_BAND, mean(|w| w.outside));
+        None
     }
 
     /// The longest stable step over the longest step of the log.

@@ -70,6 +70,9 @@ impl Trial<'_> {
             Err(reason) => return Ok(Some(reason)),
         };
         let exact = self.errors(&exact_run);
+        if let Some(reason) = exact.run_away() {
+            return Ok(Some(reason));
+        }
         self.judge_exact(row, &exact, &exact_run);
         row.set(
             measures::SAMPLING_MARGIN,

@@ -303,6 +303,28 @@ fn two_of_one_header_in_a_log_are_refused_by_name() {
     );
 }
 
+/// The true value of a hidden state is taken from a log that happens to have it, and from
+/// nothing else: not from time, and not from one of two columns.
+#[test]
+fn the_truth_in_a_log_is_a_column_of_its_own() {
+    let judged = |name: &str, header: &str| {
+        let folder = renamed("two-tanks", &TANKS, "upper", name);
+        let shipped = Folder::new().read("log.csv");
+        let mut lines = shipped.lines();
+        lines.next();
+        let rows = lines.map(|line| format!("{line},5,6\n"));
+        folder.write(
+            "log.csv",
+            &format!("{header}\n{}", rows.collect::<String>()),
+        );
+        let json = ran(&folder, &["estimate", "study.toml", "log.csv", "--json"]).json();
+        json["rms_error_last_half"][name].as_f64()
+    };
+    assert!(judged("upper", "t,level,pump,upper,other").is_some());
+    assert_eq!(judged("upper", "t,level,pump,upper,upper"), None);
+    assert_eq!(judged("t", "t,level,pump,upper,other"), None);
+}
+
 /// `check --how-well` has a column of its own, too.
 #[test]
 fn the_horizon_gives_way_to_a_state_of_that_name() {

@@ -284,3 +284,38 @@ fn an_undecided_study_that_leaves_is_told_of_it() {
         ended.out
     );
 }
+
+/// No figure for a value whose estimate runs away; where all do, the answer is no.
+#[test]
+fn tuning_takes_no_value_whose_estimate_runs_away() {
+    let folder = runaway(20.0, 5.5);
+    let log = [
+        "simulate",
+        "study.toml",
+        "--log",
+        "l.csv",
+        "-o",
+        "o.csv",
+        "-q",
+    ];
+    assert_eq!(folder.run(&log).code, 0);
+    let study = folder.read("study.toml");
+    for (on, blocks) in [(vec![], ""), (vec!["--log", "l.csv"], "blocks = 4\n")] {
+        let tune = |values: &str| {
+            let keys = format!("[tune]\n{blocks}keys = {{ theta = {values} }}\n");
+            folder.write("study.toml", &format!("{study}{keys}"));
+            let arguments = [&["tune", "study.toml", "--json", "-q"], &on[..]].concat();
+            folder.run(&arguments)
+        };
+        let ended = tune("[1, 20]");
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let json = ended.json();
+        assert_eq!(json["knee"]["keys"]["theta"], 20.0);
+        let reason = json["rows"][0]["failure"].as_str().unwrap();
+        assert!(reason.contains("runs away"), "{reason}");
+        assert!(json["rows"][1]["failure"].is_null());
+        let ended = tune("[1, 1.1]");
+        assert_eq!(ended.code, 1, "{}", ended.out);
+        assert!(ended.err.contains("runs away"), "{}", ended.err);
+    }
+}
