@@ -29,11 +29,16 @@ pub fn estimate(
     refuse_derivatives(study, &design)?;
     let observer = systems::observer(&plant, &design.observer)?;
     refuse_stray_columns(&plant, settings)?;
+    // the log, the estimates, and both as the outcome has them
+    let read = 1 + observer.signals().len();
+    table.check_room(2 * read + 2 * (1 + observer.estimates().len()))?;
     let log = log(table, settings, &design, &observer)?;
     let run = run_settings(settings);
     let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
         .map_err(|error| interrupted(error.error, table.file()))?;
+    // as large as the table, and of no more use
+    drop(log);
     let mut notes = design.notes.clone();
     if between == lynkeus_run::BetweenSamples::Linear {
         notes.push(
