@@ -52,7 +52,7 @@
 //!   has a kink (`abs`, `min`, `max`). They are isolated by interval arithmetic and
 //!   bisected to the last bit, so that no pulse is too short to be seen; what rounding
 //!   errors hide for more than a millionth of the interval, and what switches more than
-//!   200,000 times in it, is refused by name. Jumps that depend on states are left to
+//!   100,000 times in it, or 400,000 times and 1000 more per interval in a run, is refused by name. Jumps that depend on states are left to
 //!   the error control.
 //! - A value that is NaN or infinite never becomes an estimate: an adaptive step
 //!   into it is shortened, and if the solution really leads there the run ends with
@@ -92,6 +92,7 @@ mod error;
 mod estimate;
 mod estimator;
 pub mod filter;
+mod grid;
 mod integrator;
 mod method;
 mod noise;

@@ -42,7 +42,8 @@ pub struct Tolerances {
     /// above 0, in the unit of the states
     pub absolute: f64,
     /// most steps (rejected ones included) from one output point or sample to the
-    /// next; each switching instant between them adds 20
+    /// next; each switching instant between them adds 20. A whole run has 300 000
+    /// and 200 more for each of its intervals
     pub budget: usize,
 }
 

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
+use crate::grid::Grid;
 use crate::noise::Sensors;
 use crate::{Dynamics, Error, Integrator, Interrupted, Method, Noise, System, Trajectory};
 
@@ -130,6 +131,7 @@ impl Simulation {
 struct Run<'a> {
     simulation: &'a Simulation,
     intervals: usize,
+    grid: Grid,
     integrator: Integrator,
     system: Loop,
     x: Vec<f64>,
@@ -162,6 +164,7 @@ impl<'a> Run<'a> {
         let x = system.start();
         Ok(Self {
             intervals,
+            grid: Grid::new(simulation.start, simulation.output_step),
             integrator: Integrator::new(simulation.method, x.len())?,
             table: system.table(),
             row: vec![],
@@ -193,7 +196,7 @@ impl<'a> Run<'a> {
         if k == self.intervals {
             self.simulation.until
         } else {
-            self.simulation.start + k as f64 * self.simulation.output_step
+            self.grid.time(k)
         }
     }
 

@@ -206,6 +206,31 @@ fn the_budget_ends_a_run() {
 }
 
 #[test]
+fn what_chatters_ends_within_the_steps_of_a_run() {
+    // a relay: every row takes fewer steps than the budget of a row
+    let relay = |_: f64, x: &[f64], dx: &mut [f64]| {
+        dx[0] = x[1];
+        dx[1] = -1e9 * x[0].signum() - x[1];
+    };
+    let rows: Vec<f64> = (1..=100).map(|row| 0.05 * f64::from(row)).collect();
+    let error = run(Method::default(), relay, [1.0, 0.0], &rows).unwrap_err();
+    let Error::StepBudget { time, steps, .. } = error else {
+        panic!("{error}");
+    };
+    assert!(time > 0.05 && time < 5.0, "{error}");
+    assert!((300_000..=320_000).contains(&steps), "{error}");
+    assert!(!error.to_string().contains("budget"), "{error}");
+    // a long run of ordinary rows has steps enough
+    let oscillator = |_: f64, x: &[f64], dx: &mut [f64]| {
+        dx[0] = 40.0 * x[1];
+        dx[1] = -40.0 * x[0];
+    };
+    let rows: Vec<f64> = (1..=20_000).map(f64::from).collect();
+    let x = run(Method::default(), oscillator, [0.0, 1.0], &rows).unwrap();
+    close(x[0].hypot(x[1]), 1.0, 1e-3);
+}
+
+#[test]
 fn automatic_fixed_steps_are_stable() {
     let stiff = |t: f64, x: &[f64], dx: &mut [f64]| dx[0] = -500.0 * (x[0] - t);
     let x = run(Method::Rk4(Step::Auto), stiff, [1.0], &[1.0, 2.0]).unwrap();

@@ -42,6 +42,9 @@ pub(crate) fn estimated(
     refuse_derivatives(study, &design)?;
     refuse_stray_columns(plant, settings)?;
     let signals = Signals::of(table, plant, settings, &design.observer)?;
+    // the log, the estimates, and both as the outcome has them
+    let read = 1 + signals.readings.len() + signals.inputs.len();
+    table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
     let mut course = course(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
     if let Some(error) = &course.ended

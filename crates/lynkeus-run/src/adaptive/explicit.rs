@@ -1,7 +1,7 @@
 //! The explicit method, step by step to the end of a leg.
 
 use super::dop853::{Dop853, Tried};
-use super::{Adaptive, Leg, Point, Ran};
+use super::{Adaptive, Leg, Point, Ran, resolution};
 use crate::{Dynamics, Error};
 
 impl Adaptive {
@@ -39,7 +39,9 @@ impl Adaptive {
             }
             if self.pace.next == 0.0 {
                 let span = leg.to - leg.t;
-                self.pace.next = method.first_step(f, (leg.t, leg.x), span, &tolerances);
+                let first = method.first_step(f, (leg.t, leg.x), span, &tolerances);
+                // a guess that time does not resolve is too careful: it may be longer all the same
+                self.pace.next = first.max(2.0 * resolution(leg.t)).min(span);
             }
             let step = self.accepted_step(method, f, leg, &mut bad)?;
             leg.x.copy_from_slice(method.reached());

@@ -35,6 +35,11 @@ const STIFF_BELOW: f64 = 1.0;
 /// Steps granted for each stop at a switch, beyond the budget of the interval.
 const STEPS_PER_STOP: usize = 20;
 
+/// Steps granted for a whole run, and for each of its intervals beside them: what is
+/// harder from row to row than the budget of a row shows ends within seconds.
+const STEPS_PER_RUN: usize = 300_000;
+const STEPS_PER_INTERVAL: usize = 200;
+
 /// Error-controlled integrator; remembers its step and method between calls.
 #[derive(Clone, Debug)]
 pub(crate) struct Adaptive {
@@ -45,6 +50,7 @@ pub(crate) struct Adaptive {
     radau: Option<Radau>,
     pace: Pace,
     purse: Purse,
+    run: Run,
 }
 
 /// Steps of the interval under way.
@@ -52,6 +58,15 @@ pub(crate) struct Adaptive {
 struct Purse {
     granted: usize,
     left: usize,
+    /// steps of the run before this interval, where its end is what ends the budget
+    before: usize,
+}
+
+/// Steps of the run.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    granted: usize,
+    spent: usize,
 }
 
 /// What is known about the steps that the solution wants.
@@ -95,17 +110,26 @@ impl Adaptive {
             radau: None,
             pace: Pace::default(),
             purse: Purse::default(),
+            run: Run {
+                granted: STEPS_PER_RUN,
+                spent: 0,
+            },
         }
     }
 
     /// Grants the budget of an interval with `stops` switches in it.
     pub(crate) fn grant(&mut self, stops: usize) {
-        let granted = stops
-            .saturating_mul(STEPS_PER_STOP)
-            .saturating_add(self.tolerances.budget);
+        self.run.spent += self.purse.granted - self.purse.left;
+        let for_stops = stops.saturating_mul(STEPS_PER_STOP);
+        let more = for_stops.saturating_add(STEPS_PER_INTERVAL);
+        self.run.granted = self.run.granted.saturating_add(more);
+        let left = self.run.granted.saturating_sub(self.run.spent);
+        let own = for_stops.saturating_add(self.tolerances.budget);
+        let granted = own.min(left);
         self.purse = Purse {
             granted,
             left: granted,
+            before: if left < own { self.run.spent } else { 0 },
         };
     }
 
@@ -199,7 +223,7 @@ impl Leg<'_> {
             return Err(Error::StepBudget {
                 time: self.t,
                 until: self.to,
-                steps: self.purse.granted,
+                steps: self.purse.before + self.purse.granted,
                 state: state_text(&f.names(), self.x),
             });
         }

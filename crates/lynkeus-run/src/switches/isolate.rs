@@ -7,13 +7,72 @@ use super::timeline::{apart, same};
 use crate::Error;
 
 /// Switching instants allowed in one interval, over all indicators of a system.
-const SWITCHES: usize = 200_000;
+const SWITCHES: usize = 100_000;
 
 /// Stretches that may be looked at for them.
-const LOOKS: usize = 1_000_000;
+const LOOKS: usize = 500_000;
+
+/// What a run may have in all, in multiples of what an interval may.
+const INTERVALS: usize = 4;
+
+/// What each interval adds to that of the run.
+const MORE_SWITCHES: usize = 1000;
+const MORE_LOOKS: usize = 4000;
 
 /// Part of the interval in which rounding errors may hide the mode.
 const DOUBTFUL: f64 = 1e-6;
+
+/// What following the switches over all intervals of a run may still cost.
+#[derive(Clone, Debug)]
+pub(super) struct Allowance {
+    /// start of the first interval
+    since: Option<f64>,
+    switches: usize,
+    /// switches found and left
+    granted: usize,
+    looks: usize,
+}
+
+impl Default for Allowance {
+    fn default() -> Self {
+        Self {
+            since: None,
+            switches: INTERVALS * SWITCHES,
+            granted: INTERVALS * SWITCHES,
+            looks: INTERVALS * LOOKS,
+        }
+    }
+}
+
+impl Allowance {
+    /// What the interval may cost.
+    pub(super) fn effort(&mut self, from: f64, to: f64) -> Effort {
+        let since = *self.since.get_or_insert(from);
+        self.switches = self.switches.saturating_add(MORE_SWITCHES);
+        self.granted = self.granted.saturating_add(MORE_SWITCHES);
+        self.looks = self.looks.saturating_add(MORE_LOOKS);
+        let (counted_from, limit) = match self.switches < SWITCHES {
+            true => (since, self.granted),
+            false => (from, SWITCHES),
+        };
+        Effort {
+            from,
+            to,
+            switches: self.switches.min(SWITCHES),
+            looks: self.looks.min(LOOKS),
+            counted_from,
+            limit,
+            doubtful: DOUBTFUL * (to - from),
+        }
+    }
+
+    /// Takes what the interval cost.
+    pub(super) fn pay(&mut self, effort: &Effort) {
+        let spent = |left: usize, most: usize, now: usize| left - (left.min(most) - now);
+        self.switches = spent(self.switches, SWITCHES, effort.switches);
+        self.looks = spent(self.looks, LOOKS, effort.looks);
+    }
+}
 
 /// What following the switches over an interval may still cost.
 #[derive(Debug)]
@@ -22,21 +81,14 @@ pub(super) struct Effort {
     pub to: f64,
     switches: usize,
     looks: usize,
+    /// where the switches that the limit is for begin
+    counted_from: f64,
+    limit: usize,
     /// length of time on which rounding errors may still hide a mode
     doubtful: f64,
 }
 
 impl Effort {
-    pub(super) fn new(from: f64, to: f64) -> Self {
-        Self {
-            from,
-            to,
-            switches: SWITCHES,
-            looks: LOOKS,
-            doubtful: DOUBTFUL * (to - from),
-        }
-    }
-
     /// Pays for one look.
     fn look(&mut self, at: f64, expression: &str) -> Result<(), Error> {
         self.looks = self
@@ -65,9 +117,9 @@ impl Effort {
         }
         Err(Error::TooManySwitches {
             expression: expression.to_owned(),
-            from: self.from,
+            from: self.counted_from,
             to: self.to,
-            limit: SWITCHES,
+            limit: self.limit,
         })
     }
 

@@ -24,7 +24,7 @@ use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
 
 use crate::Error;
 use indicator::Indicator;
-use isolate::Effort;
+use isolate::Allowance;
 use timeline::Timeline;
 
 /// Modes, kinks and how they are found.
@@ -36,6 +36,8 @@ pub(crate) struct Switches {
     values: Evaluator,
     /// what was found in the interval asked for last, as `indicators`
     timelines: Vec<Timeline>,
+    /// what the intervals to come may cost
+    allowance: Allowance,
 }
 
 /// Expressions with their modes taken out.
@@ -61,6 +63,7 @@ impl Switches {
             timelines: vec![Timeline::default(); indicators.len()],
             indicators,
             values: values.evaluator(),
+            allowance: Allowance::default(),
         }
     }
 
@@ -78,7 +81,10 @@ impl Switches {
         to: f64,
         times: &mut Vec<f64>,
     ) -> Result<(), Error> {
-        let mut effort = Effort::new(from, to);
+        if self.indicators.is_empty() {
+            return Ok(());
+        }
+        let mut effort = self.allowance.effort(from, to);
         for (i, indicator) in self.indicators.iter_mut().enumerate() {
             let (before, rest) = self.timelines.split_at_mut(i);
             if let Some(timeline) = rest.first_mut() {
@@ -86,6 +92,7 @@ impl Switches {
                 times.extend_from_slice(timeline.instants());
             }
         }
+        self.allowance.pay(&effort);
         Ok(())
     }
 }

@@ -188,6 +188,20 @@ fn what_switches_without_end_is_named() {
 }
 
 #[test]
+fn what_switches_without_end_in_a_run_is_named() {
+    // a row has fewer switches than a row may have
+    let error = integral(|t| (t * 1e6).floor(), 5.0, 0.05, Method::default()).unwrap_err();
+    let Error::TooManySwitches {
+        from, to, limit, ..
+    } = error
+    else {
+        panic!("{error}");
+    };
+    assert_eq!(from, 0.0);
+    assert!(to < 1.0 && limit > 400_000 && limit < 500_000, "{error}");
+}
+
+#[test]
 fn what_rounding_hides_is_named() {
     let hidden: [(Input, &str); 3] = [
         (

@@ -53,7 +53,7 @@ pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
     let mut bytes = vec![];
     table::write_csv(&mut bytes, &named)
         .map_err(|e| Error::input(format!("cannot write CSV: {e}")))?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    String::from_utf8(bytes).map_err(|e| Error::input(format!("cannot write CSV: {e}")))
 }
 
 /// Columns into a CSV file.

@@ -88,6 +88,7 @@ pub(super) fn estimate(study: &Study, log: &Path, output: &Output) -> Result<Exi
     let mut progress = Progress::new("estimating", output.quiet);
     let outcome = lynkeus::estimate(study, &table, &mut progress.watch())?;
     progress.finish();
+    drop(table);
     finish(study, output, &outcome, false)
 }
 

@@ -181,6 +181,25 @@ impl Table {
         .hint("sort the rows by time and remove doubles"))
     }
 
+    /// Makes sure that there is memory for so many more columns of this table's length, so that a
+    /// replay ends with a line before it starts and not in its middle.
+    ///
+    /// # Errors
+    /// There is not.
+    pub fn check_room(&self, columns: usize) -> Result<(), Error> {
+        let values = self.rows().checked_mul(columns);
+        let fits = values.is_some_and(|values| Vec::<f64>::new().try_reserve_exact(values).is_ok());
+        match fits {
+            true => Ok(()),
+            false => Err(Error::input(format!(
+                "the replay of {} rows does not fit into memory: it makes {columns} more columns",
+                self.rows()
+            ))
+            .at(&self.file)
+            .hint("replay fewer rows at a time, or allow more memory")),
+        }
+    }
+
     fn find(&self, name: &str) -> Result<&Column, Error> {
         let mut matching = self.columns.iter().filter(|c| c.name == name);
         let Some(column) = matching.next() else {

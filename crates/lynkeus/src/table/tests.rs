@@ -66,6 +66,19 @@ fn time_must_increase_and_both_lines_are_given() {
 }
 
 #[test]
+fn memory_that_ends_is_an_error() {
+    let table = Table::parse("t,y\n0,1\n1,2\n", "log.csv").unwrap();
+    assert!(table.check_room(1000).is_ok());
+    for columns in [usize::MAX, usize::MAX / 17] {
+        let message = table.check_room(columns).unwrap_err().to_string();
+        assert!(
+            message.contains("2 rows does not fit into memory"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn columns_of_different_length_are_refused() {
     let columns = vec![("t".to_owned(), vec![0.0]), ("y".to_owned(), vec![])];
     assert!(Table::from_columns(columns).is_err());

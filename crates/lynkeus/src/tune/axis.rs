@@ -116,10 +116,13 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
 /// # Errors
 /// Too many.
 pub(super) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)>, Error> {
-    let count = axes.iter().map(|a| a.values.len()).product::<usize>();
-    if count > MOST_VALUES {
+    let mut counts = axes.iter().map(|a| a.values.len());
+    let count = counts.clone().try_fold(1_usize, usize::checked_mul);
+    if count.is_none_or(|count| count > MOST_VALUES) {
+        let product = counts.try_fold(1_u128, |all, n| all.checked_mul(n as u128));
+        let found = product.map_or("more than 10^38".to_owned(), |count| count.to_string());
         return Err(Error::input(format!(
-            "`keys` of [tune]: expected at most {MOST_VALUES} combinations of values, found {count}"
+            "`keys` of [tune]: expected at most {MOST_VALUES} combinations of values, found {found}"
         ))
         .at(&study.file)
         .hint("sweep fewer keys or values at a time"));
@@ -334,6 +337,29 @@ mod tests {
         let tuning = &grid[5].1.observer.tuning.values;
         assert_eq!(tuning["theta"].to_string(), "[1, 4]");
         assert_eq!(tuning["r"], Value::Number(3.0));
+    }
+
+    #[test]
+    fn a_grid_is_counted_without_overflow() {
+        let counted = |points: usize, keys: &[&str]| {
+            let axis = |key: &&str| Axis {
+                key: (*key).to_owned(),
+                is_factor: false,
+                values: vec![1.0; points],
+                present: None,
+                base: (*key).to_owned(),
+                path: vec![],
+            };
+            let axes: Vec<Axis> = keys.iter().map(axis).collect();
+            let counted = grid(&study("observer = { theta = 1 }"), &axes);
+            counted.map(|grid| grid.len()).map_err(|e| e.to_string())
+        };
+        let keys = ["a", "b", "c", "d", "e", "f", "g", "h", "i"];
+        assert_eq!(counted(3, &keys[..2]), Ok(9));
+        let found = |points, n: usize| counted(points, &keys[..n]).unwrap_err();
+        assert!(found(65_536, 4).contains("found 18446744073709551616"));
+        assert!(found(65_536, 5).contains("found 1208925819614629174706176"));
+        assert!(found(65_536, 8).contains("found more than 10^38"));
     }
 
     #[test]
