@@ -2,7 +2,7 @@
 
 use crate::Check;
 use crate::statement::{Statement, standing};
-use lynkeus_expr::MissingInput;
+use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::Standing;
 use lynkeus_structure::{Extended, Region};
 
@@ -90,6 +90,8 @@ pub struct Examination {
     pub checks: Vec<Check>,
     /// f and h have values and do not jump; none where the form is another anyway
     regularity: Option<Check>,
+    /// what ended the examination before its end
+    ended: Option<Spent>,
 }
 
 impl Examination {
@@ -110,6 +112,7 @@ impl Examination {
             chains: form.chains,
             checks,
             regularity: Some(regularity),
+            ended: None,
         })
     }
 
@@ -121,15 +124,30 @@ impl Examination {
             chains: vec![],
             checks,
             regularity: None,
+            ended: None,
         }
+    }
+
+    /// A limit ended the examination: whether the family fits is not known.
+    pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
+        Self {
+            ended: Some(spent),
+            ..Self::unfit(family, format!("undecided: {spent}"), vec![])
+        }
+    }
+
+    /// What ended the examination before anything was decided.
+    pub fn spent(&self) -> Option<Spent> {
+        self.ended
     }
 
     /// Whether the family fits: proved where every condition is, refuted where the form is
     /// another or a required condition is refuted.
     pub fn fit(&self) -> Standing {
-        match self.regularity {
-            Some(_) => standing(self.conditions()),
-            None => Standing::Refuted,
+        match (&self.regularity, self.ended) {
+            (_, Some(_)) => Standing::Undecided,
+            (Some(_), None) => standing(self.conditions()),
+            (None, None) => Standing::Refuted,
         }
     }
 
@@ -197,6 +215,9 @@ pub enum DesignError {
     /// the plant has parameters without value
     #[error(transparent)]
     MissingInput(#[from] MissingInput),
+    /// a limit ended the work
+    #[error("undecided: {0}")]
+    Spent(#[from] Spent),
 }
 
 fn refusal(examination: &Examination) -> String {

@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
 use lynkeus_observers::Design;
-use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
+use lynkeus_run::{Estimates, EstimatorSettings, Log, System, estimate_watched};
 
-use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::outcome::{alarms, measurements, partial, show_measurements, watches};
 use crate::prepare::Prepared;
+use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, hat, method};
 use crate::{Error, Outcome, Quantity, Study, Table, prepare};
@@ -31,9 +32,19 @@ pub fn estimate(
     let log = log(table, settings, &observer)?;
     let run = run_settings(settings);
     let between = run.between;
-    let estimates = estimate_watched(&observer, &log, run, watch)
-        .map_err(|error| interrupted(error.error, table.file()))?;
+    let run = estimate_watched(&observer, &log, run, &mut within(&study.budget, watch));
     let mut notes = design.notes.clone();
+    let estimates = match run {
+        Ok(estimates) => estimates,
+        Err(error) => {
+            let (trajectory, note) = partial(*error, &study.budget, table.file())?;
+            notes.push(note);
+            Estimates {
+                trajectory,
+                advice: None,
+            }
+        }
+    };
     if between == lynkeus_run::BetweenSamples::Linear {
         notes.push(
             "between_samples = \"linear\" looks ahead one sample: the estimate at a row is that of an off-line replay".to_owned(),
@@ -49,7 +60,12 @@ pub fn estimate(
         ));
     }
     let trajectory = &estimates.trajectory;
-    let logged = |name: &str| logged(table, settings, name);
+    let rows = trajectory.times().len();
+    let logged = |name: &str| {
+        let mut column = logged(table, settings, name)?;
+        column.truncate(rows);
+        Some(column)
+    };
     let mut quantities = quantities(&design, &logged, &|name| trajectory.column(&hat(name)));
     let measurements = measurements(&design, logged);
     show_measurements(&plant, &measurements, &mut quantities);

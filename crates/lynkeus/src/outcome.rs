@@ -1,5 +1,6 @@
 //! What a simulation or a replay gives.
 
+use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor};
 use lynkeus_run::{Error as RunError, Trajectory};
@@ -120,6 +121,22 @@ pub(crate) fn alarms(watches: &[Watch]) -> Vec<String> {
             format!("{meaning}: {name} fell below {alarm_below} first at t = {t}")
         })
         .collect()
+}
+
+/// The rows of a run that a limit ended, with a note; any other run that ended early has an
+/// error.
+pub(crate) fn partial(
+    interrupted: lynkeus_run::Interrupted,
+    budget: &Budget,
+    place: &str,
+) -> Result<(Trajectory, String), Error> {
+    match (interrupted.error, budget.marked()) {
+        (RunError::Cancelled { time }, Some(spent)) => Ok((
+            interrupted.partial,
+            format!("the run is not whole: {spent} at t = {time}"),
+        )),
+        (error, _) => Err(self::interrupted(error, place)),
+    }
 }
 
 /// A run that ended early: no result; an estimate that left every bound is an

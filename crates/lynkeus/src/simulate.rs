@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::{Level, Simulation, Trajectory};
 
-use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::outcome::{alarms, measurements, partial, show_measurements, watches};
 use crate::prepare::Prepared;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, hat, method};
@@ -33,10 +34,28 @@ pub fn simulate(
         inputs: systems::inputs(study, &plant, settings, &design.observer)?,
         ..open_loop(study, settings, &plant)?
     };
-    let trajectory = simulation
-        .run_watched(watch)
-        .map_err(|error| interrupted(error.error, &study.file))?;
-    Ok(outcome(&plant, design, &trajectory))
+    let run = simulation.run_watched(&mut within(&study.budget, watch));
+    let (trajectory, note) = match run {
+        Ok(trajectory) => (trajectory, None),
+        Err(error) => {
+            let (trajectory, note) = partial(*error, &study.budget, &study.file)?;
+            (trajectory, Some(note))
+        }
+    };
+    let mut outcome = outcome(&plant, design, &trajectory);
+    outcome.notes.extend(note);
+    Ok(outcome)
+}
+
+/// A watch that also ends a run whose budget is spent.
+pub(crate) fn within<'a>(
+    budget: &'a Budget,
+    watch: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
+    move |fraction| match budget.spent() {
+        Some(_) => ControlFlow::Break(()),
+        None => watch(fraction),
+    }
 }
 
 /// The study's `[simulate]`.

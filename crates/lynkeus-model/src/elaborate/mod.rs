@@ -17,7 +17,7 @@ mod subscripts;
 mod symbols;
 mod value;
 
-use lynkeus_expr::Graph;
+use lynkeus_expr::{Graph, Spent};
 
 pub(crate) use evaluate::Evaluator;
 pub(crate) use scope::{Mode, Named, Scope};
@@ -43,6 +43,7 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
     let ast = parse_file(source)?;
     let model = choose_model(source, &ast, options)?;
     let graph = Graph::new();
+    graph.set_budget(options.budget.clone());
     let budget = budget();
     let context = Context {
         source,
@@ -51,10 +52,18 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
         budget: &budget,
         options,
     };
-    let symbols = Symbols::new(&context, model)?;
-    let equations = flatten::flatten(&context, &symbols, model)?;
-    let parts = assemble::parts(&context, &symbols, model, &equations)?;
+    let parts = graph.budgeted(options.budget.clone(), || {
+        let symbols = Symbols::new(&context, model)?;
+        let equations = flatten::flatten(&context, &symbols, model)?;
+        assemble::parts(&context, &symbols, model, &equations)
+    });
+    let parts = parts.map_err(|spent| ended(model, spent))??;
     Ok(parts.with_graph(graph))
+}
+
+/// A limit ended the reading.
+fn ended(model: &ModelSyntax, spent: Spent) -> Problem {
+    Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
 /// The model that is asked for, or the only one.

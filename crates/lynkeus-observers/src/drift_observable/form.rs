@@ -9,7 +9,7 @@ use lynkeus_structure::{Extended, Region, Regularity, visibility};
 use super::conditions::{self, Inputs};
 use super::variant::Variant;
 use super::{NAME, degrees, derivative_name};
-use crate::conditions::{lipschitz, names};
+use crate::conditions::{lasts, lipschitz, names};
 use crate::family;
 use crate::stages::Found;
 use crate::{DesignError, Examination};
@@ -44,12 +44,14 @@ impl Map {
         let order = extended.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(extended, &affine, order)?;
         let x = extended.symbols();
+        let mut gradients = vec![];
+        for h in &lie {
+            lasts(extended)?;
+            gradients.push(output_map::jacobian_rows(graph, h, &x));
+        }
         Ok(Ok(Self {
             affine,
-            gradients: lie
-                .iter()
-                .map(|h| output_map::jacobian_rows(graph, h, &x))
-                .collect(),
+            gradients,
             lie,
             slopes: degrees::slopes(extended),
             lipschitz: lipschitz(extended, region)?,
@@ -125,7 +127,9 @@ impl Form {
             .iter()
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
+        lasts(extended)?;
         let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
+        lasts(extended)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => {
                 let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
@@ -186,6 +190,7 @@ pub(super) fn blind(
     indices: &[usize],
 ) -> Result<Examination, DesignError> {
     let n = extended.states.len();
+    lasts(extended)?;
     let seen = visibility::visible(extended)?;
     let hidden: Vec<usize> = (0..n).filter(|&i| !seen[i]).collect();
     let found: usize = indices.iter().sum();
@@ -210,6 +215,7 @@ fn with_inputs(
     let graph = extended.graph();
     let order = rows.iter().map(|r| r.1).max().unwrap_or(0);
     let y = output_map::output_derivatives(extended, U, order)?;
+    lasts(extended)?;
     let Φ̄: Vec<Node> = rows.iter().map(|&(i, k)| y[i][k]).collect();
     let Q̄ = output_map::jacobian_rows(graph, &Φ̄, &extended.symbols());
     let Q̄_a = output_map::jacobian_rows(graph, &Φ̄, &U.concat());

@@ -4,6 +4,7 @@
 mod certify;
 mod families;
 mod how_well;
+mod limits;
 mod messages;
 mod observability;
 mod references;
