@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
-/// Time, memory and the wish to go on. A clone is the same budget; asking it from many
+/// Time, memory and the wish to go on. Parts of it may end on their own: one that used too much
+/// memory leaves the others theirs. A clone is the same budget; asking it from many
 /// threads is cheap.
 #[derive(Clone, Debug, Default)]
 pub struct Budget {
@@ -74,7 +75,7 @@ impl Budget {
     /// At most this time of what is left.
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
-        Self::part_of(self.clone(), Some(time), Some(time), None)
+        Self::part_of(self.clone(), Some(time), Some(time), self.memory())
     }
 
     /// That share of the time that is left, in the words of the whole.
@@ -82,7 +83,7 @@ impl Budget {
     pub fn part(&self, share: f64) -> Self {
         let left = self.left();
         let time = left.map(|left| left.mul_f64(share.clamp(0.0, 1.0)));
-        Self::part_of(self.clone(), time, self.named(), None)
+        Self::part_of(self.clone(), time, self.named(), self.memory())
     }
 
     fn part_of(
@@ -103,6 +104,10 @@ impl Budget {
         Self {
             shared: Some(Arc::new(shared)),
         }
+    }
+
+    fn memory(&self) -> Option<Memory> {
+        self.shared.as_deref()?.memory
     }
 
     /// Time until the end; none where there is no such limit.
@@ -141,14 +146,24 @@ impl Budget {
         if let Some(known) = self.marked() {
             return Some(known);
         }
-        if shared.whole.spent().is_some() {
-            shared.set(WHOLE);
-        } else if shared.ends.is_some_and(|ends| Instant::now() >= ends) {
-            shared.set(TIME);
-        } else if shared.memory.is_some_and(|m| (m.used)() > m.limit) {
+        // memory comes back when a part that took too much of it has ended: the whole goes on
+        if !self.is_over() && shared.memory.is_some_and(|m| (m.used)() > m.limit) {
             shared.set(MEMORY);
         }
         self.marked()
+    }
+
+    /// Whether the time is over, or somebody asked to stop.
+    fn is_over(&self) -> bool {
+        let Some(shared) = self.shared.as_deref() else {
+            return false;
+        };
+        if shared.whole.is_over() {
+            shared.set(WHOLE);
+        } else if shared.ends.is_some_and(|ends| Instant::now() >= ends) {
+            shared.set(TIME);
+        }
+        shared.mark.load(Ordering::Relaxed) != GOING
     }
 
     /// What ended the work as far as anybody noticed.
@@ -165,12 +180,8 @@ impl Budget {
 
     /// Bytes that may still be asked for; none where memory has no limit.
     pub fn room(&self) -> Option<usize> {
-        let shared = self.shared.as_deref()?;
-        let own = shared.memory.map(|m| m.limit.saturating_sub((m.used)()));
-        match (own, shared.whole.room()) {
-            (Some(own), Some(whole)) => Some(own.min(whole)),
-            (own, whole) => own.or(whole),
-        }
+        let memory = self.memory()?;
+        Some(memory.limit.saturating_sub((memory.used)()))
     }
 
     /// Whether there is room for so many more bytes; the budget is spent where there is not,
@@ -179,9 +190,6 @@ impl Budget {
         let Some(shared) = self.shared.as_deref() else {
             return true;
         };
-        if !shared.whole.affords(bytes) {
-            shared.set(WHOLE);
-        }
         let over = |m: Memory| (m.used)().saturating_add(bytes) > m.limit;
         if shared.memory.is_some_and(over) {
             shared.set(MEMORY);
@@ -256,7 +264,8 @@ mod tests {
         assert!(!part.affords(50 << 20));
         let spent = part.spent().unwrap();
         assert_eq!(spent.to_string(), "the limit of 100 MiB ended it");
-        assert_eq!(budget.marked(), Some(spent));
+        // it may have come back
+        assert_eq!(budget.marked(), None);
     }
 
     #[test]

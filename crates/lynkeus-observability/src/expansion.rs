@@ -85,6 +85,7 @@ pub(crate) struct Expansion<'a> {
     /// values of the named quantities at the start
     pub point: Vec<Modular>,
     next: usize,
+    budget: Budget,
 }
 
 impl<'a> Expansion<'a> {
@@ -103,6 +104,7 @@ impl<'a> Expansion<'a> {
             columns,
             start,
             model,
+            budget: budget.clone(),
         }
     }
 
@@ -153,6 +155,14 @@ impl<'a> Expansion<'a> {
         let k = self.next;
         self.next += 1;
         if k == 0 {
+            // a row for every symbol
+            let numbers = self
+                .columns
+                .width()
+                .saturating_mul(self.model.symbols.len());
+            self.budget
+                .affords(numbers.saturating_mul(size_of::<Modular>()));
+            Stop::where_spent(&self.budget)?;
             return self.first_coefficients();
         }
         let mut unknown_input = 0;

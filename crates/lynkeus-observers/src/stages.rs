@@ -81,7 +81,7 @@ fn lasting<T>(
     work: impl FnOnce() -> Result<T, DesignError>,
 ) -> Result<T, DesignError> {
     let graph = extended.graph();
-    graph.budgeted(graph.budget(), work)?
+    graph.budgeted(graph.budget().part(1.0), work)?
 }
 
 impl<S: Stages> Family for S {

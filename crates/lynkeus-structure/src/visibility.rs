@@ -26,6 +26,10 @@ pub fn visible(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
     let system = Variational::new(extended)?;
     let mut best: Option<(usize, Vec<bool>)> = None;
     for point in 0..POINTS {
+        // no point shows more than all
+        if best.as_ref().is_some_and(|(rank, _)| *rank == system.n) {
+            break;
+        }
         let matrix = system.observability(point);
         // a decomposition that nobody reads is not worth its time
         if extended.graph().spent().is_some() {

@@ -228,7 +228,7 @@ impl fmt::Display for Report {
         if let Some(spent) = self.ended {
             writeln!(f, "\nwhere states can be told apart is undecided: {spent}")?;
         }
-        for examination in &self.examinations {
+        for examination in self.examinations.iter().filter(|e| e.spent().is_none()) {
             writeln!(
                 f,
                 "\n{}: {}",
@@ -241,12 +241,24 @@ impl fmt::Display for Report {
         if self.examinations.is_empty() {
             return Ok(());
         }
+        self.ended_families(f)?;
         writeln!(f)?;
         self.conclusion(f)
     }
 }
 
 impl Report {
+    /// The families whose examination a limit ended, told once.
+    fn ended_families(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut ended = self.examinations.iter().filter(|e| e.spent().is_some());
+        let Some(first) = ended.next() else {
+            return Ok(());
+        };
+        let names = std::iter::once(first).chain(ended).map(|e| e.family);
+        let names = names.collect::<Vec<_>>().join(", ");
+        writeln!(f, "\n{names}: undecided\n  {}", first.summary)
+    }
+
     /// That there is no observer, or that a limit ended the search for one.
     fn none(&self) -> String {
         let undecided = self.examinations.iter().filter(|e| e.spent().is_some());

@@ -62,7 +62,7 @@ pub fn certify(
     claim: Claim,
 ) -> Result<Certificate, DesignError> {
     let graph = extended.graph();
-    let certified = graph.budgeted(graph.budget(), || {
+    let certified = graph.budgeted(graph.budget().part(1.0), || {
         certified(extended, observer, assumptions, claim)
     });
     certified.unwrap_or_else(|spent| Ok(Certificate::ended(BASIS, assumptions, spent)))
