@@ -27,7 +27,7 @@ pub(super) struct Limits {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     time_limit: Option<Duration>,
     /// Stop where more memory would be used, with what is done by then
-    #[arg(long, value_name = "MIB", default_value_t = 4096)]
+    #[arg(long, value_name = "MIB", default_value_t = 2048)]
     memory_limit: usize,
 }
 
