@@ -27,6 +27,11 @@ pub trait Algebra {
         b.clone_from_slice(&x);
         rcond
     }
+    /// Whether the budget behind the values is spent, so that what is computed from here on
+    /// does not count.
+    fn is_spent(&self) -> bool {
+        false
+    }
 }
 
 impl<A: Algebra> Algebra for &A {
@@ -58,6 +63,10 @@ impl<A: Algebra> Algebra for &A {
 
     fn solve_in_place(&self, a: &mut [A::Value], b: &mut [A::Value]) -> A::Value {
         (**self).solve_in_place(a, b)
+    }
+
+    fn is_spent(&self) -> bool {
+        (**self).is_spent()
     }
 }
 
@@ -134,5 +143,9 @@ impl Algebra for Nodes<'_> {
     fn solve(&self, a: &[Node], b: &[Node]) -> (Vec<Node>, Node) {
         let solution = self.0.solve(a, b);
         (solution.x, solution.rcond)
+    }
+
+    fn is_spent(&self) -> bool {
+        self.0.is_spent()
     }
 }

@@ -42,6 +42,9 @@ pub fn derivatives(
     let read = Program::new(graph, flow, outputs)?;
     let mut x: Vec<Vec<Node>> = flow.states.iter().map(|&s| vec![s]).collect();
     for k in 0..order {
+        if graph.is_spent() {
+            break;
+        }
         let f = right.run(graph, flow, &x, k);
         for (jet, f) in x.iter_mut().zip(f) {
             let next = coefficient(graph, &f, k);

@@ -1,5 +1,7 @@
 //! The hash-consed arena: an expression built twice is one node.
 
+mod limits;
+mod reach;
 mod systems;
 
 use std::cell::RefCell;
@@ -9,7 +11,8 @@ use std::hash::Hash;
 pub use systems::{LinearSystem, Solution};
 
 use crate::facts::Facts;
-use crate::{Binary, Expr, Op, Unary, real};
+use crate::{Binary, Budget, Expr, Op, Unary, real};
+use reach::Marks;
 
 /// A node of a [`Graph`]: cheap to copy, meaningful only with its graph.
 /// Arguments of a node are always smaller than the node itself.
@@ -42,6 +45,9 @@ struct Inner {
     by_name: HashMap<String, Node>,
     systems: Vec<LinearSystem>,
     known_systems: HashMap<LinearSystem, Node>,
+    budget: Budget,
+    /// nodes made, to look at the clock now and then
+    made: u32,
 }
 
 impl Inner {
@@ -54,6 +60,9 @@ impl Inner {
     fn intern(&mut self, key: Key, op: Op) -> Node {
         if let Some(&node) = self.known.get(&key) {
             return node;
+        }
+        if !matches!(op, Op::Constant(_) | Op::Symbol(_)) && self.is_spent() {
+            return self.nothing();
         }
         let node = self.push(op);
         self.known.insert(key, node);
@@ -75,6 +84,7 @@ impl Inner {
 pub struct Graph {
     inner: RefCell<Inner>,
     facts: RefCell<Facts>,
+    marks: RefCell<Marks>,
 }
 
 impl std::fmt::Debug for Graph {
@@ -196,7 +206,10 @@ impl Graph {
         K: Clone + Eq + Hash + Send + Sync + 'static,
         V: Clone + Send + Sync + 'static,
     {
-        self.facts.borrow_mut().insert(question, answer);
+        // what was found after a limit struck need not be true
+        if !self.is_spent() {
+            self.facts.borrow_mut().insert(question, answer);
+        }
     }
 
     /// A function of one node.
@@ -294,28 +307,6 @@ impl Graph {
         self.inner
             .borrow_mut()
             .intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
-    }
-
-    /// Every node that the roots need, arguments before their users.
-    pub fn reachable(&self, roots: &[Node]) -> Vec<Node> {
-        let Some(last) = roots.iter().max() else {
-            return vec![];
-        };
-        let mut needed = vec![false; last.index() + 1];
-        for root in roots {
-            needed[root.index()] = true;
-        }
-        for index in (0..needed.len()).rev() {
-            if needed[index] {
-                for argument in self.arguments(Node(index as u32)) {
-                    needed[argument.index()] = true;
-                }
-            }
-        }
-        (0..needed.len() as u32)
-            .map(Node)
-            .filter(|node| needed[node.index()])
-            .collect()
     }
 
     /// The symbols that the roots depend on, in order of creation.

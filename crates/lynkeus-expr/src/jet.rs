@@ -252,7 +252,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
 
     fn unary(&self, op: Unary, x: &Self::Value) -> Self::Value {
         let value = || self.inner.unary(op, &x[0]);
-        if x.len() == 1 {
+        if x.len() == 1 || self.is_spent() {
             return vec![value()];
         }
         match op {
@@ -282,7 +282,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
 
     fn powi(&self, x: &Self::Value, n: i32) -> Self::Value {
         let value = self.inner.powi(&x[0], n);
-        if x.len() == 1 || n == 0 {
+        if x.len() == 1 || n == 0 || self.is_spent() {
             return vec![value];
         }
         let (mut square, mut left) = (x.clone(), n.unsigned_abs());
@@ -305,6 +305,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
 
     fn binary(&self, op: Binary, x: &Self::Value, y: &Self::Value) -> Self::Value {
         match op {
+            _ if self.is_spent() => vec![self.two(op, &x[0], &y[0])],
             Binary::Add | Binary::Sub => self.add_sub(op, x, y),
             Binary::Mul => self.product(x, y),
             Binary::Div => self.quotient(x, y),
@@ -334,10 +335,14 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
         self.choose(&c[0], x, y)
     }
 
+    fn is_spent(&self) -> bool {
+        self.inner.is_spent()
+    }
+
     /// A₀ xₖ = bₖ − Σ_{j≥1} Aⱼ x_{k−j}.
     fn solve(&self, a: &[Self::Value], b: &[Self::Value]) -> (Vec<Self::Value>, Self::Value) {
         let n = b.len();
-        let constant = a.iter().chain(b).all(|jet| jet.len() == 1);
+        let constant = self.is_spent() || a.iter().chain(b).all(|jet| jet.len() == 1);
         let a0: Vec<A::Value> = a.iter().map(|jet| jet[0].clone()).collect();
         let mut x: Vec<Self::Value> = vec![vec![]; n];
         let mut rcond = None;

@@ -25,6 +25,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod algebra;
+mod budget;
 mod expr;
 mod facts;
 pub mod flow;
@@ -41,6 +42,7 @@ mod render;
 mod tape;
 
 pub use algebra::{Algebra, Nodes, Reals};
+pub use budget::{Budget, Memory, Spent};
 pub use expr::Expr;
 pub use graph::{Graph, LinearSystem, Node, Solution};
 pub use interval::Interval;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Budget, Graph, Node};
 
 use crate::language::Language;
 use crate::limits::MAX_SOURCE_BYTES;
@@ -82,6 +82,8 @@ pub struct LoadOptions {
     /// keep parameters of type Real as symbols, and allow them to have no value. Sizes,
     /// loop bounds and attributes still use the values.
     pub symbolic_parameters: bool,
+    /// when to stop; the graph of the plant keeps it
+    pub budget: Budget,
 }
 
 impl Plant {

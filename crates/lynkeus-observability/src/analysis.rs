@@ -1,7 +1,6 @@
 //! The analysis.
 
-use std::time::{Duration, Instant};
-
+use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 
 use crate::expansion::Columns;
@@ -12,7 +11,7 @@ use crate::search::Search;
 use crate::series::Stop;
 use crate::start::{Affine, Start};
 use crate::symmetry::{Twin, symmetries};
-use crate::{Answer, Asked, Limits, Quantity, Question, QuestionError, Verdict};
+use crate::{Answer, Asked, Quantity, Question, QuestionError, Verdict};
 use crate::{hull, lie, place};
 
 /// Seed of the first point.
@@ -30,20 +29,13 @@ const ORDERS: usize = 1000;
 /// # Errors
 /// [`QuestionError`].
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
-    let now = Instant::now();
-    // a limit beyond what a clock can tell is none
-    let deadline = now
-        .checked_add(question.limits.time)
-        .unwrap_or(now + Duration::from_secs(1 << 30));
     let model = match Model::new(plant, question)? {
         Ok(model) => model,
         Err(Refused { named, reason }) => return Ok(undecided(&named, question, &reason)),
     };
-    let limits = question.limits;
     let analysis = Analysis {
         model: &model,
-        limits,
-        deadline,
+        budget: &question.budget,
     };
     let reason = |stop: Stop| match stop {
         Stop::Point(_) => SINGULAR.to_owned(),
@@ -110,26 +102,25 @@ impl Found<'_> {
 
 struct Analysis<'a> {
     model: &'a Model,
-    limits: Limits,
-    deadline: Instant,
+    budget: &'a Budget,
 }
 
 impl<'a> Analysis<'a> {
     fn find(&self, start: Start) -> Result<Start, Stop> {
-        place::find(self.model, self.limits, start, self.deadline)
+        place::find(self.model, start, self.budget)
     }
 
     fn search<'s>(&self, start: &'s Start, columns: Columns) -> Search<'s>
     where
         'a: 's,
     {
-        Search::new(self.model, self.limits, start, columns, self.deadline)
+        Search::new(self.model, start, columns, self.budget)
     }
 
     /// A start, with the invariant set around it.
     fn ground(&self) -> Result<Ground, Stop> {
         let start = Start::new(self.model, FIRST);
-        let around = |at_zero| hull::invariant(self.model, self.limits, at_zero, self.deadline);
+        let around = |at_zero| hull::invariant(self.model, at_zero, self.budget);
         if self.model.known_starts().next().is_none() {
             return Ok(Ground {
                 start: self.find(start)?,
@@ -280,10 +271,9 @@ impl<'a> Analysis<'a> {
     fn fields(&self, ground: &Ground, set: &Affine) -> Result<Vec<Vec<Modular>>, Stop> {
         let setting = lie::Setting {
             model: self.model,
-            limits: self.limits,
             set,
             at_zero: ground.at_zero,
-            deadline: self.deadline,
+            budget: self.budget,
         };
         lie::directions(&setting, &ground.start)
     }
@@ -301,7 +291,7 @@ impl<'a> Analysis<'a> {
             return Ok(vec![]);
         };
         let starts = (&ground.start, &elsewhere);
-        let steady = steady_from(self.model, self.limits, starts, set, last, self.deadline)?;
+        let steady = steady_from(self.model, starts, set, last, self.budget)?;
         Ok(match steady {
             Some(_) => vec![Hidden::all(search)],
             None => joined(search, vec![], &self.fields(ground, set)?),

@@ -1,13 +1,16 @@
 //! The power series of a model's solution from one point, order by order.
 
 use std::ops::Range;
-use std::time::Instant;
 
-use crate::Limits;
+use lynkeus_expr::Budget;
+
 use crate::field::{Modular, Random};
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
 use crate::start::{Affine, Start};
+
+/// Bytes of a series where nothing limits the memory.
+const ROOM: usize = 1 << 30;
 
 /// The unknowns with respect to which a series is differentiated, as columns: the named
 /// quantities, the derivatives of unknown inputs, directions in which known starts move.
@@ -82,23 +85,18 @@ pub(crate) struct Expansion<'a> {
     /// values of the named quantities at the start
     pub point: Vec<Modular>,
     next: usize,
+    budget: Budget,
 }
 
 impl<'a> Expansion<'a> {
-    pub fn new(
-        model: &'a Model,
-        limits: Limits,
-        start: &'a Start,
-        columns: Columns,
-        deadline: Instant,
-    ) -> Self {
-        let room = limits.memory / size_of::<Modular>();
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
+        let room = budget.room().unwrap_or(ROOM) / size_of::<Modular>();
         let functions = Functions::new(start.seed, &start.turned);
         let width = columns.width();
         let none = Functions::new(start.seed, &Default::default());
         Self {
-            run: Run::new(&model.program, width, functions, deadline, room),
-            computed: Run::new(&model.starts, width, none, deadline, room),
+            run: Run::new(&model.program, width, functions, budget.clone(), room),
+            computed: Run::new(&model.starts, width, none, budget.clone(), room),
             coefficients: vec![(Modular::ZERO, vec![]); model.symbols.len()],
             point: vec![Modular::ZERO; columns.named],
             random: Random::new(start.seed.wrapping_mul(0x1000_0000_01b3) + 7),
@@ -106,6 +104,7 @@ impl<'a> Expansion<'a> {
             columns,
             start,
             model,
+            budget: budget.clone(),
         }
     }
 
@@ -156,6 +155,14 @@ impl<'a> Expansion<'a> {
         let k = self.next;
         self.next += 1;
         if k == 0 {
+            // a row for every symbol
+            let numbers = self
+                .columns
+                .width()
+                .saturating_mul(self.model.symbols.len());
+            self.budget
+                .affords(numbers.saturating_mul(size_of::<Modular>()));
+            Stop::where_spent(&self.budget)?;
             return self.first_coefficients();
         }
         let mut unknown_input = 0;

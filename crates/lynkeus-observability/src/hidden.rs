@@ -1,9 +1,9 @@
 //! Which of the directions that no derivative so far has seen no derivative will ever see.
 
 use std::collections::BTreeSet;
-use std::time::Instant;
 
-use crate::Limits;
+use lynkeus_expr::Budget;
+
 use crate::echelon::Echelon;
 use crate::expansion::Columns;
 use crate::field::Modular;
@@ -169,14 +169,13 @@ impl Ranks {
 /// that the ranks agree for all higher orders too: the settled part, which never shrinks, cannot grow.
 pub(crate) fn steady_from(
     model: &Model,
-    limits: Limits,
     (special, generic): (&Start, &Start),
     set: &Affine,
     last: usize,
-    deadline: Instant,
+    budget: &Budget,
 ) -> Result<Option<usize>, Stop> {
     let columns = Columns::new(model, last).moving(set);
-    let begin = |start| Search::new(model, limits, start, columns.clone(), deadline);
+    let begin = |start| Search::new(model, start, columns.clone(), budget);
     let (mut here, mut there) = (begin(special), begin(generic));
     let mut before: Option<(Ranks, Ranks)> = None;
     for k in 0..=last {

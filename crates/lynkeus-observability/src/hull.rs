@@ -8,9 +8,8 @@
 //! tighter the set, the sharper the bound: an equilibrium stays in a point, s' = −s from s = 0
 //! in a plane.
 
-use std::time::Instant;
+use lynkeus_expr::Budget;
 
-use crate::Limits;
 use crate::echelon::Echelon;
 use crate::expansion::{Columns, Expansion};
 use crate::field::Modular;
@@ -25,12 +24,7 @@ const FIRST: u64 = 9001;
 const CONFIRMED: usize = 2;
 
 /// The set, grown from the known starts by the flow at random points of it.
-pub(crate) fn invariant(
-    model: &Model,
-    limits: Limits,
-    at_zero: bool,
-    deadline: Instant,
-) -> Result<Affine, Stop> {
+pub(crate) fn invariant(model: &Model, at_zero: bool, budget: &Budget) -> Result<Affine, Stop> {
     let mut moving: Vec<usize> = model.known_starts().collect();
     moving.extend(model.time().filter(|_| at_zero));
     let mut set = Affine::default();
@@ -40,7 +34,7 @@ pub(crate) fn invariant(
         seed += 1;
         let start = Start::new(model, seed).at_zero(at_zero);
         let start = start.within(model, &set);
-        let velocity = match velocity(model, limits, start, &moving, deadline) {
+        let velocity = match velocity(model, start, &moving, budget) {
             Ok(velocity) => velocity,
             Err(Stop::Point(_)) => return Ok(everywhere(model, &moving)),
             Err(stop) => return Err(stop),
@@ -58,14 +52,13 @@ pub(crate) fn invariant(
 /// The derivatives of these symbols at a start.
 fn velocity(
     model: &Model,
-    limits: Limits,
     start: Start,
     moving: &[usize],
-    deadline: Instant,
+    budget: &Budget,
 ) -> Result<Vec<Modular>, Stop> {
-    let start = place::find(model, limits, start, deadline)?;
+    let start = place::find(model, start, budget)?;
     let columns = Columns::new(model, 0);
-    let mut expansion = Expansion::new(model, limits, &start, columns, deadline);
+    let mut expansion = Expansion::new(model, &start, columns, budget);
     expansion.first()?;
     let mut velocity = vec![Modular::ZERO; model.symbols.len()];
     for &place in moving {

@@ -50,4 +50,4 @@ mod symmetry;
 
 pub use analysis::analyse;
 pub use answer::{Answer, Asked, Quantity, Symmetry, Verdict};
-pub use question::{Limits, Question, QuestionError};
+pub use question::{Question, QuestionError};

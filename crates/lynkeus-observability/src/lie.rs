@@ -6,9 +6,8 @@
 //! coefficients of v at every point; they are written down at random points of the invariant
 //! set until they determine what is left. Unknown inputs may answer in any affine way.
 
-use std::time::Instant;
+use lynkeus_expr::Budget;
 
-use crate::Limits;
 use crate::echelon::Echelon;
 use crate::expansion::{Columns, Expansion};
 use crate::field::Modular;
@@ -47,10 +46,9 @@ struct Place {
 /// What is needed to visit points of the set.
 pub(crate) struct Setting<'a> {
     pub model: &'a Model,
-    pub limits: Limits,
     pub set: &'a Affine,
     pub at_zero: bool,
-    pub deadline: Instant,
+    pub budget: &'a Budget,
 }
 
 /// Directions of the named quantities at a start along which the fields found move them.
@@ -65,7 +63,7 @@ pub(crate) fn directions(setting: &Setting<'_>, start: &Start) -> Result<Vec<Vec
         seed += 1;
         let anywhere = Start::new(setting.model, seed).at_zero(setting.at_zero);
         let anywhere = anywhere.within(setting.model, setting.set);
-        let found = place::find(setting.model, setting.limits, anywhere, setting.deadline);
+        let found = place::find(setting.model, anywhere, setting.budget);
         let place = match found.and_then(|start| setting.visit(&start)) {
             Ok(place) => place,
             Err(Stop::Point(_)) => return Ok(vec![]),
@@ -127,7 +125,7 @@ impl Setting<'_> {
     fn visit(&self, start: &Start) -> Result<Place, Stop> {
         let (known, directions) = self.known();
         let columns = Columns::new(self.model, 0).moving(&directions);
-        let mut expansion = Expansion::new(self.model, self.limits, start, columns, self.deadline);
+        let mut expansion = Expansion::new(self.model, start, columns, self.budget);
         expansion.advance()?;
         let mut values = expansion.point.clone();
         values.extend(known.iter().map(|&place| expansion.moved_by(place)));

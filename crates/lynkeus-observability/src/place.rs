@@ -1,9 +1,9 @@
 //! Starts at which a model has a series.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
-use crate::Limits;
+use lynkeus_expr::Budget;
+
 use crate::expansion::{Columns, Expansion};
 use crate::field::Random;
 use crate::model::Model;
@@ -19,17 +19,12 @@ const STUBBORN: usize = 40;
 /// A start at which the first coefficients exist, beginning with the one given. Where an
 /// operation does not, one of the numbers that it depends on is drawn anew, if possible one
 /// that no earlier root depends on: so a hundred roots cost some hundred draws.
-pub(crate) fn find(
-    model: &Model,
-    limits: Limits,
-    mut start: Start,
-    deadline: Instant,
-) -> Result<Start, Stop> {
+pub(crate) fn find(model: &Model, mut start: Start, budget: &Budget) -> Result<Start, Stop> {
     let mut random = Random::new(start.seed ^ 0x5eed);
     let mut failures: BTreeMap<usize, usize> = BTreeMap::new();
     for _ in 0..POINTS {
         let columns = Columns::new(model, 0);
-        let failed = match Expansion::new(model, limits, &start, columns, deadline).first() {
+        let failed = match Expansion::new(model, &start, columns, budget).first() {
             Ok(()) => return Ok(start),
             Err(Stop::Point(slot)) => slot,
             Err(stop) => return Err(stop),

@@ -1,24 +1,6 @@
 //! What is asked.
 
-use std::time::Duration;
-
-/// When to stop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// wall-clock time
-    pub time: Duration,
-    /// memory of the series, bytes
-    pub memory: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            time: Duration::from_secs(20),
-            memory: 1 << 30,
-        }
-    }
-}
+use lynkeus_expr::Budget;
 
 /// What is known and what is asked.
 #[derive(Clone, Debug, Default)]
@@ -37,7 +19,7 @@ pub struct Question {
     /// expressions to decide on, in states, parameters and inputs
     pub about: Vec<String>,
     /// when to stop
-    pub limits: Limits,
+    pub budget: Budget,
 }
 
 /// A question that cannot be answered.

@@ -1,8 +1,7 @@
 //! The rank of the outputs' coefficients at one start, order by order.
 
-use std::time::Instant;
+use lynkeus_expr::Budget;
 
-use crate::Limits;
 use crate::echelon::Echelon;
 use crate::expansion::{Columns, Expansion};
 use crate::field::Modular;
@@ -24,16 +23,10 @@ pub(crate) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(
-        model: &'a Model,
-        limits: Limits,
-        start: &'a Start,
-        columns: Columns,
-        deadline: Instant,
-    ) -> Self {
+    pub fn new(model: &'a Model, start: &'a Start, columns: Columns, budget: &Budget) -> Self {
         let width = columns.width();
         Self {
-            expansion: Expansion::new(model, limits, start, columns, deadline),
+            expansion: Expansion::new(model, start, columns, budget),
             rows: Echelon::new(width),
             signals: Echelon::new(width),
             about: vec![],

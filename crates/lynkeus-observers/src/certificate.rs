@@ -1,11 +1,11 @@
 //! What can be guaranteed about an observer, and why.
 
-use lynkeus_expr::MissingInput;
+use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::{Dimension, Extended, Region, Standing};
 use nalgebra::DMatrix;
 
 use crate::Check;
-use crate::statement::{Statement, standing, sufficient};
+use crate::statement::{Statement, standing, sufficient, undecided};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -169,6 +169,12 @@ impl Certificate {
             notes: vec![],
             regularity: assumptions.regularity.clone(),
         }
+    }
+
+    /// A limit ended the work: nothing is decided.
+    pub(crate) fn ended(basis: impl Into<String>, assumptions: &Assumptions, spent: Spent) -> Self {
+        let check = undecided(Statement::Finished, spent.to_string());
+        Self::new(basis, assumptions, vec![check])
     }
 
     /// That the plant has values on the box and does not jump: no certificate is made without

@@ -63,6 +63,7 @@ pub(crate) fn partials(
 ) -> Result<(Vec<Partial>, Vec<Check>), DesignError> {
     let (mut found, mut checks) = (vec![], vec![]);
     for pair in states.windows(2) {
+        lasts(extended)?;
         let (node, verdict) = partial(extended, pair[0], pair[1], region)?;
         found.push(Partial {
             node,
@@ -123,6 +124,14 @@ pub(crate) fn on_output(
     names(extended, states).into_iter().zip(gains).collect()
 }
 
+/// Ends a form or a design whose budget is spent: it would not count.
+pub(crate) fn lasts(extended: &Extended<'_>) -> Result<(), DesignError> {
+    match extended.graph().spent() {
+        None => Ok(()),
+        Some(spent) => Err(DesignError::Spent(spent)),
+    }
+}
+
 /// H3 i): the right-hand side is Lipschitz on the box. Never a refusal: outside
 /// of a bounded set nothing nonlinear is, and `clamp` prolongs f as the paper does.
 pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Check, DesignError> {
@@ -133,8 +142,11 @@ pub(crate) fn lipschitz(extended: &Extended<'_>, region: &Region) -> Result<Chec
     if !regularity.holds() {
         return Ok(Statement::Lipschitz.with(regularity.finding()));
     }
-    for &(row, column, node) in &jacobian.entries {
-        if sign::bounded(graph, node, region)? {
+    let entries: Vec<_> = jacobian.entries.iter().map(|entry| entry.2).collect();
+    let at_once = sign::bounded_at_once(graph, &entries, region)?;
+    for (&(row, column, node), at_once) in jacobian.entries.iter().zip(at_once) {
+        lasts(extended)?;
+        if at_once || sign::bounded(graph, node, region)? {
             continue;
         }
         let detail = format!(

@@ -2,7 +2,7 @@
 
 use crate::Check;
 use crate::statement::{Statement, standing};
-use lynkeus_expr::MissingInput;
+use lynkeus_expr::{MissingInput, Spent};
 use lynkeus_structure::Standing;
 use lynkeus_structure::{Extended, Region};
 
@@ -107,6 +107,8 @@ enum PlantFit {
     Form(Check),
     /// any plant will do
     Any,
+    /// a limit ended the examination before its end
+    Ended(Spent),
 }
 
 impl Examination {
@@ -152,9 +154,25 @@ impl Examination {
         }
     }
 
+    /// A limit ended the examination: whether the family fits is not known.
+    pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
+        Self {
+            plant: PlantFit::Ended(spent),
+            ..Self::unfit(family, format!("undecided: {spent}"), vec![])
+        }
+    }
+
     /// Whether a theorem stands behind the family, whose conditions are told here.
     pub fn has_theorem(&self) -> bool {
         !matches!(self.plant, PlantFit::Any)
+    }
+
+    /// What ended the examination before anything was decided.
+    pub fn spent(&self) -> Option<Spent> {
+        match self.plant {
+            PlantFit::Ended(spent) => Some(spent),
+            _ => None,
+        }
     }
 
     /// Whether the family fits: proved where every condition is, refuted where the form is
@@ -162,6 +180,7 @@ impl Examination {
     pub fn fit(&self) -> Standing {
         match self.plant {
             PlantFit::Unfit => Standing::Refuted,
+            PlantFit::Ended(_) => Standing::Undecided,
             PlantFit::Form(_) | PlantFit::Any => standing(self.conditions()),
         }
     }
@@ -170,7 +189,7 @@ impl Examination {
     pub fn conditions(&self) -> impl Iterator<Item = &Check> {
         let regularity = match &self.plant {
             PlantFit::Form(regularity) => Some(regularity),
-            PlantFit::Unfit | PlantFit::Any => None,
+            PlantFit::Unfit | PlantFit::Any | PlantFit::Ended(_) => None,
         };
         regularity.into_iter().chain(&self.checks)
     }
@@ -234,6 +253,9 @@ pub enum DesignError {
     /// the plant has parameters without value
     #[error(transparent)]
     MissingInput(#[from] MissingInput),
+    /// a limit ended the work
+    #[error("undecided: {0}")]
+    Spent(#[from] Spent),
 }
 
 fn refusal(examination: &Examination) -> String {

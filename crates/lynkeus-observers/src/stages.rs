@@ -75,6 +75,15 @@ pub trait Stages: Sync {
     ) -> Result<Certificate, DesignError>;
 }
 
+/// Work whose result counts only where the budget lasted.
+fn lasting<T>(
+    extended: &Extended<'_>,
+    work: impl FnOnce() -> Result<T, DesignError>,
+) -> Result<T, DesignError> {
+    let graph = extended.graph();
+    graph.budgeted(graph.budget().part(1.0), work)?
+}
+
 impl<S: Stages> Family for S {
     fn name(&self) -> &'static str {
         S::NAME
@@ -94,16 +103,24 @@ impl<S: Stages> Family for S {
         tuning: &Tuning,
     ) -> Result<Examination, DesignError> {
         let settings = S::read(extended, tuning)?;
-        Ok(match S::form(extended, &settings, &extended.region())? {
-            Ok(Found { examination, .. }) | Err(examination) => examination,
-        })
+        let examined = lasting(extended, || {
+            Ok(match S::form(extended, &settings, &extended.region())? {
+                Ok(Found { examination, .. }) | Err(examination) => examination,
+            })
+        });
+        match examined {
+            Err(DesignError::Spent(spent)) => Ok(Examination::ended(S::NAME, spent)),
+            examined => examined,
+        }
     }
 
     fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
         let settings = S::read(extended, tuning)?;
-        match S::form(extended, &settings, &extended.region())? {
+        match lasting(extended, || {
+            S::form(extended, &settings, &extended.region())
+        })? {
             Ok(found) if found.examination.fit() != Standing::Refuted => {
-                S::design(extended, &settings, found)
+                lasting(extended, || S::design(extended, &settings, found))
             }
             Ok(Found { examination, .. }) | Err(examination) => {
                 Err(DesignError::Refused(Box::new(examination)))
@@ -117,21 +134,34 @@ impl<S: Stages> Family for S {
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        let settings = S::read(extended, tuning)?;
-        let (region, ends) = match S::FORM_BOX {
-            FormBox::Declared => (extended.region(), false),
-            FormBox::Assumed => (assumptions.region.clone(), true),
-        };
-        match S::form(extended, &settings, &region)? {
-            Ok(found) if !(ends && found.examination.fit() == Standing::Refuted) => {
+        match theorem::<S>(extended, tuning, assumptions) {
+            Err(DesignError::Spent(spent)) => Ok(Certificate::ended(S::BASIS, assumptions, spent)),
+            found => found,
+        }
+    }
+}
+
+fn theorem<S: Stages>(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let settings = S::read(extended, tuning)?;
+    let (region, ends) = match S::FORM_BOX {
+        FormBox::Declared => (extended.region(), false),
+        FormBox::Assumed => (assumptions.region.clone(), true),
+    };
+    match lasting(extended, || S::form(extended, &settings, &region))? {
+        Ok(found) if !(ends && found.examination.fit() == Standing::Refuted) => {
+            lasting(extended, || {
                 S::theorem(extended, &settings, found, assumptions)
-            }
-            Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
-                Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
-            }
-            Ok(Found { examination, .. }) | Err(examination) => {
-                Err(DesignError::Refused(Box::new(examination)))
-            }
+            })
+        }
+        Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
+            Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
+        }
+        Ok(Found { examination, .. }) | Err(examination) => {
+            Err(DesignError::Refused(Box::new(examination)))
         }
     }
 }

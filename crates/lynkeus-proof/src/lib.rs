@@ -20,7 +20,7 @@
 //! ones have to be taken.
 //!
 //! ```
-//! use lynkeus_expr::Interval;
+//! use lynkeus_expr::{Budget, Interval};
 //! use lynkeus_proof::decay::{ErrorModel, Proof, fastest, holds};
 //!
 //! // e₁' = e₂ − 2e₁, e₂' = θe₁ − e₂ with θ(t) in [−1, 1]
@@ -30,7 +30,7 @@
 //!     sectors: vec![],
 //! };
 //! let models = [model(-1.0), model(1.0)];
-//! let found = fastest(&models, &[1.0, 1.0], 1.0).unwrap();
+//! let found = fastest(&models, &[1.0, 1.0], 1.0, &Budget::default()).unwrap();
 //! // at θ = 1 the slow eigenvalue is −(3 − √5)/2
 //! assert!(found.rate > 0.35 && found.rate < 0.382);
 //! // no one's word is taken for it

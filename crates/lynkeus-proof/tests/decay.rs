@@ -3,7 +3,7 @@
 //! is the thirteenth state.
 #![allow(clippy::unwrap_used, non_upper_case_globals)]
 
-use lynkeus_expr::Interval;
+use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::decay::{self, Aim, ErrorModel, NoGain, Request, Sector};
 use nalgebra::DMatrix;
 
@@ -52,6 +52,7 @@ fn request(rate: f64, aim: Aim) -> Request {
         scale: vec![1.0; TRAYS + 1],
         aim,
         limit: None,
+        budget: Budget::default(),
     }
 }
 
@@ -123,7 +124,7 @@ fn the_fastest_rate_of_a_gain_is_found_again() {
     let models = [column(4.69, 5.94)];
     let found = decay::design(&models, &request(0.2, Aim::Noise)).unwrap();
     let corrected = [models[0].corrected(&found.K, &[0, TRAYS - 1])];
-    let proof = decay::fastest(&corrected, &[1.0; TRAYS + 1], 5.0).unwrap();
+    let proof = decay::fastest(&corrected, &[1.0; TRAYS + 1], 5.0, &Budget::default()).unwrap();
     assert!(proof.rate >= 0.198, "{}", proof.rate);
 }
 

@@ -138,7 +138,7 @@ impl Search<'_, '_> {
         }
         let before = self.found.len();
         for output in self.next(order) {
-            if self.steps == STEPS {
+            if self.steps == STEPS || self.extended.graph().spent().is_some() {
                 return;
             }
             self.steps += 1;

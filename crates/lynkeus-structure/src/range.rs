@@ -100,6 +100,7 @@ fn search(
 ) -> Result<Range, MissingInput> {
     let tape = Tape::new(graph, &region.symbols(), &[node])?;
     let mut search = Search {
+        graph,
         evaluator: tape.evaluator(),
         bounds: tape.evaluator_in(Intervals),
         region,
@@ -152,6 +153,7 @@ struct Minimum {
 }
 
 struct Search<'a> {
+    graph: &'a Graph,
     bounds: Evaluator<Intervals>,
     evaluator: Evaluator,
     region: &'a Region,
@@ -167,7 +169,7 @@ impl Search<'_> {
         let mut open = BinaryHeap::from([Open { bound, cell: whole }]);
         for _ in 0..self.budget {
             let Some(weakest) = open.peek() else { break };
-            if close(weakest.bound, best.as_ref()) {
+            if close(weakest.bound, best.as_ref()) || self.graph.spent().is_some() {
                 break;
             }
             let Some((first, second)) = self.region.split(&weakest.cell) else {

@@ -137,7 +137,9 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         let at: Cell = middle.iter().map(|&x| Interval::point(x)).collect();
         let det = sure_determinant(tape.eval_in(&Intervals, &at), block.rows);
         signs.note(&region, &middle, det);
-        let halves = region.split(&cell).filter(|_| looked < CELLS);
+        let halves = region
+            .split(&cell)
+            .filter(|_| looked < CELLS && graph.spent().is_none());
         let Some((first, second)) = halves.filter(|_| signs.witness().is_none()) else {
             let verdict = match signs.witness() {
                 Some(witness) => Verdict::Refuted(witness),

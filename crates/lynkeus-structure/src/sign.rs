@@ -86,6 +86,22 @@ pub fn bounded(graph: &Graph, node: Node, region: &Region) -> Result<bool, Missi
     Ok(found.is_defined() && found.lo().is_finite() && found.hi().is_finite())
 }
 
+/// Which of the expressions the whole box proves [bounded], without halving it: one
+/// evaluation of what they share.
+///
+/// # Errors
+/// [`MissingInput`] where one depends on a symbol outside the region.
+pub fn bounded_at_once(
+    graph: &Graph,
+    nodes: &[Node],
+    region: &Region,
+) -> Result<Vec<bool>, MissingInput> {
+    let tape = Tape::new(graph, &region.symbols(), nodes)?;
+    let values = tape.eval_in(&Intervals, &region.cell());
+    let is_bounded = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
+    Ok(values.iter().map(is_bounded).collect())
+}
+
 /// A hint where the box has no declared end.
 fn undeclared(found: &Range) -> String {
     let open = |side: &&Side| side.min.is_infinite() || side.max.is_infinite();

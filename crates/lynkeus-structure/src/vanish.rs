@@ -31,6 +31,9 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
     let mut points: Vec<Vec<f64>> = (0..POINTS).map(|p| generic(&region, p)).collect();
     points.extend(region.samples(&whole));
     for point in points {
+        if graph.spent().is_some() {
+            break;
+        }
         let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
         let enclosure = value(&cell);
         let sure = enclosure.is_positive() || enclosure.is_negative();

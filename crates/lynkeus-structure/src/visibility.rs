@@ -26,7 +26,16 @@ pub fn visible(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
     let system = Variational::new(extended)?;
     let mut best: Option<(usize, Vec<bool>)> = None;
     for point in 0..POINTS {
-        let Some(matrix) = system.observability(point) else {
+        // no point shows more than all
+        if best.as_ref().is_some_and(|(rank, _)| *rank == system.n) {
+            break;
+        }
+        let matrix = system.observability(point);
+        // a decomposition that nobody reads is not worth its time
+        if extended.graph().spent().is_some() {
+            break;
+        }
+        let Some(matrix) = matrix else {
             continue;
         };
         let found = judge(matrix);
@@ -137,6 +146,9 @@ impl<'e, 'p> Variational<'e, 'p> {
         state.extend((0..n).map(|i| vec![f64::from(u8::from(i == direction))]));
         let mut values = vec![];
         for order in 0..n {
+            if self.extended.graph().spent().is_some() {
+                return vec![];
+            }
             let jets = Jets {
                 inner: &Reals,
                 order,

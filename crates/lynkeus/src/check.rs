@@ -4,8 +4,10 @@ mod observability;
 mod uniform;
 
 use std::fmt;
+use std::time::Duration;
 
-use lynkeus_observability::{Answer, Limits, Verdict};
+use lynkeus_expr::Spent;
+use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Check, Examination, fit_word};
 use lynkeus_structure::{self as structure, Point, Standing, uniformity};
 use serde_json::{Value, json};
@@ -22,8 +24,6 @@ pub struct CheckOptions {
     pub parameters: bool,
     /// expressions in states, parameters and inputs to decide on
     pub about: Vec<String>,
-    /// when to stop looking
-    pub limits: Limits,
 }
 
 /// The answer of `lynkeus check`.
@@ -48,7 +48,15 @@ pub struct Report {
     pub uniform: Option<Uniform>,
     /// parameters are unknown constants
     pub parameters: bool,
+    /// what ended the search for the places where states cannot be told apart
+    ended: Option<Spent>,
 }
+
+/// The time for what can be known at all, where the study has no limit.
+const OBSERVABILITY: Duration = Duration::from_secs(20);
+
+/// The share of the time for the places where states cannot be told apart.
+const UNIFORMITY: f64 = 0.2;
 
 /// Examines the study's plant: what can be known, and by which of the families that the
 /// study allows.
@@ -57,7 +65,11 @@ pub struct Report {
 /// A study that does not fit its plant; an expression of `about` that cannot be read.
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study)?;
-    let answer = observability::answer(study, &symbolic, options)?;
+    let time = match study.budget.left() {
+        Some(_) => study.budget.part(0.5),
+        None => study.budget.within(OBSERVABILITY),
+    };
+    let answer = observability::answer(study, &symbolic, options, time)?;
     let names = |of: &[lynkeus_model::Variable]| -> Vec<String> {
         of.iter().map(|v| v.name.clone()).collect()
     };
@@ -77,14 +89,22 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         answer,
         uniform: None,
         parameters: options.parameters,
+        ended: None,
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
         let plant = prepare::plant(study)?;
         let prepared = Prepared::new(study, &plant)?;
-        let examined = uniformity(prepared.extended()).map_err(Error::from_source)?;
-        report.uniform =
-            examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+        let time = prepare::share(&study.budget, UNIFORMITY);
+        let graph = prepared.extended().graph();
+        match graph.budgeted(time, || uniformity(prepared.extended())) {
+            Ok(examined) => {
+                let examined = examined.map_err(Error::from_source)?;
+                report.uniform = examined
+                    .map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+            }
+            Err(spent) => report.ended = Some(spent),
+        }
         report.examinations = prepared.examinations()?.to_vec();
         report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
@@ -101,7 +121,9 @@ impl Report {
             .find(|e| Some(e.family) == self.recommended);
         let with_theorem = chosen.is_some_and(Examination::has_theorem);
         let hidden = |q: &(lynkeus_observability::Asked, _)| q.0.verdict == Verdict::Unobservable;
+        // what was not decided is no refusal
         self.examinations.is_empty()
+            || self.examinations.iter().any(|e| e.spent().is_some())
             || with_theorem
             || (chosen.is_some() && !self.answer.quantities.iter().any(hidden))
     }
@@ -210,7 +232,10 @@ impl fmt::Display for Report {
         if let Some(uniform) = &self.uniform {
             uniform::print(f, uniform)?;
         }
-        for examination in &self.examinations {
+        if let Some(spent) = self.ended {
+            writeln!(f, "\nwhere states can be told apart is undecided: {spent}")?;
+        }
+        for examination in self.examinations.iter().filter(|e| e.spent().is_none()) {
             writeln!(
                 f,
                 "\n{}: {}",
@@ -223,12 +248,37 @@ impl fmt::Display for Report {
         if self.examinations.is_empty() {
             return Ok(());
         }
+        self.ended_families(f)?;
         writeln!(f)?;
         self.conclusion(f)
     }
 }
 
 impl Report {
+    /// The families whose examination a limit ended, told once.
+    fn ended_families(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut ended = self.examinations.iter().filter(|e| e.spent().is_some());
+        let Some(first) = ended.next() else {
+            return Ok(());
+        };
+        let names = std::iter::once(first).chain(ended).map(|e| e.family);
+        let names = names.collect::<Vec<_>>().join(", ");
+        writeln!(f, "\n{names}: undecided\n  {}", first.summary)
+    }
+
+    /// That there is no observer, or that a limit ended the search for one.
+    fn none(&self) -> String {
+        let undecided = self.examinations.iter().filter(|e| e.spent().is_some());
+        let names: Vec<&str> = undecided.map(|e| e.family).collect();
+        match names.is_empty() {
+            true => "no observer of this version fits these sensors".to_owned(),
+            false => format!(
+                "undecided: the limits ended the examination of {}; `--time-limit` and `--memory-limit` move them",
+                names.join(", ")
+            ),
+        }
+    }
+
     /// Why the family is recommended.
     fn reason(&self) -> String {
         let chosen = self
@@ -276,7 +326,7 @@ impl Report {
 
     fn conclusion(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(family) = self.recommended else {
-            return writeln!(f, "no observer of this version fits these sensors");
+            return writeln!(f, "{}", self.none());
         };
         let of = |hidden: bool| -> Vec<&str> {
             let quantities = self.answer.quantities.iter();

@@ -11,6 +11,8 @@ pub enum ErrorKind {
     Input,
     /// The input is fine and the answer is no: a condition is refuted, an estimate diverges.
     Refused,
+    /// A limit of time or memory ended the work before there was an answer.
+    Ended,
 }
 
 /// Why there is no result.
@@ -35,6 +37,11 @@ impl Error {
     /// A well-posed question whose answer is no.
     pub fn refused(message: impl Into<String>) -> Self {
         Self::new(ErrorKind::Refused, message.into())
+    }
+
+    /// A limit that ended the work before there was an answer.
+    pub fn ended(spent: lynkeus_expr::Spent) -> Self {
+        Self::new(ErrorKind::Ended, format!("undecided: {spent}")).caused_by(spent)
     }
 
     /// An error in what the user gave, in the words of the error that tells it; that error

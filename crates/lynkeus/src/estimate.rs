@@ -9,8 +9,9 @@ use lynkeus_run::{EstimatorSettings, Log, estimate_watched};
 
 use crate::course::{Course, Samples};
 use crate::headers::time_of;
-use crate::outcome::{Raw, interrupted, measurements};
+use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
+use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, Reported, method};
 use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
@@ -45,13 +46,10 @@ pub(crate) fn estimated(
     // the log, the estimates, and both as the outcome has them
     let read = 1 + signals.readings.len() + signals.inputs.len();
     table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
+    let watch = &mut within(&study.budget, watch);
     let mut course = course(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
-    if let Some(error) = &course.ended
-        && (rows == 0 || !is_answer(error))
-    {
-        return Err(interrupted(error.clone(), table.file()));
-    }
+    settle(&mut course, rows, &study.budget, table.file())?;
     let logged = |name: &str| {
         let values = logged(table, settings, &signals.time_header, name)?;
         Some(values[..rows].to_vec())
@@ -89,16 +87,6 @@ pub(crate) fn estimated(
         design,
     };
     Ok(raw.finish())
-}
-
-/// Whether the end of a run is an answer about the estimate: then the rows before it are worth
-/// having.
-fn is_answer(error: &lynkeus_run::Error) -> bool {
-    use lynkeus_run::Error as Run;
-    matches!(
-        error,
-        Run::Diverged { .. } | Run::NotFinite { .. } | Run::StepUnderflow { .. }
-    )
 }
 
 /// The columns of a log that an observer reads.

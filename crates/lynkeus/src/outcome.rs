@@ -1,5 +1,6 @@
 //! What a simulation or a replay gives.
 
+use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
@@ -303,15 +304,47 @@ fn alarms(watches: &[Watch]) -> Vec<String> {
         .collect()
 }
 
+/// What becomes of a run that ended before its last row: one that a limit ended is not whole,
+/// and an estimate that left every bound is an answer; both keep their rows.
+///
+/// # Errors
+/// Any other end, or one before the first row.
+pub(crate) fn settle(
+    course: &mut Course,
+    rows: usize,
+    budget: &Budget,
+    place: &str,
+) -> Result<(), Error> {
+    match (course.ended.take(), budget.marked()) {
+        (None, _) => Ok(()),
+        (Some(RunError::Cancelled { time }), Some(spent)) => {
+            let note = format!("the run is not whole: {spent} at t = {time}");
+            course.notes.push(note);
+            Ok(())
+        }
+        (Some(error), _) if rows > 0 && is_answer(&error) => {
+            course.ended = Some(error);
+            Ok(())
+        }
+        (Some(error), _) => Err(interrupted(error, place)),
+    }
+}
+
+/// Whether the end of a run says something of the estimate, and not of the input.
+fn is_answer(error: &RunError) -> bool {
+    matches!(
+        error,
+        RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. }
+    )
+}
+
 /// A run that ended early: no result; an estimate that left every bound is an
 /// answer, everything else is a fault of the input.
 pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
     let text = error.to_string();
-    let told = match error {
-        RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. } => {
-            Error::refused(text)
-        }
-        _ => Error::input(text),
+    let told = match is_answer(&error) {
+        true => Error::refused(text),
+        false => Error::input(text),
     };
     told.caused_by(error).at(place)
 }

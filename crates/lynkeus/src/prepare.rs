@@ -1,7 +1,9 @@
 //! From a study to its plant and its observer.
 
 use std::cell::OnceCell;
+use std::time::Duration;
 
+use lynkeus_expr::Budget;
 use lynkeus_model::{LoadError, LoadOptions, Plant};
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, TuningError, Value};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, Standing, range};
@@ -35,8 +37,13 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
         model: study.model.clone(),
         parameters: study.parameters.clone(),
         symbolic_parameters,
+        budget: study.budget.clone(),
     };
-    Plant::load(path, &options).map_err(|error| match error {
+    let plant = Plant::load(path, &options);
+    if let Some(spent) = study.budget.marked() {
+        return Err(Error::ended(spent).at(path.display()));
+    }
+    plant.map_err(|error| match error {
         LoadError::Refused(diagnostic) => Error::from_source(diagnostic),
         other => Error::from_source(other),
     })
@@ -104,13 +111,23 @@ impl<'a> Prepared<'a> {
         if let Some(known) = self.examinations.get() {
             return Ok(known);
         }
-        let observer = &self.study.observer;
-        let examine = |family: &dyn Family| {
-            let found = family.examine(&self.extended, &observer.tuning);
-            found.map_err(|error| self.refusal(error))
-        };
-        let found = observer.families().map(examine).collect::<Result<_, _>>()?;
+        let families: Vec<&dyn Family> = self.study.observer.families().collect();
+        let mut found = vec![];
+        for (done, family) in families.iter().enumerate() {
+            found.push(self.examined(*family, families.len() - done)?);
+        }
         Ok(self.examinations.get_or_init(|| found))
+    }
+
+    /// What one family finds, of `left` that are still to come, in its share of the time.
+    fn examined(&self, family: &dyn Family, left: usize) -> Result<Examination, Error> {
+        let graph = self.extended.graph();
+        let whole = graph.budget();
+        // the rest of the work needs a share as well
+        graph.set_budget(share(&whole, 1.0 / (left + 1) as f64));
+        let found = family.examine(&self.extended, &self.study.observer.tuning);
+        graph.set_budget(whole);
+        found.map_err(|error| self.refusal(error))
     }
 
     /// The observer of the study.
@@ -229,7 +246,19 @@ impl<'a> Prepared<'a> {
                 .at(&study.file),
             DesignError::NoGain { key, .. } => study.observer.place(key, &study.file, &error),
             DesignError::MissingInput(_) => Error::from_source(error).at(&study.file),
+            DesignError::Spent(spent) => Error::ended(*spent).at(&study.file),
         }
+    }
+}
+
+/// What one part of an examination may take where the study's time has no limit.
+const PART: Duration = Duration::from_secs(10);
+
+/// A share of the time that is left; where the time has no limit, ten seconds.
+pub(crate) fn share(whole: &Budget, share: f64) -> Budget {
+    match whole.left() {
+        Some(_) => whole.part(share),
+        None => whole.within(PART),
     }
 }
 
@@ -277,7 +306,10 @@ fn blame(study: &Study, error: SensorsError) -> Error {
 /// The family to use: the first with a theorem that fits, else the first that asks nothing of
 /// the plant, else the first that is undecided.
 pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
-    let with = |fit: Standing| examinations.iter().filter(move |e| e.fit() == fit);
+    let with = |fit: Standing| {
+        let examined = examinations.iter().filter(|e| e.spent().is_none());
+        examined.filter(move |e| e.fit() == fit)
+    };
     let proved = with(Standing::Proved).find(|e| e.has_theorem());
     proved
         .or_else(|| with(Standing::Proved).next())
@@ -316,6 +348,11 @@ fn fallback<'e>(lost: impl Iterator<Item = &'e Examination>) -> String {
 }
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
+    if let Some(spent) = examinations.iter().find_map(Examination::spent) {
+        return Error::ended(spent)
+            .at(&study.file)
+            .hint("`--time-limit` and `--memory-limit` move the limits");
+    }
     let reasons: Vec<String> = examinations
         .iter()
         .map(|e| DesignError::Refused(Box::new(e.clone())).to_string())

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
+use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
-use lynkeus_run::{Level, Role, Simulation, Trajectory};
+use lynkeus_run::{Interrupted, Level, Role, Simulation, Trajectory};
 
 use crate::course::{Course, Samples};
-use crate::outcome::{Raw, interrupted, measurements};
+use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
@@ -48,12 +49,20 @@ pub(crate) fn simulated(
         inputs: systems::inputs(study, plant, settings, &design.observer)?,
         ..open_loop(study, settings, plant)?
     };
-    let run = simulation
-        .run_watched(watch)
-        .map_err(|error| interrupted(error.error, &study.file))?;
+    let (run, ended) = rows(simulation.run_watched(&mut within(&study.budget, watch)));
     let reported = Reported::new(&design.observer, &run);
-    let course = Course::of_run(&design.observer, &reported);
+    let mut course = Course::of_run(&design.observer, &reported);
+    course.ended = ended;
+    settle(&mut course, run.times().len(), &study.budget, &study.file)?;
     Ok(outcome(prepared, design, &run, course))
+}
+
+/// The rows of a run, and why it ended early.
+fn rows(run: Result<Trajectory, Box<Interrupted>>) -> (Trajectory, Option<lynkeus_run::Error>) {
+    match run {
+        Ok(run) => (run, None),
+        Err(interrupted) => (interrupted.partial, Some(interrupted.error)),
+    }
 }
 
 /// The plant alone, then a filter on what its sensors show: every row is a sample.
@@ -66,6 +75,7 @@ fn sampled(
     let (study, plant) = (prepared.study(), prepared.plant());
     let mut simulation = open_loop(study, settings, plant)?;
     simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
+    let watch = &mut within(&study.budget, watch);
     let run = simulation
         .run_watched(&mut |done| watch(0.5 * done))
         .map_err(|error| interrupted(error.error, &study.file))?;
@@ -91,6 +101,17 @@ fn sampled(
         return Err(interrupted(error, &study.file));
     }
     Ok(outcome(prepared, design, &run, course))
+}
+
+/// A watch that also ends a run whose budget is spent.
+pub(crate) fn within<'a>(
+    budget: &'a Budget,
+    watch: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
+    move |fraction| match budget.spent() {
+        Some(_) => ControlFlow::Break(()),
+        None => watch(fraction),
+    }
 }
 
 /// The study's `[simulate]`.

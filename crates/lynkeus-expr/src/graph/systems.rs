@@ -60,8 +60,15 @@ impl Graph {
             n,
         };
         let mut inner = self.inner.borrow_mut();
-        let node = match inner.known_systems.get(&system) {
-            Some(&node) => node,
+        let node = match inner.known_systems.get(&system).copied() {
+            Some(node) => node,
+            None if inner.is_spent() => {
+                let nothing = inner.nothing();
+                return Solution {
+                    x: vec![nothing; n],
+                    rcond: nothing,
+                };
+            }
             None => {
                 let index = inner.systems.len() as u32;
                 inner.systems.push(system.clone());

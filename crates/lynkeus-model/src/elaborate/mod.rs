@@ -18,7 +18,7 @@ mod symbols;
 mod tables;
 mod value;
 
-use lynkeus_expr::Graph;
+use lynkeus_expr::{Graph, Spent};
 
 pub(crate) use evaluate::Evaluator;
 pub(crate) use scope::{Mode, Named, Scope};
@@ -44,6 +44,7 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
     let ast = parse_file(source)?;
     let model = choose_model(source, &ast, options)?;
     let graph = Graph::new();
+    graph.set_budget(options.budget.clone());
     let budget = budget();
     let context = Context {
         source,
@@ -52,10 +53,18 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
         budget: &budget,
         options,
     };
-    let symbols = Symbols::new(&context, model)?;
-    let equations = flatten::flatten(&context, &symbols, model)?;
-    let parts = assemble::parts(&context, &symbols, model, &equations)?;
+    let parts = graph.budgeted(options.budget.clone(), || {
+        let symbols = Symbols::new(&context, model)?;
+        let equations = flatten::flatten(&context, &symbols, model)?;
+        assemble::parts(&context, &symbols, model, &equations)
+    });
+    let parts = parts.map_err(|spent| ended(model, spent))??;
     Ok(parts.with_graph(graph))
+}
+
+/// A limit ended the reading.
+fn ended(model: &ModelSyntax, spent: Spent) -> Problem {
+    Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
 /// The model that is asked for, or the only one.

@@ -28,6 +28,7 @@ fn load(text: &str, parameters: &[(&str, f64)], symbolic: bool) -> Result<Plant,
         parameters,
         symbolic_parameters: symbolic,
         model: None,
+        ..LoadOptions::default()
     };
     Plant::from_modelica(text, "test.mo", &options)
 }

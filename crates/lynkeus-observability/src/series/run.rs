@@ -1,7 +1,8 @@
 //! Coefficients and sensitivities, order by order.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
+
+use lynkeus_expr::{Budget, Spent};
 
 use super::functions::Arc;
 use super::program::{Inverse, Step};
@@ -21,6 +22,15 @@ pub(crate) enum Stop {
 }
 
 impl Stop {
+    /// Ends the work whose budget is spent.
+    pub fn where_spent(budget: &Budget) -> Result<(), Self> {
+        match budget.spent() {
+            None => Ok(()),
+            Some(Spent::Memory(_)) => Err(Stop::Memory),
+            Some(_) => Err(Stop::Time),
+        }
+    }
+
     /// `time`, `memory` or `the point`.
     pub fn word(self) -> &'static str {
         match self {
@@ -37,7 +47,7 @@ pub(crate) struct Run<'a> {
     width: usize,
     slots: Vec<Series>,
     functions: Functions,
-    deadline: Instant,
+    budget: Budget,
     /// numbers that may still be stored
     room: usize,
 }
@@ -47,7 +57,7 @@ impl<'a> Run<'a> {
         program: &'a Program,
         width: usize,
         functions: Functions,
-        deadline: Instant,
+        budget: Budget,
         room: usize,
     ) -> Self {
         Self {
@@ -55,7 +65,7 @@ impl<'a> Run<'a> {
             width,
             slots: vec![Series::default(); program.steps.len()],
             functions,
-            deadline,
+            budget,
             room,
         }
     }
@@ -69,8 +79,8 @@ impl<'a> Run<'a> {
         let k = self.slots.first().map_or(0, |s| s.values.len());
         let program = self.program;
         for (slot, step) in program.steps.iter().enumerate() {
-            if slot % 64 == 0 && Instant::now() > self.deadline {
-                return Err(Stop::Time);
+            if slot % 64 == 0 {
+                Stop::where_spent(&self.budget)?;
             }
             // the second of a pair is computed with the first
             if matches!(step, Step::Cos) {

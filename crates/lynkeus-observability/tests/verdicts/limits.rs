@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::{plant, question};
-use lynkeus_observability::{Limits, Question, QuestionError, Verdict, analyse};
+use lynkeus_expr::{Budget, Memory};
+use lynkeus_observability::{Question, QuestionError, Verdict, analyse};
 
 #[test]
 fn a_model_without_output_is_told_so() {
@@ -80,10 +81,7 @@ fn large(n: usize) -> lynkeus_model::Plant {
 fn two_thousand_parameters_end_at_the_limit_of_time() {
     let model = large(1000);
     let asking = Question {
-        limits: Limits {
-            time: Duration::from_secs(2),
-            ..Limits::default()
-        },
+        budget: Budget::new(Some(Duration::from_secs(2)), None),
         ..question()
     };
     let begun = Instant::now();
@@ -99,10 +97,13 @@ fn two_thousand_parameters_end_at_the_limit_of_time() {
 #[test]
 fn memory_ends_it_as_well() {
     let asking = Question {
-        limits: Limits {
-            memory: 1 << 20,
-            ..Limits::default()
-        },
+        budget: Budget::new(
+            None,
+            Some(Memory {
+                limit: 1 << 20,
+                used: || 0,
+            }),
+        ),
         ..question()
     };
     let answer = analyse(&large(60), &asking).unwrap();

@@ -12,6 +12,7 @@ use lynkeus_structure::{Standing, Verdict};
 use super::form::{Form, Map, blind};
 use super::keys::Asked;
 use super::settings::{POLES, Settings};
+use crate::conditions::lasts;
 use crate::stages::{Found, Searched};
 use crate::{DesignError, TuningError};
 
@@ -34,7 +35,9 @@ pub(super) fn form(
         Asked::Indices(indices) => return Ok(Ok(Form::new(extended, &map, indices, region)?)),
         Asked::Lengths(lengths) => lengths,
     };
+    lasts(extended)?;
     let mut rows = Codistribution::new(extended, &map.gradients)?;
+    lasts(extended)?;
     let first = rows.krener_respondek();
     if first.iter().sum::<usize>() < extended.states.len() {
         return Ok(Err(blind(extended, &first)?));

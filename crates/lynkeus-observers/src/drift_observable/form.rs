@@ -9,10 +9,13 @@ use lynkeus_structure::{Extended, Region, Regularity, visibility};
 use super::conditions::{self, Inputs};
 use super::variant::Variant;
 use super::{NAME, degrees, derivative_name};
-use crate::conditions::{lipschitz, names};
+use crate::conditions::{lasts, lipschitz, names};
 use crate::family;
 use crate::stages::Found;
 use crate::{DesignError, Examination};
+
+/// The share of the time for the names of what is not seen.
+const WORDS: f64 = 0.5;
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map {
@@ -44,12 +47,14 @@ impl Map {
         let order = extended.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(extended, &affine, order)?;
         let x = extended.symbols();
+        let mut gradients = vec![];
+        for h in &lie {
+            lasts(extended)?;
+            gradients.push(output_map::jacobian_rows(graph, h, &x));
+        }
         Ok(Ok(Self {
             affine,
-            gradients: lie
-                .iter()
-                .map(|h| output_map::jacobian_rows(graph, h, &x))
-                .collect(),
+            gradients,
             lie,
             slopes: degrees::slopes(extended),
             lipschitz: lipschitz(extended, region)?,
@@ -125,7 +130,9 @@ impl Form {
             .iter()
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
+        lasts(extended)?;
         let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
+        lasts(extended)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => {
                 let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
@@ -186,10 +193,17 @@ pub(super) fn blind(
     indices: &[usize],
 ) -> Result<Examination, DesignError> {
     let n = extended.states.len();
-    let seen = visibility::visible(extended)?;
-    let hidden: Vec<usize> = (0..n).filter(|&i| !seen[i]).collect();
+    lasts(extended)?;
+    let graph = extended.graph();
+    let words = graph.budget().part(WORDS);
+    // the verdict does not wait for the names
+    let seen = graph.budgeted(words, || visibility::visible(extended)).ok();
+    let seen = seen.transpose()?;
+    let is_hidden = |i: &usize| seen.as_ref().is_some_and(|seen| !seen[*i]);
+    let hidden: Vec<usize> = (0..n).filter(is_hidden).collect();
     let found: usize = indices.iter().sum();
     let advice = match hidden.is_empty() {
+        _ if seen.is_none() => "measure more".to_owned(),
         true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
         false => format!(
             "no measured output feels {}; measure more",
@@ -210,6 +224,7 @@ fn with_inputs(
     let graph = extended.graph();
     let order = rows.iter().map(|r| r.1).max().unwrap_or(0);
     let y = output_map::output_derivatives(extended, U, order)?;
+    lasts(extended)?;
     let Φ̄: Vec<Node> = rows.iter().map(|&(i, k)| y[i][k]).collect();
     let Q̄ = output_map::jacobian_rows(graph, &Φ̄, &extended.symbols());
     let Q̄_a = output_map::jacobian_rows(graph, &Φ̄, &U.concat());

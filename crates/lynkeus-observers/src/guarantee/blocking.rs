@@ -1,5 +1,6 @@
 //! Why there is no proof, or no gain: which range stands in the way.
 
+use lynkeus_expr::Budget;
 use lynkeus_proof::decay::{self, ErrorModel, Request};
 use lynkeus_structure::{Slopes, short};
 
@@ -36,10 +37,13 @@ fn share(slopes: &Slopes, works: impl Fn(&[ErrorModel]) -> bool) -> Option<f64> 
 }
 
 /// The share of the ranges for which some decay of the observer is proved.
-pub(super) fn provable_share(system: &ErrorSystem) -> Option<f64> {
-    share(&system.slopes, |models| {
-        decay::prove(models, &system.scale, 0.0).is_some()
-    })
+///
+/// None where the budget ends.
+pub(super) fn provable_share(system: &ErrorSystem, budget: &Budget) -> Option<f64> {
+    let share = share(&system.slopes, |models| {
+        decay::prove(models, &system.scale, 0.0, budget).is_some()
+    });
+    share.filter(|_| budget.marked().is_none())
 }
 
 /// In words: what keeps every gain from a proof of the requested rate.

@@ -109,6 +109,7 @@ pub(crate) fn design(
         scale: system.scale.clone(),
         aim: asked.aim,
         limit: asked.limit,
+        budget: extended.graph().budget(),
     };
     let gain = match (asked.rate, asked.limit) {
         (Some(_), _) => decay::design(&system.models, &request)
@@ -146,6 +147,7 @@ fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
 
 fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignError {
     match error {
+        NoGain::Spent(spent) => spent.into(),
         NoGain::Limit(found) => DesignError::NoGain {
             key: "gain_limit",
             reason: format!(
@@ -167,6 +169,7 @@ fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignErro
 
 /// The fastest decay within the limit of the gain.
 fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignError> {
+    let budget = request.budget.clone();
     let mut at = |rate: f64| {
         request.rate = rate;
         decay::design(&system.models, &request)
@@ -180,6 +183,9 @@ fn fastest(system: &ErrorSystem, mut request: Request) -> Result<Gain, DesignErr
     let mut best = None;
     let mut low = 0.0;
     for _ in 0..HALVINGS {
+        if budget.spent().is_some() {
+            break;
+        }
         let rate = if low > 0.0 {
             f64::midpoint(low, high)
         } else {

@@ -24,6 +24,7 @@ mod ultimate;
 use crate::kalman::NO_THEOREM;
 use crate::statement::{Statement, proved, undecided};
 use crate::{Check, Inequality};
+use lynkeus_expr::Budget;
 use lynkeus_proof::decay::{self, ErrorModel, Proof};
 use lynkeus_structure::Standing;
 use lynkeus_structure::{Extended, short};
@@ -38,6 +39,8 @@ use refute::Sample;
 const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";
 /// Vertices up to which slopes are taken by their ends instead of by multipliers.
 const VERTICES: usize = 32;
+/// The share of the time that is left in which a Lyapunov function is sought.
+const SEARCH: f64 = 0.8;
 
 /// What to prove.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,27 +66,52 @@ pub fn certify(
         let check = undecided(Statement::FilterConverges, NO_THEOREM);
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
+    let graph = extended.graph();
+    let certified = graph.budgeted(graph.budget().part(1.0), || {
+        certified(extended, observer, assumptions, claim)
+    });
+    certified.unwrap_or_else(|spent| Ok(Certificate::ended(BASIS, assumptions, spent)))
+}
+
+fn certified(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    assumptions: &Assumptions,
+    claim: Claim,
+) -> Result<Certificate, DesignError> {
     let system = match ErrorSystem::new(extended, observer, assumptions)? {
         Ok(system) => system,
         Err(reason) => return Ok(not_covered(assumptions, reason)),
     };
     let mut hypotheses = vec![system.bounded()];
     let sample = refute::worst(extended.graph(), &system);
+    // where it ends, what is proved by then still has to be told
+    let search = extended.graph().budget().part(SEARCH);
     if let Some(check) = refute::growing(extended, observer, &system, &sample)? {
         hypotheses.push(check);
         return Ok(Certificate::new(BASIS, assumptions, hypotheses));
     }
     let found = match (system.is_bounded() && !sample.unstable, claim) {
         (false, _) => None,
-        (true, Claim::Fastest) => decay::fastest(&system.models, &system.scale, sample.limit),
-        (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate),
+        (true, Claim::Fastest) => {
+            decay::fastest(&system.models, &system.scale, sample.limit, &search)
+        }
+        (true, Claim::At(rate)) => decay::prove(&system.models, &system.scale, rate, &search),
     };
-    hypotheses.push(inequality(&system, &sample, found.as_ref()));
+    let spent = search.marked();
+    hypotheses.push(match (&found, spent) {
+        (None, Some(spent)) => undecided(Inequality::OneLyapunovFunction, spent.to_string()),
+        _ => inequality(&system, &sample, found.as_ref()),
+    });
     let mut certificate = Certificate::new(BASIS, assumptions, hypotheses);
     match found {
-        Some(proof) => fill(&mut certificate, extended, &system, &proof, assumptions),
+        Some(proof) => {
+            fill(&mut certificate, extended, &system, &proof, assumptions);
+            let faster = |spent| format!("a faster rate was sought: {spent}");
+            certificate.notes.extend(spent.map(faster));
+        }
         None if claim == Claim::Fastest => {
-            let said = still_said(&system, &sample);
+            let said = still_said(&system, &sample, &search);
             certificate.notes.extend(said);
         }
         None => {}
@@ -125,7 +153,7 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
 }
 
 /// What can be said without a proof on the whole box.
-fn still_said(system: &ErrorSystem, sample: &Sample) -> Vec<String> {
+fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<String> {
     let mut notes = vec![];
     if sample.slowest > 0.0 {
         notes.push(format!(
@@ -134,7 +162,7 @@ fn still_said(system: &ErrorSystem, sample: &Sample) -> Vec<String> {
         ));
     }
     if system.is_bounded()
-        && let Some(share) = blocking::provable_share(system)
+        && let Some(share) = blocking::provable_share(system, search)
     {
         notes.push(format!(
             "the inequality holds once every slope's range is cut to {:.0} % about its middle: a smaller box would do",

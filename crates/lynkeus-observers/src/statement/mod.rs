@@ -20,6 +20,8 @@ pub enum Statement {
     PlantIsRegular,
     /// what a certificate counts has bounds: asked where anything acts
     WhatActs,
+    /// the work came to its end: asked where a limit ended it
+    Finished,
     /// a partial derivative along a chain keeps its sign
     PartialKeepsSign {
         /// the state whose equation it is of
@@ -148,6 +150,7 @@ impl fmt::Display for Statement {
                 f.write_str("f and h have values on the whole box and do not jump")
             }
             Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
+            Self::Finished => f.write_str("everything was examined"),
             Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
             Self::OutputKeepsSign { output, state } => {
                 write!(f, "∂{output}/∂{state} keeps its sign")

@@ -1,5 +1,6 @@
 //! The fastest decay that can be proved for a given error system.
 
+use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
 use super::frame::{Frame, Seen};
@@ -15,21 +16,21 @@ const NEGLIGIBLE: f64 = 1e-7;
 
 /// A proof of decay at `rate`, accepted by [`holds`]; none where there is none of this
 /// form or it cannot be found. `scale` is the size of each state that counts as one.
-pub fn prove(models: &[ErrorModel], scale: &[f64], rate: f64) -> Option<Proof> {
+pub fn prove(models: &[ErrorModel], scale: &[f64], rate: f64, budget: &Budget) -> Option<Proof> {
     let n = models.first()?.size();
     if !models.iter().all(|m| m.size() == n && m.is_bounded()) {
         return None;
     }
     let frames = Frame::natural(models, scale).into_iter();
     let mut frames = frames.chain([Frame::plain(models, scale)]);
-    frames.find_map(|frame| prove_in(&frame, models, rate))
+    frames.find_map(|frame| prove_in(&frame, models, rate, budget))
 }
 
-fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64) -> Option<Proof> {
+fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64, budget: &Budget) -> Option<Proof> {
     let scale = &frame.scale;
     let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
     let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
-    let mut proof = candidate(&seen, rate * scale.unit)?;
+    let mut proof = candidate(&seen, rate * scale.unit, budget)?;
     proof.P = symmetric(&frame.restored(&proof.P));
     let proof = scale.restored(models, &proof);
     let proof = Proof { rate, ..proof };
@@ -38,14 +39,18 @@ fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64) -> Option<Proof> {
 
 /// What the solver says, unchecked: P in the frame's axes, the multipliers in the
 /// models' units.
-fn candidate(models: &[Seen], rate: f64) -> Option<Proof> {
+fn candidate(models: &[Seen], rate: f64, budget: &Budget) -> Option<Proof> {
     let n = models.first()?.A.nrows();
     let mut problem = Problem::new();
+    problem.set_budget(budget);
     let P = problem.symmetric(n);
     problem.positive(P.clone());
     problem.positive(Affine::identity(n).minus(&P));
     let mut multipliers = vec![];
     for model in models {
+        if budget.spent().is_some() {
+            return None;
+        }
         let PA = P.times(&model.A);
         multipliers.push(inequality(
             &mut problem,
@@ -68,21 +73,21 @@ fn candidate(models: &[Seen], rate: f64) -> Option<Proof> {
 }
 
 /// The proof of the fastest decay up to `limit`, by bisection; none where not even a
-/// rate of zero can be proved.
-pub fn fastest(models: &[ErrorModel], scale: &[f64], limit: f64) -> Option<Proof> {
-    let mut best = prove(models, scale, 0.0)?;
-    if let Some(proof) = prove(models, scale, limit) {
+/// rate of zero can be proved. Where the budget ends it is the fastest found by then.
+pub fn fastest(models: &[ErrorModel], scale: &[f64], limit: f64, budget: &Budget) -> Option<Proof> {
+    let mut best = prove(models, scale, 0.0, budget)?;
+    if let Some(proof) = prove(models, scale, limit, budget) {
         return Some(proof);
     }
     let (mut low, mut high) = (0.0, limit);
     // slow decay is worth knowing as precisely as fast decay: bisect on a
     // logarithmic scale once a positive rate is found
-    while low < high * (1.0 - ACCURACY) && high > NEGLIGIBLE * limit {
+    while low < high * (1.0 - ACCURACY) && high > NEGLIGIBLE * limit && budget.spent().is_none() {
         let rate = match low > 0.0 {
             true => (low * high).sqrt(),
             false => high * 0.25,
         };
-        match prove(models, scale, rate) {
+        match prove(models, scale, rate, budget) {
             Some(proof) => (low, best) = (rate, proof),
             None => high = rate,
         }

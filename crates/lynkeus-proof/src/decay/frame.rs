@@ -185,7 +185,8 @@ mod tests {
             constant,
             sectors: sectors.collect(),
         };
-        let proof = super::super::prove(&[model], &[1.0; 4], 100.0);
+        let proof =
+            super::super::prove(&[model], &[1.0; 4], 100.0, &lynkeus_expr::Budget::default());
         assert!(proof.is_some());
     }
 }

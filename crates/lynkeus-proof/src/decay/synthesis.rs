@@ -1,5 +1,6 @@
 //! Gains with a proof: K and P together, by the change of variables Y = PK.
 
+use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
 use super::analysis::{inequality, prove};
@@ -48,6 +49,8 @@ pub struct Request {
     pub aim: Aim,
     /// largest entry allowed
     pub limit: Option<f64>,
+    /// when to end the search
+    pub budget: Budget,
 }
 
 /// A gain with the proof of its decay.
@@ -74,6 +77,9 @@ pub enum NoGain {
     /// the interval check rejected the solver's answer
     #[error("the solver's answer does not stand the interval check")]
     Rejected,
+    /// a limit ended the search
+    #[error("undecided: {0}")]
+    Spent(Spent),
 }
 
 /// A gain that is proved to reach the rate.
@@ -85,7 +91,10 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
         return Err(NoGain::Unbounded);
     }
     let scaled = Scaled::new(models, request);
-    let mut K = scaled.direct().map_err(NoGain::Rate)?;
+    let mut K = scaled.direct().map_err(|failure| match failure {
+        Failure::Spent(spent) => NoGain::Spent(spent),
+        other => NoGain::Rate(other),
+    })?;
     let over = |K: &DMatrix<f64>| request.limit.is_some_and(|limit| K.amax() > limit);
     if request.aim == Aim::Gain || over(&K) {
         K = scaled.alternated(K);
@@ -97,7 +106,9 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
         .iter()
         .map(|m| m.corrected(&K, &request.measured))
         .collect();
-    let proof = prove(&corrected, &request.scale, request.rate).ok_or(NoGain::Rejected)?;
+    let proof = prove(&corrected, &request.scale, request.rate, &request.budget);
+    let spent = request.budget.marked();
+    let proof = proof.ok_or(spent.map_or(NoGain::Rejected, NoGain::Spent))?;
     Ok(Gain { K, proof })
 }
 
@@ -153,6 +164,12 @@ impl<'a> Scaled<'a> {
         DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * self.unit(i, j))
     }
 
+    fn problem(&self) -> Problem {
+        let mut problem = Problem::new();
+        problem.set_budget(&self.request.budget);
+        problem
+    }
+
     /// The inequality of every model, where its middle matrix makes PA.
     fn constrain(&self, problem: &mut Problem, P: &Affine, PA: impl Fn(&DMatrix<f64>) -> Affine) {
         for model in &self.models {
@@ -163,7 +180,7 @@ impl<'a> Scaled<'a> {
 
     /// P > 0 and the inequality of every model in P and Y = PK.
     fn inequalities(&self) -> (Problem, Affine, Affine) {
-        let mut problem = Problem::new();
+        let mut problem = self.problem();
         let P = problem.symmetric(self.size());
         let Y = problem.matrix(self.size(), self.request.measured.len());
         problem.positive(P.clone());
@@ -237,7 +254,7 @@ impl<'a> Scaled<'a> {
         let n = self.size();
         let K = DMatrix::from_fn(n, K.ncols(), |i, j| K[(i, j)] / self.unit(i, j));
         let KC = K * self.selector();
-        let mut problem = Problem::new();
+        let mut problem = self.problem();
         let P = problem.symmetric(n);
         problem.positive(P.clone());
         problem.positive(Affine::identity(n).minus(&P));
@@ -249,7 +266,7 @@ impl<'a> Scaled<'a> {
     /// K with the smallest largest entry for a given P.
     fn smallest(&self, P: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let (n, p) = (self.size(), self.request.measured.len());
-        let mut problem = Problem::new();
+        let mut problem = self.problem();
         let K = problem.matrix(n, p);
         let g = problem.matrix(1, 1);
         for i in 0..n {

@@ -1,5 +1,6 @@
 //! Newton's method on t·cᵀx − Σ log det F_j(x) − log(R² − |x|²).
 
+use lynkeus_expr::Budget;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::Affine;
@@ -119,9 +120,19 @@ impl Block {
     }
 
     /// Adds −∇ log det and its Hessian: with W = F⁻¹, g_k = −tr(W F_k) and
-    /// H_kl = tr(W F_k W F_l).
-    fn derivatives(&self, W: &DMatrix<f64>, g: &mut DVector<f64>, H: &mut DMatrix<f64>) {
+    /// H_kl = tr(W F_k W F_l). Where the budget ends they are not whole, and nobody
+    /// reads them: [`newton`] asks for the budget first.
+    fn derivatives(
+        &self,
+        W: &DMatrix<f64>,
+        g: &mut DVector<f64>,
+        H: &mut DMatrix<f64>,
+        budget: &Budget,
+    ) {
         for (a, term) in self.terms.iter().enumerate() {
+            if budget.spent().is_some() {
+                return;
+            }
             let k = term.unknown;
             g[k] -= term.inner(W);
             let G = term.sandwiched(W);
@@ -142,12 +153,13 @@ pub(super) struct Barrier<'a> {
     pub blocks: &'a [Block],
     pub cost: DVector<f64>,
     pub radius: f64,
+    pub budget: &'a Budget,
 }
 
 impl Barrier<'_> {
     /// From a point inside to near the minimum, until `good(x, gap)`: the gap bounds
-    /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget of
-    /// steps, the last point is returned: it is still inside. None where the start is
+    /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget
+    /// or the steps, the last point is returned: it is still inside. None where the start is
     /// not.
     pub(super) fn minimise(
         &self,
@@ -159,7 +171,7 @@ impl Barrier<'_> {
         for _ in 0..STEPS {
             let factors = self.factors(&x)?;
             let (g, H) = self.derivatives(&x, &factors, t);
-            let Some(step) = newton(H, &g) else {
+            let Some(step) = newton(H, &g, self.budget) else {
                 return Some(x);
             };
             let decrement = -g.dot(&step);
@@ -184,7 +196,7 @@ impl Barrier<'_> {
     fn first(&self, x: &DVector<f64>, order: f64) -> Option<f64> {
         let usual = order / (1.0 + self.cost.dot(x).abs());
         let (g, H) = self.derivatives(x, &self.factors(x)?, 0.0);
-        let towards = newton(H, &self.cost)?;
+        let towards = newton(H, &self.cost, self.budget)?;
         let nearest = -towards.dot(&g) / towards.dot(&self.cost);
         Some(nearest.clamp(30.0 * usual, 1e4 * usual))
     }
@@ -215,7 +227,7 @@ impl Barrier<'_> {
         let mut H = DMatrix::identity(m, m) * (2.0 / slack);
         H.ger(4.0 / (slack * slack), x, x, 1.0);
         for (block, factor) in self.blocks.iter().zip(factors) {
-            block.derivatives(&factor.inverse(), &mut g, &mut H);
+            block.derivatives(&factor.inverse(), &mut g, &mut H, self.budget);
         }
         (g, H)
     }
@@ -257,8 +269,11 @@ impl Barrier<'_> {
     }
 }
 
-/// −H⁻¹g, with unknowns scaled so that H has a unit diagonal.
-fn newton(mut H: DMatrix<f64>, g: &DVector<f64>) -> Option<DVector<f64>> {
+/// −H⁻¹g, with unknowns scaled so that H has a unit diagonal; none where the budget is spent.
+fn newton(mut H: DMatrix<f64>, g: &DVector<f64>, budget: &Budget) -> Option<DVector<f64>> {
+    if budget.spent().is_some() {
+        return None;
+    }
     let scale = H.diagonal().map(|h| 1.0 / h.sqrt());
     for j in 0..H.ncols() {
         for i in 0..H.nrows() {
@@ -270,10 +285,35 @@ fn newton(mut H: DMatrix<f64>, g: &DVector<f64>) -> Option<DVector<f64>> {
     while ridge < 1e-4 {
         let mut regular = H.clone();
         regular.fill_diagonal(1.0 + ridge);
-        if let Some(factor) = regular.cholesky() {
+        if let Some(factor) = cholesky(regular, budget) {
             return Some(factor.solve(&right).component_mul(&scale));
         }
         ridge *= 100.0;
     }
     None
+}
+
+/// The factor of a matrix that may be large, column by column; none where it has none, or
+/// the budget ends.
+fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> {
+    let n = L.ncols();
+    for j in 0..n {
+        if budget.spent().is_some() {
+            return None;
+        }
+        for k in 0..j {
+            let factor = -L[(j, k)];
+            let (mut column, before) = L.columns_range_pair_mut(j, k);
+            let before = before.rows_range(j..);
+            column.rows_range_mut(j..).axpy(factor, &before, 1.0);
+        }
+        let pivot = L[(j, j)];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return None;
+        }
+        let mut column = L.column_mut(j);
+        let mut below = column.rows_range_mut(j..);
+        below /= pivot.sqrt();
+    }
+    Some(Cholesky::pack_dirty(L))
 }

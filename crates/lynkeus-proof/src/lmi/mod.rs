@@ -32,6 +32,7 @@ mod barrier;
 pub use affine::Affine;
 
 use barrier::{Barrier, Block};
+use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
 /// Unknowns larger than this do not occur in a well scaled problem; the bound keeps
@@ -50,6 +51,7 @@ pub struct Problem {
     unknowns: usize,
     inequalities: Vec<Affine>,
     objective: Option<Affine>,
+    budget: Budget,
 }
 
 /// Values of the unknowns strictly inside every inequality.
@@ -67,12 +69,37 @@ pub enum Failure {
     /// the arithmetic gave out before a decision
     #[error("the inequalities could not be decided in double precision; scale the problem")]
     Numerical,
+    /// a limit ended the search
+    #[error("undecided: {0}")]
+    Spent(Spent),
 }
 
 impl Problem {
     /// No unknowns, no inequalities.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// Under a budget: it may end the search.
+    pub fn set_budget(&mut self, budget: &Budget) {
+        self.budget = budget.clone();
+    }
+
+    /// Newton's matrix, and its factor, for one unknown more than there are.
+    fn affords(&self) -> Result<(), Failure> {
+        let m = self.unknowns + 1;
+        let bytes = m.saturating_mul(m).saturating_mul(3 * size_of::<f64>());
+        self.budget.affords(bytes);
+        self.budget
+            .spent()
+            .map_or(Ok(()), |spent| Err(Failure::Spent(spent)))
+    }
+
+    /// Why the barrier gave no point.
+    fn failure(&self) -> Failure {
+        self.budget
+            .marked()
+            .map_or(Failure::Numerical, Failure::Spent)
     }
 
     fn fresh(&mut self, count: usize) -> std::ops::Range<usize> {
@@ -135,18 +162,20 @@ impl Problem {
     /// # Errors
     /// [`Failure::Infeasible`] where the point is not inside.
     pub fn solve_from(&self, start: &Solution) -> Result<Solution, Failure> {
+        self.affords()?;
         let blocks: Vec<Block> = self.inequalities.iter().map(Block::new).collect();
         let barrier = Barrier {
             blocks: &blocks,
             cost: self.cost(),
             radius: RADIUS,
+            budget: &self.budget,
         };
         if !barrier.is_inside(&start.values) {
             return Err(Failure::Infeasible);
         }
         let good = |x: &DVector<f64>, gap: f64| gap < GAP * (1e-3 + barrier.cost.dot(x).abs());
         let found = barrier.minimise(start.values.clone(), good);
-        let values = found.ok_or(Failure::Numerical)?;
+        let values = found.ok_or_else(|| self.failure())?;
         Ok(Solution { values })
     }
 
@@ -157,6 +186,7 @@ impl Problem {
     /// # Errors
     /// [`Failure`].
     pub fn inside(&self) -> Result<Solution, Failure> {
+        self.affords()?;
         let s = self.unknowns;
         let relaxed = |f: &Affine| {
             let slack = Affine::unknown(f.rows(), f.rows(), |i, j| (i == j).then_some(s));
@@ -178,12 +208,16 @@ impl Problem {
             blocks: &blocks,
             cost,
             radius: RADIUS,
+            budget: &self.budget,
         };
         let decided = |x: &DVector<f64>, gap: f64| {
             gap < INSIDE * x[s].abs() || x[s] > 0.0 && gap < MARGIN || gap < 1e-2 * MARGIN
         };
-        let x = barrier.minimise(start, decided).ok_or(Failure::Numerical)?;
+        let x = barrier.minimise(start, decided);
+        let x = x.ok_or_else(|| self.failure())?;
         match x[s] < -MARGIN {
+            // a search that was ended has decided nothing
+            false if self.budget.marked().is_some() => Err(self.failure()),
             true => Ok(Solution {
                 values: x.rows(0, s).into_owned(),
             }),

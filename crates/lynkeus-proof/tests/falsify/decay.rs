@@ -1,6 +1,6 @@
 //! Decay of uncertain error systems, and the Riccati inequality.
 
-use lynkeus_expr::Interval;
+use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::decay::{self, ErrorModel, Proof, Sector};
 use lynkeus_proof::riccati::Riccati;
 use nalgebra::{DMatrix, DVector};
@@ -92,7 +92,7 @@ fn proved_decay_stands_random_members() {
             0 => vec![model.clone()],
             _ => decay::expanded(std::slice::from_ref(&model), 8),
         };
-        let Some(found) = decay::fastest(&models, &vec![1.0; n], 5.0) else {
+        let Some(found) = decay::fastest(&models, &vec![1.0; n], 5.0, &Budget::default()) else {
             continue;
         };
         proved += 1;
@@ -131,7 +131,7 @@ fn nothing_is_proved_of_a_family_with_an_unstable_member() {
         if unstable {
             attacked += 1;
             let scale = vec![1.0; model.size()];
-            assert!(decay::prove(&[model], &scale, 0.0).is_none());
+            assert!(decay::prove(&[model], &scale, 0.0, &Budget::default()).is_none());
         }
     }
     assert!(attacked >= 10, "{attacked}");

@@ -61,6 +61,9 @@ impl Regularity {
         moving: &[Node],
         region: &Region,
     ) -> Result<Self, MissingInput> {
+        if is_regular_at_once(graph, nodes, moving, region)? {
+            return Ok(Self { trouble: None });
+        }
         for &node in nodes {
             let node = crate::slopes::without_removable_jumps(graph, &[node])[0];
             if let Some(trouble) = search(graph, node, moving, region)? {
@@ -189,6 +192,18 @@ pub(crate) fn is_regular(
     Ok(walk.trouble(&[node], cell).is_none())
 }
 
+/// Whether the whole box decides all of them, without halving it: so it is with most plants,
+/// and one walk through what the expressions share is enough.
+fn is_regular_at_once(
+    graph: &Graph,
+    nodes: &[Node],
+    moving: &[Node],
+    region: &Region,
+) -> Result<bool, MissingInput> {
+    let mut walk = Walk::new(graph, nodes, moving, region)?;
+    Ok(walk.trouble(nodes, &region.cell()).is_none())
+}
+
 /// The first place where it is not decided, depth first: a true jump is found after a few
 /// dozen cells, an overestimated range goes on until every cell is decided.
 fn search(
@@ -207,7 +222,8 @@ fn search(
             continue;
         };
         let used = graph.symbols_of(&[culprit]);
-        let decidable = seen < BUDGET && !known.values.is_empty();
+        let lasts = seen < BUDGET && graph.spent().is_none();
+        let decidable = lasts && !known.values.is_empty();
         let halves = decidable
             .then(|| region.split_among(&cell, &used, FINEST))
             .flatten();

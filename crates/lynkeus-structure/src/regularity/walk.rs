@@ -30,6 +30,8 @@ pub(super) struct Walk<'g> {
     /// a selection whose branches agree where it changes from one to the other
     glued: HashSet<Node>,
     known: Vec<Known>,
+    /// the linear systems on this cell: enclosures of x, and of the condition estimate
+    solved: HashMap<Node, (Vec<Interval>, Interval)>,
 }
 
 impl<'g> Walk<'g> {
@@ -64,6 +66,7 @@ impl<'g> Walk<'g> {
         Ok(Self {
             glued: glued.collect(),
             known: Vec::with_capacity(nodes.len()),
+            solved: HashMap::new(),
             graph,
             nodes,
             place,
@@ -76,9 +79,18 @@ impl<'g> Walk<'g> {
     /// none where every root has a value everywhere and does not jump.
     pub fn trouble(&mut self, roots: &[Node], cell: &[Interval]) -> Option<(Node, Known)> {
         self.known.clear();
+        self.solved.clear();
         for i in 0..self.nodes.len() {
             let known = self.one(i, cell);
             self.known.push(known);
+            // one cell may take long where systems are large
+            if let Op::Solve(_) = self.graph.op(self.nodes[i])
+                && self.graph.spent().is_none()
+            {
+                let system = self.nodes[i];
+                let solved = self.solve(system);
+                self.solved.insert(system, solved);
+            }
         }
         let fails = |k: Known| !(k.continuous && k.values.is_defined());
         let bad = roots.iter().any(|root| fails(self.known[self.place[root]]));
@@ -147,12 +159,18 @@ impl<'g> Walk<'g> {
     }
 
     fn entry(&self, system: Node, i: usize) -> Interval {
+        match self.solved.get(&system) {
+            Some((x, condition)) => x.get(i).copied().unwrap_or(*condition),
+            None => Interval::UNKNOWN,
+        }
+    }
+
+    fn solve(&self, system: Node) -> (Vec<Interval>, Interval) {
         let arguments = self.graph.arguments(system);
         let values: Vec<Interval> = arguments.iter().map(|&a| self.of(a).values).collect();
         let n = self.unknowns(system);
         let (A, b) = values.split_at(n * n);
-        let (x, condition) = Intervals.solve(A, b);
-        x.get(i).copied().unwrap_or(condition)
+        Intervals.solve(A, b)
     }
 
     fn unknowns(&self, system: Node) -> usize {

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
 use serde_json::{Map, Value, json};
@@ -19,6 +20,7 @@ pub(super) fn answer(
     study: &Study,
     plant: &Plant,
     options: &CheckOptions,
+    budget: Budget,
 ) -> Result<Answer, Error> {
     let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
     let sensors = &study.sensors;
@@ -28,7 +30,7 @@ pub(super) fn answer(
         disturbances: texts(&sensors.disturbances),
         parameters: options.parameters,
         about: options.about.clone(),
-        limits: options.limits,
+        budget,
         ..Question::default()
     };
     analyse(plant, &question).map_err(|error| blame(study, error))

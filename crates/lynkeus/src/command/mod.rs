@@ -1,6 +1,7 @@
 //! The `lynkeus` command.
 
 mod how_well;
+mod limits;
 mod output;
 mod progress;
 mod run;
@@ -8,11 +9,12 @@ mod tune;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
 use lynkeus::{CheckOptions, Error, ErrorKind, Study};
+
+use limits::Limits;
 
 /// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.
 #[derive(Debug, Parser)]
@@ -34,7 +36,7 @@ Examples:
   lynkeus tune study.toml --plot tune.svg
 
 Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence, an estimate that is not
-credible: the table is written all the same), 2 bad input.";
+credible: the table is written all the same), 2 bad input, 3 a limit ended it.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -72,6 +74,8 @@ enum Command {
         /// One JSON object
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// Proves, refutes or leaves undecided that the observer converges, with rate and bounds
     Certify {
@@ -83,6 +87,8 @@ enum Command {
         /// One JSON object
         #[arg(long)]
         json: bool,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// Run the plant and its observer together, with noise
     Simulate {
@@ -96,6 +102,8 @@ enum Command {
         /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
         #[arg(long, value_name = "FILE.csv")]
         log: Option<PathBuf>,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// Replay a measured log through the observer
     Estimate {
@@ -105,6 +113,8 @@ enum Command {
         log: PathBuf,
         #[command(flatten)]
         output: Output,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// Sweep the tuning, in simulation or on a log, and find the knee of the trade-off
     Tune {
@@ -112,34 +122,11 @@ enum Command {
         study: PathBuf,
         #[command(flatten)]
         options: tune::Options,
+        #[command(flatten)]
+        limits: Limits,
     },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
-}
-
-/// When `check` stops looking: what is decided by then is told.
-#[derive(Debug, Args)]
-struct Limits {
-    /// Stop deciding what is observable after this time
-    #[arg(long, value_name = "SECONDS", default_value = "20", value_parser = seconds)]
-    time_limit: Duration,
-    /// Stop deciding what is observable at this size
-    #[arg(long, value_name = "MIB", default_value_t = 1024)]
-    memory_limit: usize,
-}
-
-impl Limits {
-    fn limits(&self) -> lynkeus::observability::Limits {
-        lynkeus::observability::Limits {
-            time: self.time_limit,
-            memory: self.memory_limit.saturating_mul(1 << 20),
-        }
-    }
-}
-
-fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    Duration::try_from_secs_f64(seconds).map_err(|_| "not a time".to_owned())
 }
 
 /// Where results go.
@@ -168,6 +155,7 @@ pub fn main() -> ExitCode {
             output::complain(&error);
             match error.kind() {
                 ErrorKind::Refused => ExitCode::from(1),
+                ErrorKind::Ended => limits::ENDED.into(),
                 _ => ExitCode::from(2),
             }
         }
@@ -186,44 +174,50 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             limits,
             how_well,
         } => {
-            let study = Study::load_or_bare(study, model)?;
+            let mut study = Study::load_or_bare(study, model)?;
+            study.budget = limits.budget();
             if how_well.is_asked() {
                 return how_well::how_well(&study, &how_well, json);
             }
-            let limits = limits.limits();
-            let options = CheckOptions {
-                parameters,
-                about,
-                limits,
-            };
+            let options = CheckOptions { parameters, about };
             run::check(&study, &options, singular.as_deref(), json)
         }
         Command::Design {
             study,
             output,
             json,
-        } => run::design(&Study::load(study)?, output.as_deref(), json),
+            limits,
+        } => run::design(&limits.proving(&study)?, output.as_deref(), json),
         Command::Certify {
             study,
             output,
             json,
-        } => run::certify(&Study::load(study)?, output.as_deref(), json),
+            limits,
+        } => run::certify(&limits.proving(&study)?, output.as_deref(), json),
         Command::Simulate {
             study,
             output,
             seed,
             log,
+            limits,
         } => {
-            let mut study = Study::load(study)?;
+            let mut study = limits.study(&study)?;
             if let (Some(seed), Some(settings)) = (seed, &mut study.simulate) {
                 settings.seed = seed;
             }
             run::simulate(&study, &output, log.as_deref())
         }
-        Command::Estimate { study, log, output } => {
-            run::estimate(&Study::load(study)?, &log, &output)
-        }
-        Command::Tune { study, options } => tune::tune(&study, &options),
+        Command::Estimate {
+            study,
+            log,
+            output,
+            limits,
+        } => run::estimate(&limits.study(&study)?, &log, &output),
+        Command::Tune {
+            study,
+            options,
+            limits,
+        } => tune::tune(&study, &options, &limits),
         Command::Schema => {
             output::print(&format!("{:#}\n", lynkeus::schema()))?;
             Ok(ExitCode::SUCCESS)

@@ -1,20 +1,26 @@
-//! A progress bar for anything that takes longer than a second.
+//! A progress bar for anything that takes longer than a second; where standard error is no
+//! terminal, a line every ten seconds.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 const STEPS: u64 = 1000;
+/// Between two lines where there is no bar.
+const LINES: Duration = Duration::from_secs(10);
 
-/// A bar on standard error, if that is a terminal; it appears after a second.
+/// A bar on standard error, if that is a terminal: it appears after a second. Else lines.
 pub(super) struct Progress {
     what: &'static str,
     wanted: bool,
+    terminal: bool,
     since: Instant,
+    /// of the last line
+    told: Instant,
     bar: Option<ProgressBar>,
 }
 
@@ -22,8 +28,10 @@ impl Progress {
     pub(super) fn new(what: &'static str, quiet: bool) -> Self {
         Self {
             what,
-            wanted: !quiet && std::io::stderr().is_terminal(),
+            wanted: !quiet,
+            terminal: std::io::stderr().is_terminal(),
             since: Instant::now(),
+            told: Instant::now(),
             bar: None,
         }
     }
@@ -38,6 +46,14 @@ impl Progress {
 
     fn show(&mut self, fraction: f64) {
         if !self.wanted || self.since.elapsed() < Duration::from_secs(1) {
+            return;
+        }
+        if !self.terminal {
+            if self.told.elapsed() >= LINES {
+                self.told = Instant::now();
+                let percent = (100.0 * fraction).floor();
+                line(&format!("{}: {percent} %", self.what));
+            }
             return;
         }
         let bar = self.bar.get_or_insert_with(|| {
@@ -64,22 +80,43 @@ pub(super) struct Alive {
 impl Alive {
     pub(super) fn new(what: &'static str) -> Self {
         let (done, wait) = channel();
-        let watch = move || {
-            let over = |wait: &Receiver<()>| wait.recv_timeout(Duration::from_secs(1)).is_ok();
-            if !std::io::stderr().is_terminal() || over(&wait) {
-                return;
-            }
-            let bar = ProgressBar::new_spinner().with_message(what);
-            bar.enable_steady_tick(Duration::from_millis(120));
-            // until the sender says so or is gone
-            let _ = wait.recv();
-            bar.finish_and_clear();
+        let terminal = std::io::stderr().is_terminal();
+        let watch = move || match terminal {
+            true => spin(what, &wait),
+            false => tell(what, &wait),
         };
-        Self {
-            done,
-            thread: Some(std::thread::spawn(watch)),
-        }
+        // without a thread the work goes on in silence
+        let thread = std::thread::Builder::new().spawn(watch).ok();
+        Self { done, thread }
     }
+}
+
+/// Whether the sender said so, or is gone, within that time.
+fn over(wait: &Receiver<()>, time: Duration) -> bool {
+    wait.recv_timeout(time) != Err(RecvTimeoutError::Timeout)
+}
+
+fn spin(what: &'static str, wait: &Receiver<()>) {
+    if over(wait, Duration::from_secs(1)) {
+        return;
+    }
+    let bar = ProgressBar::new_spinner().with_message(what);
+    bar.enable_steady_tick(Duration::from_millis(120));
+    // until the sender says so or is gone
+    let _ = wait.recv();
+    bar.finish_and_clear();
+}
+
+fn tell(what: &str, wait: &Receiver<()>) {
+    let since = Instant::now();
+    while !over(wait, LINES) {
+        line(&format!("{what}: {} s so far", since.elapsed().as_secs()));
+    }
+}
+
+/// A line on standard error; nobody listening is no error.
+fn line(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
 }
 
 impl Drop for Alive {

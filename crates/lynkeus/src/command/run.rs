@@ -6,9 +6,9 @@ use std::process::ExitCode;
 use lynkeus::{CheckOptions, Error, Outcome, Study, Table};
 use serde_json::{Value, json};
 
-use super::Output;
 use super::output::{self, print};
 use super::progress::{Alive, Progress};
+use super::{Output, limits};
 
 pub(super) fn check(
     study: &Study,
@@ -16,7 +16,10 @@ pub(super) fn check(
     singular: Option<&Path>,
     json: bool,
 ) -> Result<ExitCode, Error> {
-    let report = lynkeus::check(study, options)?;
+    let alive = Alive::new("examining");
+    let report = lynkeus::check(study, options);
+    drop(alive);
+    let report = report?;
     if let Some(path) = singular {
         output::write(path, report.picture()?.to_svg()?.as_bytes())?;
     }
@@ -80,7 +83,8 @@ pub(super) fn simulate(
         let columns = outcome.log(&study.estimate);
         output::write_table(path, &columns.map_err(|e| e.at(&study.file))?)?;
     }
-    finish(study, output, &outcome, true)
+    let code = finish(study, output, &outcome, true)?;
+    Ok(limits::code(study, code))
 }
 
 pub(super) fn estimate(study: &Study, log: &Path, output: &Output) -> Result<ExitCode, Error> {
@@ -89,7 +93,8 @@ pub(super) fn estimate(study: &Study, log: &Path, output: &Output) -> Result<Exi
     let outcome = lynkeus::estimate(study, &table, &mut progress.watch())?;
     progress.finish();
     drop(table);
-    finish(study, output, &outcome, false)
+    let code = finish(study, output, &outcome, false)?;
+    Ok(limits::code(study, code))
 }
 
 /// Everything is computed before the first file is written.

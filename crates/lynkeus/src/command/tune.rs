@@ -7,8 +7,9 @@ use clap::Args;
 use serde_json::json;
 
 use lynkeus::tune::{Change, Sweep};
-use lynkeus::{Error, Study, Table};
+use lynkeus::{Error, Table};
 
+use super::limits::{self, Limits};
 use super::output::{self, print};
 use super::progress::Progress;
 
@@ -36,8 +37,8 @@ pub(super) struct Options {
 }
 
 /// Everything is computed before the first file is written.
-pub(super) fn tune(path: &Path, options: &Options) -> Result<ExitCode, Error> {
-    let study = Study::load(path)?;
+pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<ExitCode, Error> {
+    let study = limits.study(path)?;
     let log = options.log.as_ref().map(Table::load).transpose()?;
     let mut progress = Progress::new("tuning", options.quiet);
     let sweep = lynkeus::tune(&study, log.as_ref(), &mut progress.watch())?;
@@ -64,7 +65,7 @@ pub(super) fn tune(path: &Path, options: &Options) -> Result<ExitCode, Error> {
         None => &[],
     };
     show(&sweep, changes, path, options)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(limits::code(&study, ExitCode::SUCCESS))
 }
 
 /// The study with the knee's values.

@@ -47,6 +47,8 @@ pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, TuneSettings, Values};
 
+use lynkeus_expr::Budget;
+
 use crate::Error;
 use section::Section;
 use source::Source;
@@ -83,6 +85,8 @@ pub struct Study {
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
     pub time_unit: Option<String>,
+    /// The time and the memory that the work on the study may take; no file has it.
+    pub budget: Budget,
 }
 
 impl Study {
@@ -160,6 +164,7 @@ impl Study {
             tune: top.optional("tune", tune::read)?.unwrap_or_default(),
             show,
             time_unit,
+            budget: Budget::default(),
         })
     }
 }

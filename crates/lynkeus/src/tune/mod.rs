@@ -26,6 +26,7 @@ pub use measures::Measure;
 pub use rewrite::Change;
 
 use crate::prepare::Prepared;
+use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
 use crew::Watch;
 use reference::Reference;
@@ -127,15 +128,26 @@ pub fn tune(
         &plant,
         &|plant, i, watch| match grid.get(i) {
             Some((values, study)) => {
+                let ended = |spent| Ok(Row::empty(values, bench.measures().len()).failed(spent));
+                if let Some(spent) = study.budget.spent() {
+                    return ended(spent);
+                }
                 // of its own: what one value builds must not meet the next
                 let plant = plant.clone();
-                bench.row(&Prepared::new(study, &plant)?, values, watch)
+                let watch = &mut within(&study.budget, watch);
+                let row = bench.row(&Prepared::new(study, &plant)?, values, watch);
+                match (row, study.budget.marked()) {
+                    (Err(_), Some(spent)) => ended(spent),
+                    (row, _) => row,
+                }
             }
             None => Err(Error::input("no such value")),
         },
         watch,
     )?;
     let mut notes = bench.notes().to_vec();
+    let ended = |spent| format!("the sweep is not whole: {spent}");
+    notes.extend(study.budget.marked().map(ended));
     let knee = least(&rows);
     notes.extend(knee.and_then(|knee| at_an_end(&axes, rows.get(knee)?)));
     Ok(Sweep {

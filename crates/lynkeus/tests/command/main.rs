@@ -5,6 +5,7 @@ mod certify;
 mod families;
 mod filters;
 mod how_well;
+mod limits;
 mod logs;
 mod messages;
 mod names;

@@ -1,0 +1,69 @@
+//! `--time-limit` and `--memory-limit`.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use cap::Cap;
+use clap::Args;
+
+use lynkeus::expr::{Budget, Memory};
+use lynkeus::{Error, Study};
+
+/// The exit code of work that a limit ended.
+pub(super) const ENDED: u8 = 3;
+
+/// The time of `design` and `certify` where none is given.
+const PROOF: Duration = Duration::from_secs(120);
+
+/// Counts what is in use, for the limit of memory.
+#[global_allocator]
+static ALLOCATOR: Cap<std::alloc::System> = Cap::new(std::alloc::System, usize::MAX);
+
+/// When a command stops: what is done by then is told.
+#[derive(Debug, Args)]
+pub(super) struct Limits {
+    /// Stop after this time, with what is done by then (`design` and `certify`: after 120 s)
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_limit: Option<Duration>,
+    /// Stop where more memory would be used, with what is done by then
+    #[arg(long, value_name = "MIB", default_value_t = 2048)]
+    memory_limit: usize,
+}
+
+impl Limits {
+    /// The budget of the command, from now on.
+    pub(super) fn budget(&self) -> Budget {
+        let memory = Memory {
+            limit: self.memory_limit.saturating_mul(1 << 20),
+            used: || ALLOCATOR.allocated(),
+        };
+        Budget::new(self.time_limit, Some(memory))
+    }
+
+    /// A study under the budget; without a limit of time, under that of a proof.
+    pub(super) fn proving(self, path: &Path) -> Result<Study, Error> {
+        let time_limit = self.time_limit.or(Some(PROOF));
+        Self { time_limit, ..self }.study(path)
+    }
+
+    /// A study under the budget.
+    pub(super) fn study(&self, path: &Path) -> Result<Study, Error> {
+        let mut study = Study::load(path)?;
+        study.budget = self.budget();
+        Ok(study)
+    }
+}
+
+/// The exit code of a command that a limit may have ended.
+pub(super) fn code(study: &Study, code: ExitCode) -> ExitCode {
+    match study.budget.marked() {
+        Some(_) => ExitCode::from(ENDED),
+        None => code,
+    }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    Duration::try_from_secs_f64(seconds).map_err(|_| "not a time".to_owned())
+}
