@@ -62,6 +62,7 @@ mod estimate;
 #[cfg(feature = "plot")]
 mod figure;
 mod files;
+pub mod interrupt;
 mod near;
 mod outcome;
 #[cfg(feature = "plot")]
