@@ -60,7 +60,7 @@ pub enum Error {
 
     /// The integrator used up its steps.
     #[error(
-        "{steps} steps took the integration only to t = {time} of {until}; loosen the tolerances, raise the budget, or try the stiff method; the state is {state}"
+        "{steps} steps took the integration only to t = {time} of {until}; loosen the tolerances or try the stiff method; the state is {state}"
     )]
     StepBudget {
         /// time reached

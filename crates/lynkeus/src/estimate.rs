@@ -6,7 +6,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 use lynkeus_run::{EstimatorSettings, Log, System, estimate_watched};
 
-use crate::outcome::{alarms, interrupted, measurements, show_measurements, watches};
+use crate::outcome::{alarms, interrupted_on, measurements, show_measurements, watches};
 use crate::prepare::Prepared;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, hat, method};
@@ -32,7 +32,7 @@ pub fn estimate(
     let run = run_settings(settings);
     let between = run.between;
     let estimates = estimate_watched(&observer, &log, run, watch)
-        .map_err(|error| interrupted(error.error, table.file()))?;
+        .map_err(|error| interrupted_on(error.error, table.file(), &study.file))?;
     let mut notes = design.notes.clone();
     if between == lynkeus_run::BetweenSamples::Linear {
         notes.push(

@@ -75,6 +75,7 @@ mod systems;
 pub mod table;
 #[cfg(feature = "tune")]
 pub mod tune;
+pub mod visible;
 mod words;
 
 pub use certify::{CertifyReport, certify};

@@ -122,6 +122,12 @@ pub(crate) fn alarms(watches: &[Watch]) -> Vec<String> {
         .collect()
 }
 
+/// A run on a log that ended early; what is wrong with a setting is the study's fault, not the log's.
+pub(crate) fn interrupted_on(error: RunError, log: &str, study: &str) -> Error {
+    let is_setting = matches!(error, RunError::Setting { .. } | RunError::TooStiff { .. });
+    interrupted(error, if is_setting { study } else { log })
+}
+
 /// A run that ended early: no result; an estimate that left every bound is an
 /// answer, everything else is a fault of the input.
 pub(crate) fn interrupted(error: RunError, place: &str) -> Error {

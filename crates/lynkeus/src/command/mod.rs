@@ -1,9 +1,13 @@
 //! The `lynkeus` command.
 
+mod files;
 mod how_well;
+mod inputs;
 mod output;
 mod progress;
 mod run;
+mod save;
+mod signals;
 mod tune;
 
 use std::path::PathBuf;
@@ -12,7 +16,10 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 
-use lynkeus::{CheckOptions, Error, ErrorKind, Study};
+use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
+
+use files::Files;
+use inputs::Source;
 
 /// Estimates what nobody measures: hidden states and unknown inputs, from a plant's equations and a few sensors.
 #[derive(Debug, Parser)]
@@ -33,13 +40,15 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
 
-Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence), 2 bad input.";
+A file called - is standard input or output.
+
+Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence, a picture with nothing to draw), 2 bad input.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// What can be estimated from these sensors, by which observer, and what fails where
     Check {
-        /// The study (TOML), or a model (.mo, .jl): then every output is measured and every input known
+        /// The study (TOML; "-": standard input), or a model (.mo, .jl): then every output is measured and every input known
         study: PathBuf,
         /// Which model, where a bare file holds several
         #[arg(long, value_name = "NAME")]
@@ -63,7 +72,7 @@ enum Command {
     },
     /// Gains, matrices and parameters of the observer
     Design {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         /// Save the text (or the JSON) instead of printing it
         #[arg(short, long, value_name = "FILE")]
@@ -74,7 +83,7 @@ enum Command {
     },
     /// Proves, refutes or leaves undecided that the observer converges, with rate and bounds
     Certify {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         /// Save the text (or the JSON) instead of printing it
         #[arg(short, long, value_name = "FILE")]
@@ -85,7 +94,7 @@ enum Command {
     },
     /// Run the plant and its observer together, with noise
     Simulate {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         output: Output,
@@ -98,16 +107,16 @@ enum Command {
     },
     /// Replay a measured log through the observer
     Estimate {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
-        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name)
+        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name; "-": standard input)
         log: PathBuf,
         #[command(flatten)]
         output: Output,
     },
     /// Sweep the tuning, in simulation or on a log, and find the knee of the trade-off
     Tune {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         options: tune::Options,
@@ -158,11 +167,22 @@ struct Output {
     quiet: bool,
 }
 
+impl Output {
+    fn added_to(&self, files: Files) -> Files {
+        files
+            .writes("-o", self.output.as_deref())
+            .writes("--plot", self.plot.as_deref())
+            .prints_json(self.json)
+    }
+}
+
 /// Runs the command line.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    signals::watch();
     match execute(cli.command) {
         Ok(code) => code,
+        Err(_) if interrupt::interrupted() => signals::end(),
         Err(error) => {
             output::complain(&error);
             match error.kind() {
@@ -185,9 +205,9 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             limits,
             how_well,
         } => {
-            let study = Study::load_or_bare(study, model)?;
+            let source = Source::load_or_bare(&study, model)?;
             if how_well.is_asked() {
-                return how_well::how_well(&study, &how_well, json);
+                return how_well::how_well(&source, &how_well, json);
             }
             let limits = limits.limits();
             let options = CheckOptions {
@@ -195,36 +215,36 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
                 about,
                 limits,
             };
-            run::check(&study, &options, singular.as_deref(), json)
+            run::check(&source, &options, singular.as_deref(), json)
         }
         Command::Design {
             study,
             output,
             json,
-        } => run::design(&Study::load(study)?, output.as_deref(), json),
+        } => run::design(&Source::load(&study)?, output.as_deref(), json),
         Command::Certify {
             study,
             output,
             json,
-        } => run::certify(&Study::load(study)?, output.as_deref(), json),
+        } => run::certify(&Source::load(&study)?, output.as_deref(), json),
         Command::Simulate {
             study,
             output,
             seed,
             log,
         } => {
-            let mut study = Study::load(study)?;
-            if let (Some(seed), Some(settings)) = (seed, &mut study.simulate) {
+            let mut source = Source::load(&study)?;
+            if let (Some(seed), Some(settings)) = (seed, &mut source.study.simulate) {
                 settings.seed = seed;
             }
-            run::simulate(&study, &output, log.as_deref())
+            run::simulate(&source, &output, log.as_deref())
         }
         Command::Estimate { study, log, output } => {
-            run::estimate(&Study::load(study)?, &log, &output)
+            run::estimate(&Source::load(&study)?, &log, &output)
         }
         Command::Tune { study, options } => tune::tune(&study, &options),
         Command::Schema => {
-            output::print(&format!("{:#}\n", lynkeus::schema()))?;
+            output::print(&output::json(&lynkeus::schema()))?;
             Ok(ExitCode::SUCCESS)
         }
     }

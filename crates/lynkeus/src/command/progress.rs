@@ -2,11 +2,12 @@
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use lynkeus::interrupt::interrupted;
 
 const STEPS: u64 = 1000;
 
@@ -28,11 +29,14 @@ impl Progress {
         }
     }
 
-    /// What a run calls with the fraction done.
+    /// What a run calls with the fraction done; it ends the run when the user asks to stop.
     pub(super) fn watch(&mut self) -> impl FnMut(f64) -> ControlFlow<()> + '_ {
         |fraction| {
             self.show(fraction);
-            ControlFlow::Continue(())
+            match interrupted() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
         }
     }
 
@@ -62,24 +66,28 @@ pub(super) struct Alive {
 }
 
 impl Alive {
+    /// Without a thread to spare there is no sign.
     pub(super) fn new(what: &'static str) -> Self {
         let (done, wait) = channel();
-        let watch = move || {
-            let over = |wait: &Receiver<()>| wait.recv_timeout(Duration::from_secs(1)).is_ok();
-            if !std::io::stderr().is_terminal() || over(&wait) {
-                return;
-            }
-            let bar = ProgressBar::new_spinner().with_message(what);
-            bar.enable_steady_tick(Duration::from_millis(120));
-            // until the sender says so or is gone
-            let _ = wait.recv();
-            bar.finish_and_clear();
-        };
+        let thread = Builder::new().name("progress".to_owned());
         Self {
             done,
-            thread: Some(std::thread::spawn(watch)),
+            thread: thread.spawn(move || show_life(what, &wait)).ok(),
         }
     }
+}
+
+/// Until the sender says so or is gone.
+fn show_life(what: &'static str, wait: &Receiver<()>) {
+    let goes_on = |time| wait.recv_timeout(time) == Err(RecvTimeoutError::Timeout);
+    if !std::io::stderr().is_terminal() || !goes_on(Duration::from_secs(1)) {
+        return;
+    }
+    let bar = ProgressBar::new_spinner().with_message(what);
+    while goes_on(Duration::from_millis(120)) {
+        bar.tick();
+    }
+    bar.finish_and_clear();
 }
 
 impl Drop for Alive {

@@ -7,6 +7,7 @@ mod how_well;
 mod messages;
 mod observability;
 mod references;
+mod results;
 mod runs;
 mod tune;
 
