@@ -138,7 +138,7 @@ fn finish(
     let printed = Path::new("-");
     match &output.output {
         Some(path) => results.put(path, output::csv(&columns)?)?,
-        None if !shown => results.put(printed, output::csv(&columns)?)?,
+        None if !shown && !results.has_printed() => results.put(printed, output::csv(&columns)?)?,
         None => {}
     }
     if output.json {

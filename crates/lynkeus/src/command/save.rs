@@ -4,7 +4,7 @@
 //! results of a command got that far, each takes its place by a rename. The temporary file is locked as long
 //! as its writer lives: one that is not locked was left by a run that was killed, and is removed.
 
-use std::fs::{File, OpenOptions, Permissions, TryLockError};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -236,7 +236,7 @@ fn temporary(folder: &Path, replaced: Option<&std::fs::Metadata>) -> io::Result<
 #[cfg(unix)]
 fn ordinary(builder: &mut tempfile::Builder<'_, '_>) {
     use std::os::unix::fs::PermissionsExt;
-    builder.permissions(Permissions::from_mode(0o666));
+    builder.permissions(std::fs::Permissions::from_mode(0o666));
 }
 
 #[cfg(not(unix))]

@@ -28,6 +28,10 @@ fn every_result_can_be_printed() {
     let folder = Folder::new();
     let files = folder.files();
     for (arguments, start) in [
+        (
+            vec!["simulate", "study.toml", "--log", "-"],
+            "t,level,pump\n",
+        ),
         (vec!["simulate", "study.toml", "-o", "-"], "t,"),
         (
             vec!["simulate", "study.toml", "--log", "-", "--plot", "p.svg"],
@@ -51,6 +55,8 @@ fn every_result_can_be_printed() {
             "{arguments:?}: {:.80}",
             ended.out
         );
+        let tables = ended.out.lines().filter(|line| line.starts_with("t,"));
+        assert!(tables.count() <= 1, "{arguments:?}");
     }
     let mut expected = [files, vec!["p.svg".to_owned(), "t.csv".to_owned()]].concat();
     expected.sort();
