@@ -151,14 +151,24 @@ pub(super) fn probe(path: &Path) -> Result<(), Error> {
         }
         Err(_) => {}
     }
-    let tried = temporary(folder(&place), None);
+    let folder = folder(&place);
+    if !folder.is_dir() {
+        let missing = folder.display();
+        let why = format!("cannot write {shown}: there is no folder {missing}");
+        return Err(Error::input(why).hint("make it first"));
+    }
+    let tried = temporary(folder, None);
     tried.map(drop).map_err(|e| refusal(path, &e))
 }
 
 fn refusal(path: &Path, error: &io::Error) -> Error {
-    // without the name of the temporary file
-    let inner = error.get_ref().and_then(|inner| inner.source());
-    let why = inner.map_or_else(|| error.to_string(), ToString::to_string);
+    let why = match (error.raw_os_error(), error.kind()) {
+        (None, kind) if kind != io::ErrorKind::Other => {
+            // else it tells the name of the temporary file
+            io::Error::from(kind).to_string()
+        }
+        _ => error.to_string(),
+    };
     Error::input(format!("cannot write {}: {why}", path.display()))
 }
 
@@ -199,7 +209,7 @@ fn stage(place: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
         if interrupt::interrupted() {
             return Err(io::Error::other("interrupted"));
         }
-        file.write_all(piece)?;
+        file.as_file_mut().write_all(piece)?;
     }
     if let Some(replaced) = replaced {
         inherit(file.as_file(), &replaced)?;

@@ -180,7 +180,10 @@ fn what_cannot_be_written_is_told_first() {
     let design = |file: &str, words: &[&str]| {
         refused(&folder, &["design", "study.toml", "-o", file], words);
     };
-    design("missing/a.txt", &["cannot write missing/a.txt"]);
+    design(
+        "missing/a.txt",
+        &["error: cannot write missing/a.txt: there is no folder missing"],
+    );
     std::fs::create_dir(folder.path.path().join("b")).unwrap();
     let ended = folder.run(&["design", "study.toml", "-o", "b"]);
     assert!(ended.err.contains("it is a folder"), "{}", ended.err);
@@ -211,6 +214,7 @@ fn a_full_disk_leaves_nothing() {
         ended.err
     );
     assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
+    assert!(!ended.err.contains(".lynkeus-"), "{}", ended.err);
     assert!(contents(&folder) == before);
 }
 
