@@ -15,7 +15,7 @@ use lynkeus::interrupt;
 use signal_hook::{consts, flag, low_level};
 
 /// How long a run may take to end by itself.
-const GRACE: Duration = Duration::from_millis(700);
+const GRACE: Duration = Duration::from_millis(500);
 
 /// How often the guard looks.
 const LOOK: Duration = Duration::from_millis(40);

@@ -1,7 +1,7 @@
 //! A run that is ended from outside, at any moment, leaves the old file or the new one.
 #![cfg(unix)]
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::Folder;
@@ -12,6 +12,7 @@ fn start(folder: &Folder, arguments: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_lynkeus"))
         .args(arguments)
         .current_dir(&folder.path)
+        .stdin(Stdio::piped())
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -111,18 +112,33 @@ fn a_signal_ends_a_long_run_within_a_second() {
         .read("study.toml")
         .replace("output_step = ", "output_step = 1e-4 # ");
     folder.write("study.toml", &text);
+    let simulate = ["simulate", "study.toml", "-o", "s.csv"];
+    // its input never comes
+    let waiting = ["check", "-"];
     for (signal, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
-        let mut child = start(&folder, &["simulate", "study.toml", "-o", "s.csv"]);
-        std::thread::sleep(Duration::from_millis(300));
-        kill(&child, signal);
-        let since = Instant::now();
-        let status = child.wait().unwrap();
-        assert!(
-            since.elapsed() < Duration::from_secs(1),
-            "{:?}",
-            since.elapsed()
-        );
-        assert_eq!(status.signal(), Some(number), "{status:?}");
+        for arguments in [&simulate[..], &waiting] {
+            let mut child = start(&folder, arguments);
+            std::thread::sleep(Duration::from_millis(300));
+            kill(&child, signal);
+            let since = Instant::now();
+            let status = ended(&mut child);
+            assert!(
+                since.elapsed() < Duration::from_secs(1),
+                "{:?}",
+                since.elapsed()
+            );
+            assert_eq!(status.signal(), Some(number), "{status:?}");
+        }
     }
     assert_eq!(folder.files(), ["log.csv", "study.toml", "two_tanks.mo"]);
+}
+
+/// Waits with standard input open: `wait` would close it.
+fn ended(child: &mut Child) -> ExitStatus {
+    loop {
+        match child.try_wait().unwrap() {
+            Some(status) => return status,
+            None => std::thread::sleep(Duration::from_millis(5)),
+        }
+    }
 }
