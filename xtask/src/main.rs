@@ -1,8 +1,10 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
+mod attack;
 mod falsify;
 mod gallery;
 mod gap;
+mod numbers;
 mod process;
 mod python;
 
@@ -19,12 +21,15 @@ usage: cargo xtask <task>
   gap       compute the table of docs/gap.md again from the shipped studies;
             `gap NAME` only the rows of that example
   falsify   try to break the certificates of random and adversarial plants
-            [--seed N] [--count N] [--refutations N] [--family F]; build with --release";
+            [--seed N] [--count N] [--refutations N] [--family F]; build with --release
+  attack    run the command on mutated models, studies, logs and options, and see that it neither
+            fails nor harms; [--seed N] [--count N] [--seconds N] [--limit SECONDS]
+            [--binary FILE]; build with --release";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let (task, name) = match arguments.as_slice() {
-        [task, ..] if task == "falsify" => ("falsify", None),
+        [task, ..] if task == "falsify" || task == "attack" => (task.as_str(), None),
         [task] => (task.as_str(), None),
         [task, name] if task == "gap" => ("gap", Some(name.as_str())),
         _ => ("", None),
@@ -34,6 +39,7 @@ fn main() -> ExitCode {
         "ci" => ci(),
         "gallery" => gallery::draw(),
         "gap" => gap::tabulate(name),
+        "attack" => attack::run(&arguments[1..]),
         "falsify" => falsify::run(&arguments[1..]),
         _ => {
             eprintln!("{USAGE}");

@@ -29,6 +29,13 @@ pub enum Shape {
     NotNegative,
     /// a number in (0, 1)
     Share,
+    /// a number in [least, most]
+    Between {
+        /// the least
+        least: f64,
+        /// the most
+        most: f64,
+    },
     /// a whole number of at least this
     Whole(u32),
     /// true or false

@@ -1,5 +1,7 @@
 //! The choice of an integrator.
 
+use std::ops::RangeInclusive;
+
 use crate::Error;
 
 /// How a system is integrated.
@@ -37,7 +39,7 @@ impl Method {
 /// Error control: a step may be wrong by `absolute + relative·|x|` per state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// in (0, 0.1]
+    /// in [`Tolerances::RELATIVE`]
     pub relative: f64,
     /// above 0, in the unit of the states
     pub absolute: f64,
@@ -58,10 +60,14 @@ impl Default for Tolerances {
 }
 
 impl Tolerances {
+    /// What the relative tolerance may be: below, rounding errors of a step exceed what it may be
+    /// wrong by.
+    pub const RELATIVE: RangeInclusive<f64> = 1e-13..=0.1;
+
     fn check(&self) -> Result<(), Error> {
-        // below, rounding errors of a step exceed what it may be wrong by
-        if !(1e-13..=0.1).contains(&self.relative) {
-            let expected = "a number in [1e-13, 0.1]";
+        let range = Self::RELATIVE;
+        if !range.contains(&self.relative) {
+            let expected = format!("a number in [{:e}, {}]", range.start(), range.end());
             return Err(Error::setting("rtol", expected, self.relative));
         }
         if !(self.absolute > 0.0 && self.absolute.is_finite()) {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::visible;
+
 /// What kind of answer an [`Error`] is; the command's exit code follows from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -18,7 +20,8 @@ pub enum ErrorKind {
 /// Why there is no result.
 ///
 /// Its text is one line (several when it quotes a Modelica source line under its message):
-/// the place, what is wrong, what was expected, and what to do.
+/// the place, what is wrong, what was expected, and what to do. Control characters of names in it
+/// are [spelled out](visible).
 #[derive(Clone, Debug)]
 pub struct Error {
     kind: ErrorKind,
@@ -95,11 +98,11 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(place) = &self.place {
-            write!(f, "{place}: ")?;
+            write!(f, "{}: ", visible::line(place))?;
         }
-        f.write_str(&self.message)?;
+        f.write_str(&visible::lines(&self.message))?;
         match &self.hint {
-            Some(hint) => write!(f, "; {hint}"),
+            Some(hint) => write!(f, "; {}", visible::lines(hint)),
             None => Ok(()),
         }
     }

@@ -49,7 +49,7 @@ pub(crate) fn estimated(
     let watch = &mut within(&study.budget, watch);
     let mut course = course(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
-    settle(&mut course, rows, &study.budget, table.file())?;
+    settle(&mut course, rows, study, table.file())?;
     let logged = |name: &str| {
         let values = logged(table, settings, &signals.time_header, name)?;
         Some(values[..rows].to_vec())

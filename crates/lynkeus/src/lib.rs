@@ -67,6 +67,7 @@ mod files;
 mod filter;
 mod headers;
 mod innovations;
+pub mod interrupt;
 mod near;
 mod outcome;
 mod outside;
@@ -81,6 +82,7 @@ mod systems;
 pub mod table;
 #[cfg(feature = "tune")]
 pub mod tune;
+pub mod visible;
 mod words;
 
 pub use certify::{CertifyReport, Strays, certify};

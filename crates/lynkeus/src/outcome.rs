@@ -1,6 +1,5 @@
 //! What a simulation or a replay gives.
 
-use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
@@ -13,7 +12,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::systems::hat;
-use crate::{Error, estimate};
+use crate::{Error, Study, estimate};
 
 /// One quantity of the result with everything that is known of it.
 #[derive(Clone, Debug, Default)]
@@ -312,10 +311,10 @@ fn alarms(watches: &[Watch]) -> Vec<String> {
 pub(crate) fn settle(
     course: &mut Course,
     rows: usize,
-    budget: &Budget,
+    study: &Study,
     place: &str,
 ) -> Result<(), Error> {
-    match (course.ended.take(), budget.marked()) {
+    match (course.ended.take(), study.budget.marked()) {
         (None, _) => Ok(()),
         (Some(RunError::Cancelled { time }), Some(spent)) => {
             let note = format!("the run is not whole: {spent} at t = {time}");
@@ -326,7 +325,7 @@ pub(crate) fn settle(
             course.ended = Some(error);
             Ok(())
         }
-        (Some(error), _) => Err(interrupted(error, place)),
+        (Some(error), _) => Err(interrupted_on(error, place, &study.file)),
     }
 }
 
@@ -336,6 +335,12 @@ fn is_answer(error: &RunError) -> bool {
         error,
         RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. }
     )
+}
+
+/// A run on a log that ended early; what is wrong with a setting is the study's fault, not the log's.
+pub(crate) fn interrupted_on(error: RunError, log: &str, study: &str) -> Error {
+    let is_setting = matches!(error, RunError::Setting { .. } | RunError::TooStiff { .. });
+    interrupted(error, if is_setting { study } else { log })
 }
 
 /// A run that ended early: no result; an estimate that left every bound is an

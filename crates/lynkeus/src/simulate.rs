@@ -53,7 +53,7 @@ pub(crate) fn simulated(
     let reported = Reported::new(&design.observer, &run);
     let mut course = Course::of_run(&design.observer, &reported);
     course.ended = ended;
-    settle(&mut course, run.times().len(), &study.budget, &study.file)?;
+    settle(&mut course, run.times().len(), study, &study.file)?;
     Ok(outcome(prepared, design, &run, course))
 }
 

@@ -3,10 +3,10 @@
 use super::case::{Case, Role};
 use super::claims::Claim;
 use super::integrate::{Flow, Limits, follow};
-use super::numbers::Numbers;
 use super::pair::Pair;
 use super::run::Run;
 use super::signals::{self, Signal};
+use crate::numbers::Numbers;
 
 /// Everything that the adversary chooses.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@
 
 use lynkeus::structure::Extended;
 
-use super::numbers::Numbers;
 use super::pair::Pair;
+use crate::numbers::Numbers;
 
 /// What contradicts a claim about the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

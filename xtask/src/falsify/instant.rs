@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
 use super::attack::Attack;
-use super::numbers::Numbers;
 use super::signals::Signal;
+use crate::numbers::Numbers;
 
 /// Pairs tried per claim, the second half near the worst of the first.
 const PAIRS: usize = 160;

@@ -11,11 +11,11 @@ use super::attack::Attack;
 use super::case::{Case, Kind, Role};
 use super::claims::{self, Findings};
 use super::facts::{self, Fact, Facts};
-use super::numbers::Numbers;
 use super::pair::Pair;
 use super::refute;
 use super::retune;
 use super::tally::Counts;
+use crate::numbers::Numbers;
 
 /// What kind of claim turned out to be false.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

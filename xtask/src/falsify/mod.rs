@@ -2,14 +2,13 @@
 //! and whose refutations are looked at again with many digits.
 
 mod attack;
-mod case;
+pub mod case;
 mod claims;
 mod facts;
-mod generate;
+pub mod generate;
 mod instant;
 mod integrate;
 mod judge;
-mod numbers;
 mod pair;
 mod precise;
 mod refute;
@@ -26,9 +25,9 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::numbers::Numbers;
 use case::Kind;
 use judge::{Desk, Effort, Flaw, Judgement, Violation};
-use numbers::Numbers;
 use report::Report;
 
 pub use report::Options;

@@ -7,8 +7,8 @@ use lynkeus::structure::Extended;
 use super::case::{Case, Kind, Role};
 use super::claims::{self, Claim, Findings};
 use super::judge::{Desk, Flaw, Violation, attack};
-use super::numbers::Numbers;
 use super::pair::Pair;
+use crate::numbers::Numbers;
 
 /// Gains above these make equations that no explicit method follows.
 const LARGEST: f64 = 3e3;

@@ -3,7 +3,7 @@
 
 use super::case::Case;
 use super::judge::{Desk, Effort, Violation, judge};
-use super::numbers::Numbers;
+use crate::numbers::Numbers;
 
 /// Cases tried at most.
 const TRIALS: usize = 60;

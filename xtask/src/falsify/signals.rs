@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::case::{Role, Side};
-use super::numbers::Numbers;
+use crate::numbers::Numbers;
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Signal {

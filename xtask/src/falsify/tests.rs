@@ -7,9 +7,9 @@ use super::case::{Case, Input, Kind, Role, Side};
 use super::claims::Claim;
 use super::facts::{Fact, Facts};
 use super::judge::{Desk, attack};
-use super::numbers::Numbers;
 use super::pair::Pair;
 use super::report::Options;
+use crate::numbers::Numbers;
 use lynkeus::Study;
 use lynkeus::prepare::Prepared;
 

@@ -1,14 +1,16 @@
 //! `lynkeus check --how-well`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
+use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
-use lynkeus::{Error, Study};
 
-use super::output::{self, print};
+use super::inputs::Source;
+use super::output;
+use super::save::Results;
 
 /// How well, where the answer goes, and which sensors to try.
 #[derive(Debug, Args)]
@@ -22,7 +24,7 @@ pub(super) struct Options {
     /// Longest horizon, in the plant's unit of time, instead of the whole run
     #[arg(long, value_name = "TIME")]
     horizon: Option<f64>,
-    /// Draw a bar for every state and the errors over the horizon
+    /// Draw a bar for every state and the errors over the horizon ("-": standard output)
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Write the standard errors over the horizon as CSV ("-": standard output)
@@ -47,7 +49,13 @@ impl Options {
 }
 
 /// Everything is computed before the first file is written.
-pub(super) fn how_well(study: &Study, options: &Options, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result<ExitCode, Error> {
+    source
+        .files()
+        .writes("-o", options.output.as_deref())
+        .writes("--plot", options.plot.as_deref())
+        .prints_json(json)
+        .check()?;
     let asked = precision::Options {
         horizon: options.horizon,
         sensors: options.sensors.map(|which| match which {
@@ -55,26 +63,21 @@ pub(super) fn how_well(study: &Study, options: &Options, json: bool) -> Result<E
             Which::All => Candidates::All,
         }),
     };
-    let report = lynkeus::precision(study, &asked)?;
+    let report = lynkeus::precision(&source.study, &asked)?;
     let columns = report.columns();
     let columns: Vec<(String, &[f64])> = columns
         .iter()
         .map(|(name, values)| (name.clone(), &values[..]))
         .collect();
+    let mut results = Results::default();
     if let Some(path) = &options.plot {
-        output::write(path, report.to_svg()?.as_bytes())?;
+        results.picture(path, report.to_svg())?;
     }
-    let to_stdout = options.output.as_deref() == Some(Path::new("-"));
-    match &options.output {
-        Some(_) if to_stdout => print(&output::csv(&columns)?)?,
-        Some(path) => output::write_table(path, &columns)?,
-        None => {}
+    if let Some(path) = &options.output {
+        results.put(path, output::csv(&columns)?)?;
     }
-    match json {
-        _ if to_stdout => {}
-        true => print(&format!("{:#}\n", report.to_json()))?,
-        false => print(&report.to_string())?,
-    }
+    results.report(json, &report, || report.to_json());
+    results.keep()?;
     Ok(match report.is_positive() {
         true => ExitCode::SUCCESS,
         false => ExitCode::from(1),

@@ -1,14 +1,13 @@
 //! `--time-limit` and `--memory-limit`.
 
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use cap::Cap;
 use clap::Args;
 
+use lynkeus::Study;
 use lynkeus::expr::{Budget, Memory};
-use lynkeus::{Error, Study};
 
 /// The exit code of work that a limit ended.
 pub(super) const ENDED: u8 = 3;
@@ -41,17 +40,10 @@ impl Limits {
         Budget::new(self.time_limit, Some(memory))
     }
 
-    /// A study under the budget; without a limit of time, under that of a proof.
-    pub(super) fn proving(self, path: &Path) -> Result<Study, Error> {
+    /// The same; without a limit of time, that of a proof.
+    pub(super) fn for_a_proof(self) -> Budget {
         let time_limit = self.time_limit.or(Some(PROOF));
-        Self { time_limit, ..self }.study(path)
-    }
-
-    /// A study under the budget.
-    pub(super) fn study(&self, path: &Path) -> Result<Study, Error> {
-        let mut study = Study::load(path)?;
-        study.budget = self.budget();
-        Ok(study)
+        Self { time_limit, ..self }.budget()
     }
 }
 

@@ -1,10 +1,14 @@
 //! The `lynkeus` command.
 
+mod files;
 mod how_well;
+mod inputs;
 mod limits;
 mod output;
 mod progress;
 mod run;
+mod save;
+mod signals;
 mod tune;
 
 use std::path::PathBuf;
@@ -12,7 +16,10 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
 
-use lynkeus::{CheckOptions, Error, ErrorKind, Study};
+use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
+
+use files::Files;
+use inputs::Source;
 
 use limits::Limits;
 
@@ -35,14 +42,16 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
 
+A file called - is standard input or output.
+
 Exit codes: 0 done, 1 the answer is no (a condition refuted, a divergence, an estimate that is not
-credible: the table is written all the same), 2 bad input, 3 a limit ended it.";
+credible: the table is written all the same; a picture with nothing to draw), 2 bad input, 3 a limit ended it.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
     /// What can be estimated from these sensors, by which observer, and what fails where
     Check {
-        /// The study (TOML), or a model (.mo, .jl): then every output is measured and every input known
+        /// The study (TOML; "-": standard input), or a model (.mo, .jl): then every output is measured and every input known
         study: PathBuf,
         /// Which model, where a bare file holds several
         #[arg(long, value_name = "NAME")]
@@ -66,7 +75,7 @@ enum Command {
     },
     /// Gains, matrices and parameters of the observer
     Design {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         /// Save the text (or the JSON) instead of printing it
         #[arg(short, long, value_name = "FILE")]
@@ -79,7 +88,7 @@ enum Command {
     },
     /// Proves, refutes or leaves undecided that the observer converges, with rate and bounds
     Certify {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         /// Save the text (or the JSON) instead of printing it
         #[arg(short, long, value_name = "FILE")]
@@ -92,7 +101,7 @@ enum Command {
     },
     /// Run the plant and its observer together, with noise
     Simulate {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         output: Output,
@@ -107,9 +116,9 @@ enum Command {
     },
     /// Replay a measured log through the observer
     Estimate {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
-        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name)
+        /// The log (CSV with a header; a time column and the measured outputs and known inputs by name; "-": standard input)
         log: PathBuf,
         #[command(flatten)]
         output: Output,
@@ -118,7 +127,7 @@ enum Command {
     },
     /// Sweep the tuning, in simulation or on a log, and find the knee of the trade-off
     Tune {
-        /// The study (TOML)
+        /// The study (TOML; "-": standard input)
         study: PathBuf,
         #[command(flatten)]
         options: tune::Options,
@@ -146,11 +155,22 @@ struct Output {
     quiet: bool,
 }
 
+impl Output {
+    fn added_to(&self, files: Files) -> Files {
+        files
+            .writes("-o", self.output.as_deref())
+            .writes("--plot", self.plot.as_deref())
+            .prints_json(self.json)
+    }
+}
+
 /// Runs the command line.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    signals::watch();
     match execute(cli.command) {
         Ok(code) => code,
+        Err(_) if interrupt::interrupted() => signals::end(),
         Err(error) => {
             output::complain(&error);
             match error.kind() {
@@ -174,26 +194,31 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             limits,
             how_well,
         } => {
-            let mut study = Study::load_or_bare(study, model)?;
-            study.budget = limits.budget();
+            let source = Source::load_or_bare(&study, model)?.within(limits.budget());
             if how_well.is_asked() {
-                return how_well::how_well(&study, &how_well, json);
+                return how_well::how_well(&source, &how_well, json);
             }
             let options = CheckOptions { parameters, about };
-            run::check(&study, &options, singular.as_deref(), json)
+            run::check(&source, &options, singular.as_deref(), json)
         }
         Command::Design {
             study,
             output,
             json,
             limits,
-        } => run::design(&limits.proving(&study)?, output.as_deref(), json),
+        } => {
+            let source = Source::load(&study)?.within(limits.for_a_proof());
+            run::design(&source, output.as_deref(), json)
+        }
         Command::Certify {
             study,
             output,
             json,
             limits,
-        } => run::certify(&limits.proving(&study)?, output.as_deref(), json),
+        } => {
+            let source = Source::load(&study)?.within(limits.for_a_proof());
+            run::certify(&source, output.as_deref(), json)
+        }
         Command::Simulate {
             study,
             output,
@@ -201,25 +226,28 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             log,
             limits,
         } => {
-            let mut study = limits.study(&study)?;
-            if let (Some(seed), Some(settings)) = (seed, &mut study.simulate) {
+            let mut source = Source::load(&study)?.within(limits.budget());
+            if let (Some(seed), Some(settings)) = (seed, &mut source.study.simulate) {
                 settings.seed = seed;
             }
-            run::simulate(&study, &output, log.as_deref())
+            run::simulate(&source, &output, log.as_deref())
         }
         Command::Estimate {
             study,
             log,
             output,
             limits,
-        } => run::estimate(&limits.study(&study)?, &log, &output),
+        } => {
+            let source = Source::load(&study)?.within(limits.budget());
+            run::estimate(&source, &log, &output)
+        }
         Command::Tune {
             study,
             options,
             limits,
         } => tune::tune(&study, &options, &limits),
         Command::Schema => {
-            output::print(&format!("{:#}\n", lynkeus::schema()))?;
+            output::print(&output::json(&lynkeus::schema()))?;
             Ok(ExitCode::SUCCESS)
         }
     }

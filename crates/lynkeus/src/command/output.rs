@@ -1,54 +1,18 @@
-//! Files written whole or not at all, and words for people.
+//! Words for people, and columns as text.
 
 use std::io::{self, Write};
-use std::path::Path;
 
 use lynkeus::model::Diagnostic;
-use lynkeus::{Error, table};
-
-/// Writes a file through a temporary one beside it, so that it is whole or absent.
-/// A link is followed; a device or a pipe is written to, never replaced.
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let failed = |e: io::Error| Error::input(format!("cannot write {}: {e}", path.display()));
-    let place = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    if std::fs::metadata(&place).is_ok_and(|data| !data.is_file()) {
-        let mut device = std::fs::OpenOptions::new()
-            .write(true)
-            .open(&place)
-            .map_err(failed)?;
-        return device.write_all(bytes).map_err(failed);
-    }
-    let folder = match place.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::Builder::new()
-        .prefix(".lynkeus-")
-        .tempfile_in(folder)
-        .map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    readable(file.as_file()).map_err(failed)?;
-    file.persist(&place).map_err(|e| failed(e.error))?;
-    Ok(())
-}
-
-/// Temporary files are private; results have the permissions of ordinary files.
-#[cfg(unix)]
-fn readable(file: &std::fs::File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn readable(_: &std::fs::File) -> io::Result<()> {
-    Ok(())
-}
+use lynkeus::{Error, table, visible};
+use serde_json::Value;
 
 /// Columns as CSV text.
 pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
-    let named: Vec<(&str, &[f64])> = columns
+    let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
+    let named: Vec<(&str, &[f64])> = names
         .iter()
-        .map(|(name, values)| (name.as_str(), *values))
+        .zip(columns)
+        .map(|(name, (_, values))| (name.as_ref(), *values))
         .collect();
     let mut bytes = vec![];
     table::write_csv(&mut bytes, &named)
@@ -56,9 +20,14 @@ pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
     String::from_utf8(bytes).map_err(|e| Error::input(format!("cannot write CSV: {e}")))
 }
 
-/// Columns into a CSV file.
-pub(super) fn write_table(path: &Path, columns: &[(String, &[f64])]) -> Result<(), Error> {
-    write(path, csv(columns)?.as_bytes())
+/// A JSON object as text.
+pub(super) fn json(value: &Value) -> String {
+    visible::json(&format!("{value:#}\n")).into_owned()
+}
+
+/// A report as text.
+pub(super) fn text(report: &impl std::fmt::Display) -> String {
+    visible::lines(&report.to_string()).into_owned()
 }
 
 /// Text to standard output; a reader that went away (`| head`) is no error.
@@ -72,14 +41,19 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
     }
 }
 
-pub(super) fn note(text: &str) {
+/// A line to standard error.
+pub(super) fn say(text: &str) {
     // nothing can be done where standard error is closed
-    let _ = writeln!(io::stderr(), "note: {text}");
+    let _ = writeln!(io::stderr(), "{}", visible::lines(text));
+}
+
+pub(super) fn note(text: &str) {
+    say(&format!("note: {text}"));
 }
 
 pub(super) fn complain(error: &Error) {
     let heading = if brings_heading(error) { "" } else { "error: " };
-    let _ = writeln!(io::stderr(), "{heading}{error}");
+    say(&format!("{heading}{error}"));
 }
 
 /// A diagnostic of a model starts with its own "error".

@@ -4,10 +4,11 @@
 use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
+use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
+use lynkeus::interrupt::interrupted;
 
 const STEPS: u64 = 1000;
 /// Between two lines where there is no bar.
@@ -36,11 +37,14 @@ impl Progress {
         }
     }
 
-    /// What a run calls with the fraction done.
+    /// What a run calls with the fraction done; it ends the run when the user asks to stop.
     pub(super) fn watch(&mut self) -> impl FnMut(f64) -> ControlFlow<()> + '_ {
         |fraction| {
             self.show(fraction);
-            ControlFlow::Continue(())
+            match interrupted() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
         }
     }
 
@@ -78,6 +82,7 @@ pub(super) struct Alive {
 }
 
 impl Alive {
+    /// Without a thread to spare there is no sign.
     pub(super) fn new(what: &'static str) -> Self {
         let (done, wait) = channel();
         let terminal = std::io::stderr().is_terminal();
@@ -85,9 +90,11 @@ impl Alive {
             true => spin(what, &wait),
             false => tell(what, &wait),
         };
-        // without a thread the work goes on in silence
-        let thread = std::thread::Builder::new().spawn(watch).ok();
-        Self { done, thread }
+        let thread = Builder::new().name("progress".to_owned());
+        Self {
+            done,
+            thread: thread.spawn(watch).ok(),
+        }
     }
 }
 
@@ -96,14 +103,15 @@ fn over(wait: &Receiver<()>, time: Duration) -> bool {
     wait.recv_timeout(time) != Err(RecvTimeoutError::Timeout)
 }
 
+/// Until the sender says so or is gone.
 fn spin(what: &'static str, wait: &Receiver<()>) {
     if over(wait, Duration::from_secs(1)) {
         return;
     }
     let bar = ProgressBar::new_spinner().with_message(what);
-    bar.enable_steady_tick(Duration::from_millis(120));
-    // until the sender says so or is gone
-    let _ = wait.recv();
+    while !over(wait, Duration::from_millis(120)) {
+        bar.tick();
+    }
     bar.finish_and_clear();
 }
 

@@ -3,48 +3,54 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Error, Outcome, Study, Table};
+use lynkeus::{CheckOptions, Error, Outcome, Study};
 use serde_json::{Value, json};
 
-use super::output::{self, print};
+use super::inputs::{self, Source};
+use super::output;
 use super::progress::{Alive, Progress};
+use super::save::Results;
 use super::{Output, limits};
 
 pub(super) fn check(
-    study: &Study,
+    source: &Source,
     options: &CheckOptions,
     singular: Option<&Path>,
     json: bool,
 ) -> Result<ExitCode, Error> {
+    let files = source.files().writes("--singular", singular);
+    files.prints_json(json).check()?;
     let alive = Alive::new("examining");
-    let report = lynkeus::check(study, options);
+    let report = lynkeus::check(&source.study, options);
     drop(alive);
     let report = report?;
+    let mut results = Results::default();
     if let Some(path) = singular {
-        output::write(path, report.picture()?.to_svg()?.as_bytes())?;
+        let svg = report.picture().and_then(|picture| picture.to_svg());
+        results.picture(path, svg)?;
     }
-    match json {
-        true => print(&format!("{:#}\n", report.to_json()))?,
-        false => print(&report.to_string())?,
-    }
+    results.report(json, &report, || report.to_json());
+    results.keep()?;
     Ok(match report.is_positive() {
         true => ExitCode::SUCCESS,
         false => ExitCode::from(1),
     })
 }
 
-pub(super) fn design(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn design(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    source.files().writes("-o", file).check()?;
     let alive = Alive::new("designing");
-    let report = lynkeus::design(study);
+    let report = lynkeus::design(&source.study);
     drop(alive);
     let report = report?;
     tell(file, json, &report, || report.to_json())?;
     Ok(ExitCode::SUCCESS)
 }
 
-pub(super) fn certify(study: &Study, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+pub(super) fn certify(source: &Source, file: Option<&Path>, json: bool) -> Result<ExitCode, Error> {
+    source.files().writes("-o", file).check()?;
     let alive = Alive::new("certifying");
-    let report = lynkeus::certify(study);
+    let report = lynkeus::certify(&source.study);
     drop(alive);
     let report = report?;
     tell(file, json, &report, || report.to_json())?;
@@ -59,76 +65,80 @@ fn tell(
     file: Option<&Path>,
     json: bool,
     report: &impl std::fmt::Display,
-    to_json: impl Fn() -> Value,
+    to_json: impl FnOnce() -> Value,
 ) -> Result<(), Error> {
-    let text = match json {
-        true => format!("{:#}\n", to_json()),
-        false => report.to_string(),
-    };
+    let mut results = Results::default();
     match file {
-        Some(path) => output::write(path, text.as_bytes()),
-        None => print(&text),
+        None => results.report(json, report, to_json),
+        Some(path) if json => results.put(path, output::json(&to_json()))?,
+        Some(path) => results.put(path, output::text(report))?,
     }
+    results.keep()
 }
 
 pub(super) fn simulate(
-    study: &Study,
+    source: &Source,
     output: &Output,
     log: Option<&Path>,
 ) -> Result<ExitCode, Error> {
+    output
+        .added_to(source.files().writes("--log", log))
+        .check()?;
     let mut progress = Progress::new("simulating", output.quiet);
-    let outcome = lynkeus::simulate(study, &mut progress.watch())?;
+    let outcome = lynkeus::simulate(&source.study, &mut progress.watch())?;
     progress.finish();
+    let mut results = Results::default();
     if let Some(path) = log {
-        let columns = outcome.log(&study.estimate);
-        output::write_table(path, &columns.map_err(|e| e.at(&study.file))?)?;
+        let columns = outcome.log(&source.study.estimate);
+        let columns = columns.map_err(|e| e.at(&source.study.file))?;
+        results.put(path, output::csv(&columns)?)?;
     }
-    let code = finish(study, output, &outcome, true)?;
-    Ok(limits::code(study, code))
+    let code = finish(&source.study, output, &outcome, true, results)?;
+    Ok(limits::code(&source.study, code))
 }
 
-pub(super) fn estimate(study: &Study, log: &Path, output: &Output) -> Result<ExitCode, Error> {
-    let table = Table::load(log)?;
+pub(super) fn estimate(source: &Source, log: &Path, output: &Output) -> Result<ExitCode, Error> {
+    let files = source.files().reads("the log", Some(log));
+    output.added_to(files).check()?;
+    let table = inputs::log(log)?;
     let mut progress = Progress::new("estimating", output.quiet);
-    let outcome = lynkeus::estimate(study, &table, &mut progress.watch())?;
+    let outcome = lynkeus::estimate(&source.study, &table, &mut progress.watch())?;
     progress.finish();
     drop(table);
-    let code = finish(study, output, &outcome, false)?;
-    Ok(limits::code(study, code))
+    let code = finish(&source.study, output, &outcome, false, Results::default())?;
+    Ok(limits::code(&source.study, code))
 }
 
-/// Everything is computed before the first file is written.
+/// Everything is computed before the first file is written. Where nothing is asked for, and where
+/// all that is asked for is a picture that cannot be drawn, the columns are printed.
 fn finish(
     study: &Study,
     output: &Output,
     outcome: &Outcome,
     simulated: bool,
+    mut results: Results,
 ) -> Result<ExitCode, Error> {
-    let picture = match &output.plot {
-        Some(path) => {
-            let figure =
-                lynkeus::figure(outcome, study.time_unit.as_deref(), study.show.as_deref())?;
-            Some((path, figure.to_svg()?))
-        }
-        None => None,
-    };
     if !output.quiet {
         outcome.notes.iter().for_each(|note| output::note(note));
     }
     let columns = outcome.columns(simulated);
-    if let Some((path, svg)) = &picture {
-        output::write(path, svg.as_bytes())?;
+    let mut shown = output.json;
+    if let Some(path) = &output.plot {
+        let figure = lynkeus::figure(outcome, study.time_unit.as_deref(), study.show.as_deref());
+        let svg = figure.and_then(|figure| figure.to_svg());
+        shown |= svg.is_ok();
+        results.picture(path, svg)?;
     }
-    let to_stdout = output.output.as_deref() == Some(Path::new("-"));
+    let printed = Path::new("-");
     match &output.output {
-        Some(path) if !to_stdout => output::write_table(path, &columns)?,
-        Some(_) => print(&output::csv(&columns)?)?,
-        None if !output.json && picture.is_none() => print(&output::csv(&columns)?)?,
+        Some(path) => results.put(path, output::csv(&columns)?)?,
+        None if !shown && !results.has_printed() => results.put(printed, output::csv(&columns)?)?,
         None => {}
     }
-    if output.json && !to_stdout {
-        print(&format!("{:#}\n", summary(outcome, &columns)))?;
+    if output.json {
+        results.print(&output::json(&summary(outcome, &columns)));
     }
+    results.keep()?;
     match outcome.refusal() {
         None => Ok(ExitCode::SUCCESS),
         Some(refusal) => {

@@ -6,12 +6,14 @@ use std::process::ExitCode;
 use clap::Args;
 use serde_json::json;
 
-use lynkeus::tune::{Change, Sweep};
-use lynkeus::{Error, Table};
-
+use super::files::is_standard;
+use super::inputs::{self, Source};
 use super::limits::{self, Limits};
-use super::output::{self, print};
+use super::output;
 use super::progress::Progress;
+use super::save::Results;
+use lynkeus::Error;
+use lynkeus::tune::{Change, Sweep};
 
 /// On what it is judged and where the answer goes.
 #[derive(Debug, Args)]
@@ -38,34 +40,47 @@ pub(super) struct Options {
 
 /// Everything is computed before the first file is written.
 pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<ExitCode, Error> {
-    let study = limits.study(path)?;
-    let log = options.log.as_ref().map(Table::load).transpose()?;
+    if options.write && is_standard(path) {
+        return Err(Error::input("--write needs a study that is a file"));
+    }
+    let source = Source::load(path)?.within(limits.budget());
+    let files = match options.write {
+        true => source.plant().writes("--write", Some(path)),
+        false => source.files(),
+    };
+    files
+        .reads("the log", options.log.as_deref())
+        .writes("-o", options.output.as_deref())
+        .writes("--plot", options.plot.as_deref())
+        .prints_json(options.json)
+        .check()?;
+    let log = options.log.as_deref().map(inputs::log).transpose()?;
     let mut progress = Progress::new("tuning", options.quiet);
-    let sweep = lynkeus::tune(&study, log.as_ref(), &mut progress.watch())?;
+    let sweep = lynkeus::tune(&source.study, log.as_ref(), &mut progress.watch())?;
     progress.finish();
     if sweep.is_empty_handed() {
-        return Err(sweep.refusal().at(&study.file));
+        return Err(sweep.refusal().at(&source.study.file));
     }
-    let picture = options.plot.as_ref().map(|path| (path, sweep.to_svg()));
-    let rewritten = match options.write {
-        true => Some(rewritten(path, &sweep)?),
-        false => None,
+    let (text, changes) = match options.write {
+        true => rewritten(path, &sweep)?,
+        false => (String::new(), vec![]),
     };
     if !options.quiet {
         sweep.notes.iter().for_each(|note| output::note(note));
     }
-    if let Some((path, svg)) = picture {
-        output::write(path, svg?.as_bytes())?;
+    let mut results = Results::default();
+    if let Some(path) = &options.plot {
+        results.picture(path, sweep.to_svg())?;
     }
-    let changes = match &rewritten {
-        Some((text, changes)) => {
-            output::write(path, text.as_bytes())?;
-            &changes[..]
-        }
-        None => &[],
-    };
-    show(&sweep, changes, path, options)?;
-    Ok(limits::code(&study, ExitCode::SUCCESS))
+    if let Some(file) = &options.output {
+        results.put(file, sweep.to_csv()?)?;
+    }
+    if options.write {
+        results.put(path, text)?;
+    }
+    show(&sweep, &changes, path, options, &mut results);
+    results.keep()?;
+    Ok(limits::code(&source.study, ExitCode::SUCCESS))
 }
 
 /// The study with the knee's values.
@@ -77,26 +92,22 @@ fn rewritten(path: &Path, sweep: &Sweep) -> Result<(String, Vec<Change>), Error>
     rewritten.map_err(|error| error.at(path.display()))
 }
 
-fn show(sweep: &Sweep, changes: &[Change], path: &Path, options: &Options) -> Result<(), Error> {
-    let to_stdout = options.output.as_deref() == Some(Path::new("-"));
-    match &options.output {
-        Some(_) if to_stdout => print(&sweep.to_csv()?)?,
-        Some(file) => output::write(file, sweep.to_csv()?.as_bytes())?,
-        None => {}
+/// The sweep in words or as JSON, with what was written; where standard output has a result, that is a note.
+fn show(sweep: &Sweep, changes: &[Change], path: &Path, options: &Options, results: &mut Results) {
+    let told: Vec<String> = changes
+        .iter()
+        .map(|c| format!("{}: {c}", path.display()))
+        .collect();
+    if results.has_printed() {
+        return told.iter().for_each(|change| output::note(change));
     }
-    let told = changes.iter().map(|c| format!("{}: {c}", path.display()));
-    if to_stdout {
-        told.for_each(|change| output::note(&change));
-        return Ok(());
-    }
-    if options.json {
+    let told: String = told.into_iter().map(|change| change + "\n").collect();
+    results.report(options.json, &format!("{sweep}{told}"), || {
         let mut answer = sweep.to_json();
         if options.write {
             let words: Vec<String> = changes.iter().map(Change::to_string).collect();
             answer["written"] = json!(words);
         }
-        return print(&format!("{answer:#}\n"));
-    }
-    let told: String = told.map(|change| change + "\n").collect();
-    print(&format!("{sweep}{told}"))
+        answer
+    });
 }

@@ -57,7 +57,7 @@ impl Bars {
     /// There is nothing finite to draw.
     pub fn to_svg(&self) -> Result<String, Error> {
         let Some(axis) = self.axis() else {
-            return Err(Error::input("nothing to draw: no finite values"));
+            return Err(Error::refused("nothing to draw: no finite values"));
         };
         let mut text = String::new();
         self.draw(&axis, &mut text)

@@ -30,7 +30,7 @@ pub(super) fn svg(chart: &Chart) -> Result<String, Error> {
     let axes = chart.plots.iter().map(|plot| (plot, plot.axis(mark)));
     let shown: Vec<(&Plot, Axis)> = axes.filter_map(|(p, axis)| Some((p, axis?))).collect();
     let (Some(axis), false) = (chart.axis(), shown.is_empty()) else {
-        return Err(Error::input("nothing to draw: no finite values"));
+        return Err(Error::refused("nothing to draw: no finite values"));
     };
     let mut text = String::new();
     draw(chart, &axis, &shown, &mut text).map_err(|e| Error::input(format!("cannot draw: {e}")))?;

@@ -1,5 +1,6 @@
 //! Figures drawn with `plotters` onto its SVG backend.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use plotters::chart::ChartContext;
@@ -11,7 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::decimate::{clipped, decimated};
 use super::limits::Limits;
 use super::{Curve, Figure, Kind, Panel};
-use crate::Error;
+use crate::{Error, visible};
 
 pub(super) const WIDTH: u32 = 900;
 const HEAD: u32 = 52;
@@ -37,7 +38,9 @@ pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 /// The whole figure as SVG text.
 pub(super) fn svg(figure: &Figure) -> Result<String, Error> {
     let Some(time) = figure.time_range().filter(|t| t.end > t.start) else {
-        return Err(Error::input("nothing to draw: no finite values over time"));
+        return Err(Error::refused(
+            "nothing to draw: expected finite values at two times at least",
+        ));
     };
     let mut text = String::new();
     draw(figure, &time, &mut text).map_err(|e| Error::input(format!("cannot draw: {e}")))?;
@@ -227,8 +230,16 @@ fn rounded(value: f64, digits: usize) -> f64 {
     text.parse().unwrap_or(value)
 }
 
-/// Names the picture for screen readers and hovering.
+/// Names the picture for screen readers and hovering. Characters of names that no XML may have, and those that a
+/// terminal obeys, are spelled out.
 pub(super) fn titled(svg: String, title: &str) -> String {
+    let svg = match visible::lines(&svg) {
+        Cow::Borrowed(_) => svg,
+        Cow::Owned(safe) => safe,
+    };
+    // the two that are no control characters
+    let svg = svg.replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
+    let title = visible::line(title).replace(['\u{fffe}', '\u{ffff}'], "\u{fffd}");
     let Some(end) = svg
         .find("<svg")
         .and_then(|at| Some(at + svg.get(at..)?.find('>')? + 1))
@@ -279,6 +290,24 @@ mod tests {
         }
         assert!(!svg.contains("measured"));
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn no_name_breaks_the_picture() {
+        let mut picture = figure(vec![wave(Kind::True, 30)]);
+        picture.title = "a\u{1b}[31m\u{0}\u{fffe}".to_owned();
+        picture.time_label = "<&\u{7}\u{9b}".to_owned();
+        let svg = picture.to_svg().unwrap();
+        let is_wrong = |c: char| {
+            (c.is_control() && c != '\n' && c != '\t') || matches!(c, '\u{fffe}' | '\u{ffff}')
+        };
+        assert!(!svg.contains(is_wrong), "{svg}");
+        for words in [
+            "<title>a\\u{1b}[31m\\u{0}\u{fffd}</title>",
+            "&lt;&amp;\\u{7}\\u{9b}",
+        ] {
+            assert!(svg.contains(words), "{words}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //! tables in `docs/study.md` and the schema for editors come from here.
 
 use lynkeus_observers::{KeySpec, REQUIRED, Shape};
+use lynkeus_run::Tolerances;
 
 /// A number, or a Modelica expression of time.
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
@@ -227,8 +228,11 @@ pub(super) const INTEGRATOR: [KeySpec; 5] = [
     },
     KeySpec {
         name: "rtol",
-        kind: "number > 0",
-        shape: Shape::Positive,
+        kind: "number in [1e-13, 0.1]",
+        shape: Shape::Between {
+            least: *Tolerances::RELATIVE.start(),
+            most: *Tolerances::RELATIVE.end(),
+        },
         default: "1e-9",
         meaning: "relative tolerance of the adaptive methods",
     },

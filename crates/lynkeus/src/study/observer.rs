@@ -37,6 +37,11 @@ impl ObserverSettings {
             })
     }
 
+    /// Messages about `key` are to blame another place, where its value comes from.
+    pub(crate) fn comes_from(&mut self, key: &str, place: &Place) {
+        self.places.insert(key.to_owned(), place.clone());
+    }
+
     /// The answer no to what a key asks for, with the key's place.
     pub(crate) fn place(&self, key: &str, file: &str, error: &DesignError) -> Error {
         let refusal = Error::refused(format!("`{key}` of [observer]: {error}"));

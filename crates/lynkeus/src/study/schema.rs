@@ -122,6 +122,9 @@ fn shape(shape: &Shape) -> Value {
         Shape::Share => {
             json!({ "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 })
         }
+        Shape::Between { least, most } => {
+            json!({ "type": "number", "minimum": least, "maximum": most })
+        }
         Shape::Whole(least) => json!({ "type": "integer", "minimum": least }),
         Shape::Flag => json!({ "type": "boolean" }),
         Shape::Text => json!({ "type": "string" }),

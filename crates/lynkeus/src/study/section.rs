@@ -1,7 +1,7 @@
 //! Tables of a study file, read key by key: every refusal names the place, the key, what was
 //! expected and what was found.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use lynkeus_observers::KeySpec;
 use toml::Spanned;
@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 use super::source::{Name, Source};
 use crate::Error;
 use crate::near::suggest;
+use crate::visible;
 
 /// One table (`[observer]`, or the top of the file) whose keys are all known words.
 pub(crate) struct Section<'a> {
@@ -40,8 +41,9 @@ impl<'a> Section<'a> {
             None => Ok(section),
             Some(key) => {
                 let word = key.get_ref().as_ref();
+                let shown = visible::line(word);
                 Err(
-                    Error::input(format!("unknown key \"{word}\" in {}", section.name))
+                    Error::input(format!("unknown key \"{shown}\" in {}", section.name))
                         .at(source.place(&key.span()))
                         .hint(suggest(word, known.iter().map(|spec| spec.name))),
                 )
@@ -115,6 +117,16 @@ impl<'a> Entry<'a> {
     pub fn positive(self) -> Result<f64, Error> {
         let refusal = self.wrong("a number > 0");
         self.number().ok().filter(|x| *x > 0.0).ok_or(refusal)
+    }
+
+    /// A number in a range.
+    pub fn within(self, range: &RangeInclusive<f64>) -> Result<f64, Error> {
+        let expected = format!("a number in [{:e}, {}]", range.start(), range.end());
+        let refusal = self.wrong(&expected);
+        self.number()
+            .ok()
+            .filter(|x| range.contains(x))
+            .ok_or(refusal)
     }
 
     /// A whole number from `least` up.
@@ -207,7 +219,7 @@ impl<'a> Entry<'a> {
                 };
                 let entry = Entry {
                     source,
-                    key: format!("\"{}\" in {outer}", name.text),
+                    key: format!("\"{}\" in {outer}", visible::line(&name.text)),
                     key_span: key.span(),
                     value,
                 };
@@ -259,7 +271,7 @@ impl<'a> Entry<'a> {
 /// A value as a message shows it.
 fn found(value: &DeValue<'_>) -> String {
     match value {
-        DeValue::String(text) => format!("the text \"{text}\""),
+        DeValue::String(text) => format!("the text \"{}\"", visible::line(text)),
         DeValue::Integer(number) => number.to_string(),
         DeValue::Float(number) => number.to_string(),
         DeValue::Boolean(b) => b.to_string(),

@@ -1,5 +1,7 @@
 //! `[simulate]`: how plant and observer are run together.
 
+use lynkeus_run::Tolerances;
+
 use super::Name;
 use super::keys::{INTEGRATOR, SIMULATE};
 use super::section::{Entry, Section};
@@ -124,7 +126,8 @@ pub(super) fn read(entry: Entry<'_>) -> Result<SimulateSettings, Error> {
 pub(super) fn method(section: &mut Section<'_>) -> Result<Method, Error> {
     let step = section.optional("step", Entry::positive)?;
     let substeps = section.optional("substeps", |e| e.whole(1))?;
-    let rtol = section.optional("rtol", Entry::positive)?.unwrap_or(1e-9);
+    let rtol = section.optional("rtol", |e| e.within(&Tolerances::RELATIVE))?;
+    let rtol = rtol.unwrap_or(1e-9);
     let atol = section.optional("atol", Entry::positive)?.unwrap_or(1e-12);
     let fixed = match (step, substeps) {
         (Some(step), _) => Rk4Step::Length(step),

@@ -168,6 +168,9 @@ impl Table {
     /// # Errors
     /// As [`Table::column`], or a row's time is not after the one before it.
     pub fn time(&self, name: &str) -> Result<&[f64], Error> {
+        if self.get(name).is_none() {
+            return Err(self.without_time(name));
+        }
         let time = self.column(name)?;
         let back = time.windows(2).position(|pair| pair[1] <= pair[0]);
         let Some(i) = back else { return Ok(time) };
@@ -212,6 +215,18 @@ impl Table {
             ))
             .at(&self.file)),
         }
+    }
+
+    /// The time column is named by a key of its own.
+    fn without_time(&self, name: &str) -> Error {
+        let found = format!(
+            "no time column \"{name}\"; the columns found are: {}",
+            list(self.names())
+        );
+        let near = nearest(name, self.names()).unwrap_or("…");
+        Error::input(found).at(&self.file).hint(format!(
+            "if it has another name, set time = \"{near}\" in [estimate] of the study"
+        ))
     }
 
     fn absent(&self, name: &str) -> Error {

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use lynkeus_observers::{FAMILIES, Value};
 
 use crate::near::suggest;
-use crate::study::{Name, Scale, Values};
+use crate::study::{Name, Place, Scale, Values};
 use crate::table::significant;
 use crate::{Error, Study};
 
@@ -36,6 +36,8 @@ pub struct Axis {
     base: String,
     /// Its indices, from 0.
     path: Vec<usize>,
+    /// Where the study says which values it takes.
+    place: Option<Place>,
 }
 
 impl Axis {
@@ -74,6 +76,9 @@ impl Axis {
             slot = entry;
         }
         self.scale(slot, value);
+        if let Some(place) = &self.place {
+            study.observer.comes_from(&self.base, place);
+        }
     }
 
     fn scale(&self, slot: &mut Value, value: f64) {
@@ -173,6 +178,7 @@ fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
         present,
         base: base.to_owned(),
         path,
+        place: name.place.clone(),
     })
 }
 

@@ -2,9 +2,9 @@
 
 use std::num::NonZero;
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+use std::thread::{self, Builder};
 
 use crate::Error;
 
@@ -26,107 +26,162 @@ pub(super) fn part<'w, 'a>(
 /// A message of a worker.
 enum News<T> {
     Fraction(usize, f64),
-    Done(usize, Result<T, Error>),
+    /// What a run gave; none where it was told to stop.
+    Done(usize, Option<Result<T, Error>>),
 }
 
-/// Does the runs 0 … `count` − 1 on as many threads as there are processors; `watch` is told
-/// the fraction done of them all, on the caller's thread, and may stop them. The runs of a
-/// thread have one clone of `shared`.
+/// What the workers share: which run is next, and from which on they need not run any more.
+struct Board {
+    count: usize,
+    next: AtomicUsize,
+    /// The first run that is not wanted: all are from 0 where the caller stopped them, and
+    /// those after the first that failed.
+    end: AtomicUsize,
+}
+
+impl Board {
+    fn new(count: usize) -> Self {
+        Self {
+            count,
+            next: AtomicUsize::new(0),
+            end: AtomicUsize::new(count),
+        }
+    }
+
+    /// Takes the next run that is wanted.
+    fn take(&self) -> Option<usize> {
+        let index = self.next.fetch_add(1, Ordering::Relaxed);
+        self.wants(index).then_some(index)
+    }
+
+    fn wants(&self, index: usize) -> bool {
+        index < self.end.load(Ordering::Relaxed)
+    }
+
+    /// The runs from `index` on are not wanted.
+    fn end_at(&self, index: usize) {
+        self.end.fetch_min(index, Ordering::Relaxed);
+    }
+}
+
+/// Does the runs 0 … `count` − 1 on as many threads as there are processors, or on the caller's where
+/// none can be had; `watch` is told the fraction done of them all, on the caller's thread, and may stop them.
+/// The runs of a thread have one clone of `shared`.
 ///
 /// # Errors
-/// The error of the first run that has one, or that `watch` stopped them.
+/// The error of the first run in order that has one: the runs before it are done to their ends,
+/// so that it is the same every time. Or that `watch` stopped them.
 pub(super) fn every<S: Clone + Send, T: Send>(
     count: usize,
     shared: &S,
     run: &(impl Fn(&S, usize, &mut Watch<'_>) -> Result<T, Error> + Sync),
     watch: &mut Watch<'_>,
 ) -> Result<Vec<T>, Error> {
-    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let board = Board::new(count);
     let (sender, receiver) = channel();
     let threads = thread::available_parallelism().map_or(1, NonZero::get);
-    let results = thread::scope(|scope| {
+    let mut desk = Desk::new(&board, watch);
+    thread::scope(|scope| {
+        let mut hired = 0;
         for _ in 0..threads.min(count) {
-            let (sender, next, stop) = (sender.clone(), &next, &stop);
+            let (sender, board) = (sender.clone(), &board);
             let own = shared.clone();
-            scope.spawn(move || work(count, &|i, watch| run(&own, i, watch), next, stop, &sender));
+            let worker = move || {
+                let mut tell = |news| {
+                    // the receiver only goes away with the scope
+                    let _ = sender.send(news);
+                };
+                work(board, &|i, watch| run(&own, i, watch), &mut tell);
+            };
+            // one processor, or a user's limit, may not have room for them all
+            hired += usize::from(Builder::new().spawn_scoped(scope, worker).is_ok());
         }
         drop(sender);
-        collect(count, &receiver, &stop, watch)
+        match hired {
+            0 => work(&board, &|i, watch| run(shared, i, watch), &mut |news| {
+                desk.note(news);
+            }),
+            _ => receiver.iter().for_each(|news| desk.note(news)),
+        }
     });
-    let cancelled = || Error::input("the sweep was stopped");
-    let is_error = |r: &Option<Result<T, Error>>| matches!(r, Some(Err(_)));
-    if stop.load(Ordering::Relaxed) && !results.iter().any(is_error) {
-        return Err(cancelled());
+    let stopped = || Error::input("the sweep was stopped");
+    let is_stopped = desk.is_stopped;
+    let results = desk.results.into_iter();
+    let results: Result<Vec<T>, Error> = results
+        .map(|r| r.unwrap_or_else(|| Err(stopped())))
+        .collect();
+    match is_stopped {
+        true => results.and(Err(stopped())),
+        false => results,
     }
-    results
-        .into_iter()
-        .map(|result| result.unwrap_or_else(|| Err(cancelled())))
-        .collect()
 }
 
 /// One thread: takes the next run as long as there is one.
 fn work<T>(
-    count: usize,
+    board: &Board,
     run: &impl Fn(usize, &mut Watch<'_>) -> Result<T, Error>,
-    next: &AtomicUsize,
-    stop: &AtomicBool,
-    news: &Sender<News<T>>,
+    tell: &mut impl FnMut(News<T>),
 ) {
-    while !stop.load(Ordering::Relaxed) {
-        let index = next.fetch_add(1, Ordering::Relaxed);
-        if index >= count {
-            return;
-        }
-        let mut told = 0.0;
+    while let Some(index) = board.take() {
+        let (mut told, mut stopped) = (0.0, false);
         let mut watch = |fraction: f64| {
             if fraction - told >= STEP {
                 told = fraction;
-                // the receiver only goes away with the scope
-                let _ = news.send(News::Fraction(index, fraction));
+                tell(News::Fraction(index, fraction));
             }
-            match stop.load(Ordering::Relaxed) {
+            stopped = !board.wants(index);
+            match stopped {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             }
         };
         let result = run(index, &mut watch);
-        let _ = news.send(News::Done(index, result));
+        // the error of a run that was told to stop says nothing of it
+        tell(News::Done(index, (!stopped).then_some(result)));
     }
 }
 
-fn collect<T>(
-    count: usize,
-    news: &Receiver<News<T>>,
-    stop: &AtomicBool,
-    watch: &mut Watch<'_>,
-) -> Vec<Option<Result<T, Error>>> {
-    let mut results: Vec<Option<Result<T, Error>>> = (0..count).map(|_| None).collect();
-    let mut fractions = vec![0.0; count];
-    for message in news {
-        let (index, fraction) = match message {
+/// Where the news come together.
+struct Desk<'d, 'w, T> {
+    board: &'d Board,
+    watch: &'d mut Watch<'w>,
+    results: Vec<Option<Result<T, Error>>>,
+    fractions: Vec<f64>,
+    is_stopped: bool,
+}
+
+impl<'d, 'w, T> Desk<'d, 'w, T> {
+    fn new(board: &'d Board, watch: &'d mut Watch<'w>) -> Self {
+        Self {
+            board,
+            watch,
+            results: (0..board.count).map(|_| None).collect(),
+            fractions: vec![0.0; board.count],
+            is_stopped: false,
+        }
+    }
+
+    fn note(&mut self, news: News<T>) {
+        let (index, fraction) = match news {
             News::Fraction(index, fraction) => (index, fraction),
             News::Done(index, result) => {
-                if result.is_err() {
-                    stop.store(true, Ordering::Relaxed);
+                if let Some(Err(_)) = result {
+                    self.board.end_at(index + 1);
                 }
-                if let Some(slot) = results.get_mut(index) {
-                    *slot = Some(result);
+                if let Some(slot) = self.results.get_mut(index) {
+                    *slot = result;
                 }
                 (index, 1.0)
             }
         };
-        if let Some(slot) = fractions.get_mut(index) {
+        if let Some(slot) = self.fractions.get_mut(index) {
             *slot = fraction;
         }
-        if watch(fractions.iter().sum::<f64>() / count as f64).is_break() {
-            stop.store(true, Ordering::Relaxed);
+        let done = self.fractions.iter().sum::<f64>() / self.board.count as f64;
+        if (self.watch)(done).is_break() {
+            self.is_stopped = true;
+            self.board.end_at(0);
         }
-    }
-    // what a failed run stopped is told by its error, which may come after gaps
-    let failed = results.iter().position(|r| matches!(r, Some(Err(_))));
-    match failed {
-        Some(index) => results.into_iter().skip(index).take(1).collect(),
-        None => results,
     }
 }
 
@@ -166,6 +221,47 @@ mod tests {
             ControlFlow::Break(()) => Err(Error::input("told to stop")),
             ControlFlow::Continue(()) => Ok(i),
         };
-        assert!(every(1000, &(), &slow, &mut |_| ControlFlow::Break(())).is_err());
+        let error = every(1000, &(), &slow, &mut |_| ControlFlow::Break(())).unwrap_err();
+        assert_eq!(error.to_string(), "the sweep was stopped");
+    }
+
+    /// Run 0 fails late, run 1 at once, and the others when they are told to stop.
+    #[test]
+    fn the_first_error_in_order_is_told_however_late_it_comes() {
+        let run = |_: &(), i: usize, watch: &mut Watch<'_>| -> Result<usize, Error> {
+            for step in 0..30 {
+                if i == 1 {
+                    break;
+                }
+                thread::sleep(std::time::Duration::from_millis(1));
+                if watch(f64::from(step) / 30.0).is_break() {
+                    return Err(Error::input(format!("run {i} was stopped")));
+                }
+            }
+            Err(Error::input(format!("run {i}")))
+        };
+        for _ in 0..10 {
+            let error = every(8, &(), &run, &mut |_| ControlFlow::Continue(())).unwrap_err();
+            assert_eq!(error.to_string(), "run 0");
+        }
+    }
+
+    #[test]
+    fn the_callers_thread_does_it_alone() {
+        let board = Board::new(5);
+        let mut last = 0.0;
+        let mut watch = |fraction| {
+            last = fraction;
+            ControlFlow::Continue(())
+        };
+        let mut desk = Desk::new(&board, &mut watch);
+        let run = |i: usize, watch: &mut Watch<'_>| {
+            let _ = watch(0.5);
+            Ok(i)
+        };
+        work(&board, &run, &mut |news| desk.note(news));
+        let results: Vec<usize> = desk.results.into_iter().flatten().flatten().collect();
+        assert_eq!(results, [0, 1, 2, 3, 4]);
+        assert_eq!(last, 1.0);
     }
 }

@@ -15,7 +15,7 @@ use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::estimate::{refuse_derivatives, refuse_stray_columns, run_settings, signal};
 use crate::headers::time_of;
-use crate::outcome::interrupted;
+use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
 use crate::systems::{self, Reported};
 use crate::{Error, Study, Table};
@@ -51,13 +51,20 @@ struct Replay<'a> {
     plan: Plan,
     settings: EstimatorSettings,
     file: &'a str,
+    /// the file of the study
+    study: &'a str,
 }
 
 /// A replay, or why its estimate is none.
 type Ran = Result<Trajectory, String>;
 
 impl<'a> Replay<'a> {
-    fn new(study: &Study, plant: &Plant, design: &Design, table: &'a Table) -> Result<Self, Error> {
+    fn new(
+        study: &'a Study,
+        plant: &Plant,
+        design: &Design,
+        table: &'a Table,
+    ) -> Result<Self, Error> {
         let settings = &study.estimate;
         let run = run_settings(settings);
         refuse_derivatives(study, design)?;
@@ -87,6 +94,7 @@ impl<'a> Replay<'a> {
                 ..run
             },
             file: table.file(),
+            study: &study.file,
         })
     }
 
@@ -131,7 +139,7 @@ impl<'a> Replay<'a> {
         match estimate_watched(&self.observer, &log, settings, watch) {
             Ok(estimates) => Ok(Ok(estimates.trajectory)),
             Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
-            Err(error) => Err(interrupted(error.error, self.file)),
+            Err(error) => Err(interrupted_on(error.error, self.file, self.study)),
         }
     }
 

@@ -1,10 +1,15 @@
 //! The chosen values into the study file, of which everything else stays as it is.
 
-use toml_edit::{DocumentMut, Item, TableLike, Value};
+use std::ops::Range;
+
+use toml_edit::{Document, Item, Table, Value};
 
 use super::axis::shown;
 use super::{Axis, Sweep};
 use crate::Error;
+
+/// What editors of some systems put before a text.
+const MARK: &str = "\u{feff}";
 
 /// What was changed at a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,85 +34,176 @@ impl std::fmt::Display for Change {
 
 impl Sweep {
     /// The study's text with the values of the knee at the swept keys, and what changed. Only
-    /// those numbers are touched: comments, order and layout stay.
+    /// those numbers are touched: every other byte stays, line ends and a byte order mark among them.
     ///
     /// # Errors
     /// There is no knee, or `text` is not the study that was swept.
     pub fn rewritten(&self, text: &str) -> Result<(String, Vec<Change>), Error> {
         let knee = self.chosen().ok_or_else(|| self.refusal())?;
-        let mut document: DocumentMut = text
-            .parse()
-            .map_err(|e| Error::input(format!("not a TOML file: {e}")))?;
-        let observer = document
-            .get_mut("observer")
-            .and_then(Item::as_table_like_mut)
-            .ok_or_else(|| Error::input("the study has no [observer] to write to"))?;
-        let pairs = self.axes.iter().zip(&knee.values);
-        let changes = pairs
-            .map(|(axis, value)| put(observer, axis, *value))
-            .collect::<Result<_, _>>()?;
-        Ok((document.to_string(), changes))
+        let (mark, mut text) = match text.strip_prefix(MARK) {
+            Some(rest) => (MARK, rest.to_owned()),
+            None => ("", text.to_owned()),
+        };
+        let mut changes = vec![];
+        for (axis, value) in self.axes.iter().zip(&knee.values) {
+            // one key after the other, as the sweep set them
+            let change;
+            (text, change) = put(&text, axis, *value)?;
+            changes.push(change);
+        }
+        parsed(&text)?;
+        Ok((format!("{mark}{text}"), changes))
     }
 }
 
-fn put(observer: &mut dyn TableLike, axis: &Axis, value: f64) -> Result<Change, Error> {
+fn parsed(text: &str) -> Result<Document<&str>, Error> {
+    Document::parse(text).map_err(|e| Error::input(format!("not a TOML file: {e}")))
+}
+
+/// A piece of the text and what replaces it.
+struct Edit {
+    range: Range<usize>,
+    by: String,
+}
+
+fn put(text: &str, axis: &Axis, value: f64) -> Result<(String, Change), Error> {
+    let document = parsed(text)?;
+    let item = document.get("observer");
+    let (Some(item), Some(observer)) = (item, item.and_then(Item::as_table_like)) else {
+        return Err(Error::input("the study has no [observer] to write to"));
+    };
     let (base, path) = axis.path();
-    let Some(item) = observer.get_mut(base) else {
-        let number = number(value)?;
-        let to = number.to_string();
-        observer.insert(base, Item::Value(number));
-        return Ok(Change {
-            key: axis.key.clone(),
+    let key = axis.key.clone();
+    let Some(present) = observer.get(base) else {
+        let to = shown(value);
+        let edit = addition(text, item, &format!("{base} = {to}"))
+            .ok_or_else(|| Error::input(format!("cannot see where `{base}` belongs")))?;
+        let change = Change {
+            key,
             from: None,
             to,
-        });
+        };
+        return Ok((edited(text, 0..text.len(), &[edit]), change));
     };
     let gone = || Error::input(format!("[observer] no longer has `{}`", axis.key));
-    let mut slot = item.as_value_mut().ok_or_else(gone)?;
+    let mut slot = present.as_value().ok_or_else(gone)?;
     for &index in path {
-        let entries = slot.as_array_mut().ok_or_else(gone)?;
-        slot = entries.get_mut(index).ok_or_else(gone)?;
+        let entries = slot.as_array().ok_or_else(gone)?;
+        slot = entries.get(index).ok_or_else(gone)?;
     }
-    let from = bare(slot);
-    scale(slot, axis, value)?;
-    Ok(Change {
-        key: axis.key.clone(),
-        from: Some(from),
-        to: bare(slot),
-    })
+    let place = slot.span().ok_or_else(gone)?;
+    let mut edits = vec![];
+    scale(slot, axis, value, &mut edits)?;
+    let change = Change {
+        key,
+        from: text.get(place.clone()).map(str::to_owned),
+        to: edited(text, place, &edits),
+    };
+    Ok((edited(text, 0..text.len(), &edits), change))
 }
 
-/// Replaces a number, or every number of a list, and keeps the spaces and comments around it.
-fn scale(slot: &mut Value, axis: &Axis, value: f64) -> Result<(), Error> {
-    if let Some(entries) = slot.as_array_mut() {
-        return entries.iter_mut().try_for_each(|e| scale(e, axis, value));
+/// Replaces a number, or every number of a list.
+fn scale(slot: &Value, axis: &Axis, value: f64, edits: &mut Vec<Edit>) -> Result<(), Error> {
+    if let Some(entries) = slot.as_array() {
+        return entries
+            .iter()
+            .try_for_each(|e| scale(e, axis, value, edits));
+    }
+    if let Some(parts) = slot.as_inline_table() {
+        // a conjugate pair of poles
+        return parts
+            .iter()
+            .try_for_each(|(_, e)| scale(e, axis, value, edits));
     }
     let whole = slot.as_integer().map(|i| i as f64);
-    let Some(present) = slot.as_float().or(whole) else {
+    let (Some(present), Some(range)) = (slot.as_float().or(whole), slot.span()) else {
         return Err(Error::input(format!(
             "`{}` is no longer a number",
             axis.key
         )));
     };
     let chosen = axis.chosen(present, value);
-    if chosen == present {
-        return Ok(()); // as it was written
+    if chosen != present {
+        // else as it was written
+        let by = shown(chosen);
+        edits.push(Edit { range, by });
     }
-    let mut number = number(chosen)?;
-    *number.decor_mut() = slot.decor().clone();
-    *slot = number;
     Ok(())
 }
 
-fn number(x: f64) -> Result<Value, Error> {
-    let text = shown(x);
-    text.parse()
-        .map_err(|e| Error::input(format!("cannot write {text} as TOML: {e}")))
+/// A piece of `text` with the edits in it, which come in its order.
+fn edited(text: &str, piece: Range<usize>, edits: &[Edit]) -> String {
+    let mut out = String::new();
+    let mut at = piece.start;
+    for edit in edits {
+        out.push_str(text.get(at..edit.range.start).unwrap_or_default());
+        out.push_str(&edit.by);
+        at = edit.range.end;
+    }
+    out.push_str(text.get(at..piece.end).unwrap_or_default());
+    out
 }
 
-/// A value without the spaces and comments around it.
-fn bare(value: &Value) -> String {
-    value.clone().decorated("", "").to_string()
+/// How `[observer]`, however it is written, gets a key: after its last one.
+fn addition(text: &str, observer: &Item, assignment: &str) -> Option<Edit> {
+    let insert = |at: usize, by: String| Some(Edit { range: at..at, by });
+    match observer {
+        Item::Value(Value::InlineTable(table)) => {
+            let ends = table.iter().filter_map(|(_, value)| value.span());
+            match ends.map(|span| span.end).max() {
+                Some(end) => insert(end, format!(", {assignment}")),
+                None => insert(table.span()?.start + 1, format!(" {assignment} ")),
+            }
+        }
+        Item::Table(table) => {
+            let header = table.span().filter(|_| !table.is_implicit());
+            if let Some(end) = last_end(table).or(header.map(|span| span.end)) {
+                let prefix = if table.is_dotted() { "observer." } else { "" };
+                return Some(new_line(text, end, &format!("{prefix}{assignment}")));
+            }
+            // only tables in it, such as [observer.initial]: its own comes before them
+            let inner = table.iter().filter_map(|(_, item)| item.span());
+            let first = inner.map(|span| span.start).min()?;
+            let end = line_end(text);
+            let start = text.get(..first)?.rfind('\n').map_or(0, |i| i + 1);
+            insert(start, format!("[observer]{end}{assignment}{end}{end}"))
+        }
+        _ => None,
+    }
+}
+
+/// Where the last value ends that stands in a table itself.
+fn last_end(table: &Table) -> Option<usize> {
+    let end = |item: &Item| match item {
+        Item::Value(value) => value.span().map(|span| span.end),
+        Item::Table(inner) if inner.is_dotted() => last_end(inner),
+        _ => None,
+    };
+    table.iter().filter_map(|(_, item)| end(item)).max()
+}
+
+/// A line below the one in which `end` is.
+fn new_line(text: &str, end: usize, line: &str) -> Edit {
+    let (at, by) = match text.get(end..).and_then(|rest| rest.find('\n')) {
+        Some(more) => {
+            let at = end + more + 1;
+            let above = text.get(..at).unwrap_or_default();
+            (
+                at,
+                format!("{line}{}", line_end(above.get(end..).unwrap_or_default())),
+            )
+        }
+        None => (text.len(), format!("{}{line}", line_end(text))),
+    };
+    Edit { range: at..at, by }
+}
+
+/// The line end that a text uses.
+fn line_end(text: &str) -> &'static str {
+    match text.contains("\r\n") {
+        true => "\r\n",
+        false => "\n",
+    }
 }
 
 #[cfg(test)]
@@ -162,6 +258,66 @@ mod tests {
             changes[0].to_string(),
             "poles: [-2, -3.1] becomes [-2.2, -3.41]"
         );
+    }
+
+    #[test]
+    fn line_ends_and_marks_stay() {
+        for text in [
+            "\u{feff}plant = 'p.mo'\r\n[observer]\r\ntheta = 4.0  # \u{3b8}\r\n[plot]\r\n",
+            "[observer]\rtheta = 4.0\n".replace('\r', "\r\n").as_str(),
+            "[observer]\r\ntheta = 4.0 \nname = 1\r\n",
+            "observer . theta = 4.0",
+        ] {
+            let plain = text.trim_start_matches('\u{feff}');
+            let swept = plain.replace("name = 1\r\n", "");
+            let (new, _) = sweep(&swept, &[3.5]).rewritten(text).unwrap();
+            assert_eq!(new, text.replace("4.0", "3.5"));
+        }
+    }
+
+    #[test]
+    fn a_new_key_goes_below_the_others() {
+        let keys = "tune.keys = { delta = [1, 2] }";
+        for (text, new) in [
+            (
+                "[observer]\r\ntheta = 1 # a\r\n\r\n[plot]\r\n",
+                "[observer]\r\ntheta = 1 # a\r\ndelta = 2\r\n\r\n[plot]\r\n",
+            ),
+            ("[observer]\n[plot]\n", "[observer]\ndelta = 2\n[plot]\n"),
+            (
+                "[observer]\r\ntheta = 1",
+                "[observer]\r\ntheta = 1\r\ndelta = 2",
+            ),
+            (
+                "observer.theta = 1\nx = 2\n",
+                "observer.theta = 1\nobserver.delta = 2\nx = 2\n",
+            ),
+            (
+                "observer = { theta = 1 }\n",
+                "observer = { theta = 1, delta = 2 }\n",
+            ),
+            ("observer = {}\n", "observer = { delta = 2 }\n"),
+            (
+                "[observer.initial]\nx = 1\n",
+                "[observer]\ndelta = 2\n\n[observer.initial]\nx = 1\n",
+            ),
+            (
+                "[observer]\ntheta = 1\ninitial.x = [\n1]\n",
+                "[observer]\ntheta = 1\ninitial.x = [\n1]\ndelta = 2\n",
+            ),
+        ] {
+            let swept = format!("{keys}\nobserver.theta = 1");
+            let (found, changes) = sweep(&swept, &[2.0]).rewritten(text).unwrap();
+            assert_eq!(found, new);
+            assert_eq!(changes[0].to_string(), "delta = 2 is new");
+        }
+    }
+
+    #[test]
+    fn a_pair_of_poles_is_scaled() {
+        let text = "[observer]\r\npoles = [{ re = -2, im = 1 }, -3]\r\n";
+        let (new, _) = sweep(text, &[2.0]).rewritten(text).unwrap();
+        assert_eq!(new, "[observer]\r\npoles = [{ re = -4, im = 2 }, -6]\r\n");
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod names;
 mod observability;
 mod outside;
 mod references;
+mod results;
 mod runs;
 mod tune;
 

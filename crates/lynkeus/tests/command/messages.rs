@@ -53,7 +53,10 @@ fn wrong_columns() {
         ],
     );
     let text = refused(line(1, "time,level,pump"), 2);
-    says(&text, &["no column \"t\""]);
+    says(
+        &text,
+        &["no time column \"t\"", "in [estimate]", "set time = \""],
+    );
 }
 
 #[test]

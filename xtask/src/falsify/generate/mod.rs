@@ -5,7 +5,7 @@ mod settings;
 mod terms;
 
 use super::case::{Case, Input, Kind, Role, Side, number};
-use super::numbers::Numbers;
+use crate::numbers::Numbers;
 use terms::{Reads, round};
 
 /// The case of that number.

@@ -1,8 +1,8 @@
 //! Settings of `[observer]` for random plants.
 
 use super::super::case::{Case, Kind, Role};
-use super::super::numbers::Numbers;
 use super::terms::round;
+use crate::numbers::Numbers;
 
 pub fn choose(numbers: &mut Numbers, case: &mut Case) {
     match case.kind {

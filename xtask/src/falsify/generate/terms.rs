@@ -1,7 +1,7 @@
 //! Terms of right-hand sides: smooth ones, kinks, and what breaks theorems.
 
 use super::super::case::{Side, number};
-use super::super::numbers::Numbers;
+use crate::numbers::Numbers;
 
 /// What a term may read.
 pub struct Reads<'a> {

@@ -1,0 +1,78 @@
+//! What to attack, and for how long.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::process::{cargo, root, run};
+
+/// What was asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    pub seed: u64,
+    /// cases
+    pub count: u64,
+    /// after which no further case starts
+    pub seconds: Option<u64>,
+    /// the longest that a command may run
+    pub limit: Duration,
+    /// the command; built where none is named
+    pub binary: Option<PathBuf>,
+    /// where findings are kept
+    pub folder: PathBuf,
+}
+
+impl Options {
+    /// Reads `--seed N --count N --seconds N --limit SECONDS --binary FILE`.
+    pub fn read(arguments: &[String]) -> Result<Self, String> {
+        let mut options = Self {
+            seed: 1,
+            count: 100_000,
+            seconds: None,
+            limit: Duration::from_secs(60),
+            binary: None,
+            folder: root().join("target/attack"),
+        };
+        let mut rest = arguments.iter();
+        while let Some(key) = rest.next() {
+            let value = rest
+                .next()
+                .ok_or_else(|| format!("{key}: expected a value"))?;
+            let number = || {
+                value
+                    .parse::<u64>()
+                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
+            };
+            match key.as_str() {
+                "--seed" => options.seed = number()?,
+                "--count" => options.count = number()?,
+                "--seconds" => options.seconds = Some(number()?),
+                "--limit" => options.limit = Duration::from_secs(number()?),
+                "--binary" => options.binary = Some(PathBuf::from(value)),
+                _ => {
+                    return Err(format!(
+                        "expected --seed, --count, --seconds, --limit or --binary, found {key}"
+                    ));
+                }
+            }
+        }
+        Ok(options)
+    }
+
+    /// The command that is attacked, as an absolute path.
+    pub fn binary(&self) -> Result<PathBuf, String> {
+        if let Some(path) = &self.binary {
+            return path
+                .canonicalize()
+                .map_err(|e| format!("{}: {e}", path.display()));
+        }
+        let (profile, folder): (&[&str], _) = match cfg!(debug_assertions) {
+            true => (&[], "debug"),
+            false => (&["--release"], "release"),
+        };
+        run(&mut cargo(&[&["build", "-p", "lynkeus"], profile].concat()))?;
+        let target = std::env::var_os("CARGO_TARGET_DIR");
+        let target = target.map_or_else(|| root().join("target"), PathBuf::from);
+        let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
+        Ok(target.join(folder).join(name))
+    }
+}
