@@ -39,7 +39,7 @@ pub struct Settings {
     pub common: Common,
     θ: Late<Option<f64>>,
     /// S(0) in the order of the plant's states
-    S0: Late<Vec<Vec<f64>>>,
+    S0: Late<Given>,
     pub alarm: Late<Option<f64>>,
 }
 
@@ -59,8 +59,13 @@ impl Settings {
         let missing = || TuningError::absent(THETA.name, expected);
         let θ = self.θ.clone()?.ok_or_else(missing)?;
         let given = self.S0.as_ref().map_err(TuningError::clone)?;
-        let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
-        let ordered: Vec<Vec<f64>> = order.iter().map(row).collect();
+        let ordered: Vec<Vec<f64>> = match given {
+            Given::Number(s) => scaled_identity(order.len(), *s),
+            Given::Matrix(given) => {
+                let row = |&i: &usize| order.iter().map(|&j| given[i][j]).collect();
+                order.iter().map(row).collect()
+            }
+        };
         let S0 = UnitFactor::new(&ordered).map_err(|error| START.wrong(error))?;
         Ok(Numbers { θ, S0 })
     }
@@ -73,15 +78,23 @@ pub(super) struct Numbers {
     pub S0: UnitFactor,
 }
 
+/// S(0) as the study has it: a large plant needs no matrix before its observer does.
+enum Given {
+    /// s of s·I
+    Number(f64),
+    /// in the order of the plant's states
+    Matrix(Vec<Vec<f64>>),
+}
+
 /// S(0): s·I for a number s, or a matrix in the order of the plant's states.
-fn start(tuning: &Tuning, n: usize) -> Late<Vec<Vec<f64>>> {
+fn start(tuning: &Tuning, n: usize) -> Late<Given> {
     let expected = format!(
         "a positive number s for s·I, or a symmetric positive definite {n}×{n} matrix as a list of rows, one per estimated quantity"
     );
     let wrong = |found: String| TuningError::new(START.name, expected.clone(), found);
     let given = match tuning.values.get(START.name) {
-        None => scaled_identity(n, 1.0),
-        Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => scaled_identity(n, *s),
+        None => return Ok(Given::Number(1.0)),
+        Some(Value::Number(s)) if *s > 0.0 && s.is_finite() => return Ok(Given::Number(*s)),
         Some(Value::List(rows)) => {
             let entry = |x: &Value| match x {
                 Value::Number(x) => Ok(*x),
@@ -100,7 +113,7 @@ fn start(tuning: &Tuning, n: usize) -> Late<Vec<Vec<f64>>> {
     }
     // refused in the user's order, factored in that of the blocks
     UnitFactor::new(&given).map_err(|error| wrong(error.to_string()))?;
-    Ok(given)
+    Ok(Given::Matrix(given))
 }
 
 fn scaled_identity(n: usize, s: f64) -> Vec<Vec<f64>> {
