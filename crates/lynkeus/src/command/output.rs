@@ -46,18 +46,28 @@ fn readable(_: &std::fs::File) -> io::Result<()> {
 
 /// Columns as CSV text.
 pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
-    let named: Vec<(&str, &[f64])> = columns
-        .iter()
-        .map(|(name, values)| (name.as_str(), *values))
-        .collect();
     let mut bytes = vec![];
-    table::write_csv(&mut bytes, &named)
+    table::write_csv(&mut bytes, &named(columns))
         .map_err(|e| Error::input(format!("cannot write CSV: {e}")))?;
     String::from_utf8(bytes).map_err(|e| Error::input(format!("cannot write CSV: {e}")))
 }
 
-/// Columns into a CSV file.
+fn named<'a>(columns: &'a [(String, &'a [f64])]) -> Vec<(&'a str, &'a [f64])> {
+    let named = columns.iter();
+    named
+        .map(|(name, values)| (name.as_str(), *values))
+        .collect()
+}
+
+/// Columns into a CSV file, or into a Parquet file if it is called so.
 pub(super) fn write_table(path: &Path, columns: &[(String, &[f64])]) -> Result<(), Error> {
+    #[cfg(feature = "parquet")]
+    if table::is_parquet(path) {
+        let mut bytes = vec![];
+        table::write_parquet(&mut bytes, &named(columns))
+            .map_err(|e| Error::input(format!("cannot write {}: {e}", path.display())))?;
+        return write(path, &bytes);
+    }
     write(path, csv(columns)?.as_bytes())
 }
 
