@@ -6,18 +6,24 @@ use lynkeus::model::Diagnostic;
 use lynkeus::{Error, table, visible};
 use serde_json::Value;
 
-/// Columns as CSV text.
-pub(super) fn csv(columns: &[(String, &[f64])]) -> Result<String, Error> {
+/// Columns as a CSV file, or as a Parquet file if it is called so.
+pub(super) fn table(path: &Path, columns: &[(String, &[f64])]) -> Result<Vec<u8>, Error> {
     let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
     let named: Vec<(&str, &[f64])> = names
         .iter()
         .zip(columns)
         .map(|(name, (_, values))| (name.as_ref(), *values))
         .collect();
+    let failed =
+        |e: &dyn std::fmt::Display| Error::input(format!("cannot write {}: {e}", path.display()));
     let mut bytes = vec![];
-    table::write_csv(&mut bytes, &named)
-        .map_err(|e| Error::input(format!("cannot write CSV: {e}")))?;
-    String::from_utf8(bytes).map_err(|e| Error::input(format!("cannot write CSV: {e}")))
+    #[cfg(feature = "parquet")]
+    if table::is_parquet(path) {
+        table::write_parquet(&mut bytes, &named).map_err(|e| failed(&e))?;
+        return Ok(bytes);
+    }
+    table::write_csv(&mut bytes, &named).map_err(|e| failed(&e))?;
+    Ok(bytes)
 }
 
 /// A JSON object as text.

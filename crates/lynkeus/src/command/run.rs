@@ -91,7 +91,7 @@ pub(super) fn simulate(
     if let Some(path) = log {
         let columns = outcome.log(&source.study.estimate);
         let columns = columns.map_err(|e| e.at(&source.study.file))?;
-        results.put(path, output::csv(&columns)?)?;
+        results.put(path, output::table(path, &columns)?)?;
     }
     let code = finish(&source.study, output, &outcome, true, results)?;
     Ok(limits::code(&source.study, code))
@@ -131,8 +131,10 @@ fn finish(
     }
     let printed = Path::new("-");
     match &output.output {
-        Some(path) => results.put(path, output::csv(&columns)?)?,
-        None if !shown && !results.has_printed() => results.put(printed, output::csv(&columns)?)?,
+        Some(path) => results.put(path, output::table(path, &columns)?)?,
+        None if !shown && !results.has_printed() => {
+            results.put(printed, output::table(printed, &columns)?)?
+        }
         None => {}
     }
     if output.json {

@@ -50,17 +50,18 @@ enum Content {
 
 impl Results {
     /// Adds a result; "-" prints it.
-    pub fn put(&mut self, path: &Path, text: String) -> Result<(), Error> {
+    pub fn put(&mut self, path: &Path, content: impl Into<Vec<u8>>) -> Result<(), Error> {
+        let bytes = content.into();
         if is_standard(path) {
-            self.print(&text);
+            self.print(&String::from_utf8_lossy(&bytes));
             return Ok(());
         }
         let failed = |e: io::Error| refusal(path, &e);
         let place = destination(path);
         let is_device = std::fs::metadata(&place).is_ok_and(|data| !data.is_file());
         let content = match is_device {
-            true => Content::Device(text.into_bytes()),
-            false => Content::Beside(stage(&place, text.as_bytes()).map_err(failed)?),
+            true => Content::Device(bytes),
+            false => Content::Beside(stage(&place, &bytes).map_err(failed)?),
         };
         let path = path.to_owned();
         self.files.push(Staged {

@@ -88,11 +88,45 @@ impl Column {
         self.values.try_reserve_exact(more).map_err(|_| OutOfMemory)
     }
 
+    fn grow(&mut self) -> Result<(), OutOfMemory> {
+        match self.values.len() == self.values.capacity() {
+            true => self.reserve(self.values.len() / 2 * 3 + 1024),
+            false => Ok(()),
+        }
+    }
+
+    /// Takes the next row's number; one that is not finite is missing.
+    #[cfg(feature = "parquet")]
+    pub(super) fn put(&mut self, value: f64) -> Result<(), OutOfMemory> {
+        self.grow()?;
+        let value = match value.is_finite() {
+            true => value,
+            false => {
+                let line = self.values.len() as u64 + 1;
+                self.miss(line, &value.to_string());
+                f64::NAN
+            }
+        };
+        self.values.push(value);
+        Ok(())
+    }
+
+    /// Takes the next row's point in time.
+    #[cfg(feature = "parquet")]
+    pub(super) fn put_instant(&mut self, instant: Instant) -> Result<(), OutOfMemory> {
+        self.grow()?;
+        let line = self.values.len() as u64 + 1;
+        let seconds = match &self.origin {
+            Some(origin) => instant.seconds_since(origin.instant),
+            None => self.instant(instant, line, &instant.to_string()),
+        };
+        self.values.push(seconds);
+        Ok(())
+    }
+
     /// Takes the next row's cell.
     pub(super) fn push(&mut self, text: &str, line: u64) -> Result<(), OutOfMemory> {
-        if self.values.len() == self.values.capacity() {
-            self.reserve(self.values.len() / 2 * 3 + 1024)?;
-        }
+        self.grow()?;
         let value = match cell::read(text) {
             Cell::Number(value) => {
                 self.marks.see_plain(value);

@@ -13,6 +13,12 @@ pub(super) struct Instant {
 const SECOND: i128 = 1_000_000_000;
 
 impl Instant {
+    /// So many nanoseconds after 1970-01-01T00:00:00.
+    #[cfg(feature = "parquet")]
+    pub(super) fn at(nanoseconds: i128, zoned: bool) -> Self {
+        Self { nanoseconds, zoned }
+    }
+
     /// From `origin` to here, rounded once where that is less than 104 days.
     pub(super) fn seconds_since(self, origin: Self) -> f64 {
         let nanoseconds = self.nanoseconds - origin.nanoseconds;
@@ -21,6 +27,42 @@ impl Instant {
         }
         let part = nanoseconds.rem_euclid(SECOND) as f64 / SECOND as f64;
         nanoseconds.div_euclid(SECOND) as f64 + part
+    }
+}
+
+/// As RFC 3339 has it.
+#[cfg(feature = "parquet")]
+impl std::fmt::Display for Instant {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seconds = self.nanoseconds.div_euclid(SECOND);
+        let (mut year, mut day) = (1970, seconds.div_euclid(86_400));
+        // whole cycles of the calendar, then years, then months
+        year += 400 * day.div_euclid(146_097);
+        day = day.rem_euclid(146_097);
+        let length = |year: i64| 337 + i128::from(days(year, 2));
+        let mut year = i64::try_from(year).unwrap_or(0);
+        while day >= length(year) {
+            day -= length(year);
+            year += 1;
+        }
+        let mut month = 1;
+        while day >= i128::from(days(year, month)) {
+            day -= i128::from(days(year, month));
+            month += 1;
+        }
+        let of_day = seconds.rem_euclid(86_400);
+        let (hour, minute, second) = (of_day / 3600, of_day / 60 % 60, of_day % 60);
+        write!(
+            f,
+            "{year:04}-{month:02}-{:02}T{hour:02}:{minute:02}:{second:02}",
+            day + 1
+        )?;
+        let fraction = self.nanoseconds.rem_euclid(SECOND);
+        if fraction > 0 {
+            let digits = format!("{fraction:09}");
+            write!(f, ".{}", digits.trim_end_matches('0'))?;
+        }
+        f.write_str(if self.zoned { "Z" } else { "" })
     }
 }
 
@@ -175,6 +217,19 @@ mod tests {
         );
         assert_eq!(a.seconds_since(b), 1e-9);
         assert!(a.zoned && !at("2026-11-22").zoned);
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn what_is_shown_is_read() {
+        let nanoseconds = (-1000..1000).map(|i: i128| i * 86_399_999_999_999 * 37 + 5);
+        for instant in nanoseconds.map(|n| Instant::at(n, true)) {
+            assert_eq!(read(&instant.to_string()), Some(instant), "{instant}");
+        }
+        assert_eq!(
+            Instant::at(951_825_600 * SECOND, false).to_string(),
+            "2000-02-29T12:00:00"
+        );
     }
 
     #[test]

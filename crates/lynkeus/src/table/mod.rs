@@ -11,6 +11,8 @@ mod instant;
 mod lines;
 mod marks;
 mod number;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod read;
 mod row;
 mod write;
@@ -22,9 +24,17 @@ use crate::near::{list, nearest};
 use column::Column;
 use lines::Lines;
 
+#[cfg(feature = "parquet")]
+pub use self::parquet::write_parquet;
 pub use column::Fault;
 pub use number::{exact, significant};
 pub use write::write_csv;
+
+/// Whether a file is a Parquet file by its name.
+pub fn is_parquet(path: &std::path::Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
+}
 
 /// A table of named columns of equal length, all numbers.
 ///

@@ -17,7 +17,7 @@ const SAMPLE: usize = 4096;
 const MOST_COLUMNS: usize = 100_000;
 
 impl Table {
-    /// Reads a CSV file with a header row.
+    /// Reads a CSV file with a header row, or a Parquet file if it is called `*.parquet`.
     ///
     /// The delimiter is a comma, a semicolon or a tab, whichever the header has most of; headers
     /// and cells are trimmed. Decimal commas, marks between thousands, and dates are understood
@@ -29,6 +29,10 @@ impl Table {
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let file = crate::files::open(path, "log")?;
+        #[cfg(feature = "parquet")]
+        if super::is_parquet(path) {
+            return super::parquet::load(file, &path.display().to_string());
+        }
         let length = file.metadata().map_or(0, |data| data.len());
         let input = BufReader::with_capacity(1 << 16, file);
         read(input, &path.display().to_string(), Some(length))
