@@ -35,6 +35,7 @@ fn case(term: &str) -> Case {
             vec!["-x1".into(), "x2".into()],
             vec!["-x2".into(), term.into()],
         ],
+        couplings: vec![],
         outputs: vec![vec!["x1".into(), "d".into()]],
         noise: vec![0.0],
         slope: None,
