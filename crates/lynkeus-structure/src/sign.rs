@@ -140,7 +140,7 @@ mod tests {
             let Verdict::Refuted(witness) = sign.finding.verdict else {
                 panic!()
             };
-            assert!(witness.points[0].coordinates[0].1.abs() < 1e-9);
+            assert!(witness.points[0].coordinates[0].value.abs() < 1e-9);
         }
     }
 
@@ -181,7 +181,7 @@ mod tests {
         let Verdict::Refuted(witness) = sign.finding.verdict else {
             panic!()
         };
-        let zero = witness.zero().unwrap().coordinates[0].1;
+        let zero = witness.zero().unwrap().coordinates[0].value;
         assert!((zero.abs() - 0.5).abs() < 1e-9, "{zero}");
     }
 
@@ -196,7 +196,7 @@ mod tests {
             let Verdict::Refuted(witness) = &sign.finding.verdict else {
                 panic!("{sign:?}")
             };
-            let far = |p: &Point| p.coordinates[0].1.abs() > 1e10;
+            let far = |p: &Point| p.coordinates[0].value.abs() > 1e10;
             assert!(!witness.points.iter().any(far), "{witness}");
         }
         // of one sign as far as anyone looks

@@ -7,7 +7,7 @@ use std::fmt;
 
 use lynkeus_observability::{Answer, Limits, Verdict};
 use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{self as structure, Point, Standing, uniformity};
+use lynkeus_structure::{self as structure, Point, Standing, counted, uniformity};
 use serde_json::{Value, json};
 
 use crate::prepare::Prepared;
@@ -175,7 +175,7 @@ pub(crate) fn point(point: &Point) -> Value {
     let at = point
         .coordinates
         .iter()
-        .map(|(name, x)| (name.clone(), json!(x)));
+        .map(|c| (c.name.clone(), json!(c.value)));
     json!({ "value": point.value, "at": Value::Object(at.collect()) })
 }
 
@@ -190,9 +190,9 @@ impl fmt::Display for Report {
         };
         writeln!(
             f,
-            "{}: {} states, measured {}, unknown {}",
+            "{}: {}, measured {}, unknown {}",
             self.plant,
-            self.states.len(),
+            counted(self.states.len(), "state"),
             list(&self.measured),
             list(&self.unknown)
         )?;

@@ -193,10 +193,10 @@ fn filled(point: &Point, extended: &Extended<'_>, attempt: usize) -> Result<Vec<
             let share = (0.6234 + 0.618 * (attempt * (i + 1)) as f64).fract();
             let width = (side.max - side.min).min(1e6);
             let coordinates = &point.coordinates;
-            match coordinates.iter().find(|c| c.0 == side.name) {
+            match coordinates.iter().find(|c| c.name == side.name) {
                 None => Ok(centre + (share - 0.5) * width),
-                Some((_, x)) if side.min <= *x && *x <= side.max => Ok(*x),
-                Some((name, x)) => Err(format!("{name} = {x} is outside of the box")),
+                Some(c) if side.min <= c.value && c.value <= side.max => Ok(c.value),
+                Some(c) => Err(format!("{} = {} is outside of the box", c.name, c.value)),
             }
         })
         .collect()

@@ -6,7 +6,7 @@ use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 use crate::region::Cell;
 use crate::regularity::is_regular;
 use crate::slopes::without_removable_jumps;
-use crate::{Point, Range, Region, Witness};
+use crate::{Coordinate, Point, Range, Region, Witness};
 
 pub(super) fn witness(
     graph: &Graph,
@@ -57,7 +57,7 @@ pub(super) fn enclosure(tape: &Tape, point: &Point) -> Interval {
     let cell: Vec<Interval> = point
         .coordinates
         .iter()
-        .map(|c| Interval::point(c.1))
+        .map(|c| Interval::point(c.value))
         .collect();
     tape.eval_in(&Intervals, &cell)[0]
 }
@@ -68,7 +68,8 @@ const BLURRED: f64 = 1e-8;
 const HALVINGS: i32 = 50;
 
 /// The point, or where rounding blurs the value there one of the same sign on a way into the
-/// box where it does not: what is told has to be true in every digit.
+/// box where it does not: what is told has to be true in every digit. The value is that of
+/// the enclosure: computed without one, a badly scaled linear system may have lost most digits.
 fn legible(tape: &Tape, region: &Region, point: &Point) -> Point {
     let is_positive = enclosure(tape, point).is_positive();
     let shows = |point: &Point| {
@@ -79,10 +80,11 @@ fn legible(tape: &Tape, region: &Region, point: &Point) -> Point {
         };
         keeps && value.hi() - value.lo() <= BLURRED * value.lo().abs()
     };
-    if shows(point) {
-        return point.clone();
+    let from: Vec<f64> = point.coordinates.iter().map(|c| c.value).collect();
+    let here = told(tape, point, &from);
+    if shows(&here) {
+        return here;
     }
-    let from: Vec<f64> = point.coordinates.iter().map(|c| c.1).collect();
     let targets = region.samples(&region.cell());
     let ways = targets.iter().filter(|to| region.connected(&from, to));
     let mut places = ways.flat_map(|to| (1..=HALVINGS).rev().map(|k| along(&from, to, k)));
@@ -90,7 +92,7 @@ fn legible(tape: &Tape, region: &Region, point: &Point) -> Point {
         let next = told(tape, point, &place);
         shows(&next).then_some(next)
     });
-    found.unwrap_or_else(|| point.clone())
+    found.unwrap_or(here)
 }
 
 /// So many halvings away from `from` toward `to`.
@@ -102,19 +104,23 @@ fn along(from: &[f64], to: &[f64], halvings: i32) -> Vec<f64> {
 
 /// The place with the value there, named like the point.
 fn told(tape: &Tape, like: &Point, place: &[f64]) -> Point {
-    let mut value = [0.0];
-    tape.evaluator().eval(place, &mut value);
-    let names = like.coordinates.iter().map(|c| c.0.clone());
-    Point {
-        coordinates: names.zip(place.iter().copied()).collect(),
-        value: value[0],
-    }
+    let names = like.coordinates.iter().map(|c| c.name.clone());
+    let mut point = Point {
+        coordinates: names
+            .zip(place.iter().copied())
+            .map(Coordinate::from)
+            .collect(),
+        value: 0.0,
+    };
+    let value = enclosure(tape, &point);
+    point.value = f64::midpoint(value.lo(), value.hi());
+    point
 }
 
 /// A small cell of the region around a point.
 fn around(point: &Point, region: &Region) -> Cell {
     let sides = point.coordinates.iter().zip(&region.dimensions);
-    let side = |((_, x), d): (&(String, f64), &crate::Dimension)| {
+    let side = |(Coordinate { value: x, .. }, d): (&Coordinate, &crate::Dimension)| {
         let (low, high) = (x.next_down().max(d.min), x.next_up().min(d.max));
         Interval::new(low, high).unwrap_or(Interval::point(*x))
     };
@@ -129,7 +135,7 @@ fn zero_between(
     negative: &Point,
     positive: &Point,
 ) -> Option<(Cell, Point)> {
-    let values = |p: &Point| p.coordinates.iter().map(|c| c.1).collect::<Vec<f64>>();
+    let values = |p: &Point| p.coordinates.iter().map(|c| c.value).collect::<Vec<f64>>();
     let (mut p, mut q) = (values(negative), values(positive));
     if !region.connected(&p, &q) {
         return None;
@@ -198,6 +204,7 @@ mod tests {
             let value = enclosure(&tape, point);
             let width = value.hi() - value.lo();
             assert!(width <= 1e-7 * point.value.abs(), "{point:?} {value:?}");
+            assert!(value.contains(point.value), "{point:?} {value:?}");
         }
     }
 
@@ -210,13 +217,10 @@ mod tests {
         let inverse = 1.0 / (x + 0.673);
         let slope = inverse.sin() - inverse * inverse.cos();
         assert_legible(slope, &[(x, -0.673 + 6e-16, 1.177)]);
-        let a = 2.0 * x;
-        let one = g.constant(1.0).node();
+        let a = (2.0 * x).node();
+        let [zero, one] = [0.0, 1.0].map(|c| g.constant(c).node());
         let b = (-0.9 * (y - 0.4)).node();
-        let zero = g.constant(0.0).node();
-        let [f, _] = g.solve(&[one, a.node(), a.node(), one], &[b, zero]).x[..] else {
-            panic!()
-        };
+        let f = g.solve(&[one, a, one, one], &[b, zero]).x[0];
         let slope = g.expr(jacobian::forward(&g, &[f], &[y.node()]).get(0, 0).unwrap());
         assert_legible(slope, &[(x, -2.672, 2.288), (y, -0.152, 1.076)]);
     }

@@ -61,8 +61,8 @@ fn jacobian(
     }
     let precise = &lens.precise;
     let value = |name: &str| {
-        let given = point.coordinates.iter().find(|c| c.0 == name);
-        precise.number(given.map_or(0.0, |c| c.1))
+        let given = point.coordinates.iter().find(|c| c.name == name);
+        precise.number(given.map_or(0.0, |c| c.value))
     };
     let graph = extended.graph();
     let names = extended.states.iter().chain(&extended.inputs);
