@@ -4,6 +4,10 @@ use crate::{Binary, Graph, Node, Op, Unary};
 
 /// Deeper expressions are cut: messages need no more.
 const DEPTH: usize = 40;
+/// Linear systems up to this size are spelled out.
+const SPELLED: usize = 3;
+/// Symbols named of others.
+const NAMED: usize = 4;
 
 impl Graph {
     /// The expression in Modelica notation, cut with `…` to about `max_chars`.
@@ -12,6 +16,7 @@ impl Graph {
         Renderer {
             graph: self,
             max: max_chars,
+            in_system: false,
         }
         .write(node, 0, DEPTH, &mut text);
         if text.chars().count() > max_chars {
@@ -25,6 +30,8 @@ impl Graph {
 struct Renderer<'g> {
     graph: &'g Graph,
     max: usize,
+    /// a system within one is not spelled out
+    in_system: bool,
 }
 
 impl Renderer<'_> {
@@ -36,22 +43,49 @@ impl Renderer<'_> {
         }
         let depth = depth - 1;
         match self.graph.op(node) {
-            Op::Constant(value) => text.push_str(&brief(value)),
+            Op::Constant(value) => {
+                let negative = value.is_sign_negative();
+                self.grouped(outer > 2 && negative, text, |text| {
+                    text.push_str(&brief(value))
+                });
+            }
             Op::Symbol(_) => text.push_str(&self.graph.symbol_name(node).unwrap_or_default()),
             Op::Unary(Unary::Neg, a) => self.grouped(outer > 1, text, |text| {
-                text.push('-');
+                let start = text.len();
                 self.write(a, 2, depth, text);
+                // two signs cancel: what stands here is a product
+                match text[start..].starts_with('-') {
+                    true => _ = text.remove(start),
+                    false => text.insert(start, '-'),
+                }
             }),
-            Op::Powi(a, n) => {
+            Op::Powi(a, n) => self.grouped(outer > 3, text, |text| {
                 self.write(a, 4, depth, text);
-                text.push_str(&format!("^{n}"));
-            }
+                match n < 0 {
+                    true => text.push_str(&format!("^({n})")),
+                    false => text.push_str(&format!("^{n}")),
+                }
+            }),
             Op::Unary(op, a) => self.call(&format!("{op:?}").to_lowercase(), &[a], depth, text),
             Op::Binary(op, a, b) => match infix(op) {
                 Some((sign, level)) => self.grouped(outer > level, text, |text| {
-                    self.write(a, level, depth, text);
+                    let is_power = op == Binary::Pow;
+                    let (a, b) = self.ordered(op, a, b);
+                    self.write(a, level + u8::from(is_power), depth, text);
+                    let start = text.len();
                     text.push_str(sign);
                     self.write(b, level + 1, depth, text);
+                    let joined = match op {
+                        Binary::Add => Some(" - "),
+                        Binary::Sub => Some(" + "),
+                        _ => None,
+                    };
+                    let end = start + sign.len();
+                    if let Some(other) = joined
+                        && text[end..].starts_with('-')
+                    {
+                        text.replace_range(start..=end, other);
+                    }
                 }),
                 None => self.call(&format!("{op:?}").to_lowercase(), &[a, b], depth, text),
             },
@@ -61,9 +95,52 @@ impl Renderer<'_> {
                     self.write(part, 1, depth, text);
                 }
             }),
-            Op::Solve(_) => text.push_str("solve(A, b)"),
-            Op::Entry(_, entry) => text.push_str(&format!("solve(A, b)[{}]", entry + 1)),
+            Op::Solve(_) => self.system(node, depth, text),
+            Op::Entry(system, entry) => {
+                self.system(system, depth, text);
+                text.push_str(&format!("[{}]", entry + 1));
+            }
         }
+    }
+
+    /// The operands, a negative factor in front.
+    fn ordered(&self, op: Binary, a: Node, b: Node) -> (Node, Node) {
+        match self.graph.op(b) {
+            Op::Constant(value) if op == Binary::Mul && value < 0.0 => (b, a),
+            _ => (a, b),
+        }
+    }
+
+    /// `solve([a, b; c, d], {e, f})`; a large system, and one within another, by what it reads.
+    fn system(&self, node: Node, depth: usize, text: &mut String) {
+        let Some(system) = self.graph.system(node) else {
+            return;
+        };
+        let n = system.right().len();
+        if self.in_system || n > SPELLED {
+            let symbols = self.graph.symbols_of(&[node]);
+            let names: Vec<String> = symbols
+                .iter()
+                .take(NAMED + 1)
+                .filter_map(|s| self.graph.symbol_name(*s))
+                .collect();
+            let more = if names.len() > NAMED { ", …" } else { "" };
+            let names = names[..names.len().min(NAMED)].join(", ");
+            text.push_str(&format!("solve({n}×{n} in {names}{more})"));
+            return;
+        }
+        let inner = Renderer {
+            in_system: true,
+            ..*self
+        };
+        text.push_str("solve([");
+        for (i, row) in system.matrix().chunks(n).enumerate() {
+            text.push_str(if i > 0 { "; " } else { "" });
+            inner.list(row, depth, text);
+        }
+        text.push_str("], {");
+        inner.list(system.right(), depth, text);
+        text.push_str("})");
     }
 
     fn grouped(&self, parentheses: bool, text: &mut String, body: impl FnOnce(&mut String)) {
@@ -79,13 +156,15 @@ impl Renderer<'_> {
     fn call(&self, name: &str, arguments: &[Node], depth: usize, text: &mut String) {
         text.push_str(name);
         text.push('(');
-        for (i, &argument) in arguments.iter().enumerate() {
-            if i > 0 {
-                text.push_str(", ");
-            }
-            self.write(argument, 0, depth, text);
-        }
+        self.list(arguments, depth, text);
         text.push(')');
+    }
+
+    fn list(&self, nodes: &[Node], depth: usize, text: &mut String) {
+        for (i, &node) in nodes.iter().enumerate() {
+            text.push_str(if i > 0 { ", " } else { "" });
+            self.write(node, 0, depth, text);
+        }
     }
 }
 
@@ -127,10 +206,31 @@ mod tests {
             (x / (y * x), "x/(x*y)"),
             (x.sqrt() / 2.0, "sqrt(x)/2"),
             (x * (1.65 - 1.0), "x*0.65"),
+            (-(-1.097 * (x + y)), "1.097*(x + y)"),
+            (x - -1.5 * y, "x + 1.5*y"),
+            (g.constant(-2.0) + x, "x - 2"),
+            (x / g.constant(-2.0), "x/(-2)"),
+            ((-2.0 * x).sin() * -3.0, "-3*sin(-2*x)"),
+            (x.powi(2).powi(-3), "(x^2)^(-3)"),
+            (x.pow(y).pow(x), "(x^y)^x"),
         ];
         for (expression, text) in cases {
             assert_eq!(g.render(expression.node(), 80), text);
         }
+    }
+
+    #[test]
+    fn a_linear_system_is_spelled_out() {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let one = g.constant(1.0).node();
+        let inner = g.solve(&[one, x.node(), y.node(), one], &[y.node(), one]);
+        let text = "solve([1, x; y, 1], {y, 1})[2]";
+        assert_eq!(g.render(inner.x[1], 80), text);
+        assert_eq!(g.render(inner.x[1], 12), "solve([1, x…");
+        let outer = g.solve(&[inner.x[0]], &[one]).x[0];
+        let text = "solve([solve(2×2 in x, y)[1]], {1})[1]";
+        assert_eq!(g.render(outer, 80), text);
     }
 
     #[test]

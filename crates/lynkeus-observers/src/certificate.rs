@@ -1,7 +1,7 @@
 //! What can be guaranteed about an observer, and why.
 
 use lynkeus_expr::{MissingInput, Spent};
-use lynkeus_structure::{Dimension, Extended, Region, Standing};
+use lynkeus_structure::{Dimension, Extended, Region, Side, Standing};
 use nalgebra::DMatrix;
 
 use crate::Check;
@@ -113,6 +113,21 @@ impl Constant {
     }
 }
 
+/// What the error of a quantity ends within.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UltimateBound {
+    /// name of the extended state
+    pub name: String,
+    /// of the absolute value, in the state's unit
+    pub value: f64,
+}
+
+impl From<(String, f64)> for UltimateBound {
+    fn from((name, value): (String, f64)) -> Self {
+        Self { name, value }
+    }
+}
+
 /// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
 /// while plant and estimate stay in the box.
 #[derive(Clone, Debug)]
@@ -127,10 +142,10 @@ pub struct Certificate {
     /// guaranteed bound of the Euclidean norm of the error as t → ∞, under the
     /// assumed drift and noise; only where proved
     pub ultimate_bound: Option<f64>,
-    /// the same per extended state: (name, bound); empty where not known
-    pub ultimate: Vec<(String, f64)>,
-    /// the box: (name, smallest, largest)
-    pub region: Vec<(String, f64, f64)>,
+    /// the same per extended state; empty where not known
+    pub ultimate: Vec<UltimateBound>,
+    /// the box
+    pub region: Vec<Side>,
     /// what has to hold, with verdicts and witnesses
     pub hypotheses: Vec<Check>,
     /// the numbers of the proof
@@ -154,6 +169,11 @@ impl Certificate {
     ) -> Self {
         let bounded = |d: &&Dimension| d.name != "time" || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
+        let side = |d: &Dimension| Side {
+            name: d.name.clone(),
+            min: d.min,
+            max: d.max,
+        };
         let first = std::iter::once(assumptions.regularity.clone()).chain(assumptions.what_acts());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
@@ -162,7 +182,7 @@ impl Certificate {
             overshoot: None,
             ultimate_bound: None,
             ultimate: vec![],
-            region: sides.map(|d| (d.name.clone(), d.min, d.max)).collect(),
+            region: sides.map(side).collect(),
             hypotheses,
             constants: vec![],
             lyapunov: None,

@@ -59,7 +59,11 @@ impl GainedChain<'_> {
         let name = |j: usize| format!("a{}", j + 1);
         let rightmost = self.eigenvalues(a).first().map_or(f64::NAN, |λ| λ.0);
         Point {
-            coordinates: a.iter().enumerate().map(|(j, &a)| (name(j), a)).collect(),
+            coordinates: a
+                .iter()
+                .enumerate()
+                .map(|(j, &a)| (name(j), a).into())
+                .collect(),
             value: rightmost,
         }
     }

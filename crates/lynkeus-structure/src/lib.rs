@@ -43,5 +43,5 @@ pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
 pub use uniform::{Blind, Uniformity, uniformity};
 pub use vanish::vanishes;
-pub use verdict::{Finding, Place, Point, Side, Standing, Verdict, Witness};
+pub use verdict::{Coordinate, Finding, Place, Point, Side, Standing, Verdict, Witness};
 pub use words::{counted, figures, short};

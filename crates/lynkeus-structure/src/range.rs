@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Region};
-use crate::{Dimension, Place, Point, Regularity};
+use crate::{Coordinate, Dimension, Place, Point, Regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -237,9 +237,9 @@ impl Search<'_> {
     }
 }
 
-fn named(dimensions: &[Dimension], point: &[f64]) -> Vec<(String, f64)> {
+fn named(dimensions: &[Dimension], point: &[f64]) -> Vec<Coordinate> {
     let pairs = dimensions.iter().zip(point);
-    pairs.map(|(d, &x)| (d.name.clone(), x)).collect()
+    pairs.map(|(d, &x)| (d.name.clone(), x).into()).collect()
 }
 
 fn close(bound: f64, best: Option<&Point>) -> bool {

@@ -222,7 +222,11 @@ mod tests {
         let Verdict::Refuted(witness) = check.verdict else {
             panic!("{}", check.detail)
         };
-        let values: Vec<f64> = witness.points[0].coordinates.iter().map(|c| c.1).collect();
+        let values: Vec<f64> = witness.points[0]
+            .coordinates
+            .iter()
+            .map(|c| c.value)
+            .collect();
         assert_eq!(values, [0.0, 0.0]);
     }
 

@@ -15,7 +15,7 @@ use crate::irreducible::blocks;
 use crate::output_map::determinant;
 use crate::region::Cell;
 use crate::words::short;
-use crate::{Finding, Matrix, Point, Region, Verdict, Witness, sign};
+use crate::{Coordinate, Finding, Matrix, Point, Region, Verdict, Witness, sign};
 
 /// Determinants of larger blocks are not expanded.
 const EXPANDED: usize = 5;
@@ -177,7 +177,10 @@ impl Signs {
         let Some(value) = det else { return };
         let names = region.dimensions.iter().map(|d| d.name.clone());
         let point = Point {
-            coordinates: names.zip(at.iter().copied()).collect(),
+            coordinates: names
+                .zip(at.iter().copied())
+                .map(Coordinate::from)
+                .collect(),
             value,
         };
         match value > 0.0 {
@@ -265,7 +268,7 @@ mod tests {
             panic!()
         };
         for point in &witness.points {
-            let [x, y] = [0, 1].map(|i| point.coordinates[i].1);
+            let [x, y] = [0, 1].map(|i| point.coordinates[i].value);
             let det = 1.0 - x.powi(7) * y;
             assert!((det - point.value).abs() < 1e-9, "{det} {}", point.value);
         }

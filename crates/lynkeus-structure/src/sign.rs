@@ -1,15 +1,12 @@
 //! Does an expression keep its sign on the box?
 
-use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
+mod witness;
 
-use crate::region::Cell;
-use crate::regularity::is_regular;
-use crate::slopes::without_removable_jumps;
+use lynkeus_expr::{Graph, MissingInput, Node};
+
 use crate::words::short;
-use crate::{
-    Finding, Point, Range, Region, Regularity, Side, Verdict, Witness, range, range_within,
-};
+use crate::{Finding, Range, Region, Regularity, Side, Verdict, range, range_within};
+use witness::witness;
 
 /// Cells examined per end to see whether there is a bound.
 const GLANCE: usize = 20;
@@ -117,124 +114,10 @@ fn undeclared(found: &Range) -> String {
     }
 }
 
-fn witness(
-    graph: &Graph,
-    node: Node,
-    region: &Region,
-    found: &Range,
-) -> Result<Option<Witness>, MissingInput> {
-    let (Some(lowest), Some(highest)) = (&found.lowest, &found.highest) else {
-        return Ok(None);
-    };
-    let region = region.restricted(&graph.symbols_of(&[node]));
-    let tape = Tape::new(graph, &region.symbols(), &[node])?;
-    // a·sign(a) does not jump
-    let smooth = without_removable_jumps(graph, &[node])
-        .first()
-        .copied()
-        .unwrap_or(node);
-    for point in [lowest, highest] {
-        let value = enclosure(&tape, point);
-        // where it jumps, the value between is no zero
-        if value.lo() == 0.0
-            && value.hi() == 0.0
-            && is_regular(graph, smooth, &region, &around(point, &region))?
-        {
-            return Ok(Some(Witness {
-                points: vec![point.clone()],
-            }));
-        }
-    }
-    if !(enclosure(&tape, lowest).is_negative() && enclosure(&tape, highest).is_positive()) {
-        return Ok(None);
-    }
-    let mut points = vec![lowest.clone(), highest.clone()];
-    if let Some((bracket, zero)) = zero_between(&tape, &region, lowest, highest)
-        && is_regular(graph, smooth, &region, &bracket)?
-    {
-        points.insert(0, zero);
-    }
-    Ok(Some(Witness { points }))
-}
-
-/// The value at a point, rounding errors included: an underflow or a cancellation
-/// must not refute anything.
-fn enclosure(tape: &Tape, point: &Point) -> Interval {
-    let cell: Vec<Interval> = point
-        .coordinates
-        .iter()
-        .map(|c| Interval::point(c.1))
-        .collect();
-    tape.eval_in(&Intervals, &cell)[0]
-}
-
-/// A small cell of the region around a point.
-fn around(point: &Point, region: &Region) -> Cell {
-    let sides = point.coordinates.iter().zip(&region.dimensions);
-    let side = |((_, x), d): (&(String, f64), &crate::Dimension)| {
-        let (low, high) = (x.next_down().max(d.min), x.next_up().min(d.max));
-        Interval::new(low, high).unwrap_or(Interval::point(*x))
-    };
-    sides.map(side).collect()
-}
-
-/// Bisection along the straight line between two points of opposite sign, rounding errors
-/// included: a cell at whose ends the signs still differ, and the zero in it.
-fn zero_between(
-    tape: &Tape,
-    region: &Region,
-    negative: &Point,
-    positive: &Point,
-) -> Option<(Cell, Point)> {
-    let values = |p: &Point| p.coordinates.iter().map(|c| c.1).collect::<Vec<f64>>();
-    let (mut p, mut q) = (values(negative), values(positive));
-    if !region.connected(&p, &q) {
-        return None;
-    }
-    let middle_of = |p: &[f64], q: &[f64]| -> Vec<f64> {
-        p.iter().zip(q).map(|(p, q)| p + (q - p) / 2.0).collect()
-    };
-    let sign_at = |x: &[f64]| {
-        let cell: Vec<Interval> = x.iter().map(|&x| Interval::point(x)).collect();
-        let value = tape.eval_in(&Intervals, &cell)[0];
-        i8::from(value.is_positive()) - i8::from(value.is_negative())
-    };
-    let mut middle = middle_of(&p, &q);
-    while middle != p && middle != q {
-        match sign_at(&middle) {
-            -1 => p = middle,
-            1 => q = middle,
-            _ => break,
-        }
-        middle = middle_of(&p, &q);
-    }
-    // a zero within rounding errors: its neighbours with a sign, on both sides
-    for (end, sign) in [(&mut p, -1), (&mut q, 1)] {
-        let mut next = middle_of(end, &middle);
-        while next != *end && next != middle && sign_at(&next) == sign {
-            *end = next;
-            next = middle_of(end, &middle);
-        }
-    }
-    let mut value = [0.0];
-    tape.evaluator().eval(&middle, &mut value);
-    let ends = p.iter().zip(&q);
-    let bracket: Option<Cell> = ends
-        .map(|(&p, &q)| Interval::new(p.min(q), p.max(q)).ok())
-        .collect();
-    let names = negative.coordinates.iter().map(|c| c.0.clone());
-    let small = value[0].abs() <= 1e-9 * (positive.value - negative.value);
-    let zero = Point {
-        coordinates: names.zip(middle).collect(),
-        value: value[0],
-    };
-    Some((bracket?, zero)).filter(|_| small)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Dimension;
+    use crate::{Dimension, Point};
     use lynkeus_expr::Expr;
 
     fn side(x: Expr<'_>, min: f64, max: f64, integer: bool) -> Dimension {
@@ -273,7 +156,7 @@ mod tests {
             let Verdict::Refuted(witness) = sign.finding.verdict else {
                 panic!()
             };
-            assert!(witness.points[0].coordinates[0].1.abs() < 1e-9);
+            assert!(witness.points[0].coordinates[0].value.abs() < 1e-9);
         }
     }
 
@@ -314,7 +197,7 @@ mod tests {
         let Verdict::Refuted(witness) = sign.finding.verdict else {
             panic!()
         };
-        let zero = witness.zero().unwrap().coordinates[0].1;
+        let zero = witness.zero().unwrap().coordinates[0].value;
         assert!((zero.abs() - 0.5).abs() < 1e-9, "{zero}");
     }
 
@@ -329,7 +212,7 @@ mod tests {
             let Verdict::Refuted(witness) = &sign.finding.verdict else {
                 panic!("{sign:?}")
             };
-            let far = |p: &Point| p.coordinates[0].1.abs() > 1e10;
+            let far = |p: &Point| p.coordinates[0].value.abs() > 1e10;
             assert!(!witness.points.iter().any(far), "{witness}");
         }
         // of one sign as far as anyone looks

@@ -4,7 +4,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::visibility::{inside, spread};
-use crate::{Point, Region, Verdict, Witness};
+use crate::{Coordinate, Point, Region, Verdict, Witness};
 
 /// Points tried beside those on the edges of the box.
 const POINTS: usize = 12;
@@ -40,7 +40,7 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
         if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
             let names = region.dimensions.iter().map(|d| d.name.clone());
             return Ok(Verdict::Refuted(Witness::from(Point {
-                coordinates: names.zip(point).collect(),
+                coordinates: names.zip(point).map(Coordinate::from).collect(),
                 value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
             })));
         }

@@ -4,11 +4,26 @@ use std::fmt;
 
 use crate::words::short;
 
+/// Where a variable is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinate {
+    /// name of the variable
+    pub name: String,
+    /// its value
+    pub value: f64,
+}
+
+impl From<(String, f64)> for Coordinate {
+    fn from((name, value): (String, f64)) -> Self {
+        Self { name, value }
+    }
+}
+
 /// A point of the box and the value of the expression in question there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// (name, value) of every variable the expression depends on
-    pub coordinates: Vec<(String, f64)>,
+    /// of every variable the expression depends on
+    pub coordinates: Vec<Coordinate>,
     /// value of the expression at the point
     pub value: f64,
 }
@@ -171,7 +186,7 @@ impl Finding {
 impl fmt::Display for Point {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", short(self.value))?;
-        for (i, (name, value)) in self.coordinates.iter().enumerate() {
+        for (i, Coordinate { name, value }) in self.coordinates.iter().enumerate() {
             let word = if i == 0 { " at" } else { "," };
             write!(f, "{word} {name} = {}", short(*value))?;
         }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use lynkeus_expr::Spent;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{self as structure, Point, Standing, uniformity};
+use lynkeus_structure::{self as structure, Point, Standing, counted, uniformity};
 use serde_json::{Value, json};
 
 use crate::prepare::Prepared;
@@ -206,7 +206,7 @@ pub(crate) fn point(point: &Point) -> Value {
     let at = point
         .coordinates
         .iter()
-        .map(|(name, x)| (name.clone(), json!(x)));
+        .map(|c| (c.name.clone(), json!(c.value)));
     json!({ "value": point.value, "at": Value::Object(at.collect()) })
 }
 
@@ -221,9 +221,9 @@ impl fmt::Display for Report {
         };
         writeln!(
             f,
-            "{}: {} states, measured {}, unknown {}",
+            "{}: {}, measured {}, unknown {}",
             self.plant,
-            self.states.len(),
+            counted(self.states.len(), "state"),
             list(&self.measured),
             list(&self.unknown)
         )?;

@@ -81,6 +81,15 @@ pub struct Input {
 /// Sums of terms, so that terms can be dropped one by one.
 pub type Sum = Vec<String>;
 
+/// A derivative that stands in another's equation: an entry of the mass matrix beside its
+/// diagonal of ones.
+#[derive(Clone, Debug)]
+pub struct Coupling {
+    pub row: usize,
+    pub column: usize,
+    pub factor: String,
+}
+
 #[derive(Clone, Debug)]
 pub struct Case {
     pub kind: Kind,
@@ -88,6 +97,8 @@ pub struct Case {
     pub inputs: Vec<Input>,
     /// right-hand sides, one per state
     pub equations: Vec<Sum>,
+    /// empty where the derivatives are explicit
+    pub couplings: Vec<Coupling>,
     pub outputs: Vec<Sum>,
     /// standard deviation per output; 0 for none
     pub noise: Vec<f64>,
@@ -146,8 +157,12 @@ impl Case {
             _ = writeln!(text, "  output Real y{} = {};", i + 1, sum(output));
         }
         text += "equation\n";
-        for (side, terms) in self.states.iter().zip(&self.equations) {
-            _ = writeln!(text, "  der({}) = {};", side.name, sum(terms));
+        for (i, (side, terms)) in self.states.iter().zip(&self.equations).enumerate() {
+            let mut left = format!("der({})", side.name);
+            for Coupling { column, factor, .. } in self.couplings.iter().filter(|c| c.row == i) {
+                left += &format!(" + {factor}*der({})", self.states[*column].name);
+            }
+            _ = writeln!(text, "  {left} = {};", sum(terms));
         }
         text + "end M;\n"
     }

@@ -1,9 +1,11 @@
 //! What the library says about a case: every claim that can be attacked. The only file
 //! that knows what certificates look like.
 
-use lynkeus::observers::{Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning};
+use lynkeus::observers::{
+    Certificate, Check, Design, Examination, FAMILIES, Statement, Tuning, UltimateBound,
+};
 use lynkeus::prepare::Prepared;
-use lynkeus::structure::{Extended, Standing, Verdict};
+use lynkeus::structure::{Extended, Side, Standing, Verdict};
 use nalgebra::DMatrix;
 
 use super::tally::Counts;
@@ -19,11 +21,11 @@ pub struct Claim {
     /// none where the certificate makes no statement
     pub ultimate: Option<f64>,
     /// the same per quantity
-    pub each: Vec<(String, f64)>,
+    pub each: Vec<UltimateBound>,
     /// V = eᵀPe falls at 2·rate without disturbance and noise
     pub lyapunov: Option<DMatrix<f64>>,
     /// the box by names
-    pub sides: Vec<(String, f64, f64)>,
+    pub sides: Vec<Side>,
 }
 
 /// A condition that is said to fail, with the points that are to show it.

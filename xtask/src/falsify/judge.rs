@@ -281,10 +281,10 @@ pub fn attack<'a>(
         let own = claims
             .iter()
             .flat_map(|c| &c.sides)
-            .filter(|s| s.0 == state.name);
+            .filter(|s| s.name == state.name);
         // the smallest of the boxes, where two proofs have two
-        own.fold([state.min, state.max], |[low, high], (_, min, max)| {
-            [low.max(*min), high.min(*max)]
+        own.fold([state.min, state.max], |[low, high], own| {
+            [low.max(own.min), high.min(own.max)]
         })
     };
     let sides: Vec<[f64; 2]> = extended.states.iter().map(side).collect();

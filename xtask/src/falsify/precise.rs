@@ -1,47 +1,51 @@
-//! Expressions evaluated with some seventy decimal digits.
+//! Expressions evaluated with as many digits as are asked for.
 
 use std::cell::RefCell;
 
 use astro_float_num::{BigFloat, Consts, INF_NEG, INF_POS, NAN, RoundingMode};
 use lynkeus::expr::{Algebra, Binary, Reals, Unary};
 
-/// Bits.
-const PRECISION: usize = 256;
 const ROUNDING: RoundingMode = RoundingMode::ToEven;
 
-/// Numbers of 256 bits with infinities and NaN, with the meaning that `f64` gives to
+/// Numbers of so many bits with infinities and NaN, with the meaning that `f64` gives to
 /// every operation. The condition estimate of a linear system is that of `f64`.
-pub struct Precise(RefCell<Consts>);
+pub struct Precise {
+    bits: usize,
+    constants: RefCell<Consts>,
+}
 
 impl Precise {
-    pub fn new() -> Result<Self, String> {
+    pub fn new(bits: usize) -> Result<Self, String> {
         let constants = Consts::new().map_err(|e| format!("multiple precision: {e:?}"))?;
-        Ok(Self(RefCell::new(constants)))
+        Ok(Self {
+            bits,
+            constants: RefCell::new(constants),
+        })
     }
 
-    pub fn from(x: f64) -> BigFloat {
-        BigFloat::from_f64(x, PRECISION)
+    pub fn number(&self, x: f64) -> BigFloat {
+        BigFloat::from_f64(x, self.bits)
     }
 
-    pub fn add(x: &BigFloat, y: &BigFloat) -> BigFloat {
-        x.add(y, PRECISION, ROUNDING)
+    pub fn add(&self, x: &BigFloat, y: &BigFloat) -> BigFloat {
+        x.add(y, self.bits, ROUNDING)
     }
 
-    pub fn sub(x: &BigFloat, y: &BigFloat) -> BigFloat {
-        x.sub(y, PRECISION, ROUNDING)
+    pub fn sub(&self, x: &BigFloat, y: &BigFloat) -> BigFloat {
+        x.sub(y, self.bits, ROUNDING)
     }
 
-    pub fn mul(x: &BigFloat, y: &BigFloat) -> BigFloat {
-        x.mul(y, PRECISION, ROUNDING)
+    pub fn mul(&self, x: &BigFloat, y: &BigFloat) -> BigFloat {
+        x.mul(y, self.bits, ROUNDING)
     }
 
-    pub fn div(x: &BigFloat, y: &BigFloat) -> BigFloat {
+    pub fn div(&self, x: &BigFloat, y: &BigFloat) -> BigFloat {
         match y.is_zero() {
             // as IEEE has it, signed zeros aside
             true if x.is_zero() || x.is_nan() => NAN,
             true if x.is_negative() => INF_NEG,
             true => INF_POS,
-            false => x.div(y, PRECISION, ROUNDING),
+            false => x.div(y, self.bits, ROUNDING),
         }
     }
 
@@ -64,39 +68,44 @@ impl Precise {
             return 0.0;
         }
         // the most significant word is the last; the mantissa lies in [½, 1)
-        let top = words.last().map_or(0.0, |w| *w as f64 / 2f64.powi(64));
-        let size = top * 2f64.powi(exponent);
+        let top = words.last().map_or(0.0, |w| *w as f64 / 2f64.powi(63));
+        let size = top * 2f64.powi(exponent.saturating_sub(1));
         if x.is_negative() { -size } else { size }
     }
 
-    fn compare(x: &BigFloat, y: &BigFloat, holds: fn(std::cmp::Ordering) -> bool) -> BigFloat {
+    fn compare(
+        &self,
+        x: &BigFloat,
+        y: &BigFloat,
+        holds: fn(std::cmp::Ordering) -> bool,
+    ) -> BigFloat {
         match x.cmp(y) {
-            Some(order) => Self::from(f64::from(u8::from(holds(order.cmp(&0))))),
-            None => Self::from(0.0),
+            Some(order) => self.number(f64::from(u8::from(holds(order.cmp(&0))))),
+            None => self.number(0.0),
         }
     }
 
-    fn within_one(x: &BigFloat) -> bool {
-        let one = Self::from(1.0);
+    fn within_one(&self, x: &BigFloat) -> bool {
+        let one = self.number(1.0);
         x.abs().cmp(&one).is_some_and(|order| order <= 0)
     }
 
     fn atan2(&self, y: &BigFloat, x: &BigFloat) -> BigFloat {
-        let constants = &mut *self.0.borrow_mut();
-        let pi = constants.pi(PRECISION, ROUNDING);
+        let constants = &mut *self.constants.borrow_mut();
+        let pi = constants.pi(self.bits, ROUNDING);
         if x.is_zero() {
-            let half = Self::div(&pi, &Self::from(2.0));
+            let half = self.div(&pi, &self.number(2.0));
             return match (y.is_zero(), y.is_negative()) {
-                (true, _) => Self::from(0.0),
+                (true, _) => self.number(0.0),
                 (false, true) => half.neg(),
                 (false, false) => half,
             };
         }
-        let angle = Self::div(y, x).atan(PRECISION, ROUNDING, constants);
+        let angle = self.div(y, x).atan(self.bits, ROUNDING, constants);
         match (x.is_negative(), y.is_negative() && !y.is_zero()) {
             (false, _) => angle,
-            (true, true) => Self::sub(&angle, &pi),
-            (true, false) => Self::add(&angle, &pi),
+            (true, true) => self.sub(&angle, &pi),
+            (true, false) => self.add(&angle, &pi),
         }
     }
 }
@@ -105,19 +114,19 @@ impl Algebra for Precise {
     type Value = BigFloat;
 
     fn constant(&self, value: f64) -> BigFloat {
-        Self::from(value)
+        self.number(value)
     }
 
     fn unary(&self, op: Unary, x: &BigFloat) -> BigFloat {
-        let constants = &mut *self.0.borrow_mut();
-        let (p, r) = (PRECISION, ROUNDING);
+        let constants = &mut *self.constants.borrow_mut();
+        let (p, r) = (self.bits, ROUNDING);
         if x.is_nan() {
             return NAN;
         }
         match op {
             Unary::Neg => x.neg(),
             Unary::Abs => x.abs(),
-            Unary::Sign if x.is_zero() => Self::from(0.0),
+            Unary::Sign if x.is_zero() => self.number(0.0),
             Unary::Sign => x.signum(),
             Unary::Floor => x.floor(),
             Unary::Sqrt => x.sqrt(p, r),
@@ -127,22 +136,22 @@ impl Algebra for Precise {
             Unary::Sin => x.sin(p, r, constants),
             Unary::Cos => x.cos(p, r, constants),
             Unary::Tan => x.tan(p, r, constants),
-            Unary::Asin if !Self::within_one(x) => NAN,
+            Unary::Asin if !self.within_one(x) => NAN,
             Unary::Asin => x.asin(p, r, constants),
-            Unary::Acos if !Self::within_one(x) => NAN,
+            Unary::Acos if !self.within_one(x) => NAN,
             Unary::Acos => x.acos(p, r, constants),
             Unary::Atan => x.atan(p, r, constants),
             Unary::Sinh => x.sinh(p, r, constants),
             Unary::Cosh => x.cosh(p, r, constants),
             Unary::Tanh => x.tanh(p, r, constants),
-            Unary::Not => Self::from(f64::from(u8::from(x.is_zero()))),
+            Unary::Not => self.number(f64::from(u8::from(x.is_zero()))),
         }
     }
 
     fn powi(&self, x: &BigFloat, n: i32) -> BigFloat {
-        let power = x.powi(n.unsigned_abs() as usize, PRECISION, ROUNDING);
+        let power = x.powi(n.unsigned_abs() as usize, self.bits, ROUNDING);
         match n < 0 {
-            true => Self::div(&Self::from(1.0), &power),
+            true => self.div(&self.number(1.0), &power),
             false => power,
         }
     }
@@ -151,24 +160,24 @@ impl Algebra for Precise {
         if x.is_nan() || y.is_nan() {
             return NAN;
         }
-        let truth = |holds: bool| Self::from(f64::from(u8::from(holds)));
+        let truth = |holds: bool| self.number(f64::from(u8::from(holds)));
         match op {
-            Binary::Add => Self::add(x, y),
-            Binary::Sub => Self::sub(x, y),
-            Binary::Mul => Self::mul(x, y),
-            Binary::Div => Self::div(x, y),
+            Binary::Add => self.add(x, y),
+            Binary::Sub => self.sub(x, y),
+            Binary::Mul => self.mul(x, y),
+            Binary::Div => self.div(x, y),
             Binary::Pow if x.is_negative() && !x.is_zero() => match y.is_int() {
-                true => x.pow(y, PRECISION, ROUNDING, &mut self.0.borrow_mut()),
+                true => x.pow(y, self.bits, ROUNDING, &mut self.constants.borrow_mut()),
                 false => NAN,
             },
             Binary::Pow if x.is_zero() && y.is_negative() => INF_POS,
-            Binary::Pow => x.pow(y, PRECISION, ROUNDING, &mut self.0.borrow_mut()),
+            Binary::Pow => x.pow(y, self.bits, ROUNDING, &mut self.constants.borrow_mut()),
             Binary::Atan2 => self.atan2(x, y),
             Binary::Min => x.min(y),
             Binary::Max => x.max(y),
-            Binary::Less => Self::compare(x, y, std::cmp::Ordering::is_lt),
-            Binary::LessEq => Self::compare(x, y, std::cmp::Ordering::is_le),
-            Binary::Equal => Self::compare(x, y, std::cmp::Ordering::is_eq),
+            Binary::Less => self.compare(x, y, std::cmp::Ordering::is_lt),
+            Binary::LessEq => self.compare(x, y, std::cmp::Ordering::is_le),
+            Binary::Equal => self.compare(x, y, std::cmp::Ordering::is_eq),
             Binary::And => truth(!x.is_zero() && !y.is_zero()),
             Binary::Or => truth(!x.is_zero() || !y.is_zero()),
         }
@@ -202,20 +211,18 @@ impl Algebra for Precise {
                 if i == k {
                     continue;
                 }
-                let factor = Self::div(&rows[i][k], &rows[k][k]);
+                let factor = self.div(&rows[i][k], &rows[k][k]);
                 let pivot = rows[k].clone();
                 for (entry, above) in rows[i].iter_mut().zip(&pivot).skip(k) {
-                    *entry = Self::sub(entry, &Self::mul(&factor, above));
+                    *entry = self.sub(entry, &self.mul(&factor, above));
                 }
             }
         }
-        let x = (0..n)
-            .map(|k| Self::div(&rows[k][n], &rows[k][k]))
-            .collect();
+        let x = (0..n).map(|k| self.div(&rows[k][n], &rows[k][k])).collect();
         // its meaning is that of the factorisation that is used at run time
         let near = |values: &[BigFloat]| values.iter().map(Self::rounded).collect::<Vec<f64>>();
         let (_, rcond) = Reals.solve(&near(a), &near(b));
-        (x, Self::from(rcond))
+        (x, self.number(rcond))
     }
 }
 
@@ -227,7 +234,7 @@ mod tests {
     /// At many points the nearest number is what `f64` computes, up to its rounding.
     #[test]
     fn every_operation_means_what_it_means_in_f64() {
-        let precise = Precise::new().unwrap();
+        let precise = Precise::new(256).unwrap();
         let unary = [
             Unary::Neg,
             Unary::Abs,
@@ -269,7 +276,7 @@ mod tests {
             assert!(same, "{what}: {x} against {y}");
         };
         for x in points {
-            let big = Precise::from(x);
+            let big = precise.number(x);
             for op in unary {
                 agree(
                     format!("{op:?} {x}"),
@@ -286,7 +293,7 @@ mod tests {
             }
             for y in points {
                 for op in binary {
-                    let found = precise.binary(op, &big, &Precise::from(y));
+                    let found = precise.binary(op, &big, &precise.number(y));
                     agree(format!("{op:?} {x} {y}"), &found, Reals.binary(op, &x, &y));
                 }
             }
@@ -295,22 +302,22 @@ mod tests {
 
     #[test]
     fn a_linear_system_is_solved() {
-        let precise = Precise::new().unwrap();
-        let a = [0.0, 2.0, 1.0, 1.0].map(Precise::from);
-        let (x, _) = precise.solve(&a, &[4.0, 3.0].map(Precise::from));
+        let precise = Precise::new(256).unwrap();
+        let a = [0.0, 2.0, 1.0, 1.0].map(|x| precise.number(x));
+        let (x, _) = precise.solve(&a, &[4.0, 3.0].map(|x| precise.number(x)));
         let x: Vec<f64> = x.iter().map(Precise::rounded).collect();
         assert_eq!(x, [1.0, 2.0]);
     }
 
     /// (1 + h) − 1 − h with h = 1e-30 is nothing here, where `f64` has −1e-30.
     #[test]
-    fn seventy_digits_are_kept() {
+    fn the_digits_asked_for_are_kept() {
         let graph = Graph::new();
         let h = graph.symbol("h");
         let f = (h + 1.0) - 1.0 - h;
         let tape = Tape::new(&graph, &[h.node()], &[f.node()]).unwrap();
-        let precise = Precise::new().unwrap();
-        let found = Precise::rounded(&tape.eval_in(&precise, &[Precise::from(1e-30)])[0]);
+        let precise = Precise::new(256).unwrap();
+        let found = Precise::rounded(&tape.eval_in(&precise, &[precise.number(1e-30)])[0]);
         assert!(found.abs() < 1e-60, "{found}");
         assert_eq!(tape.eval_in(&Reals, &[1e-30])[0], -1e-30);
     }

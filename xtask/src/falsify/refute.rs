@@ -1,10 +1,12 @@
-//! Refutations, looked at again with seventy digits: does the witness show what it is
+//! Refutations, looked at again with many digits: does the witness show what it is
 //! said to show? Slopes are differences of the equations' values, so the library's
 //! derivatives are judged as well.
 
+mod stability;
+
 use astro_float_num::BigFloat;
-use lynkeus::expr::{Node, Tape};
-use lynkeus::observers::{Design, Observer, Statement};
+use lynkeus::expr::{Algebra, Node, Tape};
+use lynkeus::observers::{Design, Statement};
 use lynkeus::structure::{Extended, Point};
 
 use super::claims::Refutation;
@@ -25,9 +27,11 @@ pub fn check(refutation: &Refutation, extended: &Extended<'_>, design: Option<&D
         refutation.of_error,
         slope_of(&refutation.condition, extended),
     ) {
-        (false, Some(slope)) => sign(&slope, refutation, extended),
+        (false, Some(slope)) => finely(|lens| sign(&slope, refutation, extended, lens)),
         (true, _) => match design {
-            Some(design) => unstable(&design.observer, refutation, extended),
+            Some(design) => {
+                finely(|lens| stability::unstable(&design.observer, refutation, extended, lens))
+            }
             None => Ok(Answer::Unread),
         },
         _ => Ok(Answer::Unread),
@@ -58,20 +62,74 @@ fn slope_of(condition: &Statement, extended: &Extended<'_>) -> Option<Slope> {
     Some(Slope { value, of })
 }
 
-/// Steps of differences, to be seen against 1e-77.
-const STEP: f64 = 1e-36;
+/// How finely a witness is looked at.
+struct Lens {
+    precise: Precise,
+    /// of differences
+    step: BigFloat,
+    /// whether the slopes to both sides of a point are looked at, too: at a kink and at
+    /// the edge of where a function has a value, a slope is that to one side
+    one_sided: bool,
+}
+
+impl Lens {
+    /// Seventy digits with steps of 1e-36.
+    fn coarse() -> Result<Self, String> {
+        Self::new(256, 120, false)
+    }
+
+    /// Five thousand digits with steps of 1e-421: beside sinh(500) or the thousandth power
+    /// of a thousand a slope of one can still be seen, and a pole may be as near as
+    /// numbers of double precision come.
+    fn fine() -> Result<Self, String> {
+        Self::new(16_384, 1400, true)
+    }
+
+    fn new(bits: usize, halvings: i32, one_sided: bool) -> Result<Self, String> {
+        let precise = Precise::new(bits)?;
+        let step = precise.powi(&precise.number(2.0), -halvings);
+        Ok(Self {
+            precise,
+            step,
+            one_sided,
+        })
+    }
+
+    /// The slope from `below` to `above`, so many steps away from each other.
+    fn slope(&self, above: &BigFloat, below: &BigFloat, steps: f64) -> BigFloat {
+        let far = self.precise.mul(&self.step, &self.precise.number(steps));
+        self.precise.div(&self.precise.sub(above, below), &far)
+    }
+}
+
+/// A judgement by the coarse lens where that confirms, else by the fine one.
+fn finely(judge: impl Fn(&Lens) -> Result<Answer, String>) -> Result<Answer, String> {
+    match judge(&Lens::coarse()?) {
+        Err(_) => judge(&Lens::fine()?),
+        judged => judged,
+    }
+}
+
 /// Slopes below it count as zero.
 const ZERO: f64 = 1e-26;
 
-fn sign(slope: &Slope, refutation: &Refutation, extended: &Extended<'_>) -> Result<Answer, String> {
+fn sign(
+    slope: &Slope,
+    refutation: &Refutation,
+    extended: &Extended<'_>,
+    lens: &Lens,
+) -> Result<Answer, String> {
     let values: Vec<f64> = refutation
         .points
         .iter()
-        .map(|point| slope_at(slope, point, extended))
+        .map(|point| slope_at(slope, point, extended, lens))
         .collect::<Result<_, _>>()?;
-    let size = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+    let sizes = values.iter().map(|v| v.abs()).filter(|v| v.is_finite());
+    let size = sizes.fold(0.0, f64::max);
     for (point, value) in refutation.points.iter().zip(&values) {
-        if value.is_nan() || (value - point.value).abs() > 1e-6 * (1e-3 + size) {
+        let near = (value - point.value).abs() <= 1e-6 * (1e-3 + size);
+        // beyond the largest number of double precision
+        if !near && *value != point.value {
             return Err(format!(
                 "the slope is {value}, said to be {} at {:?}",
                 point.value, point.coordinates
@@ -89,212 +147,126 @@ fn sign(slope: &Slope, refutation: &Refutation, extended: &Extended<'_>) -> Resu
     }
 }
 
-/// The central difference at a point of the box.
-fn slope_at(slope: &Slope, point: &Point, extended: &Extended<'_>) -> Result<f64, String> {
+/// Places tried for what the slope does not depend on.
+const PLACES: usize = 12;
+
+/// The slope at a point of the box.
+fn slope_at(
+    slope: &Slope,
+    point: &Point,
+    extended: &Extended<'_>,
+    lens: &Lens,
+) -> Result<f64, String> {
     let graph = extended.graph();
     let region = extended.region();
     let symbols = region.symbols();
-    let mut place = vec![];
-    // what the slope does not depend on is beside the middle of its range, where models
-    // like to switch
-    for (side, centre) in region.dimensions.iter().zip(&region.centre()) {
-        let width = (side.max - side.min).min(1e6);
-        let centre = centre + 0.1234 * width;
-        let given = point
-            .coordinates
-            .iter()
-            .find(|c| c.0 == side.name)
-            .map(|c| c.1);
-        if given.is_some_and(|x| !(side.min <= x && x <= side.max)) {
-            return Err(format!("{} = {given:?} is outside of the box", side.name));
-        }
-        place.push(Precise::from(given.unwrap_or(centre)));
-    }
     let moved = symbols
         .iter()
         .position(|s| *s == slope.of)
         .ok_or("no such symbol")?;
     let tape = Tape::new(graph, &symbols, &[slope.value]).map_err(|e| e.to_string())?;
-    let precise = Precise::new()?;
-    let at = |by: f64| {
-        let mut place = place.clone();
-        place[moved] = Precise::add(&place[moved], &Precise::from(by));
-        tape.eval_in(&precise, &place).remove(0)
-    };
-    Ok(Precise::rounded(&difference(&at(STEP), &at(-STEP))))
-}
-
-fn difference(above: &BigFloat, below: &BigFloat) -> BigFloat {
-    Precise::div(&Precise::sub(above, below), &Precise::from(2.0 * STEP))
-}
-
-/// An eigenvalue of the error's Jacobian is said not to decay, by more than 1e-9 of the
-/// matrix's size.
-fn unstable(
-    observer: &Observer,
-    refutation: &Refutation,
-    extended: &Extended<'_>,
-) -> Result<Answer, String> {
-    let Some(point) = refutation.points.first() else {
-        return Err("no point".into());
-    };
-    let Some(A) = jacobian(observer, point, extended)? else {
-        return Ok(Answer::Unread);
-    };
-    let n = A.len();
-    let size = A
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |m, a| m.max(Precise::rounded(a).abs()));
-    if !size.is_finite() {
-        return Err(format!(
-            "the Jacobian has no value at {:?}",
-            point.coordinates
-        ));
-    }
-    let mut shifted = A;
-    for (i, row) in shifted.iter_mut().enumerate() {
-        row[i] = Precise::sub(&row[i], &Precise::from(1e-10 * size));
-    }
-    match is_hurwitz(&shifted) {
-        true => Err(format!(
-            "all {n} eigenvalues decay at {:?}",
-            point.coordinates
-        )),
-        false => Ok(Answer::Confirmed),
-    }
-}
-
-/// ∂x̂'/∂x̂ where the estimate is right; none for observers with further states or signals.
-fn jacobian(
-    observer: &Observer,
-    point: &Point,
-    extended: &Extended<'_>,
-) -> Result<Option<Vec<Vec<BigFloat>>>, String> {
-    let n = extended.states.len();
-    if observer.states.len() != n || !observer.input_derivatives.is_empty() {
-        return Ok(None);
-    }
-    let value = |name: &str| {
-        let given = point.coordinates.iter().find(|c| c.0 == name);
-        Precise::from(given.map_or(0.0, |c| c.1))
-    };
-    let graph = extended.graph();
-    let precise = Precise::new()?;
-    let names = extended.states.iter().chain(&extended.inputs);
-    let mut symbols: Vec<Node> = names.clone().map(|v| v.node).collect();
-    let mut place: Vec<BigFloat> = names.map(|v| value(&v.name)).collect();
-    symbols.push(extended.plant.time);
-    place.push(value("time"));
-    let h: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
-    let outputs = Tape::new(graph, &symbols, &h).map_err(|e| e.to_string())?;
-    let y = outputs.eval_in(&precise, &place);
-    for (signal, y) in observer.measured.iter().zip(y) {
-        symbols.push(signal.symbol);
-        place.push(y);
-    }
-    let mut own = vec![];
-    for (k, (hat, _)) in observer.states.iter().enumerate() {
-        own.push(symbols.len());
-        symbols.push(hat.symbol);
-        place.push(place[k].clone());
-    }
-    let tape = Tape::new(graph, &symbols, &observer.derivatives).map_err(|e| e.to_string())?;
-    let mut columns = vec![];
-    for moved in own {
-        let at = |by: f64| {
+    let mut found = f64::NAN;
+    for attempt in 0..PLACES {
+        let place = filled(point, extended, attempt)?;
+        let place: Vec<BigFloat> = place.iter().map(|x| lens.precise.number(*x)).collect();
+        let at = |by: &BigFloat| {
             let mut place = place.clone();
-            place[moved] = Precise::add(&place[moved], &Precise::from(by));
-            tape.eval_in(&precise, &place)
+            place[moved] = lens.precise.add(&place[moved], by);
+            tape.eval_in(&lens.precise, &place).remove(0)
         };
-        let (above, below) = (at(STEP), at(-STEP));
-        let column: Vec<BigFloat> = above
-            .iter()
-            .zip(&below)
-            .map(|(a, b)| difference(a, b))
-            .collect();
-        columns.push(column);
+        found = told(lens, at, point.value);
+        if !found.is_nan() {
+            break;
+        }
     }
-    let row = |i: usize| columns.iter().map(|c| c[i].clone()).collect();
-    Ok(Some((0..n).map(row).collect()))
+    Ok(found)
 }
 
-/// Whether every eigenvalue has a negative real part: the coefficients by Faddeev and
-/// LeVerrier, then Routh's scheme.
-fn is_hurwitz(A: &[Vec<BigFloat>]) -> bool {
-    let n = A.len();
-    let zero = Precise::from(0.0);
-    let mut coefficients = vec![Precise::from(1.0)];
-    let mut M = vec![vec![zero.clone(); n]; n];
-    for k in 1..=n {
-        let last = coefficients[k - 1].clone();
-        M = product(A, &M);
-        for (i, row) in M.iter_mut().enumerate() {
-            row[i] = Precise::add(&row[i], &last);
-        }
-        let AM = product(A, &M);
-        let trace = (0..n).fold(zero.clone(), |sum, i| Precise::add(&sum, &AM[i][i]));
-        coefficients.push(Precise::div(&trace, &Precise::from(-(k as f64))));
-    }
-    let every = |start: usize| {
-        coefficients
-            .iter()
-            .skip(start)
-            .step_by(2)
-            .cloned()
-            .collect()
-    };
-    let mut rows: [Vec<BigFloat>; 2] = [every(0), every(1)];
-    for _ in 0..n {
-        let [above, below] = &rows;
-        let positive = |x: Option<&BigFloat>| x.is_some_and(|x| x.is_positive() && !x.is_zero());
-        if !positive(above.first()) || !positive(below.first()) {
-            return false;
-        }
-        let of = |row: &[BigFloat], i: usize| row.get(i).cloned().unwrap_or(zero.clone());
-        let ratio = Precise::div(&above[0], &below[0]);
-        let next: Vec<BigFloat> = (1..above.len())
-            .map(|i| Precise::sub(&of(above, i), &Precise::mul(&ratio, &of(below, i))))
-            .collect();
-        if next.is_empty() {
-            return true;
-        }
-        rows = [below.clone(), next];
-    }
-    true
-}
-
-fn product(A: &[Vec<BigFloat>], B: &[Vec<BigFloat>]) -> Vec<Vec<BigFloat>> {
-    let n = A.len();
-    let entry = |i: usize, j: usize| {
-        (0..n).fold(Precise::from(0.0), |sum, k| {
-            Precise::add(&sum, &Precise::mul(&A[i][k], &B[k][j]))
+/// A place of the box that agrees with the point. What the slope does not depend on is
+/// beside the middle of its range, where models like to switch, and elsewhere in further
+/// attempts: the equation may have no value there.
+fn filled(point: &Point, extended: &Extended<'_>, attempt: usize) -> Result<Vec<f64>, String> {
+    let region = extended.region();
+    let sides = region.dimensions.iter().zip(region.centre()).enumerate();
+    sides
+        .map(|(i, (side, centre))| {
+            let share = (0.6234 + 0.618 * (attempt * (i + 1)) as f64).fract();
+            let width = (side.max - side.min).min(1e6);
+            let coordinates = &point.coordinates;
+            match coordinates.iter().find(|c| c.name == side.name) {
+                None => Ok(centre + (share - 0.5) * width),
+                Some(c) if side.min <= c.value && c.value <= side.max => Ok(c.value),
+                Some(c) => Err(format!("{} = {} is outside of the box", c.name, c.value)),
+            }
         })
-    };
-    (0..n)
-        .map(|i| (0..n).map(|j| entry(i, j)).collect())
         .collect()
+}
+
+/// The slope of `at` around 0; of those to both sides and between them the one that is
+/// nearest to what is said, where the lens has them.
+fn told(lens: &Lens, at: impl Fn(&BigFloat) -> BigFloat, said: f64) -> f64 {
+    let zero = lens.precise.number(0.0);
+    let (above, below) = (at(&lens.step), at(&lens.step.neg()));
+    let between = Precise::rounded(&lens.slope(&above, &below, 2.0));
+    if !lens.one_sided {
+        return between;
+    }
+    let here = at(&zero);
+    let up = Precise::rounded(&lens.slope(&above, &here, 1.0));
+    let down = Precise::rounded(&lens.slope(&here, &below, 1.0));
+    let apart = |x: &f64| match *x == said {
+        true => 0.0,
+        false => (x - said).abs(),
+    };
+    let slopes = [between, up, down].into_iter().filter(|x| !x.is_nan());
+    let nearest = slopes.min_by(|x, y| apart(x).total_cmp(&apart(y)));
+    nearest.unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lynkeus::expr::{Expr, Graph, Unary};
 
-    fn matrix(rows: &[&[f64]]) -> Vec<Vec<BigFloat>> {
-        rows.iter()
-            .map(|row| row.iter().map(|x| Precise::from(*x)).collect())
-            .collect()
+    fn seen(lens: &Lens, f: &dyn Fn(Expr<'_>) -> Node, x: f64, said: f64) -> f64 {
+        let graph = Graph::new();
+        let symbol = graph.symbol("x");
+        let tape = Tape::new(&graph, &[symbol.node()], &[f(symbol)]).unwrap();
+        let x = lens.precise.number(x);
+        let at = |by: &BigFloat| {
+            let place = [lens.precise.add(&x, by)];
+            tape.eval_in(&lens.precise, &place).remove(0)
+        };
+        told(lens, at, said)
     }
 
+    /// d(x + sinh(500))/dx, that of x + 1000^1000, and −1/x² at 1e-154.
     #[test]
-    fn stable_matrices_are_told_from_unstable_ones() {
-        assert!(is_hurwitz(&matrix(&[&[-1.0]])));
-        assert!(!is_hurwitz(&matrix(&[&[1e-20]])));
-        assert!(is_hurwitz(&matrix(&[&[0.0, 1.0], &[-2.0, -1e-9]])));
-        assert!(!is_hurwitz(&matrix(&[&[0.0, 1.0], &[-2.0, 1e-9]])));
-        assert!(!is_hurwitz(&matrix(&[&[0.0, 1.0], &[-1.0, 0.0]])));
-        // s³ + s² + 2s + c is stable below c = 2
-        let of = |c: f64| matrix(&[&[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0], &[-c, -2.0, -1.0]]);
-        assert!(is_hurwitz(&of(1.999)) && !is_hurwitz(&of(2.001)));
+    fn a_slope_beside_a_huge_value_and_beside_a_pole() {
+        let (coarse, fine) = (Lens::coarse().unwrap(), Lens::fine().unwrap());
+        let huge = |x: Expr<'_>| (x + x.graph().constant(500.0).sinh()).node();
+        assert_ne!(seen(&coarse, &huge, 0.3, 1.0), 1.0);
+        assert_eq!(seen(&fine, &huge, 0.3, 1.0), 1.0);
+        let power = |x: Expr<'_>| (x + x.graph().constant(1000.0).powi(1000)).node();
+        assert_eq!(seen(&fine, &power, 0.3, 1.0), 1.0);
+        let pole = |x: Expr<'_>| (1.0 / x).node();
+        let (found, slope) = (seen(&fine, &pole, 1e-154, -1e308), -1e308);
+        assert!((found / slope - 1.0).abs() < 1e-9, "{found}");
+        // what is said is no excuse
+        let found = seen(&fine, &pole, 1e-154, 1.0);
+        assert!((found / slope - 1.0).abs() < 1e-9, "{found}");
+    }
+
+    /// |x| has the slopes −1 and 1 at 0 and no other beside that between; the root begins
+    /// at 0.
+    #[test]
+    fn at_a_kink_the_slope_is_that_to_one_side() {
+        let fine = Lens::fine().unwrap();
+        let kink = |x: Expr<'_>| x.graph().unary(Unary::Abs, x.node());
+        let found = [-1.0, 0.0, 1.0, 0.6].map(|said| seen(&fine, &kink, 0.0, said));
+        assert_eq!(found, [-1.0, 0.0, 1.0, 1.0]);
+        let root = |x: Expr<'_>| (x.powi(2) * x.sqrt()).node();
+        assert!(seen(&Lens::coarse().unwrap(), &root, 0.0, 0.0).is_nan());
+        assert!(seen(&fine, &root, 0.0, 0.0).abs() < 1e-300);
     }
 }

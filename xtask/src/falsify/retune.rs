@@ -6,6 +6,7 @@ use lynkeus::structure::Extended;
 
 use super::case::{Case, Kind, Role};
 use super::claims::{self, Claim, Findings};
+use super::facts;
 use super::judge::{Desk, Flaw, Violation, attack};
 use super::pair::Pair;
 use crate::numbers::Numbers;
@@ -114,6 +115,25 @@ fn scale(case: &mut Case, factor: f64) -> bool {
     false
 }
 
+/// Whether the plant itself is faster somewhere on its box than any gain that is tried.
+fn is_stiff(pair: &mut Pair, extended: &Extended<'_>, numbers: &mut Numbers) -> bool {
+    let plant = extended.plant;
+    let side = |v: &lynkeus::model::Variable| facts::finite(v.min, v.max);
+    let sides: Vec<[f64; 2]> = plant.states.iter().map(side).collect();
+    let acting: Vec<[f64; 2]> = plant.inputs.iter().map(side).collect();
+    (0..60).any(|_| {
+        let mut place = |sides: &[[f64; 2]]| -> Vec<f64> {
+            let point = sides.iter().map(|s| numbers.between(s[0], s[1]));
+            point.collect()
+        };
+        let (x, u) = (place(&sides), place(&acting));
+        let slopes = pair.plant(0.0, &x, &u).iter().zip(&sides);
+        slopes
+            .into_iter()
+            .any(|(x, side)| x.abs() > LARGEST * (side[1] - side[0]))
+    })
+}
+
 /// Where every condition is proved, some gain has to make a small error shrink. Looks
 /// for a plant on which the error grows a hundredfold for each of several gains.
 pub fn diverges(
@@ -144,6 +164,9 @@ pub fn diverges(
             || pair.estimates() != extended.states.len()
             || pair.held.iter().any(Option::is_none)
         {
+            return Ok(None);
+        }
+        if is_stiff(&mut pair, extended, numbers) {
             return Ok(None);
         }
         let n = extended.states.len() as i32;

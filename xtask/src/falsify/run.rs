@@ -98,10 +98,10 @@ impl<'a> Run<'a> {
                 let allowed = fades + last;
                 self.note(norm, allowed, || named("|e|", norm, allowed));
             }
-            for ((name, last), e) in claim.each.iter().zip(&error) {
-                let (e, allowed) = (e.abs(), fades + last);
+            for (bound, e) in claim.each.iter().zip(&error) {
+                let (e, allowed) = (e.abs(), fades + bound.value);
                 self.note(e, allowed, || {
-                    named(&format!("error of {name}"), e, allowed)
+                    named(&format!("error of {}", bound.name), e, allowed)
                 });
             }
             // sqrt V in the unit of the error

@@ -49,6 +49,11 @@ fn simpler(case: &Case) -> Vec<Case> {
             cases.push(less);
         }
     }
+    for i in 0..case.couplings.len() {
+        let mut less = case.clone();
+        less.couplings.remove(i);
+        cases.push(less);
+    }
     for i in 0..case.outputs.len() {
         for j in 0..case.outputs[i].len() {
             if case.outputs[i].len() > 1 {
@@ -65,8 +70,12 @@ fn simpler(case: &Case) -> Vec<Case> {
     }
     for i in 0..case.inputs.len() {
         let name = &case.inputs[i].side.name;
-        let sums = case.equations.iter().chain(&case.outputs);
-        if !sums.flatten().any(|term| term.contains(name.as_str())) {
+        let terms = case.equations.iter().chain(&case.outputs).flatten();
+        let factors = case.couplings.iter().map(|c| &c.factor);
+        if !terms
+            .chain(factors)
+            .any(|term| term.contains(name.as_str()))
+        {
             let mut less = case.clone();
             less.inputs.remove(i);
             cases.push(less);

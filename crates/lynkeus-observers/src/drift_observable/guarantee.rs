@@ -25,7 +25,7 @@ use super::gains::{closed_loop, slowest, spread};
 use super::lipschitz::Share;
 use super::proof::{Proof, Solutions};
 use super::variant::Variant;
-use crate::{Assumptions, Certificate, Constant};
+use crate::{Assumptions, Certificate, Constant, UltimateBound};
 
 /// Shares of the filter's slowest pole tried for α₂.
 const SHARES: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
@@ -73,7 +73,7 @@ pub(super) fn conclude(
     if let Some(left) = left.min_by(|x, y| x.whole.total_cmp(&y.whole)) {
         let names = proof.extended.states.iter().map(|x| x.name.clone());
         found.ultimate_bound = Some(left.whole);
-        found.ultimate = names.zip(left.each).collect();
+        found.ultimate = names.zip(left.each).map(UltimateBound::from).collect();
     }
 }
 

@@ -248,7 +248,7 @@ impl<'a> Search<'a> {
         let sides = self.system.sides.dimensions.iter();
         let named = sides.zip(self.full(&middle, 0.0));
         Some(Point {
-            coordinates: named.map(|(d, x)| (d.name.clone(), x)).collect(),
+            coordinates: named.map(|(d, x)| (d.name.clone(), x).into()).collect(),
             value,
         })
     }

@@ -51,8 +51,8 @@ impl ErrorSystem {
         let same = pairs.filter(|((s, _), e)| s.symbol == e.node).count();
         if same != observer.states.len() || same != extended.states.len() {
             let reason = format!(
-                "the observer has {} states for {} quantities to estimate: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
-                observer.states.len(),
+                "the observer has {} for {} to be estimated: its gain is a state, or its coordinates are not the plant's; see what its theorem says",
+                counted(observer.states.len(), "state"),
                 extended.states.len()
             );
             return Ok(Err(reason));

@@ -10,7 +10,7 @@ use crate::statement::refuted;
 use crate::{Check, Inequality};
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
 use lynkeus_proof::decay::is_unstable;
-use lynkeus_structure::{Dimension, Extended, Point};
+use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
 use nalgebra::DMatrix;
 
 use super::edges::edges;
@@ -74,7 +74,7 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
         },
         unstable: highest > 0.0 && is_unstable(&system.enclosed_at(&cell)),
         worst: Point {
-            coordinates: named.collect(),
+            coordinates: named.map(Coordinate::from).collect(),
             value: highest,
         },
     }

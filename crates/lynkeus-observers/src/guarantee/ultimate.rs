@@ -14,7 +14,7 @@ use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
 use super::error_system::ErrorSystem;
-use crate::Assumptions;
+use crate::{Assumptions, UltimateBound};
 
 /// A guessed bound of a quadratic form is raised by this before it is tried.
 const RESERVE: f64 = 1e-6;
@@ -26,7 +26,7 @@ pub(super) struct Bounds {
     /// of its Euclidean norm
     pub norm: f64,
     /// per extended state
-    pub states: Vec<(String, f64)>,
+    pub states: Vec<UltimateBound>,
 }
 
 /// The bounds; none where an assumed size is infinite.
@@ -59,7 +59,7 @@ pub(super) fn bounds(
         let mut unit = DMatrix::zeros(n, n);
         unit[(i, i)] = 1.0;
         let bound = finite((r * width(&proof.P, &unit)?).hi())?;
-        Some((extended.states[i].name.clone(), bound))
+        Some((extended.states[i].name.clone(), bound).into())
     };
     Some(Bounds {
         norm: finite((r * width(&proof.P, &DMatrix::identity(n, n))?).hi())?,

@@ -76,7 +76,7 @@ pub(crate) fn conclude(
             // in the order of the states, whatever that of the chains is
             let mut states = found.states;
             states.sort_unstable_by_key(|(i, _)| *i);
-            let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound);
+            let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound).into();
             certificate.ultimate = states.into_iter().map(name).collect();
         }
         _ => certificate.notes.push(

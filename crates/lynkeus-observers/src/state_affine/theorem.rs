@@ -373,7 +373,9 @@ impl Study<'_> {
             if norm.is_finite() {
                 certificate.ultimate_bound = Some(norm);
                 let name = |p: usize| self.extended.states[self.order[p]].name.clone();
-                certificate.ultimate = (0..self.order.len()).map(|p| (name(p), bound(p))).collect();
+                certificate.ultimate = (0..self.order.len())
+                    .map(|p| (name(p), bound(p)).into())
+                    .collect();
             }
             return;
         }

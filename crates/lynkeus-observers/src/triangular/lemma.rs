@@ -7,7 +7,7 @@ use lynkeus_gain::Tridiagonal;
 use lynkeus_gain::lemma1::{self, Breaking, Kernel};
 use lynkeus_proof::chain::Chain;
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::Point;
+use lynkeus_structure::{Coordinate, Point};
 
 use crate::Constant;
 use crate::proof::words::shown;
@@ -133,7 +133,7 @@ fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) 
     let name = |j: usize| format!("a{}", j + 1);
     let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
     let point = Point {
-        coordinates: coordinates.collect(),
+        coordinates: coordinates.map(Coordinate::from).collect(),
         value: found.eigenvalue,
     };
     (refuted(title, point, detail), true)

@@ -16,8 +16,7 @@ use crate::statement::{Statement, proved, undecided};
 use crate::{Check, Farza};
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::shortened_stability;
-use lynkeus_structure::Finding;
-use lynkeus_structure::{Point, Region};
+use lynkeus_structure::{Finding, Point, Region, counted};
 
 use super::form::Form;
 use super::partition;
@@ -99,8 +98,8 @@ pub(super) fn covered(form: &Form<'_, '_>, region: &Region) -> Result<Check, Des
     let reason = match (form.shape(), form.bends()) {
         (Shape::Square, _) => {
             return Ok(proved(format!(
-                "the blocks of Λ₂ are square: {} states in each block of X²",
-                sizes[0]
+                "the blocks of Λ₂ are square: {} in each block of X²",
+                counted(sizes[0], "state")
             )));
         }
         (Shape::Tall, false) => {

@@ -22,7 +22,7 @@ use super::form::Form;
 use super::norms::{Constants, Norms, in_S};
 use super::settings::{Settings, Thetas};
 use crate::enclosure::figures;
-use crate::{Assumptions, Certificate, Constant, DesignError, Examination};
+use crate::{Assumptions, Certificate, Constant, DesignError, Examination, UltimateBound};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
 /// Numbers that have to be exceeded are by this factor at least.
@@ -331,7 +331,7 @@ impl Proof<'_, '_, '_> {
         Ok([of(&self.form.first)?, of(&self.form.second)?])
     }
 
-    fn per_state(&self, sizes: &[f64]) -> Vec<(String, f64)> {
+    fn per_state(&self, sizes: &[f64]) -> Vec<UltimateBound> {
         let (form, extended) = (self.form, self.form.extended);
         let n = extended.plant_states();
         let unknown: Vec<usize> = (n..extended.states.len()).collect();
@@ -340,7 +340,7 @@ impl Proof<'_, '_, '_> {
         let place = |i: usize| groups.iter().position(|g| g.contains(&i));
         let states = extended.states.iter().enumerate();
         states
-            .filter_map(|(i, s)| Some((s.name.clone(), *sizes.get(place(i)?)?)))
+            .filter_map(|(i, s)| Some((s.name.clone(), *sizes.get(place(i)?)?).into()))
             .collect()
     }
 }

@@ -315,7 +315,7 @@ fn the_examination_tells_the_degree_and_the_singular_surface() {
     };
     // already for a constant input: u' does not appear
     let at = &witness.points[0].coordinates;
-    let value = |name: &str| at.iter().find(|c| c.0 == name).map(|c| c.1);
+    let value = |name: &str| at.iter().find(|c| c.name == name).map(|c| c.value);
     let (x, u) = (
         ["x1", "x2", "x3"].map(|n| value(n).unwrap()),
         value("u").unwrap(),

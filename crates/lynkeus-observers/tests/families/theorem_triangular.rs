@@ -59,14 +59,14 @@ fn a_pendulum_by_hand() {
     assert_safely(found.rate.unwrap(), 0.279_866_040_234_261_3, false);
     assert_safely(constant(&found, "λ1"), 8.817_954_624_466_813, true);
     assert_safely(found.ultimate_bound.unwrap(), 1.980_352_701_167_238_8, true);
-    for ((name, bound), expected) in found
+    for (bound, expected) in found
         .ultimate
         .iter()
         .zip([("angle", 0.275_973_92), ("speed", 1.961_029_12)])
     {
         assert!(
-            name == expected.0 && (bound - expected.1).abs() < 1e-7,
-            "{name} {bound}"
+            bound.name == expected.0 && (bound.value - expected.1).abs() < 1e-7,
+            "{bound:?}"
         );
     }
 }
@@ -120,7 +120,7 @@ fn the_printed_matrix_is_refuted_with_its_direction() {
         point
             .coordinates
             .iter()
-            .all(|(name, a)| name.starts_with('a') && *a == 1.0)
+            .all(|c| c.name.starts_with('a') && c.value == 1.0)
     );
     assert!(
         check.detail.contains("for no ρ") && check.detail.contains("·x"),

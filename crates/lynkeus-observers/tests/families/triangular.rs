@@ -133,7 +133,7 @@ fn the_counter_example_is_refused_with_its_witness() {
     let found: Vec<(f64, f64)> = witness
         .points
         .iter()
-        .map(|p| (p.coordinates[0].1, p.value))
+        .map(|p| (p.coordinates[0].value, p.value))
         .collect();
     assert_eq!(found, [(0.0, -1.0), (1.0, 1.0)]);
 }

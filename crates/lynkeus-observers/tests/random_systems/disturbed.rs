@@ -53,7 +53,8 @@ impl<'c> Bound<'c> {
             e.norm()
         );
         let root = self.claim.V(start).sqrt();
-        for (i, (name, last)) in self.certificate.ultimate.iter().enumerate() {
+        for (i, bound) in self.certificate.ultimate.iter().enumerate() {
+            let (name, last) = (&bound.name, bound.value);
             let fading = fading * root * self.widths[i];
             assert!(
                 e[i].abs() <= (fading + last) * slack,

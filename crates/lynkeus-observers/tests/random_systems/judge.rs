@@ -24,7 +24,7 @@ pub struct Sides {
 impl Sides {
     pub fn new(certificate: &Certificate, states: usize) -> Self {
         let sides = certificate.region.iter();
-        let all: Vec<(f64, f64)> = sides.map(|(_, low, high)| (*low, *high)).collect();
+        let all: Vec<(f64, f64)> = sides.map(|s| (s.min, s.max)).collect();
         Self {
             states: all[..states].to_vec(),
             inputs: all[states..].to_vec(),
@@ -126,12 +126,9 @@ pub fn witness(pair: &mut Pair, certificate: &Certificate, sides: &Sides) {
     };
     let value = |name: &String| {
         let mut coordinates = point.coordinates.iter();
-        coordinates.find(|(n, _)| n == name).map(|(_, x)| *x)
+        coordinates.find(|c| c.name == *name).map(|c| c.value)
     };
-    let named = certificate
-        .region
-        .iter()
-        .map(|(name, ..)| value(name).unwrap());
+    let named = certificate.region.iter().map(|s| value(&s.name).unwrap());
     let mut x: Vec<f64> = named.collect();
     let u = x.split_off(pair.states);
     // a plant that time does not move needs none

@@ -168,10 +168,10 @@ pub fn has_value_at(
     let mut walk = Walk::new(graph, &[node], &[], &region)?;
     let middle = region.middle_point(&region.cell());
     for point in &witness.points {
-        let told = |name: &str| point.coordinates.iter().find(|c| c.0 == name);
+        let told = |name: &str| point.coordinates.iter().find(|c| c.name == name);
         let sides = region.dimensions.iter().zip(&middle);
         let cell: Cell = sides
-            .map(|(d, &middle)| Interval::point(told(&d.name).map_or(middle, |c| c.1)))
+            .map(|(d, &middle)| Interval::point(told(&d.name).map_or(middle, |c| c.value)))
             .collect();
         if walk.trouble(&[node], &cell).is_some() {
             return Ok(false);

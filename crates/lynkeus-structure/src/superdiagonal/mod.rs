@@ -273,7 +273,11 @@ mod tests {
         let Verdict::Refuted(witness) = &verdicts(text)[1] else {
             panic!()
         };
-        let ξ: Vec<f64> = witness.points[0].coordinates.iter().map(|c| c.1).collect();
+        let ξ: Vec<f64> = witness.points[0]
+            .coordinates
+            .iter()
+            .map(|c| c.value)
+            .collect();
         assert!((ξ[0] + ξ[1]).abs() < 1e-14 && ξ[0].abs() > 0.7);
     }
 

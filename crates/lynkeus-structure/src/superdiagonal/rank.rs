@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::Factor;
 use crate::rank::subsets;
-use crate::{Extended, Finding, Matrix, Point, Region, Verdict, sign};
+use crate::{Coordinate, Extended, Finding, Matrix, Point, Region, Verdict, sign};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -75,7 +75,8 @@ impl Factor {
             return None;
         }
         let ξ = svd.v_t?.row(smallest).into_owned();
-        let component = |(&i, &x): (&usize, &f64)| (extended.states[i].name.clone(), x);
+        let component =
+            |(&i, &x): (&usize, &f64)| Coordinate::from((extended.states[i].name.clone(), x));
         Some(Point {
             coordinates: self.columns.iter().zip(ξ.iter()).map(component).collect(),
             value: 0.0,

@@ -49,11 +49,11 @@ fn summary(certificate: &Certificate) -> Value {
     let sides = certificate
         .region
         .iter()
-        .map(|(name, low, high)| (name.clone(), json!([low, high])));
+        .map(|s| (s.name.clone(), json!([s.min, s.max])));
     let bounds = certificate
         .ultimate
         .iter()
-        .map(|(name, bound)| (name.clone(), json!(bound)));
+        .map(|b| (b.name.clone(), json!(b.value)));
     let constants = certificate
         .constants
         .iter()

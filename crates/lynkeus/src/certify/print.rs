@@ -21,7 +21,7 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .best()
         .region
         .iter()
-        .map(|(n, low, high)| side(n, *low, *high))
+        .map(|s| side(&s.name, s.min, s.max))
         .collect();
     writeln!(f, "box: {}", abbreviated(&sides))?;
     writeln!(f)?;
@@ -139,7 +139,7 @@ fn bounds(report: &CertifyReport, certificate: &Certificate) -> Vec<String> {
     };
     let entries = certificate.ultimate.iter();
     entries
-        .map(|(name, bound)| format!("{}{} of {name}", number(*bound), unit(name)))
+        .map(|b| format!("{}{} of {}", number(b.value), unit(&b.name), b.name))
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lynkeus_structure::{self as structure, Blind, Place, Uniformity};
+use lynkeus_structure::{self as structure, Blind, Place, Uniformity, counted};
 use serde_json::{Map, Value, json};
 
 use crate::words::{number, side};
@@ -74,7 +74,10 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Resul
         }
         structure::Verdict::Refuted(witness) => {
             let place = witness.zero().map(|p| {
-                let sides = p.coordinates.iter().map(|(n, x)| side(n, *x, *x));
+                let sides = p
+                    .coordinates
+                    .iter()
+                    .map(|c| side(&c.name, c.value, c.value));
                 sides.collect::<Vec<_>>().join(", ")
             });
             writeln!(
@@ -172,8 +175,8 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
 pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Error> {
     let [x, y] = &uniformity.sides[..] else {
         let message = format!(
-            "{plant} has {} states and unknown inputs: a picture of the singular set needs two; --json lists its parts",
-            uniformity.sides.len()
+            "{plant} has {} with its unknown inputs: a picture of the singular set needs two; --json lists its parts",
+            counted(uniformity.sides.len(), "state")
         );
         return Err(Error::input(message));
     };

@@ -1,6 +1,7 @@
 //! Words for people, and columns as text.
 
 use std::io::{self, Write};
+use std::path::Path;
 
 use lynkeus::model::Diagnostic;
 use lynkeus::{Error, table, visible};

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lynkeus_structure::counted;
 use serde_json::{Map, Value, json};
 
 use super::axis::shown;
@@ -119,7 +120,12 @@ impl fmt::Display for Sweep {
             .log
             .as_deref()
             .map_or("in simulation".to_owned(), |log| format!("on {log}"));
-        writeln!(f, "{}: {} values {on}\n", self.plant, self.rows.len())?;
+        writeln!(
+            f,
+            "{}: {} {on}\n",
+            self.plant,
+            counted(self.rows.len(), "value")
+        )?;
         let headings = (0..self.measures.len()).map(|i| self.heading(i));
         let header: Vec<String> = self
             .axes

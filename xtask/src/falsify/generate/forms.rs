@@ -233,6 +233,7 @@ fn case(
         states,
         inputs,
         equations,
+        couplings: vec![],
         outputs,
         slope: None,
         observer: vec![],

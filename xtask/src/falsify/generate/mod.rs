@@ -1,6 +1,7 @@
 //! Random and adversarial plants, with studies that ask for a claim about them.
 
 mod forms;
+mod implicit;
 mod settings;
 mod terms;
 
@@ -24,6 +25,7 @@ pub fn case(numbers: &mut Numbers, kind: Kind) -> Case {
     };
     draft.unmeasured(&mut case);
     draft.hostile(&mut case);
+    draft.implicit(&mut case);
     settings::choose(draft.numbers, &mut case);
     case
 }

@@ -88,8 +88,8 @@ impl Driven<'_> {
             "{}: {all} {bound}",
             self.text
         );
-        for (left, (name, bound)) in each.iter().zip(&found.ultimate) {
-            assert!(left <= bound, "{name}: {left} {bound}");
+        for (left, bound) in each.iter().zip(&found.ultimate) {
+            assert!(*left <= bound.value, "{bound:?}: {left}");
         }
     }
 }
@@ -111,7 +111,7 @@ fn a_moving_input_leaves_an_error() {
     let plant = plant(driven.text);
     let found = driven.certificate(&plant);
     assert_eq!(found.verdict(), Standing::Proved);
-    assert!(found.ultimate[0].1 >= 0.0866 && found.ultimate[1].1 >= 0.2596);
+    assert!(found.ultimate[0].value >= 0.0866 && found.ultimate[1].value >= 0.2596);
     let bound = found.ultimate_bound.unwrap();
     assert!((0.2596..1.5).contains(&bound), "{bound}");
 }

@@ -4,7 +4,7 @@
 use crate::common::{plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, Value,
+    Assumptions, Certificate, Check, Design, Family, Germani, Tuning, UltimateBound, Value,
     drift_observable::DriftObservable,
 };
 use lynkeus_structure::{Extended, Sensors, Standing};
@@ -206,7 +206,7 @@ fn kept(plant: &Plant, mut tuning: Tuning, peak: &str, start: [f64; 2]) {
             row[0],
             error(row)
         );
-        for (i, (name, bound)) in found.ultimate.iter().enumerate() {
+        for (i, UltimateBound { name, value: bound }) in found.ultimate.iter().enumerate() {
             let e = (row[1 + i] - row[3 + i]).abs();
             assert!(
                 e <= transient + bound,

@@ -3,7 +3,9 @@
 
 use crate::common::{constant, plant, run};
 use lynkeus_model::Plant;
-use lynkeus_observers::{Assumptions, Certificate, Family, Tuning, unknown_input::UnknownInput};
+use lynkeus_observers::{
+    Assumptions, Certificate, Family, Tuning, UltimateBound, unknown_input::UnknownInput,
+};
 use lynkeus_structure::{Extended, Sensors, Standing};
 
 use super::shapes::{TALL, sensors};
@@ -54,7 +56,7 @@ impl Promise<'_> {
         for row in &rows {
             let (e, rest) = (errors(row), peak * (-rate * row[0]).exp());
             assert!(size(&e) <= rest + bound, "t = {}: {e:?}", row[0]);
-            for (e, (name, bound)) in e.iter().zip(&found.ultimate) {
+            for (e, UltimateBound { name, value: bound }) in e.iter().zip(&found.ultimate) {
                 assert!(*e <= rest + bound, "{name}: {e} against {bound}");
             }
         }

@@ -4,7 +4,7 @@
 use crate::common::{design_with, plant, run};
 use lynkeus_model::Plant;
 use lynkeus_observers::{
-    Assumptions, Certificate, Family, Tuning, Value, unknown_input::UnknownInput,
+    Assumptions, Certificate, Family, Tuning, UltimateBound, Value, unknown_input::UnknownInput,
 };
 use lynkeus_structure::{Extended, Sensors, Standing, Verdict};
 
@@ -185,7 +185,7 @@ fn promised(text: &str, x0: &[f64], start: &[f64]) -> bool {
     for row in &rows {
         let (e, rest) = (errors(row), peak * (-rate * row[0]).exp());
         assert!(size(&e) <= rest + bound, "t = {}: {}", row[0], size(&e));
-        for (e, (name, bound)) in e.iter().zip(&found.ultimate) {
+        for (e, UltimateBound { name, value: bound }) in e.iter().zip(&found.ultimate) {
             assert!(*e <= rest + bound, "{name}: {e} against {bound}");
         }
     }

@@ -41,8 +41,8 @@ impl Numbers {
 
 fn side(certificate: &Certificate, name: &str) -> (f64, f64) {
     let mut sides = certificate.region.iter();
-    let (_, low, high) = sides.find(|(n, ..)| n == name).unwrap();
-    (*low, *high)
+    let found = sides.find(|s| s.name == name).unwrap();
+    (found.min, found.max)
 }
 
 /// Plant and observer from their starts under constant inputs; rows of the plant's
