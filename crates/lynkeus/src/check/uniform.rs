@@ -175,7 +175,7 @@ pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Err
             "{plant} has {} states and unknown inputs: a picture of the singular set needs two; --json lists its parts",
             uniformity.sides.len()
         );
-        return Err(Error::input(message));
+        return Err(Error::refused(message));
     };
     let along = |part: &Place, whole: &Side| {
         let side = part.iter().find(|side| side.name == whole.name);
