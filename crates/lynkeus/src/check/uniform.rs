@@ -178,7 +178,7 @@ pub(super) fn picture(plant: &str, uniformity: &Uniformity) -> Result<Plane, Err
             "{plant} has {} with its unknown inputs: a picture of the singular set needs two; --json lists its parts",
             counted(uniformity.sides.len(), "state")
         );
-        return Err(Error::input(message));
+        return Err(Error::refused(message));
     };
     let along = |part: &Place, whole: &Side| {
         let side = part.iter().find(|side| side.name == whole.name);

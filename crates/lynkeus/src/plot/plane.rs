@@ -34,7 +34,7 @@ impl Plane {
                     "nothing to draw over the range of {name}, [{}, {}]: declare min and max",
                     range.start, range.end
                 );
-                return Err(Error::input(message));
+                return Err(Error::refused(message));
             }
         }
         let mut text = String::new();
