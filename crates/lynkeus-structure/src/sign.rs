@@ -2,7 +2,8 @@
 
 mod witness;
 
-use lynkeus_expr::{Graph, MissingInput, Node};
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
 use crate::words::short;
 use crate::{Finding, Range, Region, Regularity, Side, Verdict, range, range_within};

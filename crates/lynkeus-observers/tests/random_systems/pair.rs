@@ -65,6 +65,7 @@ pub fn observer(extended: &Extended<'_>, K: &DMatrix<f64>) -> Observer {
         input_derivatives: vec![],
         measured,
         monitors: vec![],
+        filter: None,
         states: hats.into_iter().map(|hat| (hat, 0.0)).collect(),
     }
 }

@@ -355,6 +355,7 @@ mod tests {
                 present: None,
                 base: (*key).to_owned(),
                 path: vec![],
+                place: None,
             };
             let axes: Vec<Axis> = keys.iter().map(axis).collect();
             let counted = grid(&study("observer = { theta = 1 }"), &axes);
