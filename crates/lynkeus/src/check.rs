@@ -291,22 +291,9 @@ impl Report {
             .filter(|e| e.has_theorem() && e.fit() == Standing::Proved)
             .count()
             > 1;
-        let named: Vec<&str> = self
-            .examinations
-            .iter()
-            .filter(|e| e.has_theorem() && e.fit() == Standing::Undecided)
-            .map(|e| e.family)
-            .collect();
         if let Some(filter) = chosen.filter(|e| !e.has_theorem()) {
-            let open = match named.is_empty() {
-                true => "no family with a theorem fits".to_owned(),
-                false => format!(
-                    "no family with a theorem is proved to fit ({} undecided)",
-                    named.join(", ")
-                ),
-            };
             return format!(
-                "{open}: {} runs on any plant, and nothing is proved of its error",
+                "no family with a theorem fits: {} runs on any plant, and nothing is proved of its error",
                 filter.family
             );
         }

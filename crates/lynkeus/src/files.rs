@@ -1,14 +1,26 @@
 //! Reading whole text files, with errors that name the file.
 
 use std::fs::File;
-use std::io;
+use std::io::{self, Read};
 use std::path::Path;
 
 use crate::Error;
 
+/// Bytes of the largest text that is read whole.
+const LARGEST: u64 = 64 << 20;
+
 /// The text of a file; `what` says in messages what the file is for.
 pub(crate) fn read_text(path: &Path, what: &str) -> Result<String, Error> {
-    let bytes = std::fs::read(path).map_err(|e| unreadable(path, what, &e))?;
+    let mut bytes = vec![];
+    let mut file = open(path, what)?.take(LARGEST + 1);
+    file.read_to_end(&mut bytes)
+        .map_err(|e| unreadable(path, what, &e))?;
+    if bytes.len() as u64 > LARGEST {
+        return Err(Error::input(format!(
+            "the {what} file has more than {LARGEST} bytes: it is none"
+        ))
+        .at(path.display()));
+    }
     let text = String::from_utf8(bytes).map_err(|e| {
         let good = e.utf8_error().valid_up_to();
         let line = e

@@ -97,17 +97,14 @@ pub(crate) fn time_of<'s>(
         .at(table.file())
         .hint("say which columns they are: `time` and `columns` of [estimate]"));
     }
-    if table.get(&time).is_none() && settings.time.is_none() {
-        let why = match time.as_str() {
-            OTHER_TIME => " (the model has a variable called t)",
-            _ => "",
-        };
+    let is_there = table.names().any(|name| name == time);
+    if !is_there && settings.time.is_none() && time == OTHER_TIME {
         return Err(Error::input(format!(
-            "no column \"{time}\" of times{why}; the columns found are: {}",
+            "no time column \"{time}\" (the model has a variable called t); the columns found are: {}",
             crate::near::list(table.names())
         ))
         .at(table.file())
-        .hint("set `time` of [estimate] to the header of the time column"));
+        .hint("if it has another name, set `time` in [estimate] of the study"));
     }
     Ok(time)
 }

@@ -55,6 +55,8 @@
 
 mod certify;
 mod check;
+#[cfg(feature = "tune")]
+mod compare;
 mod correction;
 mod course;
 mod credible;
@@ -87,6 +89,8 @@ mod words;
 
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
+#[cfg(feature = "tune")]
+pub use compare::{Against, Compared, Comparison, Run, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};

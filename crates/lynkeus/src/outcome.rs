@@ -70,6 +70,15 @@ pub struct Watch {
     pub alarm: Option<f64>,
 }
 
+/// Why a run ended before its last row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// in words
+    pub message: String,
+    /// the study
+    pub file: String,
+}
+
 /// Rows over time.
 #[derive(Debug)]
 pub struct Outcome {
@@ -101,7 +110,7 @@ pub struct Outcome {
     /// where these contradict the declared noise, in words
     pub contradictions: Vec<String>,
     /// why the run ended before its last row
-    pub ended: Option<String>,
+    pub ended: Option<Ended>,
     /// what the user should know
     pub notes: Vec<String>,
 }
@@ -166,8 +175,9 @@ impl Outcome {
     /// noise; or the run ended early.
     pub fn refusal(&self) -> Option<Error> {
         if let Some(ended) = &self.ended {
-            let message = format!("{ended} (the {} rows before are written)", self.time.len());
-            return Some(Error::refused(message));
+            let rows = self.time.len();
+            let message = format!("{} (the {rows} rows before are written)", ended.message);
+            return Some(Error::refused(message).at(&ended.file));
         }
         credible::refusal(&self.doubts).or_else(|| {
             let first = self.contradictions.first()?;
@@ -245,7 +255,10 @@ impl Raw<'_> {
             log_time: log_time(plant, &prepared.study().estimate),
             doubts: credible::doubts(plant, &quantities),
             contradictions: credible::contradictions(&innovations),
-            ended: course.ended.map(|error| error.to_string()),
+            ended: course.ended.map(|error| Ended {
+                message: error.to_string(),
+                file: prepared.study().file.clone(),
+            }),
             innovations,
             time: time.to_vec(),
             time_header,

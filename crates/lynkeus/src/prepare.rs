@@ -160,8 +160,7 @@ impl<'a> Prepared<'a> {
         let by_itself =
             self.study.observer.family.is_none() && chosen.family == design.observer.family;
         if by_itself && design.observer.filter.is_some() {
-            let lost = examinations.iter().filter(|e| e.has_theorem());
-            design.notes.push(fallback(lost));
+            design.notes.push(FALLBACK.to_owned());
         }
         Ok(design)
     }
@@ -303,17 +302,17 @@ fn blame(study: &Study, error: SensorsError) -> Error {
     }
 }
 
-/// The family to use: the first with a theorem that fits, else the first that asks nothing of
-/// the plant, else the first that is undecided.
+/// The family to use: the first with a theorem that fits, else the first that is undecided, else
+/// the first that asks nothing of the plant.
 pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
     let with = |fit: Standing| {
         let examined = examinations.iter().filter(|e| e.spent().is_none());
         examined.filter(move |e| e.fit() == fit)
     };
-    let proved = with(Standing::Proved).find(|e| e.has_theorem());
-    proved
-        .or_else(|| with(Standing::Proved).next())
+    with(Standing::Proved)
+        .find(|e| e.has_theorem())
         .or_else(|| with(Standing::Undecided).next())
+        .or_else(|| with(Standing::Proved).next())
 }
 
 /// Whether the study asks for a certified gain.
@@ -333,19 +332,7 @@ fn design_by(
 }
 
 /// What is lost where a filter takes the place of the families with a theorem.
-fn fallback<'e>(lost: impl Iterator<Item = &'e Examination>) -> String {
-    let undecided: Vec<&str> = lost
-        .filter(|e| e.fit() == Standing::Undecided)
-        .map(|e| e.family)
-        .collect();
-    match undecided.is_empty() {
-        true => "no family with a theorem fits this plant and these sensors (`lynkeus check` says why): a filter estimates all the same, and nothing is proved of its error".to_owned(),
-        false => format!(
-            "no family with a theorem is proved to fit ({} undecided, see `lynkeus check`): a filter estimates all the same, and nothing is proved of its error",
-            undecided.join(", ")
-        ),
-    }
-}
+const FALLBACK: &str = "no family with a theorem fits this plant and these sensors (`lynkeus check` says why): a filter estimates all the same, and nothing is proved of its error";
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     if let Some(spent) = examinations.iter().find_map(Examination::spent) {

@@ -65,7 +65,7 @@ impl Dynamics for Linearised<'_> {
                 (drows[a], drows[b]) = (sum, sum);
             }
             let diagonal = &mut drows[i * width + n + i];
-            *diagonal += *diagonal + q;
+            *diagonal = 2.0 * *diagonal + q;
         }
     }
 

@@ -48,6 +48,13 @@ struct Row {
     met: Vec<(usize, f64)>,
 }
 
+/// A row given the whole window.
+struct Smooth {
+    x: Vec<f64>,
+    /// how hard each bound that is met (its place among `met`) pushes its state upward
+    forces: Vec<(usize, f64)>,
+}
+
 /// One row of a forward pass.
 struct Pass {
     before: Belief,
@@ -147,9 +154,9 @@ impl Horizon {
     fn solve(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {
         let mut passes = self.forward(sensing)?;
         for _ in 0..STEPS {
-            let (states, forces) = backward(&passes);
-            let step = self.move_to(&states, &passes);
-            let changed = self.change_bounds(&states, &forces);
+            let found = backward(&passes);
+            let step = self.move_to(&found, &passes);
+            let changed = self.change_bounds(&found);
             if !changed && step < SMALL {
                 break;
             }
@@ -159,10 +166,10 @@ impl Horizon {
     }
 
     /// The smoothed states as the next guess; how far the guess moved, in deviations.
-    fn move_to(&mut self, states: &[Vec<f64>], passes: &[Pass]) -> f64 {
+    fn move_to(&mut self, found: &[Smooth], passes: &[Pass]) -> f64 {
         let mut largest = 0.0_f64;
-        for ((row, x), pass) in self.rows.iter_mut().zip(states).zip(passes) {
-            for (i, (old, new)) in row.guess.iter_mut().zip(x).enumerate() {
+        for ((row, found), pass) in self.rows.iter_mut().zip(found).zip(passes) {
+            for (i, (old, new)) in row.guess.iter_mut().zip(&found.x).enumerate() {
                 let deviation = pass.before.root.deviation(i).max(f64::MIN_POSITIVE);
                 largest = largest.max((*new - *old).abs() / deviation);
                 *old = new.max(self.bounds[i].low).min(self.bounds[i].high);
@@ -172,9 +179,9 @@ impl Horizon {
     }
 
     /// Bounds that are exceeded are met from now on; those that pull inward are let go.
-    fn change_bounds(&mut self, states: &[Vec<f64>], forces: &[Vec<(usize, f64)>]) -> bool {
+    fn change_bounds(&mut self, found: &[Smooth]) -> bool {
         let mut changed = false;
-        for ((row, x), forces) in self.rows.iter_mut().zip(states).zip(forces) {
+        for (row, Smooth { x, forces }) in self.rows.iter_mut().zip(found) {
             let before = row.met.len();
             let bounds = &self.bounds;
             let mut place = 0;
@@ -329,29 +336,19 @@ fn take(belief: &mut Belief, c: Vec<f64>, y: f64, r: f64) -> Option<Correction> 
     })
 }
 
-/// The smoothed states, and the force of each bound that is met: positive where it pushes its
-/// state upward.
-fn backward(passes: &[Pass]) -> (Vec<Vec<f64>>, Vec<Vec<(usize, f64)>>) {
+/// The window's rows given all of it.
+fn backward(passes: &[Pass]) -> Vec<Smooth> {
     let n = passes.first().map_or(0, |p| p.after.x.len());
     let mut adjoint = Adjoint::nothing(n);
-    let mut states = vec![];
-    let mut forces = vec![];
+    let mut rows = vec![];
     for pass in passes.iter().rev() {
         let shift = pass.after.root.covariance_times(&adjoint.vector);
-        states.push(
-            pass.after
-                .x
-                .iter()
-                .zip(&shift)
-                .map(|(x, s)| x - s)
-                .collect(),
-        );
-        let of_bounds = pass.bounds.iter().rev();
-        forces.push(
-            of_bounds
-                .map(|(place, b)| (*place, adjoint.over_vector(b)))
-                .collect(),
-        );
+        let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
+        let x = x.collect();
+        let bounds = pass.bounds.iter().rev();
+        let forces = bounds.map(|(place, b)| (*place, adjoint.over_vector(b)));
+        let forces = forces.collect();
+        rows.push(Smooth { x, forces });
         for reading in pass.readings.iter().rev() {
             adjoint.over_vector(reading);
         }
@@ -359,7 +356,6 @@ fn backward(passes: &[Pass]) -> (Vec<Vec<f64>>, Vec<Vec<(usize, f64)>>) {
             adjoint.vector_through(&pass.transition);
         }
     }
-    states.reverse();
-    forces.reverse();
-    (states, forces)
+    rows.reverse();
+    rows
 }

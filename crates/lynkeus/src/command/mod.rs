@@ -134,6 +134,24 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
+    /// Run several families on the same data: one table of errors, peaks, settling and cost
+    Compare {
+        /// The study (TOML; "-": standard input)
+        study: PathBuf,
+        /// A log (CSV or Parquet); without one the study's simulation
+        log: Option<PathBuf>,
+        /// Draw the estimates of each family
+        #[arg(long, value_name = "FILE.svg")]
+        plot: Option<PathBuf>,
+        /// Print one JSON object
+        #[arg(long)]
+        json: bool,
+        /// No progress bar
+        #[arg(short, long)]
+        quiet: bool,
+        #[command(flatten)]
+        limits: Limits,
+    },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
 }
@@ -246,6 +264,23 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             options,
             limits,
         } => tune::tune(&study, &options, &limits),
+        Command::Compare {
+            study,
+            log,
+            plot,
+            json,
+            quiet,
+            limits,
+        } => {
+            let source = Source::load(&study)?.within(limits.budget());
+            let output = Output {
+                output: None,
+                plot,
+                json,
+                quiet,
+            };
+            run::compare(&source, log.as_deref(), &output)
+        }
         Command::Schema => {
             output::print(&output::json(&lynkeus::schema()))?;
             Ok(ExitCode::SUCCESS)

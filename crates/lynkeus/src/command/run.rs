@@ -109,6 +109,31 @@ pub(super) fn estimate(source: &Source, log: &Path, output: &Output) -> Result<E
     Ok(limits::code(&source.study, code))
 }
 
+pub(super) fn compare(
+    source: &Source,
+    log: Option<&Path>,
+    output: &Output,
+) -> Result<ExitCode, Error> {
+    let files = source.files().reads("the log", log);
+    output.added_to(files).check()?;
+    let table = log.map(inputs::log).transpose()?;
+    let mut progress = Progress::new("comparing", output.quiet);
+    let found = lynkeus::compare(&source.study, table.as_ref(), &mut progress.watch())?;
+    progress.finish();
+    let mut results = Results::default();
+    if let Some(path) = &output.plot {
+        let picture = found.picture(source.study.time_unit.as_deref());
+        results.picture(path, picture.to_svg())?;
+    }
+    results.report(output.json, &found, || found.to_json());
+    results.keep()?;
+    let code = match found.is_positive() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::from(1),
+    };
+    Ok(limits::code(&source.study, code))
+}
+
 /// Everything is computed before the first file is written. Where nothing is asked for, and where
 /// all that is asked for is a picture that cannot be drawn, the columns are printed.
 fn finish(

@@ -56,7 +56,7 @@ fn even(readings: &[f64]) -> f64 {
 /// The standard deviation of white noise on a smooth signal, from the distance of each reading
 /// to the line between its neighbours: robust, by the median. None for fewer than five
 /// readings, or readings that lie on one line.
-fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
+pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
     let points: Vec<(f64, f64)> = time
         .iter()
         .zip(readings)

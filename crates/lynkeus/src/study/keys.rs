@@ -33,7 +33,7 @@ pub(super) const KEYS: [KeySpec; 3] = [
 ];
 
 /// The sections.
-pub(super) const SECTIONS: [KeySpec; 9] = [
+pub(super) const SECTIONS: [KeySpec; 10] = [
     KeySpec {
         name: "sensors",
         kind: "table",
@@ -92,6 +92,13 @@ pub(super) const SECTIONS: [KeySpec; 9] = [
         shape: Shape::Section(&[&TUNE]),
         default: "none",
         meaning: "which keys are swept, and what a value is judged by",
+    },
+    KeySpec {
+        name: "compare",
+        kind: "table",
+        shape: Shape::Section(&[&COMPARE]),
+        default: "none",
+        meaning: "which families are compared",
     },
     KeySpec {
         name: "plot",
@@ -438,6 +445,15 @@ pub(super) const RANGE: [KeySpec; 4] = [
         meaning: "equal ratios, or equal differences",
     },
 ];
+
+/// `[compare]`
+pub(super) const COMPARE: [KeySpec; 1] = [KeySpec {
+    name: "families",
+    kind: "list of families",
+    shape: Shape::NAMES,
+    default: "every family that is not refuted, and the filters",
+    meaning: "what `compare` runs; each gets the keys of `[observer]` that it owns",
+}];
 
 /// `[plot]`
 pub(super) const PLOT: [KeySpec; 2] = [

@@ -81,6 +81,8 @@ pub struct Study {
     pub estimate: EstimateSettings,
     /// Which tuning to sweep and how to judge it.
     pub tune: TuneSettings,
+    /// The families that `compare` runs; `None` means each that fits, and the filters.
+    pub compare: Option<Vec<Name>>,
     /// The quantities to draw, one panel each; `None` lets the tool choose.
     pub show: Option<Vec<Name>>,
     /// The unit on the time axis.
@@ -162,6 +164,7 @@ impl Study {
                 .optional("estimate", estimate::read)?
                 .unwrap_or_default(),
             tune: top.optional("tune", tune::read)?.unwrap_or_default(),
+            compare: top.optional("compare", compare)?.flatten(),
             show,
             time_unit,
             budget: Budget::default(),
@@ -190,6 +193,12 @@ fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error>
         .into_iter()
         .map(|(name, value)| Ok((name.text, value.number()?)))
         .collect()
+}
+
+/// `families` of `[compare]`.
+fn compare(entry: section::Entry<'_>) -> Result<Option<Vec<Name>>, Error> {
+    let mut section = entry.section("[compare]", &keys::COMPARE)?;
+    section.optional("families", |e| e.list_of(section::Entry::name))
 }
 
 /// `show` and `time_unit` of `[plot]`.

@@ -137,7 +137,7 @@ fn wrong_values_say_what_was_expected_and_found() {
         ),
         (
             "[estimate]\nbetween_samples = \"cubic\"",
-            "must be one of \"hold\", \"linear\"",
+            "must be one of \"hold\", \"predict\", \"linear\"",
         ),
         ("a = ", "s.toml:1:"),
     ];

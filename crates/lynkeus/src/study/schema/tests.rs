@@ -4,7 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::*;
-use crate::study::keys::{CERTIFY, ESTIMATE, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE};
+use crate::study::keys::{
+    CERTIFY, COMPARE, ESTIMATE, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE,
+};
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
 
@@ -58,7 +60,7 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 9] = [
+    let tables: [(&str, &[KeySpec]); 10] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[observer]`\n", &OBSERVER),
@@ -67,6 +69,7 @@ fn the_page_of_studies_shows_the_keys() {
         ("\n## `[estimate]`\n", &ESTIMATE),
         ("\n## The integrator\n", &INTEGRATOR),
         ("\n## `[tune]`\n", &TUNE),
+        ("\n## `[compare]`\n", &COMPARE),
         ("\n## `[plot]`\n", &PLOT),
     ];
     for (heading, keys) in tables {

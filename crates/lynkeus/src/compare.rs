@@ -1,0 +1,371 @@
+//! Every observer that can be had, on the same data.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use lynkeus_observers::{FAMILIES, Family};
+use lynkeus_structure::{Standing, figures};
+use serde_json::{Map, Value, json};
+
+use crate::prepare::Prepared;
+use crate::study::Name;
+use crate::tune::errors::Errors;
+use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare, simulate};
+
+/// The answer of `lynkeus compare`.
+#[derive(Debug)]
+pub struct Comparison {
+    /// name of the plant
+    pub plant: String,
+    /// one per family
+    pub rows: Vec<Compared>,
+    /// what the figures are measured against
+    pub against: Against,
+}
+
+/// What errors are measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Against {
+    /// the simulated plant
+    Simulation,
+    /// columns of the log that the observers do not read
+    Log,
+    /// nothing: the log has no true values
+    Nothing,
+}
+
+/// One family on the data.
+#[derive(Debug)]
+pub struct Compared {
+    /// name of the family
+    pub family: &'static str,
+    /// its run, or why there is none
+    pub run: Result<Run, String>,
+}
+
+/// What a family makes of the data.
+#[derive(Debug)]
+pub struct Run {
+    /// root of the mean square error of each quantity over the last half of the rows, in its
+    /// unit; none where its true value is not known
+    pub rms: Vec<(String, Option<f64>)>,
+    /// largest error after the first row, in widths of the declared ranges
+    pub peak: Option<f64>,
+    /// time until every error stays within 5 % of its range; none where it does not
+    pub settling: Option<f64>,
+    /// how rough the estimates are in the last half: the standard deviation of each about the
+    /// line between its neighbours, in widths of its range, the largest of them
+    pub roughness: Option<f64>,
+    /// seconds of computing per sample, examination and design left out
+    pub per_sample: f64,
+    /// why the estimate is not credible, where it is not
+    pub doubt: Option<String>,
+    /// the estimates
+    pub outcome: Outcome,
+}
+
+/// Settled is an error below this share of the range.
+const SETTLED: f64 = 0.05;
+
+/// Runs every family of `[compare]`, or each that fits and the filters, on the study's simulation
+/// or on a log. Keys of `[observer]` reach the families that own them.
+///
+/// # Errors
+/// A study that does not fit its plant; no family that can be run; a log without the columns
+/// that are read.
+pub fn compare(
+    study: &Study,
+    log: Option<&Table>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Comparison, Error> {
+    let plant = prepare::plant(study)?;
+    let families = families(study, &plant)?;
+    let count = families.len() as f64;
+    let mut rows = vec![];
+    for (i, family) in families.into_iter().enumerate() {
+        let own = of_family(study, family);
+        let prepared = Prepared::new(&own, &plant)?;
+        let part = &mut |done: f64| watch((i as f64 + done) / count);
+        let run = match log {
+            Some(table) => timed(&prepared, |p| estimate::estimated(p, table, part)),
+            None => timed(&prepared, |p| simulate::simulated(p, part)),
+        };
+        rows.push(Compared {
+            family: family.name(),
+            run: run.map_err(|e| e.to_string()),
+        });
+    }
+    if rows.iter().all(|row| row.run.is_err()) {
+        let reasons = rows.iter().filter_map(|row| row.run.as_ref().err());
+        let first = reasons.into_iter().next().cloned().unwrap_or_default();
+        return Err(Error::refused(format!("no family can be run: {first}")).at(&study.file));
+    }
+    let known = rows.iter().filter_map(|row| row.run.as_ref().ok());
+    let known = known.flat_map(|run| &run.rms).any(|(_, rms)| rms.is_some());
+    Ok(Comparison {
+        plant: plant.name.clone(),
+        rows,
+        against: match (log, known) {
+            (None, _) => Against::Simulation,
+            (Some(_), true) => Against::Log,
+            (Some(_), false) => Against::Nothing,
+        },
+    })
+}
+
+/// The families asked for; else those that are not refuted, whose required keys are there or not,
+/// and the filters.
+fn families(
+    study: &Study,
+    plant: &lynkeus_model::Plant,
+) -> Result<Vec<&'static dyn Family>, Error> {
+    let find = |name: &Name| {
+        let found = lynkeus_observers::find(&name.text);
+        found.ok_or_else(|| {
+            let names = FAMILIES.iter().map(|f| f.name());
+            let message = format!("families of [compare]: no family is called \"{name}\"");
+            name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names)))
+        })
+    };
+    if let Some(asked) = &study.compare {
+        return asked.iter().map(find).collect();
+    }
+    let mut found = vec![];
+    for &family in FAMILIES {
+        let own = of_family(study, family);
+        let prepared = Prepared::new(&own, plant)?;
+        let examined = prepared.examinations()?;
+        if examined.iter().any(|e| e.fit() != Standing::Refuted) {
+            found.push(family);
+        }
+    }
+    Ok(found)
+}
+
+/// The study for one family: its name, and of the keys those that it owns.
+fn of_family(study: &Study, family: &dyn Family) -> Study {
+    let mut own = study.clone();
+    own.observer.family = Some(Name::from(family.name()));
+    own.observer.tuning.values.retain(|key, _| family.owns(key));
+    if family.name() != "ekf" {
+        own.estimate.smoothing = None;
+    }
+    own
+}
+
+fn timed<'p>(
+    prepared: &'p Prepared<'p>,
+    run: impl FnOnce(&'p Prepared<'p>) -> Result<Outcome, Error>,
+) -> Result<Run, Error> {
+    // the design is found once more inside; it is not what is timed
+    let since = Instant::now();
+    prepared.design()?;
+    let designing = since.elapsed();
+    let since = Instant::now();
+    let outcome = run(prepared)?;
+    let running = since.elapsed().saturating_sub(designing).as_secs_f64();
+    Ok(judged(prepared, outcome, running))
+}
+
+fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
+    let width = |quantity: &Quantity| {
+        let states = prepared.extended().states.iter();
+        let mut own = states.filter(|s| s.name == quantity.name);
+        let width = own.next().map_or(f64::INFINITY, |s| s.max - s.min);
+        if width.is_finite() && width > 0.0 {
+            width
+        } else {
+            size(quantity)
+        }
+    };
+    let estimated = || outcome.quantities.iter().filter(|q| q.estimate.is_some());
+    let scaled = estimated().filter_map(|q| {
+        let (truth, estimate) = (q.truth.as_ref()?, q.estimate.as_ref()?);
+        let width = width(q);
+        Some(
+            truth
+                .iter()
+                .zip(estimate)
+                .map(|(x, hat)| (hat - x) / width)
+                .collect(),
+        )
+    });
+    let errors = Errors {
+        time: outcome.time.clone(),
+        scaled: scaled.collect(),
+    };
+    let is_known = !errors.scaled.is_empty();
+    let half = outcome.time.len() / 2;
+    let rough = estimated().filter_map(|q| {
+        let estimate = q.estimate.as_ref()?;
+        let found = crate::filter::noise::scatter(&outcome.time[half..], &estimate[half..])?;
+        Some(found / width(q))
+    });
+    Run {
+        rms: estimated()
+            .map(|q| (q.name.clone(), q.settled_error()))
+            .collect(),
+        peak: errors.peak().map(|peak| peak.2).filter(|_| is_known),
+        settling: outcome
+            .time
+            .first()
+            .filter(|_| is_known)
+            .and_then(|first| errors.settling(&[*first], SETTLED)),
+        roughness: rough.reduce(f64::max),
+        per_sample: seconds / outcome.time.len().max(1) as f64,
+        doubt: outcome.refusal().map(|e| e.to_string()),
+        outcome,
+    }
+}
+
+/// The span of a quantity without a declared range.
+fn size(quantity: &Quantity) -> f64 {
+    let values = quantity.truth.iter().chain(&quantity.estimate).flatten();
+    let finite = || values.clone().copied().filter(|x| x.is_finite());
+    let (low, high) = (
+        finite().fold(f64::INFINITY, f64::min),
+        finite().fold(f64::NEG_INFINITY, f64::max),
+    );
+    if high > low { high - low } else { 1.0 }
+}
+
+impl Comparison {
+    /// For machines.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let row = |row: &Compared| match &row.run {
+            Err(reason) => json!({ "family": row.family, "refused": reason }),
+            Ok(run) => {
+                let rms: Map<String, Value> = run
+                    .rms
+                    .iter()
+                    .map(|(name, x)| (name.clone(), json!(x)))
+                    .collect();
+                json!({
+                    "family": row.family,
+                    "rms": rms,
+                    "peak": run.peak,
+                    "settling_time": run.settling,
+                    "roughness": run.roughness,
+                    "seconds_per_sample": run.per_sample,
+                    "credible": run.doubt.is_none(),
+                })
+            }
+        };
+        json!({
+            "plant": self.plant,
+            "against": match self.against {
+                Against::Simulation => "simulation",
+                Against::Log => "log",
+                Against::Nothing => "nothing",
+            },
+            "families": self.rows.iter().map(row).collect::<Vec<_>>(),
+        })
+    }
+
+    /// Whether an estimate of some family is credible.
+    #[must_use]
+    pub fn is_positive(&self) -> bool {
+        let mut runs = self.rows.iter().filter_map(|row| row.run.as_ref().ok());
+        runs.any(|run| run.doubt.is_none())
+    }
+
+    /// One panel per family: the quantity that is hardest to see.
+    #[cfg(feature = "plot")]
+    #[must_use]
+    pub fn picture(&self, time_unit: Option<&str>) -> crate::plot::Figure {
+        crate::figure::compared(self, time_unit)
+    }
+}
+
+/// Quantities shown in a table for people.
+const SHOWN: usize = 5;
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let against = match self.against {
+            Against::Simulation => "against the simulated plant",
+            Against::Log => "against the columns of the log that are not read",
+            Against::Nothing => "the log has no true values",
+        };
+        writeln!(f, "{}: {against}\n", self.plant)?;
+        let runs = || {
+            self.rows
+                .iter()
+                .filter_map(|row| Some((row.family, row.run.as_ref().ok()?)))
+        };
+        let names: Vec<&str> = match runs().next() {
+            Some((_, run)) => run
+                .rms
+                .iter()
+                .map(|(name, _)| name.as_str())
+                .take(SHOWN)
+                .collect(),
+            None => vec![],
+        };
+        let mut table = vec![vec!["family".to_owned()]];
+        table[0].extend(names.iter().map(|name| format!("RMS {name}")));
+        for title in ["peak", "settling", "roughness", "µs/sample"] {
+            table[0].push(title.to_owned());
+        }
+        for (family, run) in runs() {
+            let mut line = vec![family.to_owned()];
+            for name in &names {
+                let rms = run
+                    .rms
+                    .iter()
+                    .find(|(n, _)| n == name)
+                    .and_then(|(_, x)| *x);
+                line.push(cell(rms));
+            }
+            line.push(cell(run.peak));
+            line.push(cell(run.settling));
+            line.push(cell(run.roughness));
+            line.push(figures(1e6 * run.per_sample, 2));
+            table.push(line);
+        }
+        aligned(f, &table)?;
+        for (family, run) in runs() {
+            if let Some(doubt) = &run.doubt {
+                writeln!(f, "\n{family}: {doubt}")?;
+            }
+        }
+        for row in &self.rows {
+            if let Err(reason) = &row.run {
+                writeln!(f, "\n{}: {reason}", row.family)?;
+            }
+        }
+        writeln!(
+            f,
+            "\nRMS over the last half; peak and roughness in widths of the declared ranges; settling within 5 % of them"
+        )
+    }
+}
+
+fn cell(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |x| figures(x, 3))
+}
+
+fn aligned(f: &mut fmt::Formatter<'_>, table: &[Vec<String>]) -> fmt::Result {
+    let columns = table.first().map_or(0, Vec::len);
+    let width = |j: usize| {
+        table
+            .iter()
+            .map(|row| row[j].chars().count())
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    for row in table {
+        let cells = row.iter().zip(&widths).enumerate();
+        for (j, (text, width)) in cells {
+            match j {
+                0 => write!(f, "{text:<width$}")?,
+                _ => write!(f, "  {text:>width$}")?,
+            }
+        }
+        writeln!(f)?;
+    }
+    Ok(())
+}
