@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::prepare::Prepared;
 use crate::words::conditions;
-use crate::{Error, Study, prepare};
+use crate::{Error, Study, calibrate, prepare};
 pub use uniform::Uniform;
 
 /// What to ask beside "which states, by which observer".
@@ -83,7 +83,7 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
             Some(measured) => asked(measured),
             None => names(&symbolic.outputs),
         },
-        unknown: asked(&study.sensors.unknown),
+        unknown: calibrate::unknown_inputs(study, &symbolic),
         examinations: vec![],
         recommended: None,
         answer,

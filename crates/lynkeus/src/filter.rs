@@ -4,7 +4,8 @@ use std::ops::ControlFlow;
 
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Filter, FilterModel, FilterPlant, FilterSettings, Limits, Sensor, SensorHealth, Smoothed,
+    Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor, SensorHealth,
+    Smoothed,
 };
 use lynkeus_run::{Error as RunError, EstimatorSettings};
 use lynkeus_structure::Extended;
@@ -30,6 +31,10 @@ pub(crate) fn run(
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
+    if study.estimate.smoothing.is_some() && tuning.kind != FilterKind::Extended {
+        let message = "`smooth` and `lag` of [estimate] need family = \"ekf\"";
+        return Err(Error::input(message).at(&study.file));
+    }
     let mut notes = vec![];
     let model = model(study, extended, design, tuning, samples, &mut notes)?;
     let settings_of_filter = FilterSettings {
@@ -50,8 +55,8 @@ pub(crate) fn run(
     course.inputs_held = filter.health().inputs_held;
     let smoothed = match study.estimate.smoothing {
         None => None,
-        Some(Smoothing::Interval) => filter.smoothed(),
-        Some(Smoothing::Lag(lag)) => filter.smoothed_with_lag(lag),
+        Some(Smoothing::Interval) => filter.smoothed(false),
+        Some(Smoothing::Lag(lag)) => filter.smoothed_with_lag(lag, false),
     };
     course.smoothed = smoothed.map(|rows| columns(n, &rows));
     Ok(course)

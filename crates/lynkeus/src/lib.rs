@@ -53,6 +53,7 @@
 //! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod calibrate;
 mod certify;
 mod check;
 #[cfg(feature = "tune")]

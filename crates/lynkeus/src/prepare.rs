@@ -9,14 +9,18 @@ use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Tuning
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, Standing, range};
 
 use crate::study::Name;
-use crate::{Error, Study, systems};
+use crate::{Error, Study, calibrate, systems};
 
 /// The plant of a study, with the study's parameters.
 ///
 /// # Errors
 /// No plant, a file that cannot be read, or a model that is refused.
 pub fn plant(study: &Study) -> Result<Plant, Error> {
-    load(study, false)
+    let plant = load(study, false)?;
+    match calibrate::are_asked(study, &plant) {
+        true => calibrate::as_states(study, load(study, true)?, true),
+        false => Ok(plant),
+    }
 }
 
 /// The plant with its parameters as symbols, also those without value.
@@ -24,7 +28,11 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
 /// # Errors
 /// As [`plant`].
 pub(crate) fn symbolic_plant(study: &Study) -> Result<Plant, Error> {
-    load(study, true)
+    let plant = load(study, true)?;
+    match calibrate::are_asked(study, &plant) {
+        true => calibrate::as_states(study, plant, false),
+        false => Ok(plant),
+    }
 }
 
 fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
@@ -71,7 +79,7 @@ impl<'a> Prepared<'a> {
         let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
         let sensors = Sensors {
             measured: texts(study.sensors.measured.as_deref().unwrap_or_default()),
-            unknown: texts(&study.sensors.unknown),
+            unknown: calibrate::unknown_inputs(study, plant),
             disturbances: texts(&study.sensors.disturbances),
         };
         let mut extended = Extended::new(plant, &sensors).map_err(|error| blame(study, error))?;

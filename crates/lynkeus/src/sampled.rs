@@ -135,8 +135,8 @@ fn error_noise(
     notes: &mut Vec<String>,
 ) -> Result<ErrorNoise, Error> {
     let extended = prepared.extended();
-    let span = samples.time.last().unwrap_or(&0.0) - samples.time.first().unwrap_or(&0.0);
-    let mut process = noise::densities(study, extended, span, notes)?;
+    let declared = noise::declared(study, extended)?;
+    let mut process: Vec<f64> = declared.iter().map(|q| q.unwrap_or(0.0)).collect();
     let quarter = |variable: &lynkeus_model::Variable| {
         let width = variable.max - variable.min;
         if width.is_finite() {

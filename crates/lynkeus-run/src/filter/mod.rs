@@ -248,17 +248,18 @@ impl Filter {
     }
 
     /// The fixed-interval smoother over everything so far: the estimate at each sample given
-    /// all of them; none without history.
+    /// all of them, with standard deviations if asked for; none without history.
     #[must_use]
-    pub fn smoothed(&self) -> Option<Vec<Smoothed>> {
-        self.history.as_ref().map(|history| history.smoothed(None))
+    pub fn smoothed(&self, deviations: bool) -> Option<Vec<Smoothed>> {
+        let history = self.history.as_ref()?;
+        Some(history.smoothed(None, deviations))
     }
 
     /// The fixed-lag smoother: the estimate at each sample given those up to `lag` later.
     #[must_use]
-    pub fn smoothed_with_lag(&self, lag: usize) -> Option<Vec<Smoothed>> {
+    pub fn smoothed_with_lag(&self, lag: usize, deviations: bool) -> Option<Vec<Smoothed>> {
         let history = self.history.as_ref()?;
-        Some(history.smoothed(Some(lag)))
+        Some(history.smoothed(Some(lag), deviations))
     }
 
     /// The inputs to come, the last value where there is none.

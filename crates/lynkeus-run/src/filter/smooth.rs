@@ -31,7 +31,7 @@ pub(super) struct Step {
 pub struct Smoothed {
     /// x̂ˢ
     pub estimate: Vec<f64>,
-    /// its standard deviations
+    /// its standard deviations; empty where they were not asked for
     pub deviations: Vec<f64>,
 }
 
@@ -43,7 +43,7 @@ pub(super) struct History {
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
 pub(super) struct Adjoint {
     pub vector: Vec<f64>,
-    /// Λ, row by row
+    /// Λ, row by row; empty where no deviations are asked for
     matrix: Vec<f64>,
 }
 
@@ -57,12 +57,12 @@ impl History {
     /// λ ← (I − k cᵀ)ᵀλ − c ν/α, Λ ← (I − k cᵀ)ᵀΛ(I − k cᵀ) + c cᵀ/α, then over the flow
     /// λ ← Φᵀλ, Λ ← ΦᵀΛΦ. It equals the smoother of Rauch, Tung and Striebel,
     /// x̂ˢ = x̂⁺ + P⁺Φᵀ(P⁻)⁻¹(x̂ˢ' − x̂⁻'), and never inverts P⁻.
-    pub fn smoothed(&self, lag: Option<usize>) -> Vec<Smoothed> {
+    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
         let count = self.steps.len();
         let mut result = vec![];
         match lag {
             None => {
-                let mut adjoint = self.nothing();
+                let mut adjoint = self.nothing(deviations);
                 for k in (0..count).rev() {
                     result.push(self.at(k, &adjoint));
                     self.back(k, &mut adjoint);
@@ -71,7 +71,7 @@ impl History {
             }
             Some(lag) => {
                 for k in 0..count {
-                    let mut adjoint = self.nothing();
+                    let mut adjoint = self.nothing(deviations);
                     for later in (k + 1..=(k + lag).min(count - 1)).rev() {
                         self.back(later, &mut adjoint);
                     }
@@ -82,8 +82,12 @@ impl History {
         result
     }
 
-    fn nothing(&self) -> Adjoint {
-        Adjoint::nothing(self.steps.first().map_or(0, |s| s.x.len()))
+    fn nothing(&self, deviations: bool) -> Adjoint {
+        let n = self.steps.first().map_or(0, |s| s.x.len());
+        match deviations {
+            true => Adjoint::with_matrix(n),
+            false => Adjoint::nothing(n),
+        }
     }
 
     fn at(&self, k: usize, adjoint: &Adjoint) -> Smoothed {
@@ -91,7 +95,9 @@ impl History {
         let n = x.len();
         let shift = root.covariance_times(&adjoint.vector);
         let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
-        let deviations = (0..n).map(|i| {
+        // without Λ there is nothing to tell
+        let told = if adjoint.matrix.is_empty() { 0 } else { n };
+        let deviations = (0..told).map(|i| {
             let mut unit = vec![0.0; n];
             unit[i] = 1.0;
             let column = root.covariance_times(&unit);
@@ -125,7 +131,14 @@ impl Adjoint {
     pub fn nothing(n: usize) -> Self {
         Self {
             vector: vec![0.0; n],
+            matrix: vec![],
+        }
+    }
+
+    fn with_matrix(n: usize) -> Self {
+        Self {
             matrix: vec![0.0; n * n],
+            ..Self::nothing(n)
         }
     }
 
@@ -156,6 +169,9 @@ impl Adjoint {
 
     fn over(&mut self, correction: &Correction) {
         self.over_vector(correction);
+        if self.matrix.is_empty() {
+            return;
+        }
         let Correction {
             slopes: c,
             variance,
@@ -176,6 +192,9 @@ impl Adjoint {
     fn through(&mut self, transition: &[f64]) {
         let n = self.vector.len();
         self.vector_through(transition);
+        if self.matrix.is_empty() {
+            return;
+        }
         // ΛΦ, then Φᵀ(ΛΦ)
         let mut half = vec![0.0; n * n];
         for (i, row) in transition.chunks_exact(n).enumerate() {

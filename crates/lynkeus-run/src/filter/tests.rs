@@ -85,11 +85,11 @@ fn the_smoother_of_a_constant_is_its_last_estimate() {
         filter.push(f64::from(k), &[f64::from(k % 3)], &[]).unwrap();
     }
     let (last, deviation) = (filter.estimate()[0], filter.deviations()[0]);
-    for smoothed in filter.smoothed().unwrap() {
+    for smoothed in filter.smoothed(true).unwrap() {
         assert!((smoothed.estimate[0] - last).abs() < 1e-12);
         assert!((smoothed.deviations[0] - deviation).abs() < 1e-12);
     }
-    let lagged = filter.smoothed_with_lag(3).unwrap();
+    let lagged = filter.smoothed_with_lag(3, false).unwrap();
     assert!((lagged[6].estimate[0] - last).abs() < 1e-12);
     assert!((lagged[0].estimate[0] - last).abs() > 1e-3);
 }

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
 use crate::study::Name;
-use crate::{Error, Study};
+use crate::{Error, Study, calibrate};
 
 /// Names listed before the rest becomes a count.
 const LISTED: usize = 24;
@@ -26,7 +26,7 @@ pub(super) fn answer(
     let sensors = &study.sensors;
     let question = Question {
         measured: texts(sensors.measured.as_deref().unwrap_or_default()),
-        unknown: texts(&sensors.unknown),
+        unknown: calibrate::unknown_inputs(study, plant),
         disturbances: texts(&sensors.disturbances),
         parameters: options.parameters,
         about: options.about.clone(),

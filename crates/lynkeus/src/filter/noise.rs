@@ -94,13 +94,51 @@ pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
 }
 
 /// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
-/// unknown input without one, a wander over a quarter of its range in a tenth of the log.
+/// unknown input without one, a wander over a quarter of its range in a tenth of the log. Where the
+/// study declares none at all every state may drift a little.
 pub(crate) fn densities(
     study: &Study,
     extended: &Extended<'_>,
     span: f64,
     notes: &mut Vec<String>,
 ) -> Result<Vec<f64>, Error> {
+    let states = &extended.states;
+    let densities = declared(study, extended)?;
+    let is_declared = !study.process_noise.is_empty();
+    let is_constant = |state: &Variable| {
+        let mut names = study.sensors.unknown.iter();
+        names.any(|name| name.is_or_has(&state.name))
+    };
+    let mut is_awake = false;
+    let chosen = densities.into_iter().zip(states).enumerate();
+    let chosen: Vec<f64> = chosen
+        .map(|(i, (density, state))| match density {
+            Some(density) => density,
+            None if span <= 0.0 => 0.0,
+            None if i >= extended.plant_states() => wander(state, span, notes),
+            None if is_declared || is_constant(state) => 0.0,
+            None => {
+                let width = state.max - state.min;
+                is_awake |= width.is_finite();
+                if width.is_finite() {
+                    10.0 * (DOUBT * width).powi(2) / span
+                } else {
+                    0.0
+                }
+            }
+        })
+        .collect();
+    if is_awake {
+        notes.push(format!(
+            "without [process_noise] the model is taken as right up to {} % of each state's range in a tenth of the log, so that the filter does not fall asleep",
+            100.0 * DOUBT
+        ));
+    }
+    Ok(chosen)
+}
+
+/// Spectral densities as the study declares them, one per estimated quantity.
+pub(crate) fn declared(study: &Study, extended: &Extended<'_>) -> Result<Vec<Option<f64>>, Error> {
     let states = &extended.states;
     let mut densities = vec![None; states.len()];
     for (name, density) in &study.process_noise {
@@ -121,15 +159,11 @@ pub(crate) fn densities(
             return Err(name.blame(refusal));
         }
     }
-    let chosen = densities.into_iter().zip(states).enumerate();
-    Ok(chosen
-        .map(|(i, (density, state))| match density {
-            Some(density) => density,
-            None if i < extended.plant_states() || span <= 0.0 => 0.0,
-            None => wander(state, span, notes),
-        })
-        .collect())
+    Ok(densities)
 }
+
+/// What a model may be wrong by where the study does not say: this share of a state's range.
+const DOUBT: f64 = 0.0025;
 
 fn wander(state: &Variable, span: f64, notes: &mut Vec<String>) -> f64 {
     let width = state.max - state.min;

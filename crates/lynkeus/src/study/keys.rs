@@ -127,10 +127,10 @@ pub(super) const SENSORS: [KeySpec; 5] = [
     },
     KeySpec {
         name: "unknown",
-        kind: "list of inputs",
+        kind: "list of inputs and parameters",
         shape: Shape::NAMES,
         default: "none",
-        meaning: "inputs that nobody measures; estimated along with the state",
+        meaning: "inputs that nobody measures, estimated along with the state; and parameters, estimated as constants",
     },
     KeySpec {
         name: "disturbances",

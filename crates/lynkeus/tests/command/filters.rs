@@ -155,6 +155,46 @@ fn any_plant_gets_an_estimate() {
     );
 }
 
+/// A stiffness that nobody knows, from a log: `unknown` names a parameter.
+#[test]
+fn a_parameter_is_calibrated() {
+    let observer = "[observer]\nfamily = \"ekf\"\ninitial_variance = { k = 0.25, default = 1 }\n[estimate]\nsd = true";
+    let folder = folder(observer, |_| false);
+    let model = DRIFT
+        .replace(
+            "  input Real u",
+            "  parameter Real k(min = 0, max = 4) = 1.5;\n  input Real u",
+        )
+        .replace("u - x -", "u - k*x -");
+    fs::write(folder.path.path().join("drift.mo"), model).unwrap();
+    let path = folder.path.path().join("drift.toml");
+    let study = fs::read_to_string(&path).unwrap();
+    fs::write(
+        &path,
+        study.replace("[sensors]", "[sensors]\nunknown = [\"k\"]"),
+    )
+    .unwrap();
+    let ended = folder.run(&["estimate", "drift.toml", "log.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (header, rows) = csv(&ended.out);
+    let at = |name: &str| header.iter().position(|n| n == name).unwrap();
+    let last = rows.last().unwrap();
+    // the log was made with k = 1
+    assert!(
+        (last[at("k_hat")] - 1.0).abs() < 0.01,
+        "{}",
+        last[at("k_hat")]
+    );
+    assert!(last[at("k_sd")] < 0.02 && rows[0][at("k_sd")] > 0.4);
+    let checked = folder.run(&["check", "drift.toml"]);
+    assert_eq!(checked.code, 0, "{}", checked.err);
+    assert!(
+        checked.out.contains("observable: x, v, k"),
+        "{}",
+        checked.out
+    );
+}
+
 /// The standard deviation that a family reports is that of its estimates over noisy logs.
 #[test]
 fn standard_deviations_are_those_of_many_runs() {
