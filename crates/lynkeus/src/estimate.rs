@@ -42,7 +42,20 @@ pub(crate) fn estimated(
     let design = prepared.design()?;
     refuse_derivatives(study, &design)?;
     refuse_stray_columns(plant, settings)?;
-    let signals = Signals::of(table, plant, settings, &design.observer)?;
+    let read = design
+        .observer
+        .measured
+        .iter()
+        .chain(&design.observer.inputs);
+    let names = read.map(|signal| signal.name.as_str());
+    let time_header = time_of(table, plant, settings, names)?;
+    let ordered = match settings.strict {
+        true => None,
+        false => table.in_order(&time_header, settings.late)?,
+    };
+    let order_notes = ordered.as_ref().map_or(&[][..], |o| &o.notes).to_vec();
+    let table = ordered.as_ref().map_or(table, |o| &o.table);
+    let signals = Signals::of(table, &time_header, settings, &design.observer)?;
     // the log, the estimates, and both as the outcome has them
     let read = 1 + signals.readings.len() + signals.inputs.len();
     table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
@@ -51,7 +64,7 @@ pub(crate) fn estimated(
     let rows = course.estimates.first().map_or(0, Vec::len);
     settle(&mut course, rows, study, table.file())?;
     let logged = |name: &str| {
-        let values = logged(table, settings, &signals.time_header, name)?;
+        let values = logged(table, settings, &time_header, name)?;
         Some(values[..rows].to_vec())
     };
     let estimated = design.observer.estimates.iter().enumerate();
@@ -76,7 +89,8 @@ pub(crate) fn estimated(
         ..Quantity::default()
     });
     let mut notes = design.notes.clone();
-    notes.extend(gaps(table, settings, &signals.time_header, &design));
+    notes.extend(order_notes);
+    notes.extend(gaps(table, settings, &time_header, &design));
     let raw = Raw {
         time: &signals.time[..rows],
         quantities: estimated.into_iter().chain(known).collect(),
@@ -91,7 +105,6 @@ pub(crate) fn estimated(
 
 /// The columns of a log that an observer reads.
 struct Signals<'t> {
-    time_header: String,
     time: &'t [f64],
     readings: Vec<&'t [f64]>,
     inputs: Vec<Cow<'t, [f64]>>,
@@ -100,13 +113,10 @@ struct Signals<'t> {
 impl<'t> Signals<'t> {
     fn of(
         table: &'t Table,
-        plant: &Plant,
+        time_header: &str,
         settings: &EstimateSettings,
         observer: &Observer,
     ) -> Result<Self, Error> {
-        let read = observer.measured.iter().chain(&observer.inputs);
-        let names = read.map(|signal| signal.name.as_str());
-        let time_header = time_of(table, plant, settings, names)?;
         let reading = |name: &str| match settings.strict {
             true => table.column(header(settings, name)),
             false => table.readings(header(settings, name)),
@@ -115,10 +125,9 @@ impl<'t> Signals<'t> {
         let inputs = observer.inputs.iter();
         let inputs = inputs.map(|s| signal(table, settings, observer, &s.name));
         Ok(Self {
-            time: table.time(&time_header)?,
+            time: table.time(time_header)?,
             readings: readings.collect::<Result<_, _>>()?,
             inputs: inputs.collect::<Result<_, _>>()?,
-            time_header,
         })
     }
 

@@ -18,8 +18,10 @@ pub struct EstimateSettings {
     pub time: Option<String>,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
-    /// A log with missing cells in a column that is read is refused.
+    /// A log with missing cells in a column that is read, or whose times do not increase, is refused.
     pub strict: bool,
+    /// How much later than the row before it a row may come, in units of time.
+    pub late: Option<f64>,
     /// Estimates given later rows, too.
     pub smoothing: Option<Smoothing>,
     /// Standard deviations beside the estimates.
@@ -79,6 +81,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
                 .map(|(name, header)| Ok((name, header.name()?.text)))
                 .collect::<Result<_, Error>>()?,
         },
+        late: section.optional("late", Entry::positive)?,
         strict: section.optional("strict", Entry::boolean)?.unwrap_or(false),
     })
 }

@@ -320,7 +320,14 @@ pub(super) const SIMULATE: [KeySpec; 7] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 7] = [
+pub(super) const ESTIMATE: [KeySpec; 8] = [
+    KeySpec {
+        name: "late",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "ten usual steps",
+        meaning: "how late a row may come, in units of time: it is put in its place; one that is later says that the clock jumped, and is refused",
+    },
     KeySpec {
         name: "smooth",
         kind: "true, false",
@@ -368,7 +375,7 @@ pub(super) const ESTIMATE: [KeySpec; 7] = [
         kind: "`true`, `false`",
         shape: Shape::Flag,
         default: "`false`",
-        meaning: "refuse a log in which a cell that is read has no number",
+        meaning: "refuse a log in which a cell that is read has no number, or whose times do not increase",
     },
 ];
 

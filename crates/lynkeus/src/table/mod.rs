@@ -11,6 +11,7 @@ mod instant;
 mod lines;
 mod marks;
 mod number;
+mod order;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod read;
@@ -28,6 +29,7 @@ use lines::Lines;
 pub use self::parquet::write_parquet;
 pub use column::Fault;
 pub use number::{exact, significant};
+pub use order::Ordered;
 pub use write::write_csv;
 
 /// Whether a file is a Parquet file by its name.

@@ -3,6 +3,7 @@
 
 mod certify;
 mod families;
+mod faulty;
 mod filters;
 mod how_well;
 mod limits;

@@ -59,34 +59,32 @@ fn wrong_columns() {
     );
 }
 
+/// As [`refused`], by a study that takes no log with faults.
+fn strict(change: impl Fn(&Folder)) -> String {
+    let with_key = |folder: &Folder| {
+        change(folder);
+        folder.change("study.toml", "[estimate]", "[estimate]\nstrict = true");
+    };
+    refused(with_key, 2)
+}
+
 #[test]
 fn cells_that_are_no_numbers() {
     // a sensor that does not report is bridged by the model; `strict` refuses it
-    let strict = |change: &dyn Fn(&Folder)| {
-        refused(
-            |folder| {
-                change(folder);
-                let study = folder.read("study.toml");
-                folder.write(
-                    "study.toml",
-                    &study.replace("[estimate]", "[estimate]\nstrict = true"),
-                );
-            },
-            2,
-        )
-    };
     says(
-        &strict(&line(3, "4,NaN,3")),
+        &strict(line(3, "4,NaN,3")),
         &["log.csv:3", "\"level\"", "found \"NaN\""],
     );
-    says(&strict(&line(4, "8,,3")), &["log.csv:4", "an empty cell"]);
+    says(&strict(line(4, "8,,3")), &["log.csv:4", "an empty cell"]);
     says(&refused(line(4, "8,5"), 2), &["log.csv:4"]);
 }
 
 #[test]
 fn time_that_goes_back() {
-    let text = refused(line(4, "3,5.1,3"), 2);
+    let text = strict(line(4, "3,5.1,3"));
     says(&text, &["log.csv:4", "found \"t\" = 3 after 4 in line 3"]);
+    let text = refused(line(900, "3,5.1,3"), 2);
+    says(&text, &["log.csv:900", "the clock jumps back", "`late`"]);
 }
 
 #[test]
