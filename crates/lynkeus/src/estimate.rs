@@ -39,7 +39,7 @@ pub(crate) fn estimated(
 ) -> Result<Outcome, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let settings = &study.estimate;
-    let design = prepared.design()?;
+    let mut design = prepared.design()?;
     refuse_derivatives(study, &design)?;
     refuse_stray_columns(plant, settings)?;
     let read = design
@@ -56,6 +56,7 @@ pub(crate) fn estimated(
     let order_notes = ordered.as_ref().map_or(&[][..], |o| &o.notes).to_vec();
     let table = ordered.as_ref().map_or(table, |o| &o.table);
     let signals = Signals::of(table, &time_header, settings, &design.observer)?;
+    start_at_readings(prepared, &signals, &mut design);
     // the log, the estimates, and both as the outcome has them
     let read = 1 + signals.readings.len() + signals.inputs.len();
     table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
@@ -101,6 +102,43 @@ pub(crate) fn estimated(
         design,
     };
     Ok(raw.finish())
+}
+
+/// A measured state for which neither the study nor the model says where it starts begins at its
+/// sensor's first reading.
+fn start_at_readings(prepared: &Prepared<'_>, signals: &Signals<'_>, design: &mut Design) {
+    let extended = prepared.extended();
+    let initial = &prepared.study().observer.tuning.initial;
+    let number = |node| extended.graph().constant_value(node);
+    for (output, readings) in extended.outputs.iter().zip(&signals.readings) {
+        let Some((i, slope, offset)) = output.state else {
+            continue;
+        };
+        let state = &extended.states[i];
+        let array = state.name.split('[').next().unwrap_or_default();
+        let is_given = state.start.is_some()
+            || initial.default.is_some()
+            || [state.name.as_str(), array]
+                .iter()
+                .any(|name| initial.values.contains_key(*name));
+        let first = readings.iter().find(|y| y.is_finite());
+        let (Some(slope), Some(offset), Some(y)) = (number(slope), number(offset), first) else {
+            continue;
+        };
+        let start = (y - offset) / slope;
+        if let (false, true, Some(own)) = (
+            is_given,
+            start.is_finite(),
+            design.observer.states.get_mut(i),
+        ) {
+            own.1 = start;
+            design.notes.push(format!(
+                "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
+                state.name,
+                lynkeus_structure::short(start)
+            ));
+        }
+    }
 }
 
 /// The columns of a log that an observer reads.

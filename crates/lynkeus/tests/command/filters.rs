@@ -155,6 +155,22 @@ fn any_plant_gets_an_estimate() {
     );
 }
 
+/// A height that starts anywhere: at the first reading, and not in the middle of its range.
+#[test]
+fn a_measured_state_starts_where_it_is_read() {
+    let folder = folder("[observer]\nfamily = \"triangular\"\ntheta = 1", |_| false);
+    let model = DRIFT.replace("x(start = 1, min = -5, max = 5)", "x(min = -5, max = 405)");
+    fs::write(folder.path.path().join("drift.mo"), model).unwrap();
+    let ended = folder.run(&["estimate", "drift.toml", "log.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(
+        ended.err.contains("x starts at its first reading, 1:"),
+        "{}",
+        ended.err
+    );
+    assert!((csv(&ended.out).1[0][1] - 1.0).abs() < 1e-12);
+}
+
 /// A stiffness that nobody knows, from a log: `unknown` names a parameter.
 #[test]
 fn a_parameter_is_calibrated() {
