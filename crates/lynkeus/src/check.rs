@@ -136,7 +136,7 @@ impl Report {
     pub fn picture(&self) -> Result<crate::plot::Plane, Error> {
         match &self.uniform {
             Some(uniform) => uniform::picture(&self.plant, uniform.examined()),
-            None => Err(Error::input(format!(
+            None => Err(Error::refused(format!(
                 "{}: the singular set was not examined: it needs values for all parameters, at most six states, and outputs that show them",
                 self.plant
             ))),
