@@ -92,6 +92,9 @@ pub struct FilterTuning {
     pub outputs: Vec<Node>,
     /// variance of the first estimate, one per state
     pub initial_variance: Vec<f64>,
+    /// the derivatives with the estimate limited to its declared range, for where the model has
+    /// no value outside of it
+    pub confined: Vec<Node>,
 }
 
 impl Observer {

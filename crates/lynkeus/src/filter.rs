@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use lynkeus_model::Variable;
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor, SensorHealth,
-    Smoothed,
+    Bounds, Confined, Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor,
+    SensorHealth, Smoothed,
 };
 use lynkeus_run::{Error as RunError, EstimatorSettings};
 use lynkeus_structure::Extended;
@@ -53,6 +54,12 @@ pub(crate) fn run(
     };
     course.ended = replay(&mut filter, samples, &mut course, watch).err();
     course.inputs_held = filter.health().inputs_held;
+    if filter.health().confined > 0 {
+        course.notes.push(format!(
+            "the model has no value where the estimate was: at {} samples it was put back into its declared range; family = \"mhe\" keeps it there",
+            filter.health().confined
+        ));
+    }
     let smoothed = match study.estimate.smoothing {
         None => None,
         Some(Smoothing::Interval) => filter.smoothed(false),
@@ -137,8 +144,19 @@ fn model(
             .collect(),
         process_noise: noise::densities(study, extended, span, notes)?,
         initial_variance: tuning.initial_variance.clone(),
+        confined: Some(Confined {
+            derivatives: tuning.confined.clone(),
+            bounds: extended.states.iter().map(bounds).collect(),
+        }),
     };
     FilterModel::new(&plant).map_err(Error::from_source)
+}
+
+fn bounds(state: &Variable) -> Bounds {
+    Bounds {
+        low: state.min,
+        high: state.max,
+    }
 }
 
 /// `limits` of `[sensors]`, by measured output.

@@ -18,7 +18,7 @@ mod settings;
 use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
 use lynkeus_structure::{Extended, Region, Standing};
 
-use crate::estimate::Copy;
+use crate::estimate::{Copy, limited};
 use crate::family::Form;
 use crate::observer::FilterTuning;
 use crate::stages::{FormBox, Found, Searched, Stages};
@@ -146,12 +146,17 @@ impl<K: Kalman> Stages for K {
         let copy = Copy::new(extended, &settings.common);
         let derivatives = copy.at_estimate(&extended.derivatives);
         let outputs: Vec<_> = extended.outputs.iter().map(|o| o.variable.node).collect();
+        let limits = copy.hats.iter().zip(&extended.states);
+        let limits =
+            limits.map(|(hat, state)| (hat.symbol, limited(extended.graph(), hat.symbol, state)));
+        let confined = extended.graph().substitute(&derivatives, &limits.collect());
         let mut observer = copy.observer(K::NAME, derivatives)?;
         let variance = settings.variances(extended, &observer.states);
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
             outputs: copy.at_estimate(&outputs),
+            confined,
             initial_variance: variance.iter().map(|v| v.value).collect(),
         });
         let parameters = variance.iter().zip(&extended.states).map(|(v, state)| {

@@ -91,4 +91,7 @@ pub struct Health {
     pub sensors: Vec<SensorHealth>,
     /// values of known inputs that were missing, where the last one held
     pub inputs_held: usize,
+    /// samples at which the estimate was put back into the declared ranges, because the plant has
+    /// no value where it was
+    pub confined: usize,
 }

@@ -17,7 +17,7 @@ use super::model::FilterModel;
 use super::root::{Root, dot};
 use super::sensing::Sensing;
 use super::smooth::{Adjoint, Correction};
-use super::{Belief, Bounds};
+use super::{Belief, Bounds, confine};
 use crate::{Error, EstimatorSettings};
 
 /// Most Gauss–Newton steps and changes of the bounds that are met, per sample.
@@ -115,7 +115,8 @@ impl Horizon {
         if let Some(last) = passes.last() {
             belief.x.copy_from_slice(&last.after.x);
             belief.root = last.after.root.clone();
-            self.confine(&mut belief.x);
+            // rounding may leave an estimate a last digit outside
+            confine(&mut belief.x, &self.bounds);
         }
         if self.rows.len() > self.length {
             self.prior = self.shortened(passes)?;
@@ -142,13 +143,6 @@ impl Horizon {
         };
         let (from, to) = (&self.rows[0], &self.rows[1]);
         Ok(predicted(&mut self.engine, &free, from, to)?.0)
-    }
-
-    /// Rounding may leave an estimate a last digit outside of its bounds.
-    fn confine(&self, x: &mut [f64]) {
-        for (x, bounds) in x.iter_mut().zip(&self.bounds) {
-            *x = x.max(bounds.low).min(bounds.high);
-        }
     }
 
     fn solve(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {

@@ -22,6 +22,7 @@
 //!     sensors: vec![Sensor { name: "y".into(), output: x.node(), noise: Level::Absolute(1.0), limits: None }],
 //!     process_noise: vec![0.0],
 //!     initial_variance: vec![1.0],
+//!     confined: None,
 //! })?;
 //! let mut filter = Filter::new(&model, FilterSettings::of(FilterKind::Extended), EstimatorSettings::default())?;
 //! filter.push(0.0, &[3.0], &[])?;
@@ -45,7 +46,7 @@ mod smooth;
 mod unscented;
 
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{FilterModel, FilterPlant, Limits, Sensor};
+pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
 pub use smooth::Smoothed;
 pub use unscented::SigmaPoints;
 
@@ -53,6 +54,7 @@ use crate::divergence::Bound;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
+use model::ConfinedFlow;
 use root::Root;
 use sensing::Sensing;
 use smooth::{History, Step};
@@ -117,10 +119,19 @@ enum Engine {
     MovingHorizon(Box<Horizon>),
 }
 
+/// For intervals on which the plant has no value where the estimate is.
+#[derive(Clone, Debug)]
+struct Spare {
+    engine: Extended,
+    bounds: Vec<Bounds>,
+}
+
 /// A filter that takes one sample after the other, live or from a log.
 #[derive(Clone, Debug)]
 pub struct Filter {
     engine: Engine,
+    /// the same inside the declared ranges
+    spare: Option<Spare>,
     belief: Belief,
     sensing: Sensing,
     inputs: Vec<f64>,
@@ -163,8 +174,20 @@ impl Filter {
             }
         };
         let x = model.flow.start().to_vec();
+        let spare = match &model.confined {
+            None => None,
+            Some(ConfinedFlow {
+                flow,
+                entries,
+                bounds,
+            }) => Some(Spare {
+                engine: Extended::new(flow, entries, &model.process_noise, run)?,
+                bounds: bounds.clone(),
+            }),
+        };
         Ok(Self {
             engine,
+            spare,
             deviations: model.initial_variance.iter().map(|v| v.sqrt()).collect(),
             belief: Belief {
                 root: Root::diagonal(&model.initial_variance),
@@ -318,8 +341,26 @@ impl Filter {
         }
     }
 
-    /// To the next sample; the transition is what the smoother needs of it.
+    /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
+    /// value on the way, inside the declared ranges.
     fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Vec<f64>, Error> {
+        let before = self.belief.clone();
+        match (self.run_flow(from, to, inputs), &mut self.spare) {
+            (Err(error), Some(spare)) if is_undefined(&error) => {
+                self.belief = before;
+                self.sensing.health.confined += 1;
+                confine(&mut self.belief.x, &spare.bounds);
+                let driven = &mut spare.engine.driven;
+                driven.start(&self.inputs);
+                driven.aim(from, to, inputs);
+                let keep = self.history.is_some();
+                spare.engine.predict(&mut self.belief, from, to, keep)
+            }
+            (result, _) => result,
+        }
+    }
+
+    fn run_flow(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Vec<f64>, Error> {
         let keep = self.history.is_some();
         match &mut self.engine {
             Engine::Extended(engine) => {
@@ -338,6 +379,19 @@ impl Filter {
     }
 
     fn correct(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
+        let before = self.sensing.health.clone();
+        match (self.correct_here(t, readings), &self.spare) {
+            (Err(error), Some(spare)) if is_undefined(&error) => {
+                self.sensing.health = before;
+                self.sensing.health.confined += 1;
+                confine(&mut self.belief.x, &spare.bounds);
+                self.correct_here(t, readings)
+            }
+            (result, _) => result,
+        }
+    }
+
+    fn correct_here(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
         let Self {
             sensing,
             belief,
@@ -367,6 +421,20 @@ impl Filter {
                 hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
             }),
         }
+    }
+}
+
+/// Whether the plant has no value where it was asked for.
+fn is_undefined(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::NotFinite { .. } | Error::StepUnderflow { .. } | Error::Diverged { .. }
+    )
+}
+
+fn confine(x: &mut [f64], bounds: &[Bounds]) {
+    for (x, bounds) in x.iter_mut().zip(bounds) {
+        *x = x.max(bounds.low).min(bounds.high);
     }
 }
 

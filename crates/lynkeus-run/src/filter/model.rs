@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Graph, Node, jacobian};
 
+use super::Bounds;
 use crate::{Error, Level, System};
 
 /// What a filter has to know: x' = f(t, x, u) + w, y_i = h_i(t, x, u) + v_i.
@@ -24,6 +25,17 @@ pub struct FilterPlant<'g> {
     pub process_noise: Vec<f64>,
     /// variance of the first estimate
     pub initial_variance: Vec<f64>,
+    /// f and where the states can be, for where f has no value outside; none without ranges
+    pub confined: Option<Confined>,
+}
+
+/// The plant inside its declared ranges.
+#[derive(Clone, Debug)]
+pub struct Confined {
+    /// f of the states limited to their ranges
+    pub derivatives: Vec<Node>,
+    /// one pair per state
+    pub bounds: Vec<Bounds>,
 }
 
 /// A measured output.
@@ -62,7 +74,18 @@ pub struct FilterModel {
     pub(super) sensors: Vec<Sensor>,
     pub(super) process_noise: Vec<f64>,
     pub(super) initial_variance: Vec<f64>,
+    pub(super) confined: Option<ConfinedFlow>,
 }
+
+/// [`Confined`], compiled.
+#[derive(Clone, Debug)]
+pub(super) struct ConfinedFlow {
+    pub flow: System,
+    pub entries: Vec<(usize, usize)>,
+    pub bounds: Vec<Bounds>,
+}
+
+type Entries = Vec<(usize, usize)>;
 
 impl FilterModel {
     /// Compiles a plant with its Jacobians.
@@ -74,19 +97,25 @@ impl FilterModel {
         check(plant)?;
         let graph = plant.graph;
         let symbols: Vec<Node> = plant.states.iter().map(|s| s.1).collect();
-        let F = jacobian::forward(graph, &plant.derivatives, &symbols);
         let h: Vec<Node> = plant.sensors.iter().map(|s| s.output).collect();
         let C = jacobian::forward(graph, &h, &symbols);
         let entry = |(i, j, node): &(usize, usize, Node)| (format!("{i},{j}"), *node);
-        let flow_outputs: Vec<(String, Node)> = F.entries.iter().map(entry).collect();
-        let flow = System::new(
-            graph,
-            plant.time,
-            &plant.states,
-            &plant.inputs,
-            &plant.derivatives,
-            &flow_outputs,
-        )?;
+        let (flow, flow_entries) = linear(plant, &plant.derivatives)?;
+        let confined = match &plant.confined {
+            None => None,
+            Some(Confined {
+                derivatives,
+                bounds,
+            }) => {
+                let (flow, entries) = linear(plant, derivatives)?;
+                let bounds = bounds.clone();
+                Some(ConfinedFlow {
+                    flow,
+                    entries,
+                    bounds,
+                })
+            }
+        };
         let states = plant
             .states
             .iter()
@@ -100,7 +129,8 @@ impl FilterModel {
         Ok(Self {
             flow,
             output_map,
-            flow_entries: places(&F.entries),
+            flow_entries,
+            confined,
             output_entries: places(&C.entries),
             sensors: plant.sensors.clone(),
             process_noise: plant.process_noise.clone(),
@@ -140,6 +170,24 @@ impl FilterModel {
         self.flow = self.flow.with_start(start)?;
         Ok(self)
     }
+}
+
+/// A flow whose outputs are the entries of its Jacobian, and their places.
+fn linear(plant: &FilterPlant<'_>, derivatives: &[Node]) -> Result<(System, Entries), Error> {
+    let symbols: Vec<Node> = plant.states.iter().map(|s| s.1).collect();
+    let F = jacobian::forward(plant.graph, derivatives, &symbols);
+    let entry = |(i, j, node): &(usize, usize, Node)| (format!("{i},{j}"), *node);
+    let outputs: Vec<(String, Node)> = F.entries.iter().map(entry).collect();
+    let (states, inputs) = (&plant.states, &plant.inputs);
+    let flow = System::new(
+        plant.graph,
+        plant.time,
+        states,
+        inputs,
+        derivatives,
+        &outputs,
+    )?;
+    Ok((flow, F.entries.iter().map(|e| (e.0, e.1)).collect()))
 }
 
 fn check(plant: &FilterPlant<'_>) -> Result<(), Error> {

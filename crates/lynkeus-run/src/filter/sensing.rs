@@ -53,6 +53,7 @@ impl Sensing {
             health: Health {
                 sensors: vec![SensorHealth::default(); count],
                 inputs_held: 0,
+                confined: 0,
             },
             corrections: vec![],
         }

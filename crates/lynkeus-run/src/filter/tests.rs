@@ -22,6 +22,7 @@ fn scalar(a: f64, q: f64, r: f64) -> FilterModel {
         }],
         process_noise: vec![q],
         initial_variance: vec![0.5],
+        confined: None,
     })
     .unwrap()
 }
@@ -185,4 +186,48 @@ fn the_moving_horizon_keeps_to_the_bounds() {
         "{:?}",
         horizon.estimate()
     );
+}
+
+/// x' = −√x, read below zero: where the plant has no value the filter goes on inside the range.
+#[test]
+fn an_estimate_without_a_value_of_the_plant_is_put_back() {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+    let plant = |confined| FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 1.0)],
+        derivatives: vec![(-x.sqrt()).node()],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: x.node(),
+            noise: Level::Absolute(0.1),
+            limits: None,
+        }],
+        process_noise: vec![0.01],
+        initial_variance: vec![1.0],
+        confined,
+    };
+    let inside = Confined {
+        derivatives: vec![(-x.max(g.constant(0.01)).sqrt()).node()],
+        bounds: vec![Bounds {
+            low: 0.01,
+            high: 2.0,
+        }],
+    };
+    let run = |confined| {
+        let model = FilterModel::new(&plant(confined)).unwrap();
+        let settings = FilterSettings::of(FilterKind::Extended);
+        let mut filter = Filter::new(&model, settings, exact()).unwrap();
+        let result =
+            (0..20).try_for_each(|k| filter.push(0.1 * f64::from(k), &[-0.5], &[]).map(drop));
+        (result, filter.health().confined)
+    };
+    assert!(matches!(
+        run(None).0,
+        Err(Error::NotFinite { .. } | Error::StepUnderflow { .. })
+    ));
+    let (result, confined) = run(Some(inside));
+    assert!(result.is_ok() && confined > 5, "{result:?} {confined}");
 }

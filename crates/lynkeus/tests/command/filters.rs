@@ -155,6 +155,39 @@ fn any_plant_gets_an_estimate() {
     );
 }
 
+/// The pump of the measured tanks from the lower level alone, smoothed: the overflow, at which the
+/// sensor shows 10, is declared and not believed.
+#[test]
+fn the_hidden_pump_is_smoothed_through_the_overflow() {
+    for file in ["estimation.csv", "validation.csv"] {
+        let Some(path) = shared(&format!("data/cascaded-tanks/{file}")) else {
+            return;
+        };
+        let folder = Folder::new();
+        let study = "plant = \"two_tanks.mo\"\n[sensors]\nmeasured = [\"level\"]\nunknown = [\"pump\"]\nnoise = { level = 0.03 }\nlimits = { level = [0, 10] }\n[process_noise]\nupper = 1e-4\nlower = 1e-4\npump = 5e-4\n[observer]\nfamily = \"ekf\"\ninitial_variance = { default = 1 }\n[estimate]\ncolumns = { level = \"y\", pump = \"u\" }\nsmooth = true\n";
+        folder.write("tanks.toml", study);
+        let log = path.canonicalize().unwrap();
+        let ended = folder.run(&["estimate", "tanks.toml", log.to_str().unwrap()]);
+        assert!(
+            ended.err.contains("at a limit of the sensor"),
+            "{}",
+            ended.err
+        );
+        let (header, rows) = csv(&ended.out);
+        let (names, measured) = csv(&fs::read_to_string(&path).unwrap());
+        let column = |names: &[String], rows: &[Vec<f64>], name: &str| {
+            let i = names.iter().position(|n| n == name).unwrap();
+            rows.iter().map(|row| row[i]).collect::<Vec<f64>>()
+        };
+        let pump = column(&names, &measured, "u");
+        let smooth = crate::references::correlation(&column(&header, &rows, "pump_smooth"), &pump);
+        let hat = column(&header, &rows, "pump_hat");
+        let filter = (0..60).map(|lag| crate::references::correlation(&hat[lag..], &pump));
+        let filter = filter.fold(-1.0, f64::max);
+        assert!(smooth > 0.88 && filter > 0.86, "{file}: {smooth} {filter}");
+    }
+}
+
 /// A height that starts anywhere: at the first reading, and not in the middle of its range.
 #[test]
 fn a_measured_state_starts_where_it_is_read() {

@@ -55,7 +55,7 @@ fn the_hidden_pump_of_the_measured_tanks() {
 }
 
 /// Pearson's correlation over the shorter of the two.
-fn correlation(x: &[f64], y: &[f64]) -> f64 {
+pub fn correlation(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     let mean = |v: &[f64]| v[..n].iter().sum::<f64>() / n as f64;
     let (mx, my) = (mean(x), mean(y));
