@@ -28,6 +28,9 @@ pub fn vanishes(graph: &Graph, node: Node) -> bool {
     }
     let mut expanded: HashMap<Node, Polynomial> = HashMap::new();
     for node in graph.reachable(&[node]) {
+        if graph.spent().is_some() {
+            return false;
+        }
         let polynomial = expand(graph, node, &expanded).unwrap_or_else(|| whole(node));
         expanded.insert(node, polynomial);
     }
