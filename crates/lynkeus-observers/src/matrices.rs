@@ -68,9 +68,12 @@ pub(crate) fn expressions(A: &Matrix<'_>) -> String {
     rows((0..A.rows).map(row).collect())
 }
 
-/// Numbers row by row, with six digits.
+/// Numbers row by row, with six digits; a dash where there is none.
 pub(crate) fn numbers(A: &[Vec<f64>]) -> String {
     let number = |x: &f64| {
+        if x.is_nan() {
+            return "–".to_owned();
+        }
         let short: f64 = format!("{x:.5e}").parse().unwrap_or(*x);
         short.to_string()
     };

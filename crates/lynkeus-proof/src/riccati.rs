@@ -39,6 +39,9 @@ pub struct Riccati {
     pub smallest: f64,
 }
 
+/// The largest entry of A that is looked at.
+const LARGEST: f64 = 1e100;
+
 impl Riccati {
     /// A proved solution of the inequality; none where none was found.
     ///
@@ -56,6 +59,10 @@ impl Riccati {
         // e = D e', D of powers of two, so that fast poles leave nothing of very
         // different size; scaling back is exact
         let mut A = matrix(A);
+        // squares that overflow would keep the balancing going for ever
+        if !A.iter().all(|a| a.abs() < LARGEST) {
+            return None;
+        }
         let D = balance_parlett_reinsch(&mut A);
         let n = A.nrows();
         let E = matrix(E);
@@ -195,6 +202,16 @@ fn holds(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The balancing of such a matrix does not end.
+    #[test]
+    fn poles_beyond_reason_have_no_solution() {
+        for pole in [-1e308, -1e200, f64::NAN] {
+            let A = vec![vec![pole, 1.0], vec![pole, 0.0]];
+            let E = vec![vec![0.0], vec![1.0]];
+            assert!(Riccati::solve(&A, &E, 0.5, 1.0).is_none());
+        }
+    }
 
     fn companion(K: &[f64]) -> Vec<Vec<f64>> {
         let entry =
