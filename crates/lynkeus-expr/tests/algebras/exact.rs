@@ -69,7 +69,10 @@ impl Exact {
             return self.constant(if y.is_negative() { f64::INFINITY } else { 0.0 });
         }
         if x.is_positive() {
-            return CONSTANTS.with_borrow_mut(|c| x.pow(y, self.0, NEAREST, c));
+            // asked to round correctly, the library looks for ever at some arguments
+            let more = self.0 + 128;
+            let power = CONSTANTS.with_borrow_mut(|c| x.pow(y, more, RoundingMode::None, c));
+            return power.mul(&self.constant(1.0), self.0, NEAREST);
         }
         if !y.is_int() {
             return self.constant(f64::NAN);
