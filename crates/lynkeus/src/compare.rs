@@ -68,8 +68,8 @@ pub struct Run {
 /// Settled is an error below this share of the range.
 const SETTLED: f64 = 0.05;
 
-/// Runs every family of `[compare]`, or each that fits and the filters, on the study's simulation
-/// or on a log. Keys of `[observer]` reach the families that own them.
+/// Runs every family of `[compare]`, or each that fits and the filters, on a log, or on what a
+/// logger would have seen of the study's simulation: the same samples for each. Keys of `[observer]` reach the families that own them.
 ///
 /// # Errors
 /// A study that does not fit its plant; no family that can be run; a log without the columns
@@ -80,6 +80,14 @@ pub fn compare(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Comparison, Error> {
     let plant = prepare::plant(study)?;
+    let simulated;
+    let table = match log {
+        Some(table) => table,
+        None => {
+            simulated = simulate::recorded(study, &plant)?;
+            &simulated
+        }
+    };
     let families = families(study, &plant)?;
     let count = families.len() as f64;
     let mut rows = vec![];
@@ -87,10 +95,7 @@ pub fn compare(
         let own = of_family(study, family);
         let prepared = Prepared::new(&own, &plant)?;
         let part = &mut |done: f64| watch((i as f64 + done) / count);
-        let run = match log {
-            Some(table) => timed(&prepared, |p| estimate::estimated(p, table, part)),
-            None => timed(&prepared, |p| simulate::simulated(p, part)),
-        };
+        let run = timed(&prepared, |p| estimate::estimated(p, table, part));
         rows.push(Compared {
             family: family.name(),
             run: run.map_err(|e| e.to_string()),

@@ -195,11 +195,65 @@ pub(crate) fn course(
     if settings.smoothing.is_some() {
         return Err(Error::input("`smooth` and `lag` of [estimate] need family = \"ekf\": this observer has no covariance to smooth with").at(&study.file));
     }
+    let is_linear = settings.between_samples == BetweenSamples::Linear;
+    if is_linear && samples.have_gaps() && !settings.deviations {
+        return across_gaps(prepared, design, samples, run, watch);
+    }
     let stands_in = samples.have_gaps() || settings.deviations;
     if stands_in || settings.between_samples == BetweenSamples::Predict {
-        return sampled::run(prepared, design, samples, run.method, watch);
+        let mut course = sampled::run(prepared, design, samples, run.method, watch)?;
+        if is_linear {
+            course.notes.push("with `sd` the measurements are held between samples, not linear: standard deviations are those of a causal observer".to_owned());
+        }
+        return Ok(course);
     }
     plain(prepared, design, samples, run, watch)
+}
+
+/// Lines between the samples reach across those that are missing.
+fn across_gaps(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    run: EstimatorSettings,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Course, Error> {
+    let filled = |columns: &[&[f64]]| -> Vec<Vec<f64>> {
+        columns.iter().map(|c| on_lines(samples.time, c)).collect()
+    };
+    let (readings, inputs) = (filled(&samples.readings), filled(&samples.inputs));
+    let whole = Samples {
+        time: samples.time,
+        readings: readings.iter().map(Vec::as_slice).collect(),
+        inputs: inputs.iter().map(Vec::as_slice).collect(),
+    };
+    let mut course = plain(prepared, design, &whole, run, watch)?;
+    course
+        .notes
+        .push("readings that are missing lie on the line between their neighbours".to_owned());
+    Ok(course)
+}
+
+/// Values with those that are not finite on the line between their neighbours; before the first
+/// and after the last the nearest one.
+fn on_lines(time: &[f64], values: &[f64]) -> Vec<f64> {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k].is_finite())
+        .collect();
+    let at = |k: usize| {
+        let next = known.partition_point(|&i| i < k);
+        match (next.checked_sub(1).map(|i| known[i]), known.get(next)) {
+            (_, Some(&j)) if j == k => values[k],
+            (Some(i), Some(&j)) => {
+                let share = (time[k] - time[i]) / (time[j] - time[i]);
+                values[i] + share * (values[j] - values[i])
+            }
+            (Some(i), None) => values[i],
+            (None, Some(&j)) => values[j],
+            (None, None) => values[k],
+        }
+    };
+    (0..values.len()).map(at).collect()
 }
 
 fn plain(
@@ -356,4 +410,19 @@ fn logged<'t>(
     let is_own = named.next().is_some() && named.next().is_none() && header != time;
     let values = table.get(header).filter(|_| is_own)?;
     values.iter().any(|x| x.is_finite()).then_some(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::on_lines;
+
+    #[test]
+    fn gaps_lie_on_the_line_between_their_neighbours() {
+        let nan = f64::NAN;
+        let found = on_lines(
+            &[0.0, 1.0, 2.0, 4.0, 5.0, 6.0],
+            &[nan, 1.0, nan, 7.0, nan, nan],
+        );
+        assert_eq!(found, [1.0, 1.0, 3.0, 7.0, 7.0, 7.0]);
+    }
 }

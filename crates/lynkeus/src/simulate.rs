@@ -9,11 +9,12 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Interrupted, Level, Role, Simulation, Trajectory};
 
 use crate::course::{Course, Samples};
+use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, estimate, prepare};
+use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare};
 
 /// Rows of a result whose study does not say how many.
 const ROWS: f64 = 500.0;
@@ -112,6 +113,38 @@ pub(crate) fn within<'a>(
         Some(_) => ControlFlow::Break(()),
         None => watch(fraction),
     }
+}
+
+/// The study's plant as a logger would have it, sample by sample, with the true states and unknown
+/// inputs in columns of their own.
+///
+/// # Errors
+/// A study that cannot be run.
+#[cfg(feature = "tune")]
+pub(crate) fn recorded(study: &Study, plant: &Plant) -> Result<Table, Error> {
+    let settings = settings(study)?;
+    let mut simulation = open_loop(study, settings, plant)?;
+    simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
+    let run = simulation
+        .run_watched(&mut within(&study.budget, &mut |_| {
+            ControlFlow::Continue(())
+        }))
+        .map_err(|error| interrupted(error.error, &study.file))?;
+    let groups = [
+        (&plant.outputs, Role::Measured),
+        (&plant.inputs, Role::Input),
+        (&plant.states, Role::State),
+    ];
+    let time = log_time(plant, &study.estimate);
+    let mut columns = vec![(time, run.times().to_vec())];
+    for (variables, role) in groups {
+        for (i, variable) in variables.iter().enumerate() {
+            let values = run.column(role.at(i)).unwrap_or_default();
+            let header = estimate::header(&study.estimate, &variable.name);
+            columns.push((header.to_owned(), values.to_vec()));
+        }
+    }
+    Table::from_columns(columns)
 }
 
 /// The study's `[simulate]`.

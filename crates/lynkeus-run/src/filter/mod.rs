@@ -344,10 +344,9 @@ impl Filter {
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
     fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Vec<f64>, Error> {
-        let before = self.belief.clone();
         match (self.run_flow(from, to, inputs), &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
-                self.belief = before;
+                // a flow that failed has left the belief as it was
                 self.sensing.health.confined += 1;
                 confine(&mut self.belief.x, &spare.bounds);
                 let driven = &mut spare.engine.driven;
@@ -379,15 +378,20 @@ impl Filter {
     }
 
     fn correct(&mut self, t: f64, readings: &[f64]) -> Result<(), Error> {
-        let before = self.sensing.health.clone();
-        match (self.correct_here(t, readings), &self.spare) {
-            (Err(error), Some(spare)) if is_undefined(&error) => {
-                self.sensing.health = before;
+        match self.correct_here(t, readings) {
+            // the outputs are evaluated before a reading is counted; a window keeps its states
+            // inside anyway
+            Err(error)
+                if is_undefined(&error) && !matches!(self.engine, Engine::MovingHorizon(_)) =>
+            {
+                let Some(spare) = &self.spare else {
+                    return Err(error);
+                };
                 self.sensing.health.confined += 1;
                 confine(&mut self.belief.x, &spare.bounds);
                 self.correct_here(t, readings)
             }
-            (result, _) => result,
+            result => result,
         }
     }
 
