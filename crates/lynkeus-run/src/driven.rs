@@ -61,6 +61,10 @@ impl Dynamics for Driven {
         self.evaluation.derivatives(t, x, dx);
     }
 
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
+    }
+
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
         self.evaluation.switches(from, to, times)
     }

@@ -15,6 +15,12 @@ pub trait Dynamics {
     /// Writes f(t, x) to `dx`; both slices have [`Dynamics::dimension`] entries.
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]);
 
+    /// Takes `x` at `t` to `next` at `t + h` by the classical Runge–Kutta method, where that is
+    /// known as one function; false where it is not, and nothing is done.
+    fn step(&mut self, _t: f64, _h: f64, _x: &[f64], _next: &mut [f64]) -> bool {
+        false
+    }
+
     /// Appends every instant strictly inside (`from`, `to`) at which f jumps or
     /// has a kink because of time, in any order.
     ///
@@ -51,6 +57,10 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         (**self).derivatives(t, x, dx);
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        (**self).step(t, h, x, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {

@@ -123,14 +123,40 @@ impl Sensors {
 
     /// What sensor `index` shows of the value.
     pub(crate) fn measured(&self, index: usize, value: f64) -> f64 {
-        match &self.channels[index] {
-            None => value,
-            Some(Channel { level, deviate, .. }) => match level {
-                Level::Absolute(size) | Level::Uniform(size) => value + size * deviate,
-                Level::Relative(fraction) => value * (1.0 + fraction * deviate),
-            },
+        match self.disturbed(index) {
+            Disturbed::Not => value,
+            Disturbed::Added => value + self.disturbance(index),
+            Disturbed::Multiplied => value * self.disturbance(index),
         }
     }
+
+    /// What noise does at sensor `index`.
+    pub(crate) fn disturbed(&self, index: usize) -> Disturbed {
+        match self.channels[index].as_ref().map(|channel| channel.level) {
+            None => Disturbed::Not,
+            Some(Level::Absolute(_) | Level::Uniform(_)) => Disturbed::Added,
+            Some(Level::Relative(_)) => Disturbed::Multiplied,
+        }
+    }
+
+    /// The number that is added at sensor `index` at present, or multiplied with.
+    pub(crate) fn disturbance(&self, index: usize) -> f64 {
+        self.channels[index].as_ref().map_or(0.0, |channel| {
+            let Channel { level, deviate, .. } = channel;
+            match level {
+                Level::Absolute(size) | Level::Uniform(size) => size * deviate,
+                Level::Relative(fraction) => 1.0 + fraction * deviate,
+            }
+        })
+    }
+}
+
+/// How noise meets a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Disturbed {
+    Not,
+    Added,
+    Multiplied,
 }
 
 /// 64-bit FNV-1a.

@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, Mutex};
 
-use lynkeus_expr::{Evaluator, Graph, Node, Tape};
+use lynkeus_expr::{Graph, Node, Tape};
 
 use crate::error::state_text;
+use crate::routine::{Routine, Runner};
 use crate::switches::Switches;
 use crate::{Dynamics, Error};
 
@@ -25,8 +26,8 @@ struct Code {
     states: Vec<String>,
     signals: Vec<String>,
     outputs: Vec<String>,
-    derivative_tape: Tape,
-    output_tape: Tape,
+    derivatives_at: Arc<Routine>,
+    outputs_at: Arc<Routine>,
     switches: Switches,
     modes: usize,
     /// only to name an operation in an error
@@ -80,8 +81,8 @@ impl System {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
             signals: signals.iter().map(|(name, _)| name.clone()).collect(),
             outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
-            derivative_tape: Tape::new(&own, &inputs, dx)?,
-            output_tape: Tape::new(&own, &inputs, y)?,
+            derivatives_at: Routine::new(Tape::new(&own, &inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(&own, &inputs, y)?),
             modes: extracted.modes.len(),
             switches: extracted.switches,
             graph: Mutex::new(own),
@@ -146,13 +147,29 @@ impl System {
         }
     }
 
+    /// (t, x, w, modes) → dx.
+    pub(crate) fn derivative_tape(&self) -> &Tape {
+        self.code.derivatives_at.tape()
+    }
+
+    /// (t, x, w, modes) → y.
+    pub(crate) fn output_tape(&self) -> &Tape {
+        self.code.outputs_at.tape()
+    }
+
+    /// How many values the switches in time have: what jumps with time alone is an input of the
+    /// tapes.
+    pub(crate) fn modes(&self) -> usize {
+        self.code.modes
+    }
+
     /// An evaluator with its own working memory, signals at zero.
     pub fn evaluation(&self) -> Evaluation {
         let code = &self.code;
         let fixed = 1 + code.states.len() + code.signals.len();
         Evaluation {
-            derivatives: code.derivative_tape.evaluator(),
-            outputs: code.output_tape.evaluator(),
+            derivatives: code.derivatives_at.runner(),
+            outputs: code.outputs_at.runner(),
             switches: code.switches.clone(),
             inputs: vec![0.0; fixed + code.modes],
             system: self.clone(),
@@ -164,8 +181,8 @@ impl System {
 #[derive(Clone, Debug)]
 pub struct Evaluation {
     system: System,
-    derivatives: Evaluator,
-    outputs: Evaluator,
+    derivatives: Runner,
+    outputs: Runner,
     switches: Switches,
     /// t, x, w, modes
     inputs: Vec<f64>,
@@ -208,6 +225,11 @@ impl Evaluation {
         }
     }
 
+    /// Values of the switches at the last [`Dynamics::enter`].
+    pub(crate) fn modes(&self) -> &[f64] {
+        &self.inputs[self.inputs.len() - self.system.code.modes..]
+    }
+
     fn place(&mut self, t: f64, x: &[f64]) {
         self.inputs[0] = t;
         self.inputs[1..=x.len()].copy_from_slice(x);
@@ -222,6 +244,11 @@ impl Dynamics for Evaluation {
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         self.place(t, x);
         self.derivatives.eval(&self.inputs, dx);
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        self.place(t, x);
+        self.derivatives.step(&self.inputs, h, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
@@ -241,9 +268,10 @@ impl Dynamics for Evaluation {
         let code = &self.system.code;
         let graph = code.graph.lock().unwrap_or_else(|e| e.into_inner());
         let named = code
-            .derivative_tape
+            .derivatives_at
+            .tape()
             .first_nonfinite(&graph, &self.inputs)
-            .or_else(|| code.output_tape.first_nonfinite(&graph, &self.inputs));
+            .or_else(|| code.outputs_at.tape().first_nonfinite(&graph, &self.inputs));
         Error::NotFinite {
             time: t,
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
