@@ -68,7 +68,7 @@ pub(crate) struct Loop {
     record_outputs: bool,
     /// the derivatives of all states, as one
     joint: Runner,
-    /// time, states, disturbances of the sensors, modes
+    /// time, states, what disturbs sensors and states, modes
     arguments: Vec<f64>,
     u: Vec<f64>,
     y: Vec<f64>,
@@ -205,15 +205,13 @@ impl Loop {
     /// the next.
     fn settle(&mut self) {
         let first = 1 + self.dimension();
-        let (noise, modes) = self.arguments[first..].split_at_mut(self.y.len());
-        for (i, noise) in noise.iter_mut().enumerate() {
-            *noise = self.sensors.disturbance(i);
-        }
+        let noise = (0..self.y.len()).map(|i| self.sensors.disturbance(i));
+        let drives = self.sensors.moved().map(|state| self.sensors.drive(state));
         let observer = self.observer.as_ref().map_or(&[][..], Evaluation::modes);
         let of = [self.inputs.modes(), self.plant.modes(), observer];
-        let values = of.into_iter().flatten();
-        for (mode, value) in modes.iter_mut().zip(values) {
-            *mode = *value;
+        let values = noise.chain(drives).chain(of.into_iter().flatten().copied());
+        for (argument, value) in self.arguments[first..].iter_mut().zip(values) {
+            *argument = value;
         }
     }
 

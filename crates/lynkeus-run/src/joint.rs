@@ -22,7 +22,7 @@ pub(crate) struct Parts<'a> {
 
 impl Parts<'_> {
     /// The derivatives of the plant's states, then of the observer's, as functions of time, these
-    /// states, what disturbs each sensor, and the modes of inputs, plant and observer.
+    /// states, what disturbs each sensor and each moved state, and the modes of inputs, plant and observer.
     pub fn joined(&self) -> Result<Arc<Routine>, Error> {
         let g = Graph::new();
         let fresh = |count: usize| -> Vec<Expr<'_>> { (0..count).map(|_| g.fresh("x")).collect() };
@@ -31,6 +31,7 @@ impl Parts<'_> {
         let plant_x = fresh(self.plant.states().len());
         let observer_x = fresh(observer_states);
         let noise = fresh(self.plant.outputs().len());
+        let drives = fresh(self.sensors.moved().count());
         let input_modes = fresh(self.inputs.modes());
         let plant_modes = fresh(self.plant.modes());
         let observer_modes = fresh(self.observer.map_or(0, System::modes));
@@ -43,6 +44,9 @@ impl Parts<'_> {
         let u = eval(self.inputs.output_tape(), [&[], &[], &input_modes]);
         let w: Vec<Expr<'_>> = self.plant_wires.iter().map(|&wire| u[wire]).collect();
         let mut derivatives = eval(self.plant.derivative_tape(), [&plant_x, &w, &plant_modes]);
+        for (state, &drive) in self.sensors.moved().zip(&drives) {
+            derivatives[state] = derivatives[state] + drive;
+        }
         if let Some(observer) = self.observer {
             let y = eval(self.plant.output_tape(), [&plant_x, &w, &plant_modes]);
             let signal = |wire: &Source| match *wire {
@@ -58,7 +62,7 @@ impl Parts<'_> {
             derivatives.extend(eval(tape, [&observer_x, &w, &observer_modes]));
         }
         let modes = [input_modes, plant_modes, observer_modes].concat();
-        let symbols = [vec![time], plant_x, observer_x, noise, modes].concat();
+        let symbols = [vec![time], plant_x, observer_x, noise, drives, modes].concat();
         let [symbols, derivatives] =
             [symbols, derivatives].map(|of| of.iter().map(|e| e.node()).collect::<Vec<_>>());
         Ok(Routine::new(Tape::new(&g, &symbols, &derivatives)?))

@@ -204,7 +204,18 @@ fn noise(
         seed: settings.seed,
         sample_step: settings.sample_step,
         levels,
+        process: process(study, plant),
     })
+}
+
+/// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.
+fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
+    let mut densities = BTreeMap::new();
+    for (name, density) in &study.process_noise {
+        let states = plant.states.iter().filter(|s| name.is_or_has(&s.name));
+        densities.extend(states.map(|s| (s.name.clone(), *density)));
+    }
+    densities
 }
 
 fn outcome(

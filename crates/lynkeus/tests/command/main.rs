@@ -1,6 +1,7 @@
 //! The command as a user types it.
 #![allow(clippy::unwrap_used)]
 
+mod backends;
 mod certify;
 mod families;
 mod faulty;
