@@ -38,7 +38,7 @@ fn both_backends_write_the_same() {
 fn compare(folder: &Folder, study: &str) {
     let [interpreted, native] = ["interpreter", "native"].map(|backend| {
         let done = folder.run(&["simulate", study, "-o", "o.csv", "-q", "--backend", backend]);
-        assert_eq!(done.code, 0, "{study}: {}", done.stderr);
+        assert_eq!(done.code, 0, "{study}: {}", done.err);
         folder.read("o.csv")
     });
     assert!(interpreted == native, "{study} differs");
