@@ -235,6 +235,33 @@ impl Dynamics for Loop {
         }
     }
 
+    fn surfaces(&self) -> usize {
+        self.plant.surfaces() + self.observer.as_ref().map_or(0, Dynamics::surfaces)
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let of_observer = self.observer.as_ref().map(Dynamics::surface_names);
+        [self.plant.surface_names(), of_observer.unwrap_or_default()].concat()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (of_plant, of_observer) = values.split_at_mut(self.plant.surfaces());
+        self.connect(t, plant_x, self.observer.is_some());
+        self.plant.read_surfaces(t, plant_x, of_plant);
+        if let Some(observer) = &mut self.observer {
+            observer.read_surfaces(t, observer_x, of_observer);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let parts = sides.map(|sides| sides.split_at(self.plant.surfaces()));
+        self.plant.hold(parts.map(|(plant, _)| plant));
+        if let Some(observer) = &mut self.observer {
+            observer.hold(parts.map(|(_, observer)| observer));
+        }
+    }
+
     fn names(&self) -> Vec<String> {
         let mut names = self.plant.names();
         if let Some(observer) = &self.observer {

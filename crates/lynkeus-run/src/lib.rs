@@ -96,6 +96,7 @@ mod grid;
 mod integrator;
 mod method;
 mod noise;
+mod relays;
 mod rk4;
 mod sampled;
 mod simulate;
