@@ -3,7 +3,7 @@
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
-use lynkeus_expr::{Algebra, Binary, Tape, Unary};
+use lynkeus_expr::{Algebra, Binary, Implicit, Tape, Unary};
 
 /// A value: its place in [`Program::values`].
 pub(crate) type Id = u32;
@@ -144,5 +144,11 @@ impl Algebra for Recorder {
             .map(|k| self.push(Value::Entry(system, k)))
             .collect();
         (x, self.push(Value::Entry(system, b.len() as u32)))
+    }
+
+    /// The interpreter finds roots.
+    fn implicit(&self, function: &Implicit, _: &[Id]) -> Vec<Id> {
+        self.is_beyond.set(true);
+        vec![self.constant(0.0); function.size()]
     }
 }

@@ -66,6 +66,8 @@ pub(crate) struct Loop {
     plant_wires: Vec<usize>,
     observer_wires: Vec<Source>,
     record_outputs: bool,
+    /// plant and observer are on known sides of the surfaces on which they jump
+    is_held: bool,
     /// the derivatives of all states, as one
     joint: Runner,
     /// time, states, what disturbs sensors and states, modes
@@ -119,6 +121,7 @@ impl Loop {
             observer_wires,
             sensors,
             record_outputs: simulation.record_outputs,
+            is_held: false,
         })
     }
 
@@ -245,11 +248,26 @@ impl Dynamics for Loop {
     }
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        self.place(t, x);
-        self.joint.eval(&self.arguments, dx);
+        if !self.is_held {
+            self.place(t, x);
+            return self.joint.eval(&self.arguments, dx);
+        }
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (plant_dx, observer_dx) = dx.split_at_mut(self.plant.dimension());
+        self.connect(t, plant_x);
+        self.plant.derivatives(t, plant_x, plant_dx);
+        for state in self.sensors.moved() {
+            plant_dx[state] += self.sensors.drive(state);
+        }
+        if let Some(observer) = &mut self.observer {
+            observer.derivatives(t, observer_x, observer_dx);
+        }
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        if self.is_held {
+            return false;
+        }
         self.place(t, x);
         self.joint.step(&self.arguments, h, next)
     }
@@ -270,6 +288,34 @@ impl Dynamics for Loop {
             observer.enter(t);
         }
         self.settle();
+    }
+
+    fn surfaces(&self) -> usize {
+        self.plant.surfaces() + self.observer.as_ref().map_or(0, Dynamics::surfaces)
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let of_observer = self.observer.as_ref().map(Dynamics::surface_names);
+        [self.plant.surface_names(), of_observer.unwrap_or_default()].concat()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (of_plant, of_observer) = values.split_at_mut(self.plant.surfaces());
+        self.connect(t, plant_x);
+        self.plant.read_surfaces(t, plant_x, of_plant);
+        if let Some(observer) = &mut self.observer {
+            observer.read_surfaces(t, observer_x, of_observer);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.is_held = sides.is_some();
+        let parts = sides.map(|sides| sides.split_at(self.plant.surfaces()));
+        self.plant.hold(parts.map(|(plant, _)| plant));
+        if let Some(observer) = &mut self.observer {
+            observer.hold(parts.map(|(_, observer)| observer));
+        }
     }
 
     fn names(&self) -> Vec<String> {

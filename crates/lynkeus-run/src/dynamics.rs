@@ -35,6 +35,24 @@ pub trait Dynamics {
     /// value at `t`, so that f is smooth on a whole segment, ends included.
     fn enter(&mut self, _t: f64) {}
 
+    /// Number of surfaces on which f jumps with the state. Where there are some,
+    /// [`Dynamics::read_surfaces`] and [`Dynamics::hold`] belong to them.
+    fn surfaces(&self) -> usize {
+        0
+    }
+
+    /// How the surfaces read, for messages.
+    fn surface_names(&self) -> Vec<String> {
+        vec![]
+    }
+
+    /// Writes the functions that vanish on the surfaces at (t, x), one per surface.
+    fn read_surfaces(&mut self, _t: f64, _x: &[f64], _values: &mut [f64]) {}
+
+    /// Holds f, from here on, as it is on one side of each surface: where its function is
+    /// positive for 1, negative for −1. With none f is what the state says again.
+    fn hold(&mut self, _sides: Option<&[f64]>) {}
+
     /// The names of the states, for messages.
     fn names(&self) -> Vec<String> {
         (1..=self.dimension()).map(|i| format!("x[{i}]")).collect()
@@ -69,6 +87,22 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn enter(&mut self, t: f64) {
         (**self).enter(t);
+    }
+
+    fn surfaces(&self) -> usize {
+        (**self).surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        (**self).surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        (**self).read_surfaces(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        (**self).hold(sides);
     }
 
     fn names(&self) -> Vec<String> {

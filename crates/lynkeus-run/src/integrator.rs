@@ -1,6 +1,7 @@
 //! One integrator for every method, stopping at every switch.
 
 use crate::adaptive::{Adaptive, Choice, resolution};
+use crate::relays::{Sides, Switched};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 
 /// Most fixed steps in one interval.
@@ -50,6 +51,8 @@ impl StepAdvice {
 pub struct Integrator {
     stepper: Stepper,
     instants: Vec<f64>,
+    /// of the surfaces on which the system jumps with its state
+    sides: Sides,
 }
 
 #[derive(Clone, Debug)]
@@ -94,6 +97,7 @@ impl Integrator {
         Ok(Self {
             stepper,
             instants: vec![],
+            sides: Sides::default(),
         })
     }
 
@@ -170,7 +174,11 @@ impl Integrator {
             }
             f.enter(start + 0.5 * (end - start));
             match &mut self.stepper {
-                Stepper::Adaptive(adaptive) => adaptive.advance(f, start, end, x)?,
+                Stepper::Adaptive(adaptive) => {
+                    let at = (start, &*x);
+                    let mut switched = Switched::new(f, &mut self.sides, at, end - start);
+                    adaptive.advance(&mut switched, start, end, x)?;
+                }
                 Stepper::Fixed(fixed) => fixed.advance(f, start, end, whole, x)?,
             }
             start = end;

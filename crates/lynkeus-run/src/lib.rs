@@ -97,6 +97,7 @@ mod integrator;
 mod joint;
 mod method;
 mod noise;
+mod relays;
 mod rk4;
 mod routine;
 mod sampled;

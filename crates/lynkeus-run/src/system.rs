@@ -2,9 +2,10 @@
 
 use std::sync::{Arc, Mutex};
 
-use lynkeus_expr::{Graph, Node, Tape};
+use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
 use crate::error::state_text;
+use crate::relays::{Held, Taken, take};
 use crate::routine::{Routine, Runner};
 use crate::switches::Switches;
 use crate::{Dynamics, Error};
@@ -30,8 +31,33 @@ struct Code {
     outputs_at: Arc<Routine>,
     switches: Switches,
     modes: usize,
+    /// the same with what jumps with the state held; none where nothing does
+    held: Option<HeldCode>,
     /// only to name an operation in an error
     graph: Mutex<Graph>,
+}
+
+/// Code whose last inputs are the values of the operations that jump with the state.
+#[derive(Debug)]
+struct HeldCode {
+    derivatives_at: Arc<Routine>,
+    outputs_at: Arc<Routine>,
+    held: Held,
+    /// number of these operations
+    modes: usize,
+}
+
+impl HeldCode {
+    fn new(graph: &Graph, inputs: &[Node], taken: Taken, states: usize) -> Result<Self, Error> {
+        let inputs = [inputs, &taken.modes].concat();
+        let (dx, y) = taken.roots.split_at(states);
+        Ok(Self {
+            derivatives_at: Routine::new(Tape::new(graph, &inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(graph, &inputs, y)?),
+            held: taken.held,
+            modes: taken.modes.len(),
+        })
+    }
 }
 
 impl System {
@@ -75,7 +101,10 @@ impl System {
         let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let extracted = Switches::extract(&own, image[&time], &roots)?;
+        let jumping = take(&own, &inputs, &extracted.roots)?;
         inputs.extend(&extracted.modes);
+        let held = |taken| HeldCode::new(&own, &inputs, taken, derivatives.len());
+        let held = jumping.map(held).transpose()?;
         let (dx, y) = extracted.roots.split_at(derivatives.len());
         let code = Code {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
@@ -85,6 +114,7 @@ impl System {
             outputs_at: Routine::new(Tape::new(&own, &inputs, y)?),
             modes: extracted.modes.len(),
             switches: extracted.switches,
+            held,
             graph: Mutex::new(own),
         };
         let start = states.iter().map(|(.., value)| *value).collect();
@@ -172,8 +202,36 @@ impl System {
             outputs: code.outputs_at.runner(),
             switches: code.switches.clone(),
             inputs: vec![0.0; fixed + code.modes],
+            held: code.held.as_ref().map(|held| HeldEvaluation {
+                derivatives: held.derivatives_at.runner(),
+                outputs: held.outputs_at.runner(),
+                surfaces: held.held.surfaces.evaluator(),
+                modes: vec![0.0; held.modes],
+                inputs: vec![],
+                is_held: false,
+            }),
             system: self.clone(),
         }
+    }
+}
+
+/// Evaluates a system on known sides of the surfaces on which it jumps.
+#[derive(Clone, Debug)]
+struct HeldEvaluation {
+    derivatives: Runner,
+    outputs: Runner,
+    surfaces: Evaluator,
+    modes: Vec<f64>,
+    /// those of the system, then the modes
+    inputs: Vec<f64>,
+    is_held: bool,
+}
+
+impl HeldEvaluation {
+    fn place(&mut self, inputs: &[f64]) {
+        self.inputs.clear();
+        self.inputs.extend_from_slice(inputs);
+        self.inputs.extend_from_slice(&self.modes);
     }
 }
 
@@ -186,6 +244,7 @@ pub struct Evaluation {
     switches: Switches,
     /// t, x, w, modes
     inputs: Vec<f64>,
+    held: Option<HeldEvaluation>,
 }
 
 impl Evaluation {
@@ -212,7 +271,13 @@ impl Evaluation {
     /// Modes are those of the last [`Dynamics::enter`].
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
         self.place(t, x);
-        self.outputs.eval(&self.inputs, y);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.outputs.eval(&held.inputs, y);
+            }
+            _ => self.outputs.eval(&self.inputs, y),
+        }
     }
 
     /// Writes what an observer reports at (t, x), in the order of
@@ -243,10 +308,47 @@ impl Dynamics for Evaluation {
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         self.place(t, x);
-        self.derivatives.eval(&self.inputs, dx);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.derivatives.eval(&held.inputs, dx);
+            }
+            _ => self.derivatives.eval(&self.inputs, dx),
+        }
+    }
+
+    fn surfaces(&self) -> usize {
+        let held = self.system.code.held.as_ref();
+        held.map_or(0, |held| held.held.names.len())
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let held = self.system.code.held.as_ref();
+        held.map_or_else(Vec::new, |held| held.held.names.clone())
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.place(t, x);
+        if let Some(held) = &mut self.held {
+            held.place(&self.inputs);
+            held.surfaces.eval(&held.inputs, values);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
+            return;
+        };
+        evaluation.is_held = sides.is_some();
+        if let Some(sides) = sides {
+            code.held.modes(sides, &mut evaluation.modes);
+        }
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        if self.held.as_ref().is_some_and(|held| held.is_held) {
+            return false;
+        }
         self.place(t, x);
         self.derivatives.step(&self.inputs, h, next)
     }

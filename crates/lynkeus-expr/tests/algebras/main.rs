@@ -8,6 +8,7 @@ mod interval_systems;
 mod interval_tightness;
 mod jets;
 mod library;
+mod loops;
 mod operations;
 mod random_graphs;
 mod recipe;

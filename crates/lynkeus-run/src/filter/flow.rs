@@ -77,6 +77,23 @@ impl Dynamics for Linearised<'_> {
         self.driven.enter(t);
     }
 
+    fn surfaces(&self) -> usize {
+        self.driven.surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        self.driven.surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, z: &[f64], values: &mut [f64]) {
+        let n = self.driven.dimension();
+        self.driven.read_surfaces(t, &z[..n], values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.driven.hold(sides);
+    }
+
     fn names(&self) -> Vec<String> {
         self.driven.names()
     }

@@ -187,6 +187,10 @@ impl Builder<'_> {
                 false => of(self, b),
             },
             Op::Solve(_) => return self.solve(node),
+            Op::Implicit(_) => {
+                let text = self.graph.render(node, 60);
+                return Err(Unsupported(format!("an algebraic loop, {text}")));
+            }
             Op::Entry(solve, i) => match self.solutions.get(&solve).and_then(|x| x.get(i as usize))
             {
                 Some(&slot) => slot,
