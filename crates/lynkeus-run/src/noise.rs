@@ -246,6 +246,7 @@ mod tests {
             seed,
             sample_step: None,
             levels: levels.collect(),
+            ..Noise::default()
         };
         let mut sensors = Sensors::new(&noise, &outputs, &[], 1.0).unwrap();
         let draw = |_| {
