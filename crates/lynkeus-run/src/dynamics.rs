@@ -29,6 +29,11 @@ pub trait Dynamics {
     /// value at `t`, so that f is smooth on a whole segment, ends included.
     fn enter(&mut self, _t: f64) {}
 
+    /// Asked at every step: true ends the run with [`Error::Cancelled`].
+    fn is_over(&mut self) -> bool {
+        false
+    }
+
     /// The names of the states, for messages.
     fn names(&self) -> Vec<String> {
         (1..=self.dimension()).map(|i| format!("x[{i}]")).collect()
@@ -59,6 +64,10 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn enter(&mut self, t: f64) {
         (**self).enter(t);
+    }
+
+    fn is_over(&mut self) -> bool {
+        (**self).is_over()
     }
 
     fn names(&self) -> Vec<String> {

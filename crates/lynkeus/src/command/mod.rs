@@ -187,6 +187,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     signals::watch();
     match execute(cli.command) {
+        Ok(_) if interrupt::interrupted() => signals::end(),
         Ok(code) => code,
         Err(_) if interrupt::interrupted() => signals::end(),
         Err(error) => {
