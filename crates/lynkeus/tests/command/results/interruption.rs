@@ -161,7 +161,7 @@ fn an_interrupt_is_told_with_what_was_being_done() {
     for (arguments, what) in cases {
         let child = Command::new(env!("CARGO_BIN_EXE_lynkeus"))
             .args(arguments)
-            .args(["--time-limit", "3000", "--memory-limit", "20000"])
+            .args(["--time-limit", "1e6", "--memory-limit", "1000000"])
             .current_dir(folder.path.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
