@@ -1,10 +1,12 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
 mod attack;
+mod draw;
 mod falsify;
 mod gallery;
 mod gap;
 mod numbers;
+mod options;
 mod process;
 mod python;
 

@@ -53,6 +53,11 @@ pub trait Dynamics {
     /// positive for 1, negative for −1. With none f is what the state says again.
     fn hold(&mut self, _sides: Option<&[f64]>) {}
 
+    /// Asked at every step: true ends the run with [`Error::Cancelled`].
+    fn is_over(&mut self) -> bool {
+        false
+    }
+
     /// The names of the states, for messages.
     fn names(&self) -> Vec<String> {
         (1..=self.dimension()).map(|i| format!("x[{i}]")).collect()
@@ -103,6 +108,10 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         (**self).hold(sides);
+    }
+
+    fn is_over(&mut self) -> bool {
+        (**self).is_over()
     }
 
     fn names(&self) -> Vec<String> {

@@ -81,6 +81,9 @@ impl Rk4 {
         let at = |i: usize| from + (to - from) * (i as f64 / steps as f64);
         for i in 0..steps {
             let (t, next) = (at(i), at(i + 1));
+            if f.is_over() {
+                return Err(Error::Cancelled { time: t });
+            }
             self.step(f, t, next - t, x)?;
         }
         Ok(())

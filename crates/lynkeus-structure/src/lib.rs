@@ -5,7 +5,7 @@
 //! disturbances are zero. [`chains`] finds the triangular form of its equations,
 //! [`sign`] decides whether a partial derivative keeps its sign on the box
 //! — [`Verdict`]: proved, refuted with a witness, or undecided with the box
-//! that is left — and [`visibility`] says which states leave a trace in the outputs.
+//! that is left.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod blocks;
@@ -16,6 +16,7 @@ mod irreducible;
 pub mod layers;
 mod matrix;
 pub mod output_map;
+mod points;
 mod polynomial;
 mod range;
 pub mod rank;
@@ -28,7 +29,6 @@ pub mod superdiagonal;
 pub mod uniform;
 mod vanish;
 mod verdict;
-pub mod visibility;
 mod words;
 
 pub use blocks::Blocks;

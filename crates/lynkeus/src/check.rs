@@ -93,22 +93,34 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
-        let plant = prepare::plant(study)?;
-        let prepared = Prepared::new(study, &plant)?;
-        let time = prepare::share(&study.budget, UNIFORMITY);
-        let graph = prepared.extended().graph();
-        match graph.budgeted(time, || uniformity(prepared.extended())) {
-            Ok(examined) => {
-                let examined = examined.map_err(Error::from_source)?;
-                report.uniform = examined
-                    .map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+        match by_which(study, &mut report) {
+            // what was found by then is told
+            Err(_) if study.budget.marked() == Some(Spent::Cancelled) => {
+                report.ended = Some(Spent::Cancelled);
             }
-            Err(spent) => report.ended = Some(spent),
+            done => done?,
         }
-        report.examinations = prepared.examinations()?.to_vec();
-        report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
     Ok(report)
+}
+
+/// Where states can be told apart, and by which family they can be estimated.
+fn by_which(study: &Study, report: &mut Report) -> Result<(), Error> {
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let time = prepare::share(&study.budget, UNIFORMITY);
+    let graph = prepared.extended().graph();
+    match graph.budgeted(time, || uniformity(prepared.extended())) {
+        Ok(examined) => {
+            let examined = examined.map_err(Error::from_source)?;
+            report.uniform =
+                examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+        }
+        Err(spent) => report.ended = Some(spent),
+    }
+    report.examinations = prepared.examinations()?.to_vec();
+    report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
+    Ok(())
 }
 
 impl Report {
@@ -233,7 +245,14 @@ impl fmt::Display for Report {
             uniform::print(f, uniform)?;
         }
         if let Some(spent) = self.ended {
-            writeln!(f, "\nwhere states can be told apart is undecided: {spent}")?;
+            let families = match self.examinations.is_empty() {
+                true => ", and which observer fits,",
+                false => "",
+            };
+            writeln!(
+                f,
+                "\nwhere states can be told apart{families} is undecided: {spent}"
+            )?;
         }
         for examination in self.examinations.iter().filter(|e| e.spent().is_none()) {
             writeln!(
@@ -255,15 +274,18 @@ impl fmt::Display for Report {
 }
 
 impl Report {
-    /// The families whose examination a limit ended, told once.
+    /// The families whose examination was not finished, each reason told once.
     fn ended_families(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut ended = self.examinations.iter().filter(|e| e.spent().is_some());
-        let Some(first) = ended.next() else {
-            return Ok(());
-        };
-        let names = std::iter::once(first).chain(ended).map(|e| e.family);
-        let names = names.collect::<Vec<_>>().join(", ");
-        writeln!(f, "\n{names}: undecided\n  {}", first.summary)
+        let ended = self.examinations.iter().filter(|e| e.spent().is_some());
+        let mut open: Vec<&Examination> = ended.collect();
+        while let Some(reason) = open.first().map(|e| &e.summary) {
+            let same = |e: &&Examination| e.summary == *reason;
+            let (told, rest): (Vec<_>, Vec<_>) = open.iter().copied().partition(same);
+            let names: Vec<&str> = told.iter().map(|e| e.family).collect();
+            writeln!(f, "\n{}: undecided\n  {reason}", names.join(", "))?;
+            open = rest;
+        }
+        Ok(())
     }
 
     /// That there is no observer, or that a limit ended the search for one.

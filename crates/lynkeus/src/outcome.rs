@@ -1,5 +1,6 @@
 //! What a simulation or a replay gives.
 
+use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
@@ -329,7 +330,7 @@ pub(crate) fn settle(
 ) -> Result<(), Error> {
     match (course.ended.take(), study.budget.marked()) {
         (None, _) => Ok(()),
-        (Some(RunError::Cancelled { time }), Some(spent)) => {
+        (Some(RunError::Cancelled { time }), Some(spent)) if spent != Spent::Cancelled => {
             let note = format!("the run is not whole: {spent} at t = {time}");
             course.notes.push(note);
             Ok(())

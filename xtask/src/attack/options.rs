@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::options;
 use crate::process::{cargo, root, run};
 
 /// What was asked for.
@@ -24,7 +25,7 @@ pub struct Options {
 impl Options {
     /// Reads `--seed N --count N --seconds N --limit SECONDS --binary FILE`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut options = Self {
+        let mut asked = Self {
             seed: 1,
             count: 100_000,
             seconds: None,
@@ -32,30 +33,18 @@ impl Options {
             binary: None,
             folder: root().join("target/attack"),
         };
-        let mut rest = arguments.iter();
-        while let Some(key) = rest.next() {
-            let value = rest
-                .next()
-                .ok_or_else(|| format!("{key}: expected a value"))?;
-            let number = || {
-                value
-                    .parse::<u64>()
-                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
-            };
-            match key.as_str() {
-                "--seed" => options.seed = number()?,
-                "--count" => options.count = number()?,
-                "--seconds" => options.seconds = Some(number()?),
-                "--limit" => options.limit = Duration::from_secs(number()?),
-                "--binary" => options.binary = Some(PathBuf::from(value)),
-                _ => {
-                    return Err(format!(
-                        "expected --seed, --count, --seconds, --limit or --binary, found {key}"
-                    ));
-                }
+        options::read(arguments, |pair| {
+            match pair.key {
+                "--seed" => asked.seed = pair.number()?,
+                "--count" => asked.count = pair.number()?,
+                "--seconds" => asked.seconds = Some(pair.number()?),
+                "--limit" => asked.limit = Duration::from_secs(pair.number()?),
+                "--binary" => asked.binary = Some(pair.path()),
+                _ => return pair.refuse("--seed, --count, --seconds, --limit or --binary"),
             }
-        }
-        Ok(options)
+            Ok(())
+        })?;
+        Ok(asked)
     }
 
     /// The command that is attacked, as an absolute path.

@@ -7,6 +7,9 @@ use std::time::Instant;
 use super::case::{Case, Kind};
 use super::judge::{Effort, Flaw, Violation};
 use super::tally::{Counts, Tally};
+use crate::options;
+
+const KEYS: &str = "--seed, --count, --refutations, --plants, --seconds or --family";
 
 /// What to search, and for how long.
 #[derive(Clone, Debug)]
@@ -29,7 +32,7 @@ pub struct Options {
 impl Options {
     /// Reads `--seed N --count N --refutations N --plants N --seconds N --family F`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut options = Self {
+        let mut asked = Self {
             seed: 1,
             count: 20_000,
             refutations: 5_000,
@@ -38,31 +41,19 @@ impl Options {
             kind: None,
             folder: PathBuf::from("target/falsify"),
         };
-        let mut rest = arguments.iter();
-        while let Some(key) = rest.next() {
-            let value = rest
-                .next()
-                .ok_or_else(|| format!("{key}: expected a value"))?;
-            let number = || {
-                value
-                    .parse::<u64>()
-                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
-            };
-            match key.as_str() {
-                "--seed" => options.seed = number()?,
-                "--count" => options.count = number()? as usize,
-                "--refutations" => options.refutations = number()? as usize,
-                "--plants" => options.plants = Some(number()?),
-                "--seconds" => options.seconds = Some(number()?),
-                "--family" => options.kind = Some(kind(value)?),
-                _ => {
-                    return Err(format!(
-                        "expected --seed, --count, --refutations, --plants, --seconds or --family, found {key}"
-                    ));
-                }
+        options::read(arguments, |pair| {
+            match pair.key {
+                "--seed" => asked.seed = pair.number()?,
+                "--count" => asked.count = pair.number()? as usize,
+                "--refutations" => asked.refutations = pair.number()? as usize,
+                "--plants" => asked.plants = Some(pair.number()?),
+                "--seconds" => asked.seconds = Some(pair.number()?),
+                "--family" => asked.kind = Some(kind(pair.value)?),
+                _ => return pair.refuse(KEYS),
             }
-        }
-        Ok(options)
+            Ok(())
+        })?;
+        Ok(asked)
     }
 
     /// All families examine one plant in sixteen, for their refutations; every one, and

@@ -227,6 +227,9 @@ impl Leg<'_> {
 
     /// Pays for one step.
     fn spend(&mut self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+        if f.is_over() {
+            return Err(Error::Cancelled { time: self.t });
+        }
         if self.purse.left == 0 {
             return Err(Error::StepBudget {
                 time: self.t,

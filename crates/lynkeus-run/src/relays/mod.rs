@@ -273,6 +273,10 @@ impl<D: Dynamics> Dynamics for Switched<'_, D> {
         self.inner.enter(t);
     }
 
+    fn is_over(&mut self) -> bool {
+        self.inner.is_over()
+    }
+
     fn names(&self) -> Vec<String> {
         self.inner.names()
     }

@@ -15,7 +15,7 @@ use lynkeus_expr::{Graph, Node, Tape, jacobian};
 
 use crate::Extended;
 use crate::chains::names;
-use crate::visibility::{inside, spread};
+use crate::points::{inside, spread};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -214,6 +214,7 @@ pub fn main() -> ExitCode {
     signals::watch();
     Backend::from(cli.backend).choose();
     match execute(cli.command) {
+        Ok(_) if interrupt::interrupted() => signals::end(),
         Ok(code) => code,
         Err(_) if interrupt::interrupted() => signals::end(),
         Err(error) => {

@@ -1,5 +1,7 @@
 //! From a study to the experiment that is judged.
 
+use std::ops::ControlFlow;
+
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
@@ -8,6 +10,7 @@ use lynkeus_structure::Extended;
 
 use super::{Assumed, Candidates, Options, POINTS};
 use crate::outcome::interrupted;
+use crate::simulate::within;
 use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
 use crate::{Error, Study, simulate, systems};
@@ -40,9 +43,12 @@ impl<'p> Setup<'p> {
         let span = horizon(study, settings, options, step)?;
         run.until = run.start + span;
         run.noise = lynkeus_run::Noise::default();
+        let go_on = &mut |_| ControlFlow::Continue(());
         let trajectory = run
-            .run()
-            .map_err(|error| interrupted(error.error, &study.file))?;
+            .run_watched(&mut within(&study.budget, go_on))
+            .map_err(|error| {
+                super::ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
+            })?;
         let reach = Reach { plant, trajectory };
         let measured: Vec<Variable> = extended
             .outputs

@@ -68,6 +68,8 @@ pub struct Report {
     pub step: f64,
     /// Horizons, in the plant's unit of time.
     pub horizons: Vec<f64>,
+    /// How many were asked for: a limit may have ended the run before the last.
+    pub asked: usize,
     /// Standard errors at each horizon, in the units of the quantities.
     pub deviations: Vec<Deviations>,
     /// All sensors considered, the study's first.
@@ -90,14 +92,14 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let setup = Setup::new(study, settings, prepared.extended(), options)?;
-    let found = setup
-        .experiment
-        .run()
-        .map_err(|error| Error::from_source(error).at(&study.file))?;
+    let found = setup.experiment.run().map_err(|error| {
+        ended(study).unwrap_or_else(|| Error::from_source(error).at(&study.file))
+    })?;
     let measured: Vec<usize> = (0..setup.measured).collect();
     let at = |horizon: usize| found.deviations(horizon, &measured);
     let candidates: Vec<usize> = (0..found.sensors.len()).collect();
-    Ok(Report {
+    let report = Report {
+        asked: setup.experiment.window.horizons.len(),
         plant: plant.name.clone(),
         time_unit: study.time_unit.clone(),
         states: plant.states.len(),
@@ -113,7 +115,15 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
         names: found.names,
         scales: found.scales,
         horizons: found.horizons,
-    })
+    };
+    // what was computed after the end does not count
+    ended(study).map_or(Ok(report), Err)
+}
+
+/// What ended the work, if anything did.
+fn ended(study: &Study) -> Option<Error> {
+    let spent = study.budget.spent()?;
+    Some(Error::ended(spent).at(&study.file))
 }
 
 impl Report {

@@ -24,6 +24,14 @@ impl fmt::Display for Report {
         if let Some(advice) = &self.advice {
             self.sensors(f, advice)?;
         }
+        if self.horizons.len() < self.asked {
+            let reached = self.horizons.len();
+            writeln!(
+                f,
+                "a limit ended the run after {reached} of {} horizons",
+                self.asked
+            )?;
+        }
         self.doubts(f)
     }
 }

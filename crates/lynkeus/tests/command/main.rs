@@ -6,6 +6,7 @@ mod certify;
 mod families;
 mod faulty;
 mod filters;
+mod hostile;
 mod how_well;
 mod limits;
 mod logs;

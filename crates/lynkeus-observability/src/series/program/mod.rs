@@ -113,6 +113,11 @@ impl Program {
         steps.filter_map(move |(slot, step)| partial(step).then_some(slot))
     }
 
+    /// Places of the symbols that a root depends on.
+    pub fn inputs(&self, root: usize) -> BTreeSet<usize> {
+        self.support(self.roots[root])
+    }
+
     /// Places of the symbols that a slot depends on.
     pub fn support(&self, slot: usize) -> BTreeSet<usize> {
         let place = |slot: usize| match self.steps[slot] {
