@@ -47,7 +47,7 @@ class Chain(ExtendedKalmanFilter):
 
 def ekf(n):
     f = Chain(dim_x=n, dim_z=1)
-    f.x, f.P, f.Q, f.R = np.full(n, 0.5), 0.01 * np.eye(n), 1e-3 * STEP * np.eye(n), np.array([[4e-4]])
+    f.x, f.P, f.Q, f.R = np.full(n, 0.5), 1e-4 * np.eye(n), 1e-6 * STEP * np.eye(n), np.array([[4e-4]])
     row = np.zeros((1, n))
     row[0, -1] = 1
 
@@ -62,7 +62,7 @@ def ekf(n):
 def ukf(n):
     points = MerweScaledSigmaPoints(n, alpha=1.0, beta=0.0, kappa=0.0)
     f = UnscentedKalmanFilter(dim_x=n, dim_z=1, dt=STEP, hx=lambda x: x[-1:], fx=lambda x, dt: flown(x), points=points)
-    f.x, f.P, f.Q, f.R = np.full(n, 0.5), 0.01 * np.eye(n), 1e-3 * STEP * np.eye(n), np.array([[4e-4]])
+    f.x, f.P, f.Q, f.R = np.full(n, 0.5), 1e-4 * np.eye(n), 1e-6 * STEP * np.eye(n), np.array([[4e-4]])
 
     def sample(y):
         f.predict()

@@ -33,8 +33,8 @@ fn chain(n: usize) -> Result<FilterModel, Error> {
             noise: Level::Absolute(0.02),
             limits: None,
         }],
-        process_noise: vec![1e-3; n],
-        initial_variance: vec![0.01; n],
+        process_noise: vec![1e-6; n],
+        initial_variance: vec![1e-4; n],
         confined: None,
     })
 }
