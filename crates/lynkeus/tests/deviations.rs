@@ -4,7 +4,7 @@
 //! `cargo test --release -p lynkeus --test deviations -- --ignored --nocapture` makes the table of
 //! docs/ekf.md from 500 runs.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::ops::ControlFlow;
 use std::path::Path;
