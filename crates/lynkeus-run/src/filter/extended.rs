@@ -1,28 +1,33 @@
 //! The extended Kalman filter, continuous-discrete.
 
 use super::Belief;
-use super::flow::Linearised;
+use super::flow::Joint;
 use super::health::Reading;
 use super::root::{dot, factor};
 use super::sensing::Sensing;
 use super::smooth::Correction;
+use super::spanned::{Rows, Spanned};
+use super::taylor::Moments;
+use super::variation::Variation;
 use crate::driven::Driven;
-use crate::{Error, EstimatorSettings, Integrator, System};
+use crate::{Error, EstimatorSettings, System};
+
+/// Up to so many states x̂, Φ and W are integrated together.
+const FEW: usize = 8;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Extended {
     pub driven: Driven,
-    integrator: Integrator,
-    entries: Vec<(usize, usize)>,
-    slopes: Vec<f64>,
-    /// Q/q, empty where Q = 0
-    noise: Vec<f64>,
-    /// q, the largest entry of Q
-    scale: f64,
-    /// the state of [`Linearised`]
-    z: Vec<f64>,
+    way: Way,
     /// rows whose sum of squares is P⁻
     rows: Vec<f64>,
+}
+
+/// How Φ and W are found.
+#[derive(Clone, Debug)]
+enum Way {
+    Joint(Box<Joint>),
+    Variation(Box<Variation>),
 }
 
 impl Extended {
@@ -35,75 +40,85 @@ impl Extended {
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
         let n = flow.states().len();
-        let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
-        let noise = match scale > 0.0 {
-            true => process_noise.iter().map(|q| q / scale).collect(),
-            false => vec![],
+        let way = match n <= FEW {
+            true => Way::Joint(Box::new(Joint::new(
+                n,
+                flow.outputs().len(),
+                entries,
+                process_noise,
+                run.method,
+            )?)),
+            false => Way::Variation(Box::new(Variation::new(
+                n,
+                flow.outputs().len(),
+                entries,
+                process_noise,
+                run.method,
+            )?)),
         };
-        let dimension = n + n * Linearised::width(n, scale > 0.0);
         Ok(Self {
             driven: Driven::new(flow, run.between),
-            integrator: Integrator::new(run.method, dimension)?,
-            entries: entries.to_vec(),
-            slopes: vec![0.0; flow.outputs().len()],
-            noise,
-            scale,
-            z: vec![],
+            way,
             rows: vec![],
         })
     }
 
-    /// x̂⁻ and P⁻ = ΦPΦᵀ + qW at the next sample. Φ is returned where it is to be kept.
+    /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. Φ is returned where it is to be kept. Where the
+    /// flow fails the belief is as it was.
     pub fn predict(
         &mut self,
         belief: &mut Belief,
         from: f64,
         to: f64,
         keep: bool,
-    ) -> Result<Vec<f64>, Error> {
-        let n = belief.x.len();
-        let noisy = !self.noise.is_empty();
-        let width = Linearised::width(n, noisy);
-        Linearised::begin(&belief.x, noisy, &mut self.z);
-        let mut flow = Linearised {
-            driven: &mut self.driven,
-            entries: &self.entries,
-            slopes: &mut self.slopes,
-            noise: &self.noise,
+    ) -> Result<Rows, Error> {
+        let mut x = belief.x.clone();
+        let driven = &mut self.driven;
+        let Moments { transition, noise } = match &mut self.way {
+            Way::Joint(joint) => joint.advance(driven, from, to, &mut x)?,
+            Way::Variation(variation) => variation.advance(driven, belief, from, to, &mut x)?,
         };
-        self.integrator.advance(&mut flow, from, to, &mut self.z)?;
-        belief.x.copy_from_slice(&self.z[..n]);
-        let transition = |i: usize| &self.z[n + i * width..n + i * width + n];
+        belief.x = x;
+        let n = belief.x.len();
         self.rows.clear();
-        self.rows.resize(width * n, 0.0);
-        // (ΦS)ᵀ, row by row
-        for i in 0..n {
-            let into = &mut self.rows[i..];
-            let mut sums = vec![0.0; n];
-            belief.root.transposed_times(transition(i), &mut sums);
-            into.iter_mut()
-                .step_by(n)
-                .zip(sums)
-                .for_each(|(into, sum)| *into = sum);
+        if let Some(noise) = noise {
+            self.push_root(&noise, n);
         }
-        if noisy {
-            let spread: Vec<f64> = (0..n)
-                .flat_map(|i| &self.z[n + i * width + n..n + (i + 1) * width])
-                .map(|w| self.scale * w)
-                .collect();
-            let lower = factor(&spread, n);
-            for (k, row) in self.rows[n * n..].chunks_exact_mut(n).enumerate() {
-                row.iter_mut()
-                    .enumerate()
-                    .for_each(|(i, into)| *into = lower[i * n + k]);
+        self.push_carried(&transition, belief, n);
+        belief.root.of_rows(&mut self.rows);
+        Ok(match keep {
+            true => Rows::of(&transition),
+            false => Rows::default(),
+        })
+    }
+
+    /// The rows of Lᵀ, W = LLᵀ. They come first: their zeros are spared in the reflections.
+    fn push_root(&mut self, noise: &Spanned, n: usize) {
+        let lower = factor(noise.entries(), n);
+        self.rows.resize(n * n, 0.0);
+        for (i, row) in lower.chunks_exact(n).enumerate() {
+            for (k, entry) in row[..=i].iter().enumerate() {
+                self.rows[k * n + i] = *entry;
             }
         }
-        let kept = match keep {
-            true => (0..n).flat_map(transition).copied().collect(),
-            false => vec![],
-        };
-        belief.root.of_rows(&mut self.rows);
-        Ok(kept)
+    }
+
+    /// The rows of (ΦS)ᵀ.
+    fn push_carried(&mut self, transition: &Spanned, belief: &Belief, n: usize) {
+        let first = self.rows.len();
+        self.rows.resize(first + n * n, 0.0);
+        let into = &mut self.rows[first..];
+        let mut sums = vec![0.0; n];
+        for i in 0..n {
+            sums.fill(0.0);
+            for (j, phi) in transition.span(i).zip(transition.row(i)) {
+                for (sum, s) in sums.iter_mut().zip(&belief.root.row(j)[..=j]) {
+                    *sum += phi * s;
+                }
+            }
+            let column = into[i..].iter_mut().step_by(n);
+            column.zip(&sums).for_each(|(into, sum)| *into = *sum);
+        }
     }
 }
 
@@ -149,12 +164,8 @@ pub(super) fn correct(
         for (x, k) in belief.x.iter_mut().zip(&gain) {
             *x += k * rest;
         }
-        sensing.corrections.push(Correction {
-            slopes: c.clone(),
-            innovation: rest,
-            variance,
-            gain,
-        });
+        let correction = Correction::single(c.clone(), rest, variance, gain);
+        sensing.corrections.push(correction);
     }
     Ok(())
 }

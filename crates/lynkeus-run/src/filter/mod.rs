@@ -35,15 +35,20 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
+mod doubling;
 pub(crate) mod extended;
 mod flow;
 mod health;
 mod horizon;
 mod model;
+mod nodes;
 pub(crate) mod root;
 mod sensing;
 mod smooth;
+mod spanned;
+mod taylor;
 mod unscented;
+mod variation;
 
 pub use health::{Health, Innovation, Reading, SensorHealth};
 pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
@@ -55,9 +60,10 @@ use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
 use model::ConfinedFlow;
-use root::Root;
+use root::{Packed, Root};
 use sensing::Sensing;
 use smooth::{History, Step};
+use spanned::Rows;
 use unscented::Unscented;
 
 /// Which filter.
@@ -114,8 +120,8 @@ pub(crate) struct Belief {
 
 #[derive(Clone, Debug)]
 enum Engine {
-    Extended(Extended),
-    Unscented(Unscented),
+    Extended(Box<Extended>),
+    Unscented(Box<Unscented>),
     MovingHorizon(Box<Horizon>),
 }
 
@@ -162,13 +168,15 @@ impl Filter {
             ));
         }
         let engine = match settings.kind {
-            FilterKind::Extended => Engine::Extended(Extended::new(
+            FilterKind::Extended => Engine::Extended(Box::new(Extended::new(
                 &model.flow,
                 &model.flow_entries,
                 &model.process_noise,
                 run,
-            )?),
-            FilterKind::Unscented(points) => Engine::Unscented(Unscented::new(model, points, run)?),
+            )?)),
+            FilterKind::Unscented(points) => {
+                Engine::Unscented(Box::new(Unscented::new(model, points, run)?))
+            }
             FilterKind::MovingHorizon(length, bounds) => {
                 Engine::MovingHorizon(Box::new(Horizon::new(model, length, bounds, run)?))
             }
@@ -233,7 +241,7 @@ impl Filter {
             history.push(Step {
                 transition,
                 x: self.belief.x.clone(),
-                root: self.belief.root.clone(),
+                root: Packed::of(&self.belief.root),
                 corrections,
             });
         }
@@ -343,7 +351,7 @@ impl Filter {
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
-    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Vec<f64>, Error> {
+    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
         match (self.run_flow(from, to, inputs), &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
                 // a flow that failed has left the belief as it was
@@ -359,7 +367,7 @@ impl Filter {
         }
     }
 
-    fn run_flow(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Vec<f64>, Error> {
+    fn run_flow(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
         let keep = self.history.is_some();
         match &mut self.engine {
             Engine::Extended(engine) => {
