@@ -91,7 +91,7 @@ mod words;
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
 #[cfg(feature = "tune")]
-pub use compare::{Against, Compared, Comparison, Run, compare};
+pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};

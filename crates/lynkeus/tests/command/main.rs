@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod certify;
+mod compare;
 mod families;
 mod faulty;
 mod filters;
