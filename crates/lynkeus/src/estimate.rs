@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
+use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::{EstimatorSettings, Log, estimate_watched};
 
 use crate::course::{Course, Samples};
+use crate::frozen::{Channel, Frozen, frozen};
 use crate::headers::time_of;
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
@@ -93,6 +94,7 @@ pub(crate) fn estimated(
     notes.extend(order_notes);
     notes.extend(gaps(table, settings, &time_header, &design));
     let raw = Raw {
+        frozen: hanging(study, &design.observer, &signals),
         time: &signals.time[..rows],
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
@@ -102,6 +104,23 @@ pub(crate) fn estimated(
         design,
     };
     Ok(raw.finish())
+}
+
+/// Where the sensors that an observer reads hang.
+fn hanging(study: &Study, observer: &Observer, signals: &Signals<'_>) -> Vec<Frozen> {
+    let sensors = observer.measured.iter().zip(&signals.readings);
+    let of = |(signal, readings): (&Signal, &&[f64])| {
+        let noises = &mut study.sensors.noise.iter();
+        let limits = &mut study.sensors.limits.iter();
+        let channel = Channel {
+            noise: noises.find(|(n, _)| n.text == signal.name).map(|n| n.1),
+            limits: limits
+                .find(|(n, ..)| n.text == signal.name)
+                .map(|(_, low, high)| (*low, *high)),
+        };
+        frozen(&signal.name, signals.time, readings, channel)
+    };
+    sensors.flat_map(of).collect()
 }
 
 /// A measured state for which neither the study nor the model says where it starts begins at its

@@ -53,6 +53,7 @@
 //! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod accuracy;
 mod calibrate;
 mod certify;
 mod check;
@@ -64,10 +65,12 @@ mod credible;
 mod design;
 mod error;
 mod estimate;
+mod expected;
 #[cfg(feature = "plot")]
 mod figure;
 mod files;
 mod filter;
+mod frozen;
 mod headers;
 mod innovations;
 pub mod interrupt;
@@ -88,6 +91,7 @@ pub mod tune;
 pub mod visible;
 mod words;
 
+pub use accuracy::{Accuracy, Settling};
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
 #[cfg(feature = "tune")]
@@ -99,6 +103,7 @@ pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
 #[cfg(feature = "plot")]
 pub use figure::figure;
+pub use frozen::Frozen;
 pub use innovations::Innovations;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};

@@ -242,6 +242,7 @@ fn outcome(
         time: run.times(),
         quantities,
         measurements: measurements(&design, measured),
+        frozen: vec![],
         notes: design.notes.clone(),
         course,
         prepared,
