@@ -15,7 +15,7 @@ use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
+use crate::{Error, Outcome, Quantity, Study, Table, filter, interval, prepare, sampled};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -65,6 +65,7 @@ pub(crate) fn estimated(
     let mut course = course(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
     settle(&mut course, rows, study, table.file())?;
+    let intervals = interval::intervals(prepared, &design, &signals.samples(), &course);
     let logged = |name: &str| {
         let values = logged(table, settings, &time_header, name)?;
         Some(values[..rows].to_vec())
@@ -94,6 +95,7 @@ pub(crate) fn estimated(
     notes.extend(order_notes);
     notes.extend(gaps(table, settings, &time_header, &design));
     let raw = Raw {
+        intervals,
         frozen: hanging(study, &design.observer, &signals),
         time: &signals.time[..rows],
         quantities: estimated.into_iter().chain(known).collect(),

@@ -10,6 +10,7 @@ use crate::credible::{self, Doubt};
 use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
 use crate::innovations::{Innovations, innovations};
+use crate::interval::Intervals;
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
@@ -117,6 +118,8 @@ pub struct Outcome {
     pub accuracies: Vec<Accuracy>,
     /// sensors whose readings hang
     pub frozen: Vec<Frozen>,
+    /// the log's sampling interval against what the observer stands; none where that is not known
+    pub intervals: Option<Intervals>,
     /// why the run ended before its last row
     pub ended: Option<Ended>,
     /// what the user should know
@@ -209,6 +212,7 @@ pub(crate) struct Raw<'r> {
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Vec<f64>)>,
     pub frozen: Vec<Frozen>,
+    pub intervals: Option<Intervals>,
     pub notes: Vec<String>,
 }
 
@@ -223,10 +227,12 @@ impl Raw<'_> {
             mut quantities,
             measurements,
             frozen,
+            intervals,
             mut notes,
         } = self;
         notes.append(&mut course.notes);
         notes.extend(frozen.iter().map(Frozen::words));
+        notes.extend(intervals.as_ref().and_then(Intervals::words));
         let innovations = innovations(&design, &course, &mut notes);
         let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
@@ -276,6 +282,7 @@ impl Raw<'_> {
             innovations,
             accuracies,
             frozen,
+            intervals,
             time: time.to_vec(),
             time_header,
             design,

@@ -243,6 +243,7 @@ fn outcome(
         quantities,
         measurements: measurements(&design, measured),
         frozen: vec![],
+        intervals: None,
         notes: design.notes.clone(),
         course,
         prepared,
