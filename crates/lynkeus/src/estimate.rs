@@ -4,17 +4,18 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
+use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::{EstimatorSettings, Log, estimate_watched};
 
 use crate::course::{Course, Samples};
+use crate::frozen::{Channel, Frozen, frozen};
 use crate::headers::time_of;
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
+use crate::{Error, Outcome, Quantity, Study, Table, filter, interval, prepare, sampled};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -64,6 +65,7 @@ pub(crate) fn estimated(
     let mut course = course(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
     settle(&mut course, rows, study, table.file())?;
+    let intervals = interval::intervals(prepared, &design, &signals.samples(), &course);
     let logged = |name: &str| {
         let values = logged(table, settings, &time_header, name)?;
         Some(values[..rows].to_vec())
@@ -93,6 +95,8 @@ pub(crate) fn estimated(
     notes.extend(order_notes);
     notes.extend(gaps(table, settings, &time_header, &design));
     let raw = Raw {
+        intervals,
+        frozen: hanging(study, &design.observer, &signals),
         time: &signals.time[..rows],
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
@@ -102,6 +106,23 @@ pub(crate) fn estimated(
         design,
     };
     Ok(raw.finish())
+}
+
+/// Where the sensors that an observer reads hang.
+fn hanging(study: &Study, observer: &Observer, signals: &Signals<'_>) -> Vec<Frozen> {
+    let sensors = observer.measured.iter().zip(&signals.readings);
+    let of = |(signal, readings): (&Signal, &&[f64])| {
+        let noises = &mut study.sensors.noise.iter();
+        let limits = &mut study.sensors.limits.iter();
+        let channel = Channel {
+            noise: noises.find(|(n, _)| n.text == signal.name).map(|n| n.1),
+            limits: limits
+                .find(|(n, ..)| n.text == signal.name)
+                .map(|(_, low, high)| (*low, *high)),
+        };
+        frozen(&signal.name, signals.time, readings, channel)
+    };
+    sensors.flat_map(of).collect()
 }
 
 /// A measured state for which neither the study nor the model says where it starts begins at its

@@ -53,6 +53,7 @@
 //! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod accuracy;
 mod calibrate;
 mod certify;
 mod check;
@@ -64,13 +65,16 @@ mod credible;
 mod design;
 mod error;
 mod estimate;
+mod expected;
 #[cfg(feature = "plot")]
 mod figure;
 mod files;
 mod filter;
+mod frozen;
 mod headers;
 mod innovations;
 pub mod interrupt;
+mod interval;
 mod near;
 mod outcome;
 mod outside;
@@ -88,10 +92,11 @@ pub mod tune;
 pub mod visible;
 mod words;
 
+pub use accuracy::{Accuracy, Settling};
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
 #[cfg(feature = "tune")]
-pub use compare::{Against, Compared, Comparison, Run, compare};
+pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};
@@ -99,7 +104,9 @@ pub use error::{Error, ErrorKind};
 pub use estimate::estimate;
 #[cfg(feature = "plot")]
 pub use figure::figure;
+pub use frozen::Frozen;
 pub use innovations::Innovations;
+pub use interval::Intervals;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;

@@ -3,6 +3,7 @@
 
 mod backends;
 mod certify;
+mod compare;
 mod families;
 mod faulty;
 mod filters;
