@@ -56,6 +56,7 @@
 mod calibrate;
 mod certify;
 mod check;
+mod choice;
 #[cfg(feature = "tune")]
 mod compare;
 mod correction;
@@ -78,6 +79,7 @@ mod outside;
 pub mod plot;
 pub mod precision;
 pub mod prepare;
+mod propose;
 mod sampled;
 mod simulate;
 pub mod study;
@@ -89,7 +91,8 @@ pub mod visible;
 mod words;
 
 pub use certify::{CertifyReport, Strays, certify};
-pub use check::{CheckOptions, Report, check};
+pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, check};
+pub use choice::{Choice, Grounds};
 #[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Run, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
@@ -103,6 +106,7 @@ pub use innovations::Innovations;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
+pub use propose::Proposal;
 pub use simulate::simulate;
 pub use study::{Study, schema};
 pub use systems::observer as observer_system;

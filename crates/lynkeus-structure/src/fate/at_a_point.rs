@@ -15,8 +15,11 @@ use crate::{Coordinate, Region};
 const STATES: usize = 60;
 /// What counts as zero beside one.
 const ZERO: f64 = 1e-8;
-/// Real parts within this share of the largest entry are on the imaginary axis.
-const AXIS: f64 = 1e-7;
+/// Real parts within this share of the largest entry count as none: multiple eigenvalues on the
+/// imaginary axis are computed with a few digits only.
+const AXIS: f64 = 1e-5;
+/// Entries within this share of those of the plant may be rounding alone.
+const ROUNDING: f64 = 1e-8;
 
 /// What the linearisation shows.
 #[derive(Debug)]
@@ -177,7 +180,8 @@ impl Linear {
         let R = reached(&A, &(V.transpose() * &self.G * &free));
         let S = null_space(&R.transpose());
         let quotient = S.transpose() * &A * &S;
-        let scale = A.amax();
+        let gross = self.F.amax() + (&self.G * &K).amax();
+        let scale = A.amax().max(ROUNDING * gross);
         let of = (0..hidden.told.len()).map(|i| {
             let (row, alone) = match i < n {
                 true => (V.row(i).into_owned(), 0.0),

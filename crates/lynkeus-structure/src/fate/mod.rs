@@ -111,17 +111,22 @@ impl Hidden<'_, '_> {
     /// [`MissingInput`] where the plant has parameters without value.
     pub fn fates(&self) -> Result<Fates, MissingInput> {
         let proved = on_the_box::fates(self)?;
-        let is_open = |i: usize| self.told[i] == Told::Hidden && proved[i].is_none();
+        let is_open = |i: usize| {
+            let decays = matches!(proved[i], Some(Fate::Decays { .. }));
+            self.told[i] == Told::Hidden && !decays
+        };
         let local = match (0..self.told.len()).any(is_open) {
             true => at_a_point::fates(self)?,
             false => None,
         };
         let of = (0..self.told.len()).map(|i| {
-            let there = || local.as_ref().map(|local| local.of[i]);
-            (self.told[i] == Told::Hidden).then(|| match proved[i] {
-                Some(fate) => fate,
-                None => there().unwrap_or(Fate::Undecided),
-            })
+            let there = local.as_ref().map(|local| local.of[i]);
+            let fate = match (proved[i], there) {
+                // a bound says little where the error vanishes near some point
+                (Some(Fate::Bounded { .. }), Some(Fate::Decays { .. })) | (None, Some(_)) => there,
+                (proved, _) => proved,
+            };
+            (self.told[i] == Told::Hidden).then(|| fate.unwrap_or(Fate::Undecided))
         });
         Ok(Fates {
             of: of.collect(),

@@ -185,7 +185,9 @@ impl Cascade {
             terms.map(|(b, width)| Interval::point(b.magnitude()) * Interval::point(*width));
         let sum = terms.fold(Interval::ZERO, |sum, term| sum + term);
         let bound = (sum / Interval::point(rate)).hi();
-        (bound.is_finite() && sum.is_defined()).then_some(Fate::Bounded { bound })
+        // the range itself is a bound
+        let tells = bound < self.scales[s] && sum.is_defined();
+        tells.then_some(Fate::Bounded { bound })
     }
 }
 

@@ -137,6 +137,31 @@ fn an_unknown_input_that_the_outputs_pin_down_does_not_matter() {
     assert!(matches!(found.fate("c"), Some(Fate::Grows { rate }) if (rate - 3.5).abs() < 1e-9));
 }
 
+/// An epidemic: of S and b only b·S is seen, and S' = −b·S·I is the same for all of them.
+#[test]
+fn what_scales_together_stays() {
+    let found = case(
+        "der(a) = -0.1*a + w*b*a; der(b) = -w*b*a; der(c) = -c;",
+        &["b", "w", "c"],
+        2,
+    );
+    assert_eq!(found.fate("b"), Some(Fate::Stays));
+    assert_eq!(found.fate("w"), Some(Fate::Stays));
+    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+}
+
+/// Two integrators in a row: a double eigenvalue at zero.
+#[test]
+fn a_double_integrator_is_not_taken_for_slow_decay() {
+    let found = case(
+        "der(a) = -a; der(b) = 3*c - 7*b; der(c) = 7*c - 49/3*b;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    assert_eq!(found.fate("b"), Some(Fate::Stays));
+}
+
 /// The unknown input stands in the equation of a known state: w = −b there, so that b' = −3b.
 #[test]
 fn an_unknown_input_is_found_where_it_acts_on_something_known() {

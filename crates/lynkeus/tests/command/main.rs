@@ -15,6 +15,7 @@ mod outside;
 mod references;
 mod results;
 mod runs;
+mod story;
 mod tune;
 
 use std::path::{Path, PathBuf};
