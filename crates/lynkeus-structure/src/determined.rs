@@ -9,6 +9,9 @@ use lynkeus_expr::{MissingInput, Node, jacobian};
 
 use crate::{Extended, Verdict, sign};
 
+/// States beyond which nothing is tried.
+const STATES: usize = 300;
+
 /// Per extended state whether it is known everywhere by that argument. False says nothing.
 ///
 /// # Errors
@@ -16,6 +19,9 @@ use crate::{Extended, Verdict, sign};
 pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
     let (graph, region) = (extended.graph(), extended.region());
     let mut known = vec![false; extended.states.len()];
+    if known.len() > STATES {
+        return Ok(known);
+    }
     // a function that jumps may take a value twice though its slope has one sign
     if extended.regularity(&region)?.verdict != Verdict::Proved {
         return Ok(known);
@@ -38,7 +44,7 @@ pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
                 break;
             }
         }
-        let Some((place, j, slope)) = next else {
+        let Some((place, j, slope)) = next.filter(|_| graph.spent().is_none()) else {
             return Ok(known);
         };
         open.remove(place);

@@ -181,9 +181,8 @@ fn knowledge(
 }
 
 impl Report {
-    /// True if a family with a theorem is chosen, if everything asked for can be known or its error
-    /// decays by itself (then a filter estimates it), for unknown inputs that do anything or
-    /// that wander, or where no observer was asked for.
+    /// True if a family with a theorem is chosen, if everything asked for can be known from the
+    /// outputs (then a filter estimates it), or where no observer was asked for.
     pub fn is_positive(&self) -> bool {
         let chosen = self
             .examinations
@@ -195,9 +194,7 @@ impl Report {
         self.examinations.is_empty()
             || self.examinations.iter().any(|e| e.spent().is_some())
             || with_theorem
-            || (chosen.is_some()
-                && (!self.answer.quantities.iter().any(hidden)
-                    || self.knowledge.iter().any(Knowledge::is_enough)))
+            || (chosen.is_some() && !self.answer.quantities.iter().any(hidden))
     }
 
     /// The singular set inside the box, for a plant with two states.

@@ -1,8 +1,8 @@
 //! Which family is taken, and why: one decision for reports and for runs.
 //!
-//! `auto` takes the first family whose conditions are all proved, whose keys are there or can be
-//! proposed, and whose error decays fast enough for the run of `[simulate]`; else one that is undecided, if the
-//! study has its keys; else the first filter, for which nothing is asked and nothing is proved.
+//! `auto` takes the first family whose conditions are all proved, whose keys are there or were tried in
+//! simulation, and whose error decays fast enough for the run of `[simulate]`; else one that is undecided, with
+//! the same; else the first filter, for which nothing is asked and nothing is proved.
 
 use std::fmt;
 
@@ -19,6 +19,9 @@ use crate::{Error, study::SimulateSettings};
 
 /// A run is long enough for an error that falls to e^−3 of itself, 5 %.
 const FALLS: f64 = 3.0;
+
+/// States beyond which no modes are computed.
+const STATES: usize = 60;
 
 /// The family to use.
 #[derive(Clone, Debug)]
@@ -96,12 +99,15 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
     for examination in with(Standing::Undecided) {
         let family = examination.family;
         match tried(prepared, examination) {
-            Trial::Good(design, None) if has_keys(prepared, examination) => {
+            Trial::Good(design, proposal)
+                if has_keys(prepared, examination)
+                    || proposal.as_ref().is_some_and(|p| p.is_tried) =>
+            {
                 return Ok(Some(chosen(
                     examination,
                     Grounds::Undecided,
                     design,
-                    None,
+                    proposal,
                     passed,
                 )));
             }
@@ -207,8 +213,10 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
     let tuning = &prepared.study().observer.tuning;
     let mut proposal = None;
     let mut tuned = tuning.clone();
-    if lacks_speed(prepared, examination) && !is_certified_gain(tuning) {
-        proposal = propose(prepared, examination);
+    if !is_certified_gain(tuning) && lacks_speed(prepared, examination) {
+        // a value that nothing was tried with is for a bare model only, which has no run
+        let is_bare = prepared.study().is_bare();
+        proposal = propose(prepared, examination).filter(|p| p.is_tried || is_bare);
         if let Some(Proposal { value, .. }) = &proposal {
             tuned
                 .values
@@ -218,7 +226,11 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
     let design = match prepared.designed(examination, prepared.extended(), &tuned) {
         Ok(design) => design,
         Err(DesignError::Tuning(e)) if e.absent => {
-            let reason = format!("it needs `{}` in [observer]: {}", e.key, e.expected);
+            let remedy = match e.key == Proposal::KEY && prepared.study().simulate.is_none() {
+                true => "; with [simulate] one is proposed",
+                false => "",
+            };
+            let reason = format!("it needs `{}` in [observer]: {}{remedy}", e.key, e.expected);
             return Trial::Bad(reason);
         }
         Err(DesignError::Tuning(e)) if proposal.is_none() => {
@@ -251,6 +263,7 @@ fn too_slow(rate: f64, run: &SimulateSettings) -> String {
 fn decay(extended: &Extended<'_>, design: &Design) -> Option<f64> {
     let observer = &design.observer;
     let is_copy = observer.states.len() == extended.states.len()
+        && extended.states.len() <= STATES
         && observer.input_derivatives.is_empty()
         && observer
             .estimates
@@ -348,8 +361,11 @@ impl Start {
         evaluated(extended, &self.known(extended), &nodes)
     }
 
-    /// ∂f/∂x of the plant there; none where an entry has no value.
+    /// ∂f/∂x of the plant there; none where an entry has no value, and for a large plant.
     pub fn jacobian(&self, extended: &Extended<'_>) -> Option<DMatrix<f64>> {
+        if extended.states.len() > STATES {
+            return None;
+        }
         let slopes =
             jacobian::forward(extended.graph(), &extended.derivatives, &extended.symbols());
         let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();

@@ -24,7 +24,7 @@ const STATES: usize = 30;
 const ROWS: f64 = 5000.0;
 /// The time that the runs may take.
 #[cfg(feature = "tune")]
-const TIME: std::time::Duration = std::time::Duration::from_secs(3);
+const TIME: std::time::Duration = std::time::Duration::from_secs(5);
 
 /// A value that the study leaves out.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,8 @@ pub struct Proposal {
     pub value: f64,
     /// where it comes from
     pub why: String,
+    /// the best of values that were tried in simulation
+    pub is_tried: bool,
 }
 
 impl Proposal {
@@ -61,6 +63,7 @@ pub(crate) fn propose(prepared: &Prepared<'_>, examination: &Examination) -> Opt
     if let Some(value) = knee(prepared, examination) {
         return Some(Proposal {
             value,
+            is_tried: true,
             why: format!("the knee of {POINTS} values in simulation, which `lynkeus tune` refines"),
         });
     }
@@ -86,6 +89,7 @@ fn knee(prepared: &Prepared<'_>, examination: &Examination) -> Option<f64> {
     own.budget = study.budget.within(TIME);
     own.observer.family = Some(Name::from(family.name()));
     own.observer.tuning.values.retain(|key, _| family.owns(key));
+    start_off(&mut own, prepared);
     let (low, high) = (
         SLOWEST / span,
         (1.0 / step).min(FASTEST / span).max(4.0 * SLOWEST / span),
@@ -100,6 +104,28 @@ fn knee(prepared: &Prepared<'_>, examination: &Examination) -> Option<f64> {
     match own.budget.marked() {
         Some(_) => None,
         None => found.chosen()?.values.first().copied(),
+    }
+}
+
+/// From the true start no speed would be too slow: where the study does not say where the estimate
+/// starts, it is off by this share of each range.
+#[cfg(feature = "tune")]
+const OFF: f64 = 0.1;
+
+#[cfg(feature = "tune")]
+fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
+    let initial = &mut own.observer.tuning.initial;
+    let extended = prepared.extended();
+    let starts = Start::of(extended).states;
+    for (state, start) in extended.states.iter().zip(starts) {
+        let off = OFF * (state.max - state.min);
+        let moved = match start + off > state.max {
+            true => start - off,
+            false => start + off,
+        };
+        if initial.default.is_none() && off.is_finite() {
+            initial.values.entry(state.name.clone()).or_insert(moved);
+        }
     }
 }
 
@@ -124,6 +150,7 @@ fn time_scales(prepared: &Prepared<'_>) -> Option<Proposal> {
     };
     let limited = span.map_or(value, |span| value.clamp(3.0 / span, FASTEST / span));
     limited.is_finite().then(|| Proposal {
+        is_tried: false,
         value: rounded(limited),
         why,
     })

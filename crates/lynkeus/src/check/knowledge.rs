@@ -115,11 +115,6 @@ impl Knowledge {
         })
     }
 
-    /// Whether everything is known, or its error decays or stays bounded.
-    pub fn is_enough(&self) -> bool {
-        self.quantities.iter().all(|(_, known)| known.is_enough())
-    }
-
     /// Names of what is known, of what follows in the end, and of what is not known.
     pub(super) fn sorted(&self) -> [Vec<&str>; 3] {
         let of = |class: usize| {
@@ -194,10 +189,6 @@ impl Found<'_> {
 }
 
 impl Known {
-    fn is_enough(&self) -> bool {
-        self.class() < 2
-    }
-
     /// 0: known; 1: known in the end; 2: not known.
     fn class(&self) -> usize {
         match self {
@@ -238,10 +229,9 @@ impl Known {
     /// The line under which it stands.
     fn line(&self, unit: &str) -> String {
         match self {
-            Known::Everywhere => "known everywhere on the box (proved)".to_owned(),
+            Known::Everywhere => "known everywhere (proved on the box)".to_owned(),
             Known::AlmostEverywhere => {
-                "known at almost every state and input (everywhere on the box is not proved)"
-                    .to_owned()
+                "known at almost every state and input (everywhere is not proved)".to_owned()
             }
             Known::WhileExcited { input, value } => {
                 format!(

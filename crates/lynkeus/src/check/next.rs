@@ -28,10 +28,7 @@ pub struct Next {
 impl Next {
     pub(super) fn new(prepared: &Prepared<'_>, choice: &Choice) -> Self {
         let study = prepared.study();
-        let bare = study
-            .plant
-            .as_deref()
-            .is_some_and(|plant| plant == Path::new(&study.file));
+        let bare = study.is_bare();
         let is_missing = !choice.is_asked_for || choice.proposal.is_some();
         let observer = (bare || is_missing).then(|| observer(prepared, choice));
         let file = match bare {
@@ -148,7 +145,7 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
         "[observer]".to_owned(),
         format!("family = {}", text(choice.family)),
     ];
-    if let Some(Proposal { value, why }) = &choice.proposal {
+    if let Some(Proposal { value, why, .. }) = &choice.proposal {
         lines.push(format!("{} = {value}  # {why}", Proposal::KEY));
     }
     let family = lynkeus_observers::find(choice.family);
