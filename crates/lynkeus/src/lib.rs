@@ -72,6 +72,7 @@ mod filter;
 mod headers;
 mod innovations;
 pub mod interrupt;
+mod modes;
 mod near;
 mod outcome;
 mod outside;

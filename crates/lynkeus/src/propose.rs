@@ -5,7 +5,7 @@ use std::fmt;
 use lynkeus_observers::Examination;
 use serde_json::{Value as Json, json};
 
-use crate::choice::Start;
+use crate::modes::Start;
 use crate::prepare::Prepared;
 use crate::words::number;
 

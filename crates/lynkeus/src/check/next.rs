@@ -267,7 +267,7 @@ fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
 /// Ten times the slowest time scale of the plant at its start, else 10.
 fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
     let extended = prepared.extended();
-    let Some(J) = crate::choice::Start::of(extended).jacobian(extended) else {
+    let Some(J) = crate::modes::Start::of(extended).jacobian(extended) else {
         return 10.0;
     };
     let sizes: Vec<f64> = J.complex_eigenvalues().iter().map(|λ| λ.norm()).collect();
