@@ -308,7 +308,8 @@ fn the_column_is_the_same_tray_by_tray() {
 #[test]
 fn the_family_is_chosen_automatically() {
     let expected = [
-        ("column/study.toml", "triangular"),
+        // triangular fits, but with Lemma 1's S its slowest mode outlasts the run
+        ("column/study.toml", "ekf"),
         ("lee/study.toml", "triangular"),
         ("ltaief/study.toml", "state-affine"),
         ("farza/study.toml", "unknown-input"),
