@@ -10,7 +10,9 @@
 
 pub mod blocks;
 pub mod chains;
+mod determined;
 mod extended;
+pub mod fate;
 pub mod indices;
 mod irreducible;
 pub mod layers;
@@ -33,6 +35,7 @@ mod words;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
+pub use determined::determined;
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;

@@ -130,9 +130,13 @@ impl Split<'_> {
                 variance += (part / value).powi(2);
                 continue;
             }
+            if part.abs() <= noise {
+                // rounding, which says nothing of an error
+                continue;
+            }
             // the error that is left of one range at the start
             let left = part.abs() / self.reach[j];
-            if part.abs() > noise && left > FORGOTTEN * scale {
+            if left > FORGOTTEN * scale {
                 return f64::INFINITY;
             }
             variance += left * left;

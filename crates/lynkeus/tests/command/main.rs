@@ -18,6 +18,7 @@ mod outside;
 mod references;
 mod results;
 mod runs;
+mod story;
 mod tune;
 
 use std::path::{Path, PathBuf};
