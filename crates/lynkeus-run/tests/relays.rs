@@ -174,3 +174,39 @@ fn a_short_rest_is_not_stepped_over() {
         assert!(resting < again);
     }
 }
+
+/// A DC motor with dry friction, through standstill and back. The reference is SciPy's Radau
+/// method (rtol 1e-10) with sign(w) written tanh(w/1e-6), which is off by about as much.
+#[test]
+fn a_motor_with_dry_friction_agrees_with_a_regularised_reference() {
+    let reference = [
+        (0.02, [0.0, 0.0, 0.09577606]),
+        (0.2, [0.78943596, 11.10260568, 0.33171298]),
+        (0.5, [4.01274237, 0.73630095, -0.02991577]),
+        (0.7, [3.22565378, -11.10260568, -0.33171298]),
+        (1.0, [0.00234737, -0.73630095, 0.02991577]),
+        (1.5, [4.01274237, 0.73630095, -0.02991577]),
+    ];
+    let times = reference.map(|(t, _)| t);
+    for method in methods() {
+        let start = [("th", 0.0), ("w", 0.0), ("i", 0.0)];
+        let rows = run(method, &start, &times, |t, x| {
+            let (w, i) = (x[1], x[2]);
+            let voltage = (std::f64::consts::TAU * t).sin();
+            vec![
+                w,
+                (0.05 * i - 1e-5 * w - 0.01 * w.sign()) / 1e-4,
+                (voltage - 1.2 * i - 0.05 * w) / 2e-3,
+            ]
+        });
+        for (row, (t, expected)) in rows.iter().zip(reference) {
+            for (found, expected) in row.iter().zip(expected) {
+                assert!(
+                    (found - expected).abs() < 1e-5,
+                    "{found} for {expected} at {t}"
+                );
+            }
+        }
+        assert!(rows[0][1].abs() < 1e-12, "at rest: {:?}", rows[0]);
+    }
+}

@@ -12,5 +12,6 @@ mod loops;
 mod operations;
 mod random_graphs;
 mod recipe;
+mod roots;
 mod sample;
 mod values;

@@ -21,6 +21,10 @@ pub(super) struct Torn<'a> {
     pub residuals: Vec<Node>,
     /// the other unknowns: symbol and value, over the same
     pub explicit: Vec<(Node, Node)>,
+    /// all unknowns of the block
+    pub all: Vec<&'a Unknown>,
+    /// the equations that gave the other unknowns
+    pub used: Vec<&'a FlatEquation>,
 }
 
 impl<'a> Torn<'a> {
@@ -178,6 +182,7 @@ impl<'a> Search<'a> {
             .iter()
             .map(|&place| &system.equations[place])
             .collect();
+        let used = self.left.keys().filter(|place| !self.open.contains(place));
         let difference = |e: &&FlatEquation| system.graph.binary(Binary::Sub, e.left, e.right);
         let residuals: Vec<Node> = equations.iter().map(difference).collect();
         Torn {
@@ -188,6 +193,12 @@ impl<'a> Search<'a> {
                 .collect(),
             residuals: system.graph.substitute(&residuals, &self.values),
             equations,
+            all: self
+                .readers
+                .keys()
+                .map(|&place| &system.unknowns[place])
+                .collect(),
+            used: used.map(|&place| &system.equations[place]).collect(),
             explicit: self.explicit,
         }
     }

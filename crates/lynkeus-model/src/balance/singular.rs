@@ -6,7 +6,7 @@ use lynkeus_expr::{Graph, Node, Tape, jacobian};
 use super::diagnose::lines;
 use super::listed;
 use super::loops::Torn;
-use crate::syntax::{Problem, Result};
+use crate::syntax::{Problem, Result, Span};
 
 /// Points looked at.
 const POINTS: usize = 4;
@@ -86,16 +86,21 @@ fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Option<Vec<usize>> {
 }
 
 fn undetermined(torn: &Torn<'_>, rows: &[usize], source: &str) -> Problem {
-    let spans = || rows.iter().map(|&i| torn.equations[i].span);
-    let span = spans().min_by_key(|span| span.start).unwrap_or_default();
-    let names = listed(torn.unknowns.iter().copied());
+    let dependent = rows.iter().map(|&i| torn.equations[i].span);
+    let span = dependent
+        .clone()
+        .max_by_key(|span| span.start)
+        .unwrap_or_default();
+    let mut spans: Vec<Span> = dependent.chain(torn.used.iter().map(|e| e.span)).collect();
+    spans.sort_by_key(|span| span.start);
+    let names = listed(torn.all.iter().copied());
     let message = format!("these equations do not determine {names}: they are singular everywhere");
     let hint = "one equation repeats others, or is a constraint between states or inputs (index \
                 above 1): leave it out, or replace it by its derivative with respect to time";
+    let lines = lines(source, spans.into_iter());
     Problem::new(span, message)
         .label(format!(
-            "what stands on {} does not determine them",
-            lines(source, spans())
+            "it says nothing new of them beside the others on {lines}"
         ))
         .hint(hint)
 }
