@@ -1,12 +1,14 @@
 //! Solves the blocks of a sorted system one after the other.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Node, Unary};
 
+use super::eliminate::{self, Core, Given};
 use super::incidence::{Incidence, arguments};
-use super::linear::{Form, Linear};
+use super::linear::Linear;
 use super::matching::Matching;
+use super::rows::{Row, Rows};
 use super::{FlatEquation, System, Unknown};
 use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
 use crate::syntax::{Problem, Result};
@@ -85,62 +87,136 @@ impl<'a> Solver<'a> {
         Ok(())
     }
 
-    /// Derivatives that share their equations linearly: a mass matrix.
+    /// Unknowns that need each other: what follows with a constant factor is taken out, the core
+    /// is a system of linear equations.
     fn coupled(&mut self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<()> {
-        if pairs.iter().any(|(_, unknown)| unknown.state.is_none()) {
-            return Err(self.algebraic_loop(pairs));
+        let core = self.core(pairs)?;
+        if let Some((place, _)) = core.rows.iter().find(|(_, row)| row.len() == 0) {
+            return Err(dependent(self.source, pairs, *place));
         }
-        if pairs.len() > MAX_COUPLED {
-            return Err(too_many_coupled(pairs));
+        if core.rows.iter().any(|(_, row)| !row.nonlinear.is_empty()) {
+            return Err(self.nonlinear(pairs, &core));
         }
-        let zero = self.system.graph.constant(0.0).node();
-        let (mut matrix, mut right) = (vec![], vec![]);
-        for (equation, _) in pairs {
-            let (row, rest) = self.row(equation, pairs)?;
-            for coefficient in row {
-                matrix.push(coefficient.map_or(zero, |node| self.replace(node)));
-            }
-            let rest = rest.map_or(zero, |node| self.replace(node));
-            let negated = self.system.graph.unary(Unary::Neg, rest);
-            right.push(negated);
+        if core.columns.len() > MAX_COUPLED {
+            return Err(too_many_coupled(pairs, core.columns.len()));
         }
-        let solved = self.system.graph.solve(&matrix, &right);
-        for ((_, unknown), value) in pairs.iter().zip(solved.x) {
-            self.solution.insert(unknown.symbol, value);
+        let values = self.linear_core(&core);
+        for (&column, value) in core.columns.iter().zip(values) {
+            self.solution.insert(pairs[column].1.symbol, value);
         }
+        self.taken_out(pairs, &core.given);
         Ok(())
     }
 
-    /// Coefficients of the unknowns and the rest, of left − right.
-    fn row(
-        &self,
-        equation: &FlatEquation,
-        pairs: &[(&FlatEquation, &Unknown)],
-    ) -> Result<(Vec<Option<Node>>, Option<Node>)> {
-        let linear = self.linear();
+    fn core(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Core> {
         let graph = self.system.graph;
-        let mut rest = Some(graph.binary(Binary::Sub, equation.left, equation.right));
-        let mut row = vec![];
-        for (_, unknown) in pairs {
-            let form = match rest {
-                Some(node) => linear.form(node, unknown.symbol, equation.span)?,
-                None => Some(Form::default()),
-            };
-            let form = form.ok_or_else(|| not_linear(equation, unknown))?;
-            row.push(form.coefficient);
-            rest = form.rest;
+        let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
+        let rows = Rows {
+            linear: self.linear(),
+            place: symbols
+                .enumerate()
+                .map(|(place, symbol)| (symbol, place))
+                .collect(),
+        };
+        let row = |(equation, _): &(&FlatEquation, &Unknown)| {
+            let residual = graph.binary(Binary::Sub, equation.left, equation.right);
+            rows.row(residual, equation.span)
+        };
+        let found: Vec<Row> = pairs.iter().map(row).collect::<Result<_>>()?;
+        let span = pairs.first().map(|(equation, _)| equation.span);
+        eliminate::core(graph, &self.budget, span.unwrap_or_default(), found)
+    }
+
+    fn linear_core(&mut self, core: &Core) -> Vec<Node> {
+        let graph = self.system.graph;
+        let zero = graph.constant(0.0).node();
+        let (mut matrix, mut right) = (vec![], vec![]);
+        for (_, row) in &core.rows {
+            for column in &core.columns {
+                let coefficient = row.coefficients.get(column);
+                matrix.push(coefficient.map_or(zero, |&node| self.replace(node)));
+            }
+            let rest = row.rest.map_or(zero, |node| self.replace(node));
+            right.push(graph.unary(Unary::Neg, rest));
         }
-        let symbols: HashSet<Node> = pairs.iter().map(|(_, unknown)| unknown.symbol).collect();
-        for (coefficient, (_, unknown)) in row.iter().zip(pairs) {
-            let Some(coefficient) = *coefficient else {
-                continue;
-            };
-            let read = linear.below(coefficient, equation.span)?;
-            if read.iter().any(|node| symbols.contains(node)) {
-                return Err(not_linear(equation, unknown));
+        match (&matrix[..], &right[..]) {
+            ([], []) => vec![],
+            ([factor], [right]) => vec![graph.binary(Binary::Div, *right, *factor)],
+            _ => graph.solve(&matrix, &right).x,
+        }
+    }
+
+    /// The unknowns that were taken out, each behind those it needs.
+    fn taken_out(&mut self, pairs: &[(&FlatEquation, &Unknown)], given: &[Given]) {
+        let graph = self.system.graph;
+        let of_symbol: HashMap<Node, usize> = given
+            .iter()
+            .enumerate()
+            .map(|(place, g)| (pairs[g.column].1.symbol, place))
+            .collect();
+        let values: Vec<Node> = given
+            .iter()
+            .map(|given| self.value_of(pairs, given))
+            .collect();
+        let needs = |place: usize| -> Vec<usize> {
+            let symbols = graph.symbols_of(&values[place..=place]);
+            symbols
+                .iter()
+                .filter_map(|symbol| of_symbol.get(symbol).copied())
+                .collect()
+        };
+        let mut done = vec![false; given.len()];
+        let mut path: Vec<(usize, Vec<usize>)> = vec![];
+        for root in (0..given.len()).rev() {
+            if !std::mem::replace(&mut done[root], true) {
+                path.push((root, needs(root)));
+            }
+            while let Some((place, open)) = path.last_mut() {
+                if let Some(need) = open.pop() {
+                    if !std::mem::replace(&mut done[need], true) {
+                        path.push((need, needs(need)));
+                    }
+                    continue;
+                }
+                let (symbol, value) = (pairs[given[*place].column].1.symbol, values[*place]);
+                let value = self.replace(value);
+                self.solution.insert(symbol, value);
+                path.pop();
             }
         }
-        Ok((row, rest))
+    }
+
+    /// −(rest + Σ coefficient · unknown) / factor
+    fn value_of(&self, pairs: &[(&FlatEquation, &Unknown)], given: &Given) -> Node {
+        let graph = self.system.graph;
+        let mut sum = given.row.rest;
+        for (&column, &coefficient) in &given.row.coefficients {
+            if column != given.column {
+                let term = graph.binary(Binary::Mul, coefficient, pairs[column].1.symbol);
+                sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
+            }
+        }
+        let Some(sum) = sum else {
+            return graph.constant(0.0).node();
+        };
+        match given.factor {
+            1.0 => graph.unary(Unary::Neg, sum),
+            -1.0 => sum,
+            factor => graph.binary(Binary::Div, sum, graph.constant(-factor).node()),
+        }
+    }
+
+    /// A loop whose core is not linear.
+    fn nonlinear(&self, pairs: &[(&FlatEquation, &Unknown)], core: &Core) -> Problem {
+        let of_derivatives = pairs.iter().all(|(_, unknown)| unknown.state.is_some());
+        let found = core
+            .rows
+            .iter()
+            .find_map(|(place, row)| Some((*place, *row.nonlinear.first()?)));
+        match found {
+            Some((place, column)) if of_derivatives => not_linear(pairs[place].0, pairs[column].1),
+            _ => self.algebraic_loop(pairs),
+        }
     }
 
     /// The expression with solved unknowns in place of their symbols.
@@ -198,15 +274,37 @@ impl<'a> Solver<'a> {
     }
 }
 
-fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)]) -> Problem {
+fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem {
     let span = pairs
         .iter()
         .map(|(equation, _)| equation.span)
         .min_by_key(|span| span.start);
     let n = pairs.len();
-    let message = format!("{n} derivatives share their equations; at most {MAX_COUPLED} may");
+    let message = format!(
+        "{n} unknowns share their equations, {left} of them with factors that vary; at most \
+         {MAX_COUPLED} may"
+    );
     Problem::new(span.unwrap_or_default(), message)
-        .hint("write the equations solved for their derivatives")
+        .hint("write the equations solved for their unknowns")
+}
+
+/// One equation of a linear loop follows from the others, or contradicts them.
+fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Problem {
+    let names: Vec<String> = pairs
+        .iter()
+        .take(8)
+        .map(|(_, unknown)| unknown.quoted())
+        .collect();
+    let more = if pairs.len() > 8 { ", …" } else { "" };
+    let spans = pairs.iter().map(|(equation, _)| equation.span);
+    let lines = super::diagnose::lines(source, spans);
+    let message = format!(
+        "these equations do not determine {}{more}",
+        names.join(", ")
+    );
+    Problem::new(pairs[place].0.span, message)
+        .label(format!("this one repeats or contradicts others on {lines}"))
+        .hint("a circuit without ground and a network without a fixed pressure look like this")
 }
 
 fn not_linear(equation: &FlatEquation, unknown: &Unknown) -> Problem {

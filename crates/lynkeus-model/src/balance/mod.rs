@@ -7,16 +7,19 @@
 
 mod blocks;
 mod diagnose;
+mod eliminate;
 mod incidence;
 mod linear;
 mod matching;
 mod order;
+mod reduce;
+mod rows;
 
 use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, Node};
 
-use crate::syntax::{Result, Span};
+use crate::syntax::{Problem, Result, Span};
 use incidence::Incidence;
 
 /// An equation between two expressions.
@@ -39,6 +42,8 @@ pub(crate) struct Unknown {
     pub span: Span,
     /// the state, where the unknown is its derivative
     pub state: Option<Node>,
+    /// how much it is wanted as a state, where there is a choice
+    pub rank: i32,
 }
 
 impl Unknown {
@@ -56,15 +61,47 @@ pub(crate) struct System<'a> {
     pub graph: &'a Graph,
     pub equations: &'a [FlatEquation],
     pub unknowns: &'a [Unknown],
+    pub inputs: &'a [Node],
+    pub time: Node,
 }
 
 /// An expression for every unknown, free of unknowns.
-pub(crate) fn solve(
+pub(crate) fn solve(system: &System<'_>, source: &str, model: Span) -> Result<HashMap<Node, Node>> {
+    let found = solved(system, source, model);
+    let is_balanced = system.equations.len() == system.unknowns.len();
+    let Err(Unsolved {
+        problem,
+        is_singular: true,
+    }) = found
+    else {
+        return found.map_err(|unsolved| unsolved.problem);
+    };
+    if !is_balanced {
+        return Err(problem);
+    }
+    // As many equations as unknowns, but some say only how states hang together.
+    let Some(reduced) = reduce::reduced(system)? else {
+        return Err(problem);
+    };
+    let system = System {
+        equations: &reduced.equations,
+        unknowns: &reduced.unknowns,
+        ..*system
+    };
+    solved(&system, source, model).map_err(|unsolved| unsolved.problem)
+}
+
+struct Unsolved {
+    problem: Problem,
+    /// some equation has no unknown of its own
+    is_singular: bool,
+}
+
+fn solved(
     system: &System<'_>,
-    inputs: &[Node],
     source: &str,
     model: Span,
-) -> Result<HashMap<Node, Node>> {
+) -> std::result::Result<HashMap<Node, Node>, Unsolved> {
     let incidence = Incidence::new(system);
     let matching = matching::maximum(system, &incidence.of_equation);
     let matched = diagnose::Balance {
@@ -73,7 +110,14 @@ pub(crate) fn solve(
         matching: &matching,
         source,
     };
-    matched.check(inputs, model)?;
+    let unsolved = |is_singular| {
+        move |problem| Unsolved {
+            problem,
+            is_singular,
+        }
+    };
+    matched.check(model).map_err(unsolved(true))?;
     let blocks = order::blocks(&incidence.of_equation, &matching);
-    blocks::Solver::new(system, &incidence, source).solve(&blocks, &matching)
+    let solver = blocks::Solver::new(system, &incidence, source);
+    solver.solve(&blocks, &matching).map_err(unsolved(false))
 }

@@ -330,7 +330,7 @@ fn long_chains_of_algebraic_variables() {
 #[test]
 fn dense_systems() {
     let text = "model M parameter Integer n = 500; Real a[n]; Real x; equation der(x) = 1; \
-                for i in 1:n loop a[i] = sum(a); end for; end M;";
+                for i in 1:n loop a[i] = sum(a)^2; end for; end M;";
     assert!(refused(text).message.starts_with("algebraic loop"));
     let mass = |n: usize| {
         format!(
@@ -341,7 +341,7 @@ fn dense_systems() {
     let found = refused(&mass(400));
     assert_eq!(
         found.message,
-        "400 derivatives share their equations; at most 64 may"
+        "the model needs more than 5,000,000 steps to solve its equations"
     );
     let start = Instant::now();
     assert!(Plant::from_modelica(&mass(64), "mass.mo", &LoadOptions::default()).is_ok());

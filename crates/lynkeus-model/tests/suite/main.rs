@@ -10,3 +10,4 @@ mod parameters;
 mod refusals;
 mod soup;
 mod support;
+mod written_out;
