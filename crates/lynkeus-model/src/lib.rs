@@ -71,6 +71,7 @@ mod ode_model;
 mod plant;
 mod study;
 mod syntax;
+mod units;
 
 pub use builder::{Attributes, Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError};

@@ -168,7 +168,8 @@ fn rank(context: &Context<'_>, declaration: &Declaration) -> i32 {
         _ => 0,
     };
     let known = |name| i32::from(given(name).is_some());
-    wanted + 4 * known("fixed") + 2 * known("start")
+    // ranges are what conditions are proved on; a compiler writes a start everywhere
+    wanted + 4 * (known("min") + known("max")) + 2 * known("fixed") + known("start")
 }
 
 fn nodes(component: &Component) -> impl Iterator<Item = Node> {

@@ -74,7 +74,8 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
         assemble::parts(&context, &symbols, &flat)
     });
     let mut parts = parts.map_err(|spent| ended(model, spent))??;
-    let warnings = std::mem::take(&mut parts.warnings);
+    let mut warnings = std::mem::take(&mut parts.warnings);
+    warnings.extend(crate::units::check(source, ast, model));
     Ok((parts.with_graph(graph), warnings))
 }
 
