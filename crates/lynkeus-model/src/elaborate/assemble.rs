@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Graph, Node};
 
 use super::attributes::Attributes;
+use super::claims;
 use super::flatten::Flat;
 use super::starts;
 use super::symbols::{Component, Context, Symbols, is_outer_input};
@@ -69,7 +70,7 @@ pub(super) fn parts<'a>(
         outputs: vec![],
         algebraics: vec![],
         parameters: vec![],
-        assertions: assertions(context, flat, &solution),
+        assertions: vec![],
         warnings: vec![],
     };
     let inputs: HashSet<Node> = inputs.into_iter().collect();
@@ -92,29 +93,12 @@ pub(super) fn parts<'a>(
     }
     let graph = context.graph;
     parts.warnings = starts::fix(graph, symbols, flat, &solution, &mut parts.states);
+    let found = claims::assertions(context, &flat.claims, &solution);
+    let variables: Vec<&Variable> = parts.states.iter().chain(&parts.inputs).collect();
+    let failing = claims::failing_at_start(graph, symbols, &found, &variables);
+    parts.warnings.extend(failing);
+    parts.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
     Ok(parts)
-}
-
-/// What is to hold along a run, over the states and inputs.
-fn assertions(
-    context: &Context<'_>,
-    flat: &Flat,
-    solution: &HashMap<Node, Node>,
-) -> Vec<Assertion> {
-    let conditions: Vec<Node> = flat.claims.iter().map(|claim| claim.condition).collect();
-    let conditions = context.graph.substitute(&conditions, solution);
-    let pairs = flat.claims.iter().zip(conditions);
-    let open = pairs.filter(|(_, condition)| {
-        // what holds whatever happens need not be followed
-        !matches!(context.graph.constant_value(*condition), Some(value) if value != 0.0)
-    });
-    open.map(|(claim, condition)| Assertion {
-        condition,
-        message: claim.message.clone(),
-        line: claim.span.line(context.source),
-        is_warning: claim.is_warning,
-    })
-    .collect()
 }
 
 /// Derivatives of the states and all other variables, and the inputs apart.

@@ -317,5 +317,20 @@ fn index_names<'a>(
                 .hint(format!("it is first declared on line {line}")));
         }
     }
+    for declaration in declarations {
+        // an element by itself beside the whole array would be two variables of one name
+        let base = declaration
+            .label
+            .strip_suffix(']')
+            .and_then(|name| name.rsplit_once('['));
+        if let Some((base, _)) = base
+            && let Some(&whole) = by_name.get(base)
+        {
+            let message = format!("`{}` is declared twice", declaration.label);
+            let line = declarations[whole].name.line(source);
+            return Err(Problem::new(declaration.name, message)
+                .hint(format!("`{base}` is declared as a whole on line {line}")));
+        }
+    }
     Ok(by_name)
 }
