@@ -3,6 +3,7 @@
 
 mod balance;
 mod examples;
+mod flat_files;
 mod hostile;
 mod language;
 mod ode_model;
