@@ -1,10 +1,12 @@
 //! Systems compiled for evaluation.
 
+use std::fmt::Write;
 use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
 use crate::error::state_text;
+use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
 use crate::{Dynamics, Error};
 
@@ -146,6 +148,25 @@ impl System {
         }
     }
 
+    /// What the system's numbers follow from.
+    pub(crate) fn tell(&self, digest: &mut Digest) {
+        let Code {
+            states,
+            signals,
+            outputs,
+            derivative_tape,
+            output_tape,
+            switches,
+            ..
+        } = &*self.code;
+        // a digest takes any text
+        let _ = write!(
+            digest,
+            "{states:?} {signals:?} {outputs:?} {derivative_tape:?} {output_tape:?} {switches:?}"
+        );
+        digest.numbers(&self.start);
+    }
+
     /// An evaluator with its own working memory, signals at zero.
     pub fn evaluation(&self) -> Evaluation {
         let code = &self.code;
@@ -211,6 +232,13 @@ impl Evaluation {
     fn place(&mut self, t: f64, x: &[f64]) {
         self.inputs[0] = t;
         self.inputs[1..=x.len()].copy_from_slice(x);
+    }
+}
+
+impl Persist for Evaluation {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(self.signals_mut())?;
+        self.switches.walk(walk)
     }
 }
 

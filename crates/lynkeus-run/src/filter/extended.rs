@@ -3,10 +3,11 @@
 use super::Belief;
 use super::flow::Linearised;
 use super::health::Reading;
-use super::root::{dot, factor};
+use super::root::{dot, factor_into};
 use super::sensing::Sensing;
 use super::smooth::Correction;
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator, System};
 
 #[derive(Clone, Debug)]
@@ -23,6 +24,10 @@ pub(crate) struct Extended {
     z: Vec<f64>,
     /// rows whose sum of squares is P⁻
     rows: Vec<f64>,
+    sums: Vec<f64>,
+    /// qW and its factor
+    spread: Vec<f64>,
+    lower: Vec<f64>,
 }
 
 impl Extended {
@@ -50,17 +55,20 @@ impl Extended {
             scale,
             z: vec![],
             rows: vec![],
+            sums: vec![0.0; n],
+            spread: vec![],
+            lower: vec![],
         })
     }
 
-    /// x̂⁻ and P⁻ = ΦPΦᵀ + qW at the next sample. Φ is returned where it is to be kept.
+    /// x̂⁻ and P⁻ = ΦPΦᵀ + qW at the next sample, and Φ where there is room for it.
     pub fn predict(
         &mut self,
         belief: &mut Belief,
         from: f64,
         to: f64,
-        keep: bool,
-    ) -> Result<Vec<f64>, Error> {
+        kept: Option<&mut Vec<f64>>,
+    ) -> Result<(), Error> {
         let n = belief.x.len();
         let noisy = !self.noise.is_empty();
         let width = Linearised::width(n, noisy);
@@ -78,33 +86,55 @@ impl Extended {
         self.rows.resize(width * n, 0.0);
         // (ΦS)ᵀ, row by row
         for i in 0..n {
-            let into = &mut self.rows[i..];
-            let mut sums = vec![0.0; n];
-            belief.root.transposed_times(transition(i), &mut sums);
-            into.iter_mut()
-                .step_by(n)
-                .zip(sums)
-                .for_each(|(into, sum)| *into = sum);
+            belief.root.transposed_times(transition(i), &mut self.sums);
+            let into = self.rows[i..].iter_mut().step_by(n);
+            into.zip(&self.sums).for_each(|(into, sum)| *into = *sum);
         }
         if noisy {
-            let spread: Vec<f64> = (0..n)
-                .flat_map(|i| &self.z[n + i * width + n..n + (i + 1) * width])
-                .map(|w| self.scale * w)
-                .collect();
-            let lower = factor(&spread, n);
+            self.spread.clear();
+            let rows = (0..n).flat_map(|i| &self.z[n + i * width + n..n + (i + 1) * width]);
+            self.spread.extend(rows.map(|w| self.scale * w));
+            factor_into(&self.spread, n, &mut self.lower);
             for (k, row) in self.rows[n * n..].chunks_exact_mut(n).enumerate() {
                 row.iter_mut()
                     .enumerate()
-                    .for_each(|(i, into)| *into = lower[i * n + k]);
+                    .for_each(|(i, into)| *into = self.lower[i * n + k]);
             }
         }
-        let kept = match keep {
-            true => (0..n).flat_map(transition).copied().collect(),
-            false => vec![],
-        };
-        belief.root.of_rows(&mut self.rows);
-        Ok(kept)
+        if let Some(kept) = kept {
+            kept.clear();
+            kept.extend((0..n).flat_map(transition));
+        }
+        belief.root.of_rows_with(&mut self.rows, &mut self.sums);
+        Ok(())
     }
+}
+
+impl Persist for Extended {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.driven.walk(walk)?;
+        self.integrator.walk(walk)
+    }
+}
+
+/// Room for a correction.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Room {
+    h: Vec<f64>,
+    before: Vec<f64>,
+    /// C, row by row
+    slopes: Vec<f64>,
+    projected: Vec<f64>,
+    gain: Vec<f64>,
+    taken: Vec<Believed>,
+}
+
+/// A reading that corrects.
+#[derive(Clone, Copy, Debug)]
+struct Believed {
+    sensor: usize,
+    variance: f64,
+    innovation: f64,
 }
 
 /// The readings one after the other, which for sensors with independent noises is all of them
@@ -116,45 +146,74 @@ pub(super) fn correct(
     readings: &[f64],
     inputs: &[f64],
 ) -> Result<(), Error> {
-    let h = sensing.evaluate(t, &belief.x, inputs)?.to_vec();
-    let before = belief.x.clone();
-    let n = before.len();
-    let mut projected = vec![0.0; n];
-    let slopes: Vec<Vec<f64>> = (0..h.len()).map(|i| sensing.slopes(i)).collect();
+    let mut room = std::mem::take(&mut sensing.room);
+    let result = correct_in(&mut room, sensing, belief, t, readings, inputs);
+    sensing.room = room;
+    result
+}
+
+fn correct_in(
+    room: &mut Room,
+    sensing: &mut Sensing,
+    belief: &mut Belief,
+    t: f64,
+    readings: &[f64],
+    inputs: &[f64],
+) -> Result<(), Error> {
+    let Room {
+        h,
+        before,
+        slopes,
+        projected,
+        gain,
+        taken,
+    } = room;
+    let n = belief.x.len();
+    h.clear();
+    h.extend_from_slice(sensing.evaluate(t, &belief.x, inputs)?);
+    before.clone_from(&belief.x);
+    slopes.resize(h.len() * n, 0.0);
+    projected.resize(n, 0.0);
+    gain.resize(n, 0.0);
+    taken.clear();
     // the gate looks at every reading from before the first correction
-    let mut taken = vec![];
-    for (i, c) in slopes.iter().enumerate() {
-        belief.root.transposed_times(c, &mut projected);
-        let r = sensing.noise(i, h[i]);
-        let variance = dot(&projected, &projected) + r;
-        let innovation = sensing.judge(i, readings[i], h[i], variance);
+    for (i, h) in h.iter().enumerate() {
+        let c = &mut slopes[i * n..(i + 1) * n];
+        sensing.write_slopes(i, c);
+        belief.root.transposed_times(c, projected);
+        let r = sensing.noise(i, *h);
+        let variance = dot(projected, projected) + r;
+        let innovation = sensing.judge(i, readings[i], *h, variance);
         if innovation.reading == Reading::Taken {
-            taken.push((i, r, innovation.value));
+            taken.push(Believed {
+                sensor: i,
+                variance: r,
+                innovation: innovation.value,
+            });
         }
     }
-    for (i, r, innovation) in taken {
-        let c = &slopes[i];
-        let moved: f64 = c
-            .iter()
-            .zip(&belief.x)
-            .zip(&before)
-            .map(|((c, x), x0)| c * (x - x0))
-            .sum();
-        let rest = innovation - moved;
-        belief.root.transposed_times(c, &mut projected);
-        let variance = dot(&projected, &projected) + r;
-        let Some(gain) = belief.root.update(&projected, r) else {
+    for believed in &*taken {
+        let c = &slopes[believed.sensor * n..(believed.sensor + 1) * n];
+        let moves = belief.x.iter().zip(&*before).map(|(x, x0)| x - x0);
+        let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
+        let rest = believed.innovation - moved;
+        belief.root.transposed_times(c, projected);
+        let variance = dot(projected, projected) + believed.variance;
+        let root = &mut belief.root;
+        if !root.update_into(projected, believed.variance, gain) {
             continue;
-        };
-        for (x, k) in belief.x.iter_mut().zip(&gain) {
+        }
+        for (x, k) in belief.x.iter_mut().zip(&*gain) {
             *x += k * rest;
         }
-        sensing.corrections.push(Correction {
-            slopes: c.clone(),
-            innovation: rest,
-            variance,
-            gain,
-        });
+        if let Some(corrections) = &mut sensing.corrections {
+            corrections.push(Correction {
+                slopes: c.to_vec(),
+                innovation: rest,
+                variance,
+                gain: gain.clone(),
+            });
+        }
     }
     Ok(())
 }

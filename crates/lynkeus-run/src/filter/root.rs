@@ -1,5 +1,7 @@
 //! Square roots of covariances: P = S Sᵀ, matrices row by row.
 
+use crate::snapshot::{Damaged, Persist, Walk};
+
 /// A root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
@@ -49,12 +51,17 @@ impl Root {
     /// (I − k cᵀ) P (I − k cᵀ)ᵀ + r k kᵀ, and the gain k is returned. `projected` is Sᵀc. No
     /// gain where neither the reading nor the estimate has any variance.
     pub fn update(&mut self, projected: &[f64], r: f64) -> Option<Vec<f64>> {
+        let mut gain = vec![0.0; self.n];
+        self.update_into(projected, r, &mut gain).then_some(gain)
+    }
+
+    /// The same with room for the gain; false where there is none.
+    pub fn update_into(&mut self, projected: &[f64], r: f64, gain: &mut [f64]) -> bool {
         let variance = dot(projected, projected) + r;
         if variance.is_nan() || variance <= 0.0 {
-            return None;
+            return false;
         }
         let shrink = 1.0 / (1.0 + (r / variance).sqrt());
-        let mut gain = vec![0.0; self.n];
         for (i, k) in gain.iter_mut().enumerate() {
             let row = &mut self.entries[i * self.n..(i + 1) * self.n];
             *k = dot(row, projected) / variance;
@@ -62,14 +69,19 @@ impl Root {
                 *s -= shrink * *k * p;
             }
         }
-        Some(gain)
+        true
     }
 
     /// The lower triangular root of AᵀA, for the rows A (each of n entries): what is left of A
     /// after Householder's reflections. The diagonal is not negative.
     pub fn of_rows(&mut self, rows: &mut [f64]) {
+        self.of_rows_with(rows, &mut vec![0.0; self.n]);
+    }
+
+    /// The same with room for n numbers.
+    pub fn of_rows_with(&mut self, rows: &mut [f64], room: &mut [f64]) {
         let n = self.n;
-        triangularise(rows, n);
+        triangularise(rows, n, room);
         self.entries.fill(0.0);
         for i in 0..n.min(rows.len() / n.max(1)) {
             let sign = if rows[i * n + i] < 0.0 { -1.0 } else { 1.0 };
@@ -80,15 +92,20 @@ impl Root {
     }
 }
 
+impl Persist for Root {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.entries)
+    }
+}
+
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Reflections that make the first n rows of A upper triangular; row by row, so that
 /// memory is read in order.
-fn triangularise(rows: &mut [f64], n: usize) {
+fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
     let count = rows.len() / n.max(1);
-    let mut sums = vec![0.0; n];
     for k in 0..n.min(count) {
         let norm = (k..count)
             .map(|i| rows[i * n + k].powi(2))
@@ -125,7 +142,15 @@ fn triangularise(rows: &mut [f64], n: usize) {
 /// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
 /// pivot that rounding cannot tell from zero has none.
 pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
-    let mut lower = vec![0.0; n * n];
+    let mut lower = vec![];
+    factor_into(matrix, n, &mut lower);
+    lower
+}
+
+/// The same with room for it.
+pub(crate) fn factor_into(matrix: &[f64], n: usize, lower: &mut Vec<f64>) {
+    lower.clear();
+    lower.resize(n * n, 0.0);
     for j in 0..n {
         let own = &lower[j * n..j * n + j];
         let pivot = matrix[j * n + j] - dot(own, own);
@@ -140,7 +165,6 @@ pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
             lower[i * n + j] = rest / root;
         }
     }
-    lower
 }
 
 #[cfg(test)]

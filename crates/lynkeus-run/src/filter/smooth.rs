@@ -1,9 +1,10 @@
 //! Smoothers: the estimate at a sample given later ones.
 
 use super::root::{Root, dot};
+use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What one reading did.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Correction {
     /// its row of C
     pub slopes: Vec<f64>,
@@ -24,6 +25,44 @@ pub(super) struct Step {
     pub x: Vec<f64>,
     pub root: Root,
     pub corrections: Vec<Correction>,
+}
+
+impl Correction {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.slopes)?;
+        walk.number(&mut self.innovation)?;
+        walk.number(&mut self.variance)?;
+        walk.numbers(&mut self.gain)
+    }
+}
+
+impl Step {
+    fn nothing(n: usize) -> Self {
+        Self {
+            transition: None,
+            x: vec![0.0; n],
+            root: Root::diagonal(&vec![0.0; n]),
+            corrections: vec![],
+        }
+    }
+
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let n = self.x.len();
+        walk.numbers(&mut self.x)?;
+        self.root.walk(walk)?;
+        walk.optional(&mut self.transition, |walk, transition: &mut Vec<f64>| {
+            transition.resize(n * n, 0.0);
+            walk.numbers(transition)
+        })?;
+        let count = walk.length(self.corrections.len())?;
+        let room = Correction {
+            slopes: vec![0.0; n],
+            gain: vec![0.0; n],
+            ..Correction::default()
+        };
+        self.corrections.resize(count, room);
+        self.corrections.iter_mut().try_for_each(|c| c.walk(walk))
+    }
 }
 
 /// The estimate at a sample given later ones.
@@ -48,6 +87,13 @@ pub(super) struct Adjoint {
 }
 
 impl History {
+    /// Of a filter of n states.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let count = walk.length(self.steps.len())?;
+        self.steps.resize_with(count, || Step::nothing(n));
+        self.steps.iter_mut().try_for_each(|step| step.walk(walk))
+    }
+
     pub fn push(&mut self, step: Step) {
         self.steps.push(step);
     }

@@ -6,6 +6,7 @@ use super::model::FilterModel;
 use super::root::{Root, dot, factor};
 use super::sensing::Sensing;
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator};
 
 /// How sigma points are spread and weighed, after Julier, Uhlmann and van der Merwe; the
@@ -150,13 +151,7 @@ impl Unscented {
     }
 
     /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + QΔt.
-    pub fn predict(
-        &mut self,
-        belief: &mut Belief,
-        from: f64,
-        to: f64,
-        _keep: bool,
-    ) -> Result<Vec<f64>, Error> {
+    pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<(), Error> {
         let mut points = self.points(belief);
         for point in &mut points {
             self.integrator.advance(&mut self.driven, from, to, point)?;
@@ -171,7 +166,7 @@ impl Unscented {
         });
         belief.root = self.spread(deviations, extra.collect());
         belief.x = cloud.mean;
-        Ok(vec![])
+        Ok(())
     }
 
     /// The lower root of Σ W d dᵀ + Σ e eᵀ. Where the first weight is negative the sum is formed,
@@ -267,6 +262,13 @@ impl Unscented {
             .map(|(a, (_, r, _))| gain.iter().map(|k| k[a] * r.sqrt()).collect());
         belief.root = self.spread(&left, noise.collect());
         Ok(())
+    }
+}
+
+impl Persist for Unscented {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.driven.walk(walk)?;
+        self.integrator.walk(walk)
     }
 }
 
