@@ -71,7 +71,7 @@ pub(crate) trait Runner: Persist {
 
 #[derive(Clone, Debug)]
 enum Core {
-    Flow(Flow),
+    Flow(Box<Flow>),
     Sampled(Box<Sampled>),
     Filter(Box<Filter>),
 }
@@ -79,7 +79,7 @@ enum Core {
 impl Core {
     fn runner(&self) -> &dyn Runner {
         match self {
-            Self::Flow(flow) => flow,
+            Self::Flow(flow) => &**flow,
             Self::Sampled(sampled) => &**sampled,
             Self::Filter(filter) => &**filter,
         }
@@ -87,7 +87,7 @@ impl Core {
 
     fn runner_mut(&mut self) -> &mut dyn Runner {
         match self {
-            Self::Flow(flow) => flow,
+            Self::Flow(flow) => &mut **flow,
             Self::Sampled(sampled) => &mut **sampled,
             Self::Filter(filter) => &mut **filter,
         }
@@ -157,7 +157,7 @@ impl Estimator {
     /// # Errors
     /// [`Error::Setting`] for impossible numbers of the method.
     pub fn new(observer: &System, settings: EstimatorSettings) -> Result<Self, Error> {
-        let core = Core::Flow(Flow::new(observer, settings)?);
+        let core = Core::Flow(Box::new(Flow::new(observer, settings)?));
         let intake = Intake::new(observer.signals().to_vec(), 0);
         let program = Program::new(vec![observer.clone()], format!("{settings:?}"));
         Ok(Self::of(

@@ -40,13 +40,14 @@
 //!     for second in 0..60 {
 //!         estimator.push(f64::from(second), &[4.0])?;
 //!     }
-//!     let [level, inflow] = estimator.state() else { unreachable!() };
+//!     let [level, inflow] = estimator.estimate() else { unreachable!() };
 //!     assert!((level - 4.0).abs() < 1e-6 && (inflow - 1.0).abs() < 1e-6);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With files instead, [`Study::load`] reads a study, and [`check`], [`simulate`] and
+//! With files instead, [`Study::load`] reads a study, [`estimator`] makes its estimator for live
+//! samples, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
 //!
 //! Features, all on by default: `plot` draws pictures, `tune` sweeps tunings, and `command` is
@@ -56,6 +57,7 @@
 mod calibrate;
 mod certify;
 mod check;
+mod checkpoint;
 #[cfg(feature = "tune")]
 mod compare;
 mod correction;
@@ -71,6 +73,7 @@ mod filter;
 mod headers;
 mod innovations;
 pub mod interrupt;
+mod live;
 mod near;
 mod outcome;
 mod outside;
@@ -78,6 +81,7 @@ mod outside;
 pub mod plot;
 pub mod precision;
 pub mod prepare;
+mod replay;
 mod sampled;
 mod simulate;
 pub mod study;
@@ -90,16 +94,18 @@ mod words;
 
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{CheckOptions, Report, check};
+pub use checkpoint::Checkpoint;
 #[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Run, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
-pub use estimate::estimate;
+pub use estimate::{estimate, estimate_resumed};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use innovations::Innovations;
+pub use live::estimator;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;

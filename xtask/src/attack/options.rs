@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use crate::options;
 use crate::process::{cargo, root, run};
 
 /// What was asked for.
@@ -32,29 +33,17 @@ impl Options {
             binary: None,
             folder: root().join("target/attack"),
         };
-        let mut rest = arguments.iter();
-        while let Some(key) = rest.next() {
-            let value = rest
-                .next()
-                .ok_or_else(|| format!("{key}: expected a value"))?;
-            let number = || {
-                value
-                    .parse::<u64>()
-                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
-            };
-            match key.as_str() {
-                "--seed" => options.seed = number()?,
-                "--count" => options.count = number()?,
-                "--seconds" => options.seconds = Some(number()?),
-                "--limit" => options.limit = Duration::from_secs(number()?),
-                "--binary" => options.binary = Some(PathBuf::from(value)),
-                _ => {
-                    return Err(format!(
-                        "expected --seed, --count, --seconds, --limit or --binary, found {key}"
-                    ));
-                }
+        let known = ["--seed", "--count", "--seconds", "--limit", "--binary"];
+        options::read(arguments, &known, |key, value| {
+            match key {
+                "--seed" => options.seed = value.number()?,
+                "--count" => options.count = value.number()?,
+                "--seconds" => options.seconds = Some(value.number()?),
+                "--limit" => options.limit = Duration::from_secs(value.number()?),
+                _ => options.binary = Some(PathBuf::from(value.text)),
             }
-        }
+            Ok(())
+        })?;
         Ok(options)
     }
 

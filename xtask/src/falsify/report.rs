@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::case::{Case, Kind};
 use super::judge::{Effort, Flaw, Violation};
 use super::tally::{Counts, Tally};
+use crate::options;
 
 /// What to search, and for how long.
 #[derive(Clone, Debug)]
@@ -38,30 +39,25 @@ impl Options {
             kind: None,
             folder: PathBuf::from("target/falsify"),
         };
-        let mut rest = arguments.iter();
-        while let Some(key) = rest.next() {
-            let value = rest
-                .next()
-                .ok_or_else(|| format!("{key}: expected a value"))?;
-            let number = || {
-                value
-                    .parse::<u64>()
-                    .map_err(|_| format!("{key}: expected a whole number, found \"{value}\""))
-            };
-            match key.as_str() {
-                "--seed" => options.seed = number()?,
-                "--count" => options.count = number()? as usize,
-                "--refutations" => options.refutations = number()? as usize,
-                "--plants" => options.plants = Some(number()?),
-                "--seconds" => options.seconds = Some(number()?),
-                "--family" => options.kind = Some(kind(value)?),
-                _ => {
-                    return Err(format!(
-                        "expected --seed, --count, --refutations, --plants, --seconds or --family, found {key}"
-                    ));
-                }
+        let known = [
+            "--seed",
+            "--count",
+            "--refutations",
+            "--plants",
+            "--seconds",
+            "--family",
+        ];
+        options::read(arguments, &known, |key, value| {
+            match key {
+                "--seed" => options.seed = value.number()?,
+                "--count" => options.count = value.number()? as usize,
+                "--refutations" => options.refutations = value.number()? as usize,
+                "--plants" => options.plants = Some(value.number()?),
+                "--seconds" => options.seconds = Some(value.number()?),
+                _ => options.kind = Some(kind(value.text)?),
             }
-        }
+            Ok(())
+        })?;
         Ok(options)
     }
 
