@@ -1,13 +1,11 @@
 //! The one incremental core: any observer, fed sample by sample.
 
-use std::fmt::Write;
-use std::sync::OnceLock;
-
 use crate::filter::{Filter, FilterModel, FilterSettings, Health, Innovation, Smoothed};
 use crate::flow::Flow;
-use crate::intake::{Intake, Sample};
+use crate::intake::Intake;
+use crate::runner::{Core, Program};
 use crate::sampled::{Sampled, SampledObserver};
-use crate::snapshot::{self, Damaged, Digest, Persist, Walk};
+use crate::snapshot::{self, Damaged, Persist, Walk};
 use crate::{Error, Method, SnapshotFault, Step, StepAdvice, System};
 
 /// What a signal is between two samples.
@@ -39,67 +37,6 @@ impl Default for EstimatorSettings {
             method: Method::Rk4(Step::Auto),
         }
     }
-}
-
-/// What the kinds of observers differ in. Any of the steps may fail half-way: the estimator
-/// then goes back to where it was.
-pub(crate) trait Runner: Persist {
-    /// The first sample, before its readings count.
-    fn begin(&mut self, sample: &Sample<'_>) -> Result<(), Error>;
-
-    /// From the sample before to the time of this one; only its inputs count.
-    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error>;
-
-    /// The readings and inputs of a sample at its time.
-    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error>;
-
-    /// Estimates and deviations at a time, all of them finite.
-    fn report(&mut self, t: f64) -> Result<(), Error>;
-
-    fn estimate(&self) -> &[f64];
-
-    fn deviations(&self) -> Option<&[f64]> {
-        None
-    }
-
-    fn innovations(&self) -> &[Innovation] {
-        &[]
-    }
-
-    fn health(&self) -> &Health;
-}
-
-#[derive(Clone, Debug)]
-enum Core {
-    Flow(Box<Flow>),
-    Sampled(Box<Sampled>),
-    Filter(Box<Filter>),
-}
-
-impl Core {
-    fn runner(&self) -> &dyn Runner {
-        match self {
-            Self::Flow(flow) => &**flow,
-            Self::Sampled(sampled) => &**sampled,
-            Self::Filter(filter) => &**filter,
-        }
-    }
-
-    fn runner_mut(&mut self) -> &mut dyn Runner {
-        match self {
-            Self::Flow(flow) => &mut **flow,
-            Self::Sampled(sampled) => &mut **sampled,
-            Self::Filter(filter) => &mut **filter,
-        }
-    }
-}
-
-/// What an estimator's numbers follow from, to tell one from another.
-#[derive(Clone, Debug)]
-struct Program {
-    systems: Vec<System>,
-    settings: String,
-    fingerprint: OnceLock<u64>,
 }
 
 /// Any observer, one sample after the other, live or from a log.
@@ -343,10 +280,7 @@ impl Estimator {
     /// A number that differs for observers with other equations, settings, noises or starts.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
-        *self
-            .program
-            .fingerprint
-            .get_or_init(|| self.program.digest(self.intake.names()))
+        self.program.fingerprint(self.intake.names())
     }
 
     /// Everything that the future depends on, with a version, the [fingerprint](Self::fingerprint)
@@ -431,25 +365,5 @@ impl Persist for Whole<'_> {
             Core::Filter(filter) => filter.walk_history(walk),
             _ => Ok(()),
         }
-    }
-}
-
-impl Program {
-    fn new(systems: Vec<System>, settings: String) -> Self {
-        Self {
-            systems,
-            settings,
-            fingerprint: OnceLock::new(),
-        }
-    }
-
-    fn digest(&self, signals: &[String]) -> u64 {
-        let mut digest = Digest::default();
-        // a digest takes any text
-        let _ = write!(digest, "{signals:?} {}", self.settings);
-        for system in &self.systems {
-            system.tell(&mut digest);
-        }
-        digest.value()
     }
 }

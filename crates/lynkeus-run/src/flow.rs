@@ -2,9 +2,9 @@
 
 use crate::divergence::Bound;
 use crate::driven::Driven;
-use crate::estimator::Runner;
 use crate::filter::Health;
 use crate::intake::Sample;
+use crate::runner::Runner;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, EstimatorSettings, Integrator, StepAdvice, System};
 

@@ -100,6 +100,7 @@ mod integrator;
 mod method;
 mod noise;
 mod rk4;
+mod runner;
 mod sampled;
 mod simulate;
 mod snapshot;

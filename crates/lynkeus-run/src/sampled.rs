@@ -2,9 +2,9 @@
 
 use crate::divergence::{Bound, deviation_diverged};
 use crate::driven::Driven;
-use crate::estimator::Runner;
 use crate::filter::Health;
 use crate::intake::Sample;
+use crate::runner::Runner;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
 use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};

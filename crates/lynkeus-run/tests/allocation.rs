@@ -86,10 +86,10 @@ fn a_warm_estimator_allocates_nothing() {
             estimator.predict(0.1 * f64::from(k) + 0.03).unwrap();
             estimator.update(&[y, 0.02]).unwrap();
         };
+        let names = estimator.names().join(", ");
         (0..8).for_each(|k| push(&mut estimator, k));
         let before = ALLOCATOR.total_allocated();
         (8..200).for_each(|k| push(&mut estimator, k));
-        let names = estimator.names().join(", ");
         assert_eq!(ALLOCATOR.total_allocated(), before, "{names}");
         // and the count counts
         drop(estimator.snapshot());

@@ -82,8 +82,10 @@ impl Checkpoint {
         let head = Head::of(estimator, samples);
         let failed = |e: &io::Error| unusable(&self.path, e);
         let mut found = vec![];
-        let start = Read::by_ref(&mut file).take(HEAD as u64);
-        { start }.read_to_end(&mut found).map_err(|e| failed(&e))?;
+        let read = Read::by_ref(&mut file)
+            .take(HEAD as u64)
+            .read_to_end(&mut found);
+        read.map_err(|e| failed(&e))?;
         let own = head.bytes();
         let mut end = HEAD as u64;
         if found.len() < HEAD {

@@ -57,8 +57,8 @@ impl Halfway {
     }
 }
 
-/// Runs an estimator over samples, of which it has to know the first `estimates` names as
-/// estimates and the rest as monitors. What ends the run early is told in the course.
+/// Runs an estimator over samples; the first `estimates` of its names are estimates, the rest
+/// monitors. What ends the run early is told in the course.
 ///
 /// # Errors
 /// A checkpoint that cannot be used.

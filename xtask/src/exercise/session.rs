@@ -116,7 +116,12 @@ impl<'s> Session<'s> {
 
     fn time(&self, numbers: &mut Numbers) -> f64 {
         let (now, step) = (self.estimator.time().unwrap_or(0.0), self.subject.step);
-        if numbers.chance(0.93) {
+        let usual = if self.subject.is_adaptive {
+            0.9995
+        } else {
+            0.93
+        };
+        if numbers.chance(usual) {
             return now + step * numbers.between(0.2, 1.5);
         }
         let odd = [

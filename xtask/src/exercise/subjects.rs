@@ -14,6 +14,8 @@ pub struct Subject {
     pub step: f64,
     /// about the size of its signals
     pub size: f64,
+    /// its steps are controlled by their error: far in time it takes as many as it may
+    pub is_adaptive: bool,
 }
 
 /// What a shipped model is observed by: the study without its plant.
@@ -157,5 +159,6 @@ fn subject(kind: &Kind) -> Result<Subject, String> {
         estimator: estimator.map_err(|e| e.to_string())?,
         step: kind.step,
         size: kind.size,
+        is_adaptive: !kind.study.contains("rk4"),
     })
 }

@@ -42,6 +42,7 @@ mod flow;
 mod health;
 mod horizon;
 mod model;
+mod persist;
 pub(crate) mod root;
 mod sensing;
 mod smooth;
@@ -54,9 +55,8 @@ pub use unscented::SigmaPoints;
 
 use crate::divergence::{Bound, deviation_diverged};
 use crate::driven::Driven;
-use crate::estimator::Runner;
 use crate::intake::Sample;
-use crate::snapshot::{Damaged, Persist, Walk};
+use crate::runner::Runner;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
@@ -229,15 +229,6 @@ impl Filter {
         }
     }
 
-    /// What the smoother keeps.
-    pub fn walk_history(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        let n = self.belief.x.len();
-        match &mut self.history {
-            Some(history) => history.walk(walk, n),
-            None => Ok(()),
-        }
-    }
-
     fn driven(&mut self) -> &mut Driven {
         match &mut self.engine {
             Engine::Extended(engine) => &mut engine.driven,
@@ -366,36 +357,6 @@ impl Runner for Filter {
 
     fn health(&self) -> &Health {
         &self.sensing.health
-    }
-}
-
-impl Persist for Filter {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        match &mut self.engine {
-            Engine::Extended(engine) => engine.walk(walk)?,
-            Engine::Unscented(engine) => engine.walk(walk)?,
-            Engine::MovingHorizon(horizon) => horizon.walk(walk)?,
-        }
-        if let Some(spare) = &mut self.spare {
-            spare.engine.walk(walk)?;
-        }
-        self.belief.walk(walk)?;
-        self.sensing.walk(walk)?;
-        walk.numbers(&mut self.inputs)?;
-        walk.numbers(&mut self.deviations)?;
-        self.bound.walk(walk)?;
-        let entries = self.belief.root.entries.len();
-        walk.optional(&mut self.pending, |walk, pending: &mut Vec<f64>| {
-            pending.resize(entries, 0.0);
-            walk.numbers(pending)
-        })
-    }
-}
-
-impl Persist for Belief {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.numbers(&mut self.x)?;
-        self.root.walk(walk)
     }
 }
 

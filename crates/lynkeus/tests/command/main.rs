@@ -7,6 +7,7 @@ mod faulty;
 mod filters;
 mod how_well;
 mod limits;
+mod live;
 mod logs;
 mod messages;
 mod names;
