@@ -227,3 +227,37 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     let (result, confined) = run(Some(inside));
     assert!(result.is_ok() && confined > 5, "{result:?} {confined}");
 }
+
+/// A snapshot has what the smoother keeps; ways with stops give the same transitions.
+#[test]
+fn smoothing_goes_on_after_a_restore_and_over_predictions() {
+    let settings = FilterSettings {
+        keep_history: true,
+        ..FilterSettings::of(FilterKind::Extended)
+    };
+    let new = || Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings.clone(), exact()).unwrap();
+    let (mut whole, mut stopped, mut restored) = (new(), new(), new());
+    for k in 0..12 {
+        let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
+        whole.push(t, &[y]).unwrap();
+        if k > 0 {
+            stopped.predict(t - 0.3).unwrap();
+            stopped.predict(t).unwrap();
+            stopped.update(&[y]).unwrap();
+        } else {
+            stopped.push(t, &[y]).unwrap();
+        }
+        if k == 6 {
+            restored.restore(&whole.snapshot()).unwrap();
+        } else if k > 6 {
+            restored.push(t, &[y]).unwrap();
+        }
+    }
+    let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
+    assert_eq!(smoothed(&restored), smoothed(&whole));
+    for (a, b) in smoothed(&stopped).iter().zip(smoothed(&whole)) {
+        assert!((a.estimate[0] - b.estimate[0]).abs() < 1e-9);
+        assert!((a.deviations[0] - b.deviations[0]).abs() < 1e-9);
+    }
+    assert_eq!(smoothed(&stopped).len(), 12);
+}
