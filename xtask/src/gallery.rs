@@ -1,7 +1,7 @@
 //! The pictures of the documentation, drawn by the tool from the studies that the repository ships.
 //!
 //! `examples/<plant>/study.toml` becomes `docs/pictures/<plant>.svg`; `study-<what>.toml` and
-//! `<what>.toml` become `<plant>-<what>.svg`. Where a `log.csv` lies beside a `study.toml` the
+//! `<what>.toml` become `<plant>-<what>.svg`. Where a `log.csv` lies beside a study the
 //! picture shows the estimates from that log, else a simulation.
 
 use std::fs;
@@ -49,7 +49,7 @@ fn title(plant: &str, study: &Path) -> String {
 fn draw_study(study: &Path, picture: &Path) -> Result<(), String> {
     let mut tool = cargo(&["run", "--release", "--quiet", "--package", "lynkeus", "--"]);
     let log = study.with_file_name("log.csv");
-    if name_of(study) == "study.toml" && log.exists() {
+    if log.exists() {
         tool.arg("estimate").arg(study).arg(log);
     } else {
         tool.arg("simulate").arg(study);

@@ -1,6 +1,7 @@
 //! The project's own chores, run as `cargo xtask <task>`.
 
 mod attack;
+mod draw;
 mod exercise;
 mod falsify;
 mod gallery;

@@ -1,6 +1,6 @@
 //! What a tape needs of the things it computes with.
 
-use crate::{Binary, Graph, Node, Unary, linear, real};
+use crate::{Binary, Graph, Implicit, Node, Unary, linear, real};
 
 /// A set of values closed under every operation of a graph. A tape evaluated
 /// over an algebra gives bounds, Taylor coefficients or new nodes with the one
@@ -27,6 +27,8 @@ pub trait Algebra {
         b.clone_from_slice(&x);
         rcond
     }
+    /// The root z of an implicit function at p.
+    fn implicit(&self, function: &Implicit, p: &[Self::Value]) -> Vec<Self::Value>;
     /// Whether the budget behind the values is spent, so that what is computed from here on
     /// does not count.
     fn is_spent(&self) -> bool {
@@ -63,6 +65,10 @@ impl<A: Algebra> Algebra for &A {
 
     fn solve_in_place(&self, a: &mut [A::Value], b: &mut [A::Value]) -> A::Value {
         (**self).solve_in_place(a, b)
+    }
+
+    fn implicit(&self, function: &Implicit, p: &[A::Value]) -> Vec<A::Value> {
+        (**self).implicit(function, p)
     }
 
     fn is_spent(&self) -> bool {
@@ -111,6 +117,14 @@ impl Algebra for Reals {
     fn solve_in_place(&self, a: &mut [f64], b: &mut [f64]) -> f64 {
         linear::solve(a, b)
     }
+
+    /// NaN where no root is found.
+    fn implicit(&self, function: &Implicit, p: &[f64]) -> Vec<f64> {
+        match function.root(p) {
+            Ok(z) => z,
+            Err(_) => vec![f64::NAN; function.size()],
+        }
+    }
 }
 
 /// The nodes of a graph: evaluation builds expressions.
@@ -143,6 +157,10 @@ impl Algebra for Nodes<'_> {
     fn solve(&self, a: &[Node], b: &[Node]) -> (Vec<Node>, Node) {
         let solution = self.0.solve(a, b);
         (solution.x, solution.rcond)
+    }
+
+    fn implicit(&self, function: &Implicit, p: &[Node]) -> Vec<Node> {
+        self.0.implicit(function, p)
     }
 
     fn is_spent(&self) -> bool {

@@ -5,7 +5,7 @@
 
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
 /// Time, memory and the wish to go on. Parts of it may end on their own: one that used too much
@@ -35,6 +35,10 @@ pub enum Spent {
     Memory(usize),
     /// somebody asked to stop
     Cancelled,
+    /// so many operations, more than what is allowed is enough for: it was not begun
+    Size(u64),
+    /// floating point has too few digits
+    Digits,
 }
 
 /// The same budget, not an equal one.
@@ -55,6 +59,8 @@ struct Shared {
     /// the time as it was asked for, for words
     time: Duration,
     memory: Option<Memory>,
+    /// raised by somebody who asks to stop
+    flag: Option<Arc<AtomicBool>>,
     /// why the work ended, once it has: what is spent stays spent
     mark: AtomicU8,
 }
@@ -70,6 +76,17 @@ impl Budget {
     /// A budget from now on, that can be [cancelled](Budget::cancel) as well.
     pub fn new(time: Option<Duration>, memory: Option<Memory>) -> Self {
         Self::part_of(Self::default(), time, time, memory)
+    }
+
+    /// The same budget, which also ends once the flag is raised.
+    #[must_use]
+    pub fn stopped_by(self, flag: Arc<AtomicBool>) -> Self {
+        let (time, memory) = (self.named(), self.memory());
+        let mut shared = Shared::part_of(self, None, time, memory);
+        shared.flag = Some(flag);
+        Self {
+            shared: Some(Arc::new(shared)),
+        }
     }
 
     /// At most this time of what is left.
@@ -92,17 +109,8 @@ impl Budget {
         named: Option<Duration>,
         memory: Option<Memory>,
     ) -> Self {
-        // a limit beyond what a clock can tell is none
-        let ends = time.and_then(|time| Instant::now().checked_add(time));
-        let shared = Shared {
-            whole,
-            ends,
-            time: named.unwrap_or_default(),
-            memory,
-            mark: AtomicU8::new(GOING),
-        };
         Self {
-            shared: Some(Arc::new(shared)),
+            shared: Some(Arc::new(Shared::part_of(whole, time, named, memory))),
         }
     }
 
@@ -158,7 +166,10 @@ impl Budget {
         let Some(shared) = self.shared.as_deref() else {
             return false;
         };
-        if shared.whole.is_over() {
+        let is_raised = |flag: &Arc<AtomicBool>| flag.load(Ordering::Relaxed);
+        if shared.flag.as_ref().is_some_and(is_raised) {
+            shared.set(CANCELLED);
+        } else if shared.whole.is_over() {
             shared.set(WHOLE);
         } else if shared.ends.is_some_and(|ends| Instant::now() >= ends) {
             shared.set(TIME);
@@ -199,6 +210,23 @@ impl Budget {
 }
 
 impl Shared {
+    fn part_of(
+        whole: Budget,
+        time: Option<Duration>,
+        named: Option<Duration>,
+        memory: Option<Memory>,
+    ) -> Self {
+        Self {
+            whole,
+            // a limit beyond what a clock can tell is none
+            ends: time.and_then(|time| Instant::now().checked_add(time)),
+            time: named.unwrap_or_default(),
+            memory,
+            flag: None,
+            mark: AtomicU8::new(GOING),
+        }
+    }
+
     /// The first reason stays.
     fn set(&self, mark: u8) {
         let order = Ordering::Relaxed;
@@ -212,6 +240,12 @@ impl fmt::Display for Spent {
             Self::Time(time) => write!(f, "the limit of {} s ended it", time.as_secs_f64()),
             Self::Memory(bytes) => write!(f, "the limit of {} MiB ended it", bytes >> 20),
             Self::Cancelled => f.write_str("an interrupt ended it"),
+            Self::Size(operations) => write!(
+                f,
+                "too large for the time and memory allowed: some {:.0e} operations",
+                *operations as f64
+            ),
+            Self::Digits => f.write_str("rounding hides it: double precision has too few digits"),
         }
     }
 }
@@ -266,6 +300,18 @@ mod tests {
         assert_eq!(spent.to_string(), "the limit of 100 MiB ended it");
         // it may have come back
         assert_eq!(budget.marked(), None);
+    }
+
+    #[test]
+    fn a_raised_flag_ends_every_part() {
+        let flag = Arc::new(AtomicBool::new(false));
+        let whole = Budget::new(Some(Duration::from_secs(100)), None).stopped_by(flag.clone());
+        let part = whole.part(0.5).within(Duration::from_secs(1));
+        assert_eq!((part.spent(), whole.spent()), (None, None));
+        assert_eq!(whole.part(0.5).named(), Some(Duration::from_secs(100)));
+        flag.store(true, Ordering::Relaxed);
+        let cancelled = Some(Spent::Cancelled);
+        assert_eq!((part.spent(), whole.spent()), (cancelled, cancelled));
     }
 
     #[test]

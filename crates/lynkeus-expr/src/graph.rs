@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::Hash;
 
-pub use systems::{LinearSystem, Solution};
+pub use systems::{ImplicitCall, LinearSystem, Solution};
 
 use crate::facts::Facts;
 use crate::{Binary, Budget, Expr, Op, Unary, real};
@@ -45,6 +45,8 @@ struct Inner {
     by_name: HashMap<String, Node>,
     systems: Vec<LinearSystem>,
     known_systems: HashMap<LinearSystem, Node>,
+    implicits: Vec<ImplicitCall>,
+    known_implicits: HashMap<ImplicitCall, Node>,
     budget: Budget,
     /// nodes made, to look at the clock now and then
     made: u32,
@@ -179,15 +181,10 @@ impl Graph {
 
     /// Arguments of a node, in order.
     pub fn arguments(&self, node: Node) -> Vec<Node> {
-        match self.op(node) {
-            Op::Constant(_) | Op::Symbol(_) => vec![],
-            Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => vec![a],
-            Op::Binary(_, a, b) => vec![a, b],
-            Op::Select(c, a, b) => vec![c, a, b],
-            Op::Solve(system) => self.inner.borrow().systems[system as usize]
-                .arguments
-                .clone(),
-        }
+        let mut arguments = vec![];
+        let inner = self.inner.borrow();
+        inner.each_argument(node, |argument| arguments.push(argument));
+        arguments
     }
 
     /// What was [noted](Graph::note) about a question that names nodes of this graph.

@@ -1,5 +1,7 @@
 //! Sparse symbolic Jacobians.
 
+mod implicit;
+
 use std::collections::{BTreeMap, HashMap};
 
 use crate::partials::{Variation, variation};
@@ -81,14 +83,19 @@ pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
         tangents.insert(input, Tangent::from([(column, graph.constant(1.0).node())]));
     }
     for node in graph.reachable(outputs) {
-        if let Op::Solve(_) = graph.op(node) {
-            solved.insert(node, solve_tangents(&build, node, &tangents));
+        let results = match graph.op(node) {
+            Op::Solve(_) => Some(solve_tangents(&build, node, &tangents)),
+            Op::Implicit(_) => Some(implicit::tangents(&build, node, &tangents)),
+            _ => None,
+        };
+        if let Some(results) = results {
+            solved.insert(node, results);
             continue;
         }
         let tangent = match variation(graph, node) {
             Variation::Sum(terms) => sum_tangent(&build, &terms, &tangents),
             Variation::Choice(c, a, b) => choice_tangent(&build, c, a, b, &tangents),
-            Variation::Entry { solve, entry } => solved[&solve]
+            Variation::Entry { system, entry } => solved[&system]
                 .iter()
                 .filter_map(|(&column, dx)| Some((column, *dx.get(entry as usize)?)))
                 .collect(),
@@ -206,9 +213,10 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
     let mut adjoints = BTreeMap::from([(output, graph.constant(1.0).node())]);
     let mut results: HashMap<Node, BTreeMap<u32, Node>> = HashMap::new();
     for node in graph.reachable(&[output]).into_iter().rev() {
-        if let Op::Solve(_) = graph.op(node) {
+        if graph.op(node).is_system() {
             if let Some(entries) = results.get(&node) {
                 solve_adjoints(&build, node, entries, &mut adjoints);
+                implicit::adjoints(&build, node, entries, &mut adjoints);
             }
             continue;
         }
@@ -229,8 +237,8 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
                 build.add_to(&mut adjoints, a, graph.select(c, bar, zero));
                 build.add_to(&mut adjoints, b, graph.select(c, zero, bar));
             }
-            Variation::Entry { solve, entry } => {
-                results.entry(solve).or_default().insert(entry, bar);
+            Variation::Entry { system, entry } => {
+                results.entry(system).or_default().insert(entry, bar);
             }
         }
     }

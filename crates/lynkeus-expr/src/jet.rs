@@ -1,6 +1,6 @@
 //! Truncated Taylor series over any algebra, and derivatives along a flow.
 
-use crate::{Algebra, Binary, Unary};
+use crate::{Algebra, Binary, Implicit, Unary};
 
 /// Taylor coefficients x(t₀+τ) = Σ cₖτᵏ, at least one. Coefficients beyond the
 /// last are zero: a constant is a jet of one coefficient.
@@ -337,6 +337,10 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
 
     fn is_spent(&self) -> bool {
         self.inner.is_spent()
+    }
+
+    fn implicit(&self, function: &Implicit, p: &[Self::Value]) -> Vec<Self::Value> {
+        function.series(self, p)
     }
 
     /// A₀ xₖ = bₖ − Σ_{j≥1} Aⱼ x_{k−j}.

@@ -9,14 +9,14 @@ pub(crate) enum Variation {
     /// d(first) where the condition holds, else d(second): the branch not taken
     /// must not spoil the derivative by 0·∞
     Choice(Node, Node, Node),
-    /// result `entry` of a linear system
-    Entry { solve: Node, entry: u32 },
+    /// result `entry` of a linear system or an implicit function
+    Entry { system: Node, entry: u32 },
 }
 
 pub(crate) fn variation(graph: &Graph, node: Node) -> Variation {
     let value = graph.expr(node);
     match graph.op(node) {
-        Op::Constant(_) | Op::Symbol(_) | Op::Solve(_) => Variation::Sum(vec![]),
+        Op::Constant(_) | Op::Symbol(_) | Op::Solve(_) | Op::Implicit(_) => Variation::Sum(vec![]),
         Op::Unary(op, a) => Variation::Sum(
             unary(op, graph.expr(a), value)
                 .map(|slope| (a, slope.node()))
@@ -30,7 +30,7 @@ pub(crate) fn variation(graph: &Graph, node: Node) -> Variation {
         }
         Op::Binary(op, a, b) => binary(graph, op, a, b, value),
         Op::Select(c, a, b) => Variation::Choice(c, a, b),
-        Op::Entry(solve, entry) => Variation::Entry { solve, entry },
+        Op::Entry(system, entry) => Variation::Entry { system, entry },
     }
 }
 

@@ -34,8 +34,8 @@ impl Graph {
     }
 
     /// A node of `from` (this graph, or another) over the images of its arguments, in this
-    /// graph. None for an [`Op::Solve`], which has no value: the images of its arguments are
-    /// asked for where an [`Op::Entry`] of it is rebuilt.
+    /// graph. None for a [system](Op::is_system), which has no value: the images of its
+    /// arguments are asked for where an [`Op::Entry`] of it is rebuilt.
     pub fn rebuilt(&self, from: &Graph, node: Node, image: impl Fn(Node) -> Node) -> Option<Node> {
         Some(match from.op(node) {
             Op::Constant(_) | Op::Symbol(_) if std::ptr::eq(self, from) => node,
@@ -51,10 +51,14 @@ impl Graph {
             Op::Powi(a, n) => self.powi(image(a), n),
             Op::Binary(op, a, b) => self.binary(op, image(a), image(b)),
             Op::Select(c, a, b) => self.select(image(c), image(a), image(b)),
-            Op::Solve(_) => return None,
-            Op::Entry(solve, entry) => {
-                let system = from.system(solve)?;
+            Op::Solve(_) | Op::Implicit(_) => return None,
+            Op::Entry(system, entry) => {
                 let images = |nodes: &[Node]| nodes.iter().map(|&n| image(n)).collect::<Vec<_>>();
+                if let Some(call) = from.implicit_call(system) {
+                    let z = self.implicit(&call.function, &images(&call.arguments));
+                    return z.get(entry as usize).copied();
+                }
+                let system = from.system(system)?;
                 let solution = self.solve(&images(system.matrix()), &images(system.right()));
                 *solution.x.get(entry as usize).unwrap_or(&solution.rcond)
             }

@@ -96,9 +96,13 @@ impl Renderer<'_> {
                 }
             }),
             Op::Solve(_) => self.system(node, depth, text),
+            Op::Implicit(_) => self.implicit(node, text),
             Op::Entry(system, entry) => {
-                self.system(system, depth, text);
-                text.push_str(&format!("[{}]", entry + 1));
+                self.write(system, 0, depth + 1, text);
+                let calls = self.graph.implicit_call(system);
+                if calls.is_none_or(|call| call.function.size() > 1) {
+                    text.push_str(&format!("[{}]", entry + 1));
+                }
             }
         }
     }
@@ -141,6 +145,13 @@ impl Renderer<'_> {
         text.push_str("], {");
         inner.list(system.right(), depth, text);
         text.push_str("})");
+    }
+
+    /// `root(a: a + exp(a) - x = 0)`
+    fn implicit(&self, node: Node, text: &mut String) {
+        if let Some(call) = self.graph.implicit_call(node) {
+            text.push_str(&format!("root({})", call.function.text()));
+        }
     }
 
     fn grouped(&self, parentheses: bool, text: &mut String, body: impl FnOnce(&mut String)) {

@@ -15,6 +15,7 @@
 pub mod integrators;
 pub mod lemma1;
 pub mod low_power;
+pub mod sampling;
 mod tridiagonal;
 mod unit_factor;
 pub mod vandermonde;

@@ -25,7 +25,7 @@ pub(crate) const MAX_NAME: usize = 250;
 pub(crate) const MAX_RANK: usize = 32;
 /// Most names that a misspelt one is compared with.
 pub(crate) const MAX_SUGGESTIONS: usize = 5_000;
-/// Most derivatives that may share their equations.
+/// Most unknowns that may need each other when those are eliminated that can be.
 pub(crate) const MAX_COUPLED: usize = 64;
 /// Most steps while equations are solved for their unknowns.
 pub(crate) const MAX_SOLVE_STEPS: u64 = 5_000_000;

@@ -178,7 +178,7 @@ impl<'a> Analysis<'a> {
             quantities: quantities.collect(),
             about: about.collect(),
             symmetries: self.symmetries(ground, &found),
-            order,
+            order: order + found.search.succession().order,
             rank: found.search.rank(),
             unknowns: named + self.model.unknown_inputs * order,
             notes: self.notes(&found),

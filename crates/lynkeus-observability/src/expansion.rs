@@ -139,15 +139,25 @@ impl<'a> Expansion<'a> {
         self.run.root(state).0
     }
 
+    /// Sensitivities of the latest coefficient of a root.
+    pub fn root(&self, root: usize) -> Vec<Modular> {
+        self.run.root(root).1
+    }
+
+    /// Sensitivities of the latest coefficient of a symbol; empty where nothing moves it.
+    pub fn symbol(&self, place: usize) -> &[Modular] {
+        &self.coefficients[place].1
+    }
+
     /// Sensitivities of the latest coefficient of an output.
     pub fn output(&self, output: usize) -> Vec<Modular> {
-        self.run.root(self.model.states + output).1
+        self.root(self.model.states + output)
     }
 
     /// Sensitivities of the latest coefficient of an expression asked about.
     pub fn about(&self, expression: usize) -> Vec<Modular> {
         let first = self.model.states + self.model.outputs;
-        self.run.root(first + expression).1
+        self.root(first + expression)
     }
 
     /// The next coefficient of every symbol: of states from the derivative's last one.

@@ -46,6 +46,7 @@ mod question;
 mod search;
 mod series;
 mod start;
+mod succession;
 mod symmetry;
 
 pub use analysis::analyse;

@@ -8,6 +8,10 @@ use crate::field::Modular;
 use crate::model::Model;
 use crate::series::Stop;
 use crate::start::Start;
+use crate::succession::{Succession, succession};
+
+/// Products of coefficients, with a sensitivity each, that cost little.
+const WORK: usize = 100_000_000;
 
 /// The rows of sensitivities so far.
 pub(crate) struct Search<'a> {
@@ -18,6 +22,8 @@ pub(crate) struct Search<'a> {
     signals: Echelon,
     /// gradients of the expressions asked about, at the start
     about: Vec<Vec<Modular>>,
+    /// what counts as measured beside the outputs
+    succession: Succession,
     /// coefficients taken so far
     taken: usize,
 }
@@ -30,6 +36,7 @@ impl<'a> Search<'a> {
             rows: Echelon::new(width),
             signals: Echelon::new(width),
             about: vec![],
+            succession: Succession::default(),
             taken: 0,
             model,
         }
@@ -39,10 +46,17 @@ impl<'a> Search<'a> {
     pub fn advance(&mut self) -> Result<(), Stop> {
         self.expansion.advance()?;
         self.taken += 1;
-        self.add_outputs();
         if self.taken == 1 {
             let expressions = 0..self.model.about;
             self.about = expressions.map(|i| self.expansion.about(i)).collect();
+            if self.is_large() {
+                self.succession = self.follow();
+            }
+        }
+        self.add_outputs();
+        for place in self.succession.places.clone() {
+            let row = self.expansion.symbol(place).to_vec();
+            self.add(row);
         }
         Ok(())
     }
@@ -72,7 +86,24 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Derivatives of the outputs that were taken.
+    /// Whether the coefficients of all orders that may be needed cost much.
+    fn is_large(&self) -> bool {
+        let products = self.model.depth.saturating_mul(self.model.depth) / 2;
+        let sensitivities = self.model.program.len() * self.columns().width();
+        products.saturating_mul(sensitivities) > WORK
+    }
+
+    /// What follows one after another from the coefficients taken last, the first ones.
+    fn follow(&self) -> Succession {
+        succession(self.model, &|root| self.expansion.root(root))
+    }
+
+    /// What counts as measured; nothing where the ranks cost little.
+    pub fn succession(&self) -> &Succession {
+        &self.succession
+    }
+
+    /// Derivatives of the outputs, and of what counts as measured, that were taken.
     pub fn order(&self) -> usize {
         self.taken.saturating_sub(1)
     }
@@ -109,17 +140,22 @@ impl<'a> Search<'a> {
     }
 
     fn add_outputs(&mut self) {
-        let inputs = self.columns().inputs();
         for output in 0..self.model.outputs {
-            let mut row = self.expansion.output(output);
-            self.rows.add(&row);
-            if self.model.unknown_inputs > 0 {
-                let columns = row.iter_mut().enumerate();
-                let others = columns.filter(|(column, _)| !inputs.contains(column));
-                others.for_each(|(_, x)| *x = Modular::ZERO);
-                self.signals.add(&row);
-            }
+            let row = self.expansion.output(output);
+            self.add(row);
         }
+    }
+
+    fn add(&mut self, mut row: Vec<Modular>) {
+        self.rows.add(&row);
+        if self.model.unknown_inputs == 0 {
+            return;
+        }
+        let inputs = self.columns().inputs();
+        let columns = row.iter_mut().enumerate();
+        let others = columns.filter(|(column, _)| !inputs.contains(column));
+        others.for_each(|(_, x)| *x = Modular::ZERO);
+        self.signals.add(&row);
     }
 
     /// Whether everything is observable: then nothing more can be learnt.
@@ -149,5 +185,80 @@ impl<'a> Search<'a> {
             restricted.add(&row);
         }
         restricted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lynkeus_model::{LoadOptions, Plant};
+
+    use super::*;
+    use crate::Question;
+
+    /// Names of what follows, in order, with the derivatives used. The ranks, which
+    /// know nothing of it, say the same.
+    fn followed(text: &str, question: &Question) -> (Vec<String>, usize) {
+        let options = LoadOptions {
+            symbolic_parameters: question.parameters,
+            ..LoadOptions::default()
+        };
+        let plant = Plant::from_modelica(text, "p.mo", &options).unwrap();
+        let model = Model::new(&plant, question).unwrap().ok().unwrap();
+        let budget = Budget::default();
+        let start = crate::place::find(&model, Start::new(&model, 1), &budget).unwrap();
+        let columns = Columns::new(&model, model.depth);
+        let mut search = Search::new(&model, &start, columns, &budget);
+        search.advance().unwrap();
+        let found = search.follow();
+        search.until(None, model.depth).unwrap();
+        assert_eq!(search.succession, Succession::default());
+        let name = |place: &usize| {
+            let column = model.symbols[*place].column.unwrap();
+            let name = model.named[column].0.clone();
+            assert!(search.sees(&search.columns().unit(column)), "{name}");
+            name
+        };
+        (found.places.iter().map(name).collect(), found.order)
+    }
+
+    fn names(of: &[&str]) -> Vec<String> {
+        of.iter().map(|&name| name.to_owned()).collect()
+    }
+
+    #[test]
+    fn chains_follow_state_by_state() {
+        let text = "model P Real a; Real b; Real c; output Real y = a^3;
+          equation der(a) = a*sin(b); der(b) = exp(c) + a; der(c) = -b*c; end P;";
+        let found = followed(text, &Question::default());
+        assert_eq!(found, (names(&["a", "b", "c"]), 2));
+    }
+
+    #[test]
+    fn unknown_inputs_and_parameters_follow_too() {
+        let text = "model P parameter Real k = 2; input Real u; Real a; Real b; output Real y = a; output Real z = b;
+          equation der(a) = -k*a; der(b) = a*u - b; end P;";
+        let question = Question {
+            unknown: names(&["u"]),
+            parameters: true,
+            ..Question::default()
+        };
+        let found = followed(text, &question);
+        assert_eq!(found, (names(&["a", "b", "k", "u"]), 1));
+    }
+
+    /// Of a sum neither part follows; what a later equation tells comes from the ranks.
+    #[test]
+    fn two_unknowns_in_one_equation_do_not_follow() {
+        let text = "model P Real a; Real b; Real c; Real d; output Real y = a;
+          equation der(a) = b + c; der(b) = -b; der(c) = -2*c; der(d) = a; end P;";
+        assert_eq!(followed(text, &Question::default()).0, names(&["a"]));
+    }
+
+    /// A fixed start is no course: b' shows c only once b is known.
+    #[test]
+    fn a_given_start_is_not_a_known_course() {
+        let text = "model P Real a; Real b(start = 1, fixed = true); Real c; output Real y = a;
+          equation der(a) = b*c; der(b) = -c*b; der(c) = -c; end P;";
+        assert_eq!(followed(text, &Question::default()).0, names(&["a"]));
     }
 }

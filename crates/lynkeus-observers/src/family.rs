@@ -48,6 +48,8 @@ pub trait Family: Sync {
     fn owns(&self, key: &str) -> bool {
         self.keys().iter().any(|spec| spec.name == key)
     }
+    /// Whether it is a filter: it takes any plant, and no theorem stands behind it.
+    fn is_filter(&self) -> bool;
     /// Does the plant have the form, and do the conditions hold on the box?
     ///
     /// # Errors

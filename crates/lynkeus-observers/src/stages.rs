@@ -48,6 +48,8 @@ pub trait Stages: Sync {
     const FORM_BOX: FormBox;
     /// its keys, in groups
     const KEYS: &'static [&'static [KeySpec]];
+    /// whether it takes any plant, without a theorem
+    const IS_FILTER: bool = false;
 
     /// The settings of a study.
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self::Settings, TuningError>;
@@ -91,6 +93,10 @@ impl<S: Stages> Family for S {
 
     fn paper(&self) -> &'static str {
         S::PAPER
+    }
+
+    fn is_filter(&self) -> bool {
+        S::IS_FILTER
     }
 
     fn keys(&self) -> Vec<&'static KeySpec> {

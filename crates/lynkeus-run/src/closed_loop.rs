@@ -1,11 +1,13 @@
 //! Inputs, plant, sensors and observer as one system.
 
+use crate::joint::Parts;
 use crate::noise::Sensors;
+use crate::routine::Runner;
 use crate::{Dynamics, Error, Evaluation, Role, Simulation, Trajectory};
 
 /// Where a signal of the observer comes from.
 #[derive(Clone, Copy, Debug)]
-enum Source {
+pub(crate) enum Source {
     /// output of the plant, as measured
     Sensor(usize),
     /// an input
@@ -64,6 +66,12 @@ pub(crate) struct Loop {
     plant_wires: Vec<usize>,
     observer_wires: Vec<Source>,
     record_outputs: bool,
+    /// plant and observer are on known sides of the surfaces on which they jump
+    is_held: bool,
+    /// the derivatives of all states, as one
+    joint: Runner,
+    /// time, states, what disturbs sensors and states, modes
+    arguments: Vec<f64>,
     u: Vec<f64>,
     y: Vec<f64>,
 }
@@ -90,16 +98,30 @@ impl Loop {
         let plant_wires = plant.signals().iter().map(|name| sources.input(name));
         let read = observer.as_ref().map_or(&[][..], |o| o.signals());
         let observer_wires = read.iter().map(|name| sources.any(name));
+        let plant_wires = plant_wires.collect::<Result<Vec<_>, _>>()?;
+        let observer_wires = observer_wires.collect::<Result<Vec<_>, _>>()?;
+        let joint = Parts {
+            inputs,
+            plant,
+            observer: observer.as_ref(),
+            sensors: &sensors,
+            plant_wires: &plant_wires,
+            observer_wires: &observer_wires,
+        }
+        .joined()?;
         Ok(Self {
-            plant_wires: plant_wires.collect::<Result<_, _>>()?,
-            observer_wires: observer_wires.collect::<Result<_, _>>()?,
+            arguments: vec![0.0; joint.tape().inputs()],
+            joint: joint.runner(),
             u: vec![0.0; inputs.outputs().len()],
             y: vec![0.0; plant.outputs().len()],
             inputs: inputs.evaluation(),
             plant: plant.evaluation(),
             observer: observer.as_ref().map(|o| o.evaluation()),
+            plant_wires,
+            observer_wires,
             sensors,
             record_outputs: simulation.record_outputs,
+            is_held: false,
         })
     }
 
@@ -152,6 +174,7 @@ impl Loop {
     /// Draws the next noise sample.
     pub(crate) fn draw(&mut self) {
         self.sensors.draw();
+        self.settle();
     }
 
     /// True without noise.
@@ -162,7 +185,7 @@ impl Loop {
     /// Appends the recorded values at (t, x), in the order of [`Loop::table`].
     pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
         let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        self.connect(t, plant_x, true);
+        self.connect(t, plant_x);
         row.extend_from_slice(plant_x);
         row.extend_from_slice(self.plant.signals());
         if self.record_outputs {
@@ -181,14 +204,30 @@ impl Loop {
         Err(self.not_finite(t, x))
     }
 
-    /// Carries inputs to the plant and, if wanted, measurements to the observer.
-    fn connect(&mut self, t: f64, plant_x: &[f64], measure: bool) {
+    /// The arguments of the joint derivatives that stay from one draw of noise, or one switch, to
+    /// the next.
+    fn settle(&mut self) {
+        let first = 1 + self.dimension();
+        let noise = (0..self.y.len()).map(|i| self.sensors.disturbance(i));
+        let drives = self.sensors.moved().map(|state| self.sensors.drive(state));
+        let observer = self.observer.as_ref().map_or(&[][..], Evaluation::modes);
+        let of = [self.inputs.modes(), self.plant.modes(), observer];
+        let values = noise.chain(drives).chain(of.into_iter().flatten().copied());
+        for (argument, value) in self.arguments[first..].iter_mut().zip(values) {
+            *argument = value;
+        }
+    }
+
+    fn place(&mut self, t: f64, x: &[f64]) {
+        self.arguments[0] = t;
+        self.arguments[1..=x.len()].copy_from_slice(x);
+    }
+
+    /// Carries inputs to the plant and measurements to the observer.
+    fn connect(&mut self, t: f64, plant_x: &[f64]) {
         self.inputs.outputs(t, &[], &mut self.u);
         for (signal, &wire) in self.plant.signals_mut().iter_mut().zip(&self.plant_wires) {
             *signal = self.u[wire];
-        }
-        if !measure {
-            return;
         }
         self.plant.outputs(t, plant_x, &mut self.y);
         let Some(observer) = &mut self.observer else {
@@ -209,13 +248,28 @@ impl Dynamics for Loop {
     }
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        if !self.is_held {
+            self.place(t, x);
+            return self.joint.eval(&self.arguments, dx);
+        }
         let (plant_x, observer_x) = x.split_at(self.plant.dimension());
         let (plant_dx, observer_dx) = dx.split_at_mut(self.plant.dimension());
-        self.connect(t, plant_x, self.observer.is_some());
+        self.connect(t, plant_x);
         self.plant.derivatives(t, plant_x, plant_dx);
+        for state in self.sensors.moved() {
+            plant_dx[state] += self.sensors.drive(state);
+        }
         if let Some(observer) = &mut self.observer {
             observer.derivatives(t, observer_x, observer_dx);
         }
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        if self.is_held {
+            return false;
+        }
+        self.place(t, x);
+        self.joint.step(&self.arguments, h, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
@@ -232,6 +286,35 @@ impl Dynamics for Loop {
         self.plant.enter(t);
         if let Some(observer) = &mut self.observer {
             observer.enter(t);
+        }
+        self.settle();
+    }
+
+    fn surfaces(&self) -> usize {
+        self.plant.surfaces() + self.observer.as_ref().map_or(0, Dynamics::surfaces)
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let of_observer = self.observer.as_ref().map(Dynamics::surface_names);
+        [self.plant.surface_names(), of_observer.unwrap_or_default()].concat()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        let (of_plant, of_observer) = values.split_at_mut(self.plant.surfaces());
+        self.connect(t, plant_x);
+        self.plant.read_surfaces(t, plant_x, of_plant);
+        if let Some(observer) = &mut self.observer {
+            observer.read_surfaces(t, observer_x, of_observer);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.is_held = sides.is_some();
+        let parts = sides.map(|sides| sides.split_at(self.plant.surfaces()));
+        self.plant.hold(parts.map(|(plant, _)| plant));
+        if let Some(observer) = &mut self.observer {
+            observer.hold(parts.map(|(_, observer)| observer));
         }
     }
 
@@ -251,7 +334,7 @@ impl Dynamics for Loop {
     /// Blames the first part whose values are not finite.
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
         let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        self.connect(t, plant_x, true);
+        self.connect(t, plant_x);
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
         if !finite(&self.u) {
             return self.inputs.not_finite(t, &[]);

@@ -39,6 +39,17 @@ impl Driven {
         self.next.copy_from_slice(signals);
     }
 
+    /// The signals at t.
+    fn read_signals(&mut self, t: f64) {
+        if self.between == BetweenSamples::Linear {
+            let s = (t - self.from) / (self.to - self.from);
+            let ends = self.last.iter().zip(&self.next);
+            for (signal, (last, next)) in self.evaluation.signals_mut().iter_mut().zip(ends) {
+                *signal = last + s * (next - last);
+            }
+        }
+    }
+
     /// The interval is over: its last sample is the present one.
     pub(crate) fn arrive(&mut self) {
         self.last.copy_from_slice(&self.next);
@@ -60,14 +71,12 @@ impl Dynamics for Driven {
     }
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        if self.between == BetweenSamples::Linear {
-            let s = (t - self.from) / (self.to - self.from);
-            let ends = self.last.iter().zip(&self.next);
-            for (signal, (last, next)) in self.evaluation.signals_mut().iter_mut().zip(ends) {
-                *signal = last + s * (next - last);
-            }
-        }
+        self.read_signals(t);
         self.evaluation.derivatives(t, x, dx);
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
@@ -76,6 +85,23 @@ impl Dynamics for Driven {
 
     fn enter(&mut self, t: f64) {
         self.evaluation.enter(t);
+    }
+
+    fn surfaces(&self) -> usize {
+        self.evaluation.surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        self.evaluation.surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.read_signals(t);
+        self.evaluation.read_surfaces(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.evaluation.hold(sides);
     }
 
     fn names(&self) -> Vec<String> {

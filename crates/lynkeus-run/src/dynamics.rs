@@ -15,6 +15,12 @@ pub trait Dynamics {
     /// Writes f(t, x) to `dx`; both slices have [`Dynamics::dimension`] entries.
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]);
 
+    /// Takes `x` at `t` to `next` at `t + h` by the classical Runge–Kutta method, where that is
+    /// known as one function; false where it is not, and nothing is done.
+    fn step(&mut self, _t: f64, _h: f64, _x: &[f64], _next: &mut [f64]) -> bool {
+        false
+    }
+
     /// Appends every instant strictly inside (`from`, `to`) at which f jumps or
     /// has a kink because of time, in any order.
     ///
@@ -28,6 +34,29 @@ pub trait Dynamics {
     /// Freezes what depends on time by jumps (relations, `floor`, `sign`) at its
     /// value at `t`, so that f is smooth on a whole segment, ends included.
     fn enter(&mut self, _t: f64) {}
+
+    /// Number of surfaces on which f jumps with the state. Where there are some,
+    /// [`Dynamics::read_surfaces`] and [`Dynamics::hold`] belong to them.
+    fn surfaces(&self) -> usize {
+        0
+    }
+
+    /// How the surfaces read, for messages.
+    fn surface_names(&self) -> Vec<String> {
+        vec![]
+    }
+
+    /// Writes the functions that vanish on the surfaces at (t, x), one per surface.
+    fn read_surfaces(&mut self, _t: f64, _x: &[f64], _values: &mut [f64]) {}
+
+    /// Holds f, from here on, as it is on one side of each surface: where its function is
+    /// positive for 1, negative for −1. With none f is what the state says again.
+    fn hold(&mut self, _sides: Option<&[f64]>) {}
+
+    /// Asked at every step: true ends the run with [`Error::Cancelled`].
+    fn is_over(&mut self) -> bool {
+        false
+    }
 
     /// The names of the states, for messages.
     fn names(&self) -> Vec<String> {
@@ -53,12 +82,36 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
         (**self).derivatives(t, x, dx);
     }
 
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        (**self).step(t, h, x, next)
+    }
+
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
         (**self).switches(from, to, times)
     }
 
     fn enter(&mut self, t: f64) {
         (**self).enter(t);
+    }
+
+    fn surfaces(&self) -> usize {
+        (**self).surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        (**self).surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        (**self).read_surfaces(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        (**self).hold(sides);
+    }
+
+    fn is_over(&mut self) -> bool {
+        (**self).is_over()
     }
 
     fn names(&self) -> Vec<String> {

@@ -69,7 +69,7 @@ pub enum Error {
 
     /// The integrator used up its steps.
     #[error(
-        "{steps} steps took the integration only to t = {time}, on the way to {until}: a gain is too high, or a relay or a threshold of the state chatters; lower the gain, smooth what jumps, loosen `rtol` and `atol`, or set method = \"stiff\" or \"rk4\"; the state is {state}"
+        "{steps} steps took the integration only to t = {time}, on the way to {until}: {chatters}a gain is too high or a relay or a threshold of the state chatters; lower the gain, smooth what jumps, loosen `rtol`, or set method = \"stiff\" or \"rk4\"; the state is {state}"
     )]
     StepBudget {
         /// time reached
@@ -78,6 +78,9 @@ pub enum Error {
         until: f64,
         /// steps spent
         steps: usize,
+        /// the surface on which the right-hand side jumps again and again, ending in "; ", or
+        /// empty
+        chatters: String,
         /// names and values of the state
         state: String,
     },

@@ -1,6 +1,7 @@
 //! One integrator for every method, stopping at every switch.
 
 use crate::adaptive::{Adaptive, Choice, resolution};
+use crate::relays::{Sides, Switched};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 
@@ -51,6 +52,8 @@ impl StepAdvice {
 pub struct Integrator {
     stepper: Stepper,
     instants: Vec<f64>,
+    /// of the surfaces on which the system jumps with its state
+    sides: Sides,
 }
 
 #[derive(Clone, Debug)]
@@ -95,6 +98,7 @@ impl Integrator {
         Ok(Self {
             stepper,
             instants: vec![],
+            sides: Sides::default(),
         })
     }
 
@@ -171,7 +175,11 @@ impl Integrator {
             }
             f.enter(start + 0.5 * (end - start));
             match &mut self.stepper {
-                Stepper::Adaptive(adaptive) => adaptive.advance(f, start, end, x)?,
+                Stepper::Adaptive(adaptive) => {
+                    let at = (start, &*x);
+                    let mut switched = Switched::new(f, &mut self.sides, at, end - start);
+                    adaptive.advance(&mut switched, start, end, x)?;
+                }
                 Stepper::Fixed(fixed) => fixed.advance(f, start, end, whole, x)?,
             }
             start = end;
@@ -201,9 +209,11 @@ impl Integrator {
     }
 }
 
-/// From one interval to the next only the step and what is known of it stay.
+/// From one interval to the next the step and what is known of it stay, and the sides of the
+/// surfaces on which the system jumps.
 impl Persist for Integrator {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.sides.walk(walk)?;
         match &mut self.stepper {
             Stepper::Adaptive(adaptive) => adaptive.walk(walk),
             Stepper::Fixed(fixed) => {

@@ -25,6 +25,10 @@ pub struct Noise {
     pub sample_step: Option<f64>,
     /// how strong, by the output's name; outputs left out are exact
     pub levels: BTreeMap<String, Level>,
+    /// process noise: the spectral density q of white noise on a state's derivative (variance per
+    /// unit of time), by the state's name. It is drawn with the samples and held in between, with
+    /// variance q/Δ for a sampling time Δ. Its streams are those of the names with `'` before them
+    pub process: BTreeMap<String, f64>,
 }
 
 /// The noise of one output: the standard deviation of a Gaussian one, or the bound of a
@@ -60,10 +64,11 @@ impl Level {
     }
 }
 
-/// The noise of all outputs of a plant, in their order.
+/// The noise of all outputs of a plant, in their order, and of its states.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensors {
     channels: Vec<Option<Channel>>,
+    process: Vec<Option<Wander>>,
 }
 
 #[derive(Clone, Debug)]
@@ -73,8 +78,28 @@ struct Channel {
     deviate: f64,
 }
 
+/// What moves a state besides the plant.
+#[derive(Clone, Debug)]
+struct Wander {
+    deviation: f64,
+    stream: ChaCha8Rng,
+    deviate: f64,
+}
+
+fn stream(seed: u64, name: &str) -> ChaCha8Rng {
+    let mut stream = ChaCha8Rng::seed_from_u64(seed);
+    stream.set_stream(fnv1a(name));
+    stream
+}
+
 impl Sensors {
-    pub(crate) fn new(noise: &Noise, outputs: &[String]) -> Result<Self, Error> {
+    /// For a plant with these outputs and states, sampled every `step`.
+    pub(crate) fn new(
+        noise: &Noise,
+        outputs: &[String],
+        states: &[String],
+        step: f64,
+    ) -> Result<Self, Error> {
         for (name, level) in &noise.levels {
             if !outputs.contains(name) {
                 let expected = format!("one of the outputs: {}", outputs.join(", "));
@@ -87,27 +112,67 @@ impl Sensors {
             }
         }
         let channel = |name: &String| {
-            let level = *noise.levels.get(name)?;
-            let mut stream = ChaCha8Rng::seed_from_u64(noise.seed);
-            stream.set_stream(fnv1a(name));
             Some(Channel {
-                level,
-                stream,
+                level: *noise.levels.get(name)?,
+                stream: stream(noise.seed, name),
                 deviate: 0.0,
             })
         };
+        let wander = |name: &String| {
+            let density = *noise.process.get(name).filter(|density| **density > 0.0)?;
+            Some(Wander {
+                deviation: (density / step).sqrt(),
+                stream: stream(noise.seed, &format!("'{name}")),
+                deviate: 0.0,
+            })
+        };
+        Self::check_process(&noise.process, states)?;
         Ok(Self {
             channels: outputs.iter().map(channel).collect(),
+            process: states.iter().map(wander).collect(),
         })
     }
 
-    /// True where every output is exact.
+    fn check_process(process: &BTreeMap<String, f64>, states: &[String]) -> Result<(), Error> {
+        for (name, &density) in process {
+            if !states.contains(name) {
+                let expected = format!("one of the states: {}", states.join(", "));
+                return Err(Error::setting(
+                    "process noise of",
+                    expected,
+                    format!("'{name}'"),
+                ));
+            }
+            if !(density >= 0.0 && density.is_finite()) {
+                let what = format!("process noise of '{name}'");
+                return Err(Error::setting(what, "a finite number, 0 or above", density));
+            }
+        }
+        Ok(())
+    }
+
+    /// True where every output is exact and nothing but the plant moves its states.
     pub(crate) fn are_exact(&self) -> bool {
-        self.channels.iter().all(Option::is_none)
+        self.channels.iter().all(Option::is_none) && self.process.iter().all(Option::is_none)
+    }
+
+    /// The states that noise moves, by place.
+    pub(crate) fn moved(&self) -> impl Iterator<Item = usize> + '_ {
+        let process = self.process.iter().enumerate();
+        process.filter_map(|(i, wander)| wander.is_some().then_some(i))
+    }
+
+    /// What noise adds to the derivative of a state at present.
+    pub(crate) fn drive(&self, state: usize) -> f64 {
+        let wander = self.process[state].as_ref();
+        wander.map_or(0.0, |wander| wander.deviation * wander.deviate)
     }
 
     /// Draws the next sample of every channel.
     pub(crate) fn draw(&mut self) {
+        for wander in self.process.iter_mut().flatten() {
+            wander.deviate = StandardNormal.sample(&mut wander.stream);
+        }
         for channel in self.channels.iter_mut().flatten() {
             channel.deviate = match channel.level {
                 Level::Absolute(_) | Level::Relative(_) => {
@@ -123,14 +188,40 @@ impl Sensors {
 
     /// What sensor `index` shows of the value.
     pub(crate) fn measured(&self, index: usize, value: f64) -> f64 {
-        match &self.channels[index] {
-            None => value,
-            Some(Channel { level, deviate, .. }) => match level {
-                Level::Absolute(size) | Level::Uniform(size) => value + size * deviate,
-                Level::Relative(fraction) => value * (1.0 + fraction * deviate),
-            },
+        match self.disturbed(index) {
+            Disturbed::Not => value,
+            Disturbed::Added => value + self.disturbance(index),
+            Disturbed::Multiplied => value * self.disturbance(index),
         }
     }
+
+    /// What noise does at sensor `index`.
+    pub(crate) fn disturbed(&self, index: usize) -> Disturbed {
+        match self.channels[index].as_ref().map(|channel| channel.level) {
+            None => Disturbed::Not,
+            Some(Level::Absolute(_) | Level::Uniform(_)) => Disturbed::Added,
+            Some(Level::Relative(_)) => Disturbed::Multiplied,
+        }
+    }
+
+    /// The number that is added at sensor `index` at present, or multiplied with.
+    pub(crate) fn disturbance(&self, index: usize) -> f64 {
+        self.channels[index].as_ref().map_or(0.0, |channel| {
+            let Channel { level, deviate, .. } = channel;
+            match level {
+                Level::Absolute(size) | Level::Uniform(size) => size * deviate,
+                Level::Relative(fraction) => 1.0 + fraction * deviate,
+            }
+        })
+    }
+}
+
+/// How noise meets a value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Disturbed {
+    Not,
+    Added,
+    Multiplied,
 }
 
 /// 64-bit FNV-1a.
@@ -155,8 +246,9 @@ mod tests {
             seed,
             sample_step: None,
             levels: levels.collect(),
+            ..Noise::default()
         };
-        let mut sensors = Sensors::new(&noise, &outputs).unwrap();
+        let mut sensors = Sensors::new(&noise, &outputs, &[], 1.0).unwrap();
         let draw = |_| {
             sensors.draw();
             sensors.measured(of, 10.0)
@@ -234,7 +326,7 @@ mod tests {
                 levels: [(name.to_string(), level)].into(),
                 ..Noise::default()
             };
-            let error = Sensors::new(&noise, &outputs).unwrap_err();
+            let error = Sensors::new(&noise, &outputs, &[], 1.0).unwrap_err();
             assert!(matches!(error, Error::Setting { .. }), "{error}");
         }
     }

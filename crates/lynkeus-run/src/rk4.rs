@@ -46,6 +46,10 @@ impl Rk4 {
         h: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
+        if f.step(t, h, x, &mut self.stage) && self.stage.iter().all(|v| v.is_finite()) {
+            x.copy_from_slice(&self.stage);
+            return Ok(());
+        }
         for (stage, (c, _)) in STAGES.iter().enumerate() {
             self.place(stage, h, x);
             f.derivatives(t + c * h, &self.stage, &mut self.k[stage]);
@@ -77,6 +81,9 @@ impl Rk4 {
         let at = |i: usize| from + (to - from) * (i as f64 / steps as f64);
         for i in 0..steps {
             let (t, next) = (at(i), at(i + 1));
+            if f.is_over() {
+                return Err(Error::Cancelled { time: t });
+            }
             self.step(f, t, next - t, x)?;
         }
         Ok(())

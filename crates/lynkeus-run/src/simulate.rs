@@ -35,7 +35,7 @@ pub struct Simulation {
     pub output_step: f64,
     /// how it is integrated
     pub method: Method,
-    /// noise on the plant's outputs
+    /// noise on the plant's outputs and states
     pub noise: Noise,
     /// also record the plant's outputs, exact and as measured
     pub record_outputs: bool,
@@ -159,7 +159,13 @@ impl<'a> Run<'a> {
             let expected = format!("a step that makes fewer than {MOST_CELLS:e} samples");
             return Err(Error::setting("sample_step", expected, sample_step));
         }
-        let sensors = Sensors::new(&simulation.noise, simulation.plant.outputs())?;
+        let plant = &simulation.plant;
+        let sensors = Sensors::new(
+            &simulation.noise,
+            plant.outputs(),
+            plant.states(),
+            sample_step,
+        )?;
         let system = Loop::new(simulation, sensors)?;
         let x = system.start();
         Ok(Self {

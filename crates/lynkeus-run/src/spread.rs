@@ -141,7 +141,7 @@ impl Spread {
     /// State and covariance to a time.
     pub fn advance(&mut self, from: f64, to: f64, x: &mut [f64]) -> Result<(), Error> {
         self.belief.x.copy_from_slice(x);
-        self.engine.predict(&mut self.belief, from, to, None)?;
+        self.engine.predict(&mut self.belief, from, to, false)?;
         x.copy_from_slice(&self.belief.x);
         Ok(())
     }

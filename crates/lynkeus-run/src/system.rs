@@ -6,6 +6,8 @@ use std::sync::{Arc, Mutex};
 use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
 use crate::error::state_text;
+use crate::relays::{Held, Taken, take};
+use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
 use crate::{Dynamics, Error};
@@ -27,12 +29,37 @@ struct Code {
     states: Vec<String>,
     signals: Vec<String>,
     outputs: Vec<String>,
-    derivative_tape: Tape,
-    output_tape: Tape,
+    derivatives_at: Arc<Routine>,
+    outputs_at: Arc<Routine>,
     switches: Switches,
     modes: usize,
+    /// the same with what jumps with the state held; none where nothing does
+    held: Option<HeldCode>,
     /// only to name an operation in an error
     graph: Mutex<Graph>,
+}
+
+/// Code whose last inputs are the values of the operations that jump with the state.
+#[derive(Debug)]
+struct HeldCode {
+    derivatives_at: Arc<Routine>,
+    outputs_at: Arc<Routine>,
+    held: Held,
+    /// number of these operations
+    modes: usize,
+}
+
+impl HeldCode {
+    fn new(graph: &Graph, inputs: &[Node], taken: Taken, states: usize) -> Result<Self, Error> {
+        let inputs = [inputs, &taken.modes].concat();
+        let (dx, y) = taken.roots.split_at(states);
+        Ok(Self {
+            derivatives_at: Routine::new(Tape::new(graph, &inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(graph, &inputs, y)?),
+            held: taken.held,
+            modes: taken.modes.len(),
+        })
+    }
 }
 
 impl System {
@@ -76,16 +103,20 @@ impl System {
         let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let extracted = Switches::extract(&own, image[&time], &roots)?;
+        let jumping = take(&own, &inputs, &extracted.roots)?;
         inputs.extend(&extracted.modes);
+        let held = |taken| HeldCode::new(&own, &inputs, taken, derivatives.len());
+        let held = jumping.map(held).transpose()?;
         let (dx, y) = extracted.roots.split_at(derivatives.len());
         let code = Code {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
             signals: signals.iter().map(|(name, _)| name.clone()).collect(),
             outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
-            derivative_tape: Tape::new(&own, &inputs, dx)?,
-            output_tape: Tape::new(&own, &inputs, y)?,
+            derivatives_at: Routine::new(Tape::new(&own, &inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(&own, &inputs, y)?),
             modes: extracted.modes.len(),
             switches: extracted.switches,
+            held,
             graph: Mutex::new(own),
         };
         let start = states.iter().map(|(.., value)| *value).collect();
@@ -148,23 +179,38 @@ impl System {
         }
     }
 
-    /// What the system's numbers follow from.
+    /// What the system's numbers follow from: the tapes, not the machine code made of them.
     pub(crate) fn tell(&self, digest: &mut Digest) {
-        let Code {
-            states,
-            signals,
-            outputs,
-            derivative_tape,
-            output_tape,
-            switches,
-            ..
-        } = &*self.code;
+        let code = &*self.code;
+        let names = (&code.states, &code.signals, &code.outputs, &code.switches);
         // a digest takes any text
-        let _ = write!(
-            digest,
-            "{states:?} {signals:?} {outputs:?} {derivative_tape:?} {output_tape:?} {switches:?}"
-        );
+        let _ = write!(digest, "{names:?}");
+        for routine in [&code.derivatives_at, &code.outputs_at] {
+            let _ = write!(digest, "{:?}", routine.tape());
+        }
+        if let Some(code) = &code.held {
+            for routine in [&code.derivatives_at, &code.outputs_at] {
+                let _ = write!(digest, "{:?}", routine.tape());
+            }
+            let _ = write!(digest, "{:?}", code.held);
+        }
         digest.numbers(&self.start);
+    }
+
+    /// (t, x, w, modes) → dx.
+    pub(crate) fn derivative_tape(&self) -> &Tape {
+        self.code.derivatives_at.tape()
+    }
+
+    /// (t, x, w, modes) → y.
+    pub(crate) fn output_tape(&self) -> &Tape {
+        self.code.outputs_at.tape()
+    }
+
+    /// How many values the switches in time have: what jumps with time alone is an input of the
+    /// tapes.
+    pub(crate) fn modes(&self) -> usize {
+        self.code.modes
     }
 
     /// An evaluator with its own working memory, signals at zero.
@@ -172,12 +218,40 @@ impl System {
         let code = &self.code;
         let fixed = 1 + code.states.len() + code.signals.len();
         Evaluation {
-            derivatives: code.derivative_tape.evaluator(),
-            outputs: code.output_tape.evaluator(),
+            derivatives: code.derivatives_at.runner(),
+            outputs: code.outputs_at.runner(),
             switches: code.switches.clone(),
             inputs: vec![0.0; fixed + code.modes],
+            held: code.held.as_ref().map(|held| HeldEvaluation {
+                derivatives: held.derivatives_at.runner(),
+                outputs: held.outputs_at.runner(),
+                surfaces: held.held.surfaces.evaluator(),
+                modes: vec![0.0; held.modes],
+                inputs: vec![],
+                is_held: false,
+            }),
             system: self.clone(),
         }
+    }
+}
+
+/// Evaluates a system on known sides of the surfaces on which it jumps.
+#[derive(Clone, Debug)]
+struct HeldEvaluation {
+    derivatives: Runner,
+    outputs: Runner,
+    surfaces: Evaluator,
+    modes: Vec<f64>,
+    /// those of the system, then the modes
+    inputs: Vec<f64>,
+    is_held: bool,
+}
+
+impl HeldEvaluation {
+    fn place(&mut self, inputs: &[f64]) {
+        self.inputs.clear();
+        self.inputs.extend_from_slice(inputs);
+        self.inputs.extend_from_slice(&self.modes);
     }
 }
 
@@ -185,11 +259,12 @@ impl System {
 #[derive(Clone, Debug)]
 pub struct Evaluation {
     system: System,
-    derivatives: Evaluator,
-    outputs: Evaluator,
+    derivatives: Runner,
+    outputs: Runner,
     switches: Switches,
     /// t, x, w, modes
     inputs: Vec<f64>,
+    held: Option<HeldEvaluation>,
 }
 
 impl Evaluation {
@@ -216,7 +291,13 @@ impl Evaluation {
     /// Modes are those of the last [`Dynamics::enter`].
     pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
         self.place(t, x);
-        self.outputs.eval(&self.inputs, y);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.outputs.eval(&held.inputs, y);
+            }
+            _ => self.outputs.eval(&self.inputs, y),
+        }
     }
 
     /// Writes what an observer reports at (t, x), in the order of
@@ -227,6 +308,11 @@ impl Evaluation {
         } else {
             self.outputs(t, x, estimates);
         }
+    }
+
+    /// Values of the switches at the last [`Dynamics::enter`].
+    pub(crate) fn modes(&self) -> &[f64] {
+        &self.inputs[self.inputs.len() - self.system.code.modes..]
     }
 
     fn place(&mut self, t: f64, x: &[f64]) {
@@ -249,7 +335,49 @@ impl Dynamics for Evaluation {
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         self.place(t, x);
-        self.derivatives.eval(&self.inputs, dx);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.derivatives.eval(&held.inputs, dx);
+            }
+            _ => self.derivatives.eval(&self.inputs, dx),
+        }
+    }
+
+    fn surfaces(&self) -> usize {
+        let held = self.system.code.held.as_ref();
+        held.map_or(0, |held| held.held.names.len())
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let held = self.system.code.held.as_ref();
+        held.map_or_else(Vec::new, |held| held.held.names.clone())
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.place(t, x);
+        if let Some(held) = &mut self.held {
+            held.place(&self.inputs);
+            held.surfaces.eval(&held.inputs, values);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
+            return;
+        };
+        evaluation.is_held = sides.is_some();
+        if let Some(sides) = sides {
+            code.held.modes(sides, &mut evaluation.modes);
+        }
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        if self.held.as_ref().is_some_and(|held| held.is_held) {
+            return false;
+        }
+        self.place(t, x);
+        self.derivatives.step(&self.inputs, h, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
@@ -260,6 +388,7 @@ impl Dynamics for Evaluation {
         let first = self.inputs.len() - self.system.code.modes;
         self.switches.modes_at(t, &mut self.inputs[first..]);
     }
+
     fn names(&self) -> Vec<String> {
         self.system.states().to_vec()
     }
@@ -269,9 +398,10 @@ impl Dynamics for Evaluation {
         let code = &self.system.code;
         let graph = code.graph.lock().unwrap_or_else(|e| e.into_inner());
         let named = code
-            .derivative_tape
+            .derivatives_at
+            .tape()
             .first_nonfinite(&graph, &self.inputs)
-            .or_else(|| code.output_tape.first_nonfinite(&graph, &self.inputs));
+            .or_else(|| code.outputs_at.tape().first_nonfinite(&graph, &self.inputs));
         Error::NotFinite {
             time: t,
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),

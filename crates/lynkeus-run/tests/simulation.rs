@@ -208,6 +208,7 @@ fn noise_is_held_recorded_and_repeatable() {
         seed: 11,
         sample_step: Some(0.2),
         levels: [("y".to_string(), Level::Absolute(0.3))].into(),
+        ..Noise::default()
     };
     let table = simulation.run().unwrap();
     assert_eq!(table, simulation.run().unwrap());
@@ -399,4 +400,34 @@ proptest::proptest! {
         let expected = piecewise(&times, &values[..=times.len()], 3.0);
         proptest::prop_assert!((final_x(&simulation) - expected).abs() < 1e-11);
     }
+}
+
+/// An integrator moved by white noise is a Brownian motion: after a time T its variance is q·T.
+#[test]
+fn process_noise_moves_states() {
+    let g = Graph::new();
+    let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name).node());
+    let states = [("x".to_string(), x, 0.0), ("v".to_string(), v, 0.0)];
+    let zero = g.constant(0.0).node();
+    let plant = System::new(&g, time, &states, &[], &[v, zero], &[]).unwrap();
+    let inputs = System::new(&g, time, &[], &[], &[], &[]).unwrap();
+    let mut simulation = Simulation::new(plant, inputs, 4.0, 0.1);
+    simulation.noise.process = [("v".to_string(), 0.25)].into();
+    let runs = 2000;
+    let (mut last, mut moved) = (vec![], vec![]);
+    for seed in 0..runs {
+        simulation.noise.seed = seed;
+        let run = simulation.run().unwrap();
+        let end = |place| *run.column(Role::State.at(place)).unwrap().last().unwrap();
+        last.push(end(1));
+        moved.push(end(0));
+    }
+    let variance = |of: &[f64]| of.iter().map(|x| x * x).sum::<f64>() / runs as f64;
+    // four standard errors of a variance: 4·√(2/runs)
+    let within = 4.0 * (2.0 / runs as f64).sqrt();
+    assert!((variance(&last) / (0.25 * 4.0) - 1.0).abs() < within);
+    // q·T³/3 of its integral, where the noise is held for 1/40 of the time: 0.1 % of it
+    assert!((variance(&moved) / (0.25 * 64.0 / 3.0) - 1.0).abs() < within);
+    simulation.noise.process = [("w".to_string(), 0.25)].into();
+    assert!(simulation.run().unwrap_err().to_string().contains("'w'"));
 }

@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Extended;
 use crate::output_map::Rows;
-use crate::visibility::{inside, spread};
+use crate::points::{inside, spread};
 
 /// Points at which the rank of the rows is tried.
 const POINTS: usize = 5;

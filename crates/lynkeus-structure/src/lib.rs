@@ -5,17 +5,20 @@
 //! disturbances are zero. [`chains`] finds the triangular form of its equations,
 //! [`sign`] decides whether a partial derivative keeps its sign on the box
 //! — [`Verdict`]: proved, refuted with a witness, or undecided with the box
-//! that is left — and [`visibility`] says which states leave a trace in the outputs.
+//! that is left.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod blocks;
 pub mod chains;
+mod determined;
 mod extended;
+pub mod fate;
 pub mod indices;
 mod irreducible;
 pub mod layers;
 mod matrix;
 pub mod output_map;
+mod points;
 mod polynomial;
 mod range;
 pub mod rank;
@@ -28,11 +31,11 @@ pub mod superdiagonal;
 pub mod uniform;
 mod vanish;
 mod verdict;
-pub mod visibility;
 mod words;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
+pub use determined::determined;
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;

@@ -14,8 +14,8 @@ use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
 use crate::indices::Codistribution;
 use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
+use crate::points::inside;
 use crate::region::Cell;
-use crate::visibility::inside;
 use crate::{Extended, Finding, Place, Region, Regularity, Side, Verdict, sign, vanishes};
 
 /// A determinant of more states has too many terms.

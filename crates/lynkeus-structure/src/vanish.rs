@@ -3,7 +3,7 @@
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
 
-use crate::visibility::{inside, spread};
+use crate::points::{inside, spread};
 use crate::{Coordinate, Point, Region, Verdict, Witness};
 
 /// Points tried beside those on the edges of the box.

@@ -215,5 +215,6 @@ fn panel(name: &str, case: &Case, outcome: &Outcome) -> Panel {
     Panel {
         caption: name.replace('`', ""),
         curves: vec![curve(Kind::True, truth), curve(Kind::Estimated, estimate)],
+        ..Panel::default()
     }
 }

@@ -75,6 +75,23 @@ pub(crate) fn as_states(study: &Study, mut plant: Plant, valued: bool) -> Result
     Ok(plant)
 }
 
+/// The plant with these inputs as states that do not move.
+pub(crate) fn constant_inputs(mut plant: Plant, names: &[String]) -> Plant {
+    let (constant, inputs): (Vec<_>, Vec<_>) = plant
+        .inputs
+        .drain(..)
+        .partition(|input| names.contains(&input.name));
+    plant.inputs = inputs;
+    for input in constant {
+        plant.states.push(Variable {
+            fixed: false,
+            ..input
+        });
+        plant.derivatives.push(plant.graph.constant(0.0).node());
+    }
+    plant
+}
+
 /// The names of `unknown` that are inputs, arrays element by element; a name that is neither an
 /// input nor a parameter stays, for the message about it.
 pub(crate) fn unknown_inputs(study: &Study, plant: &Plant) -> Vec<String> {

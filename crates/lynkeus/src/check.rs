@@ -1,20 +1,26 @@
 //! What can be estimated from these sensors, by which observer, and what fails where.
 
+mod knowledge;
+mod next;
 mod observability;
 mod uniform;
 
 use std::fmt;
 use std::time::Duration;
 
-use lynkeus_expr::Spent;
+use lynkeus_expr::{Budget, Spent};
+use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{self as structure, Point, Standing, counted, uniformity};
+use lynkeus_structure::{self as structure, Point, counted, determined, uniformity};
 use serde_json::{Value, json};
 
+use crate::choice::Choice;
 use crate::prepare::Prepared;
 use crate::words::conditions;
 use crate::{Error, Study, calibrate, prepare};
+pub use knowledge::{Assumption, Knowledge, Known};
+pub use next::Next;
 pub use uniform::Uniform;
 
 /// What to ask beside "which states, by which observer".
@@ -41,6 +47,15 @@ pub struct Report {
     pub examinations: Vec<Examination>,
     /// the family to use
     pub recommended: Option<&'static str>,
+    /// the same with why, and with what the study leaves out
+    pub choice: Option<Choice>,
+    /// what can be known of each quantity, for each assumption on unknown inputs; none where
+    /// parameters have no value or are asked for
+    pub knowledge: Vec<Knowledge>,
+    /// what to type next; none where no observer was asked for
+    pub next: Option<Next>,
+    /// the unit of time
+    pub time_unit: Option<String>,
     /// what can be known at all
     pub answer: Answer,
     /// for what inputs and where states can be told apart; none for many states, or where
@@ -69,7 +84,8 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),
     };
-    let answer = observability::answer(study, &symbolic, options, time)?;
+    let unknown = calibrate::unknown_inputs(study, &symbolic);
+    let answer = observability::answer(study, &symbolic, options, unknown, time.clone())?;
     let names = |of: &[lynkeus_model::Variable]| -> Vec<String> {
         of.iter().map(|v| v.name.clone()).collect()
     };
@@ -86,6 +102,10 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         unknown: calibrate::unknown_inputs(study, &symbolic),
         examinations: vec![],
         recommended: None,
+        choice: None,
+        knowledge: vec![],
+        next: None,
+        time_unit: study.time_unit.clone(),
         answer,
         uniform: None,
         parameters: options.parameters,
@@ -93,27 +113,93 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
-        let plant = prepare::plant(study)?;
-        let prepared = Prepared::new(study, &plant)?;
-        let time = prepare::share(&study.budget, UNIFORMITY);
-        let graph = prepared.extended().graph();
-        match graph.budgeted(time, || uniformity(prepared.extended())) {
-            Ok(examined) => {
-                let examined = examined.map_err(Error::from_source)?;
-                report.uniform = examined
-                    .map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+        match by_which(study, &symbolic, options, time, &mut report) {
+            // what was found by then is told
+            Err(_) if study.budget.marked() == Some(Spent::Cancelled) => {
+                report.ended = Some(Spent::Cancelled);
             }
-            Err(spent) => report.ended = Some(spent),
+            done => done?,
         }
-        report.examinations = prepared.examinations()?.to_vec();
-        report.recommended = prepare::recommended(&report.examinations).map(|e| e.family);
     }
     Ok(report)
 }
 
+/// Where states can be told apart, what can be known of each quantity, and by which family it
+/// can be estimated.
+fn by_which(
+    study: &Study,
+    symbolic: &Plant,
+    options: &CheckOptions,
+    time: Budget,
+    report: &mut Report,
+) -> Result<(), Error> {
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let part = prepare::share(&study.budget, UNIFORMITY);
+    let graph = prepared.extended().graph();
+    match graph.budgeted(part, || uniformity(prepared.extended())) {
+        Ok(examined) => {
+            let examined = examined.map_err(Error::from_source)?;
+            report.uniform =
+                examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
+        }
+        Err(spent) => report.ended = Some(spent),
+    }
+    report.knowledge = knowledge(&prepared, symbolic, options, report, time)?;
+    report.examinations = prepared.examinations()?.to_vec();
+    report.choice = prepared.choice()?.cloned();
+    report.recommended = report.choice.as_ref().map(|choice| choice.family);
+    let next = |choice| Next::new(&prepared, choice);
+    report.next = report.choice.as_ref().map(next);
+    Ok(())
+}
+
+/// What can be known of each quantity: whatever the unknown inputs do, and if they hardly move.
+fn knowledge(
+    prepared: &Prepared<'_>,
+    symbolic: &Plant,
+    options: &CheckOptions,
+    report: &Report,
+    time: Budget,
+) -> Result<Vec<Knowledge>, Error> {
+    let study = prepared.study();
+    let extended = prepared.extended();
+    let mut asked = vec![];
+    match report.unknown.is_empty() {
+        true => asked.push((Assumption::NoneUnknown, report.answer.clone())),
+        false => {
+            asked.push((Assumption::Arbitrary, report.answer.clone()));
+            let constant = calibrate::constant_inputs(symbolic.clone(), &report.unknown);
+            let answer = observability::answer(study, &constant, options, vec![], time)?;
+            let declared = report.unknown.iter().all(|unknown| {
+                study
+                    .process_noise
+                    .iter()
+                    .any(|(name, _)| name.is_or_has(unknown))
+            });
+            asked.push((Assumption::Wandering { declared }, answer));
+        }
+    }
+    let graph = extended.graph();
+    let work = || -> Result<Vec<Knowledge>, lynkeus_expr::MissingInput> {
+        let found = knowledge::Found {
+            uniform: report.uniform.as_ref().map(Uniform::examined),
+            determined: &determined(extended)?,
+        };
+        let of = |(assumption, answer): &(Assumption, Answer)| {
+            Knowledge::new(extended, *assumption, answer, &found)
+        };
+        asked.iter().map(of).collect()
+    };
+    match graph.budgeted(prepare::share(&study.budget, UNIFORMITY), work) {
+        Ok(known) => known.map_err(Error::from_source),
+        Err(_) => Ok(vec![]),
+    }
+}
+
 impl Report {
-    /// True if a family with a theorem fits or is undecided, if everything asked for can be known
-    /// (then a filter estimates it), or where no observer was asked for.
+    /// True if a family with a theorem is chosen, if everything asked for can be known from the
+    /// outputs (then a filter estimates it), or where no observer was asked for.
     pub fn is_positive(&self) -> bool {
         let chosen = self
             .examinations
@@ -168,6 +254,9 @@ impl Report {
                 .and_then(Uniform::said)
                 .map(uniform::json)
         );
+        report["knowledge"] = self.knowledge.iter().map(Knowledge::to_json).collect();
+        report["choice"] = json!(self.choice.as_ref().map(Choice::to_json));
+        report["next"] = json!(self.next.as_ref().map(Next::to_json));
         report
     }
 }
@@ -233,8 +322,20 @@ impl fmt::Display for Report {
             uniform::print(f, uniform)?;
         }
         if let Some(spent) = self.ended {
-            writeln!(f, "\nwhere states can be told apart is undecided: {spent}")?;
+            let families = match self.examinations.is_empty() {
+                true => ", and which observer fits,",
+                false => "",
+            };
+            writeln!(
+                f,
+                "\nwhere states can be told apart{families} is undecided: {spent}"
+            )?;
         }
+        knowledge::print(
+            f,
+            &self.knowledge,
+            self.time_unit.as_deref().unwrap_or("unit of time"),
+        )?;
         for examination in self.examinations.iter().filter(|e| e.spent().is_none()) {
             writeln!(
                 f,
@@ -250,20 +351,27 @@ impl fmt::Display for Report {
         }
         self.ended_families(f)?;
         writeln!(f)?;
-        self.conclusion(f)
+        self.conclusion(f)?;
+        match &self.next {
+            Some(next) => write!(f, "\n{next}"),
+            None => Ok(()),
+        }
     }
 }
 
 impl Report {
-    /// The families whose examination a limit ended, told once.
+    /// The families whose examination was not finished, each reason told once.
     fn ended_families(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut ended = self.examinations.iter().filter(|e| e.spent().is_some());
-        let Some(first) = ended.next() else {
-            return Ok(());
-        };
-        let names = std::iter::once(first).chain(ended).map(|e| e.family);
-        let names = names.collect::<Vec<_>>().join(", ");
-        writeln!(f, "\n{names}: undecided\n  {}", first.summary)
+        let ended = self.examinations.iter().filter(|e| e.spent().is_some());
+        let mut open: Vec<&Examination> = ended.collect();
+        while let Some(reason) = open.first().map(|e| &e.summary) {
+            let same = |e: &&Examination| e.summary == *reason;
+            let (told, rest): (Vec<_>, Vec<_>) = open.iter().copied().partition(same);
+            let names: Vec<&str> = told.iter().map(|e| e.family).collect();
+            writeln!(f, "\n{}: undecided\n  {reason}", names.join(", "))?;
+            open = rest;
+        }
+        Ok(())
     }
 
     /// That there is no observer, or that a limit ended the search for one.
@@ -279,64 +387,55 @@ impl Report {
         }
     }
 
-    /// Why the family is recommended.
-    fn reason(&self) -> String {
-        let chosen = self
-            .examinations
-            .iter()
-            .find(|e| Some(e.family) == self.recommended);
-        let others = self
-            .examinations
-            .iter()
-            .filter(|e| e.has_theorem() && e.fit() == Standing::Proved)
-            .count()
-            > 1;
-        if let Some(filter) = chosen.filter(|e| !e.has_theorem()) {
-            return format!(
-                "no family with a theorem fits: {} runs on any plant, and nothing is proved of its error",
-                filter.family
-            );
-        }
-        match chosen.map(|e| (e.family, e.fit())) {
-            Some((family, Standing::Proved)) if others => {
-                format!("{family} comes first: of the families that fit, it has the simplest gain")
-            }
-            Some((family, Standing::Proved)) => {
-                format!("{family} is the one whose every condition is proved")
-            }
-            Some((family, _)) => format!(
-                "{family} is not proved to fit, but nothing refutes it: what is undecided above says what would settle it"
-            ),
-            None => String::new(),
-        }
-    }
-
     fn conclusion(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(family) = self.recommended else {
             return writeln!(f, "{}", self.none());
         };
+        let lists = |names: &[&str]| observability::listed(names);
+        let [seen, follows, hidden] = self.sorted();
+        if !seen.is_empty() {
+            writeln!(f, "can be estimated: {} (by {family})", lists(&seen))?;
+        }
+        if !follows.is_empty() {
+            let names = lists(&follows);
+            writeln!(
+                f,
+                "in the end, as errors decay by themselves: {names} (by {family})"
+            )?;
+        }
+        // under another assumption more may be known
+        let more = self.knowledge.get(1).map(Knowledge::sorted);
+        let (wandering, hidden): (Vec<&str>, Vec<&str>) = hidden.iter().partition(|name| {
+            more.as_ref()
+                .is_some_and(|[seen, follows, _]| seen.contains(name) || follows.contains(name))
+        });
+        if !wandering.is_empty() {
+            let (unknown, names) = (self.unknown.join(", "), lists(&wandering));
+            writeln!(f, "only if {unknown} hardly moves: {names} (by {family})")?;
+        }
+        if !hidden.is_empty() {
+            let names = lists(&hidden);
+            writeln!(
+                f,
+                "not from the outputs: {names}; what {family} gives for them follows from the model alone"
+            )?;
+        }
+        match &self.choice {
+            Some(choice) => write!(f, "{choice}"),
+            None => Ok(()),
+        }
+    }
+
+    /// What is known, known in the end, and not known, whatever unknown inputs do.
+    fn sorted(&self) -> [Vec<&str>; 3] {
+        if let Some(knowledge) = self.knowledge.first() {
+            return knowledge.sorted();
+        }
         let of = |hidden: bool| -> Vec<&str> {
             let quantities = self.answer.quantities.iter();
             let kept = quantities.filter(|(q, _)| (q.verdict == Verdict::Unobservable) == hidden);
             kept.map(|(asked, _)| asked.name.as_str()).collect()
         };
-        let (seen, hidden) = (of(false).join(", "), of(true).join(", "));
-        if !seen.is_empty() {
-            writeln!(f, "can be estimated: {seen} (by {family})")?;
-        }
-        // the outputs alone do not tell: something has to be taken for granted
-        match (hidden.is_empty(), self.unknown.is_empty()) {
-            (true, _) => {}
-            (false, false) => writeln!(
-                f,
-                "only if {} stays constant: {hidden} (by {family})",
-                self.unknown.join(", ")
-            )?,
-            (false, true) => writeln!(
-                f,
-                "not from the outputs: {hidden}; what {family} gives for them follows from the model alone"
-            )?,
-        }
-        writeln!(f, "{}", self.reason())
+        [of(false), vec![], of(true)]
     }
 }

@@ -1,17 +1,22 @@
 //! Every observer that can be had, on the same data.
 
-use std::fmt;
+mod print;
+mod samples;
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use lynkeus_model::Plant;
 use lynkeus_observers::{FAMILIES, Family};
-use lynkeus_structure::{Standing, figures};
-use serde_json::{Map, Value, json};
+use lynkeus_structure::Standing;
+
+pub use samples::{Interval, Resolution};
 
 use crate::prepare::Prepared;
-use crate::study::Name;
+use crate::study::{BetweenSamples, Name};
 use crate::tune::errors::Errors;
-use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare, simulate};
+use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare};
+use samples::Watch;
 
 /// The answer of `lynkeus compare`.
 #[derive(Debug)]
@@ -22,6 +27,8 @@ pub struct Comparison {
     pub rows: Vec<Compared>,
     /// what the figures are measured against
     pub against: Against,
+    /// how a simulation was sampled; none of a log
+    pub interval: Option<Interval>,
 }
 
 /// What errors are measured against.
@@ -47,9 +54,8 @@ pub struct Compared {
 /// What a family makes of the data.
 #[derive(Debug)]
 pub struct Run {
-    /// root of the mean square error of each quantity over the last half of the rows, in its
-    /// unit; none where its true value is not known
-    pub rms: Vec<(String, Option<f64>)>,
+    /// the error of each quantity
+    pub settled: Vec<Settled>,
     /// largest error after the first row, in widths of the declared ranges
     pub peak: Option<f64>,
     /// time until every error stays within 5 % of its range; none where it does not
@@ -65,11 +71,25 @@ pub struct Run {
     pub outcome: Outcome,
 }
 
+/// The error of a quantity once the start is forgotten.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settled {
+    /// name of the quantity
+    pub quantity: String,
+    /// root of the mean square error over the last half of the rows, in its unit; none where its
+    /// true value is not known
+    pub rms: Option<f64>,
+    /// width of its declared range, in its unit
+    pub width: f64,
+}
+
 /// Settled is an error below this share of the range.
 const SETTLED: f64 = 0.05;
 
-/// Runs every family of `[compare]`, or each that fits and the filters, on a log, or on what a
-/// logger would have seen of the study's simulation: the same samples for each. Keys of `[observer]` reach the families that own them.
+/// Runs every family of `[compare]`, or each that fits and the filters, on a log, or on samples of
+/// the study's simulation: the same for each. Keys of `[observer]` reach the families that own
+/// them. Where the simulation has no noise its sensors are continuous: samples lie on lines, as
+/// densely as it takes until halving their interval changes no error any more.
 ///
 /// # Errors
 /// A study that does not fit its plant; no family that can be run; a log without the columns
@@ -80,34 +100,21 @@ pub fn compare(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Comparison, Error> {
     let plant = prepare::plant(study)?;
-    let simulated;
-    let table = match log {
-        Some(table) => table,
+    let families = families(study, &plant)?;
+    let (rows, interval) = match log {
+        Some(table) => (run_all(study, &plant, &families, table, watch)?, None),
         None => {
-            simulated = simulate::recorded(study, &plant)?;
-            &simulated
+            let (rows, interval) = samples::simulated(study, &plant, &families, watch)?;
+            (rows, Some(interval))
         }
     };
-    let families = families(study, &plant)?;
-    let count = families.len() as f64;
-    let mut rows = vec![];
-    for (i, family) in families.into_iter().enumerate() {
-        let own = of_family(study, family);
-        let prepared = Prepared::new(&own, &plant)?;
-        let part = &mut |done: f64| watch((i as f64 + done) / count);
-        let run = timed(&prepared, |p| estimate::estimated(p, table, part));
-        rows.push(Compared {
-            family: family.name(),
-            run: run.map_err(|e| e.to_string()),
-        });
-    }
     if rows.iter().all(|row| row.run.is_err()) {
-        let reasons = rows.iter().filter_map(|row| row.run.as_ref().err());
-        let first = reasons.into_iter().next().cloned().unwrap_or_default();
+        let mut reasons = rows.iter().filter_map(|row| row.run.as_ref().err());
+        let first = reasons.next().cloned().unwrap_or_default();
         return Err(Error::refused(format!("no family can be run: {first}")).at(&study.file));
     }
     let known = rows.iter().filter_map(|row| row.run.as_ref().ok());
-    let known = known.flat_map(|run| &run.rms).any(|(_, rms)| rms.is_some());
+    let known = known.flat_map(|run| &run.settled).any(|s| s.rms.is_some());
     Ok(Comparison {
         plant: plant.name.clone(),
         rows,
@@ -116,15 +123,47 @@ pub fn compare(
             (Some(_), true) => Against::Log,
             (Some(_), false) => Against::Nothing,
         },
+        interval,
     })
+}
+
+/// Each of the families on the same samples.
+///
+/// # Errors
+/// The user ended it; a study that does not fit its plant.
+fn run_all(
+    study: &Study,
+    plant: &Plant,
+    families: &[&'static dyn Family],
+    table: &Table,
+    watch: Watch<'_>,
+) -> Result<Vec<Compared>, Error> {
+    let count = families.len() as f64;
+    let mut rows = vec![];
+    for (i, &family) in families.iter().enumerate() {
+        let own = of_family(study, family);
+        let prepared = Prepared::new(&own, plant)?;
+        let mut is_ended = false;
+        let part = &mut |done: f64| {
+            let told = watch((i as f64 + done) / count);
+            is_ended |= told.is_break();
+            told
+        };
+        let run = timed(&prepared, |p| estimate::estimated(p, table, part));
+        match run {
+            Err(error) if is_ended => return Err(error),
+            run => rows.push(Compared {
+                family: family.name(),
+                run: run.map_err(|e| e.to_string()),
+            }),
+        }
+    }
+    Ok(rows)
 }
 
 /// The families asked for; else those that are not refuted, whose required keys are there or not,
 /// and the filters.
-fn families(
-    study: &Study,
-    plant: &lynkeus_model::Plant,
-) -> Result<Vec<&'static dyn Family>, Error> {
+fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Error> {
     let find = |name: &Name| {
         let found = lynkeus_observers::find(&name.text);
         found.ok_or_else(|| {
@@ -155,6 +194,11 @@ fn of_family(study: &Study, family: &dyn Family) -> Study {
     own.observer.tuning.values.retain(|key, _| family.owns(key));
     if family.name() != "ekf" {
         own.estimate.smoothing = None;
+    }
+    // their standard deviations are those of held samples
+    let is_filter = family.owns("initial_variance");
+    if !is_filter && own.estimate.between_samples == BetweenSamples::Linear {
+        own.estimate.deviations = false;
     }
     own
 }
@@ -208,8 +252,12 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
         Some(found / width(q))
     });
     Run {
-        rms: estimated()
-            .map(|q| (q.name.clone(), q.settled_error()))
+        settled: estimated()
+            .map(|q| Settled {
+                quantity: q.name.clone(),
+                rms: q.settled_error(),
+                width: width(q),
+            })
             .collect(),
         peak: errors.peak().map(|peak| peak.2).filter(|_| is_known),
         settling: outcome
@@ -236,39 +284,6 @@ fn size(quantity: &Quantity) -> f64 {
 }
 
 impl Comparison {
-    /// For machines.
-    #[must_use]
-    pub fn to_json(&self) -> Value {
-        let row = |row: &Compared| match &row.run {
-            Err(reason) => json!({ "family": row.family, "refused": reason }),
-            Ok(run) => {
-                let rms: Map<String, Value> = run
-                    .rms
-                    .iter()
-                    .map(|(name, x)| (name.clone(), json!(x)))
-                    .collect();
-                json!({
-                    "family": row.family,
-                    "rms": rms,
-                    "peak": run.peak,
-                    "settling_time": run.settling,
-                    "roughness": run.roughness,
-                    "seconds_per_sample": run.per_sample,
-                    "credible": run.doubt.is_none(),
-                })
-            }
-        };
-        json!({
-            "plant": self.plant,
-            "against": match self.against {
-                Against::Simulation => "simulation",
-                Against::Log => "log",
-                Against::Nothing => "nothing",
-            },
-            "families": self.rows.iter().map(row).collect::<Vec<_>>(),
-        })
-    }
-
     /// Whether an estimate of some family is credible.
     #[must_use]
     pub fn is_positive(&self) -> bool {
@@ -282,95 +297,4 @@ impl Comparison {
     pub fn picture(&self, time_unit: Option<&str>) -> crate::plot::Figure {
         crate::figure::compared(self, time_unit)
     }
-}
-
-/// Quantities shown in a table for people.
-const SHOWN: usize = 5;
-
-impl fmt::Display for Comparison {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let against = match self.against {
-            Against::Simulation => "against the simulated plant",
-            Against::Log => "against the columns of the log that are not read",
-            Against::Nothing => "the log has no true values",
-        };
-        writeln!(f, "{}: {against}\n", self.plant)?;
-        let runs = || {
-            self.rows
-                .iter()
-                .filter_map(|row| Some((row.family, row.run.as_ref().ok()?)))
-        };
-        let names: Vec<&str> = match runs().next() {
-            Some((_, run)) => run
-                .rms
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .take(SHOWN)
-                .collect(),
-            None => vec![],
-        };
-        let mut table = vec![vec!["family".to_owned()]];
-        table[0].extend(names.iter().map(|name| format!("RMS {name}")));
-        for title in ["peak", "settling", "roughness", "µs/sample"] {
-            table[0].push(title.to_owned());
-        }
-        for (family, run) in runs() {
-            let mut line = vec![family.to_owned()];
-            for name in &names {
-                let rms = run
-                    .rms
-                    .iter()
-                    .find(|(n, _)| n == name)
-                    .and_then(|(_, x)| *x);
-                line.push(cell(rms));
-            }
-            line.push(cell(run.peak));
-            line.push(cell(run.settling));
-            line.push(cell(run.roughness));
-            line.push(figures(1e6 * run.per_sample, 2));
-            table.push(line);
-        }
-        aligned(f, &table)?;
-        for (family, run) in runs() {
-            if let Some(doubt) = &run.doubt {
-                writeln!(f, "\n{family}: {doubt}")?;
-            }
-        }
-        for row in &self.rows {
-            if let Err(reason) = &row.run {
-                writeln!(f, "\n{}: {reason}", row.family)?;
-            }
-        }
-        writeln!(
-            f,
-            "\nRMS over the last half; peak and roughness in widths of the declared ranges; settling within 5 % of them"
-        )
-    }
-}
-
-fn cell(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".to_owned(), |x| figures(x, 3))
-}
-
-fn aligned(f: &mut fmt::Formatter<'_>, table: &[Vec<String>]) -> fmt::Result {
-    let columns = table.first().map_or(0, Vec::len);
-    let width = |j: usize| {
-        table
-            .iter()
-            .map(|row| row[j].chars().count())
-            .max()
-            .unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    for row in table {
-        let cells = row.iter().zip(&widths).enumerate();
-        for (j, (text, width)) in cells {
-            match j {
-                0 => write!(f, "{text:<width$}")?,
-                _ => write!(f, "  {text:>width$}")?,
-            }
-        }
-        writeln!(f)?;
-    }
-    Ok(())
 }

@@ -4,11 +4,12 @@ use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
+use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::{Estimator, EstimatorSettings};
 
 use crate::checkpoint::Checkpoint;
 use crate::course::{Course, Samples};
+use crate::frozen::{Channel, Frozen, frozen};
 use crate::headers::time_of;
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
@@ -16,7 +17,7 @@ use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
-use crate::{Error, Outcome, Quantity, Study, Table, filter, prepare, sampled};
+use crate::{Error, Outcome, Quantity, Study, Table, filter, interval, prepare, sampled};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -94,6 +95,7 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
     let mut course = course_of(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
     settle(&mut course, rows, study, table.file())?;
+    let intervals = interval::intervals(prepared, &design, &signals.samples(), &course);
     let logged = |name: &str| {
         let values = logged(table, settings, &time_header, name)?;
         Some(values[..rows].to_vec())
@@ -123,6 +125,8 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
     notes.extend(order_notes);
     notes.extend(gaps(table, settings, &time_header, &design));
     let raw = Raw {
+        intervals,
+        frozen: hanging(study, &design.observer, &signals),
         time: &signals.time[..rows],
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
@@ -132,6 +136,23 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
         design,
     };
     Ok(raw.finish())
+}
+
+/// Where the sensors that an observer reads hang.
+fn hanging(study: &Study, observer: &Observer, signals: &Signals<'_>) -> Vec<Frozen> {
+    let sensors = observer.measured.iter().zip(&signals.readings);
+    let of = |(signal, readings): (&Signal, &&[f64])| {
+        let noises = &mut study.sensors.noise.iter();
+        let limits = &mut study.sensors.limits.iter();
+        let channel = Channel {
+            noise: noises.find(|(n, _)| n.text == signal.name).map(|n| n.1),
+            limits: limits
+                .find(|(n, ..)| n.text == signal.name)
+                .map(|(_, low, high)| (*low, *high)),
+        };
+        frozen(&signal.name, signals.time, readings, channel)
+    };
+    sensors.flat_map(of).collect()
 }
 
 /// A measured state for which neither the study nor the model says where it starts begins at its

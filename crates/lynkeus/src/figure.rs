@@ -1,6 +1,6 @@
 //! The picture of an outcome.
 
-use crate::plot::{Curve, Figure, Kind, Panel};
+use crate::plot::{Band, Curve, Figure, Kind, Panel, Span};
 use crate::study::Name;
 use crate::{Error, Outcome, Quantity};
 
@@ -31,6 +31,7 @@ pub fn figure(
             watch.header, watch.monitor.alarm_below
         ),
         curves: vec![curve(outcome, Kind::Estimated, &watch.values)],
+        ..Panel::default()
     }));
     let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
     Ok(Figure {
@@ -120,13 +121,56 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
     let series = [
         (Kind::True, &quantity.truth),
         (Kind::Measured, &quantity.measured),
-        (Kind::Estimated, &quantity.estimate),
+        (
+            Kind::Estimated,
+            quantity
+                .estimate
+                .as_ref()
+                .map_or(&quantity.expected, |_| &quantity.estimate),
+        ),
+        (Kind::Smoothed, &quantity.smoothed),
     ];
     let curves = series
         .into_iter()
         .filter_map(|(kind, values)| Some(curve(outcome, kind, values.as_ref()?)))
         .collect();
-    Panel { caption, curves }
+    Panel {
+        caption,
+        curves,
+        bands: band(outcome, quantity).into_iter().collect(),
+        outside: outside(outcome, quantity),
+    }
+}
+
+/// Standard deviations that a band reaches to either side.
+const DEVIATIONS: f64 = 2.0;
+
+fn band(outcome: &Outcome, quantity: &Quantity) -> Option<Band> {
+    let (estimate, deviation) = (quantity.estimate.as_ref()?, quantity.deviation.as_ref()?);
+    let edge = |side: f64| {
+        let pairs = estimate.iter().zip(deviation);
+        pairs.map(|(x, sd)| x + side * DEVIATIONS * sd).collect()
+    };
+    Some(Band {
+        time: outcome.time.clone(),
+        low: edge(-1.0),
+        high: edge(1.0),
+    })
+}
+
+/// When the estimate is outside of its declared range.
+fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Span> {
+    let excursions = outcome.estimate_outside.iter().flat_map(|o| &o.quantities);
+    let mut own = excursions.filter(|e| e.name == quantity.name);
+    let stretches = own.next().map_or(&[][..], |e| &e.stretches);
+    let at = |row: usize| outcome.time.get(row).copied();
+    let spans = stretches.iter().filter_map(|rows| {
+        Some(Span {
+            from: at(*rows.start())?,
+            to: at(*rows.end())?,
+        })
+    });
+    spans.collect()
 }
 
 fn curve(outcome: &Outcome, kind: Kind, values: &[f64]) -> Curve {

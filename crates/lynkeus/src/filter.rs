@@ -65,8 +65,8 @@ pub(crate) fn estimator(
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
-    if study.estimate.smoothing.is_some() && tuning.kind != FilterKind::Extended {
-        let message = "`smooth` and `lag` of [estimate] need family = \"ekf\"";
+    if study.estimate.smoothing.is_some() && matches!(tuning.kind, FilterKind::MovingHorizon(..)) {
+        let message = "`smooth` and `lag` of [estimate] need family = \"ekf\" or \"ukf\"";
         return Err(Error::input(message).at(&study.file));
     }
     let model = model(study, extended, design, tuning, samples, notes)?;

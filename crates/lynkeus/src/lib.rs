@@ -54,10 +54,12 @@
 //! the program `lynkeus`.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod accuracy;
 mod calibrate;
 mod certify;
 mod check;
 mod checkpoint;
+mod choice;
 #[cfg(feature = "tune")]
 mod compare;
 mod correction;
@@ -66,14 +68,18 @@ mod credible;
 mod design;
 mod error;
 mod estimate;
+mod expected;
 #[cfg(feature = "plot")]
 mod figure;
 mod files;
 mod filter;
+mod frozen;
 mod headers;
 mod innovations;
 pub mod interrupt;
+mod interval;
 mod live;
+mod modes;
 mod near;
 mod outcome;
 mod outside;
@@ -81,6 +87,7 @@ mod outside;
 pub mod plot;
 pub mod precision;
 pub mod prepare;
+mod propose;
 mod replay;
 mod sampled;
 mod simulate;
@@ -92,11 +99,13 @@ pub mod tune;
 pub mod visible;
 mod words;
 
+pub use accuracy::{Accuracy, Settling};
 pub use certify::{CertifyReport, Strays, certify};
-pub use check::{CheckOptions, Report, check};
+pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, check};
 pub use checkpoint::Checkpoint;
+pub use choice::{Choice, Grounds};
 #[cfg(feature = "tune")]
-pub use compare::{Against, Compared, Comparison, Run, compare};
+pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
 pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};
@@ -104,11 +113,14 @@ pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
 #[cfg(feature = "plot")]
 pub use figure::figure;
+pub use frozen::Frozen;
 pub use innovations::Innovations;
+pub use interval::Intervals;
 pub use live::estimator;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
+pub use propose::Proposal;
 pub use simulate::simulate;
 pub use study::{Study, schema};
 pub use systems::observer as observer_system;

@@ -1,18 +1,22 @@
 //! What a simulation or a replay gives.
 
+use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 
+use crate::accuracy::{self, Accuracy};
 use crate::course::Course;
 use crate::credible::{self, Doubt};
+use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
 use crate::innovations::{Innovations, innovations};
+use crate::interval::Intervals;
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::systems::hat;
-use crate::{Error, Study, estimate};
+use crate::{Error, Study, estimate, expected};
 
 /// One quantity of the result with everything that is known of it.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +33,8 @@ pub struct Quantity {
     pub measured: Option<Vec<f64>>,
     /// what the observer makes of it
     pub estimate: Option<Vec<f64>>,
+    /// what the estimate says of a measured output that is no state
+    pub expected: Option<Vec<f64>>,
     /// its standard deviation, where it is asked for
     pub deviation: Option<Vec<f64>>,
     /// the estimate given later rows, too
@@ -109,6 +115,12 @@ pub struct Outcome {
     pub innovations: Vec<Innovations>,
     /// where these contradict the declared noise, in words
     pub contradictions: Vec<String>,
+    /// errors of the estimates whose true values are known
+    pub accuracies: Vec<Accuracy>,
+    /// sensors whose readings hang
+    pub frozen: Vec<Frozen>,
+    /// the log's sampling interval against what the observer stands; none where that is not known
+    pub intervals: Option<Intervals>,
     /// why the run ended before its last row
     pub ended: Option<Ended>,
     /// what the user should know
@@ -200,6 +212,8 @@ pub(crate) struct Raw<'r> {
     pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Vec<f64>)>,
+    pub frozen: Vec<Frozen>,
+    pub intervals: Option<Intervals>,
     pub notes: Vec<String>,
 }
 
@@ -213,9 +227,13 @@ impl Raw<'_> {
             mut course,
             mut quantities,
             measurements,
+            frozen,
+            intervals,
             mut notes,
         } = self;
         notes.append(&mut course.notes);
+        notes.extend(frozen.iter().map(Frozen::words));
+        notes.extend(intervals.as_ref().and_then(Intervals::words));
         let innovations = innovations(&design, &course, &mut notes);
         let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
@@ -236,7 +254,10 @@ impl Raw<'_> {
         }
         let watches = watches(&design, &mut course.monitors, time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
+        expected::give(prepared.extended(), time, &mut quantities);
         let sides = outside::sides(prepared.extended());
+        let accuracies = accuracy::accuracies(time, &quantities, &sides);
+        notes.extend(accuracy::told(&accuracies));
         let itself = outside::time_itself(time);
         let all = || quantities.iter().chain([&itself]);
         let plant_outside = outside(time, all(), outside::PLANT, &sides);
@@ -260,6 +281,9 @@ impl Raw<'_> {
                 file: prepared.study().file.clone(),
             }),
             innovations,
+            accuracies,
+            frozen,
+            intervals,
             time: time.to_vec(),
             time_header,
             design,
@@ -329,7 +353,7 @@ pub(crate) fn settle(
 ) -> Result<(), Error> {
     match (course.ended.take(), study.budget.marked()) {
         (None, _) => Ok(()),
-        (Some(RunError::Cancelled { time }), Some(spent)) => {
+        (Some(RunError::Cancelled { time }), Some(spent)) if spent != Spent::Cancelled => {
             let note = format!("the run is not whole: {spent} at t = {time}");
             course.notes.push(note);
             Ok(())

@@ -1,5 +1,7 @@
 //! How far a run stays in the box for which everything is proved.
 
+use std::ops::RangeInclusive;
+
 use lynkeus_structure::{Extended, Side, figures};
 use serde_json::{Map, Value, json};
 
@@ -30,6 +32,8 @@ pub struct Excursion {
     pub value: f64,
     /// the value that is farthest outside
     pub farthest: f64,
+    /// first and last row of each stretch of rows at which it is outside
+    pub stretches: Vec<RangeInclusive<usize>>,
 }
 
 /// Where a run is outside of the box.
@@ -114,8 +118,23 @@ fn excursion(time: &[f64], side: &Side, values: &[f64], any: &mut [bool]) -> Opt
         share: share(&is_outside),
         first: *time.get(first)?,
         value: *values.get(first)?,
+        stretches: stretches(&is_outside),
         farthest: farthest.max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)))?,
     })
+}
+
+/// The rows in a row at which it is so.
+fn stretches(is_so: &[bool]) -> Vec<RangeInclusive<usize>> {
+    let mut row = 0;
+    let mut found = vec![];
+    for stretch in is_so.chunk_by(|a, b| a == b) {
+        let next = row + stretch.len();
+        if stretch[0] {
+            found.push(row..=next - 1);
+        }
+        row = next;
+    }
+    found
 }
 
 /// What counts as rounding beside a side: a share of its width, or where that is none of the

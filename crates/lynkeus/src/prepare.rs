@@ -5,9 +5,11 @@ use std::time::Duration;
 
 use lynkeus_expr::Budget;
 use lynkeus_model::{LoadError, LoadOptions, Plant};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, TuningError, Value};
-use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, Standing, range};
+use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value};
+use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
+use crate::choice::{Choice, choose};
+use crate::propose::Proposal;
 use crate::study::Name;
 use crate::{Error, Study, calibrate, systems};
 
@@ -65,6 +67,8 @@ pub struct Prepared<'a> {
     extended: Extended<'a>,
     /// made when first asked for
     examinations: OnceCell<Vec<Examination>>,
+    /// the same
+    choice: OnceCell<Option<Choice>>,
 }
 
 /// Sides of a smaller box: name, least and greatest value.
@@ -93,6 +97,7 @@ impl<'a> Prepared<'a> {
             study,
             extended,
             examinations: OnceCell::new(),
+            choice: OnceCell::new(),
         })
     }
 
@@ -147,53 +152,66 @@ impl<'a> Prepared<'a> {
         self.design_with(&self.study.observer.tuning)
     }
 
+    /// The family to use, and why: the same for every command.
+    ///
+    /// # Errors
+    /// Keys of `[observer]` that cannot be used.
+    pub fn choice(&self) -> Result<Option<&Choice>, Error> {
+        if let Some(known) = self.choice.get() {
+            return Ok(known.as_ref());
+        }
+        let found = choose(self)?;
+        Ok(self.choice.get_or_init(|| found).as_ref())
+    }
+
     /// The same with another tuning.
     pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<Design, Error> {
         let examinations = self.examinations()?;
-        let Some(chosen) = recommended(examinations) else {
+        let Some(choice) = self.choice()? else {
             return Err(none_fits(self.study, examinations));
         };
+        let mut design = self.made(choice, tuning)?;
+        design.notes.extend(choice.notes());
+        Ok(design)
+    }
+
+    fn made(&self, choice: &Choice, tuning: &Tuning) -> Result<Design, Error> {
+        if let Some(design) = &choice.design
+            && *tuning == self.study.observer.tuning
+            && !is_certified_gain(tuning)
+        {
+            return Ok(design.clone());
+        }
+        let examinations = self.examinations()?;
+        let Some(chosen) = examinations.iter().find(|e| e.family == choice.family) else {
+            return Err(none_fits(self.study, examinations));
+        };
+        let mut tuned = tuning.clone();
+        if let Some(Proposal { value, .. }) = choice.proposal {
+            let slot = tuned.values.entry(Proposal::KEY.to_owned());
+            slot.or_insert(Value::Number(value));
+        }
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
             true => Some(self.narrowed(&self.simulated_inputs()?)?),
             false => None,
         };
         let place = simulated.as_ref().unwrap_or(&self.extended);
-        let mut design = match design_by(chosen, place, tuning) {
-            Err(DesignError::Tuning(error)) if error.absent => {
-                self.without(chosen, &error, tuning)?
-            }
-            design => design.map_err(|error| self.refusal(error))?,
-        };
-        let by_itself =
-            self.study.observer.family.is_none() && chosen.family == design.observer.family;
-        if by_itself && design.observer.filter.is_some() {
-            design.notes.push(FALLBACK.to_owned());
-        }
-        Ok(design)
+        let design = self.designed(chosen, place, &tuned);
+        design.map_err(|error| self.refusal(error))
     }
 
-    /// Where the chosen family lacks a key, and no family was asked for: the next one that
-    /// needs none.
-    fn without(
+    /// What a family makes of the plant on a box.
+    pub(crate) fn designed(
         &self,
         chosen: &Examination,
-        error: &TuningError,
+        place: &Extended<'_>,
         tuning: &Tuning,
-    ) -> Result<Design, Error> {
-        let refusal = || self.refusal(DesignError::Tuning(error.clone()));
-        if self.study.observer.family.is_some() {
-            return Err(refusal());
+    ) -> Result<Design, DesignError> {
+        match lynkeus_observers::find(chosen.family) {
+            Some(family) => family.design(place, tuning),
+            None => Err(DesignError::Refused(Box::new(chosen.clone()))),
         }
-        let next = self.examinations()?.iter().find(|e| !e.has_theorem());
-        let next = next.ok_or_else(refusal)?;
-        let mut design =
-            design_by(next, &self.extended, tuning).map_err(|error| self.refusal(error))?;
-        design.notes.push(format!(
-            "{} fits, and what it estimates comes with a theorem; it needs `{}` in [observer]: {}",
-            chosen.family, error.key, error.expected
-        ));
-        Ok(design)
     }
 
     /// The plant on a smaller box.
@@ -310,37 +328,10 @@ fn blame(study: &Study, error: SensorsError) -> Error {
     }
 }
 
-/// The family to use: the first with a theorem that fits, else the first that is undecided, else
-/// the first that asks nothing of the plant.
-pub fn recommended(examinations: &[Examination]) -> Option<&Examination> {
-    let with = |fit: Standing| {
-        let examined = examinations.iter().filter(|e| e.spent().is_none());
-        examined.filter(move |e| e.fit() == fit)
-    };
-    with(Standing::Proved)
-        .find(|e| e.has_theorem())
-        .or_else(|| with(Standing::Undecided).next())
-        .or_else(|| with(Standing::Proved).next())
-}
-
 /// Whether the study asks for a certified gain.
 pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
     tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
 }
-
-fn design_by(
-    chosen: &Examination,
-    extended: &Extended<'_>,
-    tuning: &Tuning,
-) -> Result<Design, DesignError> {
-    match lynkeus_observers::find(chosen.family) {
-        Some(family) => family.design(extended, tuning),
-        None => Err(DesignError::Refused(Box::new(chosen.clone()))),
-    }
-}
-
-/// What is lost where a filter takes the place of the families with a theorem.
-const FALLBACK: &str = "no family with a theorem fits this plant and these sensors (`lynkeus check` says why): a filter estimates all the same, and nothing is proved of its error";
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     if let Some(spent) = examinations.iter().find_map(Examination::spent) {

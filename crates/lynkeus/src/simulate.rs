@@ -16,9 +16,6 @@ use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
 use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare};
 
-/// Rows of a result whose study does not say how many.
-const ROWS: f64 = 500.0;
-
 /// Runs the study's plant with its observer; `watch` is told the fraction done
 /// and may stop the run.
 ///
@@ -115,16 +112,16 @@ pub(crate) fn within<'a>(
     }
 }
 
-/// The study's plant as a logger would have it, sample by sample, with the true states and unknown
+/// The study's plant as a logger would have it, a sample every `step`, with the true states and unknown
 /// inputs in columns of their own.
 ///
 /// # Errors
 /// A study that cannot be run.
 #[cfg(feature = "tune")]
-pub(crate) fn recorded(study: &Study, plant: &Plant) -> Result<Table, Error> {
+pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table, Error> {
     let settings = settings(study)?;
     let mut simulation = open_loop(study, settings, plant)?;
-    simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
+    simulation.output_step = step;
     let run = simulation
         .run_watched(&mut within(&study.budget, &mut |_| {
             ControlFlow::Continue(())
@@ -162,7 +159,6 @@ pub(crate) fn open_loop(
     settings: &SimulateSettings,
     plant: &Plant,
 ) -> Result<Simulation, Error> {
-    let span = settings.until - settings.start;
     let inputs = systems::input_expressions(study, plant, settings)?;
     Ok(Simulation {
         plant: systems::plant(plant, settings)?,
@@ -170,7 +166,7 @@ pub(crate) fn open_loop(
         observer: None,
         start: settings.start,
         until: settings.until,
-        output_step: settings.output_step.unwrap_or(span / ROWS),
+        output_step: settings.row_step(),
         method: method(&settings.method),
         noise: noise(study, settings, plant)?,
         record_outputs: true,
@@ -204,7 +200,18 @@ fn noise(
         seed: settings.seed,
         sample_step: settings.sample_step,
         levels,
+        process: process(study, plant),
     })
+}
+
+/// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.
+fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
+    let mut densities = BTreeMap::new();
+    for (name, density) in &study.process_noise {
+        let states = plant.states.iter().filter(|s| name.is_or_has(&s.name));
+        densities.extend(states.map(|s| (s.name.clone(), *density)));
+    }
+    densities
 }
 
 fn outcome(
@@ -246,6 +253,8 @@ fn outcome(
         time: run.times(),
         quantities,
         measurements: measurements(&design, measured),
+        frozen: vec![],
+        intervals: None,
         notes: design.notes.clone(),
         course,
         prepared,

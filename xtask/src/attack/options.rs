@@ -25,7 +25,7 @@ pub struct Options {
 impl Options {
     /// Reads `--seed N --count N --seconds N --limit SECONDS --binary FILE`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut options = Self {
+        let mut asked = Self {
             seed: 1,
             count: 100_000,
             seconds: None,
@@ -33,18 +33,18 @@ impl Options {
             binary: None,
             folder: root().join("target/attack"),
         };
-        let known = ["--seed", "--count", "--seconds", "--limit", "--binary"];
-        options::read(arguments, &known, |key, value| {
-            match key {
-                "--seed" => options.seed = value.number()?,
-                "--count" => options.count = value.number()?,
-                "--seconds" => options.seconds = Some(value.number()?),
-                "--limit" => options.limit = Duration::from_secs(value.number()?),
-                _ => options.binary = Some(PathBuf::from(value.text)),
+        options::read(arguments, |pair| {
+            match pair.key {
+                "--seed" => asked.seed = pair.number()?,
+                "--count" => asked.count = pair.number()?,
+                "--seconds" => asked.seconds = Some(pair.number()?),
+                "--limit" => asked.limit = Duration::from_secs(pair.number()?),
+                "--binary" => asked.binary = Some(pair.path()),
+                _ => return pair.refuse("--seed, --count, --seconds, --limit or --binary"),
             }
             Ok(())
         })?;
-        Ok(options)
+        Ok(asked)
     }
 
     /// The command that is attacked, as an absolute path.

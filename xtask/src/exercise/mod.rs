@@ -31,22 +31,21 @@ pub struct Options {
 
 impl Options {
     fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut options = Self {
+        let mut asked = Self {
             seed: 1,
             count: 10_000_000,
             seconds: None,
         };
-        let known = ["--seed", "--count", "--seconds"];
-        options::read(arguments, &known, |key, value| {
-            let number = value.number()?;
-            match key {
-                "--seed" => options.seed = number,
-                "--count" => options.count = number,
-                _ => options.seconds = Some(number),
+        options::read(arguments, |pair| {
+            match pair.key {
+                "--seed" => asked.seed = pair.number()?,
+                "--count" => asked.count = pair.number()?,
+                "--seconds" => asked.seconds = Some(pair.number()?),
+                _ => return pair.refuse("--seed, --count or --seconds"),
             }
             Ok(())
         })?;
-        Ok(options)
+        Ok(asked)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use astro_float_num::{BigFloat, Consts, INF_NEG, INF_POS, NAN, RoundingMode};
-use lynkeus::expr::{Algebra, Binary, Reals, Unary};
+use lynkeus::expr::{Algebra, Binary, Implicit, Reals, Unary};
 
 const ROUNDING: RoundingMode = RoundingMode::ToEven;
 
@@ -223,6 +223,15 @@ impl Algebra for Precise {
         let near = |values: &[BigFloat]| values.iter().map(Self::rounded).collect::<Vec<f64>>();
         let (_, rcond) = Reals.solve(&near(a), &near(b));
         (x, self.number(rcond))
+    }
+
+    /// The root that is found at run time, with more digits.
+    fn implicit(&self, function: &Implicit, p: &[BigFloat]) -> Vec<BigFloat> {
+        let near: Vec<f64> = p.iter().map(Self::rounded).collect();
+        let z = Reals.implicit(function, &near);
+        let z = z.iter().map(|&z| self.number(z)).collect();
+        let steps = self.bits.max(2).ilog2() as usize;
+        function.refined(self, z, p, steps)
     }
 }
 

@@ -9,6 +9,8 @@ use super::judge::{Effort, Flaw, Violation};
 use super::tally::{Counts, Tally};
 use crate::options;
 
+const KEYS: &str = "--seed, --count, --refutations, --plants, --seconds or --family";
+
 /// What to search, and for how long.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -30,7 +32,7 @@ pub struct Options {
 impl Options {
     /// Reads `--seed N --count N --refutations N --plants N --seconds N --family F`.
     pub fn read(arguments: &[String]) -> Result<Self, String> {
-        let mut options = Self {
+        let mut asked = Self {
             seed: 1,
             count: 20_000,
             refutations: 5_000,
@@ -39,26 +41,19 @@ impl Options {
             kind: None,
             folder: PathBuf::from("target/falsify"),
         };
-        let known = [
-            "--seed",
-            "--count",
-            "--refutations",
-            "--plants",
-            "--seconds",
-            "--family",
-        ];
-        options::read(arguments, &known, |key, value| {
-            match key {
-                "--seed" => options.seed = value.number()?,
-                "--count" => options.count = value.number()? as usize,
-                "--refutations" => options.refutations = value.number()? as usize,
-                "--plants" => options.plants = Some(value.number()?),
-                "--seconds" => options.seconds = Some(value.number()?),
-                _ => options.kind = Some(kind(value.text)?),
+        options::read(arguments, |pair| {
+            match pair.key {
+                "--seed" => asked.seed = pair.number()?,
+                "--count" => asked.count = pair.number()? as usize,
+                "--refutations" => asked.refutations = pair.number()? as usize,
+                "--plants" => asked.plants = Some(pair.number()?),
+                "--seconds" => asked.seconds = Some(pair.number()?),
+                "--family" => asked.kind = Some(kind(pair.value)?),
+                _ => return pair.refuse(KEYS),
             }
             Ok(())
         })?;
-        Ok(options)
+        Ok(asked)
     }
 
     /// All families examine one plant in sixteen, for their refutations; every one, and

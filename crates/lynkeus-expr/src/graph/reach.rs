@@ -34,7 +34,7 @@ impl Marks {
 
 impl Inner {
     /// Hands over the arguments of a node.
-    fn each_argument(&self, node: Node, mut give: impl FnMut(Node)) {
+    pub(super) fn each_argument(&self, node: Node, mut give: impl FnMut(Node)) {
         match self.ops[node.index()] {
             Op::Constant(_) | Op::Symbol(_) => {}
             Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => give(a),
@@ -49,6 +49,10 @@ impl Inner {
             }
             Op::Solve(system) => {
                 let arguments = &self.systems[system as usize].arguments;
+                arguments.iter().copied().for_each(give);
+            }
+            Op::Implicit(call) => {
+                let arguments = &self.implicits[call as usize].arguments;
                 arguments.iter().copied().for_each(give);
             }
         }

@@ -1,7 +1,7 @@
-//! Linear systems as nodes.
+//! Linear systems and implicit functions as nodes.
 
-use super::{Graph, Key, Node};
-use crate::Op;
+use super::{Graph, Inner, Key, Node};
+use crate::{Binary, Implicit, Nodes, Op, Unary};
 
 /// The linear system A x = b of an [`Op::Solve`] node.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
@@ -39,6 +39,38 @@ pub struct Solution {
     pub rcond: Node,
 }
 
+/// The implicit function of an [`Op::Implicit`] node, and where it is taken.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct ImplicitCall {
+    /// z as a function of p
+    pub function: Implicit,
+    /// p
+    pub arguments: Vec<Node>,
+}
+
+impl ImplicitCall {
+    /// (z, p): the results of the node and its arguments.
+    pub fn at(&self, graph: &Graph, node: Node) -> Vec<Node> {
+        let z = (0..self.function.size() as u32).map(|i| graph.entry(node, i));
+        z.chain(self.arguments.iter().copied()).collect()
+    }
+}
+
+impl Inner {
+    /// The node of a system, made by `make` where it is new; none where the budget is spent.
+    fn system_node(
+        &mut self,
+        known: Option<Node>,
+        make: impl FnOnce(&mut Self) -> Op,
+    ) -> Option<Node> {
+        if known.is_some() || self.is_spent() {
+            return known;
+        }
+        let op = make(self);
+        Some(self.push(op))
+    }
+}
+
 impl Graph {
     /// The linear system, where the node is an [`Op::Solve`].
     pub fn system(&self, node: Node) -> Option<LinearSystem> {
@@ -60,23 +92,19 @@ impl Graph {
             n,
         };
         let mut inner = self.inner.borrow_mut();
-        let node = match inner.known_systems.get(&system).copied() {
-            Some(node) => node,
-            None if inner.is_spent() => {
-                let nothing = inner.nothing();
-                return Solution {
-                    x: vec![nothing; n],
-                    rcond: nothing,
-                };
-            }
-            None => {
-                let index = inner.systems.len() as u32;
-                inner.systems.push(system.clone());
-                let node = inner.push(Op::Solve(index));
-                inner.known_systems.insert(system, node);
-                node
-            }
+        let known = inner.known_systems.get(&system).copied();
+        let node = inner.system_node(known, |inner| {
+            inner.systems.push(system.clone());
+            Op::Solve(inner.systems.len() as u32 - 1)
+        });
+        let Some(node) = node else {
+            let nothing = inner.nothing();
+            return Solution {
+                x: vec![nothing; n],
+                rcond: nothing,
+            };
         };
+        inner.known_systems.insert(system, node);
         let mut entry = |i: usize| {
             let i = i as u32;
             inner.intern(Key::Entry(node, i), Op::Entry(node, i))
@@ -87,7 +115,72 @@ impl Graph {
         }
     }
 
-    /// One result of a `Solve` node built before.
+    /// The implicit function and its arguments, where the node is an [`Op::Implicit`].
+    pub fn implicit_call(&self, node: Node) -> Option<ImplicitCall> {
+        let Op::Implicit(index) = self.op(node) else {
+            return None;
+        };
+        self.inner.borrow().implicits.get(index as usize).cloned()
+    }
+
+    /// The entries of z with g(z, p) = 0.
+    ///
+    /// # Panics
+    /// If `p` has not the function's number of entries.
+    pub fn implicit(&self, function: &Implicit, p: &[Node]) -> Vec<Node> {
+        assert_eq!(p.len(), function.parameters(), "one node per entry of p");
+        let call = ImplicitCall {
+            function: function.clone(),
+            arguments: p.to_vec(),
+        };
+        let mut inner = self.inner.borrow_mut();
+        let known = inner.known_implicits.get(&call).copied();
+        let node = inner.system_node(known, |inner| {
+            inner.implicits.push(call.clone());
+            Op::Implicit(inner.implicits.len() as u32 - 1)
+        });
+        let Some(node) = node else {
+            return vec![inner.nothing(); function.size()];
+        };
+        inner.known_implicits.insert(call, node);
+        let entries = (0..function.size() as u32)
+            .map(|i| inner.intern(Key::Entry(node, i), Op::Entry(node, i)));
+        entries.collect()
+    }
+
+    /// Whether the value of a node may jump where its arguments do not.
+    pub fn jumps(&self, node: Node) -> bool {
+        use Binary::{And, Equal, Less, LessEq, Or};
+        match self.op(node) {
+            Op::Unary(op, _) => matches!(op, Unary::Sign | Unary::Floor | Unary::Not),
+            Op::Binary(op, ..) => matches!(op, Less | LessEq | Equal | And | Or),
+            Op::Implicit(_) => self
+                .implicit_call(node)
+                .is_some_and(|call| call.function.steps()),
+            _ => false,
+        }
+    }
+
+    /// The roots, and of every implicit function below them what it makes zero, there: what
+    /// happens inside is then seen among the nodes.
+    pub fn with_residuals(&self, roots: &[Node]) -> Vec<Node> {
+        let (mut all, mut seen) = (roots.to_vec(), 0);
+        loop {
+            let nodes = self.reachable(&all).into_iter();
+            let calls = nodes.filter_map(|node| Some((node, self.implicit_call(node)?)));
+            let calls: Vec<(Node, ImplicitCall)> = calls.collect();
+            for (node, call) in &calls[seen..] {
+                let at = call.at(self, *node);
+                all.extend(call.function.residual(&Nodes(self), &at));
+            }
+            if calls.len() == seen {
+                return all;
+            }
+            seen = calls.len();
+        }
+    }
+
+    /// One result of a `Solve` or an `Implicit` node built before.
     pub(crate) fn entry(&self, solve: Node, i: u32) -> Node {
         self.inner
             .borrow_mut()

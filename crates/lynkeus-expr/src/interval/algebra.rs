@@ -1,7 +1,7 @@
 //! Evaluation of tapes over intervals.
 
-use super::{Interval, solve};
-use crate::{Algebra, Binary, Unary};
+use super::{Interval, implicit, solve};
+use crate::{Algebra, Binary, Implicit, Unary};
 
 /// The algebra of [`Interval`]s: a tape evaluated over a box gives enclosures of the outputs on that box.
 ///
@@ -78,5 +78,9 @@ impl Algebra for Intervals {
         let (x, regular) = solve(a, b);
         let rcond = Interval::ZERO.hull(Interval::ONE).and_defined(regular);
         (x, rcond)
+    }
+
+    fn implicit(&self, function: &Implicit, p: &[Interval]) -> Vec<Interval> {
+        implicit::enclose(function, p)
     }
 }

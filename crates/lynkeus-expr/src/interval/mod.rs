@@ -23,6 +23,7 @@ mod algebra;
 mod arithmetic;
 mod atan2;
 mod elementary;
+mod implicit;
 mod logic;
 mod power;
 mod rounding;

@@ -9,6 +9,8 @@
 mod elimination;
 mod preconditioned;
 
+pub(super) use preconditioned::invert;
+
 use super::Interval;
 
 /// Encloses all solutions x of A x = b; `a` is n×n row by row, `b` has n entries.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::{Code, Instruction, MissingInput, Register, SolveSlots};
+use super::{Code, Instruction, MissingInput, Register, System, SystemSlots};
 use crate::{Graph, Node, Op};
 
 /// Linear-scan register allocation over the reachable nodes.
@@ -38,7 +38,7 @@ impl<'g> Compiler<'g> {
 
     fn place_leaves(&mut self, outputs: &[Node]) -> Result<(), MissingInput> {
         // a system has results but no value of its own
-        let valueless = |&&node: &&Node| matches!(self.graph.op(node), Op::Solve(_));
+        let valueless = |&&node: &&Node| self.graph.op(node).is_system();
         if let Some(&node) = outputs.iter().find(valueless) {
             let name = self.graph.render(node, 20);
             return Err(MissingInput { name });
@@ -91,11 +91,10 @@ impl<'g> Compiler<'g> {
         let arguments = self.graph.arguments(node);
         let from: Vec<Register> = arguments.iter().map(|a| self.register[a]).collect();
         let instruction = match op {
-            Op::Solve(_) => {
-                let n = self.graph.system(node).map_or(0, |system| system.size());
+            Op::Solve(_) | Op::Implicit(_) => {
                 // results must not land on arguments: arguments are released after
-                self.code.systems.push(SolveSlots {
-                    n,
+                self.code.systems.push(SystemSlots {
+                    system: self.system(node),
                     arguments: from,
                     results: vec![],
                 });
@@ -115,6 +114,13 @@ impl<'g> Compiler<'g> {
         }
         self.code.instructions.push(instruction);
         self.code.sources.push(node);
+    }
+
+    fn system(&self, node: Node) -> System {
+        match self.graph.implicit_call(node) {
+            Some(call) => System::Implicit(call.function),
+            None => System::Linear(self.graph.system(node).map_or(0, |system| system.size())),
+        }
     }
 
     /// Results of a system are written when it is solved, so each takes a fresh

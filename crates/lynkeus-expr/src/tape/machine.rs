@@ -1,14 +1,14 @@
 //! What code runs on.
 
-use super::{Code, Instruction};
-use crate::{Algebra, Binary};
+use super::{Code, Instruction, System};
+use crate::{Algebra, Binary, Reals};
 
 /// Registers over one algebra, for one [`Code`].
 #[derive(Clone)]
 pub(super) struct Machine<A: Algebra> {
     algebra: A,
     pub registers: Vec<A::Value>,
-    /// A and b of the linear system that is being solved
+    /// the arguments of the system that is being solved
     system: Vec<A::Value>,
 }
 
@@ -80,10 +80,33 @@ impl<A: Algebra> Machine<A> {
         let arguments = slots.arguments.iter();
         self.system
             .extend(arguments.map(|&a| r[a as usize].clone()));
-        let (a, x) = self.system.split_at_mut(slots.n * slots.n);
-        let rcond = self.algebra.solve_in_place(a, x);
-        for &(entry, to) in &slots.results {
-            r[to as usize].clone_from(x.get(entry).unwrap_or(&rcond));
+        match &slots.system {
+            System::Linear(n) => {
+                let (a, x) = self.system.split_at_mut(n * n);
+                let rcond = self.algebra.solve_in_place(a, x);
+                for &(entry, to) in &slots.results {
+                    r[to as usize].clone_from(x.get(entry).unwrap_or(&rcond));
+                }
+            }
+            System::Implicit(function) => {
+                let z = self.algebra.implicit(function, &self.system);
+                for &(entry, to) in &slots.results {
+                    r[to as usize].clone_from(&z[entry]);
+                }
+            }
+        }
+    }
+}
+
+impl Machine<Reals> {
+    /// Why the instruction that was just run found no root, where it looked for one.
+    pub fn failure(&self, code: &Code, instruction: &Instruction) -> Option<String> {
+        let Instruction::Solve(index) = *instruction else {
+            return None;
+        };
+        match &code.systems[index as usize].system {
+            System::Linear(_) => None,
+            System::Implicit(function) => function.root(&self.system).err().map(|f| f.to_string()),
         }
     }
 }

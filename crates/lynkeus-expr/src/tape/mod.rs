@@ -6,7 +6,7 @@ mod machine;
 use std::fmt;
 use std::sync::Arc;
 
-use crate::{Algebra, Binary, Graph, Node, Reals, Unary};
+use crate::{Algebra, Binary, Graph, Implicit, Node, Reals, Unary};
 use compiler::Compiler;
 use machine::Machine;
 
@@ -24,7 +24,7 @@ enum Instruction {
     Powi(i32, Register, Register),
     Binary(Binary, Register, Register, Register),
     Select(Register, Register, Register, Register),
-    /// index among the tape's linear systems
+    /// index among the tape's linear systems and implicit functions
     Solve(u32),
 }
 
@@ -40,10 +40,19 @@ impl Instruction {
     }
 }
 
-/// Registers of one linear system: A and b, and where its used results go.
+/// What a system computes from its arguments.
 #[derive(Clone, Debug)]
-struct SolveSlots {
-    n: usize,
+enum System {
+    /// A x = b of n unknowns, from A and b
+    Linear(usize),
+    /// z with g(z, p) = 0, from p
+    Implicit(Implicit),
+}
+
+/// Registers of one system: its arguments, and where its used results go.
+#[derive(Clone, Debug)]
+struct SystemSlots {
+    system: System,
     arguments: Vec<Register>,
     /// (which result, register)
     results: Vec<(usize, Register)>,
@@ -73,7 +82,7 @@ struct Code {
     instructions: Vec<Instruction>,
     /// the node each instruction computes
     sources: Vec<Node>,
-    systems: Vec<SolveSlots>,
+    systems: Vec<SystemSlots>,
     outputs: Vec<Register>,
 }
 
@@ -138,7 +147,7 @@ impl Tape {
     }
 
     /// Names the first operation that makes a NaN or an infinity out of finite
-    /// arguments at these inputs.
+    /// arguments at these inputs; of an algebraic loop also how the search ended.
     pub fn first_nonfinite(&self, graph: &Graph, inputs: &[f64]) -> Option<String> {
         let code = &*self.code;
         let mut machine = Machine::new(code, Reals);
@@ -151,7 +160,9 @@ impl Tape {
                 (!value.is_finite()).then_some(value)
             });
             if let Some(value) = bad {
-                return Some(format!("{} is {value}", graph.render(source, 160)));
+                let failure = machine.failure(code, instruction);
+                let failure = failure.map_or_else(String::new, |how| format!(": {how}"));
+                return Some(format!("{} is {value}{failure}", graph.render(source, 160)));
             }
         }
         None

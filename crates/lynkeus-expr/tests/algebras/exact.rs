@@ -1,7 +1,7 @@
 //! The reference: an algebra of numbers with as many bits as wanted, by the `astro-float` library.
 
 use astro_float::{BigFloat, Consts, RoundingMode};
-use lynkeus_expr::{Algebra, Binary, Interval, Unary};
+use lynkeus_expr::{Algebra, Binary, Implicit, Interval, Reals, Unary};
 use std::cell::RefCell;
 
 const NEAREST: RoundingMode = RoundingMode::ToEven;
@@ -202,6 +202,14 @@ impl Algebra for Exact {
         }
         let x = (0..n).map(|i| self.div(&rows[i][n], &rows[i][i]));
         (x.collect(), self.constant(f64::NAN))
+    }
+
+    /// Newton's method from the root over `f64`, which is within reach of the exact one.
+    fn implicit(&self, function: &Implicit, p: &[BigFloat]) -> Vec<BigFloat> {
+        let near: Vec<f64> = p.iter().map(to_f64).collect();
+        let z = Reals.implicit(function, &near);
+        let z = z.iter().map(|&z| self.constant(z)).collect();
+        function.refined(self, z, p, 8)
     }
 }
 

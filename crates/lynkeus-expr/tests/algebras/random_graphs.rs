@@ -44,6 +44,12 @@ fn naive<A: Algebra>(
                 solutions.insert(node, x);
                 continue;
             }
+            Op::Implicit(_) => {
+                let call = graph.implicit_call(node).expect("it is one");
+                let p: Vec<A::Value> = call.arguments.iter().map(|&a| at(a).clone()).collect();
+                solutions.insert(node, algebra.implicit(&call.function, &p));
+                continue;
+            }
         };
         values.insert(node, value);
     }

@@ -1,15 +1,16 @@
 //! Solves the blocks of a sorted system one after the other.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-use lynkeus_expr::{Binary, Node, Unary};
+use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary};
 
 use super::incidence::{Incidence, arguments};
 use super::linear::{Form, Linear};
+use super::loops::Torn;
 use super::matching::Matching;
-use super::{FlatEquation, System, Unknown};
+use super::{FlatEquation, System, Unknown, listed, singular};
 use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
-use crate::syntax::{Problem, Result};
+use crate::syntax::{Problem, Result, Span};
 
 pub(super) struct Solver<'a> {
     system: &'a System<'a>,
@@ -47,16 +48,16 @@ impl<'a> Solver<'a> {
             ..
         } = self.system;
         for block in blocks {
-            let pairs: Vec<(&FlatEquation, &Unknown)> = block
+            let places: Vec<(usize, usize)> = block
                 .iter()
-                .filter_map(|&equation| {
-                    let unknown = matching.of_equation.get(equation).copied().flatten()?;
-                    Some((equations.get(equation)?, unknowns.get(unknown)?))
-                })
+                .filter_map(|&e| Some((e, matching.of_equation.get(e).copied().flatten()?)))
                 .collect();
-            match pairs.as_slice() {
-                [(equation, unknown)] => self.single(equation, unknown)?,
-                _ => self.coupled(&pairs)?,
+            let solved = match places[..] {
+                [(equation, unknown)] => self.single(&equations[equation], &unknowns[unknown])?,
+                _ => false,
+            };
+            if !solved {
+                self.coupled(&places)?;
             }
         }
         Ok(self.solution)
@@ -71,76 +72,110 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn single(&mut self, equation: &FlatEquation, unknown: &Unknown) -> Result<()> {
+    /// Whether the equation is linear in the unknown, which is then solved.
+    fn single(&mut self, equation: &FlatEquation, unknown: &Unknown) -> Result<bool> {
         let linear = self.linear();
         let left = linear.form(equation.left, unknown.symbol, equation.span)?;
         let right = linear.form(equation.right, unknown.symbol, equation.span)?;
-        let solved = match (left, right) {
-            (Some(left), Some(right)) => linear.solution(left, right),
-            _ => None,
+        let (Some(left), Some(right)) = (left, right) else {
+            return Ok(false);
         };
-        let value = solved.ok_or_else(|| not_linear(equation, unknown))?;
+        let value = linear.solution(left, right);
+        let value = value.ok_or_else(|| undetermined(equation, unknown))?;
         let value = self.replace(value);
         self.solution.insert(unknown.symbol, value);
+        Ok(true)
+    }
+
+    /// Unknowns that share their equations: a linear system, or an implicit function.
+    fn coupled(&mut self, block: &[(usize, usize)]) -> Result<()> {
+        let torn = Torn::new(self.system, self.incidence, &self.linear(), block)?;
+        let names: Vec<Node> = torn.unknowns.iter().map(|unknown| unknown.symbol).collect();
+        if names.len() > MAX_COUPLED {
+            return Err(self.too_many_coupled(block));
+        }
+        singular::check(self.system.graph, &torn, self.source)?;
+        let roots = match self.rows(&torn, &names)? {
+            Some(rows) => self.linear_roots(rows),
+            None => self.nonlinear_roots(&torn)?,
+        };
+        self.solution.extend(names.into_iter().zip(roots));
+        let (symbols, values): (Vec<Node>, Vec<Node>) = torn.explicit.into_iter().unzip();
+        let values = self.system.graph.substitute(&values, &self.solution);
+        self.solution.extend(symbols.into_iter().zip(values));
         Ok(())
     }
 
-    /// Derivatives that share their equations linearly: a mass matrix.
-    fn coupled(&mut self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<()> {
-        if pairs.iter().any(|(_, unknown)| unknown.state.is_none()) {
-            return Err(self.algebraic_loop(pairs));
+    /// Coefficients of the unknowns and the rest, of each residual; none where one is not
+    /// linear.
+    fn rows(&self, torn: &Torn<'_>, unknowns: &[Node]) -> Result<Option<Vec<Row>>> {
+        let mut rows = vec![];
+        for (residual, equation) in torn.residuals.iter().zip(&torn.equations) {
+            match self.row(*residual, unknowns, equation.span)? {
+                Some(row) => rows.push(row),
+                None => return Ok(None),
+            }
         }
-        if pairs.len() > MAX_COUPLED {
-            return Err(too_many_coupled(pairs));
+        Ok(Some(rows))
+    }
+
+    fn row(&self, residual: Node, unknowns: &[Node], span: Span) -> Result<Option<Row>> {
+        let linear = self.linear();
+        let mut rest = Some(residual);
+        let mut coefficients = vec![];
+        for &unknown in unknowns {
+            let form = match rest {
+                Some(node) => linear.form(node, unknown, span)?,
+                None => Some(Form::default()),
+            };
+            let Some(form) = form else {
+                return Ok(None);
+            };
+            coefficients.push(form.coefficient);
+            rest = form.rest;
         }
-        let zero = self.system.graph.constant(0.0).node();
+        for &coefficient in coefficients.iter().flatten() {
+            let read = linear.below(coefficient, span)?;
+            if read.iter().any(|node| unknowns.contains(node)) {
+                return Ok(None);
+            }
+        }
+        Ok(Some(Row { coefficients, rest }))
+    }
+
+    fn linear_roots(&mut self, rows: Vec<Row>) -> Vec<Node> {
+        let graph = self.system.graph;
+        let zero = graph.constant(0.0).node();
         let (mut matrix, mut right) = (vec![], vec![]);
-        for (equation, _) in pairs {
-            let (row, rest) = self.row(equation, pairs)?;
-            for coefficient in row {
+        for Row { coefficients, rest } in rows {
+            for coefficient in coefficients {
                 matrix.push(coefficient.map_or(zero, |node| self.replace(node)));
             }
             let rest = rest.map_or(zero, |node| self.replace(node));
-            let negated = self.system.graph.unary(Unary::Neg, rest);
-            right.push(negated);
+            right.push(graph.unary(Unary::Neg, rest));
         }
-        let solved = self.system.graph.solve(&matrix, &right);
-        for ((_, unknown), value) in pairs.iter().zip(solved.x) {
-            self.solution.insert(unknown.symbol, value);
+        match (&matrix[..], &right[..]) {
+            (&[slope], &[right]) => vec![graph.binary(Binary::Div, right, slope)],
+            _ => graph.solve(&matrix, &right).x,
         }
-        Ok(())
     }
 
-    /// Coefficients of the unknowns and the rest, of left − right.
-    fn row(
-        &self,
-        equation: &FlatEquation,
-        pairs: &[(&FlatEquation, &Unknown)],
-    ) -> Result<(Vec<Option<Node>>, Option<Node>)> {
-        let linear = self.linear();
+    fn nonlinear_roots(&self, torn: &Torn<'_>) -> Result<Vec<Node>> {
         let graph = self.system.graph;
-        let mut rest = Some(graph.binary(Binary::Sub, equation.left, equation.right));
-        let mut row = vec![];
-        for (_, unknown) in pairs {
-            let form = match rest {
-                Some(node) => linear.form(node, unknown.symbol, equation.span)?,
-                None => Some(Form::default()),
-            };
-            let form = form.ok_or_else(|| not_linear(equation, unknown))?;
-            row.push(form.coefficient);
-            rest = form.rest;
-        }
-        let symbols: HashSet<Node> = pairs.iter().map(|(_, unknown)| unknown.symbol).collect();
-        for (coefficient, (_, unknown)) in row.iter().zip(pairs) {
-            let Some(coefficient) = *coefficient else {
-                continue;
-            };
-            let read = linear.below(coefficient, equation.span)?;
-            if read.iter().any(|node| symbols.contains(node)) {
-                return Err(not_linear(equation, unknown));
-            }
-        }
-        Ok((row, rest))
+        let residuals = graph.substitute(&torn.residuals, &self.solution);
+        let unknowns: Vec<ImplicitUnknown> = torn
+            .unknowns
+            .iter()
+            .map(|unknown| ImplicitUnknown {
+                symbol: unknown.symbol,
+                start: unknown.start,
+                range: unknown.range,
+            })
+            .collect();
+        Implicit::solve(graph, &unknowns, &residuals).map_err(|error| {
+            let span = torn.equations.first().map(|equation| equation.span);
+            Problem::new(span.unwrap_or_default(), error.to_string())
+        })
     }
 
     /// The expression with solved unknowns in place of their symbols.
@@ -178,44 +213,38 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn algebraic_loop(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Problem {
-        let names: Vec<String> = pairs
-            .iter()
-            .take(8)
-            .map(|(_, unknown)| unknown.quoted())
-            .collect();
-        let more = if pairs.len() > 8 { ", …" } else { "" };
-        let spans = pairs.iter().map(|(equation, _)| equation.span);
-        let span = spans
-            .clone()
-            .min_by_key(|span| span.start)
-            .unwrap_or_default();
-        let lines = super::diagnose::lines(self.source, spans);
-        let message = format!("algebraic loop: {}{more} need each other", names.join(", "));
+    fn too_many_coupled(&self, block: &[(usize, usize)]) -> Problem {
+        let System {
+            equations,
+            unknowns,
+            ..
+        } = self.system;
+        let spans = block.iter().map(|&(equation, _)| equations[equation].span);
+        let span = spans.min_by_key(|span| span.start).unwrap_or_default();
+        let message = format!(
+            "{} unknowns need each other: {}; at most {MAX_COUPLED} may be left when equations \
+             like `v = R*i` are used",
+            block.len(),
+            listed(block.iter().map(|&(_, unknown)| &unknowns[unknown])),
+        );
         Problem::new(span, message)
-            .label(format!("the equations of the loop are on {lines}"))
-            .hint("solve them by hand, so that each variable follows from those before it")
+            .hint("write more of the equations solved for a variable, as `a = …`")
     }
 }
 
-fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)]) -> Problem {
-    let span = pairs
-        .iter()
-        .map(|(equation, _)| equation.span)
-        .min_by_key(|span| span.start);
-    let n = pairs.len();
-    let message = format!("{n} derivatives share their equations; at most {MAX_COUPLED} may");
-    Problem::new(span.unwrap_or_default(), message)
-        .hint("write the equations solved for their derivatives")
+/// Σ coefficient·unknown + rest; `None` is zero.
+struct Row {
+    coefficients: Vec<Option<Node>>,
+    rest: Option<Node>,
 }
 
-fn not_linear(equation: &FlatEquation, unknown: &Unknown) -> Problem {
+fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {
     let element = equation
         .element
         .as_deref()
         .map(|element| format!(" (element {element})"));
     let message = format!(
-        "this equation{} cannot be solved for {}: it is not linear in it",
+        "this equation{} cannot be solved for {}: its terms in it cancel",
         element.unwrap_or_default(),
         unknown.quoted()
     );

@@ -126,18 +126,28 @@ impl Balance<'_> {
             let name = name(state);
             return format!("`{name}` is a state, as `der({name})` is used: it follows from that");
         }
-        "it contains nothing that is still to be determined: states follow from their \
-         derivatives, inputs and parameters are given"
-            .to_owned()
+        let tied = graph.symbols_of(&sides);
+        let tied = self.system.unknowns.iter().filter(|unknown| {
+            let state = unknown.state.as_ref();
+            state.is_some_and(|state| tied.contains(state))
+        });
+        let names: Vec<String> = tied.take(4).map(|u| format!("`{}`", u.name)).collect();
+        let nothing = "it contains nothing that is still to be determined: states follow from \
+                       their derivatives, inputs and parameters are given";
+        match names.is_empty() {
+            true => nothing.to_owned(),
+            false => format!(
+                "{nothing}. A constraint on the states {} raises the index above 1: replace it \
+                 by its derivative with respect to time, or let it determine one of them instead \
+                 of a `der`",
+                names.join(", ")
+            ),
+        }
     }
 
     fn listed(&self, unknowns: &[usize]) -> String {
-        let found = unknowns
-            .iter()
-            .filter_map(|&place| self.system.unknowns.get(place));
-        let names: Vec<String> = found.take(8).map(Unknown::quoted).collect();
-        let more = if unknowns.len() > 8 { ", …" } else { "" };
-        format!("{}{more}", names.join(", "))
+        let unknowns = unknowns.iter();
+        super::listed(unknowns.filter_map(|&place| self.system.unknowns.get(place)))
     }
 
     fn reached_from_unknown(&self, start: usize) -> (Vec<usize>, Vec<usize>) {

@@ -9,12 +9,14 @@ mod blocks;
 mod diagnose;
 mod incidence;
 mod linear;
+mod loops;
 mod matching;
 mod order;
+mod singular;
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Graph, Interval, Node};
 
 use crate::syntax::{Result, Span};
 use incidence::Incidence;
@@ -39,9 +41,18 @@ pub(crate) struct Unknown {
     pub span: Span,
     /// the state, where the unknown is its derivative
     pub state: Option<Node>,
+    /// where the search begins, if its equation has to be solved by one
+    pub start: f64,
+    /// where it may lie
+    pub range: Interval,
 }
 
 impl Unknown {
+    /// Whether something is known of where its value lies.
+    fn is_declared(&self) -> bool {
+        self.start != 0.0 || self.range.lo().is_finite() || self.range.hi().is_finite()
+    }
+
     /// `` `x` `` or `` `der(x)` ``
     fn quoted(&self) -> String {
         match self.state {
@@ -49,6 +60,14 @@ impl Unknown {
             None => format!("`{}`", self.name),
         }
     }
+}
+
+/// `` `a`, `b`, … ``
+fn listed<'a>(unknowns: impl Iterator<Item = &'a Unknown>) -> String {
+    let mut names: Vec<String> = unknowns.take(9).map(Unknown::quoted).collect();
+    let more = if names.len() > 8 { ", …" } else { "" };
+    names.truncate(8);
+    format!("{}{more}", names.join(", "))
 }
 
 /// The equations and what they must determine.

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Graph, Interval, Node};
 
 use super::attributes::Attributes;
 use super::symbols::{Component, Context, Symbols};
@@ -46,7 +46,7 @@ pub(super) fn parts<'a>(
     model: &'a ModelSyntax,
     equations: &[FlatEquation],
 ) -> Result<Parts> {
-    let (unknowns, inputs) = unknowns(context, symbols);
+    let (unknowns, inputs) = unknowns(context, symbols)?;
     let system = System {
         graph: context.graph,
         equations,
@@ -83,37 +83,38 @@ pub(super) fn parts<'a>(
 }
 
 /// Derivatives of the states and all other variables, and the inputs apart.
-fn unknowns(context: &Context<'_>, symbols: &Symbols<'_>) -> (Vec<Unknown>, Vec<Node>) {
+fn unknowns(context: &Context<'_>, symbols: &Symbols<'_>) -> Result<(Vec<Unknown>, Vec<Node>)> {
     let (mut unknowns, mut inputs) = (vec![], vec![]);
     for (declaration, component) in symbols.all() {
         if component.is_known {
             continue;
         }
+        if declaration.prefix.causality == Causality::Input {
+            inputs.extend(nodes(component));
+            continue;
+        }
+        let attributes = Attributes::new(context, symbols, declaration, component)?;
         for (offset, node) in nodes(component).enumerate() {
-            if declaration.prefix.causality == Causality::Input {
-                inputs.push(node);
-                continue;
-            }
             let name = declaration.name.text(context.source);
             let name = element_name(name, &component.dims, offset);
             let span = declaration.name;
-            unknowns.push(match symbols.derivative_of(node) {
-                Some(symbol) => Unknown {
-                    symbol,
-                    name,
-                    span,
-                    state: Some(node),
-                },
-                None => Unknown {
-                    symbol: node,
-                    name,
-                    span,
-                    state: None,
-                },
+            let state = symbols.derivative_of(node);
+            // nothing is declared of derivatives
+            let (start, range) = match state {
+                Some(_) => (0.0, Interval::ENTIRE),
+                None => attributes.search(offset),
+            };
+            unknowns.push(Unknown {
+                symbol: state.unwrap_or(node),
+                name,
+                span,
+                state: state.map(|_| node),
+                start,
+                range,
             });
         }
     }
-    (unknowns, inputs)
+    Ok((unknowns, inputs))
 }
 
 fn nodes(component: &Component) -> impl Iterator<Item = Node> {

@@ -1,6 +1,6 @@
 //! `start`, `min`, `max`, `nominal`, `fixed` and `unit` of declarations.
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Interval, Node};
 
 use super::scope::Mode;
 use super::symbols::{Component, Context, Symbols};
@@ -110,6 +110,18 @@ impl Attributes {
             }
         }
         Ok(())
+    }
+
+    /// Where the search for an element begins that a loop determines, and where it may end.
+    pub(super) fn search(&self, offset: usize) -> (f64, Interval) {
+        let at = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
+        let low = at(&self.min).unwrap_or(f64::NEG_INFINITY);
+        let high = at(&self.max).unwrap_or(f64::INFINITY);
+        let range = Interval::new(low, high).unwrap_or(Interval::ENTIRE);
+        (
+            at(&self.start).unwrap_or(0.0).clamp(range.lo(), range.hi()),
+            range,
+        )
     }
 
     /// One element as a variable of the plant.

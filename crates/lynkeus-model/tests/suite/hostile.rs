@@ -316,22 +316,18 @@ fn long_chains_of_algebraic_variables() {
              for i in 1:n - 1 loop a[i] = sin(a[i + 1]); end for; a[n] = {last}; end M;"
         )
     };
-    let found = refused(&text("a[1]"));
-    assert!(
-        found.message.starts_with("algebraic loop: `a[1]`, "),
-        "{}",
-        found.message
-    );
-    let start = Instant::now();
-    assert!(Plant::from_modelica(&text("x"), "chain.mo", &LoadOptions::default()).is_ok());
-    assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
+    for last in ["x", "cos(a[1])"] {
+        let start = Instant::now();
+        assert!(Plant::from_modelica(&text(last), "chain.mo", &LoadOptions::default()).is_ok());
+        assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
+    }
 }
 
 #[test]
 fn dense_systems() {
     let text = "model M parameter Integer n = 500; Real a[n]; Real x; equation der(x) = 1; \
                 for i in 1:n loop a[i] = sum(a); end for; end M;";
-    assert!(refused(text).message.starts_with("algebraic loop"));
+    assert!(refused(text).message.contains("need each other"));
     let mass = |n: usize| {
         format!(
             "model M parameter Integer n = {n}; Real v[n]; equation \
@@ -339,9 +335,13 @@ fn dense_systems() {
         )
     };
     let found = refused(&mass(400));
-    assert_eq!(
-        found.message,
-        "400 derivatives share their equations; at most 64 may"
+    assert!(
+        found
+            .message
+            .starts_with("400 unknowns need each other: `der(v[1])`, ")
+            && found.message.contains("at most 64"),
+        "{}",
+        found.message
     );
     let start = Instant::now();
     assert!(Plant::from_modelica(&mass(64), "mass.mo", &LoadOptions::default()).is_ok());

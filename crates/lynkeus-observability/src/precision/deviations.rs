@@ -1,5 +1,6 @@
 //! From information to standard errors, right down to what is not seen at all.
 
+use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
 use super::information::Information;
@@ -47,7 +48,7 @@ impl Deviations {
         self.present.iter().map(|σ| σ.is_finite()).collect()
     }
 
-    /// No samples at all.
+    /// No samples at all, or nothing computed of them.
     pub(super) fn blind(count: usize) -> Self {
         Self {
             start: vec![f64::INFINITY; count],
@@ -70,16 +71,17 @@ struct Balanced {
 }
 
 /// Standard errors from settled information, the transition over the window (columns
-/// multiplied by the scales) and the relative accuracy of both.
+/// multiplied by the scales) and the relative accuracy of both. None where the budget is spent.
 pub(super) fn of(
     information: &Information,
     transition: &DMatrix<f64>,
     scales: &[f64],
     accuracy: f64,
-) -> Deviations {
+    budget: &Budget,
+) -> Option<Deviations> {
     let count = scales.len();
     let balanced = balance(information, accuracy);
-    let Singular { values, directions } = singular(balanced.factor);
+    let Singular { values, directions } = singular(balanced.factor, budget)?;
     let rank = decide(&values, balanced.accuracy);
     // errors in units of the scales, one column per direction
     let start = DMatrix::from_fn(count, count, |i, j| {
@@ -102,11 +104,11 @@ pub(super) fn of(
         let noise = blur * terms.map(|(phi, e)| (phi / e).abs()).fold(0.0, f64::max);
         split.error(&|j| present[(i, j)], noise, scales[i])
     };
-    Deviations {
+    Some(Deviations {
         start: (0..count).map(at_start).collect(),
         present: (0..count).map(at_present).collect(),
         rank,
-    }
+    })
 }
 
 /// Seen and unseen directions.
@@ -128,9 +130,13 @@ impl Split<'_> {
                 variance += (part / value).powi(2);
                 continue;
             }
+            if part.abs() <= noise {
+                // rounding, which says nothing of an error
+                continue;
+            }
             // the error that is left of one range at the start
             let left = part.abs() / self.reach[j];
-            if part.abs() > noise && left > FORGOTTEN * scale {
+            if left > FORGOTTEN * scale {
                 return f64::INFINITY;
             }
             variance += left * left;

@@ -43,7 +43,7 @@ mod orthogonal;
 mod sets;
 mod tangent;
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Budget, Graph, Node};
 use lynkeus_run::{Error, Method};
 
 pub use deviations::{Deviations, Rank};
@@ -199,7 +199,9 @@ impl<'g> Experiment<'g> {
     /// Integrates plant and sensitivities once, in parallel, and gathers what every sensor tells.
     ///
     /// # Errors
-    /// [`Error::Setting`] for numbers that are impossible; whatever ends the integration.
+    /// [`Error::Setting`] for numbers that are impossible; whatever ends the integration. Where
+    /// the graph's budget ends it, the horizons reached by then are the answer, and there is
+    /// [`Error::Cancelled`] where none was.
     pub fn run(&self) -> Result<Precision, Error> {
         self.check()?;
         tangent::run(self)
@@ -231,7 +233,12 @@ impl<'g> Experiment<'g> {
             let expected = format!("at most {MOST_CELLS} (fewer horizons or candidates)");
             return Err(setting(what, expected, cells));
         }
-        Ok(())
+        match self.graph.budget().affords(cells * size_of::<f64>()) {
+            true => Ok(()),
+            false => Err(Error::Cancelled {
+                time: self.window.start,
+            }),
+        }
     }
 }
 
@@ -248,6 +255,8 @@ pub struct Precision {
     pub horizons: Vec<f64>,
     /// relative accuracy of the sensitivities
     accuracy: f64,
+    /// of what is computed from here on; once it is spent, results do not count
+    budget: Budget,
     checkpoints: Vec<Checkpoint>,
 }
 
@@ -262,7 +271,8 @@ struct Checkpoint {
 
 impl Precision {
     /// Standard errors from the samples of the sensors `set` (indices) up to horizon number
-    /// `horizon`; everything is unseen where there is no such horizon or sensor.
+    /// `horizon`; everything is unseen where there is no such horizon or sensor, or where the
+    /// graph's budget is spent.
     pub fn deviations(&self, horizon: usize, set: &[usize]) -> Deviations {
         self.deviations_at(horizon, set, self.accuracy)
     }
@@ -286,7 +296,9 @@ impl Precision {
         };
         let parts = set.iter().filter_map(|&s| checkpoint.information.get(s));
         let joined = Information::joined(self.names.len(), parts);
-        deviations::of(&joined, &checkpoint.transition, &self.scales, accuracy)
+        let transition = &checkpoint.transition;
+        let found = deviations::of(&joined, transition, &self.scales, accuracy, &self.budget);
+        found.unwrap_or_else(|| Deviations::blind(self.names.len()))
     }
 }
 

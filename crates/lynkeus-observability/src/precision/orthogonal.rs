@@ -1,6 +1,7 @@
 //! Singular values by one-sided Jacobi rotations: small ones are as accurate, relatively, as
 //! the columns are (Demmel and Veselić 1992).
 
+use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
 /// Sweeps over all pairs of columns; a handful suffices.
@@ -17,13 +18,16 @@ pub(super) struct Singular {
     pub directions: DMatrix<f64>,
 }
 
-/// The singular values and right singular vectors of `a`.
-pub(super) fn singular(mut a: DMatrix<f64>) -> Singular {
+/// The singular values and right singular vectors of `a`; none where the budget is spent.
+pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular> {
     let columns = a.ncols();
     let mut v = DMatrix::identity(columns, columns);
     for _ in 0..SWEEPS {
         let mut is_done = true;
         for p in 0..columns {
+            if budget.spent().is_some() {
+                return None;
+            }
             for q in p + 1..columns {
                 if let Some((c, s)) = rotation(&a, p, q) {
                     is_done = false;
@@ -36,10 +40,10 @@ pub(super) fn singular(mut a: DMatrix<f64>) -> Singular {
             break;
         }
     }
-    Singular {
+    Some(Singular {
         values: a.column_iter().map(|column| column.norm()).collect(),
         directions: v,
-    }
+    })
 }
 
 /// Cosine and sine that make two columns orthogonal; none where they are.
@@ -72,7 +76,7 @@ mod tests {
         // columns nearly parallel: singular values √2 and ε/√2
         let epsilon = 1e-9;
         let a = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, epsilon]);
-        let mut found = singular(a).values;
+        let mut found = singular(a, &Budget::default()).unwrap().values;
         found.sort_by(f64::total_cmp);
         assert!(
             (found[0] / (epsilon / 2.0_f64.sqrt()) - 1.0).abs() < 1e-6,
@@ -84,7 +88,8 @@ mod tests {
     #[test]
     fn fewer_rows_than_columns_leave_zeros() {
         let a = DMatrix::from_row_slice(1, 3, &[3.0, 0.0, 4.0]);
-        let Singular { values, directions } = singular(a.clone());
+        let found = singular(a.clone(), &Budget::default());
+        let Singular { values, directions } = found.unwrap();
         assert!((values.iter().copied().fold(0.0, f64::max) - 5.0).abs() < 1e-12);
         assert_eq!(values.iter().filter(|s| **s < 1e-12).count(), 2);
         assert!((&directions * directions.transpose() - DMatrix::identity(3, 3)).norm() < 1e-12);

@@ -101,7 +101,11 @@ impl Precision {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         let share = sets.len().div_ceil(threads).max(1);
         let work = |some: &[Vec<usize>]| -> Vec<SensorSet> {
-            some.iter().map(|set| self.judge(set)).collect()
+            let judged = some.iter().map(|set| self.judge(set));
+            // what comes after the end does not count
+            judged
+                .take_while(|_| self.budget.spent().is_none())
+                .collect()
         };
         let work = &work;
         let mut judged: Vec<SensorSet> = std::thread::scope(|scope| {

@@ -1,8 +1,9 @@
 //! The plant with its sensitivities, integrated once for all sensors.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
-use lynkeus_expr::{Node, jacobian};
+use lynkeus_expr::{Budget, Node, jacobian};
 use lynkeus_run::{Error, Method, System};
 use nalgebra::DMatrix;
 
@@ -38,7 +39,12 @@ struct Tangent {
     scales: Vec<f64>,
     /// sensitivities below this share of a range are rounding
     floor: f64,
+    /// of the integration; the rest of the time is for what follows from it
+    budget: Budget,
 }
+
+/// The share of the time for the integration.
+const INTEGRATION: f64 = 0.7;
 
 impl Tangent {
     fn new(experiment: &Experiment<'_>) -> Result<Self, Error> {
@@ -60,6 +66,7 @@ impl Tangent {
             views: h.iter().map(|&(i, j, _)| (i, j)).collect(),
             scales: experiment.quantities().map(|q| q.scale).collect(),
             floor: absolute / relative,
+            budget: graph.budget().part(INTEGRATION),
         })
     }
 
@@ -126,13 +133,13 @@ pub(super) fn run(experiment: &Experiment<'_>) -> Result<Precision, Error> {
     let mut checkpoints = vec![];
     let mut next = 0;
     for &horizon in &window.horizons {
-        while next <= horizon {
-            let until = (next + CHUNK).min(horizon + 1);
-            let instants: Vec<f64> = (next..until).map(|k| window.instant(k)).collect();
-            let pieces = advance(&mut batches, &instants)?;
-            gather(experiment, &pieces, instants.len(), &mut gathered);
-            next = until;
+        let reached = reach(experiment, &mut batches, &mut gathered, next..horizon + 1);
+        match reached {
+            // what is known by then is an answer
+            Err(Error::Cancelled { .. }) if !checkpoints.is_empty() => break,
+            reached => reached?,
         }
+        next = horizon + 1;
         gathered.iter_mut().for_each(Information::settle);
         checkpoints.push(Checkpoint {
             transition: transition(&tangent, &batches),
@@ -145,10 +152,35 @@ pub(super) fn run(experiment: &Experiment<'_>) -> Result<Precision, Error> {
         names: experiment.quantities().map(|q| q.name.clone()).collect(),
         scales: tangent.scales.clone(),
         sensors: experiment.sensors.iter().map(|s| s.name.clone()).collect(),
-        horizons: window.horizons.iter().map(length).collect(),
+        horizons: window
+            .horizons
+            .iter()
+            .map(length)
+            .take(checkpoints.len())
+            .collect(),
         accuracy: TRUST * relative,
+        budget: experiment.graph.budget(),
         checkpoints,
     })
+}
+
+/// Gathers what these samples tell.
+fn reach(
+    experiment: &Experiment<'_>,
+    batches: &mut [Batch<'_>],
+    gathered: &mut [Information],
+    samples: Range<usize>,
+) -> Result<(), Error> {
+    let window = &experiment.window;
+    let mut next = samples.start;
+    while next < samples.end {
+        let until = (next + CHUNK).min(samples.end);
+        let instants: Vec<f64> = (next..until).map(|k| window.instant(k)).collect();
+        let pieces = advance(batches, &instants)?;
+        gather(experiment, &pieces, instants.len(), gathered);
+        next = until;
+    }
+    Ok(())
 }
 
 /// Takes all batches over the instants, side by side.

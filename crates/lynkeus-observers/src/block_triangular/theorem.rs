@@ -158,7 +158,7 @@ impl Study<'_> {
     fn unbounded(&self) -> Check {
         undecided(
             Lee::Assumption1,
-            "they have none: M needs declared ranges of the states it depends on and of the heads of the chains (the correction moves M), and where it depends on an input, a bound of that input's derivative, which no key declares; correction = \"classical\" needs none of this",
+            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input no key bounds its derivative; correction = \"classical\" needs none of this",
         )
     }
 

@@ -9,7 +9,8 @@ use lynkeus_structure::indices::Codistribution;
 use lynkeus_structure::{Extended, Region};
 use lynkeus_structure::{Standing, Verdict};
 
-use super::form::{Form, Map, blind};
+use super::blind::blind;
+use super::form::{Form, Map};
 use super::keys::Asked;
 use super::settings::{POLES, Settings};
 use crate::conditions::lasts;
@@ -40,7 +41,7 @@ pub(super) fn form(
     lasts(extended)?;
     let first = rows.krener_respondek();
     if first.iter().sum::<usize>() < extended.states.len() {
-        return Ok(Err(blind(extended, &first)?));
+        return Ok(Err(blind(extended)?));
     }
     let mut search = Search {
         extended,

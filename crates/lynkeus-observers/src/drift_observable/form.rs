@@ -4,18 +4,15 @@ use crate::statement::Statement;
 use crate::{Check, Germani};
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::{self, AffineForm, Rows};
-use lynkeus_structure::{Extended, Region, Regularity, visibility};
+use lynkeus_structure::{Extended, Region, Regularity};
 
 use super::conditions::{self, Inputs};
 use super::variant::Variant;
-use super::{NAME, degrees, derivative_name};
+use super::{NAME, degrees, derivative_name, size};
 use crate::conditions::{lasts, lipschitz, names};
 use crate::family;
 use crate::stages::Found;
 use crate::{DesignError, Examination};
-
-/// The share of the time for the names of what is not seen.
-const WORDS: f64 = 0.5;
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map {
@@ -44,6 +41,7 @@ impl Map {
             Ok(affine) => affine,
             Err(why) => return Ok(Err(unfit(why))),
         };
+        size::affordable(extended, &affine)?;
         let order = extended.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(extended, &affine, order)?;
         let x = extended.symbols();
@@ -183,36 +181,8 @@ impl Form {
     }
 }
 
-fn unfit(summary: String) -> Examination {
+pub(super) fn unfit(summary: String) -> Examination {
     Examination::unfit(NAME, summary, vec![])
-}
-
-/// Why the derivatives of the outputs do not determine the state.
-pub(super) fn blind(
-    extended: &Extended<'_>,
-    indices: &[usize],
-) -> Result<Examination, DesignError> {
-    let n = extended.states.len();
-    lasts(extended)?;
-    let graph = extended.graph();
-    let words = graph.budget().part(WORDS);
-    // the verdict does not wait for the names
-    let seen = graph.budgeted(words, || visibility::visible(extended)).ok();
-    let seen = seen.transpose()?;
-    let is_hidden = |i: &usize| seen.as_ref().is_some_and(|seen| !seen[*i]);
-    let hidden: Vec<usize> = (0..n).filter(is_hidden).collect();
-    let found: usize = indices.iter().sum();
-    let advice = match hidden.is_empty() {
-        _ if seen.is_none() => "measure more".to_owned(),
-        true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
-        false => format!(
-            "no measured output feels {}; measure more",
-            names(extended, &hidden).join(", ")
-        ),
-    };
-    Ok(unfit(format!(
-        "with u = 0 the outputs and their derivatives determine {found} of {n} combinations of states: {advice}"
-    )))
 }
 
 /// Φ̄, and Q̄ and Q̄_a of (4.20).

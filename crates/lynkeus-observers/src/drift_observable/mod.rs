@@ -17,6 +17,7 @@
 //! several outputs with the indices of Krener and Respondek.
 
 mod assembly;
+mod blind;
 mod choice;
 mod conditions;
 mod degrees;
@@ -29,6 +30,7 @@ mod poles;
 mod proof;
 mod report;
 mod settings;
+mod size;
 mod theorem;
 mod variant;
 

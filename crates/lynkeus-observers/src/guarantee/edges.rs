@@ -1,12 +1,12 @@
 //! Where an expression may have no derivative: kinks, steps and singular ends.
 
-use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
+use lynkeus_expr::{Binary, Graph, Node, Nodes, Op, Unary};
 
 /// Expressions over `moving` that vanish wherever one of the roots may have a kink, a step
 /// or an infinite slope in it; where none does, the roots are as smooth as their poles
 /// allow. None for roots without such operations.
 pub(super) fn edges(graph: &Graph, roots: &[Node], moving: &[Node]) -> Vec<Node> {
-    let found = graph.reachable(roots).into_iter();
+    let found = graph.reachable(&graph.with_residuals(roots)).into_iter();
     let found = found.filter_map(|node| edge(graph, node));
     let mut found: Vec<Node> = found
         .filter(|edge| {
@@ -39,6 +39,19 @@ fn edge(graph: &Graph, node: Node) -> Option<Node> {
             }
             _ => None,
         },
+        // where the equations of a loop do not determine it
+        Op::Implicit(_) => {
+            let call = graph.implicit_call(node)?;
+            let matrix = call.function.matrix(&Nodes(graph), &call.at(graph, node));
+            match matrix[..] {
+                [slope] => Some(slope),
+                _ => {
+                    let zero = graph.constant(0.0).node();
+                    let right = vec![zero; call.function.size()];
+                    Some(graph.solve(&matrix, &right).rcond)
+                }
+            }
+        }
         _ => None,
     }
 }

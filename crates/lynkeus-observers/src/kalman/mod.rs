@@ -108,6 +108,7 @@ impl<K: Kalman> Stages for K {
     const PAPER: &'static str = K::PAPER;
     const BASIS: &'static str = "no theorem";
     const FORM_BOX: FormBox = FormBox::Declared;
+    const IS_FILTER: bool = true;
     const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {

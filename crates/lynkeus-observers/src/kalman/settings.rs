@@ -11,7 +11,7 @@ const VARIANCE: KeySpec = KeySpec {
     name: "initial_variance",
     kind: "table: name = number ≥ 0, and `default`",
     shape: Shape::Table(&Shape::NotNegative),
-    default: "the square of a quarter of the declared range",
+    default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
     meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
 };
 

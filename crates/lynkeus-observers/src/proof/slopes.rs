@@ -2,7 +2,7 @@
 
 use crate::Check;
 use crate::statement::{Statement, proved};
-use lynkeus_expr::{Binary, Graph, Node, Op, Unary, jacobian};
+use lynkeus_expr::{Graph, Node, jacobian};
 use lynkeus_proof::chain::Slope;
 use lynkeus_structure::{Extended, Region, range};
 use lynkeus_structure::{Finding, Verdict};
@@ -74,15 +74,9 @@ pub(crate) fn undeclared(graph: &Graph, nodes: &[Node], region: &Region) -> Vec<
 
 /// An operation that jumps where a state passes through a value.
 fn jump(graph: &Graph, f: Node, states: &[Node]) -> Option<Node> {
-    use Binary::{And, Equal, Less, LessEq, Or};
-    let step = |op: Op| match op {
-        Op::Unary(op, _) => matches!(op, Unary::Sign | Unary::Floor | Unary::Not),
-        Op::Binary(op, ..) => matches!(op, Less | LessEq | Equal | And | Or),
-        _ => false,
-    };
     let depends = |node: Node| !jacobian::pattern(graph, &[node], states)[0].is_empty();
     let mut nodes = graph.reachable(&[f]).into_iter();
-    nodes.find(|&node| step(graph.op(node)) && depends(node))
+    nodes.find(|&node| graph.jumps(node) && depends(node))
 }
 
 /// An entry without a bound.

@@ -201,7 +201,7 @@ impl Study<'_> {
         (self.gains.divided && varies).then(|| {
             undecided(
                 Hammouri::ConstantGain,
-                "partials = true divides it by the partials at the estimate, which vary on the box: the theorem covers a constant gain, and of this one only the case of constant partials. What is missing is a bound of how fast they change along the estimate and of how much they differ between plant and estimate",
+                "partials = true divides it by the partials at the estimate, which vary on the box, and the theorem covers a constant gain only: missing is a bound of how fast they change and of how much they differ from the plant's",
             )
         })
     }

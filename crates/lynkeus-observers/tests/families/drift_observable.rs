@@ -2,6 +2,7 @@
 
 mod driven;
 mod indices;
+mod size;
 mod theorem;
 
 use std::collections::BTreeMap;

@@ -4,9 +4,11 @@
 
 mod designed;
 mod disturbed;
+mod draw;
 mod gains;
 mod judge;
 mod known;
+#[path = "../../../../xtask/src/numbers.rs"]
 mod numbers;
 mod pair;
 mod plants;

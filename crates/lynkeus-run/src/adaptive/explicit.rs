@@ -1,13 +1,15 @@
 //! The explicit method, step by step to the end of a leg.
 
+use super::crossing::Reach;
 use super::dop853::{Dop853, Tried};
 use super::{Adaptive, Leg, Point, Ran, resolution};
+use crate::relays::Switched;
 use crate::{Dynamics, Error};
 
 impl Adaptive {
     pub(super) fn run_explicit(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<Ran, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -26,7 +28,7 @@ impl Adaptive {
     fn run_with(
         &mut self,
         method: &mut Dop853,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<Ran, Error> {
         let tolerances = self.tolerances;
@@ -43,8 +45,25 @@ impl Adaptive {
                 // a guess that time does not resolve is too careful: it may be longer all the same
                 self.pace.next = first.max(2.0 * resolution(leg.t)).min(span);
             }
-            let step = self.accepted_step(method, f, leg, &mut bad)?;
-            leg.x.copy_from_slice(method.reached());
+            let mut step = self.accepted_step(method, f, leg, &mut bad)?;
+            let (start, reached) = (leg.x.to_vec(), method.reached().to_vec());
+            let (t, tolerances) = (leg.t, self.tolerances);
+            let attempt = |f: &mut Switched<'_, _>, step: f64, bad: &mut Option<Point>| {
+                let tried = method.attempt(f, (t, &start), step, &tolerances, bad);
+                matches!(tried, Tried::Accepted(_)).then(|| method.reached().to_vec())
+            };
+            let crossing = self.crossing(f, leg, &start, (step, &reached), attempt)?;
+            leg.x
+                .copy_from_slice(crossing.as_ref().map_or(&reached, |crossing| &crossing.x));
+            if let Some(Reach {
+                step: shorter,
+                x,
+                margins,
+            }) = &crossing
+            {
+                step = *shorter;
+                f.pass(leg.t + step, x, margins);
+            }
             leg.t = if step == leg.to - leg.t {
                 leg.to
             } else {
@@ -64,7 +83,7 @@ impl Adaptive {
     fn accepted_step(
         &mut self,
         method: &mut Dop853,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
         bad: &mut Option<Point>,
     ) -> Result<f64, Error> {

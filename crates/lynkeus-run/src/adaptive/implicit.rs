@@ -1,12 +1,14 @@
 //! The implicit method, driven step by step.
 
-use super::{Adaptive, Leg, Radau, Ran};
+use super::crossing::Reach;
+use super::{Adaptive, Leg, Point, Radau, Ran};
+use crate::relays::Switched;
 use crate::{Dynamics, Error};
 
 impl Adaptive {
     pub(super) fn run_implicit(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
     ) -> Result<Ran, Error> {
         if leg.at_the_end() || leg.x.is_empty() {
@@ -22,7 +24,7 @@ impl Adaptive {
 
     fn steps(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
         radau: &mut Radau,
     ) -> Result<Ran, Error> {
@@ -35,6 +37,7 @@ impl Adaptive {
             let step = leg.step(proposed);
             leg.check_step(f, step, radau.bad.as_ref())?;
             leg.spend(f)?;
+            let start = leg.x.to_vec();
             let (accepted, next) = radau.attempt(f, leg, step, rejected, &self.tolerances);
             self.pace.next = next;
             if !accepted {
@@ -50,6 +53,7 @@ impl Adaptive {
                 self.pace.next = self.pace.next.max(proposed);
             }
             rejected = false;
+            let step = self.up_to_crossing(f, leg, radau, &start, step)?;
             leg.t = if step == leg.to - leg.t {
                 leg.to
             } else {
@@ -63,5 +67,39 @@ impl Adaptive {
                 return Ok(Ran::ToTheChange);
             }
         }
+    }
+
+    /// Where the step that was just taken crosses a surface, goes back to the crossing: the
+    /// step up to there.
+    fn up_to_crossing(
+        &mut self,
+        f: &mut Switched<'_, impl Dynamics>,
+        leg: &mut Leg<'_>,
+        radau: &mut Radau,
+        start: &[f64],
+        step: f64,
+    ) -> Result<f64, Error> {
+        let (reached, t, to, tolerances) = (leg.x.to_vec(), leg.t, leg.to, self.tolerances);
+        let purse = leg.purse;
+        let attempt = |f: &mut Switched<'_, _>, step: f64, _: &mut Option<Point>| {
+            let mut x = start.to_vec();
+            let mut again = Leg {
+                t,
+                to,
+                x: &mut x,
+                purse,
+            };
+            radau.restart(f, t, again.x);
+            let (accepted, _) = radau.attempt(f, &mut again, step, true, &tolerances);
+            accepted.then_some(x)
+        };
+        let crossing = self.crossing(f, leg, start, (step, &reached), attempt)?;
+        let Some(Reach { step, x, margins }) = crossing else {
+            return Ok(step);
+        };
+        leg.x.copy_from_slice(&x);
+        f.pass(t + step, &x, &margins);
+        radau.restart(f, t + step, &x);
+        Ok(step)
     }
 }

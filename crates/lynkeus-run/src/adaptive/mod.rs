@@ -1,12 +1,14 @@
 //! Error-controlled integration that chooses between an explicit and an
 //! implicit method.
 
+mod crossing;
 mod dop853;
 mod explicit;
 mod implicit;
 mod radau;
 
 use crate::error::state_text;
+use crate::relays::Switched;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Tolerances, spectral_radius};
 
@@ -138,7 +140,7 @@ impl Adaptive {
     /// the budget. Where an error ends it early, `x` is the last state reached.
     pub(crate) fn advance(
         &mut self,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         from: f64,
         to: f64,
         x: &mut [f64],
@@ -165,7 +167,13 @@ impl Adaptive {
     }
 
     /// True every so often, where the other method is the better one.
-    fn should_change(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], step: f64) -> bool {
+    fn should_change(
+        &mut self,
+        f: &mut Switched<'_, impl Dynamics>,
+        t: f64,
+        x: &[f64],
+        step: f64,
+    ) -> bool {
         self.pace.since_look += 1;
         if self.choice != Choice::Auto || self.pace.since_look < LOOK_EVERY {
             return false;
@@ -224,7 +232,7 @@ impl Leg<'_> {
         }
     }
 
-    fn check_start(&self, f: &mut impl Dynamics) -> Result<(), Error> {
+    fn check_start(&self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
         let mut dx = vec![0.0; self.x.len()];
         f.derivatives(self.t, self.x, &mut dx);
         if dx.iter().all(|v| v.is_finite()) {
@@ -234,12 +242,16 @@ impl Leg<'_> {
     }
 
     /// Pays for one step.
-    fn spend(&mut self, f: &mut impl Dynamics) -> Result<(), Error> {
+    fn spend(&mut self, f: &mut Switched<'_, impl Dynamics>) -> Result<(), Error> {
+        if f.is_over() {
+            return Err(Error::Cancelled { time: self.t });
+        }
         if self.purse.left == 0 {
             return Err(Error::StepBudget {
                 time: self.t,
                 until: self.to,
                 steps: self.purse.before + self.purse.granted,
+                chatters: f.busiest().unwrap_or_default(),
                 state: state_text(&f.names(), self.x),
             });
         }
@@ -249,7 +261,7 @@ impl Leg<'_> {
 
     fn check_step(
         &self,
-        f: &mut impl Dynamics,
+        f: &mut Switched<'_, impl Dynamics>,
         step: f64,
         bad: Option<&Point>,
     ) -> Result<(), Error> {

@@ -1,33 +1,40 @@
 //! The extended Kalman filter, continuous-discrete.
 
 use super::Belief;
-use super::flow::Linearised;
+use super::flow::Joint;
 use super::health::Reading;
-use super::root::{dot, factor_into};
+use super::root::{Factor, Gain, dot};
 use super::sensing::Sensing;
 use super::smooth::Correction;
+use super::spanned::Rows;
+use super::taylor::Moments;
+use super::variation::Variation;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, Integrator, System};
+use crate::{Error, EstimatorSettings, System};
+
+/// Up to so many states x̂, Φ and W are integrated together.
+const FEW: usize = 8;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Extended {
     pub driven: Driven,
-    integrator: Integrator,
-    entries: Vec<(usize, usize)>,
-    slopes: Vec<f64>,
-    /// Q/q, empty where Q = 0
-    noise: Vec<f64>,
-    /// q, the largest entry of Q
-    scale: f64,
-    /// the state of [`Linearised`]
-    z: Vec<f64>,
+    way: Way,
+    /// x̂⁻, Φ and W
+    x: Vec<f64>,
+    moments: Moments,
     /// rows whose sum of squares is P⁻
     rows: Vec<f64>,
     sums: Vec<f64>,
-    /// qW and its factor
-    spread: Vec<f64>,
-    lower: Vec<f64>,
+    /// of W
+    factor: Factor,
+}
+
+/// How Φ and W are found.
+#[derive(Clone, Debug)]
+enum Way {
+    Joint(Box<Joint>),
+    Variation(Box<Variation>),
 }
 
 impl Extended {
@@ -40,80 +47,103 @@ impl Extended {
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
         let n = flow.states().len();
-        let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
-        let noise = match scale > 0.0 {
-            true => process_noise.iter().map(|q| q / scale).collect(),
-            false => vec![],
+        let way = match n <= FEW {
+            true => Way::Joint(Box::new(Joint::new(
+                n,
+                flow.outputs().len(),
+                entries,
+                process_noise,
+                run.method,
+            )?)),
+            false => Way::Variation(Box::new(Variation::new(
+                n,
+                flow.outputs().len(),
+                entries,
+                process_noise,
+                run.method,
+            )?)),
         };
-        let dimension = n + n * Linearised::width(n, scale > 0.0);
         Ok(Self {
             driven: Driven::new(flow, run.between),
-            integrator: Integrator::new(run.method, dimension)?,
-            entries: entries.to_vec(),
-            slopes: vec![0.0; flow.outputs().len()],
-            noise,
-            scale,
-            z: vec![],
+            way,
+            x: vec![0.0; n],
+            moments: Moments::start(n, process_noise.iter().any(|q| *q > 0.0)),
             rows: vec![],
             sums: vec![0.0; n],
-            spread: vec![],
-            lower: vec![],
+            factor: Factor::default(),
         })
     }
 
-    /// x̂⁻ and P⁻ = ΦPΦᵀ + qW at the next sample, and Φ where there is room for it.
+    /// x̂⁻ and P⁻ = ΦPΦᵀ + W at the next sample. Φ is returned where it is to be kept. Where the
+    /// flow fails the belief is as it was.
     pub fn predict(
         &mut self,
         belief: &mut Belief,
         from: f64,
         to: f64,
-        kept: Option<&mut Vec<f64>>,
-    ) -> Result<(), Error> {
-        let n = belief.x.len();
-        let noisy = !self.noise.is_empty();
-        let width = Linearised::width(n, noisy);
-        Linearised::begin(&belief.x, noisy, &mut self.z);
-        let mut flow = Linearised {
-            driven: &mut self.driven,
-            entries: &self.entries,
-            slopes: &mut self.slopes,
-            noise: &self.noise,
+        keep: bool,
+    ) -> Result<Rows, Error> {
+        self.x.clone_from(&belief.x);
+        let (driven, x, moments) = (&mut self.driven, &mut self.x, &mut self.moments);
+        match &mut self.way {
+            Way::Joint(joint) => joint.advance(driven, from, to, x, moments)?,
+            Way::Variation(variation) => {
+                *moments = variation.advance(driven, belief, from, to, x)?;
+            }
         };
-        self.integrator.advance(&mut flow, from, to, &mut self.z)?;
-        belief.x.copy_from_slice(&self.z[..n]);
-        let transition = |i: usize| &self.z[n + i * width..n + i * width + n];
+        belief.x.clone_from(&self.x);
         self.rows.clear();
-        self.rows.resize(width * n, 0.0);
-        // (ΦS)ᵀ, row by row
-        for i in 0..n {
-            belief.root.transposed_times(transition(i), &mut self.sums);
-            let into = self.rows[i..].iter_mut().step_by(n);
-            into.zip(&self.sums).for_each(|(into, sum)| *into = *sum);
-        }
-        if noisy {
-            self.spread.clear();
-            let rows = (0..n).flat_map(|i| &self.z[n + i * width + n..n + (i + 1) * width]);
-            self.spread.extend(rows.map(|w| self.scale * w));
-            factor_into(&self.spread, n, &mut self.lower);
-            for (k, row) in self.rows[n * n..].chunks_exact_mut(n).enumerate() {
-                row.iter_mut()
-                    .enumerate()
-                    .for_each(|(i, into)| *into = self.lower[i * n + k]);
+        self.push_root();
+        self.push_carried(belief);
+        belief.root.of_rows_with(&mut self.rows, &mut self.sums);
+        Ok(match keep {
+            true => Rows::of(&self.moments.transition),
+            false => Rows::default(),
+        })
+    }
+
+    /// The rows of Lᵀ, W = LLᵀ. They come first: their zeros are spared in the reflections.
+    fn push_root(&mut self) {
+        let Some(noise) = &self.moments.noise else {
+            return;
+        };
+        let n = self.x.len();
+        let lower = self.factor.of(noise.entries(), n);
+        self.rows.resize(n * n, 0.0);
+        for (i, row) in lower.chunks_exact(n).enumerate() {
+            for (k, entry) in row[..=i].iter().enumerate() {
+                self.rows[k * n + i] = *entry;
             }
         }
-        if let Some(kept) = kept {
-            kept.clear();
-            kept.extend((0..n).flat_map(transition));
+    }
+
+    /// The rows of (ΦS)ᵀ.
+    fn push_carried(&mut self, belief: &Belief) {
+        let (n, transition) = (self.x.len(), &self.moments.transition);
+        let first = self.rows.len();
+        self.rows.resize(first + n * n, 0.0);
+        let into = &mut self.rows[first..];
+        let sums = &mut self.sums;
+        for i in 0..n {
+            sums.fill(0.0);
+            for (j, phi) in transition.span(i).zip(transition.row(i)) {
+                for (sum, s) in sums.iter_mut().zip(&belief.root.row(j)[..=j]) {
+                    *sum += phi * s;
+                }
+            }
+            let column = into[i..].iter_mut().step_by(n);
+            column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
         }
-        belief.root.of_rows_with(&mut self.rows, &mut self.sums);
-        Ok(())
     }
 }
 
 impl Persist for Extended {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
-        self.integrator.walk(walk)
+        match &mut self.way {
+            Way::Joint(joint) => joint.walk(walk),
+            Way::Variation(variation) => variation.walk(walk),
+        }
     }
 }
 
@@ -125,7 +155,7 @@ pub(super) struct Room {
     /// C, row by row
     slopes: Vec<f64>,
     projected: Vec<f64>,
-    gain: Vec<f64>,
+    gain: Gain,
     taken: Vec<Believed>,
 }
 
@@ -174,7 +204,6 @@ fn correct_in(
     before.clone_from(&belief.x);
     slopes.resize(h.len() * n, 0.0);
     projected.resize(n, 0.0);
-    gain.resize(n, 0.0);
     taken.clear();
     // the gate looks at every reading from before the first correction
     for (i, h) in h.iter().enumerate() {
@@ -203,16 +232,12 @@ fn correct_in(
         if !root.update_into(projected, believed.variance, gain) {
             continue;
         }
-        for (x, k) in belief.x.iter_mut().zip(&*gain) {
+        for (x, k) in belief.x.iter_mut().zip(&gain.values) {
             *x += k * rest;
         }
         if let Some(corrections) = &mut sensing.corrections {
-            corrections.push(Correction {
-                slopes: c.to_vec(),
-                innovation: rest,
-                variance,
-                gain: gain.clone(),
-            });
+            let gain = gain.values.clone();
+            corrections.push(Correction::single(c.to_vec(), rest, variance, gain));
         }
     }
     Ok(())

@@ -1,7 +1,87 @@
 //! The estimate and how its error spreads, integrated together.
 
+use super::taylor::Moments;
 use crate::driven::Driven;
-use crate::{Dynamics, Error};
+use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Dynamics, Error, Integrator, Method};
+
+/// x̂, Φ and W by one integration, for flows with few states.
+#[derive(Clone, Debug)]
+pub(super) struct Joint {
+    integrator: Integrator,
+    entries: Vec<(usize, usize)>,
+    slopes: Vec<f64>,
+    /// Q/q, empty where Q = 0
+    noise: Vec<f64>,
+    /// q, the largest entry of Q
+    scale: f64,
+    /// the state of [`Linearised`]
+    z: Vec<f64>,
+}
+
+impl Joint {
+    pub fn new(
+        n: usize,
+        outputs: usize,
+        entries: &[(usize, usize)],
+        process_noise: &[f64],
+        method: Method,
+    ) -> Result<Self, Error> {
+        let scale = process_noise.iter().fold(0.0_f64, |m, q| m.max(*q));
+        let noise = match scale > 0.0 {
+            true => process_noise.iter().map(|q| q / scale).collect(),
+            false => vec![],
+        };
+        let dimension = n + n * Linearised::width(n, scale > 0.0);
+        Ok(Self {
+            integrator: Integrator::new(method, dimension)?,
+            entries: entries.to_vec(),
+            slopes: vec![0.0; outputs],
+            noise,
+            scale,
+            z: vec![],
+        })
+    }
+
+    /// Takes `x` to the next sample and writes Φ and W.
+    pub fn advance(
+        &mut self,
+        driven: &mut Driven,
+        from: f64,
+        to: f64,
+        x: &mut [f64],
+        moments: &mut Moments,
+    ) -> Result<(), Error> {
+        let n = x.len();
+        let noisy = !self.noise.is_empty();
+        let width = Linearised::width(n, noisy);
+        Linearised::begin(x, noisy, &mut self.z);
+        let mut flow = Linearised {
+            driven,
+            entries: &self.entries,
+            slopes: &mut self.slopes,
+            noise: &self.noise,
+        };
+        self.integrator.advance(&mut flow, from, to, &mut self.z)?;
+        x.copy_from_slice(&self.z[..n]);
+        let columns = |first: usize, scale: f64| {
+            let rows = self.z[n..].chunks_exact(width);
+            let entries = rows.flat_map(move |row| &row[first..first + n]);
+            entries.map(move |e| scale * e)
+        };
+        moments.transition.fill(columns(0, 1.0));
+        if let Some(noise) = &mut moments.noise {
+            noise.fill(columns(n, self.scale));
+        }
+        Ok(())
+    }
+}
+
+impl Persist for Joint {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.integrator.walk(walk)
+    }
+}
 
 /// x̂' = f(t, x̂, u) with Φ' = FΦ and W' = FW + WFᵀ + Q/q, F = ∂f/∂x along x̂: from Φ = I and
 /// W = 0 at one sample to P⁻ = ΦPΦᵀ + qW at the next, the solution of P' = FP + PFᵀ + Q.
@@ -9,23 +89,23 @@ use crate::{Dynamics, Error};
 /// In this form no error of the integration makes P indefinite. The state is x̂, then the
 /// rows of (Φ W); W is left out where Q = 0. q is the largest entry of Q: tolerances then see
 /// W in units of time.
-pub(super) struct Linearised<'a> {
-    pub driven: &'a mut Driven,
-    pub entries: &'a [(usize, usize)],
+struct Linearised<'a> {
+    driven: &'a mut Driven,
+    entries: &'a [(usize, usize)],
     /// values of the entries of F
-    pub slopes: &'a mut [f64],
+    slopes: &'a mut [f64],
     /// diagonal of Q/q, empty where Q = 0
-    pub noise: &'a [f64],
+    noise: &'a [f64],
 }
 
 impl Linearised<'_> {
     /// Entries of a row of (Φ W).
-    pub fn width(n: usize, noisy: bool) -> usize {
+    fn width(n: usize, noisy: bool) -> usize {
         if noisy { 2 * n } else { n }
     }
 
     /// The state at a sample.
-    pub fn begin(x: &[f64], noisy: bool, z: &mut Vec<f64>) {
+    fn begin(x: &[f64], noisy: bool, z: &mut Vec<f64>) {
         let n = x.len();
         let width = Self::width(n, noisy);
         z.clear();
@@ -75,6 +155,23 @@ impl Dynamics for Linearised<'_> {
 
     fn enter(&mut self, t: f64) {
         self.driven.enter(t);
+    }
+
+    fn surfaces(&self) -> usize {
+        self.driven.surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        self.driven.surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, z: &[f64], values: &mut [f64]) {
+        let n = self.driven.dimension();
+        self.driven.read_surfaces(t, &z[..n], values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.driven.hold(sides);
     }
 
     fn names(&self) -> Vec<String> {

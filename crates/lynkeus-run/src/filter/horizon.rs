@@ -14,9 +14,10 @@ use std::collections::VecDeque;
 use super::extended::Extended;
 use super::health::Reading;
 use super::model::FilterModel;
-use super::root::{Root, dot};
+use super::root::{Packed, Root, dot};
 use super::sensing::Sensing;
 use super::smooth::{Adjoint, Correction};
+use super::spanned::Rows;
 use super::{Belief, Bounds, confine};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
@@ -103,8 +104,8 @@ struct Pass {
     after: Belief,
     /// the root before the bounds
     by_readings: Root,
-    /// Φ from the row before
-    transition: Vec<f64>,
+    /// Φ from the row before; none of the first
+    transition: Option<Rows>,
     readings: Vec<Correction>,
     /// one per bound that is met, with its place among `met`
     bounds: Vec<(usize, Correction)>,
@@ -254,10 +255,11 @@ impl Horizon {
         let mut passes: Vec<Pass> = vec![];
         for k in 0..self.rows.len() {
             let (before, transition) = match passes.last() {
-                None => (self.prior.clone(), vec![]),
+                None => (self.prior.clone(), None),
                 Some(last) => {
                     let (from, to) = (&self.rows[k - 1], &self.rows[k]);
-                    predicted(&mut self.engine, &last.after, from, to)?
+                    let (before, transition) = predicted(&mut self.engine, &last.after, from, to)?;
+                    (before, Some(transition))
                 }
             };
             passes.push(corrected(sensing, &self.rows[k], before, transition)?);
@@ -296,30 +298,26 @@ fn predicted(
     after: &Belief,
     from: &Row,
     to: &Row,
-) -> Result<(Belief, Vec<f64>), Error> {
+) -> Result<(Belief, Rows), Error> {
     let mut belief = Belief {
         x: from.guess.clone(),
         root: after.root.clone(),
     };
     if to.t <= from.t {
         // the same instant again
-        let n = belief.x.len();
-        let identity = (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0)));
-        return Ok((after.clone(), identity.collect()));
+        return Ok((after.clone(), Rows::identity(belief.x.len())));
     }
     engine.driven.start(&from.inputs);
     engine.driven.aim(from.t, to.t, &to.inputs);
-    let mut transition = vec![];
-    engine.predict(&mut belief, from.t, to.t, Some(&mut transition))?;
-    let n = belief.x.len();
+    let transition = engine.predict(&mut belief, from.t, to.t, true)?;
     let off: Vec<f64> = after
         .x
         .iter()
         .zip(&from.guess)
         .map(|(x, g)| x - g)
         .collect();
-    for (x, row) in belief.x.iter_mut().zip(transition.chunks_exact(n)) {
-        *x += dot(row, &off);
+    for (x, (first, row)) in belief.x.iter_mut().zip(transition.iter()) {
+        *x += dot(row, &off[first..]);
     }
     Ok((belief, transition))
 }
@@ -328,7 +326,7 @@ fn corrected(
     sensing: &mut Sensing,
     row: &Row,
     before: Belief,
-    transition: Vec<f64>,
+    transition: Option<Rows>,
 ) -> Result<Pass, Error> {
     let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
     let mut after = before.clone();
@@ -366,12 +364,7 @@ fn take(belief: &mut Belief, c: Vec<f64>, y: f64, r: f64) -> Option<Correction> 
     for (x, k) in belief.x.iter_mut().zip(&gain) {
         *x += k * innovation;
     }
-    Some(Correction {
-        slopes: c,
-        innovation,
-        variance,
-        gain,
-    })
+    Some(Correction::single(c, innovation, variance, gain))
 }
 
 /// The window's rows given all of it.
@@ -380,18 +373,18 @@ fn backward(passes: &[Pass]) -> Vec<Smooth> {
     let mut adjoint = Adjoint::nothing(n);
     let mut rows = vec![];
     for pass in passes.iter().rev() {
-        let shift = pass.after.root.covariance_times(&adjoint.vector);
+        let shift = Packed::of(&pass.after.root).covariance_times(&adjoint.vector);
         let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
         let x = x.collect();
         let bounds = pass.bounds.iter().rev();
-        let forces = bounds.map(|(place, b)| (*place, adjoint.over_vector(b)));
+        let forces = bounds.map(|(place, b)| (*place, adjoint.over_vector(b).iter().sum()));
         let forces = forces.collect();
         rows.push(Smooth { x, forces });
         for reading in pass.readings.iter().rev() {
             adjoint.over_vector(reading);
         }
-        if !pass.transition.is_empty() {
-            adjoint.vector_through(&pass.transition);
+        if let Some(transition) = &pass.transition {
+            adjoint.vector_through(transition);
         }
     }
     rows.reverse();

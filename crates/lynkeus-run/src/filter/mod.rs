@@ -37,16 +37,21 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
+mod doubling;
 pub(crate) mod extended;
 mod flow;
 mod health;
 mod horizon;
 mod model;
+mod nodes;
 mod persist;
 pub(crate) mod root;
 mod sensing;
 mod smooth;
+mod spanned;
+mod taylor;
 mod unscented;
+mod variation;
 
 pub use health::{Health, Innovation, Reading, SensorHealth};
 pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
@@ -61,9 +66,10 @@ use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
 use model::ConfinedFlow;
-use root::Root;
+use root::{Packed, Root};
 use sensing::Sensing;
 use smooth::{History, Step};
+use spanned::Rows;
 use unscented::Unscented;
 
 /// Which filter.
@@ -120,8 +126,8 @@ pub(crate) struct Belief {
 
 #[derive(Clone, Debug)]
 enum Engine {
-    Extended(Extended),
-    Unscented(Unscented),
+    Extended(Box<Extended>),
+    Unscented(Box<Unscented>),
     MovingHorizon(Box<Horizon>),
 }
 
@@ -145,7 +151,7 @@ pub(crate) struct Filter {
     bound: Bound,
     history: Option<History>,
     /// the transition since the last update, for the smoother
-    pending: Option<Vec<f64>>,
+    pending: Option<Rows>,
 }
 
 impl Filter {
@@ -165,13 +171,15 @@ impl Filter {
             ));
         }
         let engine = match settings.kind {
-            FilterKind::Extended => Engine::Extended(Extended::new(
+            FilterKind::Extended => Engine::Extended(Box::new(Extended::new(
                 &model.flow,
                 &model.flow_entries,
                 &model.process_noise,
                 run,
-            )?),
-            FilterKind::Unscented(points) => Engine::Unscented(Unscented::new(model, points, run)?),
+            )?)),
+            FilterKind::Unscented(points) => {
+                Engine::Unscented(Box::new(Unscented::new(model, points, run)?))
+            }
             FilterKind::MovingHorizon(length, bounds) => {
                 Engine::MovingHorizon(Box::new(Horizon::new(model, length, bounds, run)?))
             }
@@ -223,7 +231,7 @@ impl Filter {
             history.push(Step {
                 transition,
                 x: self.belief.x.clone(),
-                root: self.belief.root.clone(),
+                root: Packed::of(&self.belief.root),
                 corrections,
             });
         }
@@ -237,24 +245,15 @@ impl Filter {
         }
     }
 
-    /// To the next sample; where the plant has no value on the way, inside the declared ranges.
-    /// The transition is written where a smoother asks for it.
-    fn predict(
-        &mut self,
-        from: f64,
-        to: f64,
-        inputs: &[f64],
-        transition: Option<&mut Vec<f64>>,
-    ) -> Result<(), Error> {
+    /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
+    /// value on the way, inside the declared ranges.
+    fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
         self.driven().aim(from, to, inputs);
-        let mut transition = transition;
-        let kept = transition.as_deref_mut();
+        let (belief, keep) = (&mut self.belief, self.history.is_some());
         let result = match &mut self.engine {
-            Engine::Extended(engine) => engine.predict(&mut self.belief, from, to, kept),
-            Engine::Unscented(engine) => engine.predict(&mut self.belief, from, to),
-            Engine::MovingHorizon(horizon) => {
-                horizon.engine.predict(&mut self.belief, from, to, kept)
-            }
+            Engine::Extended(engine) => engine.predict(belief, from, to, keep),
+            Engine::Unscented(engine) => engine.predict(belief, from, to, keep),
+            Engine::MovingHorizon(horizon) => horizon.engine.predict(belief, from, to, keep),
         };
         match (result, &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
@@ -264,7 +263,7 @@ impl Filter {
                 let driven = &mut spare.engine.driven;
                 driven.start(&self.inputs);
                 driven.aim(from, to, inputs);
-                spare.engine.predict(&mut self.belief, from, to, transition)
+                spare.engine.predict(&mut self.belief, from, to, keep)
             }
             (result, _) => result,
         }
@@ -311,14 +310,12 @@ impl Runner for Filter {
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
         self.bound.see(&self.inputs);
-        let mut transition = self.history.is_some().then(Vec::new);
-        self.predict(from, sample.t, sample.inputs, transition.as_mut())?;
+        let transition = self.predict(from, sample.t, sample.inputs)?;
         self.driven().arrive();
-        if let Some(transition) = transition {
-            let n = self.belief.x.len();
+        if self.history.is_some() {
             self.pending = Some(match self.pending.take() {
                 None => transition,
-                Some(earlier) => product(&transition, &earlier, n),
+                Some(earlier) => transition.after(&earlier),
             });
         }
         Ok(())
@@ -326,6 +323,8 @@ impl Runner for Filter {
 
     fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
         self.sensing.health.inputs_held += sample.held;
+        // those of an update that failed
+        self.sensing.take_corrections();
         self.inputs.copy_from_slice(sample.inputs);
         self.driven().start(sample.inputs);
         self.correct(sample.t, sample.readings)
@@ -358,20 +357,6 @@ impl Runner for Filter {
     fn health(&self) -> &Health {
         &self.sensing.health
     }
-}
-
-/// A B, row by row.
-fn product(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
-    let mut found = vec![0.0; n * n];
-    let rows = a.chunks_exact(n.max(1));
-    for (into, row) in found.chunks_exact_mut(n.max(1)).zip(rows) {
-        for (factor, from) in row.iter().zip(b.chunks_exact(n.max(1))) {
-            into.iter_mut()
-                .zip(from)
-                .for_each(|(into, x)| *into += factor * x);
-        }
-    }
-    found
 }
 
 /// Whether the plant has no value where it was asked for.

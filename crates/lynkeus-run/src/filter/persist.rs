@@ -18,11 +18,8 @@ impl Persist for Filter {
         walk.numbers(&mut self.inputs)?;
         walk.numbers(&mut self.deviations)?;
         self.bound.walk(walk)?;
-        let entries = self.belief.root.entries.len();
-        walk.optional(&mut self.pending, |walk, pending: &mut Vec<f64>| {
-            pending.resize(entries, 0.0);
-            walk.numbers(pending)
-        })
+        let n = self.belief.x.len();
+        walk.optional(&mut self.pending, |walk, pending| pending.walk(walk, n))
     }
 }
 

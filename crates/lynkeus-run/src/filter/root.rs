@@ -2,11 +2,18 @@
 
 use crate::snapshot::{Damaged, Persist, Walk};
 
-/// A root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
+/// A lower triangular root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
     pub n: usize,
     pub entries: Vec<f64>,
+}
+
+/// A gain, with room for finding it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Gain {
+    pub values: Vec<f64>,
+    factors: Vec<(f64, f64)>,
 }
 
 impl Root {
@@ -34,40 +41,74 @@ impl Root {
     pub fn transposed_times(&self, c: &[f64], out: &mut [f64]) {
         out.fill(0.0);
         for (i, c) in c.iter().enumerate().filter(|(_, c)| **c != 0.0) {
-            for (out, s) in out.iter_mut().zip(self.row(i)) {
+            for (out, s) in out.iter_mut().zip(&self.row(i)[..=i]) {
                 *out += c * s;
             }
         }
     }
 
-    /// P v = S (Sᵀ v).
-    pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
-        let mut half = vec![0.0; self.n];
-        self.transposed_times(v, &mut half);
-        (0..self.n).map(|i| dot(self.row(i), &half)).collect()
+    /// φ with φS = b; components along which P has no variance are 0.
+    pub fn against(&self, b: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; self.n];
+        let mut rest = b.to_vec();
+        for k in (0..self.n).rev() {
+            let row = &self.row(k)[..=k];
+            if row[k] > 0.0 {
+                result[k] = rest[k] / row[k];
+            }
+            for (rest, s) in rest.iter_mut().zip(row) {
+                *rest -= result[k] * s;
+            }
+        }
+        result
     }
 
-    /// Potter's update by one reading y = cᵀx + noise of variance `r`: S becomes a root of
-    /// (I − k cᵀ) P (I − k cᵀ)ᵀ + r k kᵀ, and the gain k is returned. `projected` is Sᵀc. No
+    /// Carlson's update by one reading y = cᵀx + noise of variance `r`: S becomes the lower root
+    /// of (I − k cᵀ) P (I − k cᵀ)ᵀ + r k kᵀ, and the gain k is returned. `projected` is Sᵀc. No
     /// gain where neither the reading nor the estimate has any variance.
+    ///
+    /// N. A. Carlson, "Fast triangular formulation of the square root filter", *AIAA Journal* 11
+    /// (1973) 1259–1265, for a lower root: from the last column to the first.
     pub fn update(&mut self, projected: &[f64], r: f64) -> Option<Vec<f64>> {
-        let mut gain = vec![0.0; self.n];
-        self.update_into(projected, r, &mut gain).then_some(gain)
+        let mut gain = Gain::default();
+        self.update_into(projected, r, &mut gain)
+            .then_some(gain.values)
     }
 
     /// The same with room for the gain; false where there is none.
-    pub fn update_into(&mut self, projected: &[f64], r: f64, gain: &mut [f64]) -> bool {
+    pub fn update_into(&mut self, projected: &[f64], r: f64, gain: &mut Gain) -> bool {
+        let n = self.n;
+        let Gain { values, factors } = gain;
         let variance = dot(projected, projected) + r;
         if variance.is_nan() || variance <= 0.0 {
             return false;
         }
-        let shrink = 1.0 / (1.0 + (r / variance).sqrt());
-        for (i, k) in gain.iter_mut().enumerate() {
-            let row = &mut self.entries[i * self.n..(i + 1) * self.n];
-            *k = dot(row, projected) / variance;
-            for (s, p) in row.iter_mut().zip(projected) {
-                *s -= shrink * *k * p;
+        // of each column: what is left of it, and what the later ones take
+        factors.clear();
+        factors.resize(n, (1.0, 0.0));
+        let mut alpha = r;
+        for (factor, v) in factors.iter_mut().zip(projected).rev() {
+            let before = alpha;
+            alpha += v * v;
+            if alpha > 0.0 {
+                let taken = if before > 0.0 {
+                    v / (before.sqrt() * alpha.sqrt())
+                } else {
+                    0.0
+                };
+                *factor = ((before / alpha).sqrt(), taken);
             }
+        }
+        values.resize(n, 0.0);
+        for (i, k) in values.iter_mut().enumerate() {
+            let row = &mut self.entries[i * n..=i * n + i];
+            let mut sum = 0.0;
+            for ((s, (left, taken)), v) in row.iter_mut().zip(&*factors).zip(projected).rev() {
+                let own = *s;
+                *s = own * left - sum * taken;
+                sum += own * v;
+            }
+            *k = sum / variance;
         }
         true
     }
@@ -98,8 +139,58 @@ impl Persist for Root {
     }
 }
 
+/// A lower root, its triangle alone, for keeping.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Packed {
+    n: usize,
+    entries: Vec<f64>,
+}
+
+impl Packed {
+    pub fn of(root: &Root) -> Self {
+        let rows = (0..root.n).flat_map(|i| &root.row(i)[..=i]);
+        Self {
+            n: root.n,
+            entries: rows.copied().collect(),
+        }
+    }
+
+    /// Row i of S up to its diagonal.
+    fn row(&self, i: usize) -> &[f64] {
+        &self.entries[i * (i + 1) / 2..(i + 1) * (i + 2) / 2]
+    }
+
+    /// P v = S (Sᵀ v).
+    pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
+        let mut half = vec![0.0; self.n];
+        for (i, v) in v.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+            for (half, s) in half.iter_mut().zip(self.row(i)) {
+                *half += v * s;
+            }
+        }
+        (0..self.n).map(|i| dot(self.row(i), &half[..=i])).collect()
+    }
+}
+
+impl Persist for Packed {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.entries)
+    }
+}
+
+/// Σ a_i b_i over the shorter of the two, in four partial sums, which processors add side by side.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let count = a.len().min(b.len());
+    let (fours, rest) = a[..count].as_chunks::<4>();
+    let (others, last) = b[..count].as_chunks::<4>();
+    let mut sums = [0.0; 4];
+    for (a, b) in fours.iter().zip(others) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let tail: f64 = rest.iter().zip(last).map(|(a, b)| a * b).sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + tail
 }
 
 /// Reflections that make the first n rows of A upper triangular; row by row, so that
@@ -140,30 +231,52 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
 }
 
 /// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
-/// pivot that rounding cannot tell from zero has none.
+/// pivot that rounding cannot tell from zero has none. What is zero before the first entry of a
+/// row stays so, and costs nothing.
 pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
-    let mut lower = vec![];
-    factor_into(matrix, n, &mut lower);
-    lower
+    Factor::default().of(matrix, n).to_vec()
 }
 
-/// The same with room for it.
-pub(crate) fn factor_into(matrix: &[f64], n: usize, lower: &mut Vec<f64>) {
-    lower.clear();
-    lower.resize(n * n, 0.0);
-    for j in 0..n {
-        let own = &lower[j * n..j * n + j];
-        let pivot = matrix[j * n + j] - dot(own, own);
-        let noise = n as f64 * f64::EPSILON * matrix[j * n + j].abs();
-        if pivot.is_nan() || pivot <= noise {
-            continue;
+/// Room for the [factor] of a matrix.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Factor {
+    lower: Vec<f64>,
+    /// where the entries of each row that are not 0 begin
+    firsts: Vec<usize>,
+}
+
+impl Factor {
+    /// As [`factor`].
+    pub fn of(&mut self, matrix: &[f64], n: usize) -> &[f64] {
+        let Self { lower, firsts } = self;
+        let first =
+            |(i, row): (usize, &[f64])| row[..i].iter().position(|e| *e != 0.0).unwrap_or(i);
+        firsts.clear();
+        firsts.extend(matrix.chunks_exact(n.max(1)).enumerate().map(first));
+        lower.clear();
+        lower.resize(n * n, 0.0);
+        for j in 0..n {
+            let own = &lower[j * n + firsts[j]..j * n + j];
+            let pivot = matrix[j * n + j] - dot(own, own);
+            let noise = n as f64 * f64::EPSILON * matrix[j * n + j].abs();
+            if pivot.is_nan() || pivot <= noise {
+                continue;
+            }
+            let root = pivot.sqrt();
+            lower[j * n + j] = root;
+            for i in j + 1..n {
+                let begin = firsts[i].max(firsts[j]);
+                if firsts[i] > j {
+                    continue;
+                }
+                let known = dot(
+                    &lower[i * n + begin..i * n + j],
+                    &lower[j * n + begin..j * n + j],
+                );
+                lower[i * n + j] = (matrix[i * n + j] - known) / root;
+            }
         }
-        let root = pivot.sqrt();
-        lower[j * n + j] = root;
-        for i in j + 1..n {
-            let rest = matrix[i * n + j] - dot(&lower[i * n..i * n + j], &lower[j * n..j * n + j]);
-            lower[i * n + j] = rest / root;
-        }
+        lower
     }
 }
 
@@ -225,6 +338,15 @@ mod tests {
         root.transposed_times(&[1.0, 0.0], &mut projected);
         root.update(&projected, 0.0).unwrap();
         assert!(root.deviation(0) < 1e-15);
+    }
+
+    #[test]
+    fn rows_are_divided_by_the_root() {
+        let mut root = Root::diagonal(&[4.0, 9.0]);
+        root.entries[2] = 1.0;
+        // (5, 7) [[2, 0], [1, 3]] = (17, 21)
+        close(&root.against(&[17.0, 21.0]), &[5.0, 7.0], 1e-15);
+        assert_eq!(Root::diagonal(&[0.0]).against(&[0.0]), [0.0]);
     }
 
     #[test]

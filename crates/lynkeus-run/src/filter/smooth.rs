@@ -1,38 +1,61 @@
 //! Smoothers: the estimate at a sample given later ones.
 
-use super::root::{Root, dot};
+use super::root::{Packed, Root, dot};
+use super::spanned::Rows;
 use crate::snapshot::{Damaged, Persist, Walk};
 
-/// What one reading did.
+/// What readings did that were taken together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Correction {
-    /// its row of C
-    pub slopes: Vec<f64>,
-    /// its innovation after the readings before it
-    pub innovation: f64,
-    /// the innovation's variance α
-    pub variance: f64,
-    /// k
-    pub gain: Vec<f64>,
+    /// their rows of C
+    pub slopes: Vec<Vec<f64>>,
+    /// their columns of K
+    pub gains: Vec<Vec<f64>>,
+    /// A⁻¹, A the covariance of their innovations, row by row
+    pub information: Vec<f64>,
+    /// A⁻¹ν, ν their innovations after the readings before them
+    pub weighed: Vec<f64>,
+}
+
+impl Correction {
+    /// Of one reading: its row of C, its innovation with the variance of that, its gain.
+    pub fn single(slopes: Vec<f64>, innovation: f64, variance: f64, gain: Vec<f64>) -> Self {
+        Self {
+            slopes: vec![slopes],
+            gains: vec![gain],
+            information: vec![1.0 / variance],
+            weighed: vec![innovation / variance],
+        }
+    }
 }
 
 /// What one sample did.
 #[derive(Clone, Debug)]
 pub(super) struct Step {
-    /// Φ from the sample before, row by row; none at the first and at repeated times
-    pub transition: Option<Vec<f64>>,
+    /// Φ from the sample before; none at the first and at repeated times
+    pub transition: Option<Rows>,
     /// x̂⁺ and a root of P⁺
     pub x: Vec<f64>,
-    pub root: Root,
+    pub root: Packed,
     pub corrections: Vec<Correction>,
 }
 
 impl Correction {
-    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
-        walk.numbers(&mut self.slopes)?;
-        walk.number(&mut self.innovation)?;
-        walk.number(&mut self.variance)?;
-        walk.numbers(&mut self.gain)
+    /// Of n states.
+    fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let count = walk.length(self.gains.len())?;
+        for columns in [&mut self.slopes, &mut self.gains] {
+            columns.resize_with(count, || vec![0.0; n]);
+            columns.iter_mut().try_for_each(|c| walk.numbers(c))?;
+        }
+        let entries = walk.length(self.information.len())?;
+        if Some(entries) != count.checked_mul(count) {
+            return Err(Damaged);
+        }
+        self.information.resize(entries, 0.0);
+        walk.numbers(&mut self.information)?;
+        self.weighed.resize(count, 0.0);
+        walk.numbers(&mut self.weighed)
     }
 }
 
@@ -41,7 +64,7 @@ impl Step {
         Self {
             transition: None,
             x: vec![0.0; n],
-            root: Root::diagonal(&vec![0.0; n]),
+            root: Packed::of(&Root::diagonal(&vec![0.0; n])),
             corrections: vec![],
         }
     }
@@ -50,18 +73,15 @@ impl Step {
         let n = self.x.len();
         walk.numbers(&mut self.x)?;
         self.root.walk(walk)?;
-        walk.optional(&mut self.transition, |walk, transition: &mut Vec<f64>| {
-            transition.resize(n * n, 0.0);
-            walk.numbers(transition)
+        let transition = &mut self.transition;
+        walk.optional(transition, |walk, transition: &mut Rows| {
+            transition.walk(walk, n)
         })?;
         let count = walk.length(self.corrections.len())?;
-        let room = Correction {
-            slopes: vec![0.0; n],
-            gain: vec![0.0; n],
-            ..Correction::default()
-        };
-        self.corrections.resize(count, room);
-        self.corrections.iter_mut().try_for_each(|c| c.walk(walk))
+        self.corrections.resize_with(count, Correction::default);
+        self.corrections
+            .iter_mut()
+            .try_for_each(|c| c.walk(walk, n))
     }
 }
 
@@ -99,8 +119,8 @@ impl History {
     }
 
     /// By the recursion of Bryson and Frazier, backward from the last sample or from `lag`
-    /// samples later: λ = 0, Λ = 0 there, and over each reading y = cᵀx + v with gain k
-    /// λ ← (I − k cᵀ)ᵀλ − c ν/α, Λ ← (I − k cᵀ)ᵀΛ(I − k cᵀ) + c cᵀ/α, then over the flow
+    /// samples later: λ = 0, Λ = 0 there, and over readings y = Cx + v with gain K
+    /// λ ← (I − KC)ᵀλ − CᵀA⁻¹ν, Λ ← (I − KC)ᵀΛ(I − KC) + CᵀA⁻¹C, then over the flow
     /// λ ← Φᵀλ, Λ ← ΦᵀΛΦ. It equals the smoother of Rauch, Tung and Striebel,
     /// x̂ˢ = x̂⁺ + P⁺Φᵀ(P⁻)⁻¹(x̂ˢ' − x̂⁻'), and never inverts P⁻.
     pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
@@ -188,29 +208,21 @@ impl Adjoint {
         }
     }
 
-    /// λ over a reading; returns how hard the reading pushes along its row of C.
-    pub fn over_vector(&mut self, correction: &Correction) -> f64 {
-        let pull =
-            dot(&correction.gain, &self.vector) + correction.innovation / correction.variance;
-        for (l, c) in self.vector.iter_mut().zip(&correction.slopes) {
-            *l -= c * pull;
+    /// λ over readings; returns how hard each of them pushes along its row of C.
+    pub fn over_vector(&mut self, correction: &Correction) -> Vec<f64> {
+        let known = correction.gains.iter().zip(&correction.weighed);
+        let pulls: Vec<f64> = known.map(|(k, w)| dot(k, &self.vector) + w).collect();
+        for (c, pull) in correction.slopes.iter().zip(&pulls) {
+            for (l, c) in self.vector.iter_mut().zip(c) {
+                *l -= c * pull;
+            }
         }
-        pull
+        pulls
     }
 
     /// Φᵀλ.
-    pub fn vector_through(&mut self, transition: &[f64]) {
-        let mut vector = vec![0.0; self.vector.len()];
-        for (l, row) in self
-            .vector
-            .iter()
-            .zip(transition.chunks_exact(vector.len().max(1)))
-        {
-            for (into, phi) in vector.iter_mut().zip(row) {
-                *into += l * phi;
-            }
-        }
-        self.vector = vector;
+    pub fn vector_through(&mut self, transition: &Rows) {
+        self.vector = transition.transposed_times(&self.vector);
     }
 
     fn over(&mut self, correction: &Correction) {
@@ -218,50 +230,49 @@ impl Adjoint {
         if self.matrix.is_empty() {
             return;
         }
-        let Correction {
-            slopes: c,
-            variance,
-            gain: k,
-            ..
-        } = correction;
-        let n = c.len();
-        // Λ − c (Λk)ᵀ − (Λk) cᵀ + c cᵀ (kᵀΛk + 1/α)
-        let along: Vec<f64> = self.matrix.chunks_exact(n).map(|row| dot(row, k)).collect();
-        let both = dot(k, &along) + 1.0 / variance;
-        for (i, row) in self.matrix.chunks_exact_mut(n).enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                *entry += c[i] * c[j] * both - c[i] * along[j] - along[i] * c[j];
+        // Λ − Cᵀ(ΛK)ᵀ − (ΛK)C + Cᵀ(KᵀΛK + A⁻¹)C
+        let Correction { slopes, gains, .. } = correction;
+        let (n, m) = (self.vector.len(), gains.len());
+        let rows = || self.matrix.chunks_exact(n);
+        let along: Vec<Vec<f64>> = gains
+            .iter()
+            .map(|k| rows().map(|row| dot(row, k)).collect())
+            .collect();
+        for a in 0..m {
+            // what is taken from each row along C's row a
+            let mut taken = along[a].clone();
+            for b in 0..m {
+                let both = dot(&gains[a], &along[b]) + correction.information[a * m + b];
+                for (taken, c) in taken.iter_mut().zip(&slopes[b]) {
+                    *taken -= both * c;
+                }
+            }
+            for (i, row) in self.matrix.chunks_exact_mut(n).enumerate() {
+                for (j, entry) in row.iter_mut().enumerate() {
+                    *entry -= slopes[a][i] * taken[j] + along[a][i] * slopes[a][j];
+                }
             }
         }
     }
 
-    fn through(&mut self, transition: &[f64]) {
+    fn through(&mut self, transition: &Rows) {
         let n = self.vector.len();
         self.vector_through(transition);
         if self.matrix.is_empty() {
             return;
         }
-        // ΛΦ, then Φᵀ(ΛΦ)
+        // ΦᵀΛ, then its rows times Φ
         let mut half = vec![0.0; n * n];
-        for (i, row) in transition.chunks_exact(n).enumerate() {
-            for (from, into) in self.matrix.chunks_exact(n).zip(half.chunks_exact_mut(n)) {
-                for (into, phi) in into.iter_mut().zip(row) {
-                    *into += from[i] * phi;
+        for ((first, row), from) in transition.iter().zip(self.matrix.chunks_exact(n)) {
+            for (phi, into) in row.iter().zip(half.chunks_exact_mut(n).skip(first)) {
+                for (into, from) in into.iter_mut().zip(from) {
+                    *into += phi * from;
                 }
             }
         }
-        let mut matrix = vec![0.0; n * n];
-        for (row, half) in transition.chunks_exact(n).zip(half.chunks_exact(n)) {
-            for (phi, into) in row
-                .iter()
-                .zip(matrix.chunks_exact_mut(n))
-                .filter(|(phi, _)| **phi != 0.0)
-            {
-                for (into, h) in into.iter_mut().zip(half) {
-                    *into += phi * h;
-                }
-            }
-        }
-        self.matrix = matrix;
+        let rows = half.chunks_exact(n);
+        self.matrix = rows
+            .flat_map(|row| transition.transposed_times(row))
+            .collect();
     }
 }

@@ -5,6 +5,8 @@ use super::health::Reading;
 use super::model::FilterModel;
 use super::root::{Root, dot, factor};
 use super::sensing::Sensing;
+use super::smooth::Correction;
+use super::spanned::{Rows, Spanned};
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator};
@@ -150,12 +152,25 @@ impl Unscented {
         pairs.map(|(k, (a, b))| self.weight(k) * a[i] * b[j]).sum()
     }
 
-    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + QΔt.
-    pub fn predict(&mut self, belief: &mut Belief, from: f64, to: f64) -> Result<(), Error> {
+    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + QΔt. Where it is to be kept, the transition
+    /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
+    /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
+    /// Transactions on Automatic Control* 53 (2008) 845–849).
+    pub fn predict(
+        &mut self,
+        belief: &mut Belief,
+        from: f64,
+        to: f64,
+        keep: bool,
+    ) -> Result<Rows, Error> {
         let mut points = self.points(belief);
         for point in &mut points {
             self.integrator.advance(&mut self.driven, from, to, point)?;
         }
+        let transition = match keep {
+            true => self.carried(&belief.root, &points),
+            false => Rows::default(),
+        };
         let cloud = self.cloud(points);
         let noise: Vec<f64> = self.process_noise.iter().map(|q| q * (to - from)).collect();
         let deviations = &cloud.deviations;
@@ -166,7 +181,20 @@ impl Unscented {
         });
         belief.root = self.spread(deviations, extra.collect());
         belief.x = cloud.mean;
-        Ok(())
+        Ok(transition)
+    }
+
+    /// Row i of the linear map that takes the points drawn from `root` to their images best.
+    fn row(&self, root: &Root, images: &[Vec<f64>], i: usize) -> Vec<f64> {
+        let n = root.n;
+        let apart = (0..n).map(|k| images[1 + k][i] - images[1 + n + k][i]);
+        let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.weights.spread).collect();
+        root.against(&halves)
+    }
+
+    fn carried(&self, root: &Root, images: &[Vec<f64>]) -> Rows {
+        let rows = (0..root.n).flat_map(|i| self.row(root, images, i));
+        Rows::of(&Spanned::dense(root.n, rows.collect()))
     }
 
     /// The lower root of Σ W d dᵀ + Σ e eᵀ. Where the first weight is negative the sum is formed,
@@ -240,6 +268,18 @@ impl Unscented {
                 solve(&lower, m, cross)
             })
             .collect();
+        let slopes = |&(i, ..): &(usize, f64, f64)| self.row(&belief.root, &outputs.deviations, i);
+        let column = |a: usize| gain.iter().map(|k| k[a]).collect();
+        let unit = |a: usize| (0..m).map(|b| f64::from(u8::from(a == b))).collect();
+        let innovations = || taken.iter().map(|t| t.2).collect();
+        if let Some(corrections) = &mut sensing.corrections {
+            corrections.push(Correction {
+                slopes: taken.iter().map(slopes).collect(),
+                gains: (0..m).map(column).collect(),
+                information: (0..m).flat_map(|a| solve(&lower, m, unit(a))).collect(),
+                weighed: solve(&lower, m, innovations()),
+            });
+        }
         for (x, k) in belief.x.iter_mut().zip(&gain) {
             *x += taken.iter().zip(k).map(|((.., nu), k)| k * nu).sum::<f64>();
         }

@@ -267,6 +267,9 @@ pub fn steps(graph: &Graph, node: Node, symbols: &[Node]) -> bool {
                 ..,
             ) => depends(n),
             Op::Select(condition, ..) => depends(condition),
+            Op::Implicit(_) => graph
+                .implicit_call(n)
+                .is_some_and(|call| call.function.steps() && depends(n)),
             _ => false,
         })
 }

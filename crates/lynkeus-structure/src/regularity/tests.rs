@@ -1,6 +1,6 @@
 use super::*;
 use crate::Dimension;
-use lynkeus_expr::Expr;
+use lynkeus_expr::{Expr, Implicit, ImplicitUnknown, Interval};
 
 fn side(x: Expr<'_>, min: f64, max: f64) -> Dimension {
     Dimension {
@@ -176,4 +176,37 @@ fn jumps_go_through_linear_systems() {
     assert!(jumps(&solved(|x| x.powi(2) + 3.0, |x| x.sign())));
     assert!(jumps(&solved(|x| x.floor() + 5.0, |x| x.sin())));
     assert!(undefined(&solved(|x| x, |x| x.sin())));
+}
+
+/// A loop has a value where one root in its range is proved; what jumps around it or within
+/// it is not overlooked.
+#[test]
+fn loops_are_regular_where_they_have_one_root() {
+    let root = |(low, high): (f64, f64), g: fn(Expr<'_>, Expr<'_>) -> Node| {
+        let graph = Graph::new();
+        let (z, x) = (graph.symbol("z"), graph.symbol("x"));
+        let region = Region {
+            dimensions: vec![side(x, low, high)],
+        };
+        let unknown = ImplicitUnknown {
+            symbol: z.node(),
+            start: 1.0,
+            range: Interval::new(0.0, 10.0).unwrap(),
+        };
+        let node = Implicit::solve(&graph, &[unknown], &[g(z, x)]).unwrap()[0];
+        Regularity::of(&graph, &[node], &[x.node()], &region).unwrap()
+    };
+    let square = |z: Expr<'_>, x: Expr<'_>| (z * z - x).node();
+    assert!(root((0.5, 90.0), square).holds());
+    assert!(undefined(&root((-1.0, 4.0), square)), "it ends at 0");
+    assert!(
+        undefined(&root((1.0, 200.0), square)),
+        "it leaves its range"
+    );
+    let twice = |z: Expr<'_>, x: Expr<'_>| ((z - 2.0) * (z - 5.0) - x).node();
+    assert!(undefined(&root((-1.0, 1.0), twice)));
+    let outside = |z: Expr<'_>, x: Expr<'_>| (z + z.exp() - 20.0 - x.sign()).node();
+    assert!(jumps(&root((-1.0, 1.0), outside)) && root((0.5, 1.0), outside).holds());
+    let inside = |z: Expr<'_>, x: Expr<'_>| (z + (z - 3.0).sign() - x).node();
+    assert!(undefined(&root((1.0, 5.0), inside)) && root((5.0, 8.0), inside).holds());
 }

@@ -30,8 +30,9 @@ pub(super) struct Walk<'g> {
     /// a selection whose branches agree where it changes from one to the other
     glued: HashSet<Node>,
     known: Vec<Known>,
-    /// the linear systems on this cell: enclosures of x, and of the condition estimate
-    solved: HashMap<Node, (Vec<Interval>, Interval)>,
+    /// the systems on this cell: enclosures of their entries, of a linear one also of the
+    /// condition estimate, which comes last
+    solved: HashMap<Node, Vec<Interval>>,
 }
 
 impl<'g> Walk<'g> {
@@ -84,9 +85,7 @@ impl<'g> Walk<'g> {
             let known = self.one(i, cell);
             self.known.push(known);
             // one cell may take long where systems are large
-            if let Op::Solve(_) = self.graph.op(self.nodes[i])
-                && self.graph.spent().is_none()
-            {
+            if self.graph.op(self.nodes[i]).is_system() && self.graph.spent().is_none() {
                 let system = self.nodes[i];
                 let solved = self.solve(system);
                 self.solved.insert(system, solved);
@@ -153,26 +152,31 @@ impl<'g> Walk<'g> {
             Op::Binary(op, a, b) => Intervals.binary(op, &of(a), &of(b)),
             Op::Select(c, a, b) => Intervals.select(&of(c), &of(a), &of(b)),
             // a system has no value of its own, and must not pass for a constant
-            Op::Solve(_) => Interval::ENTIRE,
+            Op::Solve(_) | Op::Implicit(_) => Interval::ENTIRE,
             Op::Entry(system, i) => self.entry(system, i as usize),
         }
     }
 
     fn entry(&self, system: Node, i: usize) -> Interval {
-        match self.solved.get(&system) {
-            Some((x, condition)) => x.get(i).copied().unwrap_or(*condition),
-            None => Interval::UNKNOWN,
-        }
+        let entries = self.solved.get(&system);
+        let entry = entries.and_then(|entries| entries.get(i).copied());
+        entry.unwrap_or(Interval::UNKNOWN)
     }
 
-    fn solve(&self, system: Node) -> (Vec<Interval>, Interval) {
+    fn solve(&self, system: Node) -> Vec<Interval> {
         let arguments = self.graph.arguments(system);
         let values: Vec<Interval> = arguments.iter().map(|&a| self.of(a).values).collect();
+        if let Some(call) = self.graph.implicit_call(system) {
+            return Intervals.implicit(&call.function, &values);
+        }
         let n = self.unknowns(system);
         let (A, b) = values.split_at(n * n);
-        Intervals.solve(A, b)
+        let (mut x, condition) = Intervals.solve(A, b);
+        x.push(condition);
+        x
     }
 
+    /// Number of unknowns of a linear system.
     fn unknowns(&self, system: Node) -> usize {
         self.graph.system(system).map_or(0, |system| system.size())
     }
@@ -206,12 +210,14 @@ impl<'g> Walk<'g> {
                     still && of(a).continuous && of(b).continuous
                 }
             },
-            // the condition estimate steps with the pivots
+            // the condition estimate steps with the pivots; a root that is the only one of
+            // equations that do not jump moves with them
             Op::Entry(system, i) => {
-                let last = i as usize == self.unknowns(system);
+                let linear = matches!(self.graph.op(system), Op::Solve(_));
+                let last = linear && i as usize == self.unknowns(system);
                 of(system).continuous && values.is_defined() && !last
             }
-            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::Solve(_) => {
+            Op::Unary(..) | Op::Powi(..) | Op::Binary(..) | Op::Solve(_) | Op::Implicit(_) => {
                 let arguments = self.graph.arguments(node);
                 arguments.into_iter().all(|a| of(a).continuous)
             }

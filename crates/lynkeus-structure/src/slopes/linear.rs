@@ -139,7 +139,7 @@ impl<'a> Splitter<'a> {
     fn other(&self, node: Node) -> Result<Linear, MissingInput> {
         let arguments = self.graph.arguments(node);
         let fixed = arguments.iter().all(|&a| self.of(a).as_number().is_some());
-        if !fixed || matches!(self.graph.op(node), Op::Solve(_)) {
+        if !fixed || self.graph.op(node).is_system() {
             return Ok(Linear::term(node));
         }
         let used = self.region.restricted(&self.graph.symbols_of(&[node]));

@@ -11,11 +11,11 @@
 
 mod rank;
 
-use lynkeus_expr::{Binary, Graph, Node, Op, Tape, Unary, jacobian};
+use lynkeus_expr::{Graph, Node, Tape, jacobian};
 
 use crate::Extended;
 use crate::chains::names;
-use crate::visibility::{inside, spread};
+use crate::points::{inside, spread};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -174,7 +174,7 @@ fn factor(
 /// What keeps a function from being affine in `symbols`.
 fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<String> {
     let depends = |node: Node| !jacobian::pattern(graph, &[node], symbols)[0].is_empty();
-    let step = |node: &Node| is_step(graph.op(*node)) && depends(*node);
+    let step = |node: &Node| graph.jumps(*node) && depends(*node);
     if let Some(step) = graph.reachable(&[function]).into_iter().find(step) {
         return Some(format!("it switches with {}", graph.render(step, 60)));
     }
@@ -185,16 +185,6 @@ fn not_affine(graph: &Graph, function: Node, symbols: &[Node]) -> Option<String>
         graph.symbol_name(symbols[column]).unwrap_or_default(),
         graph.render(slope, 60)
     ))
-}
-
-/// Operations whose derivative is zero wherever it exists.
-fn is_step(op: Op) -> bool {
-    use Binary::{And, Equal, Less, LessEq, Or};
-    match op {
-        Op::Unary(op, _) => matches!(op, Unary::Sign | Unary::Floor | Unary::Not),
-        Op::Binary(op, ..) => matches!(op, Less | LessEq | Equal | And | Or),
-        _ => false,
-    }
 }
 
 impl Factor {

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
 use crate::study::Name;
-use crate::{Error, Study, calibrate};
+use crate::{Error, Study};
 
 /// Names listed before the rest becomes a count.
 const LISTED: usize = 24;
@@ -20,13 +20,14 @@ pub(super) fn answer(
     study: &Study,
     plant: &Plant,
     options: &CheckOptions,
+    unknown: Vec<String>,
     budget: Budget,
 ) -> Result<Answer, Error> {
     let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
     let sensors = &study.sensors;
     let question = Question {
         measured: texts(sensors.measured.as_deref().unwrap_or_default()),
-        unknown: calibrate::unknown_inputs(study, plant),
+        unknown,
         disturbances: texts(&sensors.disturbances),
         parameters: options.parameters,
         about: options.about.clone(),
@@ -130,7 +131,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
         .try_for_each(|note| writeln!(f, "  ({note})"))
 }
 
-fn listed(names: &[&str]) -> String {
+pub(super) fn listed(names: &[&str]) -> String {
     match names.len() > LISTED {
         true => format!("{}, … ({} in all)", names[..LISTED].join(", "), names.len()),
         false => names.join(", "),

@@ -10,6 +10,7 @@ use lynkeus::precision::{self, Candidates};
 
 use super::inputs::Source;
 use super::output;
+use super::progress::Alive;
 use super::save::Results;
 
 /// How well, where the answer goes, and which sensors to try.
@@ -63,7 +64,10 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
             Which::All => Candidates::All,
         }),
     };
-    let report = lynkeus::precision(&source.study, &asked)?;
+    let alive = Alive::new("computing standard errors");
+    let report = lynkeus::precision(&source.study, &asked);
+    drop(alive);
+    let report = report?;
     let columns = report.columns();
     let columns: Vec<(String, &[f64])> = columns
         .iter()

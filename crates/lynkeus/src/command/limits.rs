@@ -6,8 +6,8 @@ use std::time::Duration;
 use cap::Cap;
 use clap::Args;
 
-use lynkeus::Study;
 use lynkeus::expr::{Budget, Memory};
+use lynkeus::{Study, interrupt};
 
 /// The exit code of work that a limit ended.
 pub(super) const ENDED: u8 = 3;
@@ -37,7 +37,7 @@ impl Limits {
             limit: self.memory_limit.saturating_mul(1 << 20),
             used: || ALLOCATOR.allocated(),
         };
-        Budget::new(self.time_limit, Some(memory))
+        Budget::new(self.time_limit, Some(memory)).stopped_by(interrupt::flag())
     }
 
     /// The same; without a limit of time, that of a proof.

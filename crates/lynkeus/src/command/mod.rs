@@ -14,8 +14,9 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
 
 use files::Files;
@@ -29,6 +30,31 @@ use limits::Limits;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// What evaluates the equations; all give the same digits, it is a matter of speed
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHICH")]
+    backend: Engine,
+}
+
+/// [`Backend`] in the words of the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Engine {
+    /// The interpreter, and machine code for what is evaluated often
+    #[default]
+    Auto,
+    /// The interpreter alone
+    Interpreter,
+    /// Machine code from the first evaluation on, wherever it can be made
+    Native,
+}
+
+impl From<Engine> for Backend {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::Auto => Self::Auto,
+            Engine::Interpreter => Self::Interpreter,
+            Engine::Native => Self::Native,
+        }
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -189,7 +215,9 @@ impl Output {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     signals::watch();
+    Backend::from(cli.backend).choose();
     match execute(cli.command) {
+        Ok(_) if interrupt::interrupted() => signals::end(),
         Ok(code) => code,
         Err(_) if interrupt::interrupted() => signals::end(),
         Err(error) => {

@@ -3,6 +3,7 @@
 
 use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow;
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
@@ -11,6 +12,45 @@ use indicatif::{ProgressBar, ProgressStyle};
 use lynkeus::interrupt::interrupted;
 
 const STEPS: u64 = 1000;
+
+/// What is being done, for somebody who interrupts it.
+static DOING: Mutex<Option<Doing>> = Mutex::new(None);
+
+struct Doing {
+    what: &'static str,
+    since: Instant,
+    /// done of the whole, where that is known
+    fraction: Option<f64>,
+}
+
+/// Notes what begins, or none once it has ended.
+fn doing(what: Option<&'static str>) {
+    let doing = what.map(|what| Doing {
+        what,
+        since: Instant::now(),
+        fraction: None,
+    });
+    // a thread that panicked takes only these words with it
+    if let Ok(mut now) = DOING.lock() {
+        *now = doing;
+    }
+}
+
+/// What an interrupt interrupts, and how far it is.
+pub(super) fn done_so_far() -> Option<String> {
+    let now = DOING.try_lock().ok()?;
+    let Doing {
+        what,
+        since,
+        fraction,
+    } = now.as_ref()?;
+    let seconds = since.elapsed().as_secs_f64();
+    let far = fraction.map(|f| format!(", {:.0} % done", (100.0 * f).floor()));
+    Some(format!(
+        "{what} for {seconds:.1} s{}",
+        far.unwrap_or_default()
+    ))
+}
 /// Between two lines where there is no bar.
 const LINES: Duration = Duration::from_secs(10);
 
@@ -27,6 +67,7 @@ pub(super) struct Progress {
 
 impl Progress {
     pub(super) fn new(what: &'static str, quiet: bool) -> Self {
+        doing(Some(what));
         Self {
             what,
             wanted: !quiet,
@@ -49,6 +90,9 @@ impl Progress {
     }
 
     fn show(&mut self, fraction: f64) {
+        if let Some(doing) = DOING.lock().ok().as_mut().and_then(|now| now.as_mut()) {
+            doing.fraction = Some(fraction);
+        }
         if !self.wanted || self.since.elapsed() < Duration::from_secs(1) {
             return;
         }
@@ -73,6 +117,7 @@ impl Progress {
     }
 
     pub(super) fn finish(self) {
+        doing(None);
         if let Some(bar) = self.bar {
             bar.finish_and_clear();
         }
@@ -88,6 +133,7 @@ pub(super) struct Alive {
 impl Alive {
     /// Without a thread to spare there is no sign.
     pub(super) fn new(what: &'static str) -> Self {
+        doing(Some(what));
         let (done, wait) = channel();
         let terminal = std::io::stderr().is_terminal();
         let watch = move || match terminal {
@@ -133,6 +179,9 @@ fn line(text: &str) {
 
 impl Drop for Alive {
     fn drop(&mut self) {
+        if !interrupted() {
+            doing(None);
+        }
         // the thread may have ended by itself
         let _ = self.done.send(());
         if let Some(thread) = self.thread.take() {

@@ -230,6 +230,9 @@ fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
         "estimates": object(headers.collect()),
         "final": object(estimated().map(|q| (q.name.clone(), last(q))).collect()),
         "rms_error_last_half": object(estimated().filter_map(settled).collect()),
+        "errors": object(outcome.accuracies.iter().map(|a| (a.quantity.clone(), a.to_json())).collect()),
+        "sampling": outcome.intervals.as_ref().map(lynkeus::Intervals::to_json),
+        "frozen": outcome.frozen.iter().map(lynkeus::Frozen::to_json).collect::<Vec<_>>(),
         "monitors": object(watches.collect()),
         "outside_box": {
             "plant": outside(&outcome.plant_outside),

@@ -129,10 +129,12 @@ impl Results {
     /// # Errors
     /// A result cannot take its place, the user wants to stop, or a picture could not be drawn.
     pub fn keep(self) -> Result<(), Error> {
-        if interrupt::interrupted() {
-            return Err(Error::input("interrupted before a result was written"));
-        }
-        for staged in self.files {
+        // what was found by then is told; a file is written whole or not at all
+        let files = match interrupt::interrupted() {
+            true => vec![],
+            false => self.files,
+        };
+        for staged in files {
             let path = staged.path;
             take_place(staged.content, &staged.place).map_err(|e| refusal(&path, &e))?;
         }

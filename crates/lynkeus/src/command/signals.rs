@@ -110,7 +110,11 @@ pub(super) fn end() -> ExitCode {
         return ExitCode::from(2);
     };
     let name = low_level::signal_name(signal).unwrap_or("a signal");
-    super::output::say(&format!("interrupted by {name}"));
+    let done = match super::progress::done_so_far() {
+        Some(done) => format!(" after {done}; no file was written"),
+        None => String::new(),
+    };
+    super::output::say(&format!("interrupted by {name}{done}"));
     // where this fails the exit code says the same
     let _ = low_level::emulate_default_handler(signal);
     let code = u8::try_from(128 + signal).unwrap_or(u8::MAX);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Kind, Panel};
+use super::{Band, Kind, Panel};
 
 /// A panel is cut when its curves span more than this many times what is worth seeing.
 const TOO_TALL: f64 = 4.0;
@@ -20,10 +20,11 @@ impl Panel {
     /// The limits of the value axis: everything, unless the estimate peaks.
     ///
     /// The core of a panel is the span of its true and measured values together with the middle
-    /// 90 % of the estimate. Where all values span more than 4 times the core, the axis ends one
+    /// 90 % of the estimate and of the ends of its bands; a band that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
     /// core's height beyond it on either side. `None` when nothing is finite.
     pub fn limits(&self) -> Option<Limits> {
-        let all = extremes(self.values(|_| true))?;
+        let curves = extremes(self.values(|_| true))?;
+        let all = self.bands().fold(curves, |all, b| union(&all, &b));
         let core = self.core().unwrap_or_else(|| all.clone());
         let height = core.end - core.start;
         if height > 0.0 && all.end - all.start > TOO_TALL * height {
@@ -45,20 +46,18 @@ impl Panel {
 
     fn core(&self) -> Option<Range<f64>> {
         let known = extremes(self.values(|kind| kind != Kind::Estimated));
-        let mut estimated: Vec<f64> = self.values(|kind| kind == Kind::Estimated).collect();
-        estimated.sort_by(f64::total_cmp);
-        let cut = estimated.len() / 20;
-        let middle = extremes(
-            estimated
-                .iter()
-                .copied()
-                .take(estimated.len() - cut)
-                .skip(cut),
-        );
-        match (known, middle) {
-            (Some(a), Some(b)) => Some(a.start.min(b.start)..a.end.max(b.end)),
-            (a, b) => a.or(b),
-        }
+        let middle = middle(self.values(|kind| kind == Kind::Estimated));
+        let spans = known.into_iter().chain(middle).chain(self.bands());
+        spans.reduce(|a, b| union(&a, &b))
+    }
+
+    /// What a band spans at 90 % of the instants.
+    fn bands(&self) -> impl Iterator<Item = Range<f64>> {
+        let span = |band: &Band| {
+            let low = middle(band.low.iter().copied())?;
+            Some(union(&low, &middle(band.high.iter().copied())?))
+        };
+        self.bands.iter().filter_map(span)
     }
 
     fn values(&self, of: impl Fn(Kind) -> bool) -> impl Iterator<Item = f64> {
@@ -68,6 +67,18 @@ impl Panel {
             .flat_map(|c| c.values.iter().copied())
             .filter(|v| v.is_finite())
     }
+}
+
+/// The span of the middle 90 % of the finite values.
+fn middle(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let cut = values.len() / 20;
+    extremes(values.iter().copied().take(values.len() - cut).skip(cut))
+}
+
+fn union(a: &Range<f64>, b: &Range<f64>) -> Range<f64> {
+    a.start.min(b.start)..a.end.max(b.end)
 }
 
 /// The least and the greatest of the finite values.
@@ -104,8 +115,8 @@ mod tests {
 
     fn panel(curves: Vec<Curve>) -> Panel {
         Panel {
-            caption: String::new(),
             curves,
+            ..Panel::default()
         }
     }
 

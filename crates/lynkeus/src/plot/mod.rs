@@ -2,16 +2,19 @@
 //!
 //! A [`Figure`] has panels one above the other that share the time axis.
 //! Each panel shows one quantity: what is true as a broad grey line, what is estimated as a blue
-//! line over it, what is measured as orange dots (Okabe and Ito's colours, safe for the
-//! colour-blind). An estimate that peaks far beyond everything else would flatten the rest of its
+//! line over it with a pale band of two standard deviations, what later rows make of it as a green
+//! line, what is measured as orange dots (Okabe and Ito's colours, safe for the colour-blind). Where
+//! an estimate is outside of its declared range the foot of the panel is marked. An estimate that peaks far beyond everything else would flatten the rest of its
 //! panel; the axis is then cut and the panel's caption says how far the peak goes
 //! ([`Panel::limits`] has the rule).
 
 mod axis;
+mod band;
 mod bars;
 mod chart;
 mod decimate;
 mod grid;
+mod legend;
 mod limits;
 mod plane;
 mod render;
@@ -40,6 +43,30 @@ pub struct Panel {
     pub caption: String,
     /// Its curves.
     pub curves: Vec<Curve>,
+    /// Where the truth is supposed to be.
+    pub bands: Vec<Band>,
+    /// When the estimate is outside of its declared range, in the order of time.
+    pub outside: Vec<Span>,
+}
+
+/// Values between two curves; a NaN breaks it.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// Instants, increasing.
+    pub time: Vec<f64>,
+    /// Lower ends, as many as instants.
+    pub low: Vec<f64>,
+    /// Upper ends, as many as instants.
+    pub high: Vec<f64>,
+}
+
+/// A span of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// The first instant.
+    pub from: f64,
+    /// The last.
+    pub to: f64,
 }
 
 /// One curve of a panel; a NaN breaks the line.
@@ -62,6 +89,8 @@ pub enum Kind {
     Measured,
     /// What the observer makes of it.
     Estimated,
+    /// What it makes of it knowing later rows.
+    Smoothed,
 }
 
 impl Kind {
@@ -71,6 +100,7 @@ impl Kind {
             Self::True => "true",
             Self::Measured => "measured",
             Self::Estimated => "estimated",
+            Self::Smoothed => "smoothed",
         }
     }
 }

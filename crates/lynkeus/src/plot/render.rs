@@ -9,7 +9,9 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use super::band::{draw_band, draw_marks};
 use super::decimate::{clipped, decimated};
+use super::legend::head;
 use super::limits::Limits;
 use super::{Curve, Figure, Kind, Panel};
 use crate::{Error, visible};
@@ -18,8 +20,8 @@ pub(super) const WIDTH: u32 = 900;
 const HEAD: u32 = 52;
 const CAPTION: u32 = 24;
 const TIME_AXIS: u32 = 50;
-const LEFT: u32 = 78;
-const RIGHT: u32 = 22;
+pub(super) const LEFT: u32 = 78;
+pub(super) const RIGHT: u32 = 22;
 pub(super) const FONT: &str = "sans-serif";
 
 pub(super) const INK: RGBColor = RGBColor(38, 38, 38);
@@ -27,6 +29,7 @@ pub(super) const FAINT: RGBColor = RGBColor(226, 226, 226);
 pub(super) const FRAME: RGBColor = RGBColor(150, 150, 150);
 pub(super) const GREY: RGBColor = RGBColor(140, 140, 140);
 pub(super) const BLUE: RGBColor = RGBColor(0, 114, 178);
+pub(super) const GREEN: RGBColor = RGBColor(0, 158, 115);
 pub(super) const ORANGE: RGBColor = RGBColor(230, 159, 0);
 pub(super) const VERMILION: RGBColor = RGBColor(213, 94, 0);
 
@@ -76,41 +79,11 @@ fn panel_height(panels: usize) -> u32 {
     }
 }
 
-/// The title on the left, the legend on the right.
-fn head(root: &Area<'_>, figure: &Figure) -> Drawn {
-    let title = (FONT, 18).into_font().style(FontStyle::Bold).color(&INK);
-    root.draw(&Text::new(figure.title.clone(), (LEFT as i32, 16), title))?;
-    let mut right = (WIDTH - RIGHT) as i32;
-    for kind in figure.kinds().into_iter().rev() {
-        let words = (FONT, 14)
-            .into_font()
-            .color(&INK)
-            .pos(Pos::new(HPos::Right, VPos::Center));
-        root.draw(&Text::new(kind.label(), (right, 26), words))?;
-        right -= 8 * kind.label().len() as i32 + 4;
-        sample(root, kind, right - 28, right)?;
-        right -= 28 + 20;
-    }
-    Ok(())
-}
-
-/// A short piece of a curve for the legend.
-fn sample(root: &Area<'_>, kind: Kind, from: i32, to: i32) -> Drawn {
-    match kind {
-        Kind::Measured => {
-            for x in [from + 6, from + 14, from + 22] {
-                root.draw(&Circle::new((x, 26), 2, ORANGE.filled()))?;
-            }
-            Ok(())
-        }
-        _ => root.draw(&PathElement::new([(from, 26), (to, 26)], stroke(kind))),
-    }
-}
-
-fn stroke(kind: Kind) -> ShapeStyle {
+pub(super) fn stroke(kind: Kind) -> ShapeStyle {
     match kind {
         Kind::True => GREY.stroke_width(4),
         Kind::Estimated => BLUE.stroke_width(2),
+        Kind::Smoothed => GREEN.stroke_width(2),
         Kind::Measured => ORANGE.filled(),
     }
 }
@@ -136,6 +109,11 @@ fn draw_panel(
         )
         .build_cartesian_2d(time.clone(), limits.shown.clone())?;
     axes(&mut chart, time_label, &limits.shown)?;
+    let columns = (WIDTH - LEFT - RIGHT) as usize;
+    for band in &panel.bands {
+        draw_band(&mut chart, band, &limits.shown, columns)?;
+    }
+    draw_marks(&mut chart, &panel.outside, time, &limits.shown, columns)?;
     let mut curves: Vec<&Curve> = panel.curves.iter().collect();
     curves.sort_by_key(|c| c.kind);
     for curve in curves {
@@ -256,6 +234,7 @@ pub(super) fn titled(svg: String, title: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Band, Span};
     use super::*;
 
     fn wave(kind: Kind, n: usize) -> Curve {
@@ -271,6 +250,7 @@ mod tests {
             panels: vec![Panel {
                 caption: "level (m)".to_owned(),
                 curves,
+                ..Panel::default()
             }],
         }
     }
@@ -290,6 +270,30 @@ mod tests {
         }
         assert!(!svg.contains("measured"));
         assert!(!svg.contains("NaN"));
+    }
+
+    #[test]
+    fn bands_and_marks_are_drawn_and_named() {
+        let mut picture = figure(vec![wave(Kind::Estimated, 300), wave(Kind::Smoothed, 300)]);
+        let plain = picture.to_svg().unwrap();
+        let time: Vec<f64> = (0..300).map(|i| f64::from(i) / 10.0).collect();
+        let band = Band {
+            low: vec![-3.0; 300],
+            high: vec![f64::NAN; 300],
+            time,
+        };
+        let high: Vec<f64> = band.time.iter().map(|t| 3.0 + t.sin()).collect();
+        picture.panels[0].bands = vec![Band { high, ..band }];
+        picture.panels[0].outside = vec![Span { from: 3.0, to: 4.0 }];
+        let svg = picture.to_svg().unwrap();
+        for words in ["± 2 sd", "outside its range", "smoothed", "estimated"] {
+            assert!(svg.contains(words), "{words}");
+        }
+        assert!(!plain.contains("± 2 sd") && !plain.contains("outside"));
+        assert!(svg.contains("<polygon") && !svg.contains("NaN"));
+        // the axis shows the band, too
+        let limits = picture.panels[0].limits().unwrap().shown;
+        assert!(limits.start < -3.0 && limits.end > 3.5, "{limits:?}");
     }
 
     #[test]

@@ -1,13 +1,16 @@
 //! From a study to the experiment that is judged.
 
+use std::ops::ControlFlow;
+
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, Window};
-use lynkeus_run::Trajectory;
+use lynkeus_run::{Method, Tolerances, Trajectory};
 use lynkeus_structure::Extended;
 
 use super::{Assumed, Candidates, Options, POINTS};
 use crate::outcome::interrupted;
+use crate::simulate::within;
 use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
 use crate::{Error, Study, simulate, systems};
@@ -40,9 +43,12 @@ impl<'p> Setup<'p> {
         let span = horizon(study, settings, options, step)?;
         run.until = run.start + span;
         run.noise = lynkeus_run::Noise::default();
+        let go_on = &mut |_| ControlFlow::Continue(());
         let trajectory = run
-            .run()
-            .map_err(|error| interrupted(error.error, &study.file))?;
+            .run_watched(&mut within(&study.budget, go_on))
+            .map_err(|error| {
+                super::ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
+            })?;
         let reach = Reach { plant, trajectory };
         let measured: Vec<Variable> = extended
             .outputs
@@ -78,12 +84,27 @@ impl<'p> Setup<'p> {
                     .zip(courses.into_iter().map(|c| c.1))
                     .collect(),
                 sensors: judged,
-                method: run.method,
+                method: sharp(run.method),
                 ..Experiment::new(&plant.graph, plant.time, window)
             },
             assumed,
             measured: measured.len(),
         })
+    }
+}
+
+/// Sensitivities have an accuracy of their own, however coarse the run is: what is seen hangs on it.
+fn sharp(method: Method) -> Method {
+    let sharper = |t: Tolerances| Tolerances {
+        relative: t.relative.min(1e-10),
+        absolute: t.absolute.min(1e-12),
+        ..t
+    };
+    match method {
+        Method::Adaptive(t) => Method::Adaptive(sharper(t)),
+        Method::Explicit(t) => Method::Explicit(sharper(t)),
+        Method::Stiff(t) => Method::Stiff(sharper(t)),
+        Method::Rk4(step) => Method::Rk4(step),
     }
 }
 

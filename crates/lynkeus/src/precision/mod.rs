@@ -4,6 +4,7 @@
 //! The definitions are in [`lynkeus_observability::precision`].
 
 mod experiment;
+mod filtered;
 #[cfg(feature = "plot")]
 mod picture;
 mod report;
@@ -68,8 +69,17 @@ pub struct Report {
     pub step: f64,
     /// Horizons, in the plant's unit of time.
     pub horizons: Vec<f64>,
+    /// How many were asked for: a limit may have ended the run before the last.
+    pub asked: usize,
     /// Standard errors at each horizon, in the units of the quantities.
     pub deviations: Vec<Deviations>,
+    /// By horizon, the standard errors for a model that is exact.
+    pub exact: Vec<Vec<f64>>,
+    /// By horizon, the standard deviations of the extended Kalman filter on the study's noises; none
+    /// where it breaks down.
+    pub filtered: Option<Vec<Vec<f64>>>,
+    /// The study declares `[process_noise]`: then the present standard errors count it.
+    pub counts_process_noise: bool,
     /// All sensors considered, the study's first.
     pub sensors: Vec<Assumed>,
     /// How many of them are the study's.
@@ -90,20 +100,35 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let setup = Setup::new(study, settings, prepared.extended(), options)?;
-    let found = setup
-        .experiment
-        .run()
-        .map_err(|error| Error::from_source(error).at(&study.file))?;
+    let found = setup.experiment.run().map_err(|error| {
+        ended(study).unwrap_or_else(|| Error::from_source(error).at(&study.file))
+    })?;
     let measured: Vec<usize> = (0..setup.measured).collect();
     let at = |horizon: usize| found.deviations(horizon, &measured);
     let candidates: Vec<usize> = (0..found.sensors.len()).collect();
-    Ok(Report {
+    let mut deviations: Vec<Deviations> = (0..found.horizons.len()).map(at).collect();
+    let exact = deviations.iter().map(|d| d.present.clone()).collect();
+    let mut run = simulate::open_loop(study, settings, &plant)?;
+    run.until = run.start + found.horizons.last().copied().unwrap_or_default();
+    let filtered = filtered::filtered(&prepared, &setup, run)?;
+    let counts_process_noise = !study.process_noise.is_empty() && filtered.is_some();
+    if let (true, Some(filtered)) = (counts_process_noise, &filtered) {
+        deviations
+            .iter_mut()
+            .zip(filtered)
+            .for_each(|(d, own)| count(d, own));
+    }
+    let report = Report {
+        asked: setup.experiment.window.horizons.len(),
+        exact,
+        filtered,
+        counts_process_noise,
         plant: plant.name.clone(),
         time_unit: study.time_unit.clone(),
         states: plant.states.len(),
         start: setup.experiment.window.start,
         step: setup.experiment.window.step,
-        deviations: (0..found.horizons.len()).map(at).collect(),
+        deviations,
         advice: options
             .sensors
             .map(|_| found.advise(&measured, &candidates)),
@@ -113,10 +138,37 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
         names: found.names,
         scales: found.scales,
         horizons: found.horizons,
-    })
+    };
+    // what was computed after the end does not count
+    ended(study).map_or(Ok(report), Err)
 }
 
+/// What ended the work, if anything did.
+fn ended(study: &Study) -> Option<Error> {
+    let spent = study.budget.spent()?;
+    Some(Error::ended(spent).at(&study.file))
+}
+
+/// Present errors with the process noise counted; what samples do not show stays unseen.
+fn count(deviations: &mut Deviations, filtered: &[f64]) {
+    let pairs = deviations.present.iter_mut().zip(filtered);
+    pairs
+        .filter(|(σ, _)| σ.is_finite())
+        .for_each(|(σ, own)| *σ = *own);
+}
+
+/// Errors below this share of the range are none.
+const NOTHING: f64 = 1e-12;
+
 impl Report {
+    /// A standard error of a quantity as it is told: one that the plant has forgotten altogether is 0.
+    fn told(&self, quantity: usize, σ: f64) -> f64 {
+        match σ < NOTHING * self.scales[quantity] {
+            true => 0.0,
+            false => σ,
+        }
+    }
+
     /// True where every state and unknown input is seen at the longest horizon.
     pub fn is_positive(&self) -> bool {
         self.last()
@@ -130,7 +182,7 @@ impl Report {
 
     /// Present standard error as a share of the scale; infinite where unseen.
     fn share(&self, deviations: &Deviations, quantity: usize) -> f64 {
-        deviations.present[quantity] / self.scales[quantity]
+        self.told(quantity, deviations.present[quantity]) / self.scales[quantity]
     }
 
     /// Geometric mean over the quantities that are seen, as a share of the scale, and how many are not.

@@ -61,7 +61,11 @@ impl Report {
             let look = look(rank, i);
             let share = |d| {
                 let share = self.share(d, i);
-                if share.is_finite() { share } else { f64::NAN }
+                if share.is_finite() && share > 0.0 {
+                    share
+                } else {
+                    f64::NAN
+                }
             };
             let values = self.deviations.iter().map(share);
             Line {

@@ -13,7 +13,10 @@ impl Report {
         let of = |values: fn(&lynkeus_observability::precision::Deviations) -> &Vec<f64>| {
             let pairs = self.names.iter().enumerate().map(|(i, name)| {
                 let value = last.and_then(|d| values(d).get(i)).copied();
-                (name.clone(), finite(value.unwrap_or(f64::INFINITY)))
+                (
+                    name.clone(),
+                    finite(self.told(i, value.unwrap_or(f64::INFINITY))),
+                )
             });
             Value::Object(pairs.collect())
         };
@@ -36,6 +39,9 @@ impl Report {
             "scale": Value::Object(scales.map(|(n, s)| (n.clone(), json!(s))).collect()),
             "standard_error": of(|d| &d.present),
             "standard_error_of_start": of(|d| &d.start),
+            "standard_error_exact_model": self.by_name(self.exact.last()),
+            "filter_sd": self.by_name(self.filtered.as_ref().and_then(|all| all.last())),
+            "counts_process_noise": self.counts_process_noise,
             "ranked": self.ranked().iter().map(|&i| &self.names[i]).collect::<Vec<_>>(),
             "rank": {
                 "seen": rank.seen,
@@ -50,11 +56,21 @@ impl Report {
         })
     }
 
+    fn by_name(&self, values: Option<&Vec<f64>>) -> Value {
+        let pairs = self.names.iter().zip(values.into_iter().flatten());
+        let pairs = pairs.enumerate();
+        let pairs = pairs.map(|(i, (name, σ))| (name.clone(), finite(self.told(i, *σ))));
+        Value::Object(pairs.collect())
+    }
+
     fn over_horizon(&self) -> Value {
         let mut object = Map::new();
         object.insert(self.horizon_header(), json!(self.horizons));
         for (i, name) in self.names.iter().enumerate() {
-            let values = self.deviations.iter().map(|d| finite(d.present[i]));
+            let values = self
+                .deviations
+                .iter()
+                .map(|d| finite(self.told(i, d.present[i])));
             object.insert(name.clone(), values.collect());
         }
         Value::Object(object)
@@ -90,7 +106,10 @@ impl Report {
     /// `horizon` (`horizon_2` where a quantity is called so), then the present standard error
     /// of every quantity at it.
     pub fn columns(&self) -> Vec<(String, Vec<f64>)> {
-        let curve = |i: usize| self.deviations.iter().map(|d| d.present[i]).collect();
+        let curve = |i: usize| {
+            let errors = self.deviations.iter();
+            errors.map(|d| self.told(i, d.present[i])).collect()
+        };
         let curves = self.names.iter().enumerate();
         std::iter::once((self.horizon_header(), self.horizons.clone()))
             .chain(curves.map(|(i, name)| (name.clone(), curve(i))))

@@ -24,6 +24,14 @@ impl fmt::Display for Report {
         if let Some(advice) = &self.advice {
             self.sensors(f, advice)?;
         }
+        if self.horizons.len() < self.asked {
+            let reached = self.horizons.len();
+            writeln!(
+                f,
+                "a limit ended the run after {reached} of {} horizons",
+                self.asked
+            )?;
+        }
         self.doubts(f)
     }
 }
@@ -60,22 +68,67 @@ impl Report {
         let wide = self.wide();
         writeln!(
             f,
-            "\n{:wide$}  {:>16}  {:>14}  {:>16}",
-            "", "standard error", "of the range", "of its start"
+            "\n{:wide$}  {:>16}  {:>14}  {:>16}  {:>16}",
+            "",
+            "standard error",
+            "of the range",
+            "of its start",
+            self.beside()
         )?;
         for &i in order.iter().take(LISTED) {
             writeln!(
                 f,
-                "{:wide$}  {:>16}  {:>14}  {:>16}",
+                "{:wide$}  {:>16}  {:>14}  {:>16}  {:>16}",
                 self.names[i],
-                error(last.present[i]),
+                error(self.told(i, last.present[i])),
                 percent(self.share(last, i)),
-                start_error(last.start[i], self.scales[i])
+                start_error(self.told(i, last.start[i]), self.scales[i]),
+                self.other(i)
             )?;
         }
         match order.len().saturating_sub(LISTED) {
-            0 => Ok(()),
-            more => writeln!(f, "and {more} that are known better"),
+            0 => {}
+            more => writeln!(f, "and {more} that are known better")?,
+        }
+        if order.iter().any(|&i| self.told(i, last.present[i]) == 0.0) {
+            writeln!(
+                f,
+                "0: known exactly, for a model that is right: nothing of an error is left"
+            )?;
+        }
+        self.meaning(f)
+    }
+
+    /// What stands in the last column.
+    fn beside(&self) -> &'static str {
+        match (self.counts_process_noise, &self.filtered) {
+            (true, _) => "if model exact",
+            (false, Some(_)) => "sd of ekf",
+            (false, None) => "",
+        }
+    }
+
+    fn other(&self, quantity: usize) -> String {
+        let values = match self.counts_process_noise {
+            true => self.exact.last(),
+            false => self.filtered.as_ref().and_then(|all| all.last()),
+        };
+        let value = values.and_then(|values| values.get(quantity));
+        value.map_or(String::new(), |σ| error(self.told(quantity, *σ)))
+    }
+
+    /// What the figures count, in words.
+    fn meaning(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.counts_process_noise, &self.filtered) {
+            (true, _) => writeln!(
+                f,
+                "[process_noise] is counted: these are the standard deviations of the extended Kalman filter; sensor sets are compared for an exact model"
+            ),
+            (false, Some(_)) => writeln!(
+                f,
+                "the model is taken as exact; a filter without [process_noise] trusts it less, and its sd says so"
+            ),
+            (false, None) => Ok(()),
         }
     }
 

@@ -178,7 +178,7 @@ pub(super) const OBSERVER: [KeySpec; 3] = [
             "mhe",
         ]),
         default: "`\"auto\"`",
-        meaning: "the observer family; `auto` takes the first that fits and that knows all the keys given, else `ekf`",
+        meaning: "the observer family; `auto` takes the first with a theorem that is proved to fit, has its keys and is fast enough for the run, else `ekf`",
     },
     KeySpec {
         name: "initial",

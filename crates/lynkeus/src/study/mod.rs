@@ -129,6 +129,11 @@ impl Study {
         Ok(study)
     }
 
+    /// Whether it stands for a bare model: see [`Study::load_or_bare`].
+    pub(crate) fn is_bare(&self) -> bool {
+        self.plant.as_deref() == Some(Path::new(&self.file))
+    }
+
     /// Reads a study from text; `file` names it in messages.
     ///
     /// # Errors

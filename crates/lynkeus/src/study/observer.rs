@@ -26,15 +26,21 @@ pub struct ObserverSettings {
 }
 
 impl ObserverSettings {
-    /// The families that may be used: the one asked for, or all that own the keys given.
+    /// The families that may be used: the one asked for, or all that own the keys given, and the
+    /// filters, which stand in where none of those will do.
     pub(crate) fn families(&self) -> impl Iterator<Item = &'static dyn Family> + '_ {
         FAMILIES
             .iter()
             .copied()
             .filter(|family| match &self.family {
                 Some(name) => family.name() == name.text,
-                None => self.tuning.values.keys().all(|key| family.owns(key)),
+                None => family.is_filter() || self.owns_all(*family),
             })
+    }
+
+    /// Whether a family takes all of the keys given.
+    fn owns_all(&self, family: &dyn Family) -> bool {
+        self.tuning.values.keys().all(|key| family.owns(key))
     }
 
     /// Messages about `key` are to blame another place, where its value comes from.
@@ -116,7 +122,8 @@ fn foreign(entry: &Entry<'_>, key: &str, asked: &dyn Family) -> Error {
 
 /// With `auto`, keys that no single family owns together.
 fn refuse_mixture(section: &Section<'_>, settings: &ObserverSettings) -> Result<(), Error> {
-    if settings.families().next().is_some() {
+    let mut families = FAMILIES.iter();
+    if settings.family.is_some() || families.any(|family| settings.owns_all(*family)) {
         return Ok(());
     }
     let keys: Vec<&str> = settings.tuning.values.keys().map(String::as_str).collect();

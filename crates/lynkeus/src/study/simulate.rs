@@ -28,6 +28,18 @@ pub struct SimulateSettings {
     pub seed: u64,
 }
 
+/// Rows of a result whose study does not say how many.
+const ROWS: f64 = 500.0;
+
+impl SimulateSettings {
+    /// The spacing of the rows of the result.
+    #[must_use]
+    pub fn row_step(&self) -> f64 {
+        let span = self.until - self.start;
+        self.output_step.unwrap_or(span / ROWS)
+    }
+}
+
 /// A Modelica expression of time, such as `if time < 20 then 0.75 else 0.38`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {

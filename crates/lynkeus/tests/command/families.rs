@@ -308,11 +308,13 @@ fn the_column_is_the_same_tray_by_tray() {
 #[test]
 fn the_family_is_chosen_automatically() {
     let expected = [
-        ("column/study.toml", "triangular"),
+        // triangular fits, but with Lemma 1's S its slowest mode outlasts the run
+        ("column/study.toml", "ekf"),
         ("lee/study.toml", "triangular"),
         ("ltaief/study.toml", "state-affine"),
-        ("farza/study.toml", "unknown-input"),
-        ("germani-manes/practical.toml", "drift-observable"),
+        // unknown-input fits, but lacks its two speeds; drift-observable its poles
+        ("farza/study.toml", "ekf"),
+        ("germani-manes/practical.toml", "ekf"),
     ];
     for (study, family) in expected {
         let (folder, file) = copied(study);
@@ -324,7 +326,7 @@ fn the_family_is_chosen_automatically() {
         assert_eq!(json["recommended"], family, "{study}");
         let ended = folder.run(&["check", &file]);
         assert_eq!(ended.code, 0, "{study}");
-        assert!(ended.out.lines().count() <= 50, "{study}: {}", ended.out);
+        assert!(ended.out.lines().count() <= 80, "{study}: {}", ended.out);
     }
 }
 

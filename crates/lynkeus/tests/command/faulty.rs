@@ -275,6 +275,46 @@ fn faulty_logs_cost_what_they_must() {
     println!("{table}");
 }
 
+/// Which faults hang a sensor, and when.
+#[test]
+fn a_frozen_sensor_is_told_and_nothing_else_is() {
+    let truth = truth();
+    let lines = clean(&truth);
+    for (fault, change, _) in FAULTS {
+        let folder = Folder::empty();
+        folder.write("cart.mo", PLANT);
+        let study = format!("plant = \"cart.mo\"\n{}\n[sensors]\n", OBSERVERS[0].1);
+        folder.write("s.toml", &study);
+        let rows = change(lines.clone()).into_iter();
+        let rows: String = rows.map(|(t, y, u)| format!("{t},{y},{u}\n")).collect();
+        folder.write("log.csv", &format!("t,y,u\n{rows}"));
+        let ended = folder.run(&["estimate", "s.toml", "log.csv", "--json"]);
+        let found = ended.json()["frozen"].as_array().unwrap().clone();
+        match fault {
+            // 40 rows hang, from 300 on; the row before them is the clean 299
+            "frozen for 2 s" => {
+                assert_eq!(found.len(), 1, "{found:?}");
+                assert_eq!(
+                    (&found[0]["output"], &found[0]["rows"]),
+                    (&"y".into(), &40.into())
+                );
+                let from = found[0]["from"].as_f64().unwrap();
+                assert!((from - 300.0 * STEP).abs() < 1e-9, "{from}");
+                assert!(ended.err.contains("the sensor y hangs at"), "{}", ended.err);
+            }
+            "clipped at 0.8" => {
+                assert!(
+                    found
+                        .iter()
+                        .all(|f| f["at_end_of_range"] == true && f["value"] == 0.8)
+                );
+                assert!(!found.is_empty());
+            }
+            _ => assert!(found.is_empty(), "{fault}: {found:?}"),
+        }
+    }
+}
+
 /// A reading of 1e300 is no estimate of anything, and ends no run of a filter with a gate.
 #[test]
 fn a_reading_beyond_reason_is_told() {

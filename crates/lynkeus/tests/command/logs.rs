@@ -163,3 +163,37 @@ fn a_grid_that_overflows_is_refused_with_its_size() {
         ended.err
     );
 }
+
+/// The interval beyond which the predictor's error grows is estimated, and lies where runs change
+/// from good to not credible; a log that is too coarse is told.
+#[test]
+fn a_log_that_is_too_coarse_for_the_gain_is_told() {
+    let folder = crate::Folder::new();
+    folder.change("study.toml", "theta = 0.03 ", "theta = 0.09 ");
+    folder.change(
+        "study.toml",
+        "between_samples = \"linear\"",
+        "between_samples = \"predict\"",
+    );
+    let of = |step: &str| {
+        let text = folder.read("study.toml");
+        let text = text.replace("output_step = 4", &format!("output_step = {step}"));
+        folder.write("s.toml", &text);
+        let made = folder.run(&["simulate", "s.toml", "--log", "l.csv", "-o", "r.csv", "-q"]);
+        assert_eq!(made.code, 0, "{}", made.err);
+        folder.run(&["estimate", "s.toml", "l.csv", "--json", "-o", "e.csv"])
+    };
+    let limit = |ended: &crate::Ended| ended.json()["sampling"]["largest_predict"].as_f64();
+    let fine = of("20");
+    assert_eq!(fine.code, 0, "{}", fine.err);
+    assert!(!fine.err.contains("apart"), "{}", fine.err);
+    let coarse = of("40");
+    assert_eq!(coarse.code, 1);
+    for words in ["readings are 40 apart", "no proof", "a smaller theta"] {
+        assert!(coarse.err.contains(words), "{words}: {}", coarse.err);
+    }
+    for ended in [fine, coarse] {
+        let limit = limit(&ended).unwrap();
+        assert!(20.0 < limit && limit < 40.0, "{limit}");
+    }
+}

@@ -1,10 +1,13 @@
 //! The command as a user types it.
 #![allow(clippy::unwrap_used)]
 
+mod backends;
 mod certify;
+mod compare;
 mod families;
 mod faulty;
 mod filters;
+mod hostile;
 mod how_well;
 mod limits;
 mod live;
@@ -16,6 +19,7 @@ mod outside;
 mod references;
 mod results;
 mod runs;
+mod story;
 mod tune;
 
 use std::path::{Path, PathBuf};

@@ -222,3 +222,79 @@ fn vessel(input: &str, until: f64) -> String {
          [simulate]\nuntil = {until}\noutput_step = {until}\ninputs = {{ u = \"{input}\" }}\n"
     )
 }
+
+/// What the errors are is told after a simulation, in words and for machines, and agrees with the
+/// table.
+#[test]
+fn a_simulation_sums_its_errors_up() {
+    let folder = Folder::new();
+    let ended = folder.run(&["simulate", "study.toml", "-o", "run.csv", "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (header, rows) = csv(&folder.read("run.csv"));
+    let place = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let errors = |name: &str| -> Vec<f64> {
+        let (x, hat) = (place(name), place(&format!("{name}_hat")));
+        rows.iter().map(|row| (row[hat] - row[x]).abs()).collect()
+    };
+    for (name, width) in [("pump", 10.0), ("upper", 9.95)] {
+        let told = &ended.json()["errors"][name];
+        let errors = errors(name);
+        let late = &errors[errors.len() / 2..];
+        let rms = (late.iter().map(|e| e * e).sum::<f64>() / late.len() as f64).sqrt();
+        assert!((told["rms_last_half"].as_f64().unwrap() / rms - 1.0).abs() < 1e-6);
+        let peak = errors[1..].iter().copied().fold(0.0, f64::max);
+        assert!((told["peak"].as_f64().unwrap() / peak - 1.0).abs() < 1e-6);
+        let settled = told["settled_at"].as_f64().unwrap();
+        let row = rows.iter().position(|row| row[0] == settled).unwrap();
+        assert!(errors[row - 1] > 0.05 * width && errors[row..].iter().all(|e| *e <= 0.05 * width));
+        assert!(
+            ended.err.contains(&format!("note: error of {name}: RMS ")),
+            "{}",
+            ended.err
+        );
+    }
+}
+
+/// Bands where there are deviations, a line for what later rows say, and the output that is no
+/// state against what the estimate says of it.
+#[test]
+fn the_picture_says_how_sure_and_what_later_rows_say() {
+    let folder = Folder::new();
+    folder.change("two_tanks.mo", "= lower \"", "= 2*lower \"");
+    folder.change(
+        "study.toml",
+        "[estimate]",
+        "[process_noise]\npump = 2e-4\n[estimate]",
+    );
+    let text = folder.read("study.toml");
+    let observer = text.find("[observer]").unwrap();
+    let simulate = text.find("[simulate]").unwrap();
+    let ekf = format!(
+        "{}[observer]\nfamily = \"ekf\"\n{}",
+        &text[..observer],
+        &text[simulate..]
+    );
+    folder.write(
+        "s.toml",
+        &ekf.replace(
+            "show = [\"pump\", \"upper\", \"lower\"]",
+            "show = [\"level\"]",
+        ),
+    );
+    let picture = || {
+        let ended = folder.run(&["simulate", "s.toml", "--plot", "p.svg", "-q"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        folder.read("p.svg")
+    };
+    let plain = picture();
+    assert!(plain.contains("measured") && plain.contains("estimated"));
+    assert!(!plain.contains("2 sd") && !plain.contains("smoothed"));
+    folder.change("s.toml", "show = [\"level\"]", "show = [\"pump\"]");
+    folder.change(
+        "s.toml",
+        "[estimate]",
+        "[estimate]\nsd = true\nsmooth = true",
+    );
+    let sure = picture();
+    assert!(sure.contains("± 2 sd") && sure.contains("smoothed") && sure.contains("<polygon"));
+}

@@ -105,7 +105,7 @@ fn comparison_vector(size: &[f64], n: usize) -> Option<Vec<f64>> {
 }
 
 /// Approximate inverse by Gauss–Jordan elimination with row pivoting; none when a pivot vanishes or overflows.
-fn invert(m: &[f64], n: usize) -> Option<Vec<f64>> {
+pub(in crate::interval) fn invert(m: &[f64], n: usize) -> Option<Vec<f64>> {
     let mut rows: Vec<Vec<f64>> = (0..n)
         .map(|i| {
             let unit = (0..n).map(|j| f64::from(u8::from(i == j)));

@@ -1,5 +1,6 @@
 //! Some columns of the sensitivity, integrated along with the states.
 
+use lynkeus_expr::Budget;
 use lynkeus_run::{Dynamics, Error, Evaluation, Integrator};
 
 use super::super::Experiment;
@@ -52,6 +53,7 @@ impl<'t> Batch<'t> {
                 columns: columns.clone(),
                 flow: tangent.flow.evaluation(),
                 slopes: vec![0.0; tangent.slopes.len()],
+                budget: tangent.budget.clone(),
             },
             columns,
             sight: tangent.sight.evaluation(),
@@ -128,6 +130,7 @@ struct Variation<'t> {
     flow: Evaluation,
     /// entries of ∂f/∂z
     slopes: Vec<f64>,
+    budget: Budget,
 }
 
 impl Dynamics for Variation<'_> {
@@ -160,6 +163,10 @@ impl Dynamics for Variation<'_> {
 
     fn enter(&mut self, t: f64) {
         self.flow.enter(t);
+    }
+
+    fn is_over(&mut self) -> bool {
+        self.budget.spent().is_some()
     }
 
     fn names(&self) -> Vec<String> {

@@ -113,6 +113,11 @@ impl Program {
         steps.filter_map(move |(slot, step)| partial(step).then_some(slot))
     }
 
+    /// Places of the symbols that a root depends on.
+    pub fn inputs(&self, root: usize) -> BTreeSet<usize> {
+        self.support(self.roots[root])
+    }
+
     /// Places of the symbols that a slot depends on.
     pub fn support(&self, slot: usize) -> BTreeSet<usize> {
         let place = |slot: usize| match self.steps[slot] {
@@ -187,6 +192,10 @@ impl Builder<'_> {
                 false => of(self, b),
             },
             Op::Solve(_) => return self.solve(node),
+            Op::Implicit(_) => {
+                let text = self.graph.render(node, 60);
+                return Err(Unsupported(format!("an algebraic loop, {text}")));
+            }
             Op::Entry(solve, i) => match self.solutions.get(&solve).and_then(|x| x.get(i as usize))
             {
                 Some(&slot) => slot,

@@ -142,3 +142,41 @@ fn ended(child: &mut Child) -> ExitStatus {
         }
     }
 }
+
+/// What was being done, and for how long, is told; no file is written.
+#[test]
+fn an_interrupt_is_told_with_what_was_being_done() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = Folder::empty();
+    folder.write("m.mo", &crate::limits::dense(60));
+    folder.write(
+        "s.toml",
+        "plant = \"m.mo\"\n[observer]\nfamily = \"drift-observable\"\n",
+    );
+    let cases = [
+        (&["check", "s.toml"][..], "examining"),
+        (&["design", "s.toml", "-o", "d.txt"], "designing"),
+        (&["certify", "s.toml", "-o", "c.txt"], "certifying"),
+    ];
+    for (arguments, what) in cases {
+        let child = Command::new(env!("CARGO_BIN_EXE_lynkeus"))
+            .args(arguments)
+            .args(["--time-limit", "1e6", "--memory-limit", "1000000"])
+            .current_dir(folder.path.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(400));
+        kill(&child, "INT");
+        let since = Instant::now();
+        let output = child.wait_with_output().unwrap();
+        assert!(since.elapsed() < Duration::from_secs(1), "{what}");
+        assert_eq!(output.status.signal(), Some(2), "{what}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        let expected = format!("interrupted by SIGINT after {what} for 0.");
+        assert!(told.starts_with(&expected), "{told}");
+        assert!(told.contains("no file was written"), "{told}");
+    }
+    assert_eq!(folder.files(), ["m.mo", "s.toml"]);
+}

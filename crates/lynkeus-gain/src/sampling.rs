@@ -1,0 +1,162 @@
+//! How long a gain stands between two samples.
+
+use nalgebra::DMatrix;
+
+/// Factor between two intervals that are looked at.
+const FINER: f64 = 1.1;
+/// Intervals from this one on are looked at, in units of the fastest mode,
+const SHORTEST: f64 = 1e-2;
+/// up to this one.
+const LONGEST: f64 = 1e3;
+/// Larger matrices are not looked at.
+const LARGEST: usize = 64;
+/// How far from 1 a spectral radius is told from it.
+const ROUNDING: f64 = 1e-9;
+
+/// What is found of an error between samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// with the inter-sample predictor: the first interval at which an error does not shrink from
+    /// sample to sample; infinite where none was found up to 1000 times the fastest mode
+    pub predict: f64,
+    /// with held measurements: 2/ρ(CK), in which the estimate has followed a held reading by
+    /// 1 − e⁻² = 86 %, so that it runs after the steps that holding makes
+    pub hold: f64,
+}
+
+/// The largest intervals between samples for the linearised error (e, ε)' = M (e, ε) of an
+/// observer with predicted measurements w' = L_f h(x̂), where e = x̂ − x, ε = w − y, and ε is the
+/// last `sensors` entries. A sample sets ε to 0, so that from one to the next
+/// e⁺ = Ψ(τ) e with Ψ the upper left block of exp(Mτ), and errors shrink where its spectral
+/// radius is below 1. C is ∂h/∂x̂ by sensor, K = ∂F/∂w the upper right block of M.
+///
+/// None where errors do not shrink with short intervals either, and where M is too large or
+/// not finite.
+#[must_use]
+pub fn limits(M: &[Vec<f64>], C: &[Vec<f64>]) -> Option<Limits> {
+    let (size, sensors) = (M.len(), C.len());
+    let n = size.checked_sub(sensors).filter(|n| *n > 0)?;
+    let is_fit = M
+        .iter()
+        .all(|row| row.len() == size && row.iter().all(|x| x.is_finite()))
+        && C.iter().all(|row| row.len() == n);
+    if !is_fit || size > LARGEST {
+        return None;
+    }
+    let M = DMatrix::from_fn(size, size, |i, j| M[i][j]);
+    let C = DMatrix::from_fn(sensors, n, |i, j| C[i][j]);
+    let hold = 2.0 / radius(&(C * M.view((0, n), (n, sensors))));
+    let fastest = radius(&M.view((0, 0), (n, n)).into_owned());
+    if fastest <= 0.0 || !fastest.is_finite() {
+        return None;
+    }
+    let shrinks = |interval: f64| {
+        let flow = (&M * interval).exp();
+        radius(&flow.view((0, 0), (n, n)).into_owned()) < 1.0 - ROUNDING
+    };
+    let mut interval = SHORTEST / fastest;
+    if !shrinks(interval) {
+        return None;
+    }
+    while shrinks(interval * FINER) {
+        interval *= FINER;
+        if interval > LONGEST / fastest {
+            return Some(Limits {
+                predict: f64::INFINITY,
+                hold,
+            });
+        }
+    }
+    Some(Limits {
+        predict: between(interval, interval * FINER, shrinks),
+        hold,
+    })
+}
+
+/// Where errors cease to shrink, to 1 %.
+fn between(mut shrinking: f64, mut growing: f64, shrinks: impl Fn(f64) -> bool) -> f64 {
+    while growing > 1.01 * shrinking {
+        let middle = (shrinking * growing).sqrt();
+        match shrinks(middle) {
+            true => shrinking = middle,
+            false => growing = middle,
+        }
+    }
+    shrinking
+}
+
+/// The largest modulus of an eigenvalue.
+fn radius(matrix: &DMatrix<f64>) -> f64 {
+    let is_finite = matrix.iter().all(|x| x.is_finite());
+    if !is_finite {
+        return f64::INFINITY;
+    }
+    let eigenvalues = matrix.complex_eigenvalues();
+    eigenvalues.iter().map(|λ| λ.norm()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// M for a chain of integrators with gain (θ c₁, θ² c₂, …) from its first state.
+    fn chain(θ: f64, c: &[f64]) -> Vec<Vec<f64>> {
+        let n = c.len();
+        let mut M = vec![vec![0.0; n + 1]; n + 1];
+        let mut power = 1.0;
+        for i in 0..n {
+            power *= θ;
+            M[i][0] = -power * c[i];
+            M[i][n] = power * c[i];
+            if i + 1 < n {
+                M[i][i + 1] += 1.0;
+            }
+        }
+        M[n][1] = 1.0;
+        M
+    }
+
+    const FIRST: [f64; 3] = [1.0, 0.0, 0.0];
+
+    /// By hand: with q = exp(−2θτ) ≈ 0, Ψ = [[1/4 − θτ/2, τ], [−θ/2, 1]] has determinant 1/4 and
+    /// trace 5/4 − θτ/2, which reaches −5/4 at θτ = 5. The chain of three: by SciPy.
+    #[test]
+    fn a_chain_stands_an_interval_inversely_to_its_gain() {
+        for θ in [1.0, 30.0] {
+            let two = limits(&chain(θ, &[2.0, 1.0]), &[FIRST[..2].to_vec()]).unwrap();
+            assert!((θ * two.predict - 5.001).abs() < 0.06, "{two:?}");
+            // CK = 2θ
+            assert!((θ * two.hold - 1.0).abs() < 1e-12, "{two:?}");
+            let three = limits(&chain(θ, &[3.0, 3.0, 1.0]), &[FIRST.to_vec()]).unwrap();
+            assert!((θ * three.predict - 2.899).abs() < 0.04, "{three:?}");
+        }
+    }
+
+    /// x' = a x, K = 3: stable plants stand any interval; an unstable one 3.896 at a = 1/2 (SciPy).
+    #[test]
+    fn what_decays_by_itself_stands_any_interval() {
+        let M = |a: f64| vec![vec![a - 3.0, 3.0], vec![a, 0.0]];
+        assert_eq!(
+            limits(&M(-0.5), &[vec![1.0]]).unwrap().predict,
+            f64::INFINITY
+        );
+        let unstable = limits(&M(0.5), &[vec![1.0]]).unwrap().predict;
+        assert!((unstable - 3.896).abs() < 0.04, "{unstable}");
+    }
+
+    #[test]
+    fn where_nothing_shrinks_nothing_is_said() {
+        // a second state that nobody sees and nothing moves
+        let M = vec![
+            vec![-1.0, 0.0, 1.0],
+            vec![0.0, 0.0, 0.0],
+            vec![0.0, 0.0, 0.0],
+        ];
+        assert_eq!(limits(&M, &[vec![1.0, 0.0]]), None);
+        assert_eq!(
+            limits(&[vec![f64::NAN, 0.0], vec![0.0, 0.0]], &[vec![1.0]]),
+            None
+        );
+        assert_eq!(limits(&[], &[]), None);
+    }
+}

@@ -1,0 +1,126 @@
+//! Equations that never determine their unknowns: their Jacobian is singular wherever it is
+//! looked at, as it is where a constraint between states is hidden among them.
+
+use lynkeus_expr::{Graph, Node, Tape, jacobian};
+
+use super::diagnose::lines;
+use super::listed;
+use super::loops::Torn;
+use crate::syntax::{Problem, Result, Span};
+
+/// Points looked at.
+const POINTS: usize = 4;
+/// A pivot this small against its row is none.
+const TINY: f64 = 1e-11;
+
+/// Names the equations of a block of which one follows from the others.
+pub(super) fn check(graph: &Graph, torn: &Torn<'_>, source: &str) -> Result<()> {
+    let n = torn.unknowns.len();
+    let unknowns: Vec<Node> = torn.unknowns.iter().map(|unknown| unknown.symbol).collect();
+    let slopes = jacobian::forward(graph, &torn.residuals, &unknowns);
+    let entries: Vec<Node> = slopes.entries.iter().map(|entry| entry.2).collect();
+    let symbols = graph.symbols_of(&entries);
+    let Ok(tape) = Tape::new(graph, &symbols, &entries) else {
+        return Ok(());
+    };
+    let mut dependent = None;
+    for turn in 1..=POINTS {
+        let values = tape.eval_in(&lynkeus_expr::Reals, &point(symbols.len(), turn));
+        if !values.iter().all(|value| value.is_finite()) {
+            continue;
+        }
+        let mut matrix = vec![vec![0.0; n]; n];
+        for (&(i, j, _), value) in slopes.entries.iter().zip(values) {
+            matrix[i][j] = value;
+        }
+        match dependent_rows(matrix) {
+            Some(rows) => dependent = Some(rows),
+            None => return Ok(()),
+        }
+    }
+    match dependent {
+        Some(rows) => Err(undetermined(torn, &rows, source)),
+        None => Ok(()),
+    }
+}
+
+/// Numbers in which no relation hides: multiples of √2, √3, … modulo 1, off zero.
+fn point(size: usize, turn: usize) -> Vec<f64> {
+    let root = |i: usize| ((i + 2) as f64 + 0.1 * turn as f64).sqrt();
+    (0..size)
+        .map(|i| 0.3 + (turn as f64 * root(i)).fract())
+        .collect()
+}
+
+/// The rows of which a combination vanishes; none where the matrix is regular.
+fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Option<Vec<usize>> {
+    let n = rows.len();
+    // each row with what it is made of
+    for (i, row) in rows.iter_mut().enumerate() {
+        let size = row.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        if size == 0.0 {
+            return Some(vec![i]);
+        }
+        row.iter_mut().for_each(|x| *x /= size);
+        row.extend((0..n).map(|j| f64::from(u8::from(i == j))));
+    }
+    for k in 0..n {
+        let largest = |row: &Vec<f64>| row[k..n].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        if let Some(row) = rows[k..].iter().find(|row| largest(row) < TINY) {
+            return Some((0..n).filter(|&j| row[n + j].abs() > TINY).collect());
+        }
+        let places = (k..n).flat_map(|i| (k..n).map(move |j| (i, j)));
+        let size = |&(i, j): &(usize, usize)| rows[i][j].abs();
+        let pivot = places.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        rows.swap(k, pivot.0);
+        rows.iter_mut().for_each(|row| row.swap(k, pivot.1));
+        let top = rows[k].clone();
+        for row in &mut rows[k + 1..] {
+            let factor = row[k] / top[k];
+            row.iter_mut()
+                .zip(&top)
+                .for_each(|(x, top)| *x -= factor * top);
+        }
+    }
+    None
+}
+
+fn undetermined(torn: &Torn<'_>, rows: &[usize], source: &str) -> Problem {
+    let dependent = rows.iter().map(|&i| torn.equations[i].span);
+    let span = dependent
+        .clone()
+        .max_by_key(|span| span.start)
+        .unwrap_or_default();
+    let mut spans: Vec<Span> = dependent.chain(torn.used.iter().map(|e| e.span)).collect();
+    spans.sort_by_key(|span| span.start);
+    let names = listed(torn.all.iter().copied());
+    let message = format!("these equations do not determine {names}: they are singular everywhere");
+    let hint = "one equation repeats others, or is a constraint between states or inputs (index \
+                above 1): leave it out, or replace it by its derivative with respect to time";
+    let lines = lines(source, spans.into_iter());
+    Problem::new(span, message)
+        .label(format!(
+            "it says nothing new of them beside the others on {lines}"
+        ))
+        .hint(hint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rows_that_depend_on_each_other_are_found() {
+        let regular = vec![vec![1.0, 2.0], vec![3.0, 4.0]];
+        assert_eq!(dependent_rows(regular), None);
+        let repeated = vec![
+            vec![1.0, 2.0, 0.0],
+            vec![0.0, 1.0, 1.0],
+            vec![2.0, 4.0, 0.0],
+        ];
+        assert_eq!(dependent_rows(repeated), Some(vec![0, 2]));
+        let scaled = vec![vec![1e-9, 0.0], vec![0.0, 1e9]];
+        assert_eq!(dependent_rows(scaled), None);
+        assert_eq!(dependent_rows(vec![vec![0.0]]), Some(vec![0]));
+    }
+}

@@ -1,0 +1,46 @@
+//! Tapes of `lynkeus-expr` as machine code.
+//!
+//! A [`Function`] computes what a [`Tape`](lynkeus_expr::Tape) computes, to the last bit where both
+//! call the same library functions (a NaN is a NaN, whatever its payload): the interpreter is the
+//! oracle. There are two shapes, one value per number ([`Function<1>`]) and four values side by
+//! side in vector registers ([`Function<4>`]), made by one emitter.
+//!
+//! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
+//! values are then placed in registers in one pass (`emit`), operation by operation
+//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 is compiled for: elsewhere
+//! [`Function::compile`] gives none and the interpreter does the work.
+//!
+//! This is the only crate of the workspace with `unsafe`: to call the code that it wrote.
+//!
+//! ```
+//! use lynkeus_expr::{Graph, Tape};
+//! use lynkeus_native::Function;
+//!
+//! let g = Graph::new();
+//! let x = g.symbol("x");
+//! let tape = Tape::new(&g, &[x.node()], &[(x.sin() * x + 1.0).node()])?;
+//! if let Some(function) = Function::<1>::compile(&tape) {
+//!     let mut y = [[0.0]];
+//!     function.evaluator().eval(&[[0.3]], &mut y);
+//!     assert_eq!(y, [[0.3_f64.sin() * 0.3 + 1.0]]);
+//! }
+//! # Ok::<(), lynkeus_expr::MissingInput>(())
+//! ```
+
+mod function;
+mod record;
+
+#[cfg(target_arch = "x86_64")]
+mod assemble;
+#[cfg(target_arch = "x86_64")]
+mod emit;
+#[cfg(target_arch = "x86_64")]
+mod frame;
+#[cfg(target_arch = "x86_64")]
+mod library;
+#[cfg(target_arch = "x86_64")]
+mod memory;
+#[cfg(target_arch = "x86_64")]
+mod operations;
+
+pub use function::{Evaluator, Function};

@@ -1,0 +1,151 @@
+//! The operations that are a few instructions, with the meaning that they have over `f64`.
+
+use lynkeus_expr::{Binary, Unary};
+
+use crate::assemble::{Arithmetic, Logic, Operand, Register, Relation};
+use crate::emit::{Emitter, TEMPORARY};
+use crate::record::Id;
+
+/// Bits other than the sign.
+const MAGNITUDE: f64 = f64::from_bits(!(1 << 63));
+
+/// What the operations read from memory: the frame has to know them beforehand.
+pub(crate) const CONSTANTS: [f64; 6] = [-0.0, MAGNITUDE, 0.0, 1.0, -1.0, f64::NAN];
+
+const MASK: Register = TEMPORARY[0];
+const OTHER: Register = TEMPORARY[1];
+
+impl<const LANES: usize> Emitter<'_, LANES> {
+    pub(crate) fn unary(&mut self, id: Id, op: Unary, x: Id) {
+        let from = self.register(x);
+        let [zero, one] = [0.0, 1.0].map(|c| self.constant(c));
+        match op {
+            Unary::Sign => {
+                let minus_one = self.constant(-1.0);
+                self.assembler.compare(Relation::Greater, MASK, from, zero);
+                self.assembler.compare(Relation::Less, OTHER, from, zero);
+                let to = self.result(id, &[x]);
+                self.assembler.blend(to, from, one, MASK);
+                self.assembler.blend(to, to, minus_one, OTHER);
+            }
+            Unary::Not => {
+                self.assembler.compare(Relation::Equal, MASK, from, zero);
+                let to = self.result(id, &[x]);
+                self.assembler.logic(Logic::And, to, MASK, one);
+            }
+            Unary::Sqrt => {
+                let to = self.result(id, &[x]);
+                self.assembler.sqrt(to, from);
+            }
+            Unary::Floor => {
+                let to = self.result(id, &[x]);
+                self.assembler.floor(to, from);
+            }
+            Unary::Abs => {
+                let magnitude = self.constant(MAGNITUDE);
+                let to = self.result(id, &[x]);
+                self.assembler.logic(Logic::And, to, from, magnitude);
+            }
+            // the others are called
+            _ => {
+                let sign = self.constant(-0.0);
+                let to = self.result(id, &[x]);
+                self.assembler.logic(Logic::Xor, to, from, sign);
+            }
+        }
+    }
+
+    pub(crate) fn binary(&mut self, id: Id, op: Binary, x: Id, y: Id) {
+        match op {
+            Binary::Add => self.arithmetic(id, Arithmetic::Add, x, y),
+            Binary::Sub => self.arithmetic(id, Arithmetic::Sub, x, y),
+            Binary::Mul => self.arithmetic(id, Arithmetic::Mul, x, y),
+            Binary::Div => self.arithmetic(id, Arithmetic::Div, x, y),
+            Binary::Less => self.relation(id, Relation::Less, x, y),
+            Binary::LessEq => self.relation(id, Relation::LessEqual, x, y),
+            Binary::Equal => self.relation(id, Relation::Equal, x, y),
+            Binary::And => self.truth(id, Logic::And, x, y),
+            Binary::Or => self.truth(id, Logic::Or, x, y),
+            Binary::Min => self.extreme(id, Relation::Less, Logic::And, x, y),
+            // the others are called
+            _ => self.extreme(id, Relation::Greater, Logic::AndNot, x, y),
+        }
+    }
+
+    fn arithmetic(&mut self, id: Id, op: Arithmetic, x: Id, y: Id) {
+        // a value that is in a register already comes first where the order is free
+        let commutes = matches!(op, Arithmetic::Add | Arithmetic::Mul);
+        let (x, y) = if commutes && self.is_elsewhere(x) && !self.is_elsewhere(y) {
+            (y, x)
+        } else {
+            (x, y)
+        };
+        let first = self.register(x);
+        let second = self.operand(y);
+        let to = self.result(id, &[x, y]);
+        self.assembler.arithmetic(op, to, first, second);
+    }
+
+    fn relation(&mut self, id: Id, relation: Relation, x: Id, y: Id) {
+        let first = self.register(x);
+        let second = self.operand(y);
+        let one = self.constant(1.0);
+        self.assembler.compare(relation, MASK, first, second);
+        let to = self.result(id, &[x, y]);
+        self.assembler.logic(Logic::And, to, MASK, one);
+    }
+
+    /// Anything but zero is true, NaN too.
+    fn truth(&mut self, id: Id, op: Logic, x: Id, y: Id) {
+        let (first, second) = (self.register(x), self.register(y));
+        let [zero, one] = [0.0, 1.0].map(|c| self.constant(c));
+        self.assembler
+            .compare(Relation::NotEqual, MASK, first, zero);
+        self.assembler
+            .compare(Relation::NotEqual, OTHER, second, zero);
+        self.assembler
+            .logic(op, MASK, MASK, Operand::Register(OTHER));
+        let to = self.result(id, &[x, y]);
+        self.assembler.logic(Logic::And, to, MASK, one);
+    }
+
+    /// The smaller or the larger one, NaN if either is. Of two zeros the one whose sign is the
+    /// extreme: `pick` takes x's sign where both are equal.
+    fn extreme(&mut self, id: Id, relation: Relation, pick: Logic, x: Id, y: Id) {
+        let (first, second) = (self.register(x), self.register(y));
+        let nan = self.constant(f64::NAN);
+        let y_value = Operand::Register(second);
+        self.assembler.compare(relation, MASK, first, y_value);
+        self.assembler
+            .compare(Relation::Equal, OTHER, first, y_value);
+        self.assembler
+            .logic(pick, OTHER, first, Operand::Register(OTHER));
+        self.assembler
+            .logic(Logic::Or, MASK, MASK, Operand::Register(OTHER));
+        self.assembler
+            .compare(Relation::Unordered, OTHER, first, y_value);
+        let to = self.result(id, &[x, y]);
+        self.assembler
+            .blend(to, second, Operand::Register(first), MASK);
+        self.assembler.blend(to, to, nan, OTHER);
+    }
+
+    /// `if c then x else y`; NaN where nobody knows.
+    pub(crate) fn select(&mut self, id: Id, c: Id, x: Id, y: Id) {
+        let condition = self.register(c);
+        let (first, second) = (self.register(x), self.register(y));
+        let [zero, nan] = [0.0, f64::NAN].map(|c| self.constant(c));
+        self.assembler
+            .compare(Relation::NotEqual, MASK, condition, zero);
+        self.assembler.compare(
+            Relation::Unordered,
+            OTHER,
+            condition,
+            Operand::Register(condition),
+        );
+        let to = self.result(id, &[c, x, y]);
+        self.assembler
+            .blend(to, second, Operand::Register(first), MASK);
+        self.assembler.blend(to, to, nan, OTHER);
+    }
+}

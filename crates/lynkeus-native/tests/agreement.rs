@@ -1,0 +1,150 @@
+//! Compiled code gives what the interpreter gives, to the bit.
+
+use lynkeus_expr::{Binary, Graph, Node, Tape, Unary};
+use lynkeus_native::Function;
+use proptest::prelude::*;
+
+const UNARY: [Unary; 17] = [
+    Unary::Neg,
+    Unary::Abs,
+    Unary::Sign,
+    Unary::Floor,
+    Unary::Sqrt,
+    Unary::Exp,
+    Unary::Ln,
+    Unary::Sin,
+    Unary::Cos,
+    Unary::Tan,
+    Unary::Asin,
+    Unary::Acos,
+    Unary::Atan,
+    Unary::Sinh,
+    Unary::Cosh,
+    Unary::Tanh,
+    Unary::Not,
+];
+
+const BINARY: [Binary; 13] = [
+    Binary::Add,
+    Binary::Sub,
+    Binary::Mul,
+    Binary::Div,
+    Binary::Pow,
+    Binary::Atan2,
+    Binary::Min,
+    Binary::Max,
+    Binary::Less,
+    Binary::LessEq,
+    Binary::Equal,
+    Binary::And,
+    Binary::Or,
+];
+
+/// One step of a random program: what to do with which earlier values.
+#[derive(Clone, Debug)]
+struct Draw {
+    kind: u8,
+    op: usize,
+    from: [usize; 6],
+    power: i32,
+    constant: f64,
+}
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        6 => -3.0..3.0_f64,
+        1 => any::<f64>(),
+        1 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 5e-324]),
+    ]
+}
+
+fn draw() -> impl Strategy<Value = Draw> {
+    let from = prop::array::uniform6(0..1000_usize);
+    (0..20_u8, 0..1000_usize, from, -5..9_i32, number()).prop_map(
+        |(kind, op, from, power, constant)| Draw {
+            kind,
+            op,
+            from,
+            power,
+            constant,
+        },
+    )
+}
+
+/// A graph of these steps; the last values, and some earlier ones, are outputs.
+fn build(g: &Graph, inputs: &[Node], draws: &[Draw]) -> Vec<Node> {
+    let mut nodes = inputs.to_vec();
+    for draw in draws {
+        // mostly recent values, so that programs are deep and long-lived ones are spilled
+        let pick = |i: usize| {
+            let span = if draw.from[i] % 3 == 0 {
+                nodes.len()
+            } else {
+                nodes.len().min(6)
+            };
+            nodes[nodes.len() - 1 - draw.from[i] % span]
+        };
+        match draw.kind {
+            0..5 => nodes.push(g.unary(UNARY[draw.op % UNARY.len()], pick(0))),
+            5 => nodes.push(g.powi(pick(0), draw.power)),
+            6 => nodes.push(g.select(pick(0), pick(1), pick(2))),
+            7 => {
+                let solution = g.solve(&[pick(0), pick(1), pick(2), pick(3)], &[pick(4), pick(5)]);
+                nodes.extend(solution.x);
+                nodes.push(solution.rcond);
+            }
+            8 => nodes.push(g.constant(draw.constant).node()),
+            9..14 => nodes.push(g.binary(BINARY[draw.op % 4], pick(0), pick(1))),
+            _ => nodes.push(g.binary(BINARY[draw.op % BINARY.len()], pick(0), pick(1))),
+        }
+    }
+    let mut outputs: Vec<Node> = nodes.iter().rev().step_by(7).copied().collect();
+    outputs.extend(nodes.iter().rev().take(4));
+    outputs
+}
+
+fn same(x: f64, y: f64) -> bool {
+    x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan())
+}
+
+fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
+    let g = Graph::new();
+    let inputs: Vec<Node> = (0..5).map(|i| g.symbol(&format!("x{i}")).node()).collect();
+    let outputs = build(&g, &inputs, draws);
+    let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
+    let Some(single) = Function::<1>::compile(&tape) else {
+        eprintln!("skipped: machine code is not made here");
+        return Ok(());
+    };
+    let (mut single, mut interpreter) = (single.evaluator(), tape.evaluator());
+    let mut lanes = Function::<4>::compile(&tape)
+        .expect("as for one lane")
+        .evaluator();
+    let columns: Vec<[f64; 4]> = (0..5).map(|i| rows.map(|row| row[i])).collect();
+    let mut side_by_side = vec![[0.0; 4]; outputs.len()];
+    lanes.eval(&columns, &mut side_by_side);
+    for (lane, row) in rows.iter().enumerate() {
+        let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![[0.0]; outputs.len()]);
+        interpreter.eval(row, &mut expected);
+        single.eval(&row.map(|x| [x]), &mut found);
+        for (i, &e) in expected.iter().enumerate() {
+            prop_assert!(same(e, found[i][0]), "output {i}: {e} and {}", found[i][0]);
+            let beside = side_by_side[i][lane];
+            prop_assert!(same(e, beside), "output {i}, lane {lane}: {e} and {beside}");
+        }
+    }
+    Ok(())
+}
+
+fn rows() -> impl Strategy<Value = [[f64; 5]; 4]> {
+    prop::array::uniform4(prop::array::uniform5(number()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(10_000))]
+
+    #[test]
+    fn random_programs_agree(draws in prop::collection::vec(draw(), 1..200), rows in rows()) {
+        agrees(&draws, &rows)?;
+    }
+}

@@ -1,0 +1,90 @@
+//! Time per sample of the filters on a chain of n cells, of which the last is measured.
+
+use divan::{Bencher, black_box};
+use lynkeus_expr::Graph;
+use lynkeus_run::filter::{
+    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
+};
+use lynkeus_run::{Error, Estimator, EstimatorSettings, Level, Method, Tolerances};
+
+fn main() {
+    divan::main();
+}
+
+const STEP: f64 = 0.1;
+
+/// x_i' = φ(x_{i−1}) − φ(x_i), φ(x) = 2.5 x/(1 + 1.5 x), fed by a signal.
+fn chain(n: usize) -> Result<FilterModel, Error> {
+    let g = Graph::new();
+    let (time, u) = (g.symbol("time"), g.symbol("u"));
+    let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x[{i}]"))).collect();
+    let flow: Vec<_> = x.iter().map(|&x| x * 2.5 / (1.0 + x * 1.5)).collect();
+    let dx = (0..n).map(|i| (if i == 0 { u } else { flow[i - 1] } - flow[i]).node());
+    let states = x.iter().map(|x| (format!("{x:?}"), x.node(), 0.5));
+    FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: states.collect(),
+        derivatives: dx.collect(),
+        inputs: vec![("u".to_owned(), u.node())],
+        sensors: vec![Sensor {
+            name: "y".to_owned(),
+            output: x[n - 1].node(),
+            noise: Level::Absolute(0.02),
+            limits: None,
+        }],
+        process_noise: vec![1e-6; n],
+        initial_variance: vec![1e-4; n],
+        confined: None,
+    })
+}
+
+/// Runs a filter for long enough that P has filled, then measures sample by sample.
+fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
+    let method = Method::Adaptive(Tolerances {
+        relative: 1e-6,
+        absolute: 1e-8,
+        ..Tolerances::default()
+    });
+    let run = EstimatorSettings {
+        method,
+        ..EstimatorSettings::default()
+    };
+    let filter =
+        chain(n).and_then(|model| Estimator::filter(&model, FilterSettings::of(kind), run));
+    let mut filter = filter.unwrap_or_else(|error| panic!("{error}"));
+    let mut k = 0_u32;
+    let mut push = || {
+        let t = STEP * f64::from(k);
+        k += 1;
+        let y = 0.5 + 0.1 * t.sin();
+        match filter.push(t, &[y, black_box(0.7)]) {
+            Ok(x) => x[0],
+            Err(error) => panic!("{error}"),
+        }
+    };
+    for _ in 0..30 {
+        black_box(push());
+    }
+    bencher.bench_local(push);
+}
+
+#[divan::bench(args = [2, 8, 25, 61, 200])]
+fn ekf(bencher: Bencher, n: usize) {
+    measure(bencher, n, FilterKind::Extended);
+}
+
+#[divan::bench(args = [2, 8, 25, 61, 200])]
+fn ukf(bencher: Bencher, n: usize) {
+    measure(bencher, n, FilterKind::Unscented(SigmaPoints::default()));
+}
+
+/// A window of ten samples.
+#[divan::bench(args = [2, 8, 25, 61], sample_count = 30)]
+fn mhe(bencher: Bencher, n: usize) {
+    let bounds = Bounds {
+        low: 0.0,
+        high: 10.0,
+    };
+    measure(bencher, n, FilterKind::MovingHorizon(10, vec![bounds; n]));
+}

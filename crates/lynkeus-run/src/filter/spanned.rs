@@ -1,0 +1,301 @@
+//! Square matrices of which each row is known to vanish outside a span.
+
+use std::ops::Range;
+
+use super::root::dot;
+use crate::snapshot::{Damaged, Walk};
+
+/// An entry of a sparse matrix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    pub row: usize,
+    pub column: usize,
+    pub value: f64,
+}
+
+/// n × n, row by row; what is outside the span of a row is 0 and never touched. The powers of a
+/// banded matrix are of this kind, and grow with their exponent only.
+#[derive(Clone, Debug)]
+pub(super) struct Spanned {
+    n: usize,
+    entries: Vec<f64>,
+    spans: Vec<Range<usize>>,
+}
+
+impl Spanned {
+    pub fn zero(n: usize) -> Self {
+        Self {
+            n,
+            entries: vec![0.0; n * n],
+            spans: vec![0..0; n],
+        }
+    }
+
+    pub fn identity(n: usize) -> Self {
+        let mut matrix = Self::zero(n);
+        (0..n).for_each(|i| matrix.add_at(i, i, 1.0));
+        matrix
+    }
+
+    /// Of all entries, row by row.
+    pub fn dense(n: usize, entries: Vec<f64>) -> Self {
+        Self {
+            n,
+            entries,
+            spans: vec![0..n; n],
+        }
+    }
+
+    /// Other entries, all of them, row by row.
+    pub fn fill(&mut self, entries: impl Iterator<Item = f64>) {
+        let n = self.n;
+        self.spans.iter_mut().for_each(|span| *span = 0..n);
+        let places = self.entries.iter_mut().zip(entries);
+        places.for_each(|(place, entry)| *place = entry);
+    }
+
+    /// Columns of row i that may differ from 0.
+    pub fn span(&self, i: usize) -> Range<usize> {
+        self.spans[i].clone()
+    }
+
+    /// The entries of row i in its span.
+    pub fn row(&self, i: usize) -> &[f64] {
+        let span = self.span(i);
+        &self.entries[i * self.n + span.start..i * self.n + span.end]
+    }
+
+    /// All entries, row by row.
+    pub fn entries(&self) -> &[f64] {
+        &self.entries
+    }
+
+    /// Zero again.
+    pub fn clear(&mut self) {
+        for i in 0..self.n {
+            let span = std::mem::take(&mut self.spans[i]);
+            self.entries[i * self.n + span.start..i * self.n + span.end].fill(0.0);
+        }
+    }
+
+    pub fn copy_from(&mut self, other: &Self) {
+        self.clear();
+        self.add(other);
+    }
+
+    pub fn add_at(&mut self, i: usize, j: usize, value: f64) {
+        self.reach(i, &(j..j + 1));
+        self.entries[i * self.n + j] += value;
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        for i in 0..self.n {
+            self.add_row(i, 1.0, other, i);
+        }
+    }
+
+    /// Adds factor · A · other for a sparse A.
+    pub fn add_product(&mut self, factor: f64, sparse: &[Entry], other: &Self) {
+        for entry in sparse {
+            self.add_row(entry.row, factor * entry.value, other, entry.column);
+        }
+    }
+
+    /// The sum with the own transpose.
+    pub fn add_transpose(&mut self) {
+        for i in 0..self.n {
+            for j in self.span(i) {
+                self.reach(j, &(i..i + 1));
+            }
+        }
+        for i in 0..self.n {
+            for j in self.spans[i].start..self.spans[i].end.min(i) {
+                let sum = self.entries[i * self.n + j] + self.entries[j * self.n + i];
+                self.entries[i * self.n + j] = sum;
+                self.entries[j * self.n + i] = sum;
+            }
+            self.entries[i * self.n + i] *= 2.0;
+        }
+    }
+
+    /// Row i times rows[i], column j times columns[j].
+    pub fn scale(&mut self, rows: impl Fn(usize) -> f64, columns: impl Fn(usize) -> f64) {
+        for i in 0..self.n {
+            let scale = rows(i);
+            for j in self.span(i) {
+                self.entries[i * self.n + j] *= scale * columns(j);
+            }
+        }
+    }
+
+    /// √(Σ entries²); not a number where an entry is none.
+    pub fn norm(&self) -> f64 {
+        let rows = (0..self.n).map(|i| self.row(i));
+        rows.map(|row| dot(row, row)).sum::<f64>().sqrt()
+    }
+
+    fn add_row(&mut self, i: usize, factor: f64, other: &Self, j: usize) {
+        let span = other.span(j);
+        if span.start == span.end {
+            return;
+        }
+        self.reach(i, &span);
+        let into = &mut self.entries[i * self.n + span.start..i * self.n + span.end];
+        for (into, from) in into.iter_mut().zip(other.row(j)) {
+            *into += factor * from;
+        }
+    }
+
+    fn reach(&mut self, i: usize, columns: &Range<usize>) {
+        let span = &mut self.spans[i];
+        *span = if span.start == span.end {
+            columns.clone()
+        } else {
+            span.start.min(columns.start)..span.end.max(columns.end)
+        };
+    }
+}
+
+/// A matrix of which only the spans are stored.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Rows {
+    /// first column of each row, and where its entries begin
+    begins: Vec<(usize, usize)>,
+    entries: Vec<f64>,
+}
+
+impl Rows {
+    pub(super) fn of(matrix: &Spanned) -> Self {
+        let mut rows = Self::default();
+        for i in 0..matrix.n {
+            rows.begins.push((matrix.span(i).start, rows.entries.len()));
+            rows.entries.extend_from_slice(matrix.row(i));
+        }
+        rows
+    }
+
+    pub fn identity(n: usize) -> Self {
+        Self {
+            begins: (0..n).map(|i| (i, i)).collect(),
+            entries: vec![1.0; n],
+        }
+    }
+
+    /// Each row: its first column, and its entries from there.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &[f64])> {
+        self.begins.iter().enumerate().map(|(i, &(first, begin))| {
+            let end = self.begins.get(i + 1).map_or(self.entries.len(), |b| b.1);
+            (first, &self.entries[begin..end])
+        })
+    }
+
+    /// What `earlier` and then this one do: their product.
+    pub fn after(&self, earlier: &Self) -> Self {
+        let n = self.begins.len();
+        let mut product = Spanned::zero(n);
+        let mut dense = Spanned::zero(n);
+        for (i, (first, row)) in earlier.iter().enumerate() {
+            let entries = row.iter().enumerate();
+            entries.for_each(|(k, entry)| dense.add_at(i, first + k, *entry));
+        }
+        for (i, (first, row)) in self.iter().enumerate() {
+            let entries = row.iter().enumerate();
+            entries.for_each(|(k, entry)| product.add_row(i, *entry, &dense, first + k));
+        }
+        Self::of(&product)
+    }
+
+    /// Of n rows and columns.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let spans = self.iter().map(|(first, row)| first..first + row.len());
+        let mut spans: Vec<Range<usize>> = spans.collect();
+        spans.resize(n, 0..0);
+        self.begins.resize(n, (0, 0));
+        let mut count = 0;
+        for (begin, span) in self.begins.iter_mut().zip(&mut spans) {
+            walk.below(&mut span.start, n + 1)?;
+            walk.below(&mut span.end, n + 1)?;
+            *begin = (span.start, count);
+            count += span.end.checked_sub(span.start).ok_or(Damaged)?;
+        }
+        self.entries.resize(count, 0.0);
+        walk.numbers(&mut self.entries)
+    }
+
+    /// Mᵀv.
+    pub fn transposed_times(&self, v: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; v.len()];
+        for (factor, (first, row)) in v.iter().zip(self.iter()) {
+            for (into, entry) in result[first..].iter_mut().zip(row) {
+                *into += factor * entry;
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(row: usize, column: usize, value: f64) -> Entry {
+        Entry { row, column, value }
+    }
+
+    #[test]
+    fn spans_grow_with_products_and_hold_what_dense_ones_do() {
+        let sparse = [entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)];
+        let mut once = Spanned::zero(3);
+        once.add_product(1.0, &sparse, &Spanned::identity(3));
+        assert_eq!(once.span(0), 1..2);
+        let mut twice = Spanned::zero(3);
+        twice.add_product(0.5, &sparse, &once);
+        // ½A² for A = [[0, 2, 0], [0, −1, 0], [3, 0, 0]]
+        assert_eq!(
+            twice.entries(),
+            [0.0, -1.0, 0.0, 0.0, 0.5, 0.0, 0.0, 3.0, 0.0]
+        );
+        twice.add_transpose();
+        assert_eq!(
+            twice.entries(),
+            [0.0, -1.0, 0.0, -1.0, 1.0, 3.0, 0.0, 3.0, 0.0]
+        );
+        assert!((twice.norm() - 21.0_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(
+            Rows::of(&twice).transposed_times(&[1.0, 2.0, 3.0]),
+            [-2.0, 10.0, 6.0]
+        );
+        twice.clear();
+        assert_eq!(twice.norm(), 0.0);
+    }
+
+    /// [[0, 2, 0], [0, −1, 0], [3, 0, 0]] after [[1, 0, 0], [4, 0, 5], [0, 0, 6]].
+    #[test]
+    fn one_after_the_other_is_the_product() {
+        let rows = |entries: &[Entry]| {
+            let mut matrix = Spanned::zero(3);
+            entries
+                .iter()
+                .for_each(|e| matrix.add_at(e.row, e.column, e.value));
+            Rows::of(&matrix)
+        };
+        let later = rows(&[entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)]);
+        let earlier = rows(&[
+            entry(0, 0, 1.0),
+            entry(1, 0, 4.0),
+            entry(1, 2, 5.0),
+            entry(2, 2, 6.0),
+        ]);
+        let product = later.after(&earlier);
+        let column = |i: usize| {
+            let mut unit = [0.0; 3];
+            unit[i] = 1.0;
+            product.transposed_times(&unit)
+        };
+        assert_eq!(column(0), [8.0, 0.0, 10.0]);
+        assert_eq!(column(1), [-4.0, 0.0, -5.0]);
+        assert_eq!(column(2), [3.0, 0.0, 0.0]);
+        let identity = Rows::of(&Spanned::identity(3));
+        assert_eq!(identity.after(&identity), identity);
+    }
+}

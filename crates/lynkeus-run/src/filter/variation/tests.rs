@@ -1,0 +1,145 @@
+//! Series and doubling against one integration of everything.
+
+use super::*;
+use crate::filter::flow::Joint;
+use crate::filter::root::Root;
+use crate::{BetweenSamples, System, Tolerances};
+use lynkeus_expr::{Expr, Graph, jacobian};
+
+/// x_i' from x_{i−1} (or the input), x_i, x_{i+1} (or x_i at the end) and the input.
+type Law = for<'g> fn([Expr<'g>; 4], usize) -> Expr<'g>;
+
+struct Chain {
+    flow: System,
+    entries: Vec<(usize, usize)>,
+    n: usize,
+}
+
+fn chain(n: usize, law: Law) -> Chain {
+    let g = Graph::new();
+    let (time, u) = (g.symbol("time"), g.symbol("u"));
+    let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
+    let dx: Vec<_> = (0..n)
+        .map(|i| {
+            let left = if i == 0 { u } else { x[i - 1] };
+            law([left, x[i], x[(i + 1).min(n - 1)], u], i).node()
+        })
+        .collect();
+    let symbols: Vec<_> = x.iter().map(|x| x.node()).collect();
+    let F = jacobian::forward(&g, &dx, &symbols).entries;
+    let outputs: Vec<_> = F
+        .iter()
+        .map(|e| (format!("{},{}", e.0, e.1), e.2))
+        .collect();
+    let states: Vec<_> = (0..n)
+        .map(|i| (format!("x{i}"), symbols[i], 0.3 + 0.1 * (i % 5) as f64))
+        .collect();
+    let signals = [("u".to_string(), u.node())];
+    Chain {
+        flow: System::new(&g, time.node(), &states, &signals, &dx, &outputs).unwrap(),
+        entries: F.iter().map(|e| (e.0, e.1)).collect(),
+        n,
+    }
+}
+
+fn tight(relative: f64) -> Tolerances {
+    Tolerances {
+        relative,
+        absolute: 1e-2 * relative,
+        ..Tolerances::default()
+    }
+}
+
+/// x̂, Φ and W over three samples by both ways; the largest relative difference.
+fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
+    let n = chain.n;
+    let noise: Vec<f64> = (0..n)
+        .map(|i| 0.01 * f64::from(u8::from(i % 3 != 1)))
+        .collect();
+    let outputs = chain.flow.outputs().len();
+    let mut variation = Variation::new(n, outputs, &chain.entries, &noise, ours).unwrap();
+    let mut joint = Joint::new(n, outputs, &chain.entries, &noise, reference).unwrap();
+    let mut worst = 0.0_f64;
+    let mut x = chain.flow.start().to_vec();
+    let mut driven = Driven::new(&chain.flow, BetweenSamples::Linear);
+    driven.start(&[0.5]);
+    for k in 0..3 {
+        let (from, to) = (step * f64::from(k), step * f64::from(k + 1));
+        let belief = Belief {
+            x: x.clone(),
+            root: Root::diagonal(&vec![0.04; n]),
+        };
+        driven.aim(from, to, &[0.5 + 0.3 * f64::from(k)]);
+        let mut other = x.clone();
+        let mut expected = Moments::start(n, true);
+        joint
+            .advance(&mut driven.clone(), from, to, &mut other, &mut expected)
+            .unwrap();
+        let found = variation
+            .advance(&mut driven, &belief, from, to, &mut x)
+            .unwrap();
+        driven.arrive();
+        let pairs = [
+            (x.as_slice(), other.as_slice()),
+            (found.transition.entries(), expected.transition.entries()),
+            (
+                found.noise.as_ref().unwrap().entries(),
+                expected.noise.as_ref().unwrap().entries(),
+            ),
+        ];
+        for (a, b) in pairs {
+            let size = b.iter().fold(0.0_f64, |m, b| m.max(b.abs()));
+            let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs() / size);
+            worst = apart.fold(worst, f64::max);
+        }
+    }
+    worst
+}
+
+/// Nonlinear, with an input that moves, over short and over long samples.
+#[test]
+fn series_agree_with_one_integration() {
+    let chain = chain(13, |[left, own, right, u], i| {
+        left - own * 1.5 + (own * right).sin() * 0.4 + u * own * 0.2 + 0.01 * i as f64
+    });
+    for (step, tolerance) in [(0.05, 1e-9), (0.7, 1e-9), (4.0, 1e-9), (0.7, 1e-5)] {
+        let off = differ(
+            &chain,
+            step,
+            Method::Explicit(tight(tolerance)),
+            Method::Explicit(tight(1e-12)),
+        );
+        assert!(off < 10.0 * tolerance, "{step}: {off}");
+    }
+}
+
+/// A derivative with a kink that the estimate crosses within a sample.
+#[test]
+fn a_kink_is_found() {
+    let chain = chain(10, |[left, own, _, _], _| left - own + (own - 0.45).abs());
+    let off = differ(
+        &chain,
+        0.9,
+        Method::Explicit(tight(1e-7)),
+        Method::Explicit(tight(1e-11)),
+    );
+    assert!(off < 1e-5, "{off}");
+}
+
+/// Rates of 10⁴ per sample, constant and not.
+#[test]
+fn stiff_flows_are_doubled_up() {
+    let linear = chain(12, |[left, own, right, _], i| match i % 2 {
+        0 => (right - own) * 1e4,
+        _ => left - own * 2.0,
+    });
+    let reference = Method::Explicit(tight(1e-10));
+    let off = differ(&linear, 1.0, Method::Adaptive(tight(1e-9)), reference);
+    assert!(off < 1e-8, "{off}");
+    let bent = chain(12, |[left, own, right, _], i| match i % 2 {
+        0 => (right - own) * 1e4,
+        _ => left - own * own * 2.0,
+    });
+    let off = differ(&bent, 1.0, Method::Adaptive(tight(1e-9)), reference);
+    assert!(off < 1e-4, "{off}");
+}

@@ -1,0 +1,307 @@
+//! Jumps of the right-hand side that the state decides: relays, thresholds, dry friction.
+//!
+//! Between two of them the right-hand side is that of one side, held. Where a step ends on
+//! another side, the instant of the crossing is located, and what follows decided by the
+//! velocities on both sides (A. F. Filippov, *Differential Equations with Discontinuous
+//! Righthand Sides*, § 4): if the other side carries the state on, it is crossed; if both push
+//! the state back, it slides along the surface with the combination of both right-hand sides
+//! that keeps it there, until one of them ceases to push. Without that an integrator creeps
+//! from one side to the other in steps as short as time resolves.
+
+mod extract;
+mod slide;
+
+use lynkeus_expr::Tape;
+
+pub(crate) use extract::{Taken, take};
+
+use crate::snapshot::{Damaged, Persist, Walk};
+use crate::{Dynamics, Error};
+
+/// A surface counts as reached this close to it, against the largest value of its function.
+const REACHED: f64 = 1e-10;
+
+/// A surface passed so often in a run is named where the steps run out.
+const OFTEN: usize = 1000;
+
+/// One operation that jumps on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Relay {
+    surface: usize,
+    /// its own argument has the other sign
+    is_reversed: bool,
+    /// its value is −1 or 1 instead of 0 or 1
+    is_sign: bool,
+}
+
+/// The jumps of a system and the surfaces on which they happen.
+#[derive(Clone, Debug)]
+pub(crate) struct Held {
+    relays: Vec<Relay>,
+    /// functions that vanish on the surfaces, of the inputs of the system and the modes
+    pub surfaces: Tape,
+    /// how the surfaces read
+    pub names: Vec<String>,
+}
+
+impl Held {
+    /// Writes the values of the operations on the given sides of the surfaces.
+    pub fn modes(&self, sides: &[f64], modes: &mut [f64]) {
+        for (mode, relay) in modes.iter_mut().zip(&self.relays) {
+            let side = match relay.is_reversed {
+                true => -sides[relay.surface],
+                false => sides[relay.surface],
+            };
+            *mode = match relay.is_sign {
+                true => side,
+                false => f64::from(u8::from(side > 0.0)),
+            };
+        }
+    }
+}
+
+/// What is remembered of the surfaces from one interval to the next.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sides {
+    /// −1 or 1
+    sides: Vec<f64>,
+    sliding: Vec<bool>,
+    /// the largest values seen of their functions
+    largest: Vec<f64>,
+    /// how often they were reached
+    passes: Vec<usize>,
+}
+
+impl Sides {
+    /// Room for so many surfaces.
+    fn fit(&mut self, count: usize) {
+        self.sides.resize(count, 1.0);
+        self.sliding.resize(count, false);
+        self.largest.resize(count, 0.0);
+        self.passes.resize(count, 0);
+    }
+}
+
+impl Persist for Sides {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        // none before the first interval
+        let count = walk.length(self.sides.len())?;
+        self.fit(count);
+        walk.numbers(&mut self.sides)?;
+        walk.numbers(&mut self.largest)?;
+        self.sliding.iter_mut().try_for_each(|s| walk.flag(s))?;
+        self.passes.iter_mut().try_for_each(|p| walk.count(p))
+    }
+}
+
+/// A system on known sides of its surfaces.
+pub(crate) struct Switched<'a, D: Dynamics> {
+    inner: &'a mut D,
+    at: &'a mut Sides,
+    /// length of the interval
+    length: f64,
+    /// parts of the other side's right-hand side, of each surface that is slid along
+    parts: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl<'a, D: Dynamics> Switched<'a, D> {
+    /// At the start of an interval of the given length; decides on which sides it starts.
+    pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
+        let count = inner.surfaces();
+        at.fit(count);
+        let mut switched = Self {
+            inner,
+            at,
+            length,
+            parts: vec![0.0; count],
+            values: vec![0.0; count],
+        };
+        if count > 0 {
+            switched.start(t, x);
+        }
+        switched
+    }
+
+    /// Whether nothing jumps with the state.
+    pub fn is_plain(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    fn start(&mut self, t: f64, x: &[f64]) {
+        self.hold();
+        self.look(t, x);
+        let mut dx = vec![0.0; x.len()];
+        self.derivatives(t, x, &mut dx);
+        let speeds = self.speeds(t, x, &dx);
+        let reached = self.values.iter().zip(&self.at.largest).zip(&speeds);
+        let reached: Vec<bool> = reached
+            .map(|((value, largest), speed)| {
+                let size = largest.max(speed.abs() * self.length);
+                value.abs() <= REACHED * size
+            })
+            .collect();
+        for (i, reached) in reached.iter().enumerate() {
+            if !reached {
+                self.at.sliding[i] = false;
+                self.at.sides[i] = if self.values[i] < 0.0 { -1.0 } else { 1.0 };
+            }
+        }
+        for (i, _) in reached.iter().enumerate().filter(|(_, reached)| **reached) {
+            self.decide(i, t, x);
+        }
+        self.hold();
+    }
+
+    /// Tells the system on which sides it is.
+    fn hold(&mut self) {
+        self.inner.hold(Some(&self.at.sides));
+    }
+
+    /// Reads the functions of the surfaces.
+    fn look(&mut self, t: f64, x: &[f64]) {
+        self.inner.read_surfaces(t, x, &mut self.values);
+        for (largest, value) in self.at.largest.iter_mut().zip(&self.values) {
+            *largest = largest.max(value.abs());
+        }
+    }
+
+    /// How far each surface is from changing what holds; negative beyond.
+    pub fn margins(&mut self, t: f64, x: &[f64], margins: &mut Vec<f64>) {
+        margins.clear();
+        if self.is_plain() {
+            return;
+        }
+        if self.at.sliding.contains(&true) {
+            let mut dx = vec![0.0; x.len()];
+            self.derivatives(t, x, &mut dx);
+        }
+        self.look(t, x);
+        for (i, value) in self.values.iter().enumerate() {
+            margins.push(match self.at.sliding[i] {
+                true => self.parts[i].min(1.0 - self.parts[i]),
+                false => self.at.sides[i] * value,
+            });
+        }
+    }
+
+    /// Where between two points the margin of a surface may be negative although it is not at
+    /// either: the part of the way to the least value of the cubic through both with their
+    /// speeds.
+    pub fn dip(&mut self, from: (f64, &[f64]), to: (f64, &[f64])) -> Option<f64> {
+        let [(before, falls), (after, rises)] = [from, to].map(|(t, x)| {
+            let mut dx = vec![0.0; x.len()];
+            self.derivatives(t, x, &mut dx);
+            let speeds = self.speeds(t, x, &dx);
+            self.look(t, x);
+            (self.values.clone(), speeds)
+        });
+        let step = to.0 - from.0;
+        let free = (0..self.values.len()).filter(|&i| !self.at.sliding[i]);
+        let lowest = free.filter_map(|i| {
+            let side = self.at.sides[i];
+            let (a, b) = (side * before[i], side * after[i]);
+            let (p, q) = (side * falls[i] * step, side * rises[i] * step);
+            let value = |s: f64| {
+                let r = 1.0 - s;
+                r * r * ((1.0 + 2.0 * s) * a + s * p) + s * s * ((3.0 - 2.0 * s) * b - r * q)
+            };
+            let parts = (1..16).map(|k| f64::from(k) / 16.0);
+            let least = parts.min_by(|x, y| value(*x).total_cmp(&value(*y)))?;
+            (p < 0.0 && q > 0.0 && value(least) < 0.0).then_some(least)
+        });
+        lowest.reduce(f64::min)
+    }
+
+    /// Goes on where margins have become negative: across, along, or off the surface.
+    pub fn pass(&mut self, t: f64, x: &[f64], margins: &[f64]) {
+        for (i, _) in margins.iter().enumerate().filter(|(_, m)| **m < 0.0) {
+            self.at.passes[i] += 1;
+            match self.at.sliding[i] {
+                true => {
+                    self.at.sliding[i] = false;
+                    if self.parts[i] > 0.5 {
+                        self.at.sides[i] = -self.at.sides[i];
+                    }
+                }
+                false => self.decide(i, t, x),
+            }
+        }
+        self.hold();
+    }
+
+    /// Which side of a surface that is reached carries the state away from it: that one
+    /// holds; or neither, and the state slides.
+    fn decide(&mut self, i: usize, t: f64, x: &[f64]) {
+        self.at.sliding[i] = false;
+        let first = -self.at.sides[i];
+        for side in [first, -first] {
+            self.at.sides[i] = side;
+            self.hold();
+            let mut dx = vec![0.0; x.len()];
+            self.derivatives(t, x, &mut dx);
+            let speed = side * self.speeds(t, x, &dx)[i];
+            // a side that does not push back is not left for the one that was
+            if speed > 0.0 || (side == first && speed == 0.0) {
+                return;
+            }
+        }
+        self.at.sliding[i] = true;
+        self.hold();
+    }
+
+    /// A branch need have no value beyond its side: f as the state says, then.
+    fn mend(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        if !self.is_plain() && !dx.iter().all(|v| v.is_finite()) {
+            self.inner.hold(None);
+            self.inner.derivatives(t, x, dx);
+            self.hold();
+        }
+    }
+
+    /// The surface that was reached most often, where that is often.
+    pub fn busiest(&self) -> Option<String> {
+        let passes = self.at.passes.iter().enumerate();
+        let (i, count) = passes.max_by_key(|(_, count)| **count)?;
+        let name = self.inner.surface_names().into_iter().nth(i)?;
+        (*count >= OFTEN).then(|| format!("{name} was passed {count} times; "))
+    }
+}
+
+impl<D: Dynamics> Drop for Switched<'_, D> {
+    fn drop(&mut self) {
+        if !self.is_plain() {
+            self.inner.hold(None);
+        }
+    }
+}
+
+impl<D: Dynamics> Dynamics for Switched<'_, D> {
+    fn dimension(&self) -> usize {
+        self.inner.dimension()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        if self.at.sliding.contains(&true) {
+            return self.slide(t, x, dx);
+        }
+        self.inner.derivatives(t, x, dx);
+        self.mend(t, x, dx);
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.inner.enter(t);
+    }
+
+    fn is_over(&mut self) -> bool {
+        self.inner.is_over()
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.inner.names()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.inner.not_finite(t, x)
+    }
+}

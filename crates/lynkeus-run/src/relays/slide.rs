@@ -1,0 +1,66 @@
+//! Motion along surfaces that both sides push the state onto.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Switched;
+use crate::Dynamics;
+
+impl<D: Dynamics> Switched<'_, D> {
+    /// How fast the functions of the surfaces change as the state moves with dx: a central
+    /// difference, exact for what is affine.
+    pub(super) fn speeds(&mut self, t: f64, x: &[f64], dx: &[f64]) -> Vec<f64> {
+        let size = |values: &[f64]| values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let stays = (1e-5 * size(x).max(1e-3)) / size(dx).max(f64::MIN_POSITIVE);
+        let step = (1e-5 * self.length).min(stays);
+        let mut at = |step: f64| {
+            let moved: Vec<f64> = x.iter().zip(dx).map(|(x, dx)| x + step * dx).collect();
+            let mut values = vec![0.0; self.parts.len()];
+            self.inner.read_surfaces(t + step, &moved, &mut values);
+            values
+        };
+        let (after, before) = (at(step), at(-step));
+        let speed = |(after, before): (&f64, &f64)| (after - before) / (2.0 * step);
+        after.iter().zip(&before).map(speed).collect()
+    }
+
+    /// f + Σ part·(f on the other side − f), with the parts that keep the state on every
+    /// surface it slides along.
+    pub(super) fn slide(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        let along: Vec<usize> = (0..self.parts.len())
+            .filter(|&i| self.at.sliding[i])
+            .collect();
+        self.inner.derivatives(t, x, dx);
+        self.mend(t, x, dx);
+        let here = self.speeds(t, x, dx);
+        let mut others = vec![];
+        let mut matrix = DMatrix::zeros(along.len(), along.len());
+        for (column, &i) in along.iter().enumerate() {
+            let mut other = vec![0.0; x.len()];
+            self.at.sides[i] = -self.at.sides[i];
+            self.hold();
+            self.inner.derivatives(t, x, &mut other);
+            self.mend(t, x, &mut other);
+            let there = self.speeds(t, x, &other);
+            self.at.sides[i] = -self.at.sides[i];
+            for (row, &j) in along.iter().enumerate() {
+                matrix[(row, column)] = there[j] - here[j];
+            }
+            others.push(other);
+        }
+        self.hold();
+        let right = DVector::from_iterator(along.len(), along.iter().map(|&j| -here[j]));
+        // where both sides move alike nothing decides between them
+        let parts = matrix
+            .lu()
+            .solve(&right)
+            .unwrap_or_else(|| DVector::repeat(along.len(), 0.5));
+        let f = dx.to_vec();
+        for ((&i, part), other) in along.iter().zip(parts.iter()).zip(&others) {
+            self.parts[i] = *part;
+            let part = part.clamp(0.0, 1.0);
+            for ((dx, f), other) in dx.iter_mut().zip(&f).zip(other) {
+                *dx += part * (other - f);
+            }
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! Decay for every pair of solutions in the box, by intervals.
+
+use lynkeus_expr::{Budget, Interval, MissingInput};
+use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
+use nalgebra::DMatrix;
+
+use super::constraints::{Row, System, is_zero};
+use super::{Fate, Ground, Hidden, linearised};
+use crate::Verdict;
+
+/// States that are hidden together, beyond which no proof is tried.
+const STATES: usize = 24;
+/// States that are coupled, beyond which no proof is tried.
+const COUPLED: usize = 8;
+/// Of several blocks in a row any rate below the least is proved; this share of it is told.
+const BELOW: f64 = 0.99;
+
+/// Per extended state what is proved, if anything is.
+pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Vec<Option<Fate>>, MissingInput> {
+    let extended = hidden.extended;
+    let mut found = vec![None; hidden.told.len()];
+    let (states, inputs) = hidden.free();
+    let region = extended.region();
+    if states.is_empty()
+        || states.len() > STATES
+        || extended.regularity(&region)?.verdict != Verdict::Proved
+    {
+        return Ok(found);
+    }
+    let width = |i: &usize| extended.states[*i].max - extended.states[*i].min;
+    let cascade = Cascade {
+        system: linearised::enclosed(hidden)?.reduced(),
+        scales: states.iter().map(width).collect(),
+        reach: inputs.iter().map(width).collect(),
+        budget: extended.graph().budget(),
+    };
+    let rates = cascade.rates();
+    let of_row = |row: &Row| {
+        let finite = row
+            .a
+            .iter()
+            .all(|x| x.is_defined() && x.lo().is_finite() && x.hi().is_finite());
+        let read = (0..row.a.len()).filter(|&s| !is_zero(&row.a[s]));
+        let rate = read.map(|s| rates[s]).collect::<Option<Vec<f64>>>()?;
+        let rate = rate.into_iter().fold(f64::INFINITY, f64::min);
+        (finite && rate.is_finite() && row.is_free_of_inputs()).then_some(Fate::Decays {
+            rate,
+            ground: Ground::Box,
+        })
+    };
+    for (s, &place) in states.iter().enumerate() {
+        let own = rates[s].map(|rate| Fate::Decays {
+            rate,
+            ground: Ground::Box,
+        });
+        found[place] = own.or_else(|| cascade.bounded(s, &rates));
+    }
+    for (s, row) in &cascade.system.followers {
+        found[states[*s]] = of_row(row);
+    }
+    for (row, &place) in cascade.system.inputs.iter().zip(&inputs) {
+        found[place] = row.as_ref().and_then(of_row);
+    }
+    Ok(found)
+}
+
+/// What is left of the differences: blocks of coupled states, one driving the next.
+struct Cascade {
+    system: System,
+    /// widths of the states' ranges
+    scales: Vec<f64>,
+    /// widths of the unknown inputs' ranges
+    reach: Vec<f64>,
+    budget: Budget,
+}
+
+impl Cascade {
+    fn row(&self, s: usize) -> Option<&Row> {
+        self.system.flow[s].as_ref()
+    }
+
+    fn reads(&self, s: usize, q: usize) -> bool {
+        self.row(s).is_some_and(|row| !is_zero(&row.a[q]))
+    }
+
+    /// Everything that acts on each state, itself included.
+    fn sources(&self) -> Vec<Vec<bool>> {
+        let n = self.system.flow.len();
+        let from = |start: usize| {
+            let mut seen = vec![false; n];
+            seen[start] = true;
+            let mut open = vec![start];
+            while let Some(s) = open.pop() {
+                for q in (0..n).filter(|&q| self.reads(s, q)) {
+                    if !std::mem::replace(&mut seen[q], true) {
+                        open.push(q);
+                    }
+                }
+            }
+            seen
+        };
+        (0..n).map(from).collect()
+    }
+
+    /// The rate at which each state's difference is proved to decay.
+    fn rates(&self) -> Vec<Option<f64>> {
+        let sources = self.sources();
+        let n = sources.len();
+        let block = |s: usize| -> Vec<usize> {
+            (0..n).filter(|&q| sources[s][q] && sources[q][s]).collect()
+        };
+        let mut own: Vec<Option<f64>> = vec![None; n];
+        for s in 0..n {
+            let together = block(s);
+            own[s] = match together.first() {
+                Some(&first) if first < s => own[first],
+                _ => self.of_block(&together),
+            };
+        }
+        let all = |s: usize| {
+            let acting = (0..n).filter(|&q| sources[s][q]);
+            let rates: Vec<f64> = acting.map(|q| own[q]).collect::<Option<_>>()?;
+            let is_one_block = (0..n).all(|q| !sources[s][q] || sources[q][s]);
+            let least = rates.into_iter().fold(f64::INFINITY, f64::min);
+            Some(if is_one_block { least } else { BELOW * least })
+        };
+        (0..n).map(all).collect()
+    }
+
+    /// The rate of coupled states that nothing drives; none where an unknown input does, or
+    /// something follows from others.
+    fn of_block(&self, states: &[usize]) -> Option<f64> {
+        let rows: Vec<&Row> = states.iter().map(|&s| self.row(s)).collect::<Option<_>>()?;
+        match rows.iter().all(|row| row.is_free_of_inputs()) {
+            true => self.decay(states, &rows),
+            false => None,
+        }
+    }
+
+    fn decay(&self, states: &[usize], rows: &[&Row]) -> Option<f64> {
+        let entry = |i: usize, j: usize| rows[i].a[states[j]];
+        let n = states.len();
+        let bounded = |x: Interval| x.is_defined() && x.lo().is_finite() && x.hi().is_finite();
+        let mut entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        // what comes from outside of the block has to be bounded as well
+        let mut outside = rows.iter().flat_map(|row| &row.a);
+        if n > COUPLED
+            || !entries.all(|(i, j)| bounded(entry(i, j)))
+            || !outside.all(|x| bounded(*x))
+        {
+            return None;
+        }
+        if let [_] = states {
+            let rate = -entry(0, 0).hi();
+            return (rate > 0.0).then_some(rate);
+        }
+        let middle = DMatrix::from_fn(n, n, |i, j| entry(i, j).midpoint());
+        let slowest = middle
+            .complex_eigenvalues()
+            .iter()
+            .map(|λ| λ.re)
+            .fold(f64::MIN, f64::max);
+        let model = model(n, &entry);
+        let width = |&s: &usize| {
+            Some(self.scales[s])
+                .filter(|w| w.is_finite() && *w > 0.0)
+                .unwrap_or(1.0)
+        };
+        let scales: Vec<f64> = states.iter().map(width).collect();
+        let proof = fastest(&[model], &scales, -slowest.min(0.0), &self.budget)?;
+        (proof.rate > 0.0).then_some(proof.rate)
+    }
+
+    /// |δη| ≤ Σ |B|·width/rate in the end, for one state that unknown inputs drive.
+    fn bounded(&self, s: usize, rates: &[Option<f64>]) -> Option<Fate> {
+        let row = self.row(s)?;
+        let rate = self.decay(&[s], &[row])?;
+        let others = (0..row.a.len()).filter(|&q| q != s && self.reads(s, q));
+        let mut others = others.map(|q| rates[q]);
+        if others.any(|rate| rate.is_none()) {
+            return None;
+        }
+        let terms = row.b.iter().zip(&self.reach).filter(|(b, _)| !is_zero(b));
+        let terms =
+            terms.map(|(b, width)| Interval::point(b.magnitude()) * Interval::point(*width));
+        let sum = terms.fold(Interval::ZERO, |sum, term| sum + term);
+        let bound = (sum / Interval::point(rate)).hi();
+        // the range itself is a bound
+        let tells = bound < self.scales[s] && sum.is_defined();
+        tells.then_some(Fate::Bounded { bound })
+    }
+}
+
+/// A constant part, and a sector for every entry that varies.
+fn model(n: usize, entry: &dyn Fn(usize, usize) -> Interval) -> ErrorModel {
+    let mut constant = vec![vec![Interval::ZERO; n]; n];
+    let mut sectors = vec![];
+    for (i, row) in constant.iter_mut().enumerate() {
+        for (j, place) in row.iter_mut().enumerate() {
+            let range = entry(i, j);
+            if range.is_point() {
+                *place = range;
+                continue;
+            }
+            let mut direction = vec![Interval::ZERO; n];
+            direction[i] = Interval::ONE;
+            sectors.push(Sector {
+                column: j,
+                direction,
+                range,
+            });
+        }
+    }
+    ErrorModel { constant, sectors }
+}

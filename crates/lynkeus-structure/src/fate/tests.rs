@@ -1,0 +1,204 @@
+use super::*;
+use crate::Sensors;
+use lynkeus_model::{LoadOptions, Plant};
+
+struct Case {
+    text: String,
+    hidden: &'static [&'static str],
+    directions: usize,
+    unknown: bool,
+}
+
+/// A plant with a measured state, two more, a known and an unknown input.
+fn case(equations: &str, hidden: &'static [&'static str], directions: usize) -> Case {
+    Case {
+        text: format!(
+            "model P
+              input Real u(min = 0, max = 1); input Real w(min = -1, max = 2);
+              Real a(start = 0.2, min = -1, max = 1); Real b(start = 0.5, min = 0, max = 2); Real c(start = 0.1, min = -1, max = 1);
+              output Real y = a;
+            equation
+              {equations}
+            end P;"
+        ),
+        hidden,
+        directions,
+        unknown: true,
+    }
+}
+
+impl Case {
+    fn fate(&self, name: &str) -> Option<Fate> {
+        let plant = Plant::from_modelica(&self.text, "p.mo", &LoadOptions::default()).unwrap();
+        let sensors = Sensors {
+            unknown: if self.unknown {
+                vec!["w".into()]
+            } else {
+                vec![]
+            },
+            ..Sensors::default()
+        };
+        let extended = Extended::new(&plant, &sensors).unwrap();
+        let told = extended
+            .states
+            .iter()
+            .map(|s| match self.hidden.contains(&s.name.as_str()) {
+                true => Told::Hidden,
+                false => Told::Determined,
+            });
+        let question = Hidden {
+            told: told.collect(),
+            arbitrary: true,
+            directions: self.directions,
+            extended: &extended,
+        };
+        question.fates().unwrap().of[extended.state_index(name).unwrap()]
+    }
+
+    fn known(mut self) -> Self {
+        self.unknown = false;
+        self
+    }
+}
+
+fn rate(fate: Option<Fate>, on: Ground) -> f64 {
+    match fate {
+        Some(Fate::Decays { rate, ground }) if ground == on => rate,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_state_that_nothing_reads_decays_on_the_box() {
+    let found = case(
+        "der(a) = -a; der(b) = -(1 + u)*b; der(c) = b - 3*c;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    assert!((rate(found.fate("b"), Ground::Box) - 1.0).abs() < 1e-9);
+    // behind b: any rate below 1
+    assert!((rate(found.fate("c"), Ground::Box) - 0.99).abs() < 1e-9);
+}
+
+/// −b³ has slope −3b², which vanishes at b = 0: at b = 0.5 alone it decays with 0.75.
+#[test]
+fn what_decays_in_a_part_of_the_box_is_linearised() {
+    let found = case(
+        "der(a) = -a; der(b) = -b^3; der(c) = u - c;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    assert!((rate(found.fate("b"), Ground::Point) - 0.75).abs() < 1e-9);
+    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_an_unknown_input_feeds_does_not_decay() {
+    let found = case(
+        "der(a) = -a; der(b) = -2*b + w; der(c) = u - c;",
+        &["b", "c", "w"],
+        3,
+    );
+    // |w − w̃| ≤ 3, over the rate 2
+    let Some(Fate::Bounded { bound }) = found.fate("b") else {
+        panic!("{:?}", found.fate("b"))
+    };
+    assert!((bound - 1.5).abs() < 1e-9, "{bound}");
+    assert_eq!(found.fate("w"), Some(Fate::Moved));
+    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    // integrated, and so without a bound
+    let found = case(
+        "der(a) = -a; der(b) = w; der(c) = b - c;",
+        &["b", "c", "w"],
+        3,
+    );
+    assert_eq!(found.fate("c"), Some(Fate::Moved));
+}
+
+/// a' = b − 2c + u leaves b = 2c, and c' = b − 4c = −2c whatever w does to b.
+#[test]
+fn an_unknown_input_that_the_outputs_pin_down_does_not_matter() {
+    let found = case(
+        "der(a) = b - 2*c + u; der(b) = w - b; der(c) = b - 4*c;",
+        &["b", "c", "w"],
+        1,
+    );
+    assert!((rate(found.fate("c"), Ground::Box) - 2.0).abs() < 1e-9);
+    assert!((rate(found.fate("b"), Ground::Box) - 2.0).abs() < 1e-9);
+    assert!((rate(found.fate("w"), Ground::Point) - 2.0).abs() < 1e-9);
+    // b = −c/2 now leaves c' = −c/2 + 4c: it grows
+    let found = case(
+        "der(a) = b + 0.5*c + u; der(b) = w - b; der(c) = b + 4*c;",
+        &["b", "c", "w"],
+        1,
+    );
+    assert!(matches!(found.fate("c"), Some(Fate::Grows { rate }) if (rate - 3.5).abs() < 1e-9));
+}
+
+/// An epidemic: of S and b only b·S is seen, and S' = −b·S·I is the same for all of them.
+#[test]
+fn what_scales_together_stays() {
+    let found = case(
+        "der(a) = -0.1*a + w*b*a; der(b) = -w*b*a; der(c) = -c;",
+        &["b", "w", "c"],
+        2,
+    );
+    assert_eq!(found.fate("b"), Some(Fate::Stays));
+    assert_eq!(found.fate("w"), Some(Fate::Stays));
+    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+}
+
+/// Two integrators in a row: a double eigenvalue at zero.
+#[test]
+fn a_double_integrator_is_not_taken_for_slow_decay() {
+    let found = case(
+        "der(a) = -a; der(b) = 3*c - 7*b; der(c) = 7*c - 49/3*b;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    assert_eq!(found.fate("b"), Some(Fate::Stays));
+}
+
+/// The unknown input stands in the equation of a known state: w = −b there, so that b' = −3b.
+#[test]
+fn an_unknown_input_is_found_where_it_acts_on_something_known() {
+    let found = case(
+        "der(a) = b + w; der(b) = -2*b + w; der(c) = -c;",
+        &["b", "w", "c"],
+        2,
+    );
+    assert!((rate(found.fate("b"), Ground::Box) - 3.0).abs() < 1e-9);
+    assert!((rate(found.fate("w"), Ground::Box) - 3.0).abs() < 1e-9);
+}
+
+#[test]
+fn marginal_and_coupled_modes_are_told_apart() {
+    // an oscillator that nothing damps
+    let found = case("der(a) = -a; der(b) = c; der(c) = -b;", &["b", "c"], 2).known();
+    assert_eq!(found.fate("b"), Some(Fate::Stays));
+    // damped: eigenvalues −1 ± 2i
+    let found = case(
+        "der(a) = -a; der(b) = -b + 2*c; der(c) = -2*b - c;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    let proved = rate(found.fate("b"), Ground::Box);
+    assert!(proved > 0.95 && proved <= 1.0, "{proved}");
+    // b + c alone is seen: b − c decays with 1, each of them too
+    let found = case("der(a) = b + c; der(b) = -b; der(c) = -c;", &["b", "c"], 1).known();
+    assert!((rate(found.fate("b"), Ground::Box) - 1.0).abs() < 1e-9);
+}
+
+/// A plant whose linearisation hides more than the plant does is not judged there.
+#[test]
+fn a_linearisation_that_hides_something_else_is_no_answer() {
+    // at b = 0 the slope of b² vanishes, but elsewhere b is seen
+    let mut found = case("der(a) = b^2; der(b) = -b; der(c) = c*c*c - u;", &["c"], 1).known();
+    found.text = found.text.replace("b(start = 0.5", "b(start = 0");
+    // judged in the middle of the box, where c = 0 is marginal
+    assert_eq!(found.fate("c"), Some(Fate::Stays));
+}

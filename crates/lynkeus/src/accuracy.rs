@@ -1,0 +1,152 @@
+//! How far estimates are from what is known to be true.
+
+use lynkeus_structure::{Side, figures};
+use serde_json::{Value, json};
+
+use crate::Quantity;
+use crate::words::number;
+
+/// Settled is an error below this share of the declared range.
+const SETTLED: f64 = 0.05;
+
+/// Quantities that are told of one by one.
+const TOLD: usize = 6;
+
+/// The error of one estimated quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Accuracy {
+    /// its name in the plant
+    pub quantity: String,
+    /// root of the mean square error over the last half of the rows, in its unit
+    pub rms: f64,
+    /// largest error after the first row, in its unit
+    pub peak: f64,
+    /// time of the largest error
+    pub peak_at: f64,
+    /// when the error is within 5 % of the declared range
+    pub settling: Settling,
+}
+
+/// When an error comes to stay within 5 % of the declared range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Settling {
+    /// from this time on
+    From(f64),
+    /// not up to the end
+    Never,
+    /// no range is declared
+    NoRange,
+}
+
+/// Of all quantities whose true values are known, unknown inputs first.
+pub(crate) fn accuracies(time: &[f64], quantities: &[Quantity], sides: &[Side]) -> Vec<Accuracy> {
+    let mut known: Vec<&Quantity> = quantities.iter().collect();
+    known.sort_by_key(|q| (!q.unknown_input, q.measured.is_some()));
+    let of = |q: &&Quantity| accuracy(time, q, sides.iter().find(|s| s.name == q.name));
+    known.iter().filter_map(of).collect()
+}
+
+fn accuracy(time: &[f64], quantity: &Quantity, side: Option<&Side>) -> Option<Accuracy> {
+    let (truth, estimate) = (quantity.truth.as_ref()?, quantity.estimate.as_ref()?);
+    let errors = time.iter().zip(truth.iter().zip(estimate));
+    let errors: Vec<(f64, f64)> = errors
+        .map(|(t, (x, hat))| (*t, (hat - x).abs()))
+        .filter(|(_, e)| e.is_finite())
+        .collect();
+    let late = &errors[errors.len() / 2..];
+    let squares: f64 = late.iter().map(|(_, e)| e * e).sum();
+    let after_start = errors.iter().skip(usize::from(errors.len() > 1));
+    let (peak_at, peak) = *after_start.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let width = side
+        .map(|s| s.max - s.min)
+        .filter(|w| w.is_finite() && *w > 0.0);
+    Some(Accuracy {
+        quantity: quantity.name.clone(),
+        rms: (squares / late.len().max(1) as f64).sqrt(),
+        peak,
+        peak_at,
+        settling: width.map_or(Settling::NoRange, |width| {
+            settling(&errors, SETTLED * width)
+        }),
+    })
+}
+
+fn settling(errors: &[(f64, f64)], most: f64) -> Settling {
+    let last = errors.iter().rposition(|(_, e)| *e > most);
+    let from = last.map_or(0, |row| row + 1);
+    errors
+        .get(from)
+        .map_or(Settling::Never, |(t, _)| Settling::From(*t))
+}
+
+impl Accuracy {
+    /// For machines.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let settled = match self.settling {
+            Settling::From(t) => Some(t),
+            Settling::Never | Settling::NoRange => None,
+        };
+        json!({
+            "rms_last_half": self.rms,
+            "peak": self.peak,
+            "peak_at": self.peak_at,
+            "settled_at": settled,
+        })
+    }
+
+    fn words(&self) -> String {
+        let settled = match self.settling {
+            Settling::From(t) => format!("; within 5 % of its range from t = {} on", number(t)),
+            Settling::Never => "; not within 5 % of its range at the end".to_owned(),
+            Settling::NoRange => String::new(),
+        };
+        format!(
+            "error of {}: RMS {} in the last half, at most {} (t = {}){settled}",
+            self.quantity,
+            figures(self.rms, 3),
+            figures(self.peak, 3),
+            number(self.peak_at),
+        )
+    }
+}
+
+/// The first of them in words.
+pub(crate) fn told(accuracies: &[Accuracy]) -> Vec<String> {
+    let mut words: Vec<String> = accuracies.iter().take(TOLD).map(Accuracy::words).collect();
+    let more = accuracies.len().saturating_sub(TOLD);
+    if more > 0 {
+        words.push(format!("errors of {more} more quantities: --json"));
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_is_told_by_its_end_its_peak_and_when_it_is_small() {
+        let quantity = Quantity {
+            name: "x".to_owned(),
+            truth: Some(vec![0.0, 0.0, f64::NAN, 0.0, 1.0, 1.0]),
+            estimate: Some(vec![9.0, -4.0, 1.0, 0.3, 1.4, 1.3]),
+            ..Quantity::default()
+        };
+        let side = |max| Side {
+            name: "x".to_owned(),
+            min: 0.0,
+            max,
+        };
+        let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let of = |max| accuracy(&time, &quantity, Some(&side(max))).unwrap();
+        let found = of(8.0);
+        // 0.3, 0.4, 0.3 are the last three of the five that are known
+        assert!((found.rms - (0.34_f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!((found.peak, found.peak_at), (4.0, 1.0));
+        assert_eq!(found.settling, Settling::From(3.0));
+        assert_eq!(of(7.0).settling, Settling::From(5.0));
+        assert_eq!(of(5.0).settling, Settling::Never);
+        assert_eq!(of(f64::INFINITY).settling, Settling::NoRange);
+    }
+}

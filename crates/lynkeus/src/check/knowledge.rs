@@ -1,0 +1,351 @@
+//! For every quantity one of four things: known everywhere; known only while inputs excite it; not
+//! observable, but its error decays by itself; not known. For each assumption on the unknown inputs.
+
+use std::fmt;
+
+use lynkeus_observability::{Answer, Verdict};
+use lynkeus_structure::fate::{Fate, Fates, Ground, Hidden, Told};
+use lynkeus_structure::{self as structure, Coordinate, Extended, Uniformity};
+use serde_json::{Map, Value, json};
+
+use super::observability::listed;
+use crate::words::number;
+
+/// What can be known of one quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Known {
+    /// on the whole box and for all inputs of the assumption: proved
+    Everywhere,
+    /// at almost every state and input; everywhere is not decided
+    AlmostEverywhere,
+    /// not while this input has this value
+    WhileExcited {
+        /// name of the input
+        input: String,
+        /// a constant value of it that hides the quantity
+        value: f64,
+    },
+    /// the outputs do not determine it; what becomes of an error in it
+    Hidden(Fate),
+    /// a limit ended the analysis, or it does not apply
+    Undecided,
+}
+
+/// What is taken for granted of the unknown inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Assumption {
+    /// there are none
+    NoneUnknown,
+    /// any functions of time
+    Arbitrary,
+    /// constants that wander slowly
+    Wandering {
+        /// as `[process_noise]` says
+        declared: bool,
+    },
+}
+
+/// What can be known under one assumption.
+#[derive(Clone, Debug)]
+pub struct Knowledge {
+    /// what is assumed of the unknown inputs
+    pub assumption: Assumption,
+    /// names of the unknown inputs
+    pub unknown: Vec<String>,
+    /// states, then unknown inputs
+    pub quantities: Vec<(String, Known)>,
+    /// where it was linearised; empty where it was not
+    pub point: Vec<Coordinate>,
+}
+
+/// What the examination of the box has found.
+pub(super) struct Found<'a> {
+    pub uniform: Option<&'a Uniformity>,
+    /// known everywhere by elimination, per extended state
+    pub determined: &'a [bool],
+}
+
+impl Knowledge {
+    /// Sorts the quantities of `extended` by the exact verdicts of `answer`.
+    pub(super) fn new(
+        extended: &Extended<'_>,
+        assumption: Assumption,
+        answer: &Answer,
+        found: &Found<'_>,
+    ) -> Result<Self, lynkeus_expr::MissingInput> {
+        let verdicts: Vec<Option<Verdict>> = extended
+            .states
+            .iter()
+            .map(|s| answer.verdict(&s.name))
+            .collect();
+        let told = verdicts.iter().map(|verdict| match verdict {
+            Some(Verdict::Observable) => Told::Determined,
+            Some(Verdict::Unobservable) => Told::Hidden,
+            Some(Verdict::Undecided) | None => Told::Open,
+        });
+        let hidden = Hidden {
+            told: told.collect(),
+            arbitrary: assumption == Assumption::Arbitrary,
+            directions: answer.symmetries.iter().map(|s| s.directions).sum(),
+            extended,
+        };
+        let fates = match hidden.told.contains(&Told::Hidden) {
+            true => hidden.fates()?,
+            false => Fates {
+                of: vec![None; verdicts.len()],
+                point: vec![],
+            },
+        };
+        let known = |i: usize| match verdicts[i] {
+            Some(Verdict::Observable) => found.seen(extended, i, assumption),
+            Some(Verdict::Unobservable) => Known::Hidden(fates.of[i].unwrap_or(Fate::Undecided)),
+            Some(Verdict::Undecided) | None => Known::Undecided,
+        };
+        let asked = (0..verdicts.len()).filter(|&i| verdicts[i].is_some());
+        Ok(Self {
+            assumption,
+            unknown: extended.states[extended.plant_states()..]
+                .iter()
+                .map(|s| s.name.clone())
+                .collect(),
+            quantities: asked
+                .map(|i| (extended.states[i].name.clone(), known(i)))
+                .collect(),
+            point: fates.point,
+        })
+    }
+
+    /// Names of what is known, of what follows in the end, and of what is not known.
+    pub(super) fn sorted(&self) -> [Vec<&str>; 3] {
+        let of = |class: usize| {
+            let kept = self
+                .quantities
+                .iter()
+                .filter(move |(_, known)| known.class() == class);
+            kept.map(|(name, _)| name.as_str()).collect()
+        };
+        [of(0), of(1), of(2)]
+    }
+
+    /// The assumption in words.
+    pub fn words(&self) -> String {
+        let names = self.unknown.join(", ");
+        match self.assumption {
+            Assumption::NoneUnknown => "what can be known".to_owned(),
+            Assumption::Arbitrary => format!("what can be known, whatever {names} does"),
+            Assumption::Wandering { declared: true } => {
+                format!("the same if {names} only wanders, as [process_noise] says")
+            }
+            Assumption::Wandering { declared: false } => {
+                format!("the same if {names} is constant or wanders slowly")
+            }
+        }
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let quantities = self
+            .quantities
+            .iter()
+            .map(|(name, known)| (name.clone(), known.to_json()));
+        let point = self.point.iter().map(|c| (c.name.clone(), json!(c.value)));
+        json!({
+            "unknown_inputs": match self.assumption {
+                Assumption::NoneUnknown => "none",
+                Assumption::Arbitrary => "arbitrary",
+                Assumption::Wandering { .. } => "wandering",
+            },
+            "words": self.words(),
+            "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
+            "linearised_at": match self.point.is_empty() {
+                true => Value::Null,
+                false => Value::Object(point.collect::<Map<_, _>>()),
+            },
+        })
+    }
+}
+
+impl Found<'_> {
+    /// Of a quantity that is observable at generic points.
+    fn seen(&self, extended: &Extended<'_>, place: usize, assumption: Assumption) -> Known {
+        let name = &extended.states[place].name;
+        let is_regular = self
+            .uniform
+            .is_some_and(|u| u.regular.verdict == structure::Verdict::Proved);
+        // the box was examined with unknown inputs that stay constant
+        let regular = is_regular && assumption != Assumption::Arbitrary;
+        if self.determined.get(place) == Some(&true) || regular {
+            return Known::Everywhere;
+        }
+        let blind = self.uniform.into_iter().flat_map(|u| &u.blind);
+        let mut hides = blind.filter(|b| b.hidden.is_empty() || b.hidden.contains(name));
+        match hides.next() {
+            Some(blind) => Known::WhileExcited {
+                input: blind.input.clone(),
+                value: blind.value,
+            },
+            None => Known::AlmostEverywhere,
+        }
+    }
+}
+
+impl Known {
+    /// 0: known; 1: known in the end; 2: not known.
+    fn class(&self) -> usize {
+        match self {
+            Known::Everywhere | Known::AlmostEverywhere | Known::WhileExcited { .. } => 0,
+            Known::Hidden(Fate::Decays { .. }) => 1,
+            Known::Hidden(_) | Known::Undecided => 2,
+        }
+    }
+
+    fn word(&self) -> &'static str {
+        match self {
+            Known::Everywhere => "everywhere",
+            Known::AlmostEverywhere => "almost everywhere",
+            Known::WhileExcited { .. } => "while excited",
+            Known::Hidden(Fate::Decays { .. }) => "decays",
+            Known::Hidden(_) => "no",
+            Known::Undecided => "undecided",
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let mut entry = json!({ "known": self.word() });
+        match self {
+            Known::WhileExcited { input, value } => {
+                entry["hidden_by"] = json!({ "input": input, "value": value })
+            }
+            Known::Hidden(Fate::Decays { rate, ground }) => {
+                entry["rate"] = json!(rate);
+                entry["proved"] = json!(*ground == Ground::Box);
+            }
+            Known::Hidden(Fate::Bounded { bound }) => entry["bound"] = json!(bound),
+            Known::Hidden(fate) => entry["error"] = json!(error_word(*fate)),
+            _ => {}
+        }
+        entry
+    }
+
+    /// The line under which it stands.
+    fn line(&self, unit: &str) -> String {
+        match self {
+            Known::Everywhere => "known everywhere (proved on the box)".to_owned(),
+            Known::AlmostEverywhere => {
+                "known at almost every state and input (everywhere is not proved)".to_owned()
+            }
+            Known::WhileExcited { input, value } => {
+                format!(
+                    "known only while inputs excite it (hidden for {input} = {})",
+                    number(*value)
+                )
+            }
+            Known::Hidden(fate) => told(*fate, unit),
+            Known::Undecided => "undecided".to_owned(),
+        }
+    }
+}
+
+fn error_word(fate: Fate) -> &'static str {
+    match fate {
+        Fate::Stays => "stays",
+        Fate::Grows { .. } => "grows",
+        Fate::Moved => "moved by an unknown input",
+        Fate::Undecided | Fate::Decays { .. } | Fate::Bounded { .. } => "undecided",
+    }
+}
+
+fn told(fate: Fate, unit: &str) -> String {
+    match fate {
+        Fate::Decays {
+            rate,
+            ground: Ground::Box,
+        } => format!(
+            "not observable, but its error decays by itself, at {} per {unit} or faster (proved on the box)",
+            number(rate)
+        ),
+        Fate::Decays {
+            rate,
+            ground: Ground::Point,
+        } => format!(
+            "not observable, but its error decays by itself, at {} per {unit} (linearised at one point only, see below)",
+            number(rate)
+        ),
+        Fate::Bounded { bound } => format!(
+            "not known: an unknown input keeps its error alive, in the end below {} (proved on the box)",
+            number(bound)
+        ),
+        Fate::Stays => {
+            "not known: its error stays as it is, or hardly moves (linearised, see below)"
+                .to_owned()
+        }
+        Fate::Grows { rate } => format!(
+            "not known: its error grows, at {} per {unit} (linearised, see below)",
+            number(rate)
+        ),
+        Fate::Moved => "not known: an unknown input moves it without a trace".to_owned(),
+        Fate::Undecided => "not known: whether its error decays is not decided".to_owned(),
+    }
+}
+
+/// Every assumption that makes a difference.
+pub(super) fn print(f: &mut fmt::Formatter<'_>, all: &[Knowledge], unit: &str) -> fmt::Result {
+    let mut before: Option<&Knowledge> = None;
+    for knowledge in all {
+        if before.is_some_and(|before| before.quantities == knowledge.quantities) {
+            writeln!(f, "{}: the same", knowledge.words())?;
+            continue;
+        }
+        writeln!(f, "\n{}", knowledge.words())?;
+        let mut lines: Vec<(String, Vec<&str>)> = vec![];
+        for (name, known) in &knowledge.quantities {
+            let line = known.line(unit);
+            match lines.iter_mut().find(|(l, _)| *l == line) {
+                Some((_, names)) => names.push(name),
+                None => lines.push((line, vec![name])),
+            }
+        }
+        for (line, names) in &lines {
+            writeln!(f, "  {}: {line}", listed(names))?;
+        }
+        caveats(f, knowledge)?;
+        before = Some(knowledge);
+    }
+    Ok(())
+}
+
+/// What the lines rest on.
+fn caveats(f: &mut fmt::Formatter<'_>, knowledge: &Knowledge) -> fmt::Result {
+    let fates = || {
+        knowledge
+            .quantities
+            .iter()
+            .filter_map(|(_, known)| match known {
+                Known::Hidden(fate) => Some(*fate),
+                _ => None,
+            })
+    };
+    if !knowledge.point.is_empty() {
+        let sides = knowledge
+            .point
+            .iter()
+            .take(8)
+            .map(|c| format!("{} = {}", c.name, number(c.value)));
+        writeln!(
+            f,
+            "  (linearised at {}; elsewhere it may be faster, slower, or not at all)",
+            sides.collect::<Vec<_>>().join(", ")
+        )?;
+    }
+    let decays = fates().any(|fate| matches!(fate, Fate::Decays { .. }));
+    match (decays, knowledge.assumption) {
+        (true, Assumption::Wandering { .. }) => writeln!(
+            f,
+            "  (decays: the error of the start is forgotten; what wanders keeps a part of it alive)"
+        ),
+        (true, _) => writeln!(
+            f,
+            "  (decays: once the observable quantities are known, for a model that is right)"
+        ),
+        (false, _) => Ok(()),
+    }
+}

@@ -1,0 +1,286 @@
+//! What to type next, with what to paste into the study.
+
+use std::fmt;
+use std::path::Path;
+
+use lynkeus_model::Variable;
+use lynkeus_observers::Value as Tuned;
+use lynkeus_structure::figures;
+use serde_json::{Value, json};
+
+use crate::Study;
+use crate::choice::{Choice, Grounds};
+use crate::prepare::Prepared;
+use crate::propose::Proposal;
+use crate::words::number;
+
+/// The next steps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Next {
+    /// commands, each with what it does
+    pub commands: Vec<(String, &'static str)>,
+    /// `[observer]`, and what else belongs to it, as TOML; none where the study has it all
+    pub observer: Option<String>,
+    /// a whole study for a bare model, `[observer]` included
+    pub study: Option<String>,
+}
+
+impl Next {
+    pub(super) fn new(prepared: &Prepared<'_>, choice: &Choice) -> Self {
+        let study = prepared.study();
+        let bare = study.is_bare();
+        let is_missing = !choice.is_asked_for || choice.proposal.is_some();
+        let observer = (bare || is_missing).then(|| observer(prepared, choice));
+        let file = match bare {
+            true => "study.toml".to_owned(),
+            false => quoted_for_shell(&study.file),
+        };
+        Self {
+            commands: commands(study, bare, choice, &file),
+            study: observer
+                .as_ref()
+                .filter(|_| bare)
+                .map(|observer| skeleton(prepared, observer)),
+            observer,
+        }
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let commands: Vec<&String> = self.commands.iter().map(|(command, _)| command).collect();
+        json!({ "commands": commands, "observer": self.observer, "study": self.study })
+    }
+}
+
+impl fmt::Display for Next {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.study, &self.observer) {
+            (Some(study), _) => writeln!(f, "a study to begin with (study.toml):\n\n{study}")?,
+            (None, Some(observer)) => writeln!(f, "to paste into the study:\n\n{observer}")?,
+            (None, None) => {}
+        }
+        writeln!(f, "next:")?;
+        let wide = self
+            .commands
+            .iter()
+            .map(|(c, _)| c.chars().count())
+            .max()
+            .unwrap_or(0);
+        let mut lines = self.commands.iter();
+        lines.try_for_each(|(command, what)| writeln!(f, "  {command:wide$}  {what}"))
+    }
+}
+
+fn commands(study: &Study, bare: bool, choice: &Choice, file: &str) -> Vec<(String, &'static str)> {
+    let line = |rest: String, what| (format!("lynkeus {rest}"), what);
+    let mut found = vec![];
+    if bare || study.simulate.is_some() {
+        found.push(line(
+            format!("simulate {file} --plot run.svg"),
+            "how it does in simulation",
+        ));
+        found.push(line(
+            format!("check {file} --how-well"),
+            "how well each quantity can be known",
+        ));
+        if choice.grounds != Grounds::Filter {
+            found.push(line(
+                format!("tune {file} --plot tune.svg"),
+                "the best speed",
+            ));
+        }
+        found.push(line(
+            format!("compare {file}"),
+            "every family on the same data",
+        ));
+    }
+    found.push(line(
+        format!("estimate {file} LOG.csv -o estimate.csv"),
+        "on a log of yours",
+    ));
+    found
+}
+
+fn quoted_for_shell(file: &str) -> String {
+    match file.contains(char::is_whitespace) {
+        true => format!("\"{file}\""),
+        false => file.to_owned(),
+    }
+}
+
+/// A name as a key of TOML.
+fn key(name: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !name.is_empty() && name.chars().all(plain) {
+        true => name.to_owned(),
+        false => text(name),
+    }
+}
+
+/// A text of TOML.
+fn text(value: &str) -> String {
+    Value::from(value).to_string()
+}
+
+/// A value as TOML.
+fn toml(value: &Tuned) -> String {
+    match value {
+        Tuned::Text(word) => text(word),
+        Tuned::List(values) => {
+            let values: Vec<String> = values.iter().map(toml).collect();
+            format!("[{}]", values.join(", "))
+        }
+        Tuned::Table(values) => {
+            let pairs = values
+                .iter()
+                .map(|(name, value)| format!("{} = {}", key(name), toml(value)));
+            format!("{{ {} }}", pairs.collect::<Vec<_>>().join(", "))
+        }
+        plain => plain.to_string(),
+    }
+}
+
+fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
+    let study = prepared.study();
+    let mut lines = vec![
+        "[observer]".to_owned(),
+        format!("family = {}", text(choice.family)),
+    ];
+    if let Some(Proposal { value, why, .. }) = &choice.proposal {
+        lines.push(format!("{} = {value}  # {why}", Proposal::KEY));
+    }
+    let family = lynkeus_observers::find(choice.family);
+    let given = study.observer.tuning.values.iter();
+    let given = given.filter(|(name, _)| family.is_some_and(|family| family.owns(name)));
+    lines.extend(given.map(|(name, value)| format!("{} = {}", key(name), toml(value))));
+    if choice.grounds == Grounds::Filter && study.process_noise.is_empty() {
+        lines.extend(process_noise(prepared));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// What the filter takes where nothing is declared, to be edited.
+fn process_noise(prepared: &Prepared<'_>) -> Vec<String> {
+    let extended = prepared.extended();
+    let unknown = &extended.states[extended.plant_states()..];
+    let mut lines = vec![
+        String::new(),
+        "# [process_noise]  # spectral densities: how far the model is trusted".to_owned(),
+    ];
+    let own = unknown
+        .iter()
+        .chain(extended.states.iter().take(extended.plant_states()));
+    for state in own.take(6) {
+        let width = state.max - state.min;
+        let size = if width.is_finite() && width > 0.0 {
+            width
+        } else {
+            state.start.unwrap_or(0.0).abs().max(1.0)
+        };
+        let is_unknown = unknown.iter().any(|u| u.name == state.name);
+        let (share, what) = match is_unknown {
+            true => (0.1, "a tenth of its range in one unit of time"),
+            false => (1e-4, "a ten-thousandth of its range in one unit of time"),
+        };
+        lines.push(format!(
+            "# {} = {}  # {what}",
+            key(&state.name),
+            figures((share * size).powi(2), 2)
+        ));
+    }
+    lines
+}
+
+/// A study for a bare model.
+fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let file = study.plant.as_deref().and_then(Path::file_name);
+    let file = file.map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    let mut lines = vec![format!("plant = {}", text(&file))];
+    lines.extend(
+        study
+            .model
+            .iter()
+            .map(|model| format!("model = {}", text(model))),
+    );
+    let names = |variables: &[Variable]| {
+        variables
+            .iter()
+            .map(|v| text(&v.name))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    lines.push("\n[sensors]".to_owned());
+    lines.push(format!(
+        "measured = [{}]  # what sensors show",
+        names(&plant.outputs)
+    ));
+    if !plant.inputs.is_empty() {
+        lines.push(format!(
+            "unknown = []  # inputs that nobody measures, of {}",
+            names(&plant.inputs)
+        ));
+    }
+    let noises = plant.outputs.iter().filter_map(|output| {
+        let states = plant.states.iter().find(|s| s.node == output.node);
+        let shown = if (output.max - output.min).is_finite() {
+            Some(output)
+        } else {
+            states
+        };
+        let width = shown
+            .map(|v| v.max - v.min)
+            .filter(|w| w.is_finite() && *w > 0.0)?;
+        Some(format!(
+            "{} = {}",
+            key(&output.name),
+            figures(0.01 * width, 2)
+        ))
+    });
+    let noises: Vec<String> = noises.collect();
+    if !noises.is_empty() {
+        lines.push(format!(
+            "noise = {{ {} }}  # standard deviations: 1 % of the range",
+            noises.join(", ")
+        ));
+    }
+    lines.push(format!("\n{observer}"));
+    lines.push("[simulate]".to_owned());
+    let until = choice_of_span(prepared);
+    lines.push(format!("until = {}", number(until)));
+    lines.push("seed = 1".to_owned());
+    if !plant.inputs.is_empty() {
+        let inputs = plant.inputs.iter().map(|input| {
+            let middle = (input.min + input.max) / 2.0;
+            let value = input
+                .start
+                .unwrap_or(if middle.is_finite() { middle } else { 0.0 });
+            format!("{} = \"{value}\"", key(&input.name))
+        });
+        lines.push(format!(
+            "inputs = {{ {} }}  # expressions of time",
+            inputs.collect::<Vec<_>>().join(", ")
+        ));
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Ten times the slowest time scale of the plant at its start, else 10.
+fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
+    let extended = prepared.extended();
+    let Some(J) = crate::modes::Start::of(extended).jacobian(extended) else {
+        return 10.0;
+    };
+    let sizes: Vec<f64> = J.complex_eigenvalues().iter().map(|λ| λ.norm()).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let slowest = sizes
+        .into_iter()
+        .filter(|x| *x > 1e-6 * largest)
+        .fold(f64::INFINITY, f64::min);
+    let span = 10.0 / slowest;
+    let rounded: f64 = format!("{span:.0e}").parse().unwrap_or(10.0);
+    if rounded.is_finite() && rounded > 0.0 {
+        rounded
+    } else {
+        10.0
+    }
+}

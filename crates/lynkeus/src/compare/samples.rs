@@ -1,0 +1,188 @@
+//! How densely a simulation is sampled, so that the samples do not decide the comparison.
+
+use std::fmt;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use lynkeus_model::Plant;
+use lynkeus_observers::Family;
+use lynkeus_structure::short;
+use serde_json::{Value, json};
+
+use super::{Compared, run_all};
+use crate::study::{BetweenSamples, SimulateSettings};
+use crate::{Error, Study, simulate};
+
+/// Is told the fraction done and may stop the work.
+pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
+
+/// How a simulation was sampled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Interval {
+    /// time between two samples
+    pub step: f64,
+    /// why this one
+    pub resolution: Resolution,
+    /// unit of time, where the study names it
+    pub unit: Option<String>,
+}
+
+/// Why a simulation was sampled at its interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resolution {
+    /// the study says so: its sensors have noise, or a `sample_step`
+    Study,
+    /// at twice the interval every error is nearly the same
+    Settled,
+    /// at half the interval there would be too many rows, or it would take too long
+    Cost,
+}
+
+/// No more rows than this for the sake of the interval alone,
+const ROWS: f64 = 20_000.0;
+/// and none more where those at hand took so long.
+const LONG: Duration = Duration::from_secs(4);
+
+/// Errors that differ by no more than this share of the larger one are the same.
+const SAME: f64 = 0.25;
+
+/// Errors below this share of a quantity's range are as good as none.
+const NONE: f64 = 1e-4;
+
+/// The families on samples of the study's simulation.
+pub(super) fn simulated(
+    study: &Study,
+    plant: &Plant,
+    families: &[&'static dyn Family],
+    watch: Watch<'_>,
+) -> Result<(Vec<Compared>, Interval), Error> {
+    let settings = simulate::settings(study)?;
+    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let interval = |step, resolution| Interval {
+        step,
+        resolution,
+        unit: study.time_unit.clone(),
+    };
+    let first = settings.sample_step.unwrap_or(settings.row_step());
+    if is_noisy || settings.sample_step.is_some() {
+        let table = simulate::recorded(study, plant, first)?;
+        let rows = run_all(study, plant, families, &table, watch)?;
+        return Ok((rows, interval(first, Resolution::Study)));
+    }
+    let mut continuous = study.clone();
+    continuous.estimate.between_samples = BetweenSamples::Linear;
+    let (step, resolution) = refined(&continuous, plant, families, settings, watch)?;
+    let table = simulate::recorded(study, plant, step)?;
+    let last = &mut |done: f64| watch(0.5 + 0.5 * done);
+    let rows = run_all(&continuous, plant, families, &table, last)?;
+    Ok((rows, interval(step, resolution)))
+}
+
+/// The interval at which the errors have settled. Windows of many samples take long and see what
+/// the other filters see: they are not asked.
+fn refined(
+    study: &Study,
+    plant: &Plant,
+    families: &[&'static dyn Family],
+    settings: &SimulateSettings,
+    watch: Watch<'_>,
+) -> Result<(f64, Resolution), Error> {
+    let quick: Vec<&'static dyn Family> = families
+        .iter()
+        .copied()
+        .filter(|family| !family.owns(WINDOW))
+        .collect();
+    let mut step = settings.row_step();
+    let mut coarse: Option<Vec<Compared>> = None;
+    let mut from = 0.0;
+    loop {
+        let to = from + (0.5 - from) / 2.0;
+        let part = &mut |done: f64| watch(from + done * (to - from));
+        let table = simulate::recorded(study, plant, step)?;
+        let since = Instant::now();
+        let fine = run_all(study, plant, &quick, &table, part)?;
+        if coarse.is_some_and(|coarse| are_same(&coarse, &fine)) {
+            return Ok((step, Resolution::Settled));
+        }
+        let is_long = since.elapsed() > LONG || study.budget.spent().is_some();
+        if is_long || 2.0 * (settings.until - settings.start) / step > ROWS {
+            return Ok((step, Resolution::Cost));
+        }
+        (coarse, from, step) = (Some(fine), to, step / 2.0);
+    }
+}
+
+/// The key of families that look at a window of samples.
+const WINDOW: &str = "horizon";
+
+/// Whether every family has the same errors, or none, in both.
+fn are_same(coarse: &[Compared], fine: &[Compared]) -> bool {
+    coarse
+        .iter()
+        .zip(fine)
+        .all(|(a, b)| match (&a.run, &b.run) {
+            (Ok(a), Ok(b)) => {
+                let mut pairs = a.settled.iter().zip(&b.settled);
+                pairs.all(|(a, b)| is_same(a.rms, b.rms, a.width))
+            }
+            (a, b) => a.is_err() == b.is_err(),
+        })
+}
+
+fn is_same(a: Option<f64>, b: Option<f64>, width: f64) -> bool {
+    let (Some(a), Some(b)) = (a, b) else {
+        return a.is_none() && b.is_none();
+    };
+    let larger = a.max(b);
+    larger <= NONE * width || (a - b).abs() <= SAME * larger
+}
+
+impl Interval {
+    /// For machines.
+    pub(super) fn to_json(&self) -> Value {
+        json!({
+            "interval": self.step,
+            "chosen_by": match self.resolution {
+                Resolution::Study => "study",
+                Resolution::Settled => "errors have settled",
+                Resolution::Cost => "cost",
+            },
+        })
+    }
+}
+
+impl fmt::Display for Interval {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = self
+            .unit
+            .as_ref()
+            .map_or(String::new(), |u| format!(" {u}"));
+        let step = short(self.step);
+        match self.resolution {
+            Resolution::Study => write!(f, "sampled every {step}{unit} as the study says"),
+            Resolution::Settled => write!(
+                f,
+                "sampled every {step}{unit} with lines in between: at twice the interval the errors are the same within 25 %"
+            ),
+            Resolution::Cost => write!(
+                f,
+                "sampled every {step}{unit} with lines in between: a shorter interval may still change errors, and costs too much"
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_same;
+
+    #[test]
+    fn errors_are_the_same_within_a_quarter_or_where_there_are_none() {
+        assert!(is_same(Some(0.4), Some(0.31), 1.0));
+        assert!(!is_same(Some(0.4), Some(0.29), 1.0));
+        // both less than 1e-4 of a range of 10
+        assert!(is_same(Some(9e-4), Some(1e-9), 10.0));
+        assert!(!is_same(Some(9e-4), Some(1e-9), 1.0));
+        assert!(is_same(None, None, 1.0) && !is_same(None, Some(0.0), 1.0));
+    }
+}

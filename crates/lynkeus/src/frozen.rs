@@ -1,0 +1,300 @@
+//! Sensors that hang: readings that repeat although their noise would not let them.
+
+use lynkeus_structure::figures;
+use serde_json::{Value, json};
+
+use crate::study::Noise;
+use crate::words::number;
+
+/// Fewer equal readings in a row are none of our business.
+const FEWEST: usize = 5;
+/// The expected number of false alarms of a channel.
+const ALARMS: f64 = 1e-6;
+/// Differences of white noise, taken three times, change their sign in this share of the pairs at
+/// least: 1/2 + asin(3/4)/π = 0.77 is expected; of a smooth signal hardly ever.
+const ALTERNATING: f64 = 0.65;
+/// Readings on which a channel's noise rests.
+const ENOUGH: usize = 30;
+/// No more of them are looked at.
+const LOOKED_AT: usize = 20_000;
+
+/// A sensor whose readings are one number for improbably long.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frozen {
+    /// the measured output
+    pub output: String,
+    /// the number
+    pub value: f64,
+    /// time of the first of the equal readings
+    pub from: f64,
+    /// time of the last
+    pub to: f64,
+    /// number of them
+    pub rows: usize,
+    /// no reading of the log is larger, or none smaller: an end of the sensor's range as well
+    pub at_end: bool,
+}
+
+/// What is known of a channel beside its readings.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Channel {
+    /// readings at these are the sensor's ends
+    pub limits: Option<(f64, f64)>,
+    pub noise: Option<Noise>,
+}
+
+/// Where a channel hangs. It has to show white noise, of a deviation above its quantisation step,
+/// so that equal neighbours are a matter of chance: at most of the chance that the noise gives them
+/// and of their share in the rest of the log. Runs so long that less than a
+/// millionth of them is expected are not by chance.
+pub(crate) fn frozen(
+    output: &str,
+    time: &[f64],
+    readings: &[f64],
+    channel: Channel,
+) -> Vec<Frozen> {
+    let points = time.iter().zip(readings).filter(|(_, y)| y.is_finite());
+    let points: Vec<(f64, f64)> = points.map(|(t, y)| (*t, *y)).collect();
+    let runs: Vec<&[(f64, f64)]> = points.chunk_by(|a, b| a.1 == b.1).collect();
+    if !runs.iter().any(|run| run.len() >= FEWEST) {
+        return vec![];
+    }
+    let Some(noise) = Scatter::of(&runs) else {
+        return vec![];
+    };
+    let equal: usize = runs.iter().map(|run| run.len() - 1).sum();
+    let extreme = |pick: fn(f64, f64) -> f64| points.iter().map(|p| p.1).reduce(pick);
+    let (low, high) = (extreme(f64::min), extreme(f64::max));
+    let is_improbable = |run: &&&[(f64, f64)]| {
+        let own = run.len() - 1;
+        let others = (points.len() - 1 - own) as f64;
+        let share = ((equal - own) as f64 + 1.0) / (others + 2.0);
+        let chance = share.max(noise.chance);
+        points.len() as f64 * chance.powf(own as f64) < ALARMS
+    };
+    runs.iter()
+        .filter(|run| run.len() >= FEWEST)
+        .filter(is_improbable)
+        .filter_map(|run| {
+            let (first, last) = (run.first()?, run.last()?);
+            let value = first.1;
+            (!channel.explains(value, noise.step)).then(|| Frozen {
+                output: output.to_owned(),
+                value,
+                from: first.0,
+                to: last.0,
+                rows: run.len(),
+                at_end: low == Some(value) || high == Some(value),
+            })
+        })
+        .collect()
+}
+
+impl Channel {
+    /// Whether a healthy sensor may well repeat the value: it is at an end of its range, or its
+    /// noise, a share of it, is less than its quantisation.
+    fn explains(self, value: f64, step: f64) -> bool {
+        let is_limit = self
+            .limits
+            .is_some_and(|(low, high)| value <= low || value >= high);
+        let is_quiet = match self.noise {
+            Some(Noise::Relative(share)) => share * value.abs() < step,
+            _ => false,
+        };
+        is_limit || is_quiet
+    }
+}
+
+/// A channel's noise where it does not hang.
+struct Scatter {
+    /// smallest difference between neighbours that differ
+    step: f64,
+    /// that two neighbours are equal
+    chance: f64,
+}
+
+impl Scatter {
+    /// None where the channel shows no white noise above its quantisation.
+    fn of(runs: &[&[(f64, f64)]]) -> Option<Self> {
+        // what is left where nothing hangs, in pieces
+        let pieces = runs.split(|run| run.len() >= FEWEST);
+        let pieces: Vec<Vec<f64>> = pieces
+            .map(|piece| piece.concat().iter().map(|p| p.1).collect())
+            .collect();
+        let thirds = pieces.iter().flat_map(|piece| {
+            let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
+            piece
+                .windows(5)
+                .map(move |w| (third(&w[..4]), third(&w[1..])))
+        });
+        let pairs: Vec<(f64, f64)> = thirds.take(LOOKED_AT).collect();
+        if pairs.len() < ENOUGH {
+            return None;
+        }
+        let alternating = pairs.iter().filter(|(a, b)| a * b < 0.0).count();
+        let mut sizes: Vec<f64> = pairs.iter().map(|(a, _)| a.abs()).collect();
+        sizes.sort_unstable_by(f64::total_cmp);
+        // the third difference of white noise has 20 times its variance
+        let deviation = 1.4826 * sizes[sizes.len() / 2] / 20_f64.sqrt();
+        let steps = pieces
+            .iter()
+            .flat_map(|piece| piece.windows(2).map(|w| (w[1] - w[0]).abs()));
+        let step = steps.filter(|d| *d > 0.0).reduce(f64::min)?;
+        let is_noise = alternating as f64 >= ALTERNATING * pairs.len() as f64 && deviation >= step;
+        // a difference of deviation √2 σ that rounds to none
+        let chance = step / (2.0 * deviation * std::f64::consts::PI.sqrt());
+        is_noise.then_some(Self { step, chance })
+    }
+}
+
+impl Frozen {
+    /// For machines.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({
+            "output": self.output,
+            "value": self.value,
+            "from": self.from,
+            "to": self.to,
+            "rows": self.rows,
+            "at_end_of_range": self.at_end,
+        })
+    }
+
+    /// In words.
+    pub(crate) fn words(&self) -> String {
+        let cause = match self.at_end {
+            true => "it is frozen, or at an end of its range (then say so: limits under [sensors])",
+            false => "it is frozen",
+        };
+        format!(
+            "the sensor {} hangs at {} from t = {} to {} ({} rows), which its noise would not let it: {cause}; a family without `gate` believes it",
+            self.output,
+            figures(self.value, 6),
+            number(self.from),
+            number(self.to),
+            self.rows
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Uniform in ±1, the same in every run.
+    fn noise(count: usize) -> Vec<f64> {
+        let mut state = 7_u64;
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        (0..count).map(|_| next()).collect()
+    }
+
+    fn found(readings: &[f64]) -> Vec<(usize, usize)> {
+        with(readings, Channel::default())
+    }
+
+    /// First row and number of rows of what hangs.
+    fn with(readings: &[f64], channel: Channel) -> Vec<(usize, usize)> {
+        let time: Vec<f64> = (0..readings.len()).map(|k| k as f64).collect();
+        let found = frozen("y", &time, readings, channel);
+        found.iter().map(|f| (f.from as usize, f.rows)).collect()
+    }
+
+    fn wave(amplitude: f64) -> Vec<f64> {
+        let noise = noise(600).into_iter().enumerate();
+        noise
+            .map(|(k, n)| amplitude * (0.05 * k as f64).sin() + 0.01 * n)
+            .collect()
+    }
+
+    #[test]
+    fn a_noisy_sensor_that_hangs_is_found_wherever_it_does() {
+        for amplitude in [0.0, 0.3, 1.0] {
+            let healthy = wave(amplitude);
+            assert_eq!(found(&healthy), []);
+            for from in [0, 200, 593] {
+                let mut y = healthy.clone();
+                let value = y[from];
+                y[from..from + 7].fill(value);
+                assert_eq!(found(&y), [(from, 7)], "{amplitude}");
+            }
+            let mut twice = healthy.clone();
+            twice[100..140].fill(0.2);
+            twice[300..330].fill(0.2);
+            twice[310] = f64::NAN;
+            assert_eq!(found(&twice), [(100, 40), (300, 29)]);
+        }
+    }
+
+    #[test]
+    fn signals_that_repeat_by_themselves_are_healthy() {
+        // nothing happens; a noise-free signal that comes to rest; an encoder that moves, then stands
+        assert_eq!(found(&[2.5; 400]), []);
+        let rest: Vec<f64> = (0..600).map(|k| (-0.2 * f64::from(k)).exp()).collect();
+        assert_eq!(found(&rest), []);
+        let encoder = |k: f64| (40.0 * (0.02 * k).sin()).round();
+        let stands: Vec<f64> = (0..600).map(|k| encoder(f64::from(k).min(300.0))).collect();
+        assert_eq!(found(&stands), []);
+        // a slow sensor whose last reading a logger repeats
+        let noisy = noise(600);
+        let held: Vec<f64> = (0..600).map(|k| noisy[k / 12]).collect();
+        assert_eq!(found(&held), []);
+        // noise of about a quantisation step: five in a row happen
+        let coarse: Vec<f64> = noise(20_000).iter().map(|n| (1.2 * n).round()).collect();
+        assert_eq!(found(&coarse), []);
+    }
+
+    #[test]
+    fn a_quantised_noisy_sensor_has_to_hang_for_longer() {
+        let mut y: Vec<f64> = noise(2000).iter().map(|n| (2.5 * n).round()).collect();
+        y[700..708].fill(1.0);
+        assert_eq!(found(&y), []);
+        y[700..760].fill(1.0);
+        let hung = found(&y);
+        assert_eq!(hung.len(), 1);
+        assert!(
+            hung[0].0.abs_diff(700) < 3 && hung[0].1.abs_diff(60) < 5,
+            "{hung:?}"
+        );
+    }
+
+    #[test]
+    fn an_end_of_the_range_is_told_from_hanging() {
+        let clipped: Vec<f64> = wave(1.0).into_iter().map(|y| y.min(0.8)).collect();
+        let time: Vec<f64> = (0..600).map(f64::from).collect();
+        let hung = frozen("y", &time, &clipped, Channel::default());
+        assert!(!hung.is_empty() && hung.iter().all(|f| f.at_end && f.value == 0.8));
+        assert!(hung[0].words().contains("limits under [sensors]"));
+        let limits = Some((-2.0, 0.8));
+        assert_eq!(
+            with(
+                &clipped,
+                Channel {
+                    limits,
+                    noise: None
+                }
+            ),
+            []
+        );
+        // noise of 1 % of nothing
+        let mut empty = wave(1.0);
+        empty[200..300].fill(0.0);
+        let noise = Some(Noise::Relative(0.01));
+        assert_eq!(
+            with(
+                &empty,
+                Channel {
+                    limits: None,
+                    noise
+                }
+            ),
+            []
+        );
+        assert_eq!(found(&empty), [(200, 100)]);
+    }
+}

@@ -1,0 +1,146 @@
+//! The log's sampling interval against what the observer stands.
+
+use lynkeus_expr::{Node, Tape, jacobian};
+use lynkeus_gain::sampling;
+use lynkeus_observers::{Design, Sampled};
+use lynkeus_structure::figures;
+use serde_json::{Value, json};
+
+use crate::course::{Course, Samples};
+use crate::prepare::Prepared;
+use crate::study::BetweenSamples;
+
+/// Rows of the log at which the error is linearised.
+const PLACES: usize = 12;
+
+/// The sampling interval of a log, and estimates of the largest that the observer stands: from
+/// its linearised error along the estimate, no proof.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intervals {
+    /// the median time between two readings of the log
+    pub log: f64,
+    /// with `between_samples = "predict"`: beyond it errors grow from sample to sample
+    pub predict: f64,
+    /// with held measurements: beyond it an observer follows the steps that holding makes
+    pub hold: f64,
+    /// how the run went
+    between: BetweenSamples,
+}
+
+/// The smallest limits along a run; none for filters, whose gains know the interval, for
+/// observers with further states, and where errors do not shrink.
+pub(crate) fn intervals(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    course: &Course,
+) -> Option<Intervals> {
+    let extended = prepared.extended();
+    let observer = &design.observer;
+    let is_estimate = observer
+        .states
+        .iter()
+        .map(|(signal, _)| signal.symbol)
+        .eq(observer.estimates.iter().map(|e| e.node));
+    if observer.filter.is_some() || !is_estimate || !observer.input_derivatives.is_empty() {
+        return None;
+    }
+    let Sampled {
+        observer: sampled,
+        outputs,
+    } = observer.sampled(extended).ok()?;
+    let states: Vec<Node> = sampled.states.iter().map(|(s, _)| s.symbol).collect();
+    let graph = extended.graph();
+    let slopes = jacobian::forward(graph, &sampled.derivatives, &states);
+    let views = jacobian::forward(graph, &outputs, &states[..observer.states.len()]);
+    let entries = slopes.entries.iter().chain(&views.entries);
+    let nodes: Vec<Node> = entries.map(|entry| entry.2).collect();
+    let inputs = sampled.inputs.iter().map(|s| s.symbol);
+    let symbols = std::iter::once(sampled.time).chain(states.iter().copied());
+    let symbols: Vec<Node> = symbols.chain(inputs).collect();
+    let slope_values = Tape::new(graph, &symbols, &nodes).ok()?;
+    let expected = Tape::new(graph, &symbols, &outputs).ok()?;
+    let sensors = outputs.len();
+    let rows = course.estimates.first()?.len();
+    let stride = rows.div_ceil(PLACES).max(1);
+    let at = |row: usize| {
+        let mut values = vec![samples.time[row]];
+        values.extend(course.estimates.iter().map(|column| column[row]));
+        let first = values.len();
+        values.extend(std::iter::repeat_n(0.0, sensors));
+        values.extend(samples.inputs.iter().map(|u| u[row]));
+        // every measurement follows the model
+        values.extend(std::iter::repeat_n(1.0, sensors));
+        let mut y = vec![0.0; sensors];
+        expected.evaluator().eval(&values, &mut y);
+        values[first..first + sensors].copy_from_slice(&y);
+        let mut entries = vec![0.0; nodes.len()];
+        slope_values.evaluator().eval(&values, &mut entries);
+        let mut M = vec![vec![0.0; states.len()]; states.len()];
+        for (&(i, j, _), value) in slopes.entries.iter().zip(&entries) {
+            M[i][j] += value;
+        }
+        let mut C = vec![vec![0.0; states.len() - sensors]; sensors];
+        let rest = entries.iter().skip(slopes.entries.len());
+        for (&(i, j, _), value) in views.entries.iter().zip(rest) {
+            C[i][j] += value;
+        }
+        sampling::limits(&M, &C)
+    };
+    let found: Vec<sampling::Limits> = (0..rows).step_by(stride).filter_map(at).collect();
+    let smallest = |of: fn(&sampling::Limits) -> f64| found.iter().map(of).reduce(f64::min);
+    Some(Intervals {
+        log: median_interval(samples)?,
+        predict: smallest(|l| l.predict)?,
+        hold: smallest(|l| l.hold)?,
+        between: prepared.study().estimate.between_samples,
+    })
+}
+
+/// The median time from one reading of a sensor to its next, of the slowest sensor.
+fn median_interval(samples: &Samples<'_>) -> Option<f64> {
+    let of = |readings: &&[f64]| {
+        let pairs = samples.time.iter().zip(*readings);
+        let times: Vec<f64> = pairs.filter(|(_, y)| y.is_finite()).map(|p| *p.0).collect();
+        let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        steps.get(steps.len() / 2).copied()
+    };
+    samples.readings.iter().filter_map(of).reduce(f64::max)
+}
+
+impl Intervals {
+    /// For machines; a limit that was not found is null.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({
+            "log": self.log,
+            "largest_predict": Some(self.predict).filter(|x| x.is_finite()),
+            "largest_hold": self.hold,
+        })
+    }
+
+    /// What is to be said where the log's interval is beyond the limit.
+    pub(crate) fn words(&self) -> Option<String> {
+        let log = figures(self.log, 2);
+        let (predict, hold) = (figures(self.predict, 2), figures(self.hold, 2));
+        let is_for_predict = self.log < self.predict;
+        match self.between {
+            BetweenSamples::Predict if !is_for_predict => Some(format!(
+                "the log's readings are {log} apart, and this observer stands about {predict} with between_samples = \"predict\" (an estimate from its linearised error, no proof): a smaller theta, or family = \"ekf\""
+            )),
+            BetweenSamples::Hold if self.log > self.hold => {
+                let remedy = match is_for_predict {
+                    true => {
+                        format!("between_samples = \"predict\", which stands about {predict}, ")
+                    }
+                    false => String::new(),
+                };
+                Some(format!(
+                    "the log's readings are {log} apart, and beyond about {hold} this observer follows the steps that holding them makes (an estimate from its linearised error, no proof): {remedy}a smaller theta, or family = \"ekf\""
+                ))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! A value for θ where the study leaves it out.
+
+use std::fmt;
+
+use lynkeus_observers::Examination;
+use serde_json::{Value as Json, json};
+
+use crate::modes::Start;
+use crate::prepare::Prepared;
+use crate::words::number;
+
+/// Values tried in simulation.
+#[cfg(feature = "tune")]
+const POINTS: usize = 13;
+/// They reach from this many decays in a run …
+#[cfg(feature = "tune")]
+const SLOWEST: f64 = 2.0;
+/// … to this many.
+const FASTEST: f64 = 1000.0;
+/// States, and rows of the run, beyond which the time scales have to do.
+#[cfg(feature = "tune")]
+const STATES: usize = 30;
+#[cfg(feature = "tune")]
+const ROWS: f64 = 5000.0;
+/// The time that the runs may take.
+#[cfg(feature = "tune")]
+const TIME: std::time::Duration = std::time::Duration::from_secs(5);
+
+/// A value that the study leaves out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// of `theta`, in 1/(unit of time)
+    pub value: f64,
+    /// where it comes from
+    pub why: String,
+    /// the best of values that were tried in simulation
+    pub is_tried: bool,
+}
+
+impl Proposal {
+    /// The key.
+    pub const KEY: &'static str = "theta";
+
+    pub(crate) fn to_json(&self) -> Json {
+        json!({ "key": Self::KEY, "value": self.value, "why": self.why })
+    }
+}
+
+impl fmt::Display for Proposal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (key, value) = (Self::KEY, number(self.value));
+        write!(
+            f,
+            "{key} = {value} is proposed: {}; write it, or another, into [observer]",
+            self.why
+        )
+    }
+}
+
+/// The knee of a short sweep where the study has a simulation, else twice the mean rate of the plant.
+pub(crate) fn propose(prepared: &Prepared<'_>, examination: &Examination) -> Option<Proposal> {
+    #[cfg(feature = "tune")]
+    if let Some(value) = knee(prepared, examination) {
+        return Some(Proposal {
+            value,
+            is_tried: true,
+            why: format!("the knee of {POINTS} values in simulation, which `lynkeus tune` refines"),
+        });
+    }
+    #[cfg(not(feature = "tune"))]
+    let _ = examination;
+    time_scales(prepared)
+}
+
+#[cfg(feature = "tune")]
+fn knee(prepared: &Prepared<'_>, examination: &Examination) -> Option<f64> {
+    use crate::study::{Name, Values};
+    use std::ops::ControlFlow;
+
+    let study = prepared.study();
+    let run = study.simulate.as_ref()?;
+    let span = run.until - run.start;
+    let step = run.sample_step.or(run.output_step).unwrap_or(span / 500.0);
+    if prepared.extended().states.len() > STATES || span / step > ROWS {
+        return None;
+    }
+    let family = lynkeus_observers::find(examination.family)?;
+    let mut own = study.clone();
+    own.budget = study.budget.within(TIME);
+    own.observer.family = Some(Name::from(family.name()));
+    own.observer.tuning.values.retain(|key, _| family.owns(key));
+    start_off(&mut own, prepared);
+    let (low, high) = (
+        SLOWEST / span,
+        (1.0 / step).min(FASTEST / span).max(4.0 * SLOWEST / span),
+    );
+    let value = |k: usize| rounded(low * (high / low).powf(k as f64 / (POINTS - 1) as f64));
+    own.tune.keys = vec![(
+        Name::from(Proposal::KEY),
+        Values::Listed((0..POINTS).map(value).collect()),
+    )];
+    let found = crate::tune::tune(&own, None, &mut |_| ControlFlow::Continue(())).ok()?;
+    // a sweep that is not whole would depend on the machine
+    match own.budget.marked() {
+        Some(_) => None,
+        None => found.chosen()?.values.first().copied(),
+    }
+}
+
+/// From the true start no speed would be too slow: where the study does not say where the estimate
+/// starts, it is off by this share of each range.
+#[cfg(feature = "tune")]
+const OFF: f64 = 0.1;
+
+#[cfg(feature = "tune")]
+fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
+    let initial = &mut own.observer.tuning.initial;
+    let extended = prepared.extended();
+    let starts = Start::of(extended).states;
+    for (state, start) in extended.states.iter().zip(starts) {
+        let off = OFF * (state.max - state.min);
+        let moved = match start + off > state.max {
+            true => start - off,
+            false => start + off,
+        };
+        if initial.default.is_none() && off.is_finite() {
+            initial.values.entry(state.name.clone()).or_insert(moved);
+        }
+    }
+}
+
+fn time_scales(prepared: &Prepared<'_>) -> Option<Proposal> {
+    let extended = prepared.extended();
+    let modes = Start::of(extended)
+        .jacobian(extended)?
+        .complex_eigenvalues();
+    let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let moving: Vec<f64> = sizes.into_iter().filter(|x| *x > 1e-9 * largest).collect();
+    let logs: f64 = moving.iter().map(|x| x.ln()).sum();
+    let span = prepared
+        .study()
+        .simulate
+        .as_ref()
+        .map(|run| run.until - run.start);
+    let (value, why): (f64, String) = match (moving.len(), span) {
+        (0, None) => (1.0, "the plant has no time scale of its own, and the study no [simulate] to try values on".to_owned()),
+        (0, Some(span)) => (30.0 / span, "thirty decays in the run of [simulate]".to_owned()),
+        (count, _) => (2.0 * (logs / count as f64).exp(), "twice the mean rate of the plant's modes at its start; with [simulate] it is the knee of a sweep".to_owned()),
+    };
+    let limited = span.map_or(value, |span| value.clamp(3.0 / span, FASTEST / span));
+    limited.is_finite().then(|| Proposal {
+        is_tried: false,
+        value: rounded(limited),
+        why,
+    })
+}
+
+/// Two significant digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.1e}").parse().unwrap_or(x)
+}

@@ -1,0 +1,340 @@
+//! `check`, `auto` and `--how-well` tell one story.
+
+use serde_json::Value;
+
+use super::{Folder, csv};
+
+/// A reactor of which only temperatures are measured, in the shape of a stirred tank: what is not
+/// seen of it decays near its start, and the sign of what it hangs on changes in the box.
+const REACTOR: &str = "model Reactor
+  input Real feed(start = 5, min = 3, max = 7);
+  Real a(start = 2, min = 0.1, max = 5);
+  Real b(start = 1, min = 0.1, max = 2);
+  Real heat(start = 0, min = -50, max = 50);
+  output Real y = heat;
+equation
+  der(a) = 4*(feed - a) - 2*a - 0.3*a^2;
+  der(b) = -4*b + 2*a - 2*b;
+  der(heat) = 3*a - 4*a^2 - 5*b - heat;
+end Reactor;";
+
+/// A digester in small: a substance that nobody sees and that only washes out, and one fed by what
+/// nobody knows.
+const DIGESTER: &str = "model Digester
+  input Real D(min = 0.2, max = 1); input Real w(min = 0, max = 1);
+  Real s(start = 1, min = 0, max = 4); Real dye(start = 1, min = 0, max = 4);
+  Real waste(start = 1, min = 0, max = 40); Real sum(min = -100, max = 100);
+  output Real y = s;
+equation
+  der(s) = 2*D - D*s;
+  der(dye) = -D*dye;
+  der(waste) = w - D*waste;
+  der(sum) = waste - s;
+end Digester;";
+
+fn folder(model: &str, study: &str) -> Folder {
+    let folder = Folder::empty();
+    folder.write("m.mo", model);
+    folder.write("study.toml", &format!("plant = \"m.mo\"\n{study}"));
+    folder
+}
+
+/// The quantities of `knowledge` under an assumption.
+fn known(report: &Value, assumption: &str) -> Value {
+    let all = report["knowledge"].as_array().unwrap();
+    let found = all.iter().find(|k| k["unknown_inputs"] == assumption);
+    found.unwrap_or_else(|| panic!("{report}"))["quantities"].clone()
+}
+
+#[test]
+fn what_washes_out_decays_and_what_is_fed_does_not() {
+    let folder = folder(DIGESTER, "[sensors]\nunknown = [\"w\"]\n");
+    let ended = folder.run(&["check", "study.toml", "--json"]);
+    let arbitrary = known(&ended.json(), "arbitrary");
+    assert_eq!(arbitrary["s"]["known"], "everywhere");
+    assert_eq!(arbitrary["dye"]["known"], "decays");
+    assert_eq!(arbitrary["dye"]["proved"], true);
+    assert!((arbitrary["dye"]["rate"].as_f64().unwrap() - 0.2).abs() < 1e-9);
+    // at most 1 unknown, over the rate 0.2
+    assert_eq!(arbitrary["waste"]["known"], "no");
+    assert!((arbitrary["waste"]["bound"].as_f64().unwrap() - 5.0).abs() < 1e-9);
+    assert_eq!(arbitrary["sum"]["known"], "no");
+    assert_eq!(arbitrary["w"]["known"], "no");
+    // a constant that no output shows is no better known
+    let wandering = known(&ended.json(), "wandering");
+    for name in ["waste", "sum", "w"] {
+        assert_eq!(wandering[name]["known"], "no", "{name}: {wandering}");
+    }
+    assert_eq!(ended.code, 1);
+    let text = folder.run(&["check", "study.toml"]).out;
+    for words in [
+        "dye: not observable, but its error decays by itself, at 0.2 per unit of time or faster (proved on the box)",
+        "in the end, as errors decay by themselves: dye",
+        "not from the outputs: waste, sum, w",
+    ] {
+        assert!(text.contains(words), "{words:?} is missing:\n{text}");
+    }
+}
+
+/// Where heat tells b by a, b' = −6b + 2a with a = −(5/13)·b at the start: −6 − 10/13.
+#[test]
+fn an_unknown_feed_leaves_an_error_that_decays_near_the_start() {
+    let study = "[sensors]\nunknown = [\"feed\"]\n[process_noise]\nfeed = 0.1\n[observer]\nfamily = \"ekf\"\n[plot]\ntime_unit = \"h\"\n";
+    let folder = folder(REACTOR, study);
+    let ended = folder.run(&["check", "study.toml", "--json"]);
+    let arbitrary = known(&ended.json(), "arbitrary");
+    for name in ["a", "b", "feed"] {
+        assert_eq!(arbitrary[name]["known"], "decays", "{name}: {arbitrary}");
+        assert_eq!(arbitrary[name]["proved"], false);
+        let rate = arbitrary[name]["rate"].as_f64().unwrap();
+        assert!((rate - (6.0 + 10.0 / 13.0)).abs() < 1e-6, "{name}: {rate}");
+    }
+    let wandering = known(&ended.json(), "wandering");
+    assert_eq!(wandering["a"]["known"], "almost everywhere");
+    // the outputs alone do not tell everything
+    assert_eq!(ended.code, 1);
+    let text = folder.run(&["check", "study.toml"]).out;
+    for words in [
+        "what can be known, whatever feed does",
+        "the same if feed only wanders, as [process_noise] says",
+        "at 6.769 per h (linearised at one point only, see below)",
+        "linearised at a = 2, b = 1",
+    ] {
+        assert!(text.contains(words), "{words:?} is missing:\n{text}");
+    }
+    // in a part of the box it is proved
+    folder.change(
+        "study.toml",
+        "[process_noise]",
+        "[box]\na = [1.5, 3]\n[process_noise]",
+    );
+    let arbitrary = known(
+        &folder.run(&["check", "study.toml", "--json"]).json(),
+        "arbitrary",
+    );
+    assert_eq!(arbitrary["b"]["proved"], true, "{arbitrary}");
+    let rate = arbitrary["b"]["rate"].as_f64().unwrap();
+    assert!(rate > 6.0 && rate < 6.0 + 10.0 / 13.0, "{rate}");
+}
+
+#[test]
+fn an_input_at_rest_hides_what_it_excites() {
+    let model = "model M input Real u(min = -1, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 1);
+      output Real y = a; equation der(a) = u*b; der(b) = -b; end M;";
+    let folder = folder(model, "");
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let found = known(&report, "none");
+    assert_eq!(found["a"]["known"], "everywhere");
+    assert_eq!(found["b"]["known"], "while excited");
+    assert_eq!(found["b"]["hidden_by"]["input"], "u");
+}
+
+/// A cart: position measured, and a chain that the triangular family takes.
+const CART: &str = "model Cart
+  input Real u(start = 0, min = -1, max = 1);
+  Real x(start = 0.5, min = -5, max = 5); Real v(start = 0, min = -5, max = 5);
+  output Real y = x;
+equation
+  der(x) = v;
+  der(v) = u - 0.5*v - x;
+end Cart;";
+
+const RUN: &str = "[sensors]\nnoise = { y = 0.02 }\n[simulate]\nuntil = 20\noutput_step = 0.05\ninputs = { u = \"sin(time)\" }\n";
+
+/// θ left out: the same value in the report, in the run's summary and in what is to be pasted.
+#[test]
+fn a_speed_is_proposed_and_told_everywhere() {
+    let folder = folder(CART, RUN);
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["recommended"], "triangular");
+    let theta = report["choice"]["proposed"]["value"].as_f64().unwrap();
+    assert!(theta > 0.1 && theta < 20.0, "{theta}");
+    let again = folder.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(again["choice"], report["choice"]);
+    let run = folder.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
+    assert_eq!(run.code, 0, "{}", run.err);
+    assert_eq!(run.json()["family"], "triangular");
+    let words = format!("theta = {theta} is proposed: the knee of 13 values in simulation");
+    assert!(run.err.contains(&words), "{}", run.err);
+    // pasted, it is the same observer and nothing is proposed
+    let observer = report["next"]["observer"].as_str().unwrap();
+    assert!(
+        observer.starts_with("[observer]\nfamily = \"triangular\"\n"),
+        "{observer}"
+    );
+    folder.write(
+        "pasted.toml",
+        &format!("plant = \"m.mo\"\n{RUN}\n{observer}"),
+    );
+    let pasted = folder.run(&["simulate", "pasted.toml", "-o", "b.csv"]);
+    assert_eq!(pasted.code, 0, "{}", pasted.err);
+    assert!(!pasted.err.contains("is proposed"), "{}", pasted.err);
+    assert_eq!(folder.read("a.csv"), folder.read("b.csv"));
+    // a family asked for by name gets the same
+    folder.write(
+        "named.toml",
+        &format!("plant = \"m.mo\"\n{RUN}\n[observer]\nfamily = \"triangular\"\n"),
+    );
+    let named = folder.run(&["simulate", "named.toml", "-o", "c.csv"]);
+    assert_eq!(folder.read("a.csv"), folder.read("c.csv"), "{}", named.err);
+}
+
+/// What `check` proposes for a bare model runs.
+#[test]
+fn the_study_for_a_bare_model_runs() {
+    let folder = folder(CART, "");
+    let report = folder.run(&["check", "m.mo", "--json"]).json();
+    let study = report["next"]["study"].as_str().unwrap();
+    folder.write("new.toml", study);
+    let run = folder.run(&["simulate", "new.toml", "-o", "a.csv"]);
+    assert_eq!(run.code, 0, "{}\n{study}", run.err);
+    let text = folder.run(&["check", "m.mo"]).out;
+    assert!(
+        text.contains(study) && text.contains("lynkeus simulate study.toml"),
+        "{text}"
+    );
+}
+
+/// A key of the filters leaves the families with a theorem out, by name; it is no refusal. Poles that
+/// are missing are named, and the next family is taken.
+#[test]
+fn a_family_without_a_key_is_named() {
+    let gated = folder(CART, &format!("{RUN}[observer]\ngate = 5\n"));
+    let ended = gated.run(&["check", "study.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(
+        ended
+            .out
+            .contains("not examined, as they do not take gate: triangular, "),
+        "{}",
+        ended.out
+    );
+    assert!(ended.out.contains("by ekf"), "{}", ended.out);
+    // y = x + v fits no chain
+    let summed = CART.replace("y = x;", "y = x + 0.2*v;");
+    let folder = folder(&summed, RUN);
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["recommended"], "ekf", "{report}");
+    let passed = report["choice"]["passed_over"].to_string();
+    assert!(
+        passed.contains("drift-observable fits, but it needs `poles`"),
+        "{passed}"
+    );
+    let run = folder.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
+    assert_eq!(run.json()["family"], "ekf");
+    assert!(
+        run.err.contains("it needs `poles`") && run.err.contains("nothing is proved"),
+        "{}",
+        run.err
+    );
+}
+
+/// A tail that nothing corrects and that decays in 1000 s is no observer for a run of 4 s.
+#[test]
+fn what_is_too_slow_for_the_run_is_not_taken() {
+    let model = CART.replace(
+        "Real x(",
+        "Real t(start = 1, min = -5, max = 5); output Real z = t; Real x(",
+    );
+    let model = model.replace("der(x) = v;", "der(t) = -0.001*t; der(x) = v;");
+    let slow = "[sensors]\nmeasured = [\"y\", \"z\"]\n[observer]\ntheta = [3, 0.001]\n[simulate]\nuntil = 4\noutput_step = 0.05\n";
+    let folder = folder(&model, slow);
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let passed = report["choice"]["passed_over"].to_string();
+    assert!(passed.contains("too slow for a run of 4"), "{passed}");
+    assert_eq!(
+        folder
+            .run(&["simulate", "study.toml", "--json", "-o", "a.csv"])
+            .json()["family"],
+        report["recommended"]
+    );
+    folder.change("study.toml", "0.001]", "3]");
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["recommended"], "triangular");
+}
+
+/// The last standard deviations of a filter's run.
+fn last_sd(folder: &Folder, names: &[&str]) -> Vec<f64> {
+    let ended = folder.run(&["simulate", "study.toml", "-o", "run.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (header, rows) = csv(&folder.read("run.csv"));
+    let at = |name: &&str| {
+        header
+            .iter()
+            .position(|h| *h == format!("{name}_sd"))
+            .unwrap()
+    };
+    names
+        .iter()
+        .map(|name| rows.last().unwrap()[at(name)])
+        .collect()
+}
+
+/// `--how-well` counts `[process_noise]` as the filter does, and without says what it is beside it.
+#[test]
+fn standard_errors_are_those_of_the_filter() {
+    let names = ["x", "v", "d"];
+    for (noise, counted) in [
+        ("[process_noise]\nx = 0\nv = 0.01\nd = 0.02\n", true),
+        ("[process_noise]\nx = 0\nv = 0\nd = 0\n", true),
+        ("", false),
+    ] {
+        let model = CART
+            .replace(
+                "input Real u",
+                "input Real d(min = -1, max = 1); input Real u",
+            )
+            .replace("u - 0.5*v", "u + d - 0.5*v");
+        let run = RUN
+            .replace("u = \"sin(time)\"", "u = \"sin(time)\", d = \"0.3\"")
+            .replace("[sensors]", "[sensors]\nunknown = [\"d\"]");
+        let folder = folder(
+            &model,
+            &format!("{run}{noise}[observer]\nfamily = \"ekf\"\n[estimate]\nsd = true\n"),
+        );
+        let report = folder
+            .run(&["check", "study.toml", "--how-well", "--json"])
+            .json();
+        assert_eq!(report["counts_process_noise"], counted);
+        let key = if counted {
+            "standard_error"
+        } else {
+            "filter_sd"
+        };
+        for (name, sd) in names.iter().zip(last_sd(&folder, &names)) {
+            let found = report[key][*name].as_f64().unwrap();
+            assert!(
+                (found / sd - 1.0).abs() < 0.02,
+                "{noise}{name}: {found} and {sd}"
+            );
+            // an exact model is never harder to see
+            let exact = report["standard_error_exact_model"][*name]
+                .as_f64()
+                .unwrap();
+            assert!(exact <= found * 1.001, "{name}: {exact} and {found}");
+        }
+        let text = folder.run(&["check", "study.toml", "--how-well"]).out;
+        let words = if counted {
+            "[process_noise] is counted"
+        } else {
+            "the model is taken as exact"
+        };
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+/// A state that forgets with e^−200 over the run: its error is nothing, not 1e-88.
+#[test]
+fn what_is_forgotten_altogether_is_known_exactly() {
+    let model = CART
+        .replace("Real x(", "Real q(start = 1, min = -1, max = 1); Real x(")
+        .replace("der(x) = v;", "der(q) = -10*q; der(x) = v;");
+    let folder = folder(&model, RUN);
+    let ended = folder.run(&["check", "study.toml", "--how-well", "--json"]);
+    assert_eq!(ended.json()["standard_error"]["q"], 0.0);
+    let text = folder.run(&["check", "study.toml", "--how-well"]).out;
+    assert!(
+        text.contains("0: known exactly") && !text.contains("e-8"),
+        "{text}"
+    );
+}

@@ -1,0 +1,422 @@
+//! The standard deviations that the families and the filters report, beside the errors of many
+//! runs: the plant driven by the declared noises, its sensors by theirs.
+//!
+//! `cargo test --release -p lynkeus --test deviations -- --ignored --nocapture` makes the table of
+//! docs/ekf.md from 500 runs.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use lynkeus::run::{Dynamics, Evaluation, Rk4, System};
+use lynkeus::{Outcome, Study, Table, estimate, prepare};
+
+/// A study beside the truth that it is tried on.
+struct Case {
+    /// folder and model among the examples
+    model: &'static str,
+    /// the study from `[sensors]` on, without noises
+    observer: &'static str,
+    sensors: &'static [&'static str],
+    unknown: &'static [&'static str],
+    disturbances: &'static [&'static str],
+    /// known inputs, and where the unknown ones start
+    input: fn(&str, f64) -> f64,
+    /// standard deviation of every sensor
+    noise: f64,
+    /// densities
+    wander: &'static [(&'static str, f64)],
+    /// variance of every state at the start
+    start: f64,
+    /// the sampling interval
+    step: f64,
+    rows: usize,
+}
+
+const LEE: Case = Case {
+    model: "lee/lee.mo",
+    observer: "family = \"block-triangular\"\ntheta = [3, 9]\nk = [[2, 1], [2, 1]]\ncorrection = \"lee\"\ninitial = { x1 = 2, x2 = 1, x3 = 3, x4 = 3.5 }",
+    sensors: &["y1", "y2"],
+    unknown: &[],
+    disturbances: &[],
+    input: |_, t| 2.0 * (3.0 * t).sin(),
+    noise: 0.01,
+    wander: &[("x2", 1e-3), ("x4", 1e-3)],
+    start: 0.0,
+    step: 0.02,
+    rows: 300,
+};
+
+const COLUMN: Case = Case {
+    model: "column/column.mo",
+    observer: "family = \"triangular\"\ntheta = 3.5\ndelta = [1, 1.2727272727272727]\nr = 1\nS = [\n{ diag = [1.5, 2, 4, 8, 10.5, 15.5, 17.5], off = [-0.5, -1.5, -2, -3, -4, -5] },\n{ diag = [1.5, 2, 4, 8, 10.5, 15.5], off = [-0.5, -1.5, -2, -3, -4] },\n]\ninitial = { default = 0.5 }",
+    sensors: &["top", "bottom"],
+    unknown: &["Zf"],
+    disturbances: &[],
+    input: |name, _| match name {
+        "L" => 4.69,
+        "V" => 5.94,
+        _ => 0.6,
+    },
+    noise: 1e-6,
+    wander: &[("Zf", 1e-6)],
+    start: 0.0,
+    step: 0.1,
+    rows: 300,
+};
+
+const LTAIEF: Case = Case {
+    model: "ltaief/ltaief.mo",
+    observer: "family = \"state-affine\"\ntheta = 10\nS0 = 1\ninitial = { x1 = 1, x2 = 0.5, x3 = 0.5 }",
+    sensors: &["y"],
+    unknown: &[],
+    disturbances: &["e1"],
+    input: |name, t| {
+        let turn = std::f64::consts::PI * t;
+        match name {
+            "u1" => (11.0 * turn).sin(),
+            "u2" => (11.0 * turn).cos(),
+            "u3" => 5.0 * (2.0 * turn).cos(),
+            _ => 0.0,
+        }
+    },
+    noise: 1e-3,
+    wander: &[("x2", 1e-4), ("x3", 1e-4)],
+    start: 0.0,
+    step: 0.005,
+    rows: 600,
+};
+
+const FARZA: Case = Case {
+    model: "farza/farza.mo",
+    observer: "family = \"unknown-input\"\ntheta = [60, 15]\ninitial = { x1 = 1, x2 = 1, x3 = 1, x4 = 2, x5 = 10, v = 0 }",
+    sensors: &["y1", "y2", "y3"],
+    unknown: &["v"],
+    disturbances: &[],
+    input: |_, _| 0.0,
+    noise: 1e-4,
+    wander: &[("v", 1e-2)],
+    start: 0.0,
+    step: 0.004,
+    rows: 1250,
+};
+
+/// Up to 1.5 s: later x3 passes through zero, where the output hides it and nothing linear holds.
+const GERMANI: Case = Case {
+    model: "germani-manes/germani_manes.mo",
+    observer: "family = \"drift-observable\"\nvariant = \"practical\"\npoles = [-8, -9.6, -11.52]\nfilter_poles = [-80, -96]\nfilter_initial = [5, 12.566370614359172]\ninitial = { x1 = 0.5, x2 = 0.5, x3 = 0.5 }",
+    sensors: &["y"],
+    unknown: &[],
+    disturbances: &[],
+    input: |_, t| 5.0 + 2.0 * (2.0 * std::f64::consts::PI * t).sin(),
+    noise: 1e-3,
+    wander: &[("x2", 1e-3)],
+    start: 0.0,
+    step: 0.005,
+    rows: 300,
+};
+
+/// Lee's plant from an uncertain start, for a filter.
+const fn filter(observer: &'static str) -> Case {
+    Case {
+        observer,
+        noise: 0.02,
+        wander: &[("x2", 1e-2), ("x4", 1e-2)],
+        start: 0.01,
+        step: 0.05,
+        rows: 120,
+        ..LEE
+    }
+}
+
+const EKF: Case = filter(
+    "family = \"ekf\"\ninitial_variance = { default = 0.01 }\ninitial = { x1 = 2, x2 = 1, x3 = 3, x4 = 3.5 }",
+);
+const UKF: Case = filter(
+    "family = \"ukf\"\ninitial_variance = { default = 0.01 }\ninitial = { x1 = 2, x2 = 1, x3 = 3, x4 = 3.5 }",
+);
+const MHE: Case = filter(
+    "family = \"mhe\"\nhorizon = 4\ninitial_variance = { default = 0.01 }\ninitial = { x1 = 2, x2 = 1, x3 = 3, x4 = 3.5 }",
+);
+
+/// Deviates by the sum of twelve uniform ones.
+struct Normal(u64);
+
+impl Normal {
+    fn next(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+
+    fn uniform(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// The plant with its unknown inputs as states, and what the study says of it.
+struct Truth {
+    plant: Evaluation,
+    /// names of the states, unknown inputs last
+    states: Vec<String>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+    start: Vec<f64>,
+    densities: Vec<f64>,
+}
+
+impl Truth {
+    fn new(case: &Case, study: &Study) -> Self {
+        let plant = prepare::plant(study).unwrap();
+        let (unknown, known): (Vec<_>, Vec<_>) = plant
+            .inputs
+            .iter()
+            .partition(|input| case.unknown.contains(&input.name.as_str()));
+        let own = plant
+            .states
+            .iter()
+            .map(|s| (s.name.clone(), s.node, s.start.unwrap()));
+        let wandering = unknown
+            .iter()
+            .map(|u| (u.name.clone(), u.node, (case.input)(&u.name, 0.0)));
+        let states: Vec<_> = own.chain(wandering).collect();
+        let zero = plant.graph.constant(0.0).node();
+        let rates = plant.derivatives.iter().copied();
+        let rates: Vec<_> = rates.chain(unknown.iter().map(|_| zero)).collect();
+        let signals: Vec<_> = known.iter().map(|k| (k.name.clone(), k.node)).collect();
+        let measured = plant.outputs.iter();
+        let measured = measured.filter(|o| case.sensors.contains(&o.name.as_str()));
+        let outputs: Vec<_> = measured.map(|o| (o.name.clone(), o.node)).collect();
+        let system = System::new(
+            &plant.graph,
+            plant.time,
+            &states,
+            &signals,
+            &rates,
+            &outputs,
+        )
+        .unwrap();
+        let density = |name: &String| {
+            case.wander
+                .iter()
+                .find(|w| w.0 == name)
+                .map_or(0.0, |w| w.1)
+        };
+        Self {
+            plant: system.evaluation(),
+            densities: states.iter().map(|s| density(&s.0)).collect(),
+            start: states.iter().map(|s| s.2).collect(),
+            states: states.into_iter().map(|s| s.0).collect(),
+            inputs: signals.into_iter().map(|s| s.0).collect(),
+            outputs: outputs.into_iter().map(|o| o.0).collect(),
+        }
+    }
+
+    /// A log, with the true states beside the readings.
+    fn log(&mut self, case: &Case, seed: u64) -> Table {
+        const SUBSTEPS: usize = 8;
+        let mut normal = Normal(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(1));
+        // neighbouring seeds part after some steps
+        for _ in 0..10 {
+            normal.uniform();
+        }
+        let mut x = self.start.clone();
+        for (x, name) in x.iter_mut().zip(&self.states) {
+            if !case.unknown.contains(&name.as_str()) {
+                *x += case.start.sqrt() * normal.next();
+            }
+        }
+        let mut rk4 = Rk4::new(x.len());
+        let names = ["t".to_owned()].into_iter().chain(self.inputs.clone());
+        let names: Vec<String> = names
+            .chain(self.outputs.clone())
+            .chain(self.states.clone())
+            .collect();
+        let mut columns = vec![vec![]; names.len()];
+        let mut y = vec![0.0; self.outputs.len()];
+        for k in 0..case.rows {
+            let t = case.step * k as f64;
+            let u: Vec<f64> = self
+                .inputs
+                .iter()
+                .map(|name| (case.input)(name, t))
+                .collect();
+            self.plant.signals_mut().copy_from_slice(&u);
+            self.plant.enter(t);
+            self.plant.outputs(t, &x, &mut y);
+            y.iter_mut().for_each(|y| *y += case.noise * normal.next());
+            let row = [t]
+                .into_iter()
+                .chain(u)
+                .chain(y.iter().copied())
+                .chain(x.iter().copied());
+            columns
+                .iter_mut()
+                .zip(row)
+                .for_each(|(column, value)| column.push(value));
+            // inputs are held from sample to sample, as the estimate takes them
+            let h = case.step / SUBSTEPS as f64;
+            for i in 0..SUBSTEPS {
+                let step = rk4.step(&mut self.plant, t + h * i as f64, h, &mut x);
+                step.unwrap();
+                for (x, q) in x.iter_mut().zip(&self.densities) {
+                    *x += (q * h).sqrt() * normal.next();
+                }
+            }
+        }
+        Table::from_columns(names.into_iter().zip(columns).collect()).unwrap()
+    }
+}
+
+/// How far each quantity's errors scatter in the last third of many runs, as a share of what is said.
+fn ratios(case: &Case, runs: u64) -> Vec<(String, f64)> {
+    let folder = tempfile::tempdir().unwrap();
+    let model = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../examples")
+        .join(case.model);
+    let table = |pairs: &[(String, f64)]| {
+        let entries: Vec<String> = pairs
+            .iter()
+            .map(|(n, v)| format!("\"{n}\" = {v:e}"))
+            .collect();
+        entries.join("\n")
+    };
+    let wander: Vec<(String, f64)> = case.wander.iter().map(|w| (w.0.to_owned(), w.1)).collect();
+    let noise = case
+        .sensors
+        .iter()
+        .map(|s| format!("{s} = {:e}", case.noise));
+    let noise: Vec<String> = noise.collect();
+    let text = format!(
+        "plant = {:?}\n[sensors]\nunknown = {:?}\ndisturbances = {:?}\nnoise = {{ {} }}\n[process_noise]\n{}\n[observer]\n{}\n[estimate]\nsd = true\nbetween_samples = {:?}\n",
+        model.canonicalize().unwrap(),
+        case.unknown,
+        case.disturbances,
+        noise.join(", "),
+        table(&wander),
+        case.observer,
+        if case.start > 0.0 { "hold" } else { "predict" },
+    );
+    let path = folder.path().join("study.toml");
+    std::fs::write(&path, text).unwrap();
+    let study = Study::load(&path).unwrap();
+    let mut truth = Truth::new(case, &study);
+    let mut all: Vec<Scatter> = vec![];
+    for seed in 0..runs {
+        let log = truth.log(case, seed);
+        let outcome = estimate(&study, &log, &mut |_| ControlFlow::Continue(())).unwrap();
+        add(&outcome, case.rows, &mut all);
+    }
+    all.iter()
+        .map(|s| (s.name.clone(), s.ratio(runs)))
+        .collect()
+}
+
+/// The errors of a quantity over many runs, row by row.
+struct Scatter {
+    name: String,
+    rows: Vec<Moments>,
+}
+
+/// Sums over the runs.
+#[derive(Clone, Default)]
+struct Moments {
+    error: f64,
+    square: f64,
+    /// of the deviations said
+    variance: f64,
+}
+
+impl Scatter {
+    /// √(variance of the errors/variance said), averaged over the rows. Errors are taken about
+    /// their mean: what the sampling shifts every run by is no noise.
+    fn ratio(&self, runs: u64) -> f64 {
+        let runs = runs as f64;
+        let shares = self.rows.iter().map(|m| {
+            let variance = (m.square - m.error * m.error / runs) / (runs - 1.0);
+            variance / (m.variance / runs)
+        });
+        (shares.sum::<f64>() / self.rows.len() as f64).sqrt()
+    }
+}
+
+fn add(outcome: &Outcome, rows: usize, all: &mut Vec<Scatter>) {
+    assert!(outcome.ended.is_none());
+    for quantity in &outcome.quantities {
+        let (Some(hat), Some(truth), Some(sd)) =
+            (&quantity.estimate, &quantity.truth, &quantity.deviation)
+        else {
+            continue;
+        };
+        let first = 2 * rows / 3;
+        let known = all.iter().position(|s| s.name == quantity.name);
+        let place = known.unwrap_or_else(|| {
+            all.push(Scatter {
+                name: quantity.name.clone(),
+                rows: vec![Moments::default(); rows - first],
+            });
+            all.len() - 1
+        });
+        for (moments, k) in all[place].rows.iter_mut().zip(first..) {
+            let error = hat[k] - truth[k];
+            moments.error += error;
+            moments.square += error * error;
+            moments.variance += sd[k] * sd[k];
+        }
+    }
+}
+
+/// Within what a chi-square of so many runs would leave in 999 of 1000 cases.
+fn agree(case: &Case) {
+    const RUNS: u64 = 40;
+    // Wilson and Hilferty's quantiles
+    let part = 2.0 / (9.0 * RUNS as f64);
+    let bound = |z: f64| (1.0 - part + z * part.sqrt()).powi(3).sqrt();
+    let (low, high) = (bound(-3.29), bound(3.29));
+    let ratios = ratios(case, RUNS);
+    assert!(!ratios.is_empty());
+    for (name, ratio) in ratios {
+        assert!(
+            (low..high).contains(&ratio),
+            "{name}: {ratio} outside {low} … {high}"
+        );
+    }
+}
+
+/// 500 runs, within 15 %.
+fn hold(name: &str, case: &Case) {
+    for (quantity, ratio) in ratios(case, 500) {
+        println!("{name:>16} {quantity:>6} {ratio:.3}");
+        assert!((0.85..1.15).contains(&ratio), "{name}, {quantity}: {ratio}");
+    }
+}
+
+macro_rules! agreements {
+    ($($name:ident: $case:ident;)*) => {
+        $(#[test] fn $name() { agree(&$case); })*
+
+        mod five_hundred_runs {
+            $(
+                #[test]
+                #[ignore = "minutes"]
+                fn $name() {
+                    super::hold(stringify!($name), &super::$case);
+                }
+            )*
+        }
+    };
+}
+
+agreements! {
+    block_triangular: LEE;
+    triangular: COLUMN;
+    state_affine: LTAIEF;
+    unknown_input: FARZA;
+    drift_observable: GERMANI;
+    ekf: EKF;
+    ukf: UKF;
+    mhe: MHE;
+}
