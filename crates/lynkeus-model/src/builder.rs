@@ -186,6 +186,8 @@ impl Model {
         let time = self.time().node();
         let parts = self.parts.into_inner();
         Ok(Plant {
+            assertions: vec![],
+            warnings: vec![],
             name: self.name,
             graph: self.graph,
             time,

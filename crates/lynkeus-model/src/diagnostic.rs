@@ -50,6 +50,8 @@ struct Excerpt {
     marked: std::ops::Range<usize>,
     /// true where the line is longer than `text`
     cut: bool,
+    /// told as a warning
+    is_warning: bool,
 }
 
 impl Diagnostic {
@@ -74,6 +76,13 @@ impl Diagnostic {
             hint: problem.hint,
             excerpt: Box::new(Excerpt::new(source, line_start..line_end, start..end)),
         }
+    }
+
+    /// What looks wrong but is taken.
+    pub(crate) fn warning(problem: Problem, file: &str, source: &str) -> Self {
+        let mut warning = Self::new(problem, file, source);
+        warning.excerpt.is_warning = true;
+        warning
     }
 
     /// `file:line:column: message (hint)` on one line.
@@ -102,7 +111,11 @@ impl Diagnostic {
         let snippet = Snippet::source(self.excerpt.text.as_str())
             .line_start(self.line as usize)
             .annotation(marked);
-        let title = Level::ERROR.primary_title(self.message.as_str());
+        let level = match self.excerpt.is_warning {
+            true => Level::WARNING,
+            false => Level::ERROR,
+        };
+        let title = level.primary_title(self.message.as_str());
         let group = if self.excerpt.cut {
             let origin = Origin::path(self.file.as_str())
                 .line(self.line as usize)
@@ -140,6 +153,7 @@ impl Excerpt {
             text: source[from..to].replace('\r', " "),
             marked: marked.start - from..marked_end - from,
             cut: from > line.start || to < line.end,
+            is_warning: false,
         }
     }
 }

@@ -45,7 +45,8 @@
 //!
 //! # The subset
 //!
-//! One or more `model`s in a file, with `Real` and `Integer` declarations (`parameter`,
+//! One or more `model`s in a file, alone or in `package`s, flat as a compiler writes them or
+//! with functions, records, types and base classes of the same file; with `Real` and `Integer` declarations (`parameter`,
 //! `constant`, `input`, `output`, arrays of any rank, the attributes `start`, `fixed`, `min`,
 //! `max`, `nominal` and `unit`), declaration equations, and an `equation` section of scalar and array
 //! equations, `for` loops, and `if` equations with the same number of equations in every
@@ -53,7 +54,8 @@
 //! comprehensions, slices, `time`, and the functions of [`parse_expression`].
 //!
 //! Derivatives may carry a factor (`H[i]*der(x[i]) = …`) or be coupled linearly (a mass
-//! matrix). Algebraic variables are sorted; every other variable than states and inputs becomes
+//! matrix). Algebraic variables are sorted, linear loops solved, and states that follow from
+//! others given up; every other variable than states and inputs becomes
 //! an expression over these. What is refused is refused by a [`Diagnostic`] with the line, a
 //! caret and a hint; hostile text ends in one as well, within bounded time and memory.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -63,6 +65,7 @@ mod builder;
 mod choose;
 mod diagnostic;
 mod elaborate;
+mod flat;
 mod language;
 mod limits;
 mod names;
@@ -70,10 +73,11 @@ mod ode_model;
 mod plant;
 mod study;
 mod syntax;
+mod units;
 
 pub use builder::{Attributes, Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError};
 pub use language::model_names;
-pub use plant::{LoadOptions, Parameter, Plant, Variable};
+pub use plant::{Assertion, LoadOptions, Parameter, Plant, Variable};
 pub use study::parse_expression;
 pub use syntax::Span;

@@ -33,6 +33,23 @@ pub struct Plant {
     pub algebraics: Vec<Variable>,
     /// parameters that a caller may set; constants and dependent parameters are not listed
     pub parameters: Vec<Parameter>,
+    /// what must hold along every run, in order of the text
+    pub assertions: Vec<Assertion>,
+    /// what the text says that has no effect here, or that looks wrong
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// An `assert` of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assertion {
+    /// 1 where it holds, over `time`, the states and the inputs
+    pub condition: Node,
+    /// the message of the model; may be empty
+    pub message: String,
+    /// line of the text, from 1
+    pub line: usize,
+    /// the model asks for a warning, not for an error
+    pub is_warning: bool,
 }
 
 /// A scalar variable with what its declaration says of it.
@@ -111,8 +128,13 @@ impl Plant {
         file_name: &str,
         options: &LoadOptions,
     ) -> Result<Self, Diagnostic> {
-        elaborate::plant(source, options)
-            .map_err(|problem| Diagnostic::new(problem, file_name, source))
+        let (mut plant, warnings) = elaborate::plant(source, options)
+            .map_err(|problem| Diagnostic::new(problem, file_name, source))?;
+        let warnings = warnings.into_iter();
+        plant.warnings = warnings
+            .map(|problem| Diagnostic::warning(problem, file_name, source))
+            .collect();
+        Ok(plant)
     }
 
     /// Reads a text in the notation of `@ODEmodel`, as StructuralIdentifiability.jl has it.

@@ -17,14 +17,89 @@ const COUNT: usize = 10;
 /// Runge–Kutta steps between compared points.
 const SUBSTEPS: usize = 2000;
 
-#[test]
-fn free_trajectories_agree() {
-    let Ok(python) = std::env::var("LYNKEUS_PYTHON") else {
+/// The models of `examples/flattened`: the flat file, the text of parts it is made from, the
+/// model in it, and the compiler's name for what it writes.
+const FLATTENED: [[&str; 4]; 10] = [
+    ["filter", "electrical", "Electrical.Filter", "base-modelica"],
+    ["bridge", "electrical", "Electrical.Bridge", "flat-modelica"],
+    [
+        "rectifier",
+        "electrical",
+        "Electrical.Rectifier",
+        "base-modelica",
+    ],
+    ["house", "thermofluid", "Thermofluid.House", "dae-modelica"],
+    ["tanks", "thermofluid", "Thermofluid.Tanks", "dae-modelica"],
+    [
+        "exchanger",
+        "thermofluid",
+        "Thermofluid.Exchanger",
+        "base-modelica",
+    ],
+    [
+        "drive_train",
+        "mechanics",
+        "Mechanics.DriveTrain",
+        "base-modelica",
+    ],
+    ["coupled", "mechanics", "Mechanics.Coupled", "flat-modelica"],
+    ["train", "mechanics", "Mechanics.Train", "dae-modelica"],
+    [
+        "double_pendulum",
+        "mechanics",
+        "Mechanics.DoublePendulum",
+        "base-modelica",
+    ],
+];
+
+fn python() -> Option<String> {
+    let found = std::env::var("LYNKEUS_PYTHON").ok();
+    if found.is_none() {
         // past the capture of passing tests, so that a skip is seen
         let _ = std::io::Write::write_fmt(
             &mut std::io::stderr(),
             format_args!("skipped: LYNKEUS_PYTHON names no Python with rumoca\n"),
         );
+    }
+    found
+}
+
+#[test]
+fn flattened_models_agree() {
+    let Some(python) = python() else {
+        return;
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/flattened");
+    for [file, source, model, rendering] in FLATTENED {
+        let path = folder.join(file).with_extension("mo");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let plant = Plant::load(&path, &LoadOptions::default()).unwrap();
+        let held = |input: &Variable| input.start.unwrap();
+        let inputs = plant.inputs.iter();
+        let inputs = inputs.map(|input| format!("{}={}", input.name, held(input)));
+        let output = Command::new(&python)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rumoca_flattened.py"))
+            .arg(folder.join("source").join(source).with_extension("mo"))
+            .args([model, rendering, &STEP.to_string(), &COUNT.to_string()])
+            .args(inputs)
+            .output()
+            .unwrap();
+        let output = succeeded(&path, output);
+        let (flat, table) = output.split_once("====\n").unwrap();
+        assert_eq!(
+            flat.trim(),
+            text.trim(),
+            "{file} is not what the compiler writes"
+        );
+        let theirs = table_of(table);
+        let ours = our_trajectory(&plant, &held);
+        agree(&path, &plant, &ours, &theirs);
+    }
+}
+
+#[test]
+fn free_trajectories_agree() {
+    let Some(python) = python() else {
         return;
     };
     for folder in ["tests/models", "../../examples"] {
@@ -41,6 +116,10 @@ fn models_below(folder: &Path) -> Vec<PathBuf> {
     let mut found = vec![];
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
+        // flat files are compared with the text they are made from
+        if path.ends_with("flattened") {
+            continue;
+        }
         if path.is_dir() {
             found.extend(models_below(&path));
         } else if path.extension().is_some_and(|extension| extension == "mo") {
@@ -53,12 +132,17 @@ fn models_below(folder: &Path) -> Vec<PathBuf> {
 fn compare(python: &str, path: &Path) {
     let plant =
         Plant::load(path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    let (names, theirs) = their_trajectory(python, path, &plant);
-    let ours = our_trajectory(&plant);
+    let theirs = their_trajectory(python, path, &plant);
+    let ours = our_trajectory(&plant, &held);
+    agree(path, &plant, &ours, &theirs);
+}
+
+fn agree(path: &Path, plant: &Plant, ours: &[Vec<f64>], theirs: &(Vec<String>, Vec<Vec<f64>>)) {
+    let (names, theirs) = theirs;
     for (i, state) in plant.states.iter().enumerate() {
         let column = names.iter().position(|name| *name == state.name).unwrap();
         let size = ours.iter().map(|row| row[i].abs()).fold(1e-9, f64::max);
-        for (ours, theirs) in ours.iter().zip(&theirs) {
+        for (ours, theirs) in ours.iter().zip(theirs) {
             let deviation = (ours[i] - theirs[column]).abs() / size;
             let time = theirs[0];
             assert!(
@@ -115,9 +199,17 @@ fn their_trajectory(python: &str, path: &Path, plant: &Plant) -> (Vec<String>, V
         .args(arguments(plant))
         .output()
         .unwrap();
+    table_of(&succeeded(path, output))
+}
+
+fn succeeded(path: &Path, output: std::process::Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{}: {errors}", path.display());
-    let text = String::from_utf8(output.stdout).unwrap();
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Names of the columns, and the rows.
+fn table_of(text: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut lines = text.lines();
     let names = lines
         .next()
@@ -132,8 +224,8 @@ fn their_trajectory(python: &str, path: &Path, plant: &Plant) -> (Vec<String>, V
 }
 
 /// The classical Runge–Kutta method with small steps.
-fn our_trajectory(plant: &Plant) -> Vec<Vec<f64>> {
-    let mut slope = Slope::new(plant);
+fn our_trajectory(plant: &Plant, held: &dyn Fn(&Variable) -> f64) -> Vec<Vec<f64>> {
+    let mut slope = Slope::new(plant, held);
     let mut x: Vec<f64> = plant
         .states
         .iter()
@@ -170,7 +262,7 @@ struct Slope {
 }
 
 impl Slope {
-    fn new(plant: &Plant) -> Self {
+    fn new(plant: &Plant, held: &dyn Fn(&Variable) -> f64) -> Self {
         let variables = plant
             .states
             .iter()

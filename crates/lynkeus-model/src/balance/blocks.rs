@@ -4,13 +4,15 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary};
 
+use super::eliminate::{self, Core, Given};
 use super::incidence::{Incidence, arguments};
-use super::linear::{Form, Linear};
+use super::linear::Linear;
 use super::loops::Torn;
 use super::matching::Matching;
+use super::rows::{Row, Rows};
 use super::{FlatEquation, System, Unknown, listed, singular};
 use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
-use crate::syntax::{Problem, Result, Span};
+use crate::syntax::{Problem, Result};
 
 pub(super) struct Solver<'a> {
     system: &'a System<'a>,
@@ -87,80 +89,53 @@ impl<'a> Solver<'a> {
         Ok(true)
     }
 
-    /// Unknowns that share their equations: a linear system, or an implicit function.
+    /// Unknowns that need each other: what follows with a constant factor is taken out, the core
+    /// is a system of linear equations; where it is not, it is an implicit function.
     fn coupled(&mut self, block: &[(usize, usize)]) -> Result<()> {
+        let System {
+            equations,
+            unknowns,
+            ..
+        } = self.system;
+        let pairs: Vec<(&FlatEquation, &Unknown)> = block
+            .iter()
+            .map(|&(equation, unknown)| (&equations[equation], &unknowns[unknown]))
+            .collect();
+        let core = self.core(&pairs)?;
+        if let Some((place, _)) = core.rows.iter().find(|(_, row)| row.len() == 0) {
+            return Err(dependent(self.source, &pairs, *place));
+        }
+        if core.rows.iter().any(|(_, row)| !row.nonlinear.is_empty()) {
+            return self.implicit(block);
+        }
+        if core.columns.len() > MAX_COUPLED {
+            return Err(too_many_coupled(&pairs, core.columns.len()));
+        }
+        let values = self.linear_core(&core);
+        for (&column, value) in core.columns.iter().zip(values) {
+            self.solution.insert(pairs[column].1.symbol, value);
+        }
+        self.taken_out(&pairs, &core.given);
+        Ok(())
+    }
+
+    /// A loop that is not linear, torn: the roots of what is left, and what follows from them.
+    fn implicit(&mut self, block: &[(usize, usize)]) -> Result<()> {
         let torn = Torn::new(self.system, self.incidence, &self.linear(), block)?;
-        let names: Vec<Node> = torn.unknowns.iter().map(|unknown| unknown.symbol).collect();
-        if names.len() > MAX_COUPLED {
-            return Err(self.too_many_coupled(block));
+        if torn.unknowns.len() > MAX_COUPLED {
+            return Err(self.too_many_torn(block));
         }
         singular::check(self.system.graph, &torn, self.source)?;
-        let roots = match self.rows(&torn, &names)? {
-            Some(rows) => self.linear_roots(rows),
-            None => self.nonlinear_roots(&torn)?,
-        };
-        self.solution.extend(names.into_iter().zip(roots));
+        let roots = self.roots(&torn)?;
+        let symbols = torn.unknowns.iter().map(|unknown| unknown.symbol);
+        self.solution.extend(symbols.zip(roots));
         let (symbols, values): (Vec<Node>, Vec<Node>) = torn.explicit.into_iter().unzip();
         let values = self.system.graph.substitute(&values, &self.solution);
         self.solution.extend(symbols.into_iter().zip(values));
         Ok(())
     }
 
-    /// Coefficients of the unknowns and the rest, of each residual; none where one is not
-    /// linear.
-    fn rows(&self, torn: &Torn<'_>, unknowns: &[Node]) -> Result<Option<Vec<Row>>> {
-        let mut rows = vec![];
-        for (residual, equation) in torn.residuals.iter().zip(&torn.equations) {
-            match self.row(*residual, unknowns, equation.span)? {
-                Some(row) => rows.push(row),
-                None => return Ok(None),
-            }
-        }
-        Ok(Some(rows))
-    }
-
-    fn row(&self, residual: Node, unknowns: &[Node], span: Span) -> Result<Option<Row>> {
-        let linear = self.linear();
-        let mut rest = Some(residual);
-        let mut coefficients = vec![];
-        for &unknown in unknowns {
-            let form = match rest {
-                Some(node) => linear.form(node, unknown, span)?,
-                None => Some(Form::default()),
-            };
-            let Some(form) = form else {
-                return Ok(None);
-            };
-            coefficients.push(form.coefficient);
-            rest = form.rest;
-        }
-        for &coefficient in coefficients.iter().flatten() {
-            let read = linear.below(coefficient, span)?;
-            if read.iter().any(|node| unknowns.contains(node)) {
-                return Ok(None);
-            }
-        }
-        Ok(Some(Row { coefficients, rest }))
-    }
-
-    fn linear_roots(&mut self, rows: Vec<Row>) -> Vec<Node> {
-        let graph = self.system.graph;
-        let zero = graph.constant(0.0).node();
-        let (mut matrix, mut right) = (vec![], vec![]);
-        for Row { coefficients, rest } in rows {
-            for coefficient in coefficients {
-                matrix.push(coefficient.map_or(zero, |node| self.replace(node)));
-            }
-            let rest = rest.map_or(zero, |node| self.replace(node));
-            right.push(graph.unary(Unary::Neg, rest));
-        }
-        match (&matrix[..], &right[..]) {
-            (&[slope], &[right]) => vec![graph.binary(Binary::Div, right, slope)],
-            _ => graph.solve(&matrix, &right).x,
-        }
-    }
-
-    fn nonlinear_roots(&self, torn: &Torn<'_>) -> Result<Vec<Node>> {
+    fn roots(&self, torn: &Torn<'_>) -> Result<Vec<Node>> {
         let graph = self.system.graph;
         let residuals = graph.substitute(&torn.residuals, &self.solution);
         let unknowns: Vec<ImplicitUnknown> = torn
@@ -176,6 +151,104 @@ impl<'a> Solver<'a> {
             let span = torn.equations.first().map(|equation| equation.span);
             Problem::new(span.unwrap_or_default(), error.to_string())
         })
+    }
+
+    fn core(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Core> {
+        let graph = self.system.graph;
+        let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
+        let rows = Rows {
+            linear: self.linear(),
+            place: symbols
+                .enumerate()
+                .map(|(place, symbol)| (symbol, place))
+                .collect(),
+        };
+        let row = |(equation, _): &(&FlatEquation, &Unknown)| {
+            let residual = graph.binary(Binary::Sub, equation.left, equation.right);
+            rows.row(residual, equation.span)
+        };
+        let found: Vec<Row> = pairs.iter().map(row).collect::<Result<_>>()?;
+        let span = pairs.first().map(|(equation, _)| equation.span);
+        eliminate::core(graph, &self.budget, span.unwrap_or_default(), found)
+    }
+
+    fn linear_core(&mut self, core: &Core) -> Vec<Node> {
+        let graph = self.system.graph;
+        let zero = graph.constant(0.0).node();
+        let (mut matrix, mut right) = (vec![], vec![]);
+        for (_, row) in &core.rows {
+            for column in &core.columns {
+                let coefficient = row.coefficients.get(column);
+                matrix.push(coefficient.map_or(zero, |&node| self.replace(node)));
+            }
+            let rest = row.rest.map_or(zero, |node| self.replace(node));
+            right.push(graph.unary(Unary::Neg, rest));
+        }
+        match (&matrix[..], &right[..]) {
+            ([], []) => vec![],
+            ([factor], [right]) => vec![graph.binary(Binary::Div, *right, *factor)],
+            _ => graph.solve(&matrix, &right).x,
+        }
+    }
+
+    /// The unknowns that were taken out, each behind those it needs.
+    fn taken_out(&mut self, pairs: &[(&FlatEquation, &Unknown)], given: &[Given]) {
+        let graph = self.system.graph;
+        let of_symbol: HashMap<Node, usize> = given
+            .iter()
+            .enumerate()
+            .map(|(place, g)| (pairs[g.column].1.symbol, place))
+            .collect();
+        let values: Vec<Node> = given
+            .iter()
+            .map(|given| self.value_of(pairs, given))
+            .collect();
+        let needs = |place: usize| -> Vec<usize> {
+            let symbols = graph.symbols_of(&values[place..=place]);
+            symbols
+                .iter()
+                .filter_map(|symbol| of_symbol.get(symbol).copied())
+                .collect()
+        };
+        let mut done = vec![false; given.len()];
+        let mut path: Vec<(usize, Vec<usize>)> = vec![];
+        for root in (0..given.len()).rev() {
+            if !std::mem::replace(&mut done[root], true) {
+                path.push((root, needs(root)));
+            }
+            while let Some((place, open)) = path.last_mut() {
+                if let Some(need) = open.pop() {
+                    if !std::mem::replace(&mut done[need], true) {
+                        path.push((need, needs(need)));
+                    }
+                    continue;
+                }
+                let (symbol, value) = (pairs[given[*place].column].1.symbol, values[*place]);
+                let value = self.replace(value);
+                self.solution.insert(symbol, value);
+                path.pop();
+            }
+        }
+    }
+
+    /// −(rest + Σ coefficient · unknown) / factor
+    fn value_of(&self, pairs: &[(&FlatEquation, &Unknown)], given: &Given) -> Node {
+        let graph = self.system.graph;
+        let mut sum = given.row.rest;
+        for (&column, &coefficient) in &given.row.coefficients {
+            if column != given.column {
+                let term = graph.binary(Binary::Mul, coefficient, pairs[column].1.symbol);
+                sum = Some(sum.map_or(term, |sum| graph.binary(Binary::Add, sum, term)));
+            }
+        }
+        let Some(sum) = sum else {
+            return graph.constant(0.0).node();
+        };
+        match given.factor {
+            1.0 => graph.unary(Unary::Neg, sum),
+            -1.0 => sum,
+            factor => graph.binary(Binary::Div, sum, graph.constant(-factor).node()),
+        }
     }
 
     /// The expression with solved unknowns in place of their symbols.
@@ -213,7 +286,7 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn too_many_coupled(&self, block: &[(usize, usize)]) -> Problem {
+    fn too_many_torn(&self, block: &[(usize, usize)]) -> Problem {
         let System {
             equations,
             unknowns,
@@ -232,10 +305,41 @@ impl<'a> Solver<'a> {
     }
 }
 
-/// Σ coefficient·unknown + rest; `None` is zero.
-struct Row {
-    coefficients: Vec<Option<Node>>,
-    rest: Option<Node>,
+fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem {
+    let span = pairs
+        .iter()
+        .map(|(equation, _)| equation.span)
+        .min_by_key(|span| span.start);
+    let n = pairs.len();
+    let message = format!(
+        "{n} unknowns share their equations, {left} of them with factors that vary; at most \
+         {MAX_COUPLED} may"
+    );
+    Problem::new(span.unwrap_or_default(), message)
+        .hint("write the equations solved for their unknowns")
+}
+
+/// One equation of a linear loop follows from the others, or contradicts them.
+fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Problem {
+    let names: Vec<String> = pairs
+        .iter()
+        .take(8)
+        .map(|(_, unknown)| unknown.quoted())
+        .collect();
+    let more = if pairs.len() > 8 { ", …" } else { "" };
+    let spans = pairs.iter().map(|(equation, _)| equation.span);
+    let lines = super::diagnose::lines(source, spans);
+    let message = format!(
+        "these equations do not determine {}{more}",
+        names.join(", ")
+    );
+    Problem::new(pairs[place].0.span, message)
+        .label(format!("this one repeats or contradicts others on {lines}"))
+        .hint(
+            "a circuit without ground and a network without a fixed pressure look like this, and a \
+             constraint between states that is hidden in the loop (index above 1): leave one \
+             equation out, or replace it by its derivative with respect to time",
+        )
 }
 
 fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {

@@ -16,10 +16,11 @@ pub(super) struct Balance<'a> {
 }
 
 impl Balance<'_> {
-    pub(super) fn check(&self, inputs: &[Node], model: Span) -> Result<()> {
+    pub(super) fn check(&self, model: Span) -> Result<()> {
         let System {
             equations,
             unknowns,
+            inputs,
             ..
         } = self.system;
         if !unknowns.iter().any(|unknown| unknown.state.is_some()) {
@@ -172,7 +173,11 @@ fn first_free(partners: &[Option<usize>]) -> Option<usize> {
 }
 
 /// Both kinds of places on alternating paths: along any edge there, along pairs back.
-fn reached(start: usize, edges: &[Vec<usize>], back: &[Option<usize>]) -> (Vec<usize>, Vec<usize>) {
+pub(super) fn reached(
+    start: usize,
+    edges: &[Vec<usize>],
+    back: &[Option<usize>],
+) -> (Vec<usize>, Vec<usize>) {
     let mut seen = vec![false; edges.len()];
     let mut seen_there = vec![false; back.len()];
     let (mut here, mut there) = (vec![start], vec![]);

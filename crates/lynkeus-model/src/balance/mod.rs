@@ -7,18 +7,21 @@
 
 mod blocks;
 mod diagnose;
+mod eliminate;
 mod incidence;
 mod linear;
 mod loops;
 mod matching;
 mod order;
+mod reduce;
+mod rows;
 mod singular;
 
 use std::collections::HashMap;
 
 use lynkeus_expr::{Graph, Interval, Node};
 
-use crate::syntax::{Result, Span};
+use crate::syntax::{Problem, Result, Span};
 use incidence::Incidence;
 
 /// An equation between two expressions.
@@ -41,6 +44,8 @@ pub(crate) struct Unknown {
     pub span: Span,
     /// the state, where the unknown is its derivative
     pub state: Option<Node>,
+    /// how much it is wanted as a state, where there is a choice
+    pub rank: i32,
     /// where the search begins, if its equation has to be solved by one
     pub start: f64,
     /// where it may lie
@@ -75,15 +80,47 @@ pub(crate) struct System<'a> {
     pub graph: &'a Graph,
     pub equations: &'a [FlatEquation],
     pub unknowns: &'a [Unknown],
+    pub inputs: &'a [Node],
+    pub time: Node,
 }
 
 /// An expression for every unknown, free of unknowns.
-pub(crate) fn solve(
+pub(crate) fn solve(system: &System<'_>, source: &str, model: Span) -> Result<HashMap<Node, Node>> {
+    let found = solved(system, source, model);
+    let is_balanced = system.equations.len() == system.unknowns.len();
+    let Err(Unsolved {
+        problem,
+        is_singular: true,
+    }) = found
+    else {
+        return found.map_err(|unsolved| unsolved.problem);
+    };
+    if !is_balanced {
+        return Err(problem);
+    }
+    // As many equations as unknowns, but some say only how states hang together.
+    let Some(reduced) = reduce::reduced(system)? else {
+        return Err(problem);
+    };
+    let system = System {
+        equations: &reduced.equations,
+        unknowns: &reduced.unknowns,
+        ..*system
+    };
+    solved(&system, source, model).map_err(|unsolved| unsolved.problem)
+}
+
+struct Unsolved {
+    problem: Problem,
+    /// some equation has no unknown of its own
+    is_singular: bool,
+}
+
+fn solved(
     system: &System<'_>,
-    inputs: &[Node],
     source: &str,
     model: Span,
-) -> Result<HashMap<Node, Node>> {
+) -> std::result::Result<HashMap<Node, Node>, Unsolved> {
     let incidence = Incidence::new(system);
     let matching = matching::maximum(system, &incidence.of_equation);
     let matched = diagnose::Balance {
@@ -92,7 +129,14 @@ pub(crate) fn solve(
         matching: &matching,
         source,
     };
-    matched.check(inputs, model)?;
+    let unsolved = |is_singular| {
+        move |problem| Unsolved {
+            problem,
+            is_singular,
+        }
+    };
+    matched.check(model).map_err(unsolved(true))?;
     let blocks = order::blocks(&incidence.of_equation, &matching);
-    blocks::Solver::new(system, &incidence, source).solve(&blocks, &matching)
+    let solver = blocks::Solver::new(system, &incidence, source);
+    solver.solve(&blocks, &matching).map_err(unsolved(false))
 }

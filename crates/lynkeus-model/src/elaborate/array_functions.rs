@@ -4,7 +4,7 @@ use super::evaluate::Evaluator;
 use super::value::{Array, Scalar, Value, describe_dims, element_count};
 use crate::limits::MAX_RANK;
 use crate::syntax::ast::{BinaryOperator, Call, ExprId, Kind};
-use crate::syntax::{Problem, Result, Span, too_many_dimensions};
+use crate::syntax::{Problem, Result, Span, plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
     /// `None` where there is no such function.
@@ -63,7 +63,8 @@ impl<'a> Evaluator<'a> {
     /// Sizes of an expression; of a declared name also where its value is not known.
     fn dims_of(&mut self, argument: ExprId) -> Result<Vec<usize>> {
         if matches!(self.ast.expression(argument).kind, Kind::Name)
-            && let Some(dims) = self.scope.dims(self.text(self.span(argument)))
+            && self.frame.is_none()
+            && let Some(dims) = self.scope.dims(&plain(self.text(self.span(argument))))
         {
             return Ok(dims.to_vec());
         }

@@ -14,7 +14,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Values of one size, side by side along a new first dimension.
-    fn stack(&self, values: Vec<Value>, span: Span) -> Result<Value> {
+    pub(super) fn stack(&self, values: Vec<Value>, span: Span) -> Result<Value> {
         let Some(first) = values.first() else {
             return Ok(Value::vector(vec![]));
         };

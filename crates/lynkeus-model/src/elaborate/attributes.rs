@@ -6,7 +6,7 @@ use super::scope::Mode;
 use super::symbols::{Component, Context, Symbols};
 use super::value::{Scalar, Value, describe_dims, element_name};
 use crate::Variable;
-use crate::syntax::ast::{Attribute, Declaration, Kind};
+use crate::syntax::ast::{Attribute, Declaration, ExprId, Kind, TypeName};
 use crate::syntax::{Problem, Result, unquoted};
 
 /// What a declaration says of all its elements.
@@ -48,6 +48,7 @@ impl Attributes {
             context,
             symbols,
             component,
+            is_boolean: declaration.prefix.type_name == TypeName::Boolean,
         };
         let mut attributes = Self {
             start: None,
@@ -58,28 +59,39 @@ impl Attributes {
             fixed: None,
             unit: None,
         };
+        if let Some(library) = context.model.library.get(&declaration.label) {
+            attributes.unit = Some(library.unit.to_owned());
+            attributes.min = library.min.map(Numbers::Same);
+        }
+        let mut given: Vec<&str> = vec![];
         for attribute in &declaration.attributes {
-            let slot = match attribute.name.text(context.source) {
+            let name = attribute.name.text(context.source);
+            if given.contains(&name) {
+                let message = "this attribute is given twice";
+                return Err(Problem::new(attribute.name, message));
+            }
+            given.push(name);
+            let Some(value) = attribute.value else {
+                return Err(Problem::new(
+                    attribute.name,
+                    format!("expected a value for `{name}`"),
+                ));
+            };
+            let slot = match name {
                 "start" => &mut attributes.start,
                 "min" => &mut attributes.min,
                 "max" => &mut attributes.max,
                 "nominal" => &mut attributes.nominal,
                 "fixed" => &mut attributes.fixed,
                 "unit" => {
-                    attributes.unit = Some(reader.text(attribute)?);
+                    attributes.unit = Some(reader.text(value)?);
                     continue;
                 }
                 _ => continue,
             };
-            if slot.is_some() {
-                return Err(Problem::new(
-                    attribute.name,
-                    "this attribute is given twice",
-                ));
-            }
-            *slot = reader.numbers(attribute)?;
-            if attribute.name.text(context.source) == "start" {
-                attributes.start_nodes = reader.symbolic(attribute)?;
+            *slot = reader.numbers(name, value)?;
+            if name == "start" {
+                attributes.start_nodes = reader.symbolic(value)?;
             }
         }
         // A start that cannot be computed from parameters is not known, however fixed.
@@ -88,22 +100,17 @@ impl Attributes {
         if unknown && declaration.attributes.iter().any(is_start) {
             attributes.fixed = None;
         }
-        attributes.check_range(context, declaration, component)?;
+        attributes.check_range(declaration, component)?;
         Ok(attributes)
     }
 
-    fn check_range(
-        &self,
-        context: &Context<'_>,
-        declaration: &Declaration,
-        component: &Component,
-    ) -> Result<()> {
+    fn check_range(&self, declaration: &Declaration, component: &Component) -> Result<()> {
         for offset in 0..component.elements.len() {
             let bound = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
             if let (Some(min), Some(max)) = (bound(&self.min), bound(&self.max))
                 && min > max
             {
-                let name = declaration.name.text(context.source);
+                let name = declaration.label.as_str();
                 let name = element_name(name, &component.dims, offset);
                 let message = format!("the range of `{name}` is empty: min {min} > max {max}");
                 return Err(Problem::new(declaration.name, message));
@@ -127,7 +134,6 @@ impl Attributes {
     /// One element as a variable of the plant.
     pub(super) fn variable(
         &self,
-        context: &Context<'_>,
         declaration: &Declaration,
         dims: &[usize],
         offset: usize,
@@ -135,7 +141,7 @@ impl Attributes {
     ) -> Variable {
         let at = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
         Variable {
-            name: element_name(declaration.name.text(context.source), dims, offset),
+            name: element_name(&declaration.label, dims, offset),
             node,
             unit: self.unit.clone(),
             description: declaration.description.clone(),
@@ -147,7 +153,7 @@ impl Attributes {
             min: at(&self.min).unwrap_or(f64::NEG_INFINITY),
             max: at(&self.max).unwrap_or(f64::INFINITY),
             nominal: at(&self.nominal),
-            integer: declaration.prefix.integer,
+            integer: declaration.prefix.is_integer(),
             fixed: at(&self.fixed) == Some(1.0),
         }
     }
@@ -157,11 +163,12 @@ struct Reader<'r, 'a> {
     context: &'r Context<'a>,
     symbols: &'r Symbols<'a>,
     component: &'r Component,
+    is_boolean: bool,
 }
 
 impl Reader<'_, '_> {
-    fn text(&self, attribute: &Attribute) -> Result<String> {
-        let expression = self.context.ast.expression(attribute.value);
+    fn text(&self, value: ExprId) -> Result<String> {
+        let expression = self.context.ast.expression(value);
         match expression.kind {
             Kind::Text => Ok(unquoted(expression.span.text(self.context.source))),
             _ => Err(Problem::new(expression.span, "expected a string")
@@ -170,13 +177,13 @@ impl Reader<'_, '_> {
     }
 
     /// The value as expressions, where it depends on parameters that are symbols.
-    fn symbolic(&self, attribute: &Attribute) -> Result<Vec<Node>> {
+    fn symbolic(&self, value: ExprId) -> Result<Vec<Node>> {
         let graph = self.context.graph;
         if !self.context.options.symbolic_parameters {
             return Ok(vec![]);
         }
         let mut evaluator = self.symbols.evaluator(self.context, Mode::Parametric);
-        let elements = match evaluator.value(attribute.value)? {
+        let elements = match evaluator.value(value)? {
             Value::Scalar(scalar) => vec![scalar],
             Value::Array(array) => array.elements,
         };
@@ -189,9 +196,8 @@ impl Reader<'_, '_> {
     }
 
     /// `None` where the value needs a parameter that has none.
-    fn numbers(&self, attribute: &Attribute) -> Result<Option<Numbers>> {
-        let id = attribute.value;
-        let is_truth = attribute.name.text(self.context.source) == "fixed";
+    fn numbers(&self, name: &str, id: ExprId) -> Result<Option<Numbers>> {
+        let is_truth = name == "fixed";
         let mut evaluator = self.symbols.evaluator(self.context, Mode::Structural);
         let span = self.context.ast.expression(id).span;
         let value = match evaluator.value(id) {
@@ -204,7 +210,9 @@ impl Reader<'_, '_> {
         let graph = self.context.graph;
         let number = |scalar: Scalar| {
             let (value, expected) = match (scalar, is_truth) {
-                (Scalar::Boolean(node), true) => (graph.constant_value(node), ""),
+                (Scalar::Boolean(node), _) if is_truth || self.is_boolean => {
+                    (graph.constant_value(node), "expected `true` or `false`")
+                }
                 (_, true) => (None, "expected `true` or `false`"),
                 _ => (scalar.number(graph), "expected a finite number"),
             };

@@ -1,10 +1,14 @@
 //! Expressions of the syntax tree to values over the graph.
 
-use lynkeus_expr::{Graph, Unary};
+use lynkeus_expr::{Graph, Node, Unary};
 
 use super::arithmetic::unequal_sizes;
-use super::scope::{Mode, Named, Scope};
+use super::execute::Claim;
+use super::frame::Frame;
+use super::scope::{Mode, Scope};
+use super::symbols::Context;
 use super::value::{Scalar, Value};
+use crate::flat::Classes;
 use crate::limits::Budget;
 use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
@@ -24,6 +28,18 @@ pub(crate) struct Evaluator<'a> {
     pub(super) ends: Vec<usize>,
     /// set when an evaluation failed because a parameter has no value
     pub(super) valueless: bool,
+    /// the classes of the text, for functions and records
+    pub(super) classes: Option<&'a Classes<'a>>,
+    /// where names of classes are looked up
+    pub(super) scopes: Vec<&'a str>,
+    /// variables of the function or algorithm around
+    pub(super) frame: Option<Frame>,
+    /// functions around, innermost last
+    pub(super) calls: Vec<usize>,
+    /// conditions of the `if`s around
+    pub(super) conditions: Vec<Node>,
+    /// what is to hold along a run
+    pub(super) claims: Vec<Claim>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -46,7 +62,20 @@ impl<'a> Evaluator<'a> {
             loops,
             ends,
             valueless,
+            classes: None,
+            scopes: vec![],
+            frame: None,
+            calls: vec![],
+            conditions: vec![],
+            claims: vec![],
         }
+    }
+
+    /// With the functions and records of a text.
+    pub(super) fn within(mut self, context: &Context<'a>) -> Self {
+        self.classes = Some(context.classes);
+        self.scopes = context.model.scopes.iter().map(String::as_str).collect();
+        self
     }
 
     pub(super) fn span(&self, id: ExprId) -> Span {
@@ -66,7 +95,13 @@ impl<'a> Evaluator<'a> {
             Kind::Integer(value) => Scalar::Integer(*value),
             Kind::Real(value) => Scalar::Real(self.graph.constant(*value).node()),
             Kind::Boolean(value) => self.truth(*value),
-            Kind::Text => return Err(Problem::new(span, "expected a number, found a string")),
+            Kind::Text => {
+                return Err(
+                    Problem::new(span, "a string here is not supported").hint("use numbers")
+                );
+            }
+            Kind::Path(parts) => return self.path(parts, span),
+            Kind::Member(record, name) => return self.member(*record, name, span),
             Kind::All => return Err(Problem::new(span, "`:` stands only in subscripts")),
             Kind::End => self.end(span)?,
             Kind::Name => return self.name(span),
@@ -141,44 +176,6 @@ impl<'a> Evaluator<'a> {
         size.map(Scalar::Integer).ok_or_else(outside)
     }
 
-    fn name(&mut self, span: Span) -> Result<Value> {
-        let name = self.text(span);
-        if let Some((_, value)) = self
-            .loops
-            .iter()
-            .rev()
-            .find(|(iterator, _)| *iterator == name)
-        {
-            return Ok(Value::Scalar(*value));
-        }
-        match self.scope.named(name, self.mode) {
-            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
-            Named::Array(dims, elements) => {
-                self.budget.charge(elements.len() as u64, span)?;
-                Ok(Value::new(dims.to_vec(), elements.to_vec()))
-            }
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
-            Named::Unknown => match self.builtin(name) {
-                Some(scalar) => Ok(Value::Scalar(scalar)),
-                None => Err(self.unknown_name(span)),
-            },
-            Named::Varying => Err(self.varying(span)),
-            Named::Valueless => Err(self.without_value(span)),
-        }
-    }
-
-    fn builtin(&self, name: &str) -> Option<Scalar> {
-        let value = match name {
-            "time" => return self.scope.time(self.mode).map(Scalar::Real),
-            "Modelica.Constants.pi" => std::f64::consts::PI,
-            "Modelica.Constants.e" => std::f64::consts::E,
-            "Modelica.Constants.g_n" => 9.80665,
-            "Modelica.Constants.D2R" => std::f64::consts::PI / 180.0,
-            _ => return None,
-        };
-        Some(Scalar::Real(self.graph.constant(value).node()))
-    }
-
     pub(super) fn varying(&self, span: Span) -> Problem {
         let name = self.text(span);
         Problem::new(
@@ -207,8 +204,12 @@ impl<'a> Evaluator<'a> {
         }
         let message = format!("unknown name `{}`", crate::syntax::shortened(name));
         if name.contains('.') {
-            let hint = "components of other models are not supported; \
-                        of `Modelica.Constants` there are pi, e, g_n and D2R";
+            let declared = self.scope.names();
+            let hint = did_you_mean(name, declared.into_iter()).unwrap_or_else(|| {
+                "components of other models are not supported, nor other constants of the \
+                 library than those of `Modelica.Constants`"
+                    .to_owned()
+            });
             return Problem::new(span, message).hint(hint);
         }
         let iterators = self.loops.iter().map(|(iterator, _)| *iterator);

@@ -1,24 +1,33 @@
 //! Equations of the text to scalar equations over the graph.
 
-use lynkeus_expr::{Binary, Node};
+use lynkeus_expr::{Binary, Node, Unary};
 
 use super::evaluate::Evaluator;
-use super::scope::Mode;
+use super::execute::{self, Claim};
+use super::frame::{Frame, Local};
+use super::inline::Outcome;
+use super::records::Record;
+use super::scope::{Mode, Named};
 use super::symbols::{Context, Symbols};
 use super::value::{Scalar, Value, describe_dims, element_name};
 use crate::balance::FlatEquation;
 use crate::syntax::ast::{
-    Causality, Declaration, Equation, EquationKind, ExprId, Iterator as Loop, ModelSyntax,
-    Variability,
+    Declaration, Equation, EquationKind, ExprId, Iterator as Loop, Kind, Statement, Variability,
 };
-use crate::syntax::{Problem, Result, Span};
+use crate::syntax::{Problem, Result, Span, plain};
+
+/// A model written out.
+pub(super) struct Flat {
+    pub equations: Vec<FlatEquation>,
+    /// of the section `initial equation`; with the places of those that are not read
+    pub initial: Vec<FlatEquation>,
+    pub initial_unread: Vec<Span>,
+    pub claims: Vec<Claim>,
+}
 
 /// All scalar equations of a model, declaration equations first.
-pub(super) fn flatten<'a>(
-    context: &Context<'a>,
-    symbols: &Symbols<'a>,
-    model: &'a ModelSyntax,
-) -> Result<Vec<FlatEquation>> {
+pub(super) fn flatten<'a>(context: &Context<'a>, symbols: &Symbols<'a>) -> Result<Flat> {
+    let model = context.model;
     let evaluator = symbols.evaluator(context, Mode::Continuous);
     let mut flattener = Flattener {
         evaluator,
@@ -29,11 +38,28 @@ pub(super) fn flatten<'a>(
             && let Some(binding) = declaration.binding
         {
             let variable = Value::new(component.dims.clone(), component.elements.clone());
-            flattener.declaration(context, declaration, variable, binding)?;
+            flattener.declaration(declaration, variable, binding)?;
         }
     }
     flattener.all(&model.equations)?;
-    Ok(flattener.equations)
+    for algorithm in &model.algorithms {
+        flattener.algorithm(algorithm)?;
+    }
+    let equations = std::mem::take(&mut flattener.equations);
+    let claims = std::mem::take(&mut flattener.evaluator.claims);
+    let mut initial_unread = vec![];
+    for equation in &model.initial {
+        match flattener.has_derivative(equation) {
+            true => initial_unread.push(equation.span),
+            false => flattener.one(equation)?,
+        }
+    }
+    Ok(Flat {
+        equations,
+        initial: flattener.equations,
+        initial_unread,
+        claims,
+    })
 }
 
 struct Flattener<'a> {
@@ -42,20 +68,77 @@ struct Flattener<'a> {
 }
 
 impl<'a> Flattener<'a> {
+    fn has_derivative(&self, equation: &Equation) -> bool {
+        let sides = match &equation.kind {
+            EquationKind::Equality(left, right) => [*left, *right],
+            _ => return false,
+        };
+        let ast = self.evaluator.ast;
+        let mut parts = sides.into_iter().flat_map(|side| ast.parts(side));
+        parts.any(|part| match &part.kind {
+            Kind::Call(call) => self.evaluator.text(call.function) == "der",
+            _ => false,
+        })
+    }
+
+    /// The variables that an algorithm assigns, each with an equation of its own.
+    fn algorithm(&mut self, statements: &'a [Statement]) -> Result<()> {
+        let evaluator = &mut self.evaluator;
+        let mut names = vec![];
+        execute::targets(evaluator.source, evaluator.ast, statements, &mut names);
+        names.sort_unstable();
+        names.dedup();
+        let mut frame = Frame::default();
+        for name in &names {
+            if let Named::Array(dims, elements) = evaluator.named(name) {
+                evaluator
+                    .budget
+                    .charge(elements.len() as u64, Span::default())?;
+                let is_integer = elements.iter().all(|e| matches!(e, Scalar::Integer(_)));
+                let local = Local::without_value(dims.to_vec(), is_integer);
+                frame.locals.insert(name.clone(), local);
+            }
+        }
+        evaluator.frame = Some(frame);
+        let done = evaluator.execute(statements);
+        let frame = evaluator.frame.take().unwrap_or_default();
+        done?;
+        let span = statements.first().map(|s| s.span).unwrap_or_default();
+        for name in names {
+            let span = statements
+                .iter()
+                .map(|statement| statement.span)
+                .find(|span| plain(self.evaluator.text(*span)).starts_with(name.as_str()))
+                .unwrap_or(span);
+            self.assigned(&name, &frame, span)?;
+        }
+        Ok(())
+    }
+
+    fn assigned(&mut self, name: &str, frame: &Frame, span: Span) -> Result<()> {
+        let (Some(local), Named::Array(dims, elements)) =
+            (frame.locals.get(name), self.evaluator.named(name))
+        else {
+            return Ok(());
+        };
+        for (offset, (&variable, value)) in elements.iter().zip(&local.elements).enumerate() {
+            let Some(value) = *value else {
+                let full = element_name(name, dims, offset);
+                return Err(self.evaluator.unassigned(&full, span));
+            };
+            self.equate(Value::Scalar(variable), Value::Scalar(value), span)?;
+        }
+        Ok(())
+    }
+
     fn declaration(
         &mut self,
-        context: &Context<'_>,
         declaration: &Declaration,
         variable: Value,
         binding: ExprId,
     ) -> Result<()> {
-        let name = declaration.name.text(context.source);
+        let name = &declaration.label;
         let span = declaration.name.to(self.evaluator.span(binding));
-        if declaration.prefix.causality == Causality::Input {
-            let message = format!("input `{name}` must not have an equation");
-            return Err(Problem::new(span, message)
-                .hint("give a starting value with `start = …`, or make it a parameter"));
-        }
         let value = self.evaluator.value(binding)?;
         if variable.dims() != value.dims() {
             let (has, found) = (describe_dims(variable.dims()), describe_dims(value.dims()));
@@ -73,14 +156,49 @@ impl<'a> Flattener<'a> {
         self.evaluator.budget.charge(1, equation.span)?;
         match &equation.kind {
             EquationKind::Equality(left, right) => {
+                if let Some(left) = self.evaluator.record(*left)? {
+                    return self.equate_records(left, *right, equation.span);
+                }
                 let (left, right) = (self.evaluator.value(*left)?, self.evaluator.value(*right)?);
                 self.equate(left, right, equation.span)
             }
+            EquationKind::Several(targets, call) => self.several(targets, *call, equation.span),
+            EquationKind::Assert(assert) => self.evaluator.claim(assert, equation.span),
             EquationKind::For(iterators, body) => self.repeat(iterators, body),
             EquationKind::If(branches, otherwise) => {
                 self.choose(branches, otherwise, equation.span)
             }
         }
+    }
+
+    fn equate_records(&mut self, left: Record, right: ExprId, span: Span) -> Result<()> {
+        let right = self.evaluator.record(right)?;
+        for (name, value) in left.members {
+            let other = right.as_ref().and_then(|right| right.member(&name));
+            let other = other.cloned().ok_or_else(|| {
+                let message = format!("expected a record with the member `{name}` on both sides");
+                Problem::new(span, message)
+            })?;
+            self.equate(value, other, span)?;
+        }
+        Ok(())
+    }
+
+    fn several(&mut self, targets: &[Option<ExprId>], call: ExprId, span: Span) -> Result<()> {
+        let outcomes = self.evaluator.outcomes(call, targets.len())?;
+        for (target, outcome) in targets.iter().zip(outcomes) {
+            let Some(target) = *target else {
+                continue;
+            };
+            match outcome {
+                Outcome::Value(value) => {
+                    let left = self.evaluator.value(target)?;
+                    self.equate(left, value, span)?;
+                }
+                Outcome::Record(record) => self.equate_records(record, target, span)?,
+            }
+        }
+        Ok(())
     }
 
     fn repeat(&mut self, iterators: &'a [Loop], body: &'a [Equation]) -> Result<()> {
@@ -108,7 +226,10 @@ impl<'a> Flattener<'a> {
         let count = left.elements().len();
         self.evaluator.budget.charge(count as u64, span)?;
         for (offset, (&a, &b)) in left.elements().iter().zip(right.elements()).enumerate() {
-            let (a, b) = (self.side(a, span)?, self.side(b, span)?);
+            let (a, b) = match (a, b) {
+                (Scalar::Boolean(a), Scalar::Boolean(b)) => (a, b),
+                _ => (self.side(a, span)?, self.side(b, span)?),
+            };
             let element = match left.dims() {
                 [] => None,
                 dims => Some(element_name("", dims, offset)),
@@ -125,8 +246,8 @@ impl<'a> Flattener<'a> {
 
     fn side(&self, scalar: Scalar, span: Span) -> Result<Node> {
         scalar.real(self.evaluator.graph).ok_or_else(|| {
-            Problem::new(span, "an equation between Booleans is not supported")
-                .hint("use Real variables and `if` expressions")
+            Problem::new(span, "an equation between a Boolean and a number")
+                .hint("write `if a then 1 else 0` for the number of a condition")
         })
     }
 
@@ -151,9 +272,15 @@ impl<'a> Flattener<'a> {
                 None => open.push((node, body)),
             }
         }
-        let mut joined = self.apart(last)?;
+        let mut conditions: Vec<Node> = open.iter().map(|(node, _)| *node).collect();
+        let negated = |node: &mut Node| *node = self.evaluator.graph.unary(Unary::Not, *node);
+        conditions.iter_mut().for_each(negated);
+        let mut joined = self.apart(&conditions, last)?;
         for (condition, body) in open.into_iter().rev() {
-            let branch = self.apart(body)?;
+            conditions.pop();
+            conditions.push(condition);
+            let branch = self.apart(&conditions, body)?;
+            conditions.pop();
             if branch.len() != joined.len() {
                 let (one, two) = (branch.len(), joined.len());
                 let message = format!("the branches have {one} and {two} equations");
@@ -170,10 +297,13 @@ impl<'a> Flattener<'a> {
         Ok(())
     }
 
-    /// The equations of a branch by themselves.
-    fn apart(&mut self, body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
+    /// The equations of a branch by themselves, and the conditions under which it is taken.
+    fn apart(&mut self, conditions: &[Node], body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
         let outside = std::mem::take(&mut self.equations);
+        let depth = self.evaluator.conditions.len();
+        self.evaluator.conditions.extend(conditions);
         let done = self.all(body);
+        self.evaluator.conditions.truncate(depth);
         let inside = std::mem::replace(&mut self.equations, outside);
         done.map(|()| inside)
     }

@@ -6,7 +6,7 @@ use super::arithmetic::overflow;
 use super::evaluate::Evaluator;
 use super::value::{Scalar, Value};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Call, ExprId, Kind};
+use crate::syntax::ast::{Call, ExprId};
 use crate::syntax::{Problem, Result, Span, shortened};
 
 const UNARY: [(&str, Unary); 14] = [
@@ -27,7 +27,10 @@ const UNARY: [(&str, Unary); 14] = [
 ];
 
 /// The other functions, for suggestions.
-const OTHERS: [&str; 30] = [
+const OTHERS: [&str; 33] = [
+    "homotopy",
+    "semiLinear",
+    "cross",
     "Modelica.Math.Vectors.interpolate",
     "der",
     "log10",
@@ -61,7 +64,7 @@ const OTHERS: [&str; 30] = [
 ];
 
 /// Functions that an observer's model cannot have, and what to do instead.
-const REFUSED: [(&str, &str); 12] = [
+const REFUSED: [(&str, &str); 10] = [
     (
         "pre",
         "models with events are not supported: use `if` expressions",
@@ -82,16 +85,23 @@ const REFUSED: [(&str, &str); 12] = [
         "delay",
         "a delay has infinitely many states: use a chain of lags",
     ),
-    ("homotopy", "write the actual expression"),
-    ("semiLinear", "write `if x >= 0 then a*x else b*x`"),
     ("spatialDistribution", "use a chain of lags"),
-    ("assert", "give bounds with `min` and `max`"),
+    ("assert", "it is an equation or a statement of its own"),
 ];
 
 impl<'a> Evaluator<'a> {
     pub(super) fn call(&mut self, call: &'a Call, span: Span) -> Result<Value> {
+        if self.classes.is_some()
+            && let Some(value) = self.own_function(call, span)?
+        {
+            return Ok(value);
+        }
         let name = self.text(call.function);
         let name = name.strip_prefix("Modelica.Math.").unwrap_or(name);
+        if let Some((name, _)) = call.named.first() {
+            let problem = Problem::new(*name, "a named argument is not supported");
+            return Err(problem.hint("give the arguments in order, without names"));
+        }
         if let Some(&(_, operation)) = UNARY.iter().find(|(known, _)| *known == name) {
             let value = self.only_argument(call)?;
             return self.map(value, span, |evaluator, scalar, span| {
@@ -124,6 +134,9 @@ impl<'a> Evaluator<'a> {
             "Vectors.interpolate" => self.interpolate(call, span),
             "noEvent" => self.only_argument(call),
             "smooth" => Ok(self.two_arguments(call)?.1),
+            "homotopy" => Ok(self.two_arguments(call)?.0),
+            "semiLinear" => self.semi_linear(call, span),
+            "cross" => self.cross(call, span),
             _ => match self.array_function(name, call, span)? {
                 Some(value) => Ok(value),
                 None => Err(self.unknown_function(call.function, name)),
@@ -140,7 +153,7 @@ impl<'a> Evaluator<'a> {
             "ln" => "the natural logarithm is `log`".to_owned(),
             "pow" => "write `a^b`".to_owned(),
             _ if self.scope.dims(name).is_some() => "subscripts stand in `[…]`".to_owned(),
-            _ => "functions of your own are not supported: write the formula out".to_owned(),
+            _ => "the text holds no function of this name".to_owned(),
         });
         Problem::new(span, format!("unknown function `{}`", shortened(name))).hint(hint)
     }
@@ -276,33 +289,5 @@ impl<'a> Evaluator<'a> {
         }
         let (a, b) = (self.real(a, span)?, self.real(b, span)?);
         Ok(Scalar::Real(self.graph.binary(op, a, b)))
-    }
-
-    /// `der(x)` of a variable, an element or a slice.
-    fn der(&mut self, call: &Call) -> Result<Value> {
-        let [argument] = self.arguments(call)?;
-        let span = self.span(argument);
-        if !matches!(
-            self.ast.expression(argument).kind,
-            Kind::Name | Kind::Index(..)
-        ) {
-            return Err(
-                Problem::new(span, "`der` takes a variable, not an expression")
-                    .hint("give the expression a variable of its own, or write its derivative out"),
-            );
-        }
-        let value = self.value(argument)?;
-        self.map(value, span, |evaluator, scalar, span| {
-            let derivative = match scalar {
-                Scalar::Real(node) => evaluator.scope.derivative(node),
-                _ => None,
-            };
-            derivative.map(Scalar::Real).ok_or_else(|| {
-                let name = evaluator.text(span);
-                let message = format!("`der({name})`: `{name}` is not a Real variable");
-                Problem::new(span, message)
-                    .hint("inputs and parameters have no derivative in the equations")
-            })
-        })
     }
 }

@@ -6,17 +6,27 @@ mod array_functions;
 mod arrays;
 mod assemble;
 mod attributes;
+mod claims;
 mod evaluate;
+mod execute;
 mod flatten;
+mod frame;
 mod functions;
+mod inline;
+mod names;
+mod operators;
 mod order;
 mod overrides;
 mod parameters;
+mod records;
 mod scope;
+mod starts;
 mod subscripts;
 mod symbols;
 mod tables;
 mod value;
+
+use std::collections::HashSet;
 
 use lynkeus_expr::{Graph, Spent};
 
@@ -25,8 +35,9 @@ pub(crate) use scope::{Mode, Named, Scope};
 pub(crate) use value::{Scalar, Value};
 
 use crate::choose::choose;
+use crate::flat::{Classes, FlatModel, flat_model, title};
 use crate::limits::{Budget, MAX_ELABORATED};
-use crate::syntax::ast::{Ast, ModelSyntax};
+use crate::syntax::ast::{Ast, Class, ClassKind};
 use crate::syntax::{Problem, Result, Span, parse_file};
 use crate::{LoadOptions, Plant};
 use symbols::{Context, Symbols};
@@ -39,49 +50,91 @@ pub(crate) fn budget() -> Budget {
     )
 }
 
-/// The plant of a Modelica text.
-pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<Plant> {
-    let ast = parse_file(source)?;
-    let model = choose_model(source, &ast, options)?;
+/// The plant of a Modelica text, with what looks wrong in it.
+pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
+    let mut ast = parse_file(source)?;
+    let place = choose_model(&ast, options)?;
+    let model = flat_model(source, &mut ast, place)?;
+    let (ast, model) = (&ast, &model);
+    let classes = Classes::new(source, &ast.classes);
     let graph = Graph::new();
     graph.set_budget(options.budget.clone());
     let budget = budget();
     let context = Context {
         source,
-        ast: &ast,
+        ast,
+        model,
+        classes: &classes,
         graph: &graph,
         budget: &budget,
         options,
     };
     let parts = graph.budgeted(options.budget.clone(), || {
-        let symbols = Symbols::new(&context, model)?;
-        let equations = flatten::flatten(&context, &symbols, model)?;
-        assemble::parts(&context, &symbols, model, &equations)
+        let symbols = Symbols::new(&context)?;
+        let flat = flatten::flatten(&context, &symbols)?;
+        assemble::parts(&context, &symbols, &flat)
     });
-    let parts = parts.map_err(|spent| ended(model, spent))??;
-    Ok(parts.with_graph(graph))
+    let mut parts = parts.map_err(|spent| ended(model, spent))??;
+    let mut warnings = std::mem::take(&mut parts.warnings);
+    warnings.extend(crate::units::check(source, ast, model));
+    Ok((parts.with_graph(graph), warnings))
 }
 
 /// A limit ended the reading.
-fn ended(model: &ModelSyntax, spent: Spent) -> Problem {
+fn ended(model: &FlatModel, spent: Spent) -> Problem {
     Problem::new(model.name, format!("the model was not read: {spent}"))
 }
 
 /// The model that is asked for, or the only one.
-fn choose_model<'a>(source: &str, ast: &'a Ast, options: &LoadOptions) -> Result<&'a ModelSyntax> {
+fn choose_model(ast: &Ast, options: &LoadOptions) -> Result<usize> {
     let none = || {
         Problem::new(Span::default(), "the text holds no model")
             .hint("a model reads `model Name … equation … end Name;`")
     };
-    let name = |model: &ModelSyntax| (model.name.text(source), model.name);
-    let models: Vec<(&str, Span)> = ast.models.iter().map(name).collect();
-    let place = choose(&models, options.model.as_deref(), none)?;
-    ast.models.get(place).ok_or_else(none)
+    let places: Vec<usize> = models(ast).collect();
+    let classes = places.iter().filter_map(|&place| ast.classes.get(place));
+    let mut names: Vec<(&str, Span)> = classes.map(|c| (title(&c.path), c.name)).collect();
+    let wanted = options.model.as_deref();
+    let last = |name: &str| name.rsplit('.').next().map(str::to_owned);
+    if let Some(wanted) = wanted
+        && names.iter().all(|(name, _)| *name != wanted)
+    {
+        // the last part of a name is enough where it says which
+        let matching = names.iter_mut();
+        let mut matching = matching.filter(|(name, _)| last(name).as_deref() == Some(wanted));
+        if let (Some((name, _)), None) = (matching.next(), matching.next()) {
+            *name = wanted;
+        }
+    }
+    let place = choose(&names, wanted, none)?;
+    places.get(place).copied().ok_or_else(none)
+}
+
+/// Places of the classes that may be a plant.
+fn models(ast: &Ast) -> impl Iterator<Item = usize> {
+    let models: HashSet<&str> = ast
+        .classes
+        .iter()
+        .filter(|class| class.kind == ClassKind::Model)
+        .map(|class| class.path.as_str())
+        .collect();
+    // a class inside of a model is a part of it
+    let is_inside = move |class: &Class| {
+        let around = class.path.rsplit_once('.');
+        around.is_some_and(|(above, _)| models.contains(above))
+    };
+    let is_model = move |class: &Class| {
+        class.kind == ClassKind::Model && !class.is_partial && !is_inside(class)
+    };
+    let classes = ast.classes.iter().enumerate();
+    classes
+        .filter(move |(_, class)| is_model(class))
+        .map(|(place, _)| place)
 }
 
 /// The names of the models of a Modelica text.
 pub(crate) fn names(source: &str) -> Result<Vec<String>> {
-    let models = parse_file(source)?.models;
-    let name = |model: &ModelSyntax| model.name.text(source).to_owned();
-    Ok(models.iter().map(name).collect())
+    let ast = parse_file(source)?;
+    let name = |place: usize| Some(title(&ast.classes.get(place)?.path).to_owned());
+    Ok(models(&ast).filter_map(name).collect())
 }

@@ -2,8 +2,10 @@
 
 use std::collections::HashMap;
 
-use crate::syntax::ast::{Ast, Declaration, ExprId, Kind, Variability};
-use crate::syntax::{Problem, Result};
+use super::symbols::Context;
+use crate::flat::FlatModel;
+use crate::syntax::ast::{Declaration, Kind, Variability};
+use crate::syntax::{Problem, Result, plain};
 
 /// What the declarations need of each other.
 pub(super) struct Order {
@@ -13,23 +15,19 @@ pub(super) struct Order {
     pub dependent: Vec<bool>,
 }
 
-pub(super) fn order(
-    source: &str,
-    ast: &Ast,
-    declarations: &[Declaration],
-    by_name: &HashMap<&str, usize>,
-) -> Result<Order> {
+pub(super) fn order(context: &Context<'_>, by_name: &HashMap<&str, usize>) -> Result<Order> {
+    let declarations = &context.model.declarations;
     let needs: Vec<Vec<usize>> = declarations
         .iter()
-        .map(|declaration| needs(source, ast, declaration, by_name))
+        .map(|declaration| needs(context, declaration, by_name))
         .collect();
-    let sequence = sort(source, declarations, &needs)?;
+    let sequence = sort(declarations, &needs)?;
     let mut dependent = vec![false; declarations.len()];
     for &place in &sequence {
         let depends = |&need: &usize| {
             let prefix = &declarations[need].prefix;
             let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
-            dependent[need] || (settable && !prefix.integer)
+            dependent[need] || (settable && !prefix.is_integer())
         };
         dependent[place] = needs[place].iter().any(depends);
     }
@@ -41,8 +39,7 @@ pub(super) fn order(
 
 /// Declarations whose size or value this one reads.
 fn needs(
-    source: &str,
-    ast: &Ast,
+    context: &Context<'_>,
     declaration: &Declaration,
     by_name: &HashMap<&str, usize>,
 ) -> Vec<usize> {
@@ -50,18 +47,37 @@ fn needs(
     let binding = declaration.binding.filter(|_| is_known);
     let mut found = vec![];
     for root in declaration.dimensions.iter().copied().chain(binding) {
-        let first = ast.expression(root).first;
-        // The parts of an expression lie side by side in the arena.
-        for id in (first.0..=root.0).map(ExprId) {
-            let expression = ast.expression(id);
-            if matches!(expression.kind, Kind::Name) {
-                found.extend(by_name.get(expression.span.text(source)));
+        for expression in context.ast.parts(root) {
+            if matches!(expression.kind, Kind::Name | Kind::Path(_)) {
+                let name = plain(expression.span.text(context.source));
+                match by_name.get(&*name) {
+                    Some(&place) => found.push(place),
+                    None => members(context.model, by_name, &name, &mut found),
+                }
             }
         }
     }
     found.sort_unstable();
     found.dedup();
     found
+}
+
+/// Declarations of the members of a record, and of elements that are declared by themselves.
+fn members(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {
+    let base = name.split('[').next().unwrap_or_default();
+    for element in 1.. {
+        let Some(&place) = by_name.get(format!("{base}[{element}]").as_str()) else {
+            break;
+        };
+        found.push(place);
+    }
+    for member in model.records.get(base).into_iter().flatten() {
+        let full = format!("{base}.{member}");
+        match by_name.get(full.as_str()) {
+            Some(&place) => found.push(place),
+            None => members(model, by_name, &full, found),
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -72,7 +88,7 @@ enum Mark {
 }
 
 /// Depth-first, without recursion: a chain of parameters may be as long as the file.
-fn sort(source: &str, declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>> {
+fn sort(declarations: &[Declaration], needs: &[Vec<usize>]) -> Result<Vec<usize>> {
     let mut marks = vec![Mark::New; needs.len()];
     let mut sequence = Vec::with_capacity(needs.len());
     let mut path: Vec<(usize, usize)> = vec![];
@@ -92,7 +108,7 @@ fn sort(source: &str, declarations: &[Declaration], needs: &[Vec<usize>]) -> Res
             *next += 1;
             match marks[need] {
                 Mark::Done => {}
-                Mark::Open => return Err(cycle(source, declarations, &path, need)),
+                Mark::Open => return Err(cycle(declarations, &path, need)),
                 Mark::New => {
                     marks[need] = Mark::Open;
                     path.push((need, 0));
@@ -103,13 +119,8 @@ fn sort(source: &str, declarations: &[Declaration], needs: &[Vec<usize>]) -> Res
     Ok(sequence)
 }
 
-fn cycle(
-    source: &str,
-    declarations: &[Declaration],
-    path: &[(usize, usize)],
-    closing: usize,
-) -> Problem {
-    let name = |place: usize| declarations[place].name.text(source);
+fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) -> Problem {
+    let name = |place: usize| declarations[place].label.as_str();
     let start = path
         .iter()
         .position(|(place, _)| *place == closing)

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use super::symbols::Context;
 use super::value::describe_dims;
+use crate::flat::FlatModel;
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Declaration, ModelSyntax, Variability};
+use crate::syntax::ast::{Declaration, Variability};
 use crate::syntax::{Problem, Result, Span};
 
 /// Values by declaration.
@@ -19,11 +20,8 @@ struct Override {
 }
 
 impl Overrides {
-    pub(super) fn new(
-        context: &Context<'_>,
-        model: &ModelSyntax,
-        by_name: &HashMap<&str, usize>,
-    ) -> Result<Self> {
+    pub(super) fn new(context: &Context<'_>, by_name: &HashMap<&str, usize>) -> Result<Self> {
+        let model = context.model;
         let mut by_place: HashMap<usize, Vec<Override>> = HashMap::new();
         for (key, &value) in &context.options.parameters {
             let (name, subscripts) = split(key).ok_or_else(|| {
@@ -33,11 +31,16 @@ impl Overrides {
                 )
                 .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
             })?;
+            // an element may be declared by itself: `x[3]`
+            let (name, subscripts) = match by_name.contains_key(key.trim()) {
+                true => (key.trim(), vec![]),
+                false => (name, subscripts),
+            };
             let Some((&place, declaration)) = by_name
                 .get(name)
                 .and_then(|place| Some((place, model.declarations.get(*place)?)))
             else {
-                return Err(unknown(context, model, name));
+                return Err(unknown(model, name));
             };
             check_settable(name, declaration)?;
             if !value.is_finite() {
@@ -89,15 +92,15 @@ fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
     Err(Problem::new(declaration.name, message).hint("only parameters can be set"))
 }
 
-fn unknown(context: &Context<'_>, model: &ModelSyntax, name: &str) -> Problem {
+fn unknown(model: &FlatModel, name: &str) -> Problem {
     let settable = model.declarations.iter().filter(|declaration| {
         let prefix = &declaration.prefix;
         prefix.variability == Variability::Parameter && !prefix.is_final
     });
     let names: Vec<&str> = settable
-        .map(|declaration| declaration.name.text(context.source))
+        .map(|declaration| declaration.label.as_str())
         .collect();
-    let model_name = model.name.text(context.source);
+    let model_name = &model.title;
     let hint = did_you_mean(name, names.iter().copied()).or_else(|| {
         let listed: Vec<&str> = names.iter().copied().take(12).collect();
         let more = if names.len() > 12 { ", …" } else { "" };

@@ -4,7 +4,7 @@ use super::overrides::Overrides;
 use super::scope::Mode;
 use super::symbols::{Component, Context, Sizes, Symbols};
 use super::value::{Array, Scalar, describe_dims, element_name};
-use crate::syntax::ast::{Causality, Declaration, ExprId, Variability};
+use crate::syntax::ast::{Causality, Declaration, ExprId, TypeName, Variability};
 use crate::syntax::{Problem, Result, Span};
 
 impl<'a> Symbols<'a> {
@@ -17,7 +17,7 @@ impl<'a> Symbols<'a> {
         place: usize,
     ) -> Result<Component> {
         let (declaration, dependent) = (&self.declarations[place], self.dependent[place]);
-        let name = declaration.name.text(context.source);
+        let name = declaration.label.as_str();
         if declaration.prefix.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
@@ -25,7 +25,7 @@ impl<'a> Symbols<'a> {
         let keeps_symbols = context.options.symbolic_parameters
             && declaration.prefix.variability == Variability::Parameter
             && !declaration.prefix.is_final
-            && !declaration.prefix.integer;
+            && declaration.prefix.type_name == TypeName::Real;
         let known = self.binding(context, declaration, Mode::Structural)?;
         let dims = self.parameter_dims(context, declaration, known.as_ref())?;
         sizes.charge(context, &dims, declaration)?;
@@ -198,8 +198,14 @@ impl Parts<'_> {
     /// A value of the declared type.
     fn known(&self, element: Scalar, span: Span) -> Result<Scalar> {
         let graph = self.context.graph;
+        if self.declaration.prefix.type_name == TypeName::Boolean {
+            return match element {
+                Scalar::Boolean(node) if graph.constant_value(node).is_some() => Ok(element),
+                _ => Err(Problem::new(span, "expected `true` or `false`")),
+            };
+        }
         let node = element.real(graph).ok_or_else(|| expected_number(span))?;
-        match (element, self.declaration.prefix.integer) {
+        match (element, self.declaration.prefix.is_integer()) {
             (Scalar::Integer(_), true) => Ok(element),
             (_, true) => {
                 let message = format!("`{}` is an Integer, its value is a Real", self.name);
@@ -214,7 +220,14 @@ impl Parts<'_> {
     }
 
     fn converted(&self, value: f64) -> Result<Scalar> {
-        if !self.declaration.prefix.integer {
+        if self.declaration.prefix.type_name == TypeName::Boolean {
+            let node = self
+                .context
+                .graph
+                .constant(f64::from(u8::from(value != 0.0)));
+            return Ok(Scalar::Boolean(node.node()));
+        }
+        if !self.declaration.prefix.is_integer() {
             return Ok(Scalar::Real(self.context.graph.constant(value).node()));
         }
         if value.fract() != 0.0 || value.abs() > 2f64.powi(53) {

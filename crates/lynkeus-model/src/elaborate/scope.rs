@@ -33,8 +33,18 @@ pub(crate) trait Scope {
     /// Dimensions of a declared name.
     fn dims(&self, name: &str) -> Option<&[usize]>;
 
+    /// The names of the members, where the name is a record's.
+    fn members(&self, _record: &str) -> Option<&[String]> {
+        None
+    }
+
     /// The symbol of the derivative, where the node is a variable that may have one.
     fn derivative(&self, variable: Node) -> Option<Node>;
+
+    /// True for the symbol of a parameter.
+    fn is_parameter(&self, _symbol: Node) -> bool {
+        false
+    }
 
     /// Declared names, for suggestions.
     fn names(&self) -> Vec<&str>;

@@ -4,7 +4,7 @@ use super::evaluate::Evaluator;
 use super::scope::Named;
 use super::value::{Array, Scalar, Value, describe_dims, element_count};
 use crate::syntax::ast::{ExprId, Kind};
-use crate::syntax::{Problem, Result, Span};
+use crate::syntax::{Problem, Result, Span, plain};
 
 /// The places that one subscript selects, from 0.
 enum Places {
@@ -20,13 +20,47 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<Value> {
         let name = self.span(base);
-        let text = self.text(name);
-        if self.loops.iter().any(|(iterator, _)| *iterator == text) {
-            return Err(not_an_array(text, name));
+        if !matches!(self.ast.expression(base).kind, Kind::Name) {
+            let Array { dims, elements } = self.value(base)?.into_array();
+            self.check_rank("the array", &dims, subscripts, span)?;
+            let places = self.places("the array", &dims, subscripts)?;
+            return self.gather(&dims, &elements, &places, span);
         }
-        // The scope outlives this evaluator, so its elements need not be copied.
-        let scope = self.scope;
-        match scope.named(text, self.mode) {
+        let text = plain(self.text(name));
+        if self.iterator(&text).is_some() {
+            return Err(not_an_array(&text, name));
+        }
+        self.index_at(&text, subscripts, name, span)
+    }
+
+    /// Elements of the array of this name.
+    pub(super) fn index_named(
+        &mut self,
+        text: &str,
+        subscripts: &[ExprId],
+        span: Span,
+    ) -> Result<Value> {
+        self.index_at(text, subscripts, span, span)
+    }
+
+    fn index_at(
+        &mut self,
+        text: &str,
+        subscripts: &[ExprId],
+        name: Span,
+        span: Span,
+    ) -> Result<Value> {
+        if let Some(Ok(local)) = self.local(text) {
+            let local = local.clone();
+            let (kept, offsets) = self.selected(text, &local.dims, subscripts, span)?;
+            let elements = offsets
+                .iter()
+                .map(|&offset| local.elements.get(offset).copied()?);
+            let elements: Option<Vec<Scalar>> = elements.collect();
+            let elements = elements.ok_or_else(|| self.unassigned(text, name))?;
+            return Ok(Value::new(kept, elements));
+        }
+        match self.named(text) {
             Named::Array(dims, elements) => {
                 self.check_rank(text, dims, subscripts, span)?;
                 let places = self.places(text, dims, subscripts)?;
@@ -37,6 +71,21 @@ impl<'a> Evaluator<'a> {
             Named::Varying => Err(self.varying(name)),
             Named::Valueless => Err(self.without_value(name)),
         }
+    }
+
+    /// The size that subscripts select, and the offsets of its elements.
+    pub(super) fn selected(
+        &mut self,
+        text: &str,
+        dims: &[usize],
+        subscripts: &[ExprId],
+        span: Span,
+    ) -> Result<(Vec<usize>, Vec<usize>)> {
+        if !subscripts.is_empty() {
+            self.check_rank(text, dims, subscripts, span)?;
+        }
+        let places = self.places(text, dims, subscripts)?;
+        self.offsets(dims, &places, span)
     }
 
     /// Names such as `x[3]` that the caller of a single expression knows.
@@ -54,9 +103,12 @@ impl<'a> Evaluator<'a> {
             numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
         }
         let full = format!("{text}[{}]", numbers.join(","));
-        match self.scope.named(&full, self.mode) {
+        match self.named(&full) {
             Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
-            _ => Err(self.unknown_name(name)),
+            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
+            Named::Varying => Err(self.varying(name)),
+            Named::Valueless => Err(self.without_value(name)),
+            Named::Unknown => Err(self.unknown_name(name)),
         }
     }
 
@@ -117,6 +169,19 @@ impl<'a> Evaluator<'a> {
         places: &[Places],
         span: Span,
     ) -> Result<Value> {
+        let (kept, offsets) = self.offsets(dims, places, span)?;
+        let selected = offsets
+            .iter()
+            .filter_map(|&offset| elements.get(offset).copied());
+        Ok(Value::new(kept, selected.collect()))
+    }
+
+    fn offsets(
+        &self,
+        dims: &[usize],
+        places: &[Places],
+        span: Span,
+    ) -> Result<(Vec<usize>, Vec<usize>)> {
         let mut kept = vec![];
         let mut offsets = vec![0usize];
         for (axis, &dim) in dims.iter().enumerate() {
@@ -139,10 +204,7 @@ impl<'a> Evaluator<'a> {
             let step = |&offset: &usize| selected.iter().map(move |place| offset * dim + place);
             offsets = offsets.iter().flat_map(step).collect();
         }
-        let selected = offsets
-            .iter()
-            .filter_map(|&offset| elements.get(offset).copied());
-        Ok(Value::new(kept, selected.collect()))
+        Ok((kept, offsets))
     }
 }
 

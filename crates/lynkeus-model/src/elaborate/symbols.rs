@@ -11,8 +11,9 @@ use super::overrides::Overrides;
 use super::scope::{Mode, Named, Scope};
 use super::value::{Scalar, element_count, element_name};
 use crate::LoadOptions;
+use crate::flat::{Classes, FlatModel};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
-use crate::syntax::ast::{Ast, Causality, Declaration, Kind, ModelSyntax, Variability};
+use crate::syntax::ast::{Ast, Causality, Declaration, Kind, TypeName, Variability};
 use crate::syntax::{Problem, Result};
 
 /// A declared name.
@@ -33,6 +34,8 @@ pub(crate) struct Context<'a> {
     pub graph: &'a Graph,
     pub budget: &'a Budget,
     pub options: &'a LoadOptions,
+    pub model: &'a FlatModel,
+    pub classes: &'a Classes<'a>,
 }
 
 /// All declared names of a model.
@@ -40,6 +43,11 @@ pub(crate) struct Symbols<'a> {
     pub declarations: &'a [Declaration],
     by_name: HashMap<&'a str, usize>,
     components: Vec<Option<Component>>,
+    /// arrays whose elements are declared by themselves: `x` of `x[1]` and `x[2]`
+    gathered: HashMap<String, Component>,
+    /// symbols of parameters
+    parameters: HashSet<Node>,
+    model: &'a FlatModel,
     /// symbols that may stand in `der`, with the symbols of their derivatives once they do
     derivatives: RefCell<HashMap<Node, Option<Node>>>,
     pub time: Node,
@@ -48,17 +56,21 @@ pub(crate) struct Symbols<'a> {
 }
 
 impl<'a> Symbols<'a> {
-    pub(crate) fn new(context: &Context<'a>, model: &'a ModelSyntax) -> Result<Self> {
+    pub(crate) fn new(context: &Context<'a>) -> Result<Self> {
+        let model = context.model;
         let by_name = index_names(context.source, &model.declarations)?;
         let Order {
             sequence,
             dependent,
-        } = order(context.source, context.ast, &model.declarations, &by_name)?;
-        let overrides = Overrides::new(context, model, &by_name)?;
+        } = order(context, &by_name)?;
+        let overrides = Overrides::new(context, &by_name)?;
         let mut symbols = Self {
             declarations: &model.declarations,
             by_name,
             components: model.declarations.iter().map(|_| None).collect(),
+            gathered: HashMap::new(),
+            parameters: HashSet::new(),
+            model,
             derivatives: RefCell::default(),
             time: context.graph.symbol("time").node(),
             graph: context.graph,
@@ -67,10 +79,18 @@ impl<'a> Symbols<'a> {
         let sizes = Sizes::new();
         for place in sequence {
             let component = symbols.component(context, &overrides, &sizes, place)?;
+            if component.is_known {
+                let elements = component
+                    .elements
+                    .iter()
+                    .filter_map(|e| e.real(context.graph));
+                symbols.parameters.extend(elements);
+            }
             if let Some(slot) = symbols.components.get_mut(place) {
                 *slot = Some(component);
             }
         }
+        symbols.gathered = super::names::gathered(&symbols.by_name, &symbols.components);
         Ok(symbols)
     }
 
@@ -88,7 +108,25 @@ impl<'a> Symbols<'a> {
             budget,
             ..
         } = context;
-        Evaluator::new(source, ast, graph, budget, self, mode)
+        Evaluator::new(source, ast, graph, budget, self, mode).within(context)
+    }
+
+    /// The symbols of parameters with their values, where they have one.
+    pub(super) fn parameter_values(&self) -> HashMap<Node, Option<f64>> {
+        let mut found = HashMap::new();
+        for component in self.components.iter().flatten().filter(|c| c.is_known) {
+            for (offset, element) in component.elements.iter().enumerate() {
+                let value = component
+                    .values
+                    .as_ref()
+                    .and_then(|values| values.get(offset));
+                let value = value.and_then(|value| value.number(self.graph));
+                if let Some(node) = element.real(self.graph) {
+                    found.insert(node, value);
+                }
+            }
+        }
+        found
     }
 
     /// The symbol of the derivative of a state; `None` if it is no state.
@@ -104,7 +142,7 @@ impl<'a> Symbols<'a> {
         place: usize,
     ) -> Result<Component> {
         let declaration = &self.declarations[place];
-        let name = declaration.name.text(context.source);
+        let name = declaration.label.as_str();
         if declaration.prefix.variability != Variability::Continuous {
             return self.parameter(context, overrides, sizes, place);
         }
@@ -119,15 +157,23 @@ impl<'a> Symbols<'a> {
         })?;
         sizes.charge(context, &dims, declaration)?;
         let count: usize = dims.iter().product();
+        let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
+        if is_boolean && declaration.prefix.causality == Causality::Input {
+            let problem = Problem::new(declaration.name, "a Boolean input is not supported");
+            return Err(problem.hint("use a Real and compare it, as in `if u > 0.5 then …`"));
+        }
         let may_have_derivative =
-            declaration.prefix.causality != Causality::Input && !declaration.prefix.integer;
+            declaration.prefix.type_name == TypeName::Real && !is_outer_input(declaration);
         let mut derivatives = self.derivatives.borrow_mut();
         let symbol = |offset: usize| {
             let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
             if may_have_derivative {
                 derivatives.insert(symbol, None);
             }
-            Scalar::Real(symbol)
+            match is_boolean {
+                true => Scalar::Boolean(symbol),
+                false => Scalar::Real(symbol),
+            }
         };
         let elements = (0..count).map(symbol).collect();
         Ok(Component {
@@ -182,7 +228,7 @@ impl Sizes {
         let texts = declaration
             .attributes
             .iter()
-            .map(|attribute| attribute.value);
+            .filter_map(|attribute| attribute.value);
         let texts = texts
             .filter(|&id| is_text(id))
             .map(|id| context.ast.expression(id).span);
@@ -199,7 +245,8 @@ impl Sizes {
 impl Scope for Symbols<'_> {
     fn named(&self, name: &str, mode: Mode) -> Named<'_> {
         let place = self.by_name.get(name).copied();
-        let Some(component) = place.and_then(|place| self.components.get(place)?.as_ref()) else {
+        let declared = place.and_then(|place| self.components.get(place)?.as_ref());
+        let Some(component) = declared.or_else(|| self.gathered.get(name)) else {
             return Named::Unknown;
         };
         match (mode, &component.values) {
@@ -211,8 +258,13 @@ impl Scope for Symbols<'_> {
     }
 
     fn dims(&self, name: &str) -> Option<&[usize]> {
-        let place = *self.by_name.get(name)?;
-        Some(&self.components.get(place)?.as_ref()?.dims)
+        let place = self.by_name.get(name).copied();
+        let declared = place.and_then(|place| self.components.get(place)?.as_ref());
+        Some(&declared.or_else(|| self.gathered.get(name))?.dims)
+    }
+
+    fn members(&self, record: &str) -> Option<&[String]> {
+        self.model.records.get(record).map(Vec::as_slice)
     }
 
     fn derivative(&self, variable: Node) -> Option<Node> {
@@ -225,6 +277,10 @@ impl Scope for Symbols<'_> {
         *slot
     }
 
+    fn is_parameter(&self, symbol: Node) -> bool {
+        self.parameters.contains(&symbol)
+    }
+
     fn names(&self) -> Vec<&str> {
         self.by_name.keys().copied().collect()
     }
@@ -234,6 +290,14 @@ impl Scope for Symbols<'_> {
     }
 }
 
+/// True for an input that nothing in the model can determine: one of a part, as `r1.u`, may be
+/// equated with another variable.
+pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
+    declaration.prefix.causality == Causality::Input
+        && declaration.binding.is_none()
+        && !declaration.label.contains('.')
+}
+
 fn index_names<'a>(
     source: &'a str,
     declarations: &'a [Declaration],
@@ -241,7 +305,7 @@ fn index_names<'a>(
     let reserved: HashSet<&str> = ["time"].into();
     let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
     for (place, declaration) in declarations.iter().enumerate() {
-        let name = declaration.name.text(source);
+        let name = declaration.label.as_str();
         if reserved.contains(name) {
             let message = format!("`{name}` is a word of the language");
             return Err(Problem::new(declaration.name, message).hint("choose another name"));
@@ -251,6 +315,21 @@ fn index_names<'a>(
             let message = format!("`{name}` is declared twice");
             return Err(Problem::new(declaration.name, message)
                 .hint(format!("it is first declared on line {line}")));
+        }
+    }
+    for declaration in declarations {
+        // an element by itself beside the whole array would be two variables of one name
+        let base = declaration
+            .label
+            .strip_suffix(']')
+            .and_then(|name| name.rsplit_once('['));
+        if let Some((base, _)) = base
+            && let Some(&whole) = by_name.get(base)
+        {
+            let message = format!("`{}` is declared twice", declaration.label);
+            let line = declarations[whole].name.line(source);
+            return Err(Problem::new(declaration.name, message)
+                .hint(format!("`{base}` is declared as a whole on line {line}")));
         }
     }
     Ok(by_name)

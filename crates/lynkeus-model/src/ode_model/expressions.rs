@@ -154,6 +154,7 @@ impl Parser<'_> {
         }
         self.expect(")")?;
         let call = Call {
+            named: vec![],
             function,
             arguments,
             iterators: vec![],

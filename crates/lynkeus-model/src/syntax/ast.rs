@@ -11,12 +11,34 @@ pub(crate) struct ExprId(pub(crate) u32);
 #[derive(Debug, Default)]
 pub(crate) struct Ast {
     pub expressions: Vec<Expression>,
-    pub models: Vec<ModelSyntax>,
+    /// every class of the text, inner ones before those around them
+    pub classes: Vec<Class>,
 }
 
 impl Ast {
     pub(crate) fn expression(&self, id: ExprId) -> &Expression {
         &self.expressions[id.0 as usize]
+    }
+
+    /// The expressions that an expression is made of, itself included.
+    pub(crate) fn parts(&self, root: ExprId) -> impl std::iter::Iterator<Item = &Expression> {
+        // The parts of an expression lie side by side in the arena; what was added to a record
+        // later stands behind them.
+        let root = match self.expression(root).kind {
+            Kind::Member(record, _) => record,
+            _ => root,
+        };
+        let first = self.expression(root).first;
+        (first.0..=root.0).map(|id| self.expression(ExprId(id)))
+    }
+
+    /// The member of a record, as an expression.
+    pub(crate) fn member(&mut self, record: ExprId, member: String) -> ExprId {
+        let (span, first) = (self.expression(record).span, self.expression(record).first);
+        let id = ExprId(u32::try_from(self.expressions.len()).unwrap_or(u32::MAX));
+        let kind = Kind::Member(record, member);
+        self.expressions.push(Expression { kind, span, first });
+        id
     }
 }
 
@@ -41,6 +63,10 @@ pub(crate) enum Kind {
     /// `end` within subscripts
     End,
     Index(ExprId, Vec<ExprId>),
+    /// `a[1].b[2].c`: the parts of a name, the subscripts of each
+    Path(Vec<PathPart>),
+    /// a member of a record: `x`, `z.re`
+    Member(ExprId, String),
     Call(Call),
     /// `{a, b}`
     Array(Vec<ExprId>),
@@ -60,10 +86,19 @@ pub(crate) enum Kind {
     Range(ExprId, Option<ExprId>, ExprId),
 }
 
+/// One part of a dotted name.
+#[derive(Debug)]
+pub(crate) struct PathPart {
+    pub name: Span,
+    pub subscripts: Vec<ExprId>,
+}
+
 #[derive(Debug)]
 pub(crate) struct Call {
     pub function: Span,
     pub arguments: Vec<ExprId>,
+    /// arguments given by name, behind the others
+    pub named: Vec<(Span, ExprId)>,
     /// of `sum(e for i in r)`
     pub iterators: Vec<Iterator>,
 }
@@ -106,11 +141,60 @@ pub(crate) struct Iterator {
     pub range: ExprId,
 }
 
-#[derive(Debug)]
-pub(crate) struct ModelSyntax {
+/// What kind of class it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ClassKind {
+    /// `model`, `class` and `block`
+    Model,
+    Package,
+    Record,
+    Function,
+    Type,
+    Connector,
+}
+
+/// A class with its contents as they are written.
+#[derive(Clone, Debug)]
+pub(crate) struct Class {
+    pub kind: ClassKind,
+    pub is_partial: bool,
     pub name: Span,
+    /// with the names of the classes around it: `Circuits.Divider`
+    pub path: String,
     pub declarations: Vec<Declaration>,
     pub equations: Vec<Equation>,
+    pub initial: Vec<Equation>,
+    pub algorithms: Vec<Vec<Statement>>,
+    pub bases: Vec<Base>,
+    pub imports: Vec<Import>,
+    /// of `type Angle = Real(unit = "rad")`
+    pub alias: Option<Alias>,
+    /// of `type Kind = enumeration(one, two)`
+    pub literals: Vec<Span>,
+    pub is_external: bool,
+}
+
+/// `extends Name(k = 2);`
+#[derive(Clone, Debug)]
+pub(crate) struct Base {
+    pub name: Span,
+    pub modification: Vec<Attribute>,
+}
+
+/// `import Name;`, `import Short = Name;` or `import Name.*;`
+#[derive(Clone, Debug)]
+pub(crate) struct Import {
+    /// what it is called here; `None` for everything in it
+    pub short: Option<String>,
+    pub full: String,
+}
+
+/// The class that a short definition stands for.
+#[derive(Clone, Debug)]
+pub(crate) struct Alias {
+    pub of: TypeName,
+    pub dimensions: Vec<ExprId>,
+    pub modification: Vec<Attribute>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,21 +211,41 @@ pub(crate) enum Causality {
     Local,
 }
 
+/// The types that are built in, or the name of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TypeName {
+    Real,
+    Integer,
+    Boolean,
+    String,
+    Named(Span),
+}
+
 /// What stands before the names of a declaration.
 #[derive(Clone, Debug)]
 pub(crate) struct Prefix {
     pub is_final: bool,
     pub variability: Variability,
     pub causality: Causality,
-    pub integer: bool,
+    /// `flow` or `stream`, where it is written
+    pub of_connector: Option<Span>,
+    pub type_name: TypeName,
     /// of `Real[N] x`
     pub dimensions: Vec<ExprId>,
 }
 
-#[derive(Debug)]
+impl Prefix {
+    pub(crate) fn is_integer(&self) -> bool {
+        self.type_name == TypeName::Integer
+    }
+}
+
+#[derive(Clone, Debug)]
 pub(crate) struct Declaration {
     pub prefix: Prefix,
     pub name: Span,
+    /// the name without quotes, members of records in full: `r1.p.v`, `x[3]`
+    pub label: String,
     /// of `Real x[N]`, with those of the prefix behind them
     pub dimensions: Vec<ExprId>,
     pub attributes: Vec<Attribute>,
@@ -149,23 +253,54 @@ pub(crate) struct Declaration {
     pub description: Option<String>,
 }
 
-/// `start = 1` in a declaration.
-#[derive(Debug)]
+/// `start = 1` in a declaration, or `x(start = 1) = 2` where it is a record.
+#[derive(Clone, Debug)]
 pub(crate) struct Attribute {
     pub name: Span,
-    pub value: ExprId,
+    pub value: Option<ExprId>,
+    pub nested: Vec<Attribute>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Equation {
     pub kind: EquationKind,
     pub span: Span,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum EquationKind {
     Equality(ExprId, ExprId),
+    /// `(a, , b) = f(x)`
+    Several(Vec<Option<ExprId>>, ExprId),
     For(Vec<Iterator>, Vec<Equation>),
     /// conditions with equations, and those of `else`
     If(Vec<(ExprId, Vec<Equation>)>, Vec<Equation>),
+    Assert(Assert),
+}
+
+/// `assert(condition, "message")`
+#[derive(Clone, Debug)]
+pub(crate) struct Assert {
+    pub condition: ExprId,
+    pub message: String,
+    /// `AssertionLevel.warning` is given
+    pub is_warning: bool,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Statement {
+    pub kind: StatementKind,
+    pub span: Span,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) enum StatementKind {
+    /// `a := e` and `(a, , b) := f(x)`
+    Assign(Vec<Option<ExprId>>, ExprId),
+    For(Vec<Iterator>, Vec<Statement>),
+    While(ExprId, Vec<Statement>),
+    If(Vec<(ExprId, Vec<Statement>)>, Vec<Statement>),
+    Assert(Assert),
+    Break,
+    Return,
 }

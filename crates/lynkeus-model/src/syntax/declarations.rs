@@ -1,6 +1,7 @@
 //! Declarations: prefixes, type, dimensions, modification, binding.
 
-use super::ast::{Attribute, Causality, Declaration, Kind, Prefix, Variability};
+use super::ast::{Attribute, Causality, Declaration, Kind, Prefix, TypeName, Variability};
+use super::names::plain;
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token, shortened};
 use super::{Problem, Result, Span};
@@ -30,34 +31,15 @@ impl Parser<'_> {
             };
         };
         let (what, hint) = match word {
-            Final | Parameter | Constant | Input | Output => return Ok(()),
-            Extends => (
-                "`extends`",
-                "copy the declarations and equations of the base model",
-            ),
-            Import => (
-                "`import`",
-                "write full names, such as `Modelica.Constants.pi`",
-            ),
+            Final | Parameter | Constant | Input | Output | Flow | Stream | Enumeration => {
+                return Ok(());
+            }
             Discrete => (
                 "a `discrete` variable",
                 "only continuous variables are supported",
             ),
-            Flow | Stream => (
-                "a connector variable",
-                "write the equations without connectors",
-            ),
-            Inner | Outer => ("`inner`/`outer`", "declare the variable in this model"),
-            Redeclare | Replaceable => ("a replaceable element", "declare it plainly"),
-            Function | Pure | Impure => (
-                "a function definition",
-                "write the formula where it is used",
-            ),
-            Model | Block | Class | Connector | Package | Record | Type | Operator | Partial
-            | Encapsulated | Expandable => (
-                "a class inside a model",
-                "write its contents into this model",
-            ),
+            Inner | Outer => ("`inner`/`outer`", crate::flat::HOW_TO_FLATTEN),
+            Redeclare | Replaceable => ("a replaceable element", crate::flat::HOW_TO_FLATTEN),
             Connect | When | If | For => {
                 let found = format!("expected a declaration, found `{}`", word.text());
                 return Err(Problem::new(self.span, found)
@@ -69,77 +51,74 @@ impl Parser<'_> {
     }
 
     fn prefix(&mut self) -> Result<Prefix> {
-        let mut prefix = Prefix {
-            is_final: self.accept_word(Keyword::Final)?,
-            variability: Variability::Continuous,
-            causality: Causality::Local,
-            integer: false,
-            dimensions: vec![],
-        };
-        loop {
-            match self.token {
-                Token::Keyword(Keyword::Parameter) => prefix.variability = Variability::Parameter,
-                Token::Keyword(Keyword::Constant) => prefix.variability = Variability::Constant,
-                Token::Keyword(Keyword::Input) => prefix.causality = Causality::Input,
-                Token::Keyword(Keyword::Output) => prefix.causality = Causality::Output,
-                Token::Keyword(_) => {
-                    self.refuse_unsupported_element()?;
-                    return Err(self.unexpected("a type"));
-                }
-                _ => break,
-            }
-            self.advance()?;
-        }
-        prefix.integer = self.type_name()?;
+        let mut prefix = Prefix::plain();
+        prefix.is_final = self.accept_word(Keyword::Final)?;
+        self.causality(&mut prefix)?;
+        prefix.type_name = self.type_name()?;
         if self.at(Symbol::OpenBracket) {
             prefix.dimensions = self.subscripts()?;
         }
         Ok(prefix)
     }
 
-    /// `Real` or `Integer`; true for the latter.
-    fn type_name(&mut self) -> Result<bool> {
-        let start = self.span;
-        self.accept(Symbol::Dot)?;
-        self.identifier("a type")?;
-        while self.accept(Symbol::Dot)? {
-            self.identifier("a name after `.`")?;
-        }
-        let span = start.to(self.last);
-        let name = span.text(self.source);
-        let refuse = |message: String, hint: &str| Err(Problem::new(span, message).hint(hint));
-        match name {
-            "Real" => Ok(false),
-            "Integer" => Ok(true),
-            "Boolean" => refuse(
-                "Boolean variables are not supported".to_owned(),
-                "use a Real and compare it, as in `if u > 0.5 then …`",
-            ),
-            "String" => refuse("String variables are not supported".to_owned(), "remove it"),
-            _ if name.starts_with("Modelica.") || name.starts_with("SI.") => refuse(
-                format!("the library type `{}` is not supported", shortened(name)),
-                "write `Real` with `unit = \"…\"`",
-            ),
-            _ if !matches!(
-                self.token,
-                Token::Identifier | Token::Symbol(Symbol::OpenBracket)
-            ) =>
-            {
-                refuse(
-                    format!("expected a declaration, found `{}`", shortened(name)),
-                    "a declaration reads `Real x;`; equations follow after the word `equation`",
-                )
+    /// `parameter`, `input`, `flow` and their like.
+    pub(super) fn causality(&mut self, prefix: &mut Prefix) -> Result<()> {
+        loop {
+            match self.token {
+                Token::Keyword(Keyword::Parameter) => prefix.variability = Variability::Parameter,
+                Token::Keyword(Keyword::Constant) => prefix.variability = Variability::Constant,
+                Token::Keyword(Keyword::Input) => prefix.causality = Causality::Input,
+                Token::Keyword(Keyword::Output) => prefix.causality = Causality::Output,
+                Token::Keyword(Keyword::Flow | Keyword::Stream) => {
+                    prefix.of_connector = Some(self.span);
+                }
+                Token::Keyword(Keyword::Enumeration) => return Ok(()),
+                Token::Keyword(_) => {
+                    self.refuse_unsupported_element()?;
+                    return Err(self.unexpected("a type"));
+                }
+                _ => return Ok(()),
             }
-            _ => refuse(
-                format!("unknown type `{}`", shortened(name)),
-                "components of other models are not supported: the types are `Real` and `Integer`",
-            ),
+            self.advance()?;
         }
+    }
+
+    pub(super) fn type_name(&mut self) -> Result<TypeName> {
+        if self.at_word(Keyword::Enumeration) {
+            // a choice that the compiler has made already
+            let start = self.advance()?;
+            if !self.at(Symbol::OpenParen) || !self.skip_brackets()? {
+                let message = "expected the literals of the enumeration in parentheses";
+                return Err(Problem::new(start, message));
+            }
+            return Ok(TypeName::String);
+        }
+        let span = self.dotted_name()?;
+        let name = match span.text(self.source) {
+            "Real" => return Ok(TypeName::Real),
+            "Integer" => return Ok(TypeName::Integer),
+            "Boolean" => return Ok(TypeName::Boolean),
+            "String" => return Ok(TypeName::String),
+            name => name,
+        };
+        if matches!(
+            self.token,
+            Token::Identifier
+                | Token::Symbol(Symbol::OpenBracket | Symbol::OpenParen | Symbol::Semicolon)
+                | Token::Text
+        ) && !name.starts_with("der")
+        {
+            return Ok(TypeName::Named(span));
+        }
+        let message = format!("expected a declaration, found `{}`", shortened(name));
+        Err(Problem::new(span, message)
+            .hint("a declaration reads `Real x;`; equations follow after the word `equation`"))
     }
 
     fn declarator(&mut self, prefix: Prefix) -> Result<Declaration> {
         self.count(8)?;
-        let name = self.identifier("the name of a variable")?;
+        let name = self.variable_name()?;
+        let label = plain(name.text(self.source)).into_owned();
         let mut dimensions = vec![];
         if self.at(Symbol::OpenBracket) {
             dimensions = self.subscripts()?;
@@ -164,6 +143,7 @@ impl Parser<'_> {
         Ok(Declaration {
             prefix,
             name,
+            label,
             dimensions,
             attributes,
             binding,
@@ -171,22 +151,54 @@ impl Parser<'_> {
         })
     }
 
+    /// `x`, `r1.p.v` or `c[2].x`: compilers write the names of parts in full.
+    fn variable_name(&mut self) -> Result<Span> {
+        let start = self.identifier("the name of a variable")?;
+        loop {
+            if self.at(Symbol::Dot) {
+                self.advance()?;
+                self.identifier("a name after `.`")?;
+            } else if self.at(Symbol::OpenBracket) && self.is_inner_subscript() {
+                self.subscripts()?;
+            } else {
+                return Ok(start.to(self.last));
+            }
+        }
+    }
+
     /// `start = 1, each min = 0)`, behind the opening parenthesis.
-    fn modification(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
+    pub(super) fn modification(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
+        self.nested(|parser| parser.modification_here(into))
+    }
+
+    fn modification_here(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
         if self.accept(Symbol::CloseParen)? {
             return Ok(());
         }
         loop {
             if self.at_word(Keyword::Redeclare) || self.at_word(Keyword::Replaceable) {
-                return Err(self.refuse("a redeclaration", "remove it"));
+                return Err(self.refuse("a redeclaration", crate::flat::HOW_TO_FLATTEN));
             }
             self.accept_word(Keyword::Each)?;
             self.accept_word(Keyword::Final)?;
             let name = self.identifier("the name of an attribute")?;
-            self.check_attribute(name)?;
-            self.expect(Symbol::Equal)?;
-            let value = self.attribute_value()?;
-            into.push(Attribute { name, value });
+            let mut nested = vec![];
+            if self.accept(Symbol::OpenParen)? {
+                self.modification(&mut nested)?;
+            }
+            let mut value = None;
+            if nested.is_empty() {
+                self.expect(Symbol::Equal)?;
+                value = Some(self.attribute_value()?);
+            } else if self.accept(Symbol::Equal)? {
+                value = Some(self.attribute_value()?);
+            }
+            self.comment()?;
+            into.push(Attribute {
+                name,
+                value,
+                nested,
+            });
             if !self.accept(Symbol::Comma)? {
                 break;
             }
@@ -203,25 +215,18 @@ impl Parser<'_> {
         self.advance()?;
         self.push(Kind::Text, start, first)
     }
+}
 
-    fn check_attribute(&self, name: Span) -> Result<()> {
-        const KNOWN: [&str; 10] = [
-            "start",
-            "min",
-            "max",
-            "nominal",
-            "unit",
-            "displayUnit",
-            "quantity",
-            "fixed",
-            "stateSelect",
-            "unbounded",
-        ];
-        let text = name.text(self.source);
-        if KNOWN.contains(&text) {
-            return Ok(());
+impl Prefix {
+    /// A Real variable, with nothing before it.
+    pub(super) fn plain() -> Self {
+        Self {
+            is_final: false,
+            variability: Variability::Continuous,
+            causality: Causality::Local,
+            of_connector: None,
+            type_name: TypeName::Real,
+            dimensions: vec![],
         }
-        let message = format!("unknown attribute `{}`", shortened(text));
-        Err(Problem::new(name, message).hint(format!("the attributes are {}", KNOWN.join(", "))))
     }
 }

@@ -1,12 +1,26 @@
 //! The `equation` section.
 
-use super::ast::{Equation, EquationKind, Iterator};
+use super::ast::{Assert, Equation, EquationKind, ExprId, Iterator};
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token};
-use super::{Problem, Result, Span};
+use super::{Problem, Result, Span, unquoted};
 use crate::limits::MAX_ITERATORS;
 
+/// What begins with a parenthesis on the left of an equation.
+enum Listed {
+    One(ExprId),
+    Several(Vec<Option<ExprId>>),
+}
+
 impl Parser<'_> {
+    /// `(a, , b)`, or an expression that begins with a parenthesis.
+    fn list_or_expression(&mut self) -> Result<Listed> {
+        match self.is_list() {
+            true => Ok(Listed::Several(self.targets()?)),
+            false => Ok(Listed::One(self.expression()?)),
+        }
+    }
+
     pub(super) fn equation(&mut self) -> Result<Equation> {
         self.nested(|parser| parser.equation_here())
     }
@@ -33,7 +47,10 @@ impl Parser<'_> {
                 "an observer needs continuous equations: use `if` expressions",
             ),
             Token::Keyword(Keyword::Connect) => {
-                ("`connect`", "write the equations of the connection")
+                return Err(
+                    Problem::new(self.span, "the model is not flat: it has `connect`")
+                        .hint(crate::flat::HOW_TO_FLATTEN),
+                );
             }
             Token::Keyword(Keyword::While) => ("`while`", "use a `for` loop"),
             Token::Keyword(
@@ -50,7 +67,19 @@ impl Parser<'_> {
 
     fn equality(&mut self) -> Result<EquationKind> {
         let start = self.span;
-        let left = self.expression()?;
+        if let Some(assert) = self.assert_call()? {
+            return Ok(EquationKind::Assert(assert));
+        }
+        let left = match self.at(Symbol::OpenParen) {
+            true => match self.list_or_expression()? {
+                Listed::One(left) => left,
+                Listed::Several(targets) => {
+                    self.expect(Symbol::Equal)?;
+                    return Ok(EquationKind::Several(targets, self.expression()?));
+                }
+            },
+            false => self.expression()?,
+        };
         if self.at(Symbol::Equal) {
             self.advance()?;
             let right = self.expression()?;
@@ -61,9 +90,9 @@ impl Parser<'_> {
             return Err(Problem::new(start, "a declaration among the equations")
                 .hint("declarations come before the word `equation`, or after `public`"));
         }
-        if matches!(text, "assert" | "terminate" | "reinit") {
+        if matches!(text, "terminate" | "reinit") {
             return Err(Problem::new(start, format!("`{text}` is not supported"))
-                .hint("give bounds with `min` and `max` in the declarations"));
+                .hint("models with events are not supported: use `if` expressions"));
         }
         let hint = match self.token {
             Token::Symbol(Symbol::Assign) => Some("`:=` assigns in algorithms; write `=`"),
@@ -71,6 +100,41 @@ impl Parser<'_> {
             _ => None,
         };
         Err(self.unexpected("`=`").maybe_hint(hint.map(str::to_owned)))
+    }
+
+    /// `assert(condition, "message", level)`, where one stands here.
+    pub(super) fn assert_call(&mut self) -> Result<Option<Assert>> {
+        if self.token != Token::Identifier || self.span.text(self.source) != "assert" {
+            return Ok(None);
+        }
+        self.advance()?;
+        self.expect(Symbol::OpenParen)?;
+        let condition = self.expression()?;
+        self.expect(Symbol::Comma)?;
+        let message = match self.token {
+            Token::Text => unquoted(self.span.text(self.source)),
+            _ => String::new(),
+        };
+        // The rest makes a text at the time of the failure: it takes no part in the plant.
+        let mut is_warning = false;
+        let mut open = 1usize;
+        while open > 0 {
+            match self.token {
+                Token::Symbol(Symbol::OpenParen) => open += 1,
+                Token::Symbol(Symbol::CloseParen) => open -= 1,
+                Token::Identifier => is_warning |= self.span.text(self.source) == "warning",
+                Token::End | Token::Symbol(Symbol::Semicolon) => {
+                    return Err(self.unexpected("`)` after the message of the `assert`"));
+                }
+                _ => {}
+            }
+            self.advance()?;
+        }
+        Ok(Some(Assert {
+            condition,
+            message,
+            is_warning,
+        }))
     }
 
     fn for_equation(&mut self) -> Result<EquationKind> {
@@ -112,7 +176,7 @@ impl Parser<'_> {
         Ok(equations)
     }
 
-    fn end_of(&mut self, keyword: Keyword) -> Result<()> {
+    pub(super) fn end_of(&mut self, keyword: Keyword) -> Result<()> {
         if !self.accept_word(Keyword::End)? {
             return Err(self.unexpected(&format!("`end {}`", keyword.text())));
         }

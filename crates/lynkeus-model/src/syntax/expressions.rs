@@ -1,6 +1,6 @@
 //! Expressions, by precedence.
 
-use super::ast::{BinaryOperator, Call, ExprId, Kind, Relation, UnaryOperator};
+use super::ast::{BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token, shortened};
 use super::{Problem, Result, Span};
@@ -176,7 +176,7 @@ impl Parser<'_> {
         let kind = match self.token {
             Token::Integer => Kind::Integer(self.integer_value()?),
             Token::Real => Kind::Real(self.real_value()?),
-            Token::Text => return Err(self.refuse("a string here", "use numbers")),
+            Token::Text => Kind::Text,
             Token::Keyword(Keyword::True) => Kind::Boolean(true),
             Token::Keyword(Keyword::False) => Kind::Boolean(false),
             Token::Keyword(Keyword::End) => Kind::End,
@@ -228,6 +228,11 @@ impl Parser<'_> {
             ));
         }
         self.expect(Symbol::CloseParen)?;
+        if self.at(Symbol::OpenBracket) {
+            let (start, first) = (self.span, self.ast.expression(inner).first);
+            let subscripts = self.subscripts()?;
+            return self.push(Kind::Index(inner, subscripts), start, first);
+        }
         Ok(inner)
     }
 
@@ -266,86 +271,6 @@ impl Parser<'_> {
         }
         self.expect(Symbol::CloseBracket)?;
         self.push(Kind::Matrix(rows), start, first)
-    }
-
-    /// A name, with subscripts or arguments behind it.
-    fn reference(&mut self) -> Result<ExprId> {
-        let (start, first) = (self.span, self.next_id());
-        let name = self.dotted_name()?;
-        if self.at(Symbol::OpenParen) {
-            return self.call(name);
-        }
-        let base = self.push(Kind::Name, start, first)?;
-        if !self.at(Symbol::OpenBracket) {
-            return Ok(base);
-        }
-        let subscripts = self.subscripts()?;
-        if self.at(Symbol::Dot) || self.at(Symbol::OpenBracket) {
-            let hint = "the parts of an array element cannot be taken further";
-            return Err(self.unexpected("an operator").hint(hint));
-        }
-        self.push(Kind::Index(base, subscripts), start, first)
-    }
-
-    fn dotted_name(&mut self) -> Result<Span> {
-        let start = self.span;
-        if !self.accept_word(Keyword::Der)? {
-            self.accept(Symbol::Dot)?;
-            self.identifier("a name")?;
-            while self.at(Symbol::Dot) {
-                self.advance()?;
-                self.identifier("a name after `.`")?;
-            }
-        }
-        Ok(start.to(self.last))
-    }
-
-    fn call(&mut self, function: Span) -> Result<ExprId> {
-        let first = self.next_id();
-        self.advance()?;
-        let mut call = Call {
-            function,
-            arguments: vec![],
-            iterators: vec![],
-        };
-        while !self.at(Symbol::CloseParen) {
-            call.arguments.push(self.expression()?);
-            if self.at(Symbol::Equal) {
-                let hint = "give the arguments in order, without names";
-                return Err(self.refuse("a named argument", hint));
-            }
-            if call.arguments.len() == 1 && self.accept_word(Keyword::For)? {
-                call.iterators = self.iterators()?;
-                break;
-            }
-            if !self.accept(Symbol::Comma)? {
-                break;
-            }
-        }
-        self.expect(Symbol::CloseParen)?;
-        self.push(Kind::Call(call), function, first)
-    }
-
-    /// `[1, :, 2:end]`
-    pub(super) fn subscripts(&mut self) -> Result<Vec<ExprId>> {
-        self.expect(Symbol::OpenBracket)?;
-        let mut subscripts = vec![];
-        loop {
-            let (start, first) = (self.span, self.next_id());
-            if self.accept(Symbol::Colon)? {
-                subscripts.push(self.push(Kind::All, start, first)?);
-            } else {
-                subscripts.push(self.expression()?);
-            }
-            if !self.accept(Symbol::Comma)? {
-                break;
-            }
-            if subscripts.len() >= MAX_RANK {
-                return Err(too_many_dimensions(self.span));
-            }
-        }
-        self.expect(Symbol::CloseBracket)?;
-        Ok(subscripts)
     }
 }
 

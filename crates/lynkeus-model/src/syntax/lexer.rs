@@ -5,6 +5,7 @@ use super::{Problem, Result, Span};
 use crate::limits::MAX_NAME;
 
 /// Reads tokens from a text.
+#[derive(Clone)]
 pub(crate) struct Lexer<'s> {
     source: &'s str,
     position: usize,
@@ -155,11 +156,12 @@ fn character_hint(found: char) -> Option<String> {
 }
 
 fn is_name_start(byte: u8) -> bool {
-    byte.is_ascii_alphabetic() || byte == b'_'
+    // compilers name what they add with `$`
+    byte.is_ascii_alphabetic() || byte == b'_' || byte == b'$'
 }
 
 fn is_name_part(byte: u8) -> bool {
-    byte.is_ascii_alphanumeric() || byte == b'_'
+    byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'$'
 }
 
 #[cfg(test)]

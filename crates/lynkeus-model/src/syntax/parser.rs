@@ -1,6 +1,6 @@
 //! The parser's hands: the current token, what may come next, and the limits.
 
-use super::ast::{Ast, ExprId, Expression, Kind, ModelSyntax};
+use super::ast::{Ast, ExprId, Expression, Kind};
 use super::lexer::Lexer;
 use super::token::{Keyword, Symbol, Token};
 use super::{Problem, Result, Span};
@@ -34,8 +34,7 @@ pub(crate) fn parse_file(source: &str) -> Result<Ast> {
     let mut parser = Parser::new(source)?;
     parser.within_clause()?;
     while parser.token != Token::End {
-        let model = parser.model()?;
-        parser.ast.models.push(model);
+        parser.class("")?;
     }
     Ok(parser.ast)
 }
@@ -72,6 +71,47 @@ impl<'s> Parser<'s> {
         self.last = self.span;
         (self.token, self.span) = self.lexer.next()?;
         Ok(self.last)
+    }
+
+    /// At an opening parenthesis: true where a comma stands between it and the one that closes
+    /// it, outside of other brackets. Looks at a line's worth of tokens at most.
+    pub(super) fn is_list(&self) -> bool {
+        const AHEAD: usize = 400;
+        let mut lexer = self.lexer.clone();
+        let mut open = 1usize;
+        for _ in 0..AHEAD {
+            match lexer.next() {
+                Ok((Token::Symbol(Symbol::Comma), _)) if open == 1 => return true,
+                Ok((Token::Symbol(symbol), _)) => match symbol {
+                    Symbol::OpenParen | Symbol::OpenBracket | Symbol::OpenBrace => open += 1,
+                    Symbol::CloseParen | Symbol::CloseBracket | Symbol::CloseBrace => open -= 1,
+                    Symbol::Semicolon => return false,
+                    _ => {}
+                },
+                Ok((Token::End, _)) | Err(_) => return false,
+                _ => {}
+            }
+            if open == 0 {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// At an opening bracket: true where a dot follows the one that closes it.
+    pub(super) fn is_inner_subscript(&self) -> bool {
+        const AHEAD: usize = 40;
+        let mut lexer = self.lexer.clone();
+        for _ in 0..AHEAD {
+            match lexer.next() {
+                Ok((Token::Symbol(Symbol::CloseBracket), _)) => {
+                    return matches!(lexer.next(), Ok((Token::Symbol(Symbol::Dot), _)));
+                }
+                Ok((Token::End, _)) | Err(_) => return false,
+                _ => {}
+            }
+        }
+        false
     }
 
     pub(super) fn at(&self, symbol: Symbol) -> bool {
@@ -181,101 +221,6 @@ impl<'s> Parser<'s> {
         ExprId(self.ast.expressions.len() as u32)
     }
 
-    fn within_clause(&mut self) -> Result<()> {
-        if self.accept_word(Keyword::Within)? {
-            while self.token == Token::Identifier || self.at(Symbol::Dot) {
-                self.advance()?;
-            }
-            self.expect(Symbol::Semicolon)?;
-        }
-        Ok(())
-    }
-
-    fn model(&mut self) -> Result<ModelSyntax> {
-        self.expect_model_keyword()?;
-        let name = self.identifier("the name of the model")?;
-        if self.at_word(Keyword::Extends) || self.at(Symbol::Equal) {
-            return Err(self.refuse(
-                "a model made from another one",
-                "write the model out in full",
-            ));
-        }
-        self.description()?;
-        let mut model = ModelSyntax {
-            name,
-            declarations: vec![],
-            equations: vec![],
-        };
-        self.model_body(&mut model)?;
-        self.expect_word(Keyword::End)?;
-        let end = self.identifier("the name of the model after `end`")?;
-        let (opened, closed) = (name.text(self.source), end.text(self.source));
-        if opened != closed {
-            return Err(
-                Problem::new(end, format!("`end {closed}` closes model `{opened}`"))
-                    .hint(format!("write `end {opened};`")),
-            );
-        }
-        self.expect(Symbol::Semicolon)?;
-        Ok(model)
-    }
-
-    fn expect_model_keyword(&mut self) -> Result<()> {
-        if self.accept_word(Keyword::Model)? {
-            return Ok(());
-        }
-        use Keyword::*;
-        match self.token {
-            Token::Keyword(
-                word @ (Block | Class | Connector | Function | Package | Record | Type | Partial
-                | Encapsulated | Operator | Expandable | Pure | Impure),
-            ) => Err(self.refuse(
-                &format!("`{}`", word.text()),
-                "only `model` is supported here",
-            )),
-            _ => Err(self
-                .unexpected("`model`")
-                .hint("a file holds one or more `model`s")),
-        }
-    }
-
-    fn model_body(&mut self, model: &mut ModelSyntax) -> Result<()> {
-        let mut in_equations = false;
-        loop {
-            match self.token {
-                Token::Keyword(Keyword::End) => return Ok(()),
-                Token::Keyword(
-                    word @ (Keyword::Equation | Keyword::Public | Keyword::Protected),
-                ) => {
-                    in_equations = word == Keyword::Equation;
-                    self.advance()?;
-                }
-                Token::End => {
-                    let name = model.name.text(self.source);
-                    return Err(self.unexpected(&format!("`end {name};`")));
-                }
-                Token::Keyword(Keyword::Annotation) => {
-                    self.annotation()?;
-                    self.expect(Symbol::Semicolon)?;
-                }
-                Token::Keyword(Keyword::Initial) => {
-                    return Err(self.refuse(
-                        "an `initial` section",
-                        "give the starting values with `start = …` in the declarations",
-                    ));
-                }
-                Token::Keyword(Keyword::Algorithm) => {
-                    return Err(self.refuse("an `algorithm` section", "write equations instead"));
-                }
-                _ if in_equations => {
-                    let equation = self.equation()?;
-                    model.equations.push(equation);
-                }
-                _ => self.declarations(&mut model.declarations)?,
-            }
-        }
-    }
-
     /// "… is not supported" at the current token.
     pub(super) fn refuse(&self, what: &str, hint: &str) -> Problem {
         Problem::new(self.span, format!("{what} is not supported")).hint(hint)
@@ -309,26 +254,30 @@ impl<'s> Parser<'s> {
     }
 
     /// `annotation(…)`: skipped by counting brackets.
-    fn annotation(&mut self) -> Result<()> {
+    pub(super) fn annotation(&mut self) -> Result<()> {
         let start = self.advance()?;
         if !self.at(Symbol::OpenParen) {
             return Err(self.unexpected("`(` after `annotation`"));
         }
+        if self.skip_brackets()? {
+            return Ok(());
+        }
+        Err(Problem::new(start, "this annotation has no end").hint("close it with `)`"))
+    }
+
+    /// From an opening bracket to behind the one that closes it; false where none does.
+    pub(super) fn skip_brackets(&mut self) -> Result<bool> {
         let mut open = 0usize;
         loop {
             match self.token {
                 Token::Symbol(Symbol::OpenParen) => open += 1,
-                Token::Symbol(Symbol::CloseParen) => open -= 1,
-                Token::End => {
-                    return Err(
-                        Problem::new(start, "this annotation has no end").hint("close it with `)`")
-                    );
-                }
+                Token::Symbol(Symbol::CloseParen) => open = open.saturating_sub(1),
+                Token::End => return Ok(false),
                 _ => {}
             }
             self.advance()?;
             if open == 0 {
-                return Ok(());
+                return Ok(true);
             }
         }
     }

@@ -326,7 +326,7 @@ fn long_chains_of_algebraic_variables() {
 #[test]
 fn dense_systems() {
     let text = "model M parameter Integer n = 500; Real a[n]; Real x; equation der(x) = 1; \
-                for i in 1:n loop a[i] = sum(a); end for; end M;";
+                for i in 1:n loop a[i] = sum(a)^2; end for; end M;";
     assert!(refused(text).message.contains("need each other"));
     let mass = |n: usize| {
         format!(
@@ -335,13 +335,9 @@ fn dense_systems() {
         )
     };
     let found = refused(&mass(400));
-    assert!(
-        found
-            .message
-            .starts_with("400 unknowns need each other: `der(v[1])`, ")
-            && found.message.contains("at most 64"),
-        "{}",
-        found.message
+    assert_eq!(
+        found.message,
+        "the model needs more than 5,000,000 steps to solve its equations"
     );
     let start = Instant::now();
     assert!(Plant::from_modelica(&mass(64), "mass.mo", &LoadOptions::default()).is_ok());

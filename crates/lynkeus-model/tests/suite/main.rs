@@ -3,6 +3,7 @@
 
 mod balance;
 mod examples;
+mod flat_files;
 mod hostile;
 mod language;
 mod ode_model;
@@ -10,3 +11,4 @@ mod parameters;
 mod refusals;
 mod soup;
 mod support;
+mod written_out;

@@ -80,6 +80,27 @@ const WORDS: &[&str] = &[
     "linspace",
     "'q'",
     ".",
+    "package",
+    "function",
+    "record",
+    "type",
+    "extends",
+    "import",
+    "algorithm",
+    "initial",
+    ":=",
+    "assert(",
+    "R",
+    "f",
+    "R(",
+    "f(",
+    "'r.x'",
+    "r.x",
+    "while",
+    "return",
+    "Boolean",
+    "enumeration",
+    "$i",
 ];
 
 const MODEL: &str = "model M \"two states\"
@@ -95,6 +116,27 @@ equation
   end for;
   0 = 2*a - sqrt(abs(u)) - transpose([x])*[1; 2]*{1}*{1};
 end M;";
+
+const PACKAGE: &str = "package P
+  import Modelica.Constants.pi;
+  type V = Real(unit = \"V\", min = 0);
+  record R Real x; V z[2]; end R;
+  partial model B parameter Real k = 2; V v(start = k); end B;
+  function f input Real x; input R r; output Real y = x; output R q; protected Real s[2];
+  algorithm
+    s := {x, r.x}; for i in 1:2 loop s[i] := s[i]*r.z[i]; end for;
+    if x > 0 then y := s[1]; elseif x < -1 then y := s[2]; else y := pi; end if;
+    q := R(y, s); assert(y < 3, \"y\");
+  end f;
+  model M
+    extends B(k = 3); R r(x = 1); R q; R t[2]; Real a; Boolean b = v > 1; Real 'c[1]'; Real 'c[2]'; Real w; Real when_;
+  initial equation v = k + 1;
+  algorithm a := v; if b then a := a*a; end if;
+  equation
+    r.z = {v, 2}; (w, q) = f(v, r); t[1] = q; t[2] = R(x = 1, z = c); 'c[1]' = a; c[2] - t[1].z[1] = 0;
+    der(v*2) = if b then w else -q.x; when_ = 1;
+  end M;
+end P;";
 
 /// The text is taken or refused at a place within it.
 fn check(text: &str) {
@@ -146,21 +188,25 @@ proptest! {
     #[test]
     fn mutated_models(edits in prop::collection::vec((any::<prop::sample::Index>(), 0..12usize,
                                                      prop::sample::select(WORDS)), 1..6)) {
-        let mut text = MODEL.to_owned();
-        for (place, removed, word) in edits {
-            let start = place.index(text.len() + 1);
-            let end = (start + removed).min(text.len());
-            if text.is_char_boundary(start) && text.is_char_boundary(end) {
-                text.replace_range(start..end, word);
+        for model in [MODEL, PACKAGE] {
+            let mut text = model.to_owned();
+            for (place, removed, word) in &edits {
+                let start = place.index(text.len() + 1);
+                let end = (start + removed).min(text.len());
+                if text.is_char_boundary(start) && text.is_char_boundary(end) {
+                    text.replace_range(start..end, word);
+                }
             }
+            check(&text);
         }
-        check(&text);
     }
 }
 
 #[test]
-fn the_model_that_is_mutated_is_taken() {
-    if let Err(refused) = Plant::from_modelica(MODEL, "soup.mo", &LoadOptions::default()) {
-        panic!("{refused}");
+fn the_models_that_are_mutated_are_taken() {
+    for model in [MODEL, PACKAGE] {
+        if let Err(refused) = Plant::from_modelica(model, "soup.mo", &LoadOptions::default()) {
+            panic!("{refused}");
+        }
     }
 }

@@ -1,0 +1,311 @@
+//! Statements, carried out on expressions: what is left are the values of the variables.
+
+use lynkeus_expr::{Binary, Node, Unary};
+
+use super::evaluate::Evaluator;
+use super::frame::{Frame, Local};
+use super::inline::Outcome;
+use super::names::joined;
+use super::value::{Array, Scalar, Value, describe_dims};
+use crate::syntax::ast::{Assert, ExprId, Iterator as Loop, Kind, Statement, StatementKind};
+use crate::syntax::{Problem, Result, Span, plain};
+
+/// How a list of statements ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ended {
+    AtItsEnd,
+    ByBreak,
+    ByReturn,
+}
+
+/// An `assert` that is not known to hold.
+#[derive(Clone, Debug)]
+pub(crate) struct Claim {
+    pub condition: Node,
+    pub message: String,
+    pub is_warning: bool,
+    pub span: Span,
+}
+
+/// Names that statements give values to.
+pub(super) fn targets(
+    source: &str,
+    ast: &crate::syntax::ast::Ast,
+    statements: &[Statement],
+    into: &mut Vec<String>,
+) {
+    for statement in statements {
+        match &statement.kind {
+            StatementKind::Assign(targets, _) => {
+                for &id in targets.iter().flatten() {
+                    into.push(target_name(source, ast, id));
+                }
+            }
+            StatementKind::For(_, body) | StatementKind::While(_, body) => {
+                self::targets(source, ast, body, into);
+            }
+            StatementKind::If(branches, otherwise) => {
+                for (_, body) in branches {
+                    self::targets(source, ast, body, into);
+                }
+                self::targets(source, ast, otherwise, into);
+            }
+            _ => {}
+        }
+    }
+}
+
+fn target_name(source: &str, ast: &crate::syntax::ast::Ast, id: ExprId) -> String {
+    let expression = ast.expression(id);
+    match &expression.kind {
+        Kind::Index(base, _) => target_name(source, ast, *base),
+        Kind::Path(parts) => joined(parts, source).1,
+        _ => plain(expression.span.text(source)).into_owned(),
+    }
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn execute(&mut self, statements: &'a [Statement]) -> Result<Ended> {
+        for statement in statements {
+            self.budget.charge(1, statement.span)?;
+            let ended = self.statement(statement)?;
+            if ended != Ended::AtItsEnd {
+                return Ok(ended);
+            }
+        }
+        Ok(Ended::AtItsEnd)
+    }
+
+    fn statement(&mut self, statement: &'a Statement) -> Result<Ended> {
+        let span = statement.span;
+        match &statement.kind {
+            StatementKind::Assign(targets, value) => self.assign_all(targets, *value, span)?,
+            StatementKind::For(iterators, body) => return self.repeated(iterators, body),
+            StatementKind::While(condition, body) => return self.repeated_while(*condition, body),
+            StatementKind::If(branches, otherwise) => {
+                return self.branched(branches, otherwise, span);
+            }
+            StatementKind::Assert(assert) => self.claim(assert, span)?,
+            StatementKind::Break => return Ok(Ended::ByBreak),
+            StatementKind::Return => return Ok(Ended::ByReturn),
+        }
+        Ok(Ended::AtItsEnd)
+    }
+
+    /// Notes an `assert`; one that is known to fail is refused.
+    pub(super) fn claim(&mut self, assert: &Assert, span: Span) -> Result<()> {
+        let node = self.condition(assert.condition)?;
+        let mut condition = node;
+        for &on_path in &self.conditions {
+            let not = self.graph.unary(Unary::Not, on_path);
+            condition = self.graph.binary(Binary::Or, not, condition);
+        }
+        match self.graph.constant_value(condition) {
+            Some(0.0) if !assert.is_warning => {
+                let message = format!("this assertion does not hold: {}", assert.message);
+                Err(Problem::new(span, message).hint("change the parameters that it is about"))
+            }
+            Some(value) if value != 0.0 => Ok(()),
+            _ => {
+                self.claims.push(Claim {
+                    condition,
+                    message: assert.message.clone(),
+                    is_warning: assert.is_warning,
+                    span,
+                });
+                Ok(())
+            }
+        }
+    }
+
+    fn repeated(&mut self, iterators: &'a [Loop], body: &'a [Statement]) -> Result<Ended> {
+        let Some((first, rest)) = iterators.split_first() else {
+            return self.execute(body);
+        };
+        let value = self.value(first.range)?;
+        if value.dims().len() != 1 {
+            let found = describe_dims(value.dims());
+            let message = format!("expected a range, found {found}");
+            let problem = Problem::new(self.span(first.range), message);
+            return Err(problem.hint("write `for i in 1:N`"));
+        }
+        for turn in value.into_array().elements {
+            self.budget.charge(1, first.name)?;
+            self.loops.push((self.text(first.name), turn));
+            let ended = self.repeated(rest, body);
+            self.loops.pop();
+            match ended? {
+                Ended::AtItsEnd => {}
+                Ended::ByBreak => break,
+                Ended::ByReturn => return Ok(Ended::ByReturn),
+            }
+        }
+        Ok(Ended::AtItsEnd)
+    }
+
+    fn repeated_while(&mut self, condition: ExprId, body: &'a [Statement]) -> Result<Ended> {
+        loop {
+            let span = self.span(condition);
+            self.budget.charge(1, span)?;
+            let node = self.condition(condition)?;
+            match self.graph.constant_value(node) {
+                Some(0.0) => return Ok(Ended::AtItsEnd),
+                Some(_) => {}
+                None => {
+                    let message = "this `while` depends on variables";
+                    return Err(Problem::new(span, message)
+                        .hint("use a `for` loop of a known length with an `if` inside"));
+                }
+            }
+            match self.execute(body)? {
+                Ended::AtItsEnd => {}
+                Ended::ByBreak => return Ok(Ended::AtItsEnd),
+                Ended::ByReturn => return Ok(Ended::ByReturn),
+            }
+        }
+    }
+
+    /// A known condition takes its branch; otherwise each variable takes the value of one
+    /// branch or the other.
+    fn branched(
+        &mut self,
+        branches: &'a [(ExprId, Vec<Statement>)],
+        otherwise: &'a [Statement],
+        span: Span,
+    ) -> Result<Ended> {
+        let Some(((condition, body), rest)) = branches.split_first() else {
+            return self.execute(otherwise);
+        };
+        let node = self.condition(*condition)?;
+        match self.graph.constant_value(node) {
+            Some(0.0) => return self.branched(rest, otherwise, span),
+            Some(_) => return self.execute(body),
+            None => {}
+        }
+        let before = self.frame.clone();
+        let size = before.as_ref().map_or(0, |frame| frame.locals.len());
+        self.budget.charge(size as u64, span)?;
+        let yes = self.on_path(node, span, |evaluator| evaluator.execute(body))?;
+        let after = std::mem::replace(&mut self.frame, before);
+        let not = self.graph.unary(Unary::Not, node);
+        let no = self.on_path(not, span, |evaluator| {
+            evaluator.branched(rest, otherwise, span)
+        })?;
+        if yes != Ended::AtItsEnd || no != Ended::AtItsEnd {
+            let message = "`break` or `return` under a condition that depends on variables";
+            return Err(Problem::new(span, message).hint("use `if … else …` without them"));
+        }
+        if let (Some(yes), Some(no)) = (after, self.frame.take()) {
+            self.frame = Some(Frame::joined(node, yes, no, self.graph));
+        }
+        Ok(Ended::AtItsEnd)
+    }
+
+    fn on_path(
+        &mut self,
+        condition: Node,
+        span: Span,
+        run: impl FnOnce(&mut Self) -> Result<Ended>,
+    ) -> Result<Ended> {
+        self.budget.charge(1, span)?;
+        self.conditions.push(condition);
+        let ended = run(self);
+        self.conditions.pop();
+        ended
+    }
+
+    fn assign_all(
+        &mut self,
+        targets: &'a [Option<ExprId>],
+        value: ExprId,
+        span: Span,
+    ) -> Result<()> {
+        if let [Some(target)] = targets {
+            if let Some(record) = self.record(value)? {
+                return self.assign_record(*target, record, span);
+            }
+            let value = self.value(value)?;
+            return self.assign(*target, value, span);
+        }
+        let outcomes = self.outcomes(value, targets.len())?;
+        for (target, outcome) in targets.iter().zip(outcomes) {
+            match (target, outcome) {
+                (Some(target), Outcome::Value(value)) => self.assign(*target, value, span)?,
+                (Some(target), Outcome::Record(record)) => {
+                    self.assign_record(*target, record, span)?;
+                }
+                (None, _) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn assign_record(
+        &mut self,
+        target: ExprId,
+        record: super::records::Record,
+        span: Span,
+    ) -> Result<()> {
+        let name = target_name(self.source, self.ast, target);
+        for (member, value) in record.members {
+            let full = format!("{name}.{member}");
+            self.assign_to(&full, &[], value, span)?;
+        }
+        Ok(())
+    }
+
+    fn assign(&mut self, target: ExprId, value: Value, span: Span) -> Result<()> {
+        let expression = self.ast.expression(target);
+        let name = target_name(self.source, self.ast, target);
+        match &expression.kind {
+            Kind::Name => self.assign_to(&name, &[], value, span),
+            Kind::Index(_, subscripts) => self.assign_to(&name, subscripts, value, span),
+            Kind::Path(parts) => {
+                let subscripts = joined(parts, self.source).0;
+                self.assign_to(&name, &subscripts, value, span)
+            }
+            _ => Err(Problem::new(
+                expression.span,
+                "expected a variable before `:=`",
+            )),
+        }
+    }
+
+    fn assign_to(
+        &mut self,
+        name: &str,
+        subscripts: &[ExprId],
+        value: Value,
+        span: Span,
+    ) -> Result<()> {
+        let unknown = || {
+            let message = format!("`{name}` cannot be given a value here");
+            Problem::new(span, message)
+                .hint("an algorithm assigns its own variables: outputs and protected ones")
+        };
+        let dims = match self.local(name) {
+            Some(Ok(local)) => local.dims.clone(),
+            _ => return Err(unknown()),
+        };
+        let (kept, offsets) = self.selected(name, &dims, subscripts, span)?;
+        let Array { dims, elements } = value.into_array();
+        if kept != dims {
+            let (has, found) = (describe_dims(&kept), describe_dims(&dims));
+            let message = format!("`{name}` takes {has} here, its value has {found}");
+            return Err(Problem::new(span, message));
+        }
+        self.budget.charge(offsets.len() as u64, span)?;
+        let graph = self.graph;
+        let frame = self.frame.as_mut();
+        let local: &mut Local = frame
+            .and_then(|frame| frame.locals.get_mut(name))
+            .ok_or_else(unknown)?;
+        for (offset, scalar) in offsets.into_iter().zip(elements) {
+            let converted: Scalar = local.converted(scalar, graph);
+            if let Some(slot) = local.elements.get_mut(offset) {
+                *slot = Some(converted);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,79 @@
+//! The variables of a function or an algorithm while its statements are carried out.
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Graph, Node};
+
+use super::value::{Scalar, Value};
+
+/// What the statements have given values to so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Frame {
+    pub locals: HashMap<String, Local>,
+    /// names of the members of its records
+    pub records: HashMap<String, Vec<String>>,
+    /// names outside of it are constants only
+    pub is_function: bool,
+}
+
+/// A variable; an element without value is `None`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Local {
+    pub dims: Vec<usize>,
+    pub elements: Vec<Option<Scalar>>,
+    pub is_integer: bool,
+}
+
+impl Local {
+    pub(super) fn without_value(dims: Vec<usize>, is_integer: bool) -> Self {
+        let count = dims.iter().product();
+        Self {
+            dims,
+            elements: vec![None; count],
+            is_integer,
+        }
+    }
+
+    /// All elements; `None` where one has no value.
+    pub(super) fn value(&self) -> Option<Value> {
+        let elements: Option<Vec<Scalar>> = self.elements.iter().copied().collect();
+        Some(Value::new(self.dims.clone(), elements?))
+    }
+
+    /// A value of this variable's type: what stands in a Real is a Real.
+    pub(super) fn converted(&self, scalar: Scalar, graph: &Graph) -> Scalar {
+        match scalar {
+            Scalar::Integer(_) if !self.is_integer => {
+                scalar.real(graph).map_or(scalar, Scalar::Real)
+            }
+            _ => scalar,
+        }
+    }
+}
+
+impl Frame {
+    /// What holds behind an `if`: the values of one branch or the other.
+    pub(super) fn joined(condition: Node, yes: Frame, mut no: Frame, graph: &Graph) -> Frame {
+        for (name, local) in &mut no.locals {
+            let Some(other) = yes.locals.get(name) else {
+                continue;
+            };
+            for (b, a) in local.elements.iter_mut().zip(&other.elements) {
+                *b = either(condition, *a, *b, graph);
+            }
+        }
+        no
+    }
+}
+
+fn either(condition: Node, a: Option<Scalar>, b: Option<Scalar>, graph: &Graph) -> Option<Scalar> {
+    let (a, b) = (a?, b?);
+    if a == b {
+        return Some(a);
+    }
+    if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (a, b) {
+        return Some(Scalar::Boolean(graph.select(condition, a, b)));
+    }
+    let (a, b) = (a.real(graph)?, b.real(graph)?);
+    Some(Scalar::Real(graph.select(condition, a, b)))
+}

@@ -1,0 +1,349 @@
+//! Classes: their heads, their sections, and what stands in them.
+
+use super::ast::{Alias, Base, Class, ClassKind, Import, Prefix};
+use super::names::plain;
+use super::parser::Parser;
+use super::token::{Keyword, Symbol, Token};
+use super::{Problem, Result, Span};
+use crate::limits::MAX_NAME;
+
+/// The section of a class that is being read.
+#[derive(Clone, Copy, PartialEq)]
+enum Section {
+    Elements,
+    Equations,
+    Initial,
+    Algorithm,
+}
+
+impl Parser<'_> {
+    pub(super) fn within_clause(&mut self) -> Result<()> {
+        if self.accept_word(Keyword::Within)? {
+            while self.token == Token::Identifier || self.at(Symbol::Dot) {
+                self.advance()?;
+            }
+            self.expect(Symbol::Semicolon)?;
+        }
+        Ok(())
+    }
+
+    /// A class with those in it, all of which go to the tree.
+    pub(super) fn class(&mut self, around: &str) -> Result<()> {
+        self.nested(|parser| parser.class_here(around))
+    }
+
+    fn class_here(&mut self, around: &str) -> Result<()> {
+        self.accept_word(Keyword::Final)?;
+        self.accept_word(Keyword::Encapsulated)?;
+        let is_partial = self.accept_word(Keyword::Partial)?;
+        let kind = self.class_kind()?;
+        if self.at_word(Keyword::Extends) {
+            return Err(self.refuse(
+                "a model made from another one",
+                "write `extends Base;` among its declarations",
+            ));
+        }
+        let name = self.class_name("the name of the model")?;
+        let mut class = Class {
+            kind,
+            is_partial,
+            name,
+            path: self.path(around, name)?,
+            declarations: vec![],
+            equations: vec![],
+            initial: vec![],
+            algorithms: vec![],
+            bases: vec![],
+            imports: vec![],
+            alias: None,
+            literals: vec![],
+            is_external: false,
+        };
+        self.count(4)?;
+        if self.accept(Symbol::Equal)? {
+            self.short_definition(&mut class)?;
+        } else {
+            self.description()?;
+            self.class_body(&mut class)?;
+            self.class_end(name)?;
+        }
+        self.comment()?;
+        self.expect(Symbol::Semicolon)?;
+        self.ast.classes.push(class);
+        Ok(())
+    }
+
+    /// A name; compilers write those of inner classes in full.
+    fn class_name(&mut self, what: &str) -> Result<Span> {
+        let start = self.identifier(what)?;
+        while self.accept(Symbol::Dot)? {
+            self.identifier("a name after `.`")?;
+        }
+        Ok(start.to(self.last))
+    }
+
+    fn path(&self, around: &str, name: Span) -> Result<String> {
+        let own = plain(name.text(self.source));
+        if around.is_empty() {
+            return Ok(own.into_owned());
+        }
+        if around.len() + own.len() > MAX_NAME {
+            let message = format!("with the classes around it this name is longer than {MAX_NAME}");
+            return Err(Problem::new(name, message).hint("choose shorter names"));
+        }
+        Ok(format!("{around}.{own}"))
+    }
+
+    /// True at a word that begins a class.
+    fn at_class(&self) -> bool {
+        use Keyword::*;
+        matches!(
+            self.token,
+            Token::Keyword(
+                Model
+                    | Class
+                    | Block
+                    | Package
+                    | Record
+                    | Function
+                    | Type
+                    | Connector
+                    | Partial
+                    | Encapsulated
+                    | Expandable
+                    | Operator
+                    | Pure
+                    | Impure
+            )
+        )
+    }
+
+    fn class_kind(&mut self) -> Result<ClassKind> {
+        use Keyword::*;
+        let Token::Keyword(word) = self.token else {
+            return Err(self
+                .unexpected("`model`")
+                .hint("a file holds one or more `model`s"));
+        };
+        if matches!(word, Expandable | Operator | Pure | Impure) {
+            self.advance()?;
+            if word == Operator && self.token == Token::Identifier {
+                return Err(self.refuse("an operator", "write the formula where it is used"));
+            }
+            return self.class_kind();
+        }
+        let kind = match word {
+            Model | Class | Block => ClassKind::Model,
+            Package => ClassKind::Package,
+            Record => ClassKind::Record,
+            Function => ClassKind::Function,
+            Type => ClassKind::Type,
+            Connector => ClassKind::Connector,
+            _ => {
+                return Err(self
+                    .unexpected("`model`")
+                    .hint("a file holds one or more `model`s"));
+            }
+        };
+        self.advance()?;
+        Ok(kind)
+    }
+
+    /// `= Real(unit = "V")` or `= enumeration(one, two)`, behind the `=`.
+    fn short_definition(&mut self, class: &mut Class) -> Result<()> {
+        if self.accept_word(Keyword::Enumeration)? {
+            self.expect(Symbol::OpenParen)?;
+            while !self.at(Symbol::CloseParen) {
+                class.literals.push(self.identifier("a literal")?);
+                self.comment()?;
+                if !self.accept(Symbol::Comma)? {
+                    break;
+                }
+            }
+            self.expect(Symbol::CloseParen)?;
+            return Ok(());
+        }
+        let mut prefix = Prefix::plain();
+        self.causality(&mut prefix)?;
+        let of = self.type_name()?;
+        let mut dimensions = vec![];
+        if self.at(Symbol::OpenBracket) {
+            dimensions = self.subscripts()?;
+        }
+        let mut modification = vec![];
+        if self.accept(Symbol::OpenParen)? {
+            self.modification(&mut modification)?;
+        }
+        class.alias = Some(Alias {
+            of,
+            dimensions,
+            modification,
+        });
+        Ok(())
+    }
+
+    fn class_end(&mut self, name: Span) -> Result<()> {
+        self.expect_word(Keyword::End)?;
+        let end = self.class_name("the name of the model after `end`")?;
+        let (opened, closed) = (name.text(self.source), end.text(self.source));
+        if plain(opened) == plain(closed) {
+            return Ok(());
+        }
+        Err(
+            Problem::new(end, format!("`end {closed}` closes model `{opened}`"))
+                .hint(format!("write `end {opened};`")),
+        )
+    }
+
+    fn class_body(&mut self, class: &mut Class) -> Result<()> {
+        let mut section = Section::Elements;
+        loop {
+            match self.token {
+                Token::Keyword(Keyword::End) => return Ok(()),
+                Token::Keyword(Keyword::Public | Keyword::Protected) => {
+                    section = Section::Elements;
+                    self.advance()?;
+                }
+                Token::Keyword(Keyword::Initial | Keyword::Equation | Keyword::Algorithm) => {
+                    section = self.section()?;
+                    if section == Section::Algorithm {
+                        class.algorithms.push(vec![]);
+                    }
+                }
+                Token::End => {
+                    let name = class.name.text(self.source);
+                    return Err(self.unexpected(&format!("`end {name};`")));
+                }
+                Token::Keyword(Keyword::Annotation) => {
+                    self.annotation()?;
+                    self.expect(Symbol::Semicolon)?;
+                }
+                Token::Keyword(Keyword::External) => {
+                    class.is_external = true;
+                    self.skip_to_semicolon()?;
+                }
+                _ => self.content(section, class)?,
+            }
+        }
+    }
+
+    /// `equation`, `algorithm`, or `initial` before one of them.
+    fn section(&mut self) -> Result<Section> {
+        let initial = self.span;
+        let is_initial = self.accept_word(Keyword::Initial)?;
+        if self.accept_word(Keyword::Equation)? {
+            return Ok(match is_initial {
+                true => Section::Initial,
+                false => Section::Equations,
+            });
+        }
+        if is_initial && self.at_word(Keyword::Algorithm) {
+            let problem = Problem::new(initial, "an `initial algorithm` is not supported");
+            return Err(problem.hint(
+                "give the starting values with `start = …` in the declarations, or in an \
+                 `initial equation`",
+            ));
+        }
+        self.expect_word(Keyword::Algorithm)?;
+        Ok(Section::Algorithm)
+    }
+
+    fn content(&mut self, section: Section, class: &mut Class) -> Result<()> {
+        match section {
+            Section::Elements => self.element(class),
+            Section::Equations => {
+                let equation = self.equation()?;
+                class.equations.push(equation);
+                Ok(())
+            }
+            Section::Initial => {
+                let equation = self.equation()?;
+                class.initial.push(equation);
+                Ok(())
+            }
+            Section::Algorithm => {
+                let statement = self.statement()?;
+                if let Some(last) = class.algorithms.last_mut() {
+                    last.push(statement);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn element(&mut self, class: &mut Class) -> Result<()> {
+        if self.at_class() {
+            let path = class.path.clone();
+            return self.class(&path);
+        }
+        if self.accept_word(Keyword::Extends)? {
+            let base = self.base()?;
+            class.bases.push(base);
+            return Ok(());
+        }
+        if self.accept_word(Keyword::Import)? {
+            let import = self.import()?;
+            class.imports.push(import);
+            return Ok(());
+        }
+        self.declarations(&mut class.declarations)
+    }
+
+    fn base(&mut self) -> Result<Base> {
+        let name = self.dotted_name()?;
+        let mut modification = vec![];
+        if self.accept(Symbol::OpenParen)? {
+            self.modification(&mut modification)?;
+        }
+        self.comment()?;
+        self.expect(Symbol::Semicolon)?;
+        Ok(Base { name, modification })
+    }
+
+    fn import(&mut self) -> Result<Import> {
+        let start = self.span;
+        let mut full = self.dotted_import()?;
+        let mut short = None;
+        if self.accept(Symbol::Equal)? {
+            short = Some(full);
+            full = self.dotted_import()?;
+        }
+        let whole = self.accept(Symbol::ElementTimes)?;
+        if self.at(Symbol::OpenBrace) || self.at(Symbol::Dot) {
+            let problem = Problem::new(start, "an import of several names is not supported");
+            return Err(problem.hint("write one `import` for each"));
+        }
+        self.comment()?;
+        self.expect(Symbol::Semicolon)?;
+        if short.is_none() && !whole {
+            let last = full.rsplit('.').next().unwrap_or_default();
+            short = Some(last.to_owned());
+        }
+        Ok(Import { short, full })
+    }
+
+    /// A name that ends before `.{` and before `.*`.
+    fn dotted_import(&mut self) -> Result<String> {
+        let mut name = plain(self.identifier("a name")?.text(self.source)).into_owned();
+        while self.accept(Symbol::Dot)? {
+            if self.at(Symbol::OpenBrace) {
+                break;
+            }
+            let part = self.identifier("a name after `.`")?;
+            name.push('.');
+            name.push_str(&plain(part.text(self.source)));
+        }
+        Ok(name)
+    }
+
+    fn skip_to_semicolon(&mut self) -> Result<()> {
+        while !self.at(Symbol::Semicolon) {
+            if self.token == Token::End {
+                return Err(self.unexpected("`;`"));
+            }
+            self.advance()?;
+        }
+        self.advance()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,107 @@
+// BaseModelica — Electrical_Filter "A ladder of two sections with a load"
+
+model Electrical_Filter "A ladder of two sections with a load"
+
+  // --- variable declarations ---
+  input Real u(unit = "V", min = 0, max = 10, start = 5);
+  Real s.p.v(unit = "V", start = 0.0) "Potential";
+  Real s.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real s.n.v(unit = "V", start = 0.0) "Potential";
+  Real s.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real s.v(unit = "V", start = 0.0);
+  Real s.i(unit = "A", start = 0.0);
+  input Real s.u(unit = "V", start = 0.0) = u;
+  Real r.p.v(unit = "V", start = 0.0) "Potential";
+  Real r.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real r.n.v(unit = "V", start = 0.0) "Potential";
+  Real r.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real r.v(unit = "V", start = 0.0);
+  Real r.i(unit = "A", start = 0.0);
+  parameter Real r.R(unit = "Ohm", min = 0, start = 0.0) = 2;
+  Real l1.p.v(unit = "V", start = 0.0) "Potential";
+  Real l1.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real l1.n.v(unit = "V", start = 0.0) "Potential";
+  Real l1.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real l1.v(unit = "V", start = 0.0);
+  Real l1.i(unit = "A", min = (-10), max = 10, start = 0.1, fixed = true);
+  parameter Real l1.L(unit = "H", start = 0.0) = 0.5;
+  Real c1.p.v(unit = "V", start = 0.0) "Potential";
+  Real c1.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real c1.n.v(unit = "V", start = 0.0) "Potential";
+  Real c1.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real c1.v(unit = "V", min = (-20), max = 20, start = 0.5, fixed = true);
+  Real c1.i(unit = "A", start = 0.0);
+  parameter Real c1.C(unit = "F", start = 0.0) = 0.1;
+  Real l2.p.v(unit = "V", start = 0.0) "Potential";
+  Real l2.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real l2.n.v(unit = "V", start = 0.0) "Potential";
+  Real l2.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real l2.v(unit = "V", start = 0.0);
+  Real l2.i(unit = "A", min = (-10), max = 10, start = 0, fixed = true);
+  parameter Real l2.L(unit = "H", start = 0.0) = 0.3;
+  Real c2.p.v(unit = "V", start = 0.0) "Potential";
+  Real c2.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real c2.n.v(unit = "V", start = 0.0) "Potential";
+  Real c2.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real c2.v(unit = "V", min = (-20), max = 20, start = 0, fixed = true);
+  Real c2.i(unit = "A", start = 0.0);
+  parameter Real c2.C(unit = "F", start = 0.0) = 0.2;
+  Real load.p.v(unit = "V", start = 0.0) "Potential";
+  Real load.p.i(unit = "A", start = 0.0) "Current into the part";
+  Real load.n.v(unit = "V", start = 0.0) "Potential";
+  Real load.n.i(unit = "A", start = 0.0) "Current into the part";
+  Real load.v(unit = "V", start = 0.0);
+  Real load.i(unit = "A", start = 0.0);
+  parameter Real load.R(unit = "Ohm", min = 0, start = 0.0) = 5;
+  Real g.p.v(unit = "V", start = 0.0) "Potential";
+  Real g.p.i(unit = "A", start = 0.0) "Current into the part";
+  output Real y(unit = "V", start = 0.0) = load.v;
+
+equation
+  // --- continuous equations ---
+  s.v = (s.p.v - s.n.v);
+  0 = (s.p.i + s.n.i);
+  s.i = s.p.i;
+  s.v = s.u;
+  r.v = (r.p.v - r.n.v);
+  0 = (r.p.i + r.n.i);
+  r.i = r.p.i;
+  r.v = (r.R * r.i);
+  l1.v = (l1.p.v - l1.n.v);
+  0 = (l1.p.i + l1.n.i);
+  l1.i = l1.p.i;
+  (l1.L * der(l1.i)) = l1.v;
+  c1.v = (c1.p.v - c1.n.v);
+  0 = (c1.p.i + c1.n.i);
+  c1.i = c1.p.i;
+  (c1.C * der(c1.v)) = c1.i;
+  l2.v = (l2.p.v - l2.n.v);
+  0 = (l2.p.i + l2.n.i);
+  l2.i = l2.p.i;
+  (l2.L * der(l2.i)) = l2.v;
+  c2.v = (c2.p.v - c2.n.v);
+  0 = (c2.p.i + c2.n.i);
+  c2.i = c2.p.i;
+  (c2.C * der(c2.v)) = c2.i;
+  load.v = (load.p.v - load.n.v);
+  0 = (load.p.i + load.n.i);
+  load.i = load.p.i;
+  load.v = (load.R * load.i);
+  g.p.v = 0;
+  0 = (s.p.i + r.p.i);
+  0 = (r.n.i + l1.p.i);
+  0 = ((l1.n.i + c1.p.i) + l2.p.i);
+  0 = ((l2.n.i + c2.p.i) + load.p.i);
+  0 = ((((load.n.i + c2.n.i) + c1.n.i) + s.n.i) + g.p.i);
+  s.p.v = r.p.v;
+  r.n.v = l1.p.v;
+  l1.n.v = c1.p.v;
+  c1.p.v = l2.p.v;
+  l2.n.v = c2.p.v;
+  c2.p.v = load.p.v;
+  load.n.v = c2.n.v;
+  c2.n.v = c1.n.v;
+  c1.n.v = s.n.v;
+  s.n.v = g.p.v;
+
+end Electrical_Filter;
