@@ -49,8 +49,8 @@ impl Default for EstimatorSettings {
 ///
 /// A call that fails changes nothing but the count of the samples: the estimator stays at the
 /// last good sample and the next call goes on from there. With [`Step::Substeps`] or
-/// [`Step::AtMost`] neither a system nor a sampled observer nor the extended filter without
-/// history allocates after its first samples.
+/// [`Step::AtMost`] neither a system nor a sampled observer nor the extended filter of up to eight
+/// states without history allocates once its equations have become machine code.
 ///
 /// ```
 /// use lynkeus_expr::Graph;

@@ -228,36 +228,70 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     assert!(result.is_ok() && confined > 5, "{result:?} {confined}");
 }
 
-/// A snapshot has what the smoother keeps; ways with stops give the same transitions.
+/// A snapshot has what the smoother keeps; ways with stops give the same transitions. The kick of
+/// the noise on a way is larger for the sigma points where the way has no stop.
 #[test]
 fn smoothing_goes_on_after_a_restore_and_over_predictions() {
-    let settings = FilterSettings {
-        keep_history: true,
-        ..FilterSettings::of(FilterKind::Extended)
-    };
-    let new = || Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings.clone(), exact()).unwrap();
-    let (mut whole, mut stopped, mut restored) = (new(), new(), new());
-    for k in 0..12 {
-        let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
-        whole.push(t, &[y]).unwrap();
-        if k > 0 {
-            stopped.predict(t - 0.3).unwrap();
-            stopped.predict(t).unwrap();
-            stopped.update(&[y]).unwrap();
-        } else {
-            stopped.push(t, &[y]).unwrap();
+    for (kind, noise) in [
+        (FilterKind::Extended, 0.2),
+        (FilterKind::Unscented(SigmaPoints::default()), 0.0),
+    ] {
+        let settings = FilterSettings {
+            keep_history: true,
+            ..FilterSettings::of(kind)
+        };
+        let model = scalar(-0.3, noise, 0.1);
+        let new = || Estimator::filter(&model, settings.clone(), exact()).unwrap();
+        let (mut whole, mut stopped, mut restored) = (new(), new(), new());
+        for k in 0..12 {
+            let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
+            whole.push(t, &[y]).unwrap();
+            if k > 0 {
+                stopped.predict(t - 0.3).unwrap();
+                stopped.predict(t).unwrap();
+                stopped.update(&[y]).unwrap();
+            } else {
+                stopped.push(t, &[y]).unwrap();
+            }
+            if k == 6 {
+                restored.restore(&whole.snapshot()).unwrap();
+            } else if k > 6 {
+                restored.push(t, &[y]).unwrap();
+            }
         }
-        if k == 6 {
-            restored.restore(&whole.snapshot()).unwrap();
-        } else if k > 6 {
-            restored.push(t, &[y]).unwrap();
+        let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
+        assert_eq!(smoothed(&restored), smoothed(&whole));
+        for (a, b) in smoothed(&stopped).iter().zip(smoothed(&whole)) {
+            assert!((a.estimate[0] - b.estimate[0]).abs() < 1e-9);
+            assert!((a.deviations[0] - b.deviations[0]).abs() < 1e-9);
         }
+        assert_eq!(smoothed(&stopped).len(), 12);
     }
-    let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
-    assert_eq!(smoothed(&restored), smoothed(&whole));
-    for (a, b) in smoothed(&stopped).iter().zip(smoothed(&whole)) {
-        assert!((a.estimate[0] - b.estimate[0]).abs() < 1e-9);
-        assert!((a.deviations[0] - b.deviations[0]).abs() < 1e-9);
+}
+
+/// An update that fails after its readings have corrected leaves nothing behind for the smoother.
+#[test]
+fn smoothing_knows_nothing_of_updates_that_failed() {
+    for kind in [
+        FilterKind::Extended,
+        FilterKind::Unscented(SigmaPoints::default()),
+    ] {
+        let settings = FilterSettings {
+            keep_history: true,
+            ..FilterSettings::of(kind)
+        };
+        let new = || Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings.clone(), exact()).unwrap();
+        let (mut whole, mut troubled) = (new(), new());
+        for k in 0..8 {
+            let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
+            whole.push(t, &[y]).unwrap();
+            if k % 3 == 1 {
+                let error = troubled.push(t, &[1e300]).unwrap_err();
+                assert!(matches!(error, Error::Diverged { .. }), "{error}");
+            }
+            troubled.push(t, &[y]).unwrap();
+        }
+        let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
+        assert_eq!(smoothed(&troubled), smoothed(&whole));
     }
-    assert_eq!(smoothed(&stopped).len(), 12);
 }
