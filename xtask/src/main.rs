@@ -2,6 +2,7 @@
 
 mod attack;
 mod draw;
+mod exercise;
 mod falsify;
 mod gallery;
 mod gap;
@@ -26,12 +27,18 @@ usage: cargo xtask <task>
             [--seed N] [--count N] [--refutations N] [--family F]; build with --release
   attack    run the command on mutated models, studies, logs and options, and see that it neither
             fails nor harms; [--seed N] [--count N] [--seconds N] [--limit SECONDS]
-            [--binary FILE]; build with --release";
+            [--binary FILE]; build with --release
+  exercise  random operations on estimators of every kind: no panic, always finite or an error, a
+            restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]; build with
+            --release";
+
+/// Tasks with options of their own.
+const WITH_OPTIONS: [&str; 3] = ["falsify", "attack", "exercise"];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let (task, name) = match arguments.as_slice() {
-        [task, ..] if task == "falsify" || task == "attack" => (task.as_str(), None),
+        [task, ..] if WITH_OPTIONS.contains(&task.as_str()) => (task.as_str(), None),
         [task] => (task.as_str(), None),
         [task, name] if task == "gap" => ("gap", Some(name.as_str())),
         _ => ("", None),
@@ -42,6 +49,7 @@ fn main() -> ExitCode {
         "gallery" => gallery::draw(),
         "gap" => gap::tabulate(name),
         "attack" => attack::run(&arguments[1..]),
+        "exercise" => exercise::run(&arguments[1..]),
         "falsify" => falsify::run(&arguments[1..]),
         _ => {
             eprintln!("{USAGE}");

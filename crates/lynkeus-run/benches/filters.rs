@@ -3,9 +3,9 @@
 use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
 use lynkeus_run::filter::{
-    Bounds, Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
+    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints,
 };
-use lynkeus_run::{Error, EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Error, Estimator, EstimatorSettings, Level, Method, Tolerances};
 
 fn main() {
     divan::main();
@@ -50,14 +50,15 @@ fn measure(bencher: Bencher, n: usize, kind: FilterKind) {
         method,
         ..EstimatorSettings::default()
     };
-    let filter = chain(n).and_then(|model| Filter::new(&model, FilterSettings::of(kind), run));
+    let filter =
+        chain(n).and_then(|model| Estimator::filter(&model, FilterSettings::of(kind), run));
     let mut filter = filter.unwrap_or_else(|error| panic!("{error}"));
     let mut k = 0_u32;
     let mut push = || {
         let t = STEP * f64::from(k);
         k += 1;
         let y = 0.5 + 0.1 * t.sin();
-        match filter.push(t, &[y], &[black_box(0.7)]) {
+        match filter.push(t, &[y, black_box(0.7)]) {
             Ok(x) => x[0],
             Err(error) => panic!("{error}"),
         }

@@ -1,6 +1,7 @@
 //! When an estimate counts as diverged.
 
 use crate::Error;
+use crate::snapshot::{Damaged, Persist, Walk};
 
 /// An estimate this many times larger than anything seen is no estimate.
 const FACTOR: f64 = 1e12;
@@ -34,7 +35,8 @@ impl Bound {
         values: &[f64],
         hint: impl FnOnce() -> String,
     ) -> Result<(), Error> {
-        let inside = |v: &f64| v.abs() <= FACTOR * self.scale;
+        // a reading may be so large that the bound itself is infinite
+        let inside = |v: &f64| v.is_finite() && v.abs() <= FACTOR * self.scale;
         match values.iter().position(|v| !inside(v)) {
             None => Ok(()),
             Some(i) => Err(Error::Diverged {
@@ -44,5 +46,21 @@ impl Bound {
                 hint: hint(),
             }),
         }
+    }
+}
+
+/// A covariance that has grown beyond every number.
+pub(crate) fn deviation_diverged(time: f64, name: &str, value: f64) -> Error {
+    Error::Diverged {
+        time,
+        name: format!("standard deviation of {name}"),
+        value,
+        hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
+    }
+}
+
+impl Persist for Bound {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.number(&mut self.scale)
     }
 }

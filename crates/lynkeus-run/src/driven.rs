@@ -1,5 +1,6 @@
 //! Signals between two samples.
 
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Evaluation, System};
 
 /// A system with its signals between two samples.
@@ -53,6 +54,14 @@ impl Driven {
     pub(crate) fn arrive(&mut self) {
         self.last.copy_from_slice(&self.next);
         self.evaluation.signals_mut().copy_from_slice(&self.last);
+    }
+}
+
+impl Persist for Driven {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.evaluation.walk(walk)?;
+        walk.numbers(&mut self.last)?;
+        walk.numbers(&mut self.next)
     }
 }
 

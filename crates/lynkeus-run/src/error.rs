@@ -2,7 +2,7 @@
 
 use lynkeus_expr::MissingInput;
 
-use crate::Trajectory;
+use crate::{SnapshotFault, Trajectory};
 
 /// Why a system could not be built, simulated or replayed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -161,6 +161,13 @@ pub enum Error {
         column: String,
         /// what stands there
         value: f64,
+    },
+
+    /// A snapshot that does not fit.
+    #[error("the snapshot cannot be restored: {fault}")]
+    Snapshot {
+        /// why
+        fault: SnapshotFault,
     },
 
     /// The caller asked to stop.

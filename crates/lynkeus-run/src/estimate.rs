@@ -162,8 +162,15 @@ fn replay(
     let mut estimator = Estimator::new(observer, settings)?;
     let mut signals = vec![0.0; columns.len()];
     for (k, &t) in log.times.iter().enumerate() {
-        for (signal, column) in signals.iter_mut().zip(&columns) {
+        for ((signal, column), name) in signals.iter_mut().zip(&columns).zip(observer.signals()) {
             *signal = column[k];
+            if !signal.is_finite() {
+                return Err(Error::NotANumber {
+                    row: k + 1,
+                    column: name.clone(),
+                    value: *signal,
+                });
+            }
         }
         let estimates = estimator.push(t, &signals)?;
         result.trajectory.push(t, estimates);

@@ -2,6 +2,7 @@
 
 use crate::adaptive::{Adaptive, Choice, resolution};
 use crate::relays::{Sides, Switched};
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 
 /// Most fixed steps in one interval.
@@ -17,7 +18,7 @@ const LOOK_EVERY: usize = 32;
 const RETRIES: usize = 3;
 
 /// A fixed step beside the one that the fastest mode needs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepAdvice {
     /// spectral radius of the Jacobian, 1/(unit of time)
     pub spectral_radius: f64,
@@ -118,7 +119,7 @@ impl Integrator {
     ) -> Result<(), Error> {
         let shortest = 4.0 * resolution(to);
         let length = to - from;
-        if length.is_nan() || length <= shortest {
+        if !length.is_finite() || length <= shortest {
             let what = format!("interval from t = {from} to {to}");
             let expected =
                 format!("more than {shortest:e}, which time resolves (shift its origin)");
@@ -205,6 +206,29 @@ impl Integrator {
             ),
             _ => String::new(),
         }
+    }
+}
+
+/// From one interval to the next the step and what is known of it stay, and the sides of the
+/// surfaces on which the system jumps.
+impl Persist for Integrator {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.sides.walk(walk)?;
+        match &mut self.stepper {
+            Stepper::Adaptive(adaptive) => adaptive.walk(walk),
+            Stepper::Fixed(fixed) => {
+                walk.optional(&mut fixed.advice, |walk, advice| advice.walk(walk))?;
+                walk.count(&mut fixed.since_look)
+            }
+        }
+    }
+}
+
+impl Persist for StepAdvice {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.number(&mut self.spectral_radius)?;
+        walk.number(&mut self.needed)?;
+        walk.number(&mut self.used)
     }
 }
 

@@ -3,7 +3,8 @@
 //! A [`System`] is x' = f(t, x, w) with outputs, compiled from expressions; a
 //! plant, an observer and the inputs of a study are all systems. A
 //! [`Simulation`] runs a plant, and an observer with it; [`estimate`] replays a
-//! log through an observer; an [`Estimator`] takes samples one by one, live.
+//! log through an observer; an [`Estimator`] takes samples one by one, live, of any kind
+//! of observer.
 //!
 //! ```
 //! use lynkeus_expr::Graph;
@@ -92,7 +93,9 @@ mod error;
 mod estimate;
 mod estimator;
 pub mod filter;
+mod flow;
 mod grid;
+mod intake;
 mod integrator;
 mod joint;
 mod method;
@@ -100,8 +103,10 @@ mod noise;
 mod relays;
 mod rk4;
 mod routine;
+mod runner;
 mod sampled;
 mod simulate;
+mod snapshot;
 mod spectral;
 mod spread;
 mod switches;
@@ -117,8 +122,9 @@ pub use method::{Method, Step, Tolerances};
 pub use noise::{Level, Noise};
 pub use rk4::Rk4;
 pub use routine::Backend;
-pub use sampled::{SampledEstimator, SampledObserver};
+pub use sampled::SampledObserver;
 pub use simulate::Simulation;
+pub use snapshot::{Digest, SnapshotFault};
 pub use spectral::spectral_radius;
 pub use spread::{ErrorModel, ErrorNoise};
 pub use system::{Evaluation, System};

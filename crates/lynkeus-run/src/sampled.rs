@@ -1,7 +1,11 @@
 //! Observers whose sensors report when they do.
 
-use crate::divergence::Bound;
+use crate::divergence::{Bound, deviation_diverged};
 use crate::driven::Driven;
+use crate::filter::Health;
+use crate::intake::Sample;
+use crate::runner::Runner;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
 use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
 
@@ -10,23 +14,23 @@ use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
 /// w' = L_f h(x̂) (the inter-sample predictor of Karafyllis and Kravaris, *From
 /// continuous-time design to sampled-data design of observers*, 2009).
 ///
-/// The system's last `sensors` states are w; its last `sensors` signals say for each sensor
-/// whether w follows the model (1) or stays (0); its last `sensors` outputs are h(x̂).
+/// With one for each of the `sensors`, the system's last states are w; its last signals say
+/// whether w follows the model (1) or stays (0); its last outputs are h(x̂).
 #[derive(Clone, Debug)]
 pub struct SampledObserver {
     /// the system
     pub system: System,
-    /// number of measured outputs
-    pub sensors: usize,
+    /// names of the measured outputs
+    pub sensors: Vec<String>,
     /// w follows the model also after a reading, not only where one is missing
     pub predict: bool,
     /// how errors spread, where standard deviations are asked for
     pub errors: Option<ErrorModel>,
 }
 
-/// A [`SampledObserver`] that takes one sample after the other.
+/// A [`SampledObserver`] under way.
 #[derive(Clone, Debug)]
-pub struct SampledEstimator {
+pub(crate) struct Sampled {
     driven: Driven,
     integrator: Integrator,
     x: Vec<f64>,
@@ -35,18 +39,12 @@ pub struct SampledEstimator {
     signals: Vec<f64>,
     sensors: usize,
     predict: bool,
-    time: Option<f64>,
-    samples: usize,
-    missing: Vec<usize>,
     bound: Bound,
     spread: Option<Spread>,
+    health: Health,
 }
 
-impl SampledEstimator {
-    /// An estimator at the observer's start values, waiting for the first sample.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] for impossible numbers of the method.
+impl Sampled {
     pub fn new(observer: &SampledObserver, method: Method) -> Result<Self, Error> {
         let SampledObserver {
             system,
@@ -54,6 +52,17 @@ impl SampledEstimator {
             predict,
             errors,
         } = observer;
+        let count = sensors.len();
+        for (what, found) in [
+            ("states", system.states().len()),
+            ("signals", system.signals().len()),
+            ("outputs", system.outputs().len()),
+        ] {
+            if found < count {
+                let expected = format!("{count} at least, one per sensor");
+                return Err(Error::setting(what, expected, found));
+            }
+        }
         let spread = errors.as_ref().map(|model| Spread::new(model, method));
         Ok(Self {
             driven: Driven::new(system, BetweenSamples::Hold),
@@ -61,139 +70,29 @@ impl SampledEstimator {
             x: system.start().to_vec(),
             outputs: vec![0.0; system.outputs().len()],
             signals: vec![0.0; system.signals().len()],
-            sensors: *sensors,
+            sensors: count,
             predict: *predict,
-            time: None,
-            samples: 0,
-            missing: vec![0; *sensors],
             bound: Bound::new(system.start()),
             spread: spread.transpose()?,
+            health: Health::of(count),
         })
     }
 
-    /// Takes the readings at `t` with the known inputs, and returns the estimates (and
-    /// monitors). A reading that is not finite says that this sensor did not report: its w
-    /// follows the model until it does. Of an input that is not finite the last value holds.
-    ///
-    /// # Errors
-    /// [`Error::TimeOrder`], [`Error::NotANumber`] for the first value of an input,
-    /// [`Error::Setting`] for wrong numbers of values; [`Error::Diverged`],
-    /// [`Error::NotFinite`] and the errors of the integration.
-    pub fn push(&mut self, t: f64, readings: &[f64], inputs: &[f64]) -> Result<&[f64], Error> {
-        self.samples += 1;
-        let next = self.checked(t, readings, inputs)?;
-        match self.time {
-            None => {
-                self.driven.start(&next);
-                if let Some(spread) = &mut self.spread {
-                    spread.start(&next);
-                }
-                self.guess(t)?;
-            }
-            Some(before) => {
-                self.driven.aim(before, t, &next);
-                match &mut self.spread {
-                    Some(spread) => spread.advance(before, t, &next, &mut self.x)?,
-                    None => self
-                        .integrator
-                        .advance(&mut self.driven, before, t, &mut self.x)?,
-                }
-                self.driven.arrive();
-            }
-        }
-        self.signals = next;
-        self.time = Some(t);
-        let first = self.x.len() - self.sensors;
-        for (i, reading) in readings.iter().enumerate() {
-            if !reading.is_finite() {
-                self.missing[i] += 1;
-                continue;
-            }
-            self.x[first + i] = *reading;
-            if let Some(spread) = &mut self.spread {
-                spread.reset(i, *reading);
-            }
-        }
-        self.bound.see(&self.x[first..]);
-        self.report(t)
+    pub fn state(&self) -> &[f64] {
+        &self.x
     }
 
-    /// Samples without a reading, by sensor.
-    #[must_use]
-    pub fn missing(&self) -> &[usize] {
-        &self.missing
-    }
-
-    /// Standard deviations of the estimates after the last sample; none without a model of the
-    /// errors.
-    #[must_use]
-    pub fn deviations(&self) -> Option<&[f64]> {
-        self.spread.as_ref().map(|spread| &spread.deviations[..])
-    }
-
-    /// h(x̂) after the last sample, by sensor.
-    #[must_use]
-    pub fn expected(&self) -> &[f64] {
-        &self.outputs[self.outputs.len() - self.sensors..]
-    }
-
-    /// Before a sensor's first reading the model's own output stands in for it.
-    fn guess(&mut self, t: f64) -> Result<(), Error> {
-        self.evaluate(t)?;
-        let first = self.x.len() - self.sensors;
-        let expected = self.outputs.len() - self.sensors;
-        self.x[first..].copy_from_slice(&self.outputs[expected..]);
-        Ok(())
-    }
-
-    fn checked(&self, t: f64, readings: &[f64], inputs: &[f64]) -> Result<Vec<f64>, Error> {
-        let known = self.signals.len() - self.sensors;
-        for (what, expected, found) in [
-            ("number of readings", self.sensors, readings.len()),
-            ("number of known inputs", known, inputs.len()),
-        ] {
-            if expected != found {
-                return Err(Error::setting(what, expected.to_string(), found));
-            }
+    /// The signals from a sample on: a sensor's w follows the model where it did not report.
+    fn start(&mut self, sample: &Sample<'_>) {
+        let (inputs, follow) = self.signals.split_at_mut(sample.inputs.len());
+        inputs.copy_from_slice(sample.inputs);
+        for (follows, reading) in follow.iter_mut().zip(sample.readings) {
+            *follows = f64::from(u8::from(self.predict || !reading.is_finite()));
         }
-        let not_a_number = |column: String, value| Error::NotANumber {
-            row: self.samples,
-            column,
-            value,
-        };
-        if !t.is_finite() {
-            return Err(not_a_number("t".to_owned(), t));
-        }
-        if let Some(previous) = self.time.filter(|previous| t <= *previous) {
-            return Err(Error::TimeOrder {
-                row: self.samples,
-                previous,
-                time: t,
-            });
-        }
-        let mut next = inputs.to_vec();
-        for (i, u) in next.iter_mut().enumerate().filter(|(_, u)| !u.is_finite()) {
-            if self.time.is_none() {
-                let name = self.driven.evaluation.system().signals()[i].clone();
-                return Err(not_a_number(name, *u));
-            }
-            *u = self.signals[i];
-        }
-        let follows = |reading: &f64| f64::from(u8::from(self.predict || !reading.is_finite()));
-        next.extend(readings.iter().map(follows));
-        Ok(next)
-    }
-
-    fn report(&mut self, t: f64) -> Result<&[f64], Error> {
-        let own = self.x.len() - self.sensors;
-        let names = self.driven.evaluation.system().states();
-        self.bound
-            .check(t, names, &self.x[..own], || self.integrator.hint())?;
-        self.evaluate(t)?;
+        self.driven.start(&self.signals);
         if let Some(spread) = &mut self.spread {
-            spread.measure(t, &self.x);
+            spread.start(&self.signals);
         }
-        Ok(&self.outputs[..self.outputs.len() - self.sensors])
     }
 
     fn evaluate(&mut self, t: f64) -> Result<(), Error> {
@@ -205,12 +104,103 @@ impl SampledEstimator {
             false => Err(evaluation.not_finite(t, &self.x)),
         }
     }
+
+    fn told(&self) -> usize {
+        self.outputs.len() - self.sensors
+    }
+}
+
+impl Runner for Sampled {
+    /// Before a sensor's first reading the model's own output stands in for it.
+    fn begin(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+        self.start(sample);
+        self.evaluate(sample.t)?;
+        let (first, expected) = (self.x.len() - self.sensors, self.told());
+        self.x[first..].copy_from_slice(&self.outputs[expected..]);
+        Ok(())
+    }
+
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+        match &mut self.spread {
+            Some(spread) => spread.advance(from, sample.t, &mut self.x),
+            None => self
+                .integrator
+                .advance(&mut self.driven, from, sample.t, &mut self.x),
+        }
+    }
+
+    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+        self.health.inputs_held += sample.held;
+        self.start(sample);
+        let first = self.x.len() - self.sensors;
+        for (i, reading) in sample.readings.iter().enumerate() {
+            let sensor = &mut self.health.sensors[i];
+            if !reading.is_finite() {
+                sensor.missing += 1;
+                continue;
+            }
+            sensor.taken += 1;
+            self.x[first + i] = *reading;
+            if let Some(spread) = &mut self.spread {
+                spread.reset(i, *reading);
+            }
+        }
+        self.bound.see(&self.x[first..]);
+        Ok(())
+    }
+
+    fn report(&mut self, t: f64) -> Result<(), Error> {
+        let own = self.x.len() - self.sensors;
+        let names = self.driven.evaluation.system().states();
+        self.bound
+            .check(t, names, &self.x[..own], || self.integrator.hint())?;
+        self.evaluate(t)?;
+        let Some(spread) = &mut self.spread else {
+            return Ok(());
+        };
+        spread.measure(t, &self.x);
+        let told = self.driven.evaluation.system().outputs();
+        match spread.deviations.iter().position(|d| !d.is_finite()) {
+            None => Ok(()),
+            Some(i) => Err(deviation_diverged(
+                t,
+                told.get(i).map_or("", String::as_str),
+                spread.deviations[i],
+            )),
+        }
+    }
+
+    fn estimate(&self) -> &[f64] {
+        &self.outputs[..self.told()]
+    }
+
+    fn deviations(&self) -> Option<&[f64]> {
+        self.spread.as_ref().map(|spread| &spread.deviations[..])
+    }
+
+    fn health(&self) -> &Health {
+        &self.health
+    }
+}
+
+impl Persist for Sampled {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.driven.walk(walk)?;
+        self.integrator.walk(walk)?;
+        walk.numbers(&mut self.x)?;
+        walk.numbers(&mut self.outputs)?;
+        self.bound.walk(walk)?;
+        if let Some(spread) = &mut self.spread {
+            spread.walk(walk)?;
+        }
+        self.health.walk(walk)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Step, Tolerances};
+    use crate::{Estimator, Step, Tolerances};
     use lynkeus_expr::Graph;
 
     /// x' = −x, x̂' = −x̂ + 2(w − x̂), w' = s·(−x̂).
@@ -228,7 +218,7 @@ mod tests {
             System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap();
         SampledObserver {
             system,
-            sensors: 1,
+            sensors: vec!["y".to_string()],
             predict,
             errors: None,
         }
@@ -246,7 +236,7 @@ mod tests {
     #[test]
     fn the_predictor_leaves_a_right_estimate_alone() {
         let error = |predict: bool| {
-            let mut estimator = SampledEstimator::new(&observer(predict), method()).unwrap();
+            let mut estimator = Estimator::sampled(&observer(predict), method()).unwrap();
             let mut worst = 0.0_f64;
             for k in 0..20 {
                 let t = 0.5 * f64::from(k);
@@ -255,10 +245,10 @@ mod tests {
                 } else {
                     3.0 * (-t).exp()
                 };
-                let x = estimator.push(t, &[y], &[]).unwrap()[0];
+                let x = estimator.push(t, &[y]).unwrap()[0];
                 worst = worst.max((x - 3.0 * (-t).exp()).abs());
             }
-            assert_eq!(estimator.missing(), [6]);
+            assert_eq!(estimator.health().sensors[0].missing, 6);
             worst
         };
         assert!(error(true) < 1e-10, "{}", error(true));
@@ -268,17 +258,17 @@ mod tests {
     #[test]
     fn before_the_first_reading_the_model_runs_alone() {
         let mut estimator =
-            SampledEstimator::new(&observer(false), Method::Rk4(Step::Substeps(50))).unwrap();
+            Estimator::sampled(&observer(false), Method::Rk4(Step::Substeps(50))).unwrap();
         for k in 0..4 {
-            let x = estimator.push(f64::from(k), &[f64::NAN], &[]).unwrap()[0];
+            let x = estimator.push(f64::from(k), &[f64::NAN]).unwrap()[0];
             assert!((x - 3.0 * (-f64::from(k)).exp()).abs() < 1e-6);
         }
         assert!(matches!(
-            estimator.push(3.0, &[1.0], &[]),
+            estimator.push(2.9, &[1.0]),
             Err(Error::TimeOrder { .. })
         ));
         assert!(matches!(
-            estimator.push(4.0, &[], &[]),
+            estimator.push(4.0, &[]),
             Err(Error::Setting { .. })
         ));
     }

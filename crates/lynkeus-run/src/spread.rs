@@ -5,6 +5,7 @@ use lynkeus_expr::{Graph, Node, jacobian};
 use crate::filter::Belief;
 use crate::filter::extended::Extended;
 use crate::filter::root::Root;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, EstimatorSettings, Level, Method, System};
 
 /// The linearised error of an observer z' = F(t, z, u), x̂ = g(z): e' = (∂F/∂z) e + white
@@ -77,6 +78,21 @@ impl ErrorModel {
     }
 }
 
+impl ErrorModel {
+    /// The compiled linearisation.
+    pub(crate) fn flow(&self) -> &System {
+        &self.flow
+    }
+
+    /// What acts on the error, as text.
+    pub(crate) fn noises(&self) -> String {
+        format!(
+            "{:?} {:?} {:?}",
+            self.process_noise, self.initial_variance, self.noise
+        )
+    }
+}
+
 /// The covariance of an observer's states along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
@@ -87,6 +103,14 @@ pub(crate) struct Spread {
     values: Vec<f64>,
     noise: Vec<Level>,
     pub deviations: Vec<f64>,
+}
+
+impl Persist for Spread {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.engine.walk(walk)?;
+        self.belief.walk(walk)?;
+        walk.numbers(&mut self.deviations)
+    }
 }
 
 impl Spread {
@@ -109,23 +133,15 @@ impl Spread {
         })
     }
 
-    /// The first signals.
+    /// The signals from here on.
     pub fn start(&mut self, signals: &[f64]) {
         self.engine.driven.start(signals);
     }
 
-    /// State and covariance to the next sample.
-    pub fn advance(
-        &mut self,
-        from: f64,
-        to: f64,
-        signals: &[f64],
-        x: &mut [f64],
-    ) -> Result<(), Error> {
+    /// State and covariance to a time.
+    pub fn advance(&mut self, from: f64, to: f64, x: &mut [f64]) -> Result<(), Error> {
         self.belief.x.copy_from_slice(x);
-        self.engine.driven.aim(from, to, signals);
         self.engine.predict(&mut self.belief, from, to, false)?;
-        self.engine.driven.arrive();
         x.copy_from_slice(&self.belief.x);
         Ok(())
     }

@@ -1,5 +1,6 @@
 //! Systems compiled for evaluation.
 
+use std::fmt::Write;
 use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Evaluator, Graph, Node, Tape};
@@ -7,6 +8,7 @@ use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 use crate::error::state_text;
 use crate::relays::{Held, Taken, take};
 use crate::routine::{Routine, Runner};
+use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
 use crate::{Dynamics, Error};
 
@@ -177,6 +179,24 @@ impl System {
         }
     }
 
+    /// What the system's numbers follow from: the tapes, not the machine code made of them.
+    pub(crate) fn tell(&self, digest: &mut Digest) {
+        let code = &*self.code;
+        let names = (&code.states, &code.signals, &code.outputs, &code.switches);
+        // a digest takes any text
+        let _ = write!(digest, "{names:?}");
+        for routine in [&code.derivatives_at, &code.outputs_at] {
+            let _ = write!(digest, "{:?}", routine.tape());
+        }
+        if let Some(code) = &code.held {
+            for routine in [&code.derivatives_at, &code.outputs_at] {
+                let _ = write!(digest, "{:?}", routine.tape());
+            }
+            let _ = write!(digest, "{:?}", code.held);
+        }
+        digest.numbers(&self.start);
+    }
+
     /// (t, x, w, modes) → dx.
     pub(crate) fn derivative_tape(&self) -> &Tape {
         self.code.derivatives_at.tape()
@@ -301,6 +321,13 @@ impl Evaluation {
     }
 }
 
+impl Persist for Evaluation {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(self.signals_mut())?;
+        self.switches.walk(walk)
+    }
+}
+
 impl Dynamics for Evaluation {
     fn dimension(&self) -> usize {
         self.system.states().len()
@@ -361,6 +388,7 @@ impl Dynamics for Evaluation {
         let first = self.inputs.len() - self.system.code.modes;
         self.switches.modes_at(t, &mut self.inputs[first..]);
     }
+
     fn names(&self) -> Vec<String> {
         self.system.states().to_vec()
     }

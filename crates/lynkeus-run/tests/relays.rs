@@ -68,6 +68,23 @@ fn friction_brakes_to_rest_and_holds() {
     }
 }
 
+/// What bends on the surface makes steps across it inaccurate: x' = 1 + |x − ½| reaches ½ at ln 1.5,
+/// from where z' = sign(x − ½) turns, whatever steps are refused on the way there.
+#[test]
+fn a_bend_on_the_surface_does_not_delay_the_jump() {
+    for method in methods() {
+        for times in [&[2.0][..], &[0.3, 0.4, 0.41, 1.0, 2.0]] {
+            let rows = run(method, &[("x", 0.0), ("z", 0.0)], times, |_, x| {
+                let off = x[0] - 0.5;
+                vec![1.0 + off.abs(), off.sign()]
+            });
+            let last = &rows[times.len() - 1];
+            close(last[0], 0.5 + ((2.0_f64 - 1.5_f64.ln()).exp() - 1.0));
+            close(last[1], 2.0 - 2.0 * 1.5_f64.ln());
+        }
+    }
+}
+
 /// Breakaway: the load grows past the friction at t = 1 and moves on from there.
 #[test]
 fn rest_ends_when_the_load_exceeds_the_friction() {

@@ -5,9 +5,9 @@
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints, Smoothed,
+    FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints, Smoothed,
 };
-use lynkeus_run::{EstimatorSettings, Level, Method, Tolerances};
+use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
 use numeris::estimate::{Ckf, Ekf, EkfStep, Ukf, rts_smooth};
 use numeris::{Matrix, Vector};
 
@@ -93,7 +93,7 @@ impl Plant {
         z
     }
 
-    fn filter(&self, kind: FilterKind) -> Filter {
+    fn filter(&self, kind: FilterKind) -> Estimator {
         let g = Graph::new();
         let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
         let (derivatives, outputs) = (self.symbols)([x, v]);
@@ -131,7 +131,7 @@ impl Plant {
             }),
             ..EstimatorSettings::default()
         };
-        Filter::new(&model.unwrap(), settings, run).unwrap()
+        Estimator::filter(&model.unwrap(), settings, run).unwrap()
     }
 }
 
@@ -182,10 +182,10 @@ fn ekf_and_smoother() {
             theirs
                 .update(&Vector::from_array(y), plant.h, plant.slopes, &noise())
                 .unwrap();
-            ours.push(STEP * k as f64, &y, &[]).unwrap();
+            ours.push(STEP * k as f64, &y).unwrap();
             let (x, P) = (theirs.state(), theirs.covariance());
             agree(
-                (ours.estimate(), ours.deviations()),
+                (ours.estimate(), ours.deviations().unwrap()),
                 x,
                 P,
                 &format!("filter, row {k}"),
@@ -198,7 +198,7 @@ fn ekf_and_smoother() {
                 f_jacobian: flown.transition,
             });
         }
-        smoothers_agree(&ours.smoothed(true).unwrap(), &steps);
+        smoothers_agree(&ours.smoothed(None, true).unwrap(), &steps);
     }
 }
 
@@ -261,10 +261,13 @@ fn ukf() {
             ckf.update(&z, plant.h, &noise()).unwrap();
             ukf.update(&z, plant.h, &noise()).unwrap();
             let t = STEP * k as f64;
-            cubature.push(t, &y, &[]).unwrap();
-            unscented.push(t, &y, &[]).unwrap();
+            cubature.push(t, &y).unwrap();
+            unscented.push(t, &y).unwrap();
             let what = format!("row {k}");
-            let ours = |filter: &Filter| (filter.estimate().to_vec(), filter.deviations().to_vec());
+            let ours = |filter: &Estimator| {
+                let deviations = filter.deviations().unwrap();
+                (filter.estimate().to_vec(), deviations.to_vec())
+            };
             let (x, d) = ours(&cubature);
             agree((&x, &d), ckf.state(), ckf.covariance(), &what);
             let (x, d) = ours(&unscented);
@@ -277,7 +280,7 @@ fn ukf() {
                 f_jacobian: carried,
             });
         }
-        let smoothed = cubature.smoothed(true).unwrap();
+        let smoothed = cubature.smoothed(None, true).unwrap();
         smoothers_agree(&smoothed, &steps);
     }
 }

@@ -8,7 +8,7 @@ use crate::Quantity;
 use crate::systems::Reported;
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Samples<'a> {
     pub time: &'a [f64],
     /// one per measured output
@@ -18,9 +18,12 @@ pub(crate) struct Samples<'a> {
 }
 
 impl Samples<'_> {
-    /// Values of row k, column by column.
-    pub fn row(columns: &[&[f64]], k: usize) -> Vec<f64> {
-        columns.iter().map(|c| c[k]).collect()
+    /// Values of row k, column by column: the readings, then the inputs.
+    pub fn write_row(&self, k: usize, row: &mut [f64]) {
+        let columns = self.readings.iter().chain(&self.inputs);
+        for (value, column) in row.iter_mut().zip(columns) {
+            *value = column[k];
+        }
     }
 
     /// Whether a reading is missing somewhere.

@@ -5,16 +5,18 @@ use std::ops::ControlFlow;
 
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Observer, Signal};
-use lynkeus_run::{EstimatorSettings, Log, estimate_watched};
+use lynkeus_run::{Estimator, EstimatorSettings};
 
+use crate::checkpoint::Checkpoint;
 use crate::course::{Course, Samples};
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::headers::time_of;
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
+use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
-use crate::systems::{self, Reported, method};
+use crate::systems::{self, method};
 use crate::{Error, Outcome, Quantity, Study, Table, filter, interval, prepare, sampled};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
@@ -32,12 +34,37 @@ pub fn estimate(
     estimated(&Prepared::new(study, &plant)?, table, watch)
 }
 
-/// The same of a study that is prepared.
+/// The same with a checkpoint: where this file holds the beginning of the same replay, it goes on
+/// from there, and its result is the same to the last bit.
+///
+/// # Errors
+/// As [`estimate`]; a checkpoint of another study or log, a file that is none or cannot be
+/// written, and a study that smooths.
+pub fn estimate_resumed(
+    study: &Study,
+    table: &Table,
+    checkpoint: &mut Checkpoint,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    refuse_smoothing(study)?;
+    let plant = prepare::plant(study)?;
+    let watch = Watch {
+        watch,
+        checkpoint: Some(checkpoint),
+    };
+    watched(&Prepared::new(study, &plant)?, table, watch)
+}
+
+/// The replay of a study that is prepared.
 pub(crate) fn estimated(
     prepared: &Prepared<'_>,
     table: &Table,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
+    watched(prepared, table, Watch::only(watch))
+}
+
+fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<Outcome, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let settings = &study.estimate;
     let mut design = prepared.design()?;
@@ -61,8 +88,11 @@ pub(crate) fn estimated(
     // the log, the estimates, and both as the outcome has them
     let read = 1 + signals.readings.len() + signals.inputs.len();
     table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
-    let watch = &mut within(&study.budget, watch);
-    let mut course = course(prepared, &design, &signals.samples(), watch)?;
+    let watch = &mut Watch {
+        watch: &mut within(&study.budget, watch.watch),
+        checkpoint: watch.checkpoint,
+    };
+    let mut course = course_of(prepared, &design, &signals.samples(), watch)?;
     let rows = course.estimates.first().map_or(0, Vec::len);
     settle(&mut course, rows, study, table.file())?;
     let intervals = interval::intervals(prepared, &design, &signals.samples(), &course);
@@ -207,6 +237,15 @@ pub(crate) fn course(
     samples: &Samples<'_>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Course, Error> {
+    course_of(prepared, design, samples, &mut Watch::only(watch))
+}
+
+fn course_of(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    watch: &mut Watch<'_>,
+) -> Result<Course, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
     let run = run_settings(settings);
@@ -237,7 +276,7 @@ fn across_gaps(
     design: &Design,
     samples: &Samples<'_>,
     run: EstimatorSettings,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let filled = |columns: &[&[f64]]| -> Vec<Vec<f64>> {
         columns.iter().map(|c| on_lines(samples.time, c)).collect()
@@ -282,30 +321,19 @@ fn plain(
     design: &Design,
     samples: &Samples<'_>,
     run: EstimatorSettings,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let observer = systems::observer(prepared.plant(), &design.observer)?;
-    let columns = samples.readings.iter().chain(&samples.inputs);
-    let log = Log::new(
-        observer.signals().to_vec(),
-        samples.time.to_vec(),
-        columns.map(|c| c.to_vec()).collect(),
-    )
-    .map_err(Error::from_source)?;
-    let (trajectory, advice, ended) = match estimate_watched(&observer, &log, run, watch) {
-        Ok(estimates) => (estimates.trajectory, estimates.advice, None),
-        Err(interrupted) => (interrupted.partial, None, Some(interrupted.error)),
-    };
-    let mut course = Course::of_run(
-        &design.observer,
-        &Reported::new(&design.observer, &trajectory),
-    );
-    course.ended = ended;
+    let mut estimator = Estimator::new(&observer, run).map_err(Error::from_source)?;
+    let mut course = Course::default();
+    let count = design.observer.estimates.len();
+    replay(&mut estimator, samples, count, &mut course, watch)?;
     if run.between == lynkeus_run::BetweenSamples::Linear {
         course.notes.push(
             "between_samples = \"linear\" looks ahead one sample: the estimate at a row is that of an off-line replay".to_owned(),
         );
     }
+    let advice = estimator.advice();
     if let Some(advice) = advice.filter(lynkeus_run::StepAdvice::is_unstable) {
         course.notes.push(format!(
             "the step {} is too long for this observer: its fastest mode needs {:.3e} or less",

@@ -1,34 +1,67 @@
 //! A log through a Kalman filter.
 
-use std::ops::ControlFlow;
-
 use lynkeus_model::Variable;
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Bounds, Confined, Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor,
-    SensorHealth, Smoothed,
+    Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor,
+    Smoothed,
 };
-use lynkeus_run::{Error as RunError, EstimatorSettings};
+use lynkeus_run::{Estimator, EstimatorSettings};
 use lynkeus_structure::Extended;
 
-use crate::course::{Course, Samples, add_row};
+use crate::course::{Course, Samples};
+use crate::replay::{Watch, replay};
 use crate::study::{Name, Smoothing};
 use crate::{Error, Study};
 
 pub(crate) mod noise;
 
-/// Runs the design's filter over samples; `watch` is told the fraction done.
+/// Runs the design's filter over samples.
 ///
 /// # Errors
-/// Noises of the study that do not fit, or that are missing.
+/// Noises of the study that do not fit, or that are missing, or a checkpoint.
 pub(crate) fn run(
     study: &Study,
     extended: &Extended<'_>,
     design: &Design,
     samples: &Samples<'_>,
     settings: EstimatorSettings,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
+    let mut course = Course::default();
+    let notes = &mut course.notes;
+    let mut filter = estimator(study, extended, design, samples, settings, notes)?;
+    let n = filter.names().len();
+    replay(&mut filter, samples, n, &mut course, watch)?;
+    let health = filter.health();
+    course.inputs_held = health.inputs_held;
+    if health.confined > 0 {
+        course.notes.push(format!(
+            "the model has no value where the estimate was: at {} samples it was put back into its declared range; family = \"mhe\" keeps it there",
+            health.confined
+        ));
+    }
+    let smoothed = match study.estimate.smoothing {
+        None => None,
+        Some(Smoothing::Interval) => filter.smoothed(None, false),
+        Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), false),
+    };
+    course.smoothed = smoothed.map(|rows| columns(n, &rows));
+    Ok(course)
+}
+
+/// The design's filter before its first sample.
+///
+/// # Errors
+/// Noises of the study that do not fit.
+pub(crate) fn estimator(
+    study: &Study,
+    extended: &Extended<'_>,
+    design: &Design,
+    samples: &Samples<'_>,
+    settings: EstimatorSettings,
+    notes: &mut Vec<String>,
+) -> Result<Estimator, Error> {
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
@@ -36,72 +69,18 @@ pub(crate) fn run(
         let message = "`smooth` and `lag` of [estimate] need family = \"ekf\" or \"ukf\"";
         return Err(Error::input(message).at(&study.file));
     }
-    let mut notes = vec![];
-    let model = model(study, extended, design, tuning, samples, &mut notes)?;
+    let model = model(study, extended, design, tuning, samples, notes)?;
     let settings_of_filter = FilterSettings {
         kind: tuning.kind.clone(),
         gate: tuning.gate,
         keep_history: study.estimate.smoothing.is_some(),
     };
-    let mut filter =
-        Filter::new(&model, settings_of_filter, settings).map_err(Error::from_source)?;
-    let n = model.dimension();
-    let mut course = Course {
-        estimates: vec![vec![]; n],
-        deviations: Some(vec![vec![]; n]),
-        notes,
-        ..Course::default()
-    };
-    course.ended = replay(&mut filter, samples, &mut course, watch).err();
-    course.inputs_held = filter.health().inputs_held;
-    if filter.health().confined > 0 {
-        course.notes.push(format!(
-            "the model has no value where the estimate was: at {} samples it was put back into its declared range; family = \"mhe\" keeps it there",
-            filter.health().confined
-        ));
-    }
-    let smoothed = match study.estimate.smoothing {
-        None => None,
-        Some(Smoothing::Interval) => filter.smoothed(false),
-        Some(Smoothing::Lag(lag)) => filter.smoothed_with_lag(lag, false),
-    };
-    course.smoothed = smoothed.map(|rows| columns(n, &rows));
-    Ok(course)
+    Estimator::filter(&model, settings_of_filter, settings).map_err(Error::from_source)
 }
 
 fn columns(count: usize, rows: &[Smoothed]) -> Vec<Vec<f64>> {
     let column = |i: usize| rows.iter().map(|row| row.estimate[i]).collect();
     (0..count).map(column).collect()
-}
-
-fn replay(
-    filter: &mut Filter,
-    samples: &Samples<'_>,
-    course: &mut Course,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<(), RunError> {
-    let mut half = vec![];
-    let result = samples.time.iter().enumerate().try_for_each(|(k, &t)| {
-        let readings = Samples::row(&samples.readings, k);
-        filter.push(t, &readings, &Samples::row(&samples.inputs, k))?;
-        add_row(&mut course.estimates, filter.estimate().iter().copied());
-        if let Some(columns) = &mut course.deviations {
-            add_row(columns, filter.deviations().iter().copied());
-        }
-        if k == samples.time.len() / 2 {
-            half = filter.health().sensors.clone();
-        }
-        match watch((k + 1) as f64 / samples.time.len() as f64).is_break() {
-            true => Err(RunError::Cancelled { time: t }),
-            false => Ok(()),
-        }
-    });
-    course.sensors = filter.health().sensors.clone();
-    let late = course.sensors.iter().zip(&half);
-    course.late = late
-        .map(|(all, half): (&SensorHealth, _)| all.since(half))
-        .collect();
-    result
 }
 
 /// The plant with the study's noises.

@@ -40,13 +40,14 @@
 //!     for second in 0..60 {
 //!         estimator.push(f64::from(second), &[4.0])?;
 //!     }
-//!     let [level, inflow] = estimator.state() else { unreachable!() };
+//!     let [level, inflow] = estimator.estimate() else { unreachable!() };
 //!     assert!((level - 4.0).abs() < 1e-6 && (inflow - 1.0).abs() < 1e-6);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! With files instead, [`Study::load`] reads a study, and [`check`], [`simulate`] and
+//! With files instead, [`Study::load`] reads a study, [`estimator`] makes its estimator for live
+//! samples, and [`check`], [`simulate`] and
 //! [`estimate`] do what the commands of the same names do.
 //!
 //! Features, all on by default: `plot` draws pictures, `tune` sweeps tunings, and `command` is
@@ -58,6 +59,7 @@ mod assertions;
 mod calibrate;
 mod certify;
 mod check;
+mod checkpoint;
 mod choice;
 #[cfg(feature = "tune")]
 mod compare;
@@ -77,6 +79,7 @@ mod headers;
 mod innovations;
 pub mod interrupt;
 mod interval;
+mod live;
 mod modes;
 mod near;
 mod outcome;
@@ -86,6 +89,7 @@ pub mod plot;
 pub mod precision;
 pub mod prepare;
 mod propose;
+mod replay;
 mod sampled;
 mod simulate;
 pub mod study;
@@ -99,6 +103,7 @@ mod words;
 pub use accuracy::{Accuracy, Settling};
 pub use certify::{CertifyReport, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, check};
+pub use checkpoint::Checkpoint;
 pub use choice::{Choice, Grounds};
 #[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
@@ -106,12 +111,13 @@ pub use correction::{Correction, GainEntry, InjectionEntry};
 pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
-pub use estimate::estimate;
+pub use estimate::{estimate, estimate_resumed};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;
 pub use innovations::Innovations;
 pub use interval::Intervals;
+pub use live::estimator;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;

@@ -1,72 +1,51 @@
 //! A log through an observer of the five families, where sensors report when they do.
 
-use std::ops::ControlFlow;
-
 use lynkeus_expr::Node;
 use lynkeus_observers::{Design, Sampled};
-use lynkeus_run::{
-    Error as RunError, ErrorModel, ErrorNoise, Method, SampledEstimator, SampledObserver, System,
-};
+use lynkeus_run::{ErrorModel, ErrorNoise, Estimator, Method, SampledObserver, System};
 
-use crate::course::{Course, Samples, add_row};
+use crate::course::{Course, Samples};
 use crate::filter::noise;
 use crate::prepare::Prepared;
+use crate::replay::{Watch, replay};
 use crate::study::BetweenSamples;
 use crate::{Error, Study};
 
-/// Runs the design's observer over samples; `watch` is told the fraction done.
+/// Runs the design's observer over samples.
 ///
 /// # Errors
-/// Noises of the study that do not fit.
+/// Noises of the study that do not fit, or a checkpoint.
 pub(crate) fn run(
     prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples<'_>,
     method: Method,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let mut course = Course::default();
     let observer = observer(prepared, design, samples, &mut course.notes)?;
-    let mut estimator = SampledEstimator::new(&observer, method).map_err(Error::from_source)?;
+    let mut estimator = Estimator::sampled(&observer, method).map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
-    course.estimates = vec![vec![]; count];
-    course.monitors = vec![vec![]; design.observer.monitors.len()];
-    course.deviations = observer.errors.is_some().then(|| vec![vec![]; count]);
-    course.ended = replay(&mut estimator, samples, &mut course, watch).err();
-    let missing = estimator.missing().iter().zip(&design.observer.measured);
-    for (missing, signal) in missing.filter(|(missing, _)| **missing > 0) {
-        course.notes.push(format!(
-            "{} has no reading in {missing} of {} rows: there the model stands in for the sensor",
-            signal.name,
-            samples.time.len()
-        ));
+    replay(&mut estimator, samples, count, &mut course, watch)?;
+    let sensors = estimator.health().sensors.iter();
+    for (sensor, signal) in sensors.zip(&design.observer.measured) {
+        if sensor.missing > 0 {
+            course.notes.push(format!(
+                "{} has no reading in {} of {} rows: there the model stands in for the sensor",
+                signal.name,
+                sensor.missing,
+                samples.time.len()
+            ));
+        }
     }
     Ok(course)
 }
 
-fn replay(
-    estimator: &mut SampledEstimator,
-    samples: &Samples<'_>,
-    course: &mut Course,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<(), RunError> {
-    let count = course.estimates.len();
-    for (k, &t) in samples.time.iter().enumerate() {
-        let readings = Samples::row(&samples.readings, k);
-        let reported = estimator.push(t, &readings, &Samples::row(&samples.inputs, k))?;
-        add_row(&mut course.estimates, reported[..count].iter().copied());
-        add_row(&mut course.monitors, reported[count..].iter().copied());
-        if let (Some(columns), Some(row)) = (&mut course.deviations, estimator.deviations()) {
-            add_row(columns, row.iter().copied());
-        }
-        if watch((k + 1) as f64 / samples.time.len() as f64).is_break() {
-            return Err(RunError::Cancelled { time: t });
-        }
-    }
-    Ok(())
-}
-
-fn observer(
+/// The design's observer with its measurements as states.
+///
+/// # Errors
+/// Noises of the study that do not fit.
+pub(crate) fn observer(
     prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples<'_>,
@@ -88,9 +67,12 @@ fn observer(
         .map(|s| (s.name.clone(), s.symbol))
         .collect();
     let estimates: Vec<Node> = observer.estimates.iter().map(|e| e.node).collect();
-    let monitors = observer.monitors.iter().map(|m| m.node);
-    let reported = estimates.iter().copied().chain(monitors).chain(outputs);
-    let reported: Vec<(String, Node)> = reported.map(|node| (String::new(), node)).collect();
+    let told = observer.estimates.iter();
+    let told = told.map(|e| (e.variable.name.clone(), e.node));
+    let monitors = observer.monitors.iter().map(|m| (m.name.clone(), m.node));
+    let sensors: Vec<String> = measured(design);
+    let outputs = sensors.iter().cloned().zip(outputs);
+    let reported: Vec<(String, Node)> = told.chain(monitors).chain(outputs).collect();
     let graph = extended.graph();
     let system = System::new(
         graph,
@@ -119,10 +101,15 @@ fn observer(
     };
     Ok(SampledObserver {
         system,
-        sensors: design.observer.measured.len(),
+        sensors,
         predict: study.estimate.between_samples == BetweenSamples::Predict,
         errors,
     })
+}
+
+fn measured(design: &Design) -> Vec<String> {
+    let measured = design.observer.measured.iter();
+    measured.map(|signal| signal.name.clone()).collect()
 }
 
 /// The noises on the observer's states: those of the plant on its estimate, which comes first,

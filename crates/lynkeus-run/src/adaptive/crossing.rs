@@ -16,7 +16,8 @@ pub(super) struct Reach {
 
 impl Adaptive {
     /// The shortest step found that crosses a surface, where the step taken does; `attempt`
-    /// makes a step of another length from the same start. None where none is crossed.
+    /// makes a step of another length from the same start. None where none is crossed; a step that
+    /// leads up to the surface where none across it is accurate.
     pub(super) fn crossing<D: Dynamics>(
         &mut self,
         f: &mut Switched<'_, D>,
@@ -50,23 +51,31 @@ impl Adaptive {
         }
         let mut begin = reach(f, 0.0, start.to_vec());
         let fine = 4.0 * resolution(leg.t + step).max(1e-14 * step);
+        let mut rejected = None;
         for turn in 0..TRIES {
             let width = end.step - begin.step;
             if width <= fine {
                 break;
             }
             let guess = match turn % 3 {
+                _ if let Some(longest) = rejected => begin.step + 0.5 * (longest - begin.step),
                 2 => begin.step + 0.5 * width,
                 _ => between(&begin, &end, fine),
             };
             leg.spend(f)?;
             let Some(x) = attempt(f, guess, &mut None) else {
-                break;
+                // the step that crosses may be accurate and this one not, where what is not
+                // held bends on the surface: shorter ones lead up to it
+                rejected = Some(guess);
+                continue;
             };
             let tried = reach(f, guess, x);
             match tried.crosses() {
-                true => end = tried,
+                true => (end, rejected) = (tried, None),
                 false => begin = tried,
+            }
+            if rejected.is_some() && begin.step > fine {
+                return Ok(Some(begin));
             }
         }
         Ok(Some(end))

@@ -9,6 +9,7 @@ mod radau;
 
 use crate::error::state_text;
 use crate::relays::Switched;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Tolerances, spectral_radius};
 
 use dop853::Dop853;
@@ -121,7 +122,7 @@ impl Adaptive {
 
     /// Grants the budget of an interval with `stops` switches in it.
     pub(crate) fn grant(&mut self, stops: usize) {
-        self.run.spent += self.purse.granted - self.purse.left;
+        self.run.spent += self.purse.granted.saturating_sub(self.purse.left);
         let for_stops = stops.saturating_mul(STEPS_PER_STOP);
         let more = for_stops.saturating_add(STEPS_PER_INTERVAL);
         self.run.granted = self.run.granted.saturating_add(more);
@@ -194,6 +195,21 @@ impl Adaptive {
             self.pace.agreeing = 0;
         }
         change
+    }
+}
+
+/// Both methods start anew on every leg: between two of them only pace and budget stay.
+impl Persist for Adaptive {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.flag(&mut self.implicit)?;
+        walk.number(&mut self.pace.next)?;
+        walk.count(&mut self.pace.since_look)?;
+        walk.count(&mut self.pace.agreeing)?;
+        walk.count(&mut self.purse.granted)?;
+        walk.count(&mut self.purse.left)?;
+        walk.count(&mut self.purse.before)?;
+        walk.count(&mut self.run.granted)?;
+        walk.count(&mut self.run.spent)
     }
 }
 

@@ -3,13 +3,14 @@
 use super::Belief;
 use super::flow::Joint;
 use super::health::Reading;
-use super::root::{dot, factor};
+use super::root::{Factor, Gain, dot};
 use super::sensing::Sensing;
 use super::smooth::Correction;
-use super::spanned::{Rows, Spanned};
+use super::spanned::Rows;
 use super::taylor::Moments;
 use super::variation::Variation;
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, System};
 
 /// Up to so many states x̂, Φ and W are integrated together.
@@ -19,8 +20,14 @@ const FEW: usize = 8;
 pub(crate) struct Extended {
     pub driven: Driven,
     way: Way,
+    /// x̂⁻, Φ and W
+    x: Vec<f64>,
+    moments: Moments,
     /// rows whose sum of squares is P⁻
     rows: Vec<f64>,
+    sums: Vec<f64>,
+    /// of W
+    factor: Factor,
 }
 
 /// How Φ and W are found.
@@ -59,7 +66,11 @@ impl Extended {
         Ok(Self {
             driven: Driven::new(flow, run.between),
             way,
+            x: vec![0.0; n],
+            moments: Moments::start(n, process_noise.iter().any(|q| *q > 0.0)),
             rows: vec![],
+            sums: vec![0.0; n],
+            factor: Factor::default(),
         })
     }
 
@@ -72,29 +83,32 @@ impl Extended {
         to: f64,
         keep: bool,
     ) -> Result<Rows, Error> {
-        let mut x = belief.x.clone();
-        let driven = &mut self.driven;
-        let Moments { transition, noise } = match &mut self.way {
-            Way::Joint(joint) => joint.advance(driven, from, to, &mut x)?,
-            Way::Variation(variation) => variation.advance(driven, belief, from, to, &mut x)?,
+        self.x.clone_from(&belief.x);
+        let (driven, x, moments) = (&mut self.driven, &mut self.x, &mut self.moments);
+        match &mut self.way {
+            Way::Joint(joint) => joint.advance(driven, from, to, x, moments)?,
+            Way::Variation(variation) => {
+                *moments = variation.advance(driven, belief, from, to, x)?;
+            }
         };
-        belief.x = x;
-        let n = belief.x.len();
+        belief.x.clone_from(&self.x);
         self.rows.clear();
-        if let Some(noise) = noise {
-            self.push_root(&noise, n);
-        }
-        self.push_carried(&transition, belief, n);
-        belief.root.of_rows(&mut self.rows);
+        self.push_root();
+        self.push_carried(belief);
+        belief.root.of_rows_with(&mut self.rows, &mut self.sums);
         Ok(match keep {
-            true => Rows::of(&transition),
+            true => Rows::of(&self.moments.transition),
             false => Rows::default(),
         })
     }
 
     /// The rows of Lᵀ, W = LLᵀ. They come first: their zeros are spared in the reflections.
-    fn push_root(&mut self, noise: &Spanned, n: usize) {
-        let lower = factor(noise.entries(), n);
+    fn push_root(&mut self) {
+        let Some(noise) = &self.moments.noise else {
+            return;
+        };
+        let n = self.x.len();
+        let lower = self.factor.of(noise.entries(), n);
         self.rows.resize(n * n, 0.0);
         for (i, row) in lower.chunks_exact(n).enumerate() {
             for (k, entry) in row[..=i].iter().enumerate() {
@@ -104,11 +118,12 @@ impl Extended {
     }
 
     /// The rows of (ΦS)ᵀ.
-    fn push_carried(&mut self, transition: &Spanned, belief: &Belief, n: usize) {
+    fn push_carried(&mut self, belief: &Belief) {
+        let (n, transition) = (self.x.len(), &self.moments.transition);
         let first = self.rows.len();
         self.rows.resize(first + n * n, 0.0);
         let into = &mut self.rows[first..];
-        let mut sums = vec![0.0; n];
+        let sums = &mut self.sums;
         for i in 0..n {
             sums.fill(0.0);
             for (j, phi) in transition.span(i).zip(transition.row(i)) {
@@ -117,9 +132,39 @@ impl Extended {
                 }
             }
             let column = into[i..].iter_mut().step_by(n);
-            column.zip(&sums).for_each(|(into, sum)| *into = *sum);
+            column.zip(&*sums).for_each(|(into, sum)| *into = *sum);
         }
     }
+}
+
+impl Persist for Extended {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.driven.walk(walk)?;
+        match &mut self.way {
+            Way::Joint(joint) => joint.walk(walk),
+            Way::Variation(variation) => variation.walk(walk),
+        }
+    }
+}
+
+/// Room for a correction.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Room {
+    h: Vec<f64>,
+    before: Vec<f64>,
+    /// C, row by row
+    slopes: Vec<f64>,
+    projected: Vec<f64>,
+    gain: Gain,
+    taken: Vec<Believed>,
+}
+
+/// A reading that corrects.
+#[derive(Clone, Copy, Debug)]
+struct Believed {
+    sensor: usize,
+    variance: f64,
+    innovation: f64,
 }
 
 /// The readings one after the other, which for sensors with independent noises is all of them
@@ -131,41 +176,69 @@ pub(super) fn correct(
     readings: &[f64],
     inputs: &[f64],
 ) -> Result<(), Error> {
-    let h = sensing.evaluate(t, &belief.x, inputs)?.to_vec();
-    let before = belief.x.clone();
-    let n = before.len();
-    let mut projected = vec![0.0; n];
-    let slopes: Vec<Vec<f64>> = (0..h.len()).map(|i| sensing.slopes(i)).collect();
+    let mut room = std::mem::take(&mut sensing.room);
+    let result = correct_in(&mut room, sensing, belief, t, readings, inputs);
+    sensing.room = room;
+    result
+}
+
+fn correct_in(
+    room: &mut Room,
+    sensing: &mut Sensing,
+    belief: &mut Belief,
+    t: f64,
+    readings: &[f64],
+    inputs: &[f64],
+) -> Result<(), Error> {
+    let Room {
+        h,
+        before,
+        slopes,
+        projected,
+        gain,
+        taken,
+    } = room;
+    let n = belief.x.len();
+    h.clear();
+    h.extend_from_slice(sensing.evaluate(t, &belief.x, inputs)?);
+    before.clone_from(&belief.x);
+    slopes.resize(h.len() * n, 0.0);
+    projected.resize(n, 0.0);
+    taken.clear();
     // the gate looks at every reading from before the first correction
-    let mut taken = vec![];
-    for (i, c) in slopes.iter().enumerate() {
-        belief.root.transposed_times(c, &mut projected);
-        let r = sensing.noise(i, h[i]);
-        let variance = dot(&projected, &projected) + r;
-        let innovation = sensing.judge(i, readings[i], h[i], variance);
+    for (i, h) in h.iter().enumerate() {
+        let c = &mut slopes[i * n..(i + 1) * n];
+        sensing.write_slopes(i, c);
+        belief.root.transposed_times(c, projected);
+        let r = sensing.noise(i, *h);
+        let variance = dot(projected, projected) + r;
+        let innovation = sensing.judge(i, readings[i], *h, variance);
         if innovation.reading == Reading::Taken {
-            taken.push((i, r, innovation.value));
+            taken.push(Believed {
+                sensor: i,
+                variance: r,
+                innovation: innovation.value,
+            });
         }
     }
-    for (i, r, innovation) in taken {
-        let c = &slopes[i];
-        let moved: f64 = c
-            .iter()
-            .zip(&belief.x)
-            .zip(&before)
-            .map(|((c, x), x0)| c * (x - x0))
-            .sum();
-        let rest = innovation - moved;
-        belief.root.transposed_times(c, &mut projected);
-        let variance = dot(&projected, &projected) + r;
-        let Some(gain) = belief.root.update(&projected, r) else {
+    for believed in &*taken {
+        let c = &slopes[believed.sensor * n..(believed.sensor + 1) * n];
+        let moves = belief.x.iter().zip(&*before).map(|(x, x0)| x - x0);
+        let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
+        let rest = believed.innovation - moved;
+        belief.root.transposed_times(c, projected);
+        let variance = dot(projected, projected) + believed.variance;
+        let root = &mut belief.root;
+        if !root.update_into(projected, believed.variance, gain) {
             continue;
-        };
-        for (x, k) in belief.x.iter_mut().zip(&gain) {
+        }
+        for (x, k) in belief.x.iter_mut().zip(&gain.values) {
             *x += k * rest;
         }
-        let correction = Correction::single(c.clone(), rest, variance, gain);
-        sensing.corrections.push(correction);
+        if let Some(corrections) = &mut sensing.corrections {
+            let gain = gain.values.clone();
+            corrections.push(Correction::single(c.to_vec(), rest, variance, gain));
+        }
     }
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! The estimate and how its error spreads, integrated together.
 
-use super::spanned::Spanned;
 use super::taylor::Moments;
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Method};
 
 /// x̂, Φ and W by one integration, for flows with few states.
@@ -43,14 +43,15 @@ impl Joint {
         })
     }
 
-    /// Takes `x` to the next sample and returns Φ and W.
+    /// Takes `x` to the next sample and writes Φ and W.
     pub fn advance(
         &mut self,
         driven: &mut Driven,
         from: f64,
         to: f64,
         x: &mut [f64],
-    ) -> Result<Moments, Error> {
+        moments: &mut Moments,
+    ) -> Result<(), Error> {
         let n = x.len();
         let noisy = !self.noise.is_empty();
         let width = Linearised::width(n, noisy);
@@ -65,13 +66,20 @@ impl Joint {
         x.copy_from_slice(&self.z[..n]);
         let columns = |first: usize, scale: f64| {
             let rows = self.z[n..].chunks_exact(width);
-            let entries = rows.flat_map(|row| &row[first..first + n]);
-            Spanned::dense(n, entries.map(|e| scale * e).collect())
+            let entries = rows.flat_map(move |row| &row[first..first + n]);
+            entries.map(move |e| scale * e)
         };
-        Ok(Moments {
-            transition: columns(0, 1.0),
-            noise: noisy.then(|| columns(n, self.scale)),
-        })
+        moments.transition.fill(columns(0, 1.0));
+        if let Some(noise) = &mut moments.noise {
+            noise.fill(columns(n, self.scale));
+        }
+        Ok(())
+    }
+}
+
+impl Persist for Joint {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.integrator.walk(walk)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Whether readings and estimate go together.
 
+use crate::snapshot::{Damaged, Persist, Walk};
+
 /// What became of a reading.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Reading {
@@ -38,7 +40,9 @@ pub struct SensorHealth {
     pub rejected: usize,
     /// readings at a limit that said nothing new
     pub at_limit: usize,
-    /// Σ (innovation/deviation)² of the readings taken
+    /// of these, those of which it was known how far off they may be
+    pub judged: usize,
+    /// Σ (innovation/deviation)² of the readings judged
     pub squares: f64,
     /// readings rejected in a row, up to now
     pub locked_out: usize,
@@ -46,10 +50,10 @@ pub struct SensorHealth {
 
 impl SensorHealth {
     /// The mean of (innovation/deviation)², 1 where noise and model are as declared; none
-    /// before the first reading.
+    /// before the first reading, and where no covariance says what to expect.
     #[must_use]
     pub fn consistency(&self) -> Option<f64> {
-        (self.taken > 0).then(|| self.squares / self.taken as f64)
+        (self.judged > 0).then(|| self.squares / self.judged as f64)
     }
 
     /// The counts after those of an earlier moment.
@@ -60,6 +64,7 @@ impl SensorHealth {
             missing: self.missing - earlier.missing,
             rejected: self.rejected - earlier.rejected,
             at_limit: self.at_limit - earlier.at_limit,
+            judged: self.judged - earlier.judged,
             squares: self.squares - earlier.squares,
             locked_out: self.locked_out,
         }
@@ -77,6 +82,7 @@ impl SensorHealth {
                 self.taken += 1;
                 self.locked_out = 0;
                 if innovation.deviation > 0.0 {
+                    self.judged += 1;
                     self.squares += (innovation.value / innovation.deviation).powi(2);
                 }
             }
@@ -94,4 +100,47 @@ pub struct Health {
     /// samples at which the estimate was put back into the declared ranges, because the plant has
     /// no value where it was
     pub confined: usize,
+}
+
+impl Health {
+    /// Of so many sensors, before the first sample.
+    pub(crate) fn of(sensors: usize) -> Self {
+        Self {
+            sensors: vec![SensorHealth::default(); sensors],
+            ..Self::default()
+        }
+    }
+}
+
+impl Persist for Health {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        for sensor in &mut self.sensors {
+            walk.count(&mut sensor.taken)?;
+            walk.count(&mut sensor.missing)?;
+            walk.count(&mut sensor.rejected)?;
+            walk.count(&mut sensor.at_limit)?;
+            walk.count(&mut sensor.judged)?;
+            walk.number(&mut sensor.squares)?;
+            walk.count(&mut sensor.locked_out)?;
+        }
+        walk.count(&mut self.inputs_held)?;
+        walk.count(&mut self.confined)
+    }
+}
+
+impl Persist for Innovation {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.number(&mut self.value)?;
+        walk.number(&mut self.deviation)?;
+        walk.number(&mut self.predicted)?;
+        let mut place = Reading::ALL.iter().position(|r| *r == self.reading);
+        let place = place.get_or_insert_default();
+        walk.below(place, Reading::ALL.len())?;
+        self.reading = Reading::ALL[*place];
+        Ok(())
+    }
+}
+
+impl Reading {
+    const ALL: [Self; 4] = [Self::Missing, Self::Taken, Self::Rejected, Self::AtLimit];
 }

@@ -19,6 +19,7 @@ use super::sensing::Sensing;
 use super::smooth::{Adjoint, Correction};
 use super::spanned::Rows;
 use super::{Belief, Bounds, confine};
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
 
 /// Most Gauss–Newton steps and changes of the bounds that are met, per sample.
@@ -30,6 +31,7 @@ const SMALL: f64 = 1e-6;
 pub(super) struct Horizon {
     pub engine: Extended,
     length: usize,
+    sensors: usize,
     bounds: Vec<Bounds>,
     /// what was known before the first row of the window
     prior: Belief,
@@ -37,7 +39,7 @@ pub(super) struct Horizon {
 }
 
 /// A sample in the window.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Row {
     t: f64,
     inputs: Vec<f64>,
@@ -47,6 +49,46 @@ struct Row {
     guess: Vec<f64>,
     /// (state, bound) that are met
     met: Vec<(usize, f64)>,
+}
+
+impl Persist for Horizon {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.engine.walk(walk)?;
+        self.prior.walk(walk)?;
+        let states = self.bounds.len();
+        let inputs = self.engine.driven.evaluation.signals().len();
+        let count = walk.length(self.rows.len())?;
+        self.rows.resize_with(count, Row::default);
+        for row in &mut self.rows {
+            // a row that was not there yet has no room
+            row.inputs.resize(inputs, 0.0);
+            row.guess.resize(states, 0.0);
+            row.walk(walk, self.sensors)?;
+        }
+        Ok(())
+    }
+}
+
+impl Row {
+    fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
+        walk.number(&mut self.t)?;
+        walk.numbers(&mut self.inputs)?;
+        walk.numbers(&mut self.guess)?;
+        let count = walk.length(self.readings.len())?;
+        self.readings.resize(count, (0, 0.0, 0.0));
+        for (sensor, reading, variance) in &mut self.readings {
+            walk.below(sensor, sensors)?;
+            walk.number(reading)?;
+            walk.number(variance)?;
+        }
+        let count = walk.length(self.met.len())?;
+        self.met.resize(count, (0, 0.0));
+        for (state, bound) in &mut self.met {
+            walk.below(state, self.guess.len())?;
+            walk.number(bound)?;
+        }
+        Ok(())
+    }
 }
 
 /// A row given the whole window.
@@ -86,6 +128,7 @@ impl Horizon {
         Ok(Self {
             engine: Extended::new(&model.flow, &model.flow_entries, &model.process_noise, run)?,
             length,
+            sensors: model.sensors.len(),
             bounds,
             prior: Belief {
                 x: model.flow.start().to_vec(),

@@ -1,14 +1,14 @@
 //! Kalman filters: estimates that are corrected when sensors report.
 //!
-//! Between samples a [`Filter`] lets the plant's own equations run; at a sample every sensor
+//! Between samples a filter lets the plant's own equations run; at a sample every sensor
 //! that reports corrects the estimate, by as much as its noise and the estimate's
 //! covariance P say. P is held as a root S, P = S Sᵀ, and only ever changed as a root:
 //! rounding cannot make it indefinite.
 //!
 //! ```
 //! use lynkeus_expr::Graph;
-//! use lynkeus_run::filter::{Filter, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
-//! use lynkeus_run::{EstimatorSettings, Level};
+//! use lynkeus_run::filter::{FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor};
+//! use lynkeus_run::{Estimator, EstimatorSettings, Level};
 //!
 //! // a level that nobody moves, measured with noise of standard deviation 1
 //! let g = Graph::new();
@@ -24,14 +24,16 @@
 //!     initial_variance: vec![1.0],
 //!     confined: None,
 //! })?;
-//! let mut filter = Filter::new(&model, FilterSettings::of(FilterKind::Extended), EstimatorSettings::default())?;
-//! filter.push(0.0, &[3.0], &[])?;
+//! let settings = FilterSettings::of(FilterKind::Extended);
+//! let mut filter = Estimator::filter(&model, settings, EstimatorSettings::default())?;
+//! filter.push(0.0, &[3.0])?;
 //! assert!((filter.estimate()[0] - 1.5).abs() < 1e-12);
 //! // no reading, no correction
-//! filter.push(1.0, &[f64::NAN], &[])?;
-//! filter.push(2.0, &[4.5], &[])?;
+//! filter.push(1.0, &[f64::NAN])?;
+//! filter.push(2.0, &[4.5])?;
 //! assert!((filter.estimate()[0] - 2.5).abs() < 1e-12);
-//! assert!((filter.deviations()[0] - (1.0_f64 / 3.0).sqrt()).abs() < 1e-12);
+//! let deviation = filter.deviations().map(|deviations| deviations[0]);
+//! assert!((deviation.unwrap_or(0.0) - (1.0_f64 / 3.0).sqrt()).abs() < 1e-12);
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
@@ -42,6 +44,7 @@ mod health;
 mod horizon;
 mod model;
 mod nodes;
+mod persist;
 pub(crate) mod root;
 mod sensing;
 mod smooth;
@@ -55,7 +58,10 @@ pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
 pub use smooth::Smoothed;
 pub use unscented::SigmaPoints;
 
-use crate::divergence::Bound;
+use crate::divergence::{Bound, deviation_diverged};
+use crate::driven::Driven;
+use crate::intake::Sample;
+use crate::runner::Runner;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
@@ -132,9 +138,9 @@ struct Spare {
     bounds: Vec<Bounds>,
 }
 
-/// A filter that takes one sample after the other, live or from a log.
+/// A filter under way.
 #[derive(Clone, Debug)]
-pub struct Filter {
+pub(crate) struct Filter {
     engine: Engine,
     /// the same inside the declared ranges
     spare: Option<Spare>,
@@ -142,17 +148,14 @@ pub struct Filter {
     sensing: Sensing,
     inputs: Vec<f64>,
     deviations: Vec<f64>,
-    time: Option<f64>,
-    samples: usize,
     bound: Bound,
     history: Option<History>,
+    /// the transition since the last update, for the smoother
+    pending: Option<Rows>,
 }
 
 impl Filter {
-    /// A filter at the plant's first estimate, waiting for the first sample.
-    ///
-    /// # Errors
-    /// [`Error::Setting`] for impossible numbers of the method, the gate or the sigma points.
+    /// At the plant's first estimate.
     pub fn new(
         model: &FilterModel,
         settings: FilterSettings,
@@ -201,42 +204,29 @@ impl Filter {
                 root: Root::diagonal(&model.initial_variance),
                 x: x.clone(),
             },
-            sensing: Sensing::new(model, settings.gate),
+            sensing: Sensing::new(model, settings.gate, settings.keep_history),
             inputs: vec![0.0; model.inputs().len()],
-            time: None,
-            samples: 0,
             bound: Bound::new(&x),
             history: settings.keep_history.then(History::default),
+            pending: None,
         })
     }
 
-    /// Takes the readings at `t`, in the order of the sensors, with the known inputs in the
-    /// order of [`FilterModel::inputs`], and returns the estimate after its correction. A
-    /// reading that is not finite says that this sensor did not report; of an input that is
-    /// not finite the last value holds. The first sample corrects the first estimate; one at
-    /// the time of the sample before corrects again.
-    ///
-    /// # Errors
-    /// [`Error::TimeOrder`], [`Error::NotANumber`] for the first value of an input,
-    /// [`Error::Setting`] for wrong numbers of values; [`Error::Diverged`],
-    /// [`Error::NotFinite`] and the errors of the integration.
-    pub fn push(&mut self, t: f64, readings: &[f64], inputs: &[f64]) -> Result<&[f64], Error> {
-        self.samples += 1;
-        let next = self.checked(t, readings, inputs)?;
-        self.bound.see(&self.inputs);
-        let transition = match self.time {
-            Some(before) if t > before => Some(self.predict(before, t, &next)?),
-            Some(_) => None,
-            None => {
-                self.start(&next);
-                None
-            }
-        };
-        self.inputs = next;
-        self.arrive();
-        self.time = Some(t);
-        self.correct(t, readings)?;
+    /// The estimate after the last sample.
+    pub fn estimate(&self) -> &[f64] {
+        &self.belief.x
+    }
+
+    /// The estimate at each update given later ones, up to `lag` of them; none without history.
+    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
+        let history = self.history.as_ref()?;
+        Some(history.smoothed(lag, deviations))
+    }
+
+    /// Keeps the last update for the smoother.
+    pub fn remember(&mut self) {
         let corrections = self.sensing.take_corrections();
+        let transition = self.pending.take();
         if let Some(history) = &mut self.history {
             history.push(Step {
                 transition,
@@ -245,114 +235,27 @@ impl Filter {
                 corrections,
             });
         }
-        self.report(t)
     }
 
-    /// The estimate after the last sample.
-    #[must_use]
-    pub fn estimate(&self) -> &[f64] {
-        &self.belief.x
-    }
-
-    /// Its standard deviations √P_ii.
-    #[must_use]
-    pub fn deviations(&self) -> &[f64] {
-        &self.deviations
-    }
-
-    /// What became of the last readings, one per sensor.
-    #[must_use]
-    pub fn innovations(&self) -> &[Innovation] {
-        &self.sensing.innovations
-    }
-
-    /// How readings and estimate went together so far.
-    #[must_use]
-    pub fn health(&self) -> &Health {
-        &self.sensing.health
-    }
-
-    /// Time of the last sample.
-    #[must_use]
-    pub fn time(&self) -> Option<f64> {
-        self.time
-    }
-
-    /// The fixed-interval smoother over everything so far: the estimate at each sample given
-    /// all of them, with standard deviations if asked for; none without history.
-    #[must_use]
-    pub fn smoothed(&self, deviations: bool) -> Option<Vec<Smoothed>> {
-        let history = self.history.as_ref()?;
-        Some(history.smoothed(None, deviations))
-    }
-
-    /// The fixed-lag smoother: the estimate at each sample given those up to `lag` later.
-    #[must_use]
-    pub fn smoothed_with_lag(&self, lag: usize, deviations: bool) -> Option<Vec<Smoothed>> {
-        let history = self.history.as_ref()?;
-        Some(history.smoothed(Some(lag), deviations))
-    }
-
-    /// The inputs to come, the last value where there is none.
-    fn checked(&mut self, t: f64, readings: &[f64], inputs: &[f64]) -> Result<Vec<f64>, Error> {
-        let wrong = |what: &str, expected: usize, found: usize| {
-            Error::setting(format!("number of {what}"), expected.to_string(), found)
-        };
-        if readings.len() != self.sensing.count() {
-            return Err(wrong("readings", self.sensing.count(), readings.len()));
-        }
-        if inputs.len() != self.inputs.len() {
-            return Err(wrong("known inputs", self.inputs.len(), inputs.len()));
-        }
-        if !t.is_finite() {
-            return Err(Error::NotANumber {
-                row: self.samples,
-                column: "t".to_owned(),
-                value: t,
-            });
-        }
-        if let Some(previous) = self.time.filter(|previous| t < *previous) {
-            return Err(Error::TimeOrder {
-                row: self.samples,
-                previous,
-                time: t,
-            });
-        }
-        let mut next = inputs.to_vec();
-        for (i, u) in next.iter_mut().enumerate().filter(|(_, u)| !u.is_finite()) {
-            if self.time.is_none() {
-                return Err(Error::NotANumber {
-                    row: self.samples,
-                    column: self.sensing.inputs()[i].clone(),
-                    value: *u,
-                });
-            }
-            *u = self.inputs[i];
-            self.sensing.health.inputs_held += 1;
-        }
-        Ok(next)
-    }
-
-    fn start(&mut self, inputs: &[f64]) {
+    fn driven(&mut self) -> &mut Driven {
         match &mut self.engine {
-            Engine::Extended(engine) => engine.driven.start(inputs),
-            Engine::Unscented(engine) => engine.driven.start(inputs),
-            Engine::MovingHorizon(horizon) => horizon.engine.driven.start(inputs),
-        }
-    }
-
-    fn arrive(&mut self) {
-        match &mut self.engine {
-            Engine::Extended(engine) => engine.driven.arrive(),
-            Engine::Unscented(engine) => engine.driven.arrive(),
-            Engine::MovingHorizon(horizon) => horizon.engine.driven.arrive(),
+            Engine::Extended(engine) => &mut engine.driven,
+            Engine::Unscented(engine) => &mut engine.driven,
+            Engine::MovingHorizon(horizon) => &mut horizon.engine.driven,
         }
     }
 
     /// To the next sample; the transition is what the smoother needs of it. Where the plant has no
     /// value on the way, inside the declared ranges.
     fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
-        match (self.run_flow(from, to, inputs), &mut self.spare) {
+        self.driven().aim(from, to, inputs);
+        let (belief, keep) = (&mut self.belief, self.history.is_some());
+        let result = match &mut self.engine {
+            Engine::Extended(engine) => engine.predict(belief, from, to, keep),
+            Engine::Unscented(engine) => engine.predict(belief, from, to, keep),
+            Engine::MovingHorizon(horizon) => horizon.engine.predict(belief, from, to, keep),
+        };
+        match (result, &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
                 // a flow that failed has left the belief as it was
                 self.sensing.health.confined += 1;
@@ -360,28 +263,9 @@ impl Filter {
                 let driven = &mut spare.engine.driven;
                 driven.start(&self.inputs);
                 driven.aim(from, to, inputs);
-                let keep = self.history.is_some();
                 spare.engine.predict(&mut self.belief, from, to, keep)
             }
             (result, _) => result,
-        }
-    }
-
-    fn run_flow(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
-        let keep = self.history.is_some();
-        match &mut self.engine {
-            Engine::Extended(engine) => {
-                engine.driven.aim(from, to, inputs);
-                engine.predict(&mut self.belief, from, to, keep)
-            }
-            Engine::Unscented(engine) => {
-                engine.driven.aim(from, to, inputs);
-                engine.predict(&mut self.belief, from, to, keep)
-            }
-            Engine::MovingHorizon(horizon) => {
-                horizon.engine.driven.aim(from, to, inputs);
-                horizon.engine.predict(&mut self.belief, from, to, keep)
-            }
         }
     }
 
@@ -417,22 +301,61 @@ impl Filter {
             Engine::MovingHorizon(horizon) => horizon.correct(sensing, belief, t, readings, inputs),
         }
     }
+}
 
-    fn report(&mut self, t: f64) -> Result<&[f64], Error> {
+impl Runner for Filter {
+    fn begin(&mut self, _: &Sample<'_>) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+        self.bound.see(&self.inputs);
+        let transition = self.predict(from, sample.t, sample.inputs)?;
+        self.driven().arrive();
+        if self.history.is_some() {
+            self.pending = Some(match self.pending.take() {
+                None => transition,
+                Some(earlier) => transition.after(&earlier),
+            });
+        }
+        Ok(())
+    }
+
+    fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
+        self.sensing.health.inputs_held += sample.held;
+        // those of an update that failed
+        self.sensing.take_corrections();
+        self.inputs.copy_from_slice(sample.inputs);
+        self.driven().start(sample.inputs);
+        self.correct(sample.t, sample.readings)
+    }
+
+    fn report(&mut self, t: f64) -> Result<(), Error> {
         let names = self.sensing.states();
         self.bound.check(t, names, &self.belief.x, String::new)?;
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             *deviation = self.belief.root.deviation(i);
         }
         match self.deviations.iter().position(|d| !d.is_finite()) {
-            None => Ok(&self.belief.x),
-            Some(i) => Err(Error::Diverged {
-                time: t,
-                name: format!("standard deviation of {}", names[i]),
-                value: self.deviations[i],
-                hint: "; give smaller values in initial_variance or [process_noise]".to_owned(),
-            }),
+            None => Ok(()),
+            Some(i) => Err(deviation_diverged(t, &names[i], self.deviations[i])),
         }
+    }
+
+    fn estimate(&self) -> &[f64] {
+        &self.belief.x
+    }
+
+    fn deviations(&self) -> Option<&[f64]> {
+        Some(&self.deviations)
+    }
+
+    fn innovations(&self) -> &[Innovation] {
+        &self.sensing.innovations
+    }
+
+    fn health(&self) -> &Health {
+        &self.sensing.health
     }
 }
 

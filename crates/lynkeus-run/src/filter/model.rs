@@ -162,6 +162,20 @@ impl FilterModel {
         self.flow.signals()
     }
 
+    /// What is compiled.
+    pub(crate) fn systems(&self) -> impl Iterator<Item = &System> {
+        let confined = self.confined.iter().map(|c| &c.flow);
+        [&self.flow, &self.output_map].into_iter().chain(confined)
+    }
+
+    /// Noises, limits and bounds, as text.
+    pub(crate) fn numbers(&self) -> String {
+        let sensors: Vec<_> = self.sensors.iter().map(|s| (s.noise, s.limits)).collect();
+        let bounds = self.confined.as_ref().map(|c| &c.bounds);
+        let (q, p) = (&self.process_noise, &self.initial_variance);
+        format!("{sensors:?} {q:?} {p:?} {bounds:?}")
+    }
+
     /// The same plant from other first estimates.
     ///
     /// # Errors

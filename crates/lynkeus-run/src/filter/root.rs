@@ -1,10 +1,19 @@
 //! Square roots of covariances: P = S Sᵀ, matrices row by row.
 
+use crate::snapshot::{Damaged, Persist, Walk};
+
 /// A lower triangular root S of P, n × n. Whatever is done to S, S Sᵀ has no negative eigenvalue.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Root {
     pub n: usize,
     pub entries: Vec<f64>,
+}
+
+/// A gain, with room for finding it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Gain {
+    pub values: Vec<f64>,
+    factors: Vec<(f64, f64)>,
 }
 
 impl Root {
@@ -61,13 +70,22 @@ impl Root {
     /// N. A. Carlson, "Fast triangular formulation of the square root filter", *AIAA Journal* 11
     /// (1973) 1259–1265, for a lower root: from the last column to the first.
     pub fn update(&mut self, projected: &[f64], r: f64) -> Option<Vec<f64>> {
+        let mut gain = Gain::default();
+        self.update_into(projected, r, &mut gain)
+            .then_some(gain.values)
+    }
+
+    /// The same with room for the gain; false where there is none.
+    pub fn update_into(&mut self, projected: &[f64], r: f64, gain: &mut Gain) -> bool {
         let n = self.n;
+        let Gain { values, factors } = gain;
         let variance = dot(projected, projected) + r;
         if variance.is_nan() || variance <= 0.0 {
-            return None;
+            return false;
         }
         // of each column: what is left of it, and what the later ones take
-        let mut factors = vec![(1.0, 0.0); n];
+        factors.clear();
+        factors.resize(n, (1.0, 0.0));
         let mut alpha = r;
         for (factor, v) in factors.iter_mut().zip(projected).rev() {
             let before = alpha;
@@ -81,25 +99,30 @@ impl Root {
                 *factor = ((before / alpha).sqrt(), taken);
             }
         }
-        let mut gain = vec![0.0; n];
-        for (i, k) in gain.iter_mut().enumerate() {
+        values.resize(n, 0.0);
+        for (i, k) in values.iter_mut().enumerate() {
             let row = &mut self.entries[i * n..=i * n + i];
             let mut sum = 0.0;
-            for ((s, (left, taken)), v) in row.iter_mut().zip(&factors).zip(projected).rev() {
+            for ((s, (left, taken)), v) in row.iter_mut().zip(&*factors).zip(projected).rev() {
                 let own = *s;
                 *s = own * left - sum * taken;
                 sum += own * v;
             }
             *k = sum / variance;
         }
-        Some(gain)
+        true
     }
 
     /// The lower triangular root of AᵀA, for the rows A (each of n entries): what is left of A
     /// after Householder's reflections. The diagonal is not negative.
     pub fn of_rows(&mut self, rows: &mut [f64]) {
+        self.of_rows_with(rows, &mut vec![0.0; self.n]);
+    }
+
+    /// The same with room for n numbers.
+    pub fn of_rows_with(&mut self, rows: &mut [f64], room: &mut [f64]) {
         let n = self.n;
-        triangularise(rows, n);
+        triangularise(rows, n, room);
         self.entries.fill(0.0);
         for i in 0..n.min(rows.len() / n.max(1)) {
             let sign = if rows[i * n + i] < 0.0 { -1.0 } else { 1.0 };
@@ -107,6 +130,12 @@ impl Root {
                 self.entries[j * n + i] = sign * rows[i * n + j];
             }
         }
+    }
+}
+
+impl Persist for Root {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.entries)
     }
 }
 
@@ -143,6 +172,12 @@ impl Packed {
     }
 }
 
+impl Persist for Packed {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(&mut self.entries)
+    }
+}
+
 /// Σ a_i b_i over the shorter of the two, in four partial sums, which processors add side by side.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let count = a.len().min(b.len());
@@ -160,9 +195,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Reflections that make the first n rows of A upper triangular; row by row, so that
 /// memory is read in order.
-fn triangularise(rows: &mut [f64], n: usize) {
+fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
     let count = rows.len() / n.max(1);
-    let mut sums = vec![0.0; n];
     for k in 0..n.min(count) {
         let norm = (k..count)
             .map(|i| rows[i * n + k].powi(2))
@@ -200,35 +234,50 @@ fn triangularise(rows: &mut [f64], n: usize) {
 /// pivot that rounding cannot tell from zero has none. What is zero before the first entry of a
 /// row stays so, and costs nothing.
 pub(crate) fn factor(matrix: &[f64], n: usize) -> Vec<f64> {
-    let first = |(i, row): (usize, &[f64])| row[..i].iter().position(|e| *e != 0.0).unwrap_or(i);
-    let firsts: Vec<usize> = matrix
-        .chunks_exact(n.max(1))
-        .enumerate()
-        .map(first)
-        .collect();
-    let mut lower = vec![0.0; n * n];
-    for j in 0..n {
-        let own = &lower[j * n + firsts[j]..j * n + j];
-        let pivot = matrix[j * n + j] - dot(own, own);
-        let noise = n as f64 * f64::EPSILON * matrix[j * n + j].abs();
-        if pivot.is_nan() || pivot <= noise {
-            continue;
-        }
-        let root = pivot.sqrt();
-        lower[j * n + j] = root;
-        for i in j + 1..n {
-            let begin = firsts[i].max(firsts[j]);
-            if firsts[i] > j {
+    Factor::default().of(matrix, n).to_vec()
+}
+
+/// Room for the [factor] of a matrix.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Factor {
+    lower: Vec<f64>,
+    /// where the entries of each row that are not 0 begin
+    firsts: Vec<usize>,
+}
+
+impl Factor {
+    /// As [`factor`].
+    pub fn of(&mut self, matrix: &[f64], n: usize) -> &[f64] {
+        let Self { lower, firsts } = self;
+        let first =
+            |(i, row): (usize, &[f64])| row[..i].iter().position(|e| *e != 0.0).unwrap_or(i);
+        firsts.clear();
+        firsts.extend(matrix.chunks_exact(n.max(1)).enumerate().map(first));
+        lower.clear();
+        lower.resize(n * n, 0.0);
+        for j in 0..n {
+            let own = &lower[j * n + firsts[j]..j * n + j];
+            let pivot = matrix[j * n + j] - dot(own, own);
+            let noise = n as f64 * f64::EPSILON * matrix[j * n + j].abs();
+            if pivot.is_nan() || pivot <= noise {
                 continue;
             }
-            let known = dot(
-                &lower[i * n + begin..i * n + j],
-                &lower[j * n + begin..j * n + j],
-            );
-            lower[i * n + j] = (matrix[i * n + j] - known) / root;
+            let root = pivot.sqrt();
+            lower[j * n + j] = root;
+            for i in j + 1..n {
+                let begin = firsts[i].max(firsts[j]);
+                if firsts[i] > j {
+                    continue;
+                }
+                let known = dot(
+                    &lower[i * n + begin..i * n + j],
+                    &lower[j * n + begin..j * n + j],
+                );
+                lower[i * n + j] = (matrix[i * n + j] - known) / root;
+            }
         }
+        lower
     }
-    lower
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! The sensors: what the model expects of them, and which readings are believed.
 
-use super::health::{Health, Innovation, Reading, SensorHealth};
+use super::extended::Room;
+use super::health::{Health, Innovation, Reading};
 use super::model::{FilterModel, Limits, Sensor};
 use super::smooth::Correction;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Evaluation};
 
 /// After so many rejections in a row the next reading is believed: a gate must not lock the
@@ -24,7 +26,6 @@ struct Lockout {
 pub(super) struct Sensing {
     output_map: Evaluation,
     states: Vec<String>,
-    inputs: Vec<String>,
     sensors: Vec<Sensor>,
     output_entries: Vec<(usize, usize)>,
     /// h, then the entries of C
@@ -33,46 +34,39 @@ pub(super) struct Sensing {
     lockouts: Vec<Lockout>,
     pub innovations: Vec<Innovation>,
     pub health: Health,
-    /// of this sample, for the smoother
-    pub corrections: Vec<Correction>,
+    /// of this sample, where a smoother asks for them
+    pub corrections: Option<Vec<Correction>>,
+    /// room of the extended filter
+    pub room: Room,
 }
 
 impl Sensing {
-    pub fn new(model: &FilterModel, gate: Option<f64>) -> Self {
+    pub fn new(model: &FilterModel, gate: Option<f64>, keep_corrections: bool) -> Self {
         let count = model.sensors.len();
         Self {
             output_map: model.output_map.evaluation(),
             states: model.states().to_vec(),
-            inputs: model.inputs().to_vec(),
             sensors: model.sensors.clone(),
             output_entries: model.output_entries.clone(),
             values: vec![0.0; count + model.output_entries.len()],
             gate,
             lockouts: vec![Lockout::default(); count],
             innovations: vec![Innovation::default(); count],
-            health: Health {
-                sensors: vec![SensorHealth::default(); count],
-                inputs_held: 0,
-                confined: 0,
-            },
-            corrections: vec![],
+            health: Health::of(count),
+            corrections: keep_corrections.then(Vec::new),
+            room: Room::default(),
         }
-    }
-
-    pub fn count(&self) -> usize {
-        self.sensors.len()
     }
 
     pub fn states(&self) -> &[String] {
         &self.states
     }
 
-    pub fn inputs(&self) -> &[String] {
-        &self.inputs
-    }
-
     pub fn take_corrections(&mut self) -> Vec<Correction> {
-        std::mem::take(&mut self.corrections)
+        self.corrections
+            .as_mut()
+            .map(std::mem::take)
+            .unwrap_or_default()
     }
 
     /// h(t, x, u), and the entries of C there.
@@ -92,13 +86,19 @@ impl Sensing {
     /// Row i of C where it was evaluated last.
     pub fn slopes(&self, i: usize) -> Vec<f64> {
         let mut row = vec![0.0; self.states.len()];
+        self.write_slopes(i, &mut row);
+        row
+    }
+
+    /// The same with room for it.
+    pub fn write_slopes(&self, i: usize, row: &mut [f64]) {
+        row.fill(0.0);
         let values = &self.values[self.sensors.len()..];
         for (&(output, state), value) in self.output_entries.iter().zip(values) {
             if output == i {
                 row[state] = *value;
             }
         }
-        row
     }
 
     /// The variance of a sensor's noise where the model predicts a value.
@@ -144,6 +144,20 @@ impl Sensing {
             Reading::Taken | Reading::AtLimit => lockout.moved = 0,
         }
         lockout.last = reading;
+    }
+}
+
+impl Persist for Sensing {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.output_map.walk(walk)?;
+        for lockout in &mut self.lockouts {
+            walk.count(&mut lockout.moved)?;
+            walk.number(&mut lockout.last)?;
+        }
+        for innovation in &mut self.innovations {
+            innovation.walk(walk)?;
+        }
+        self.health.walk(walk)
     }
 }
 

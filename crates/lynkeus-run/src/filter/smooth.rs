@@ -1,10 +1,11 @@
 //! Smoothers: the estimate at a sample given later ones.
 
-use super::root::{Packed, dot};
+use super::root::{Packed, Root, dot};
 use super::spanned::Rows;
+use crate::snapshot::{Damaged, Persist, Walk};
 
 /// What readings did that were taken together.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Correction {
     /// their rows of C
     pub slopes: Vec<Vec<f64>>,
@@ -39,6 +40,51 @@ pub(super) struct Step {
     pub corrections: Vec<Correction>,
 }
 
+impl Correction {
+    /// Of n states.
+    fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let count = walk.length(self.gains.len())?;
+        for columns in [&mut self.slopes, &mut self.gains] {
+            columns.resize_with(count, || vec![0.0; n]);
+            columns.iter_mut().try_for_each(|c| walk.numbers(c))?;
+        }
+        let entries = walk.length(self.information.len())?;
+        if Some(entries) != count.checked_mul(count) {
+            return Err(Damaged);
+        }
+        self.information.resize(entries, 0.0);
+        walk.numbers(&mut self.information)?;
+        self.weighed.resize(count, 0.0);
+        walk.numbers(&mut self.weighed)
+    }
+}
+
+impl Step {
+    fn nothing(n: usize) -> Self {
+        Self {
+            transition: None,
+            x: vec![0.0; n],
+            root: Packed::of(&Root::diagonal(&vec![0.0; n])),
+            corrections: vec![],
+        }
+    }
+
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        let n = self.x.len();
+        walk.numbers(&mut self.x)?;
+        self.root.walk(walk)?;
+        let transition = &mut self.transition;
+        walk.optional(transition, |walk, transition: &mut Rows| {
+            transition.walk(walk, n)
+        })?;
+        let count = walk.length(self.corrections.len())?;
+        self.corrections.resize_with(count, Correction::default);
+        self.corrections
+            .iter_mut()
+            .try_for_each(|c| c.walk(walk, n))
+    }
+}
+
 /// The estimate at a sample given later ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoothed {
@@ -61,6 +107,13 @@ pub(super) struct Adjoint {
 }
 
 impl History {
+    /// Of a filter of n states.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let count = walk.length(self.steps.len())?;
+        self.steps.resize_with(count, || Step::nothing(n));
+        self.steps.iter_mut().try_for_each(|step| step.walk(walk))
+    }
+
     pub fn push(&mut self, step: Step) {
         self.steps.push(step);
     }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::root::dot;
+use crate::snapshot::{Damaged, Walk};
 
 /// An entry of a sparse matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +44,14 @@ impl Spanned {
             entries,
             spans: vec![0..n; n],
         }
+    }
+
+    /// Other entries, all of them, row by row.
+    pub fn fill(&mut self, entries: impl Iterator<Item = f64>) {
+        let n = self.n;
+        self.spans.iter_mut().for_each(|span| *span = 0..n);
+        let places = self.entries.iter_mut().zip(entries);
+        places.for_each(|(place, entry)| *place = entry);
     }
 
     /// Columns of row i that may differ from 0.
@@ -180,6 +189,39 @@ impl Rows {
         })
     }
 
+    /// What `earlier` and then this one do: their product.
+    pub fn after(&self, earlier: &Self) -> Self {
+        let n = self.begins.len();
+        let mut product = Spanned::zero(n);
+        let mut dense = Spanned::zero(n);
+        for (i, (first, row)) in earlier.iter().enumerate() {
+            let entries = row.iter().enumerate();
+            entries.for_each(|(k, entry)| dense.add_at(i, first + k, *entry));
+        }
+        for (i, (first, row)) in self.iter().enumerate() {
+            let entries = row.iter().enumerate();
+            entries.for_each(|(k, entry)| product.add_row(i, *entry, &dense, first + k));
+        }
+        Self::of(&product)
+    }
+
+    /// Of n rows and columns.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
+        let spans = self.iter().map(|(first, row)| first..first + row.len());
+        let mut spans: Vec<Range<usize>> = spans.collect();
+        spans.resize(n, 0..0);
+        self.begins.resize(n, (0, 0));
+        let mut count = 0;
+        for (begin, span) in self.begins.iter_mut().zip(&mut spans) {
+            walk.below(&mut span.start, n + 1)?;
+            walk.below(&mut span.end, n + 1)?;
+            *begin = (span.start, count);
+            count += span.end.checked_sub(span.start).ok_or(Damaged)?;
+        }
+        self.entries.resize(count, 0.0);
+        walk.numbers(&mut self.entries)
+    }
+
     /// Mᵀv.
     pub fn transposed_times(&self, v: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; v.len()];
@@ -225,5 +267,35 @@ mod tests {
         );
         twice.clear();
         assert_eq!(twice.norm(), 0.0);
+    }
+
+    /// [[0, 2, 0], [0, −1, 0], [3, 0, 0]] after [[1, 0, 0], [4, 0, 5], [0, 0, 6]].
+    #[test]
+    fn one_after_the_other_is_the_product() {
+        let rows = |entries: &[Entry]| {
+            let mut matrix = Spanned::zero(3);
+            entries
+                .iter()
+                .for_each(|e| matrix.add_at(e.row, e.column, e.value));
+            Rows::of(&matrix)
+        };
+        let later = rows(&[entry(0, 1, 2.0), entry(1, 1, -1.0), entry(2, 0, 3.0)]);
+        let earlier = rows(&[
+            entry(0, 0, 1.0),
+            entry(1, 0, 4.0),
+            entry(1, 2, 5.0),
+            entry(2, 2, 6.0),
+        ]);
+        let product = later.after(&earlier);
+        let column = |i: usize| {
+            let mut unit = [0.0; 3];
+            unit[i] = 1.0;
+            product.transposed_times(&unit)
+        };
+        assert_eq!(column(0), [8.0, 0.0, 10.0]);
+        assert_eq!(column(1), [-4.0, 0.0, -5.0]);
+        assert_eq!(column(2), [3.0, 0.0, 0.0]);
+        let identity = Rows::of(&Spanned::identity(3));
+        assert_eq!(identity.after(&identity), identity);
     }
 }

@@ -1,7 +1,7 @@
 //! Filters against formulas by hand.
 
 use super::*;
-use crate::{Level, Method, Tolerances};
+use crate::{Estimator, Level, Method, Tolerances};
 use lynkeus_expr::Graph;
 
 /// x' = a x + w, y = x + v.
@@ -47,7 +47,7 @@ fn the_variance_of_a_scalar_follows_its_formula() {
         FilterKind::Unscented(SigmaPoints::default()),
     ] {
         let mut filter =
-            Filter::new(&scalar(a, q, r), FilterSettings::of(kind.clone()), exact()).unwrap();
+            Estimator::filter(&scalar(a, q, r), FilterSettings::of(kind.clone()), exact()).unwrap();
         let (mut x, mut p) = (1.0, 0.5);
         for k in 0..20 {
             let y = (k as f64).sin();
@@ -64,10 +64,10 @@ fn the_variance_of_a_scalar_follows_its_formula() {
             let gain = p / (p + r);
             x += gain * (y - x);
             p *= 1.0 - gain;
-            filter.push(step * f64::from(k), &[y], &[]).unwrap();
+            filter.push(step * f64::from(k), &[y]).unwrap();
             assert!((filter.estimate()[0] - x).abs() < 1e-10, "{kind:?} {k}");
             assert!(
-                (filter.deviations()[0] - p.sqrt()).abs() < 1e-10,
+                (filter.deviations().unwrap()[0] - p.sqrt()).abs() < 1e-10,
                 "{kind:?} {k}"
             );
         }
@@ -81,16 +81,16 @@ fn the_smoother_of_a_constant_is_its_last_estimate() {
         keep_history: true,
         ..FilterSettings::of(FilterKind::Extended)
     };
-    let mut filter = Filter::new(&scalar(0.0, 0.0, 0.2), settings, exact()).unwrap();
+    let mut filter = Estimator::filter(&scalar(0.0, 0.0, 0.2), settings, exact()).unwrap();
     for k in 0..10 {
-        filter.push(f64::from(k), &[f64::from(k % 3)], &[]).unwrap();
+        filter.push(f64::from(k), &[f64::from(k % 3)]).unwrap();
     }
-    let (last, deviation) = (filter.estimate()[0], filter.deviations()[0]);
-    for smoothed in filter.smoothed(true).unwrap() {
+    let (last, deviation) = (filter.estimate()[0], filter.deviations().unwrap()[0]);
+    for smoothed in filter.smoothed(None, true).unwrap() {
         assert!((smoothed.estimate[0] - last).abs() < 1e-12);
         assert!((smoothed.deviations[0] - deviation).abs() < 1e-12);
     }
-    let lagged = filter.smoothed_with_lag(3, false).unwrap();
+    let lagged = filter.smoothed(Some(3), false).unwrap();
     assert!((lagged[6].estimate[0] - last).abs() < 1e-12);
     assert!((lagged[0].estimate[0] - last).abs() > 1e-3);
 }
@@ -101,25 +101,25 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
         gate: Some(4.0),
         ..FilterSettings::of(FilterKind::Extended)
     };
-    let mut filter = Filter::new(&scalar(0.0, 0.0, 0.01), settings, exact()).unwrap();
+    let mut filter = Estimator::filter(&scalar(0.0, 0.0, 0.01), settings, exact()).unwrap();
     for k in 0..5 {
-        filter.push(f64::from(k), &[1.0], &[]).unwrap();
+        filter.push(f64::from(k), &[1.0]).unwrap();
     }
     let mut hanging = filter.clone();
     for k in 5..15 {
         filter
-            .push(f64::from(k), &[9.0 + 0.01 * f64::from(k)], &[])
+            .push(f64::from(k), &[9.0 + 0.01 * f64::from(k)])
             .unwrap();
         assert_eq!(filter.innovations()[0].reading, Reading::Rejected);
     }
     assert!((filter.estimate()[0] - 1.0).abs() < 1e-12);
-    filter.push(15.0, &[9.0], &[]).unwrap();
+    filter.push(15.0, &[9.0]).unwrap();
     assert!(filter.estimate()[0] > 1.5);
     let health = filter.health().sensors[0];
     assert_eq!((health.taken, health.rejected, health.missing), (6, 10, 0));
     // a sensor that shows the same number for ever has not seen a new level
     for k in 5..60 {
-        hanging.push(f64::from(k), &[9.0], &[]).unwrap();
+        hanging.push(f64::from(k), &[9.0]).unwrap();
     }
     assert_eq!(hanging.health().sensors[0].rejected, 55);
 }
@@ -127,7 +127,7 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
 #[test]
 fn what_cannot_be_is_refused() {
     let model = scalar(0.0, 1.0, 1.0);
-    let new = |settings| Filter::new(&model, settings, exact());
+    let new = |settings| Estimator::filter(&model, settings, exact());
     let gate = FilterSettings {
         gate: Some(-1.0),
         ..FilterSettings::of(FilterKind::Extended)
@@ -140,21 +140,18 @@ fn what_cannot_be_is_refused() {
     let unscented = FilterSettings::of(FilterKind::Unscented(points));
     assert!(new(unscented).unwrap_err().to_string().contains("kappa"));
     let mut filter = new(FilterSettings::of(FilterKind::Extended)).unwrap();
-    filter.push(1.0, &[0.0], &[]).unwrap();
+    filter.push(1.0, &[0.0]).unwrap();
     assert!(matches!(
-        filter.push(0.5, &[0.0], &[]),
+        filter.push(0.5, &[0.0]),
         Err(Error::TimeOrder { row: 2, .. })
     ));
     assert!(matches!(
-        filter.push(f64::NAN, &[0.0], &[]),
+        filter.push(f64::NAN, &[0.0]),
         Err(Error::NotANumber { .. })
     ));
+    assert!(matches!(filter.push(2.0, &[]), Err(Error::Setting { .. })));
     assert!(matches!(
-        filter.push(2.0, &[], &[]),
-        Err(Error::Setting { .. })
-    ));
-    assert!(matches!(
-        filter.push(2.0, &[0.0], &[1.0]),
+        filter.push(2.0, &[0.0, 1.0]),
         Err(Error::Setting { .. })
     ));
 }
@@ -169,13 +166,13 @@ fn the_moving_horizon_keeps_to_the_bounds() {
         high: 10.0,
     }];
     let settings = FilterSettings::of(FilterKind::MovingHorizon(5, bounds));
-    let mut horizon = Filter::new(&model, settings, exact()).unwrap();
+    let mut horizon = Estimator::filter(&model, settings, exact()).unwrap();
     let mut filter =
-        Filter::new(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
+        Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
     for k in 0..60 {
         let y = if k < 40 { -1.0 } else { 2.0 };
-        let x = horizon.push(f64::from(k), &[y], &[]).unwrap()[0];
-        let free = filter.push(f64::from(k), &[y], &[]).unwrap()[0];
+        let x = horizon.push(f64::from(k), &[y]).unwrap()[0];
+        let free = filter.push(f64::from(k), &[y]).unwrap()[0];
         assert!(x >= 0.0, "{k}: {x}");
         if (20..40).contains(&k) {
             assert!(x < 1e-9 && free < -0.9, "{k}: {x} {free}");
@@ -219,9 +216,8 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     let run = |confined| {
         let model = FilterModel::new(&plant(confined)).unwrap();
         let settings = FilterSettings::of(FilterKind::Extended);
-        let mut filter = Filter::new(&model, settings, exact()).unwrap();
-        let result =
-            (0..20).try_for_each(|k| filter.push(0.1 * f64::from(k), &[-0.5], &[]).map(drop));
+        let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
+        let result = (0..20).try_for_each(|k| filter.push(0.1 * f64::from(k), &[-0.5]).map(drop));
         (result, filter.health().confined)
     };
     assert!(matches!(
@@ -230,4 +226,72 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     ));
     let (result, confined) = run(Some(inside));
     assert!(result.is_ok() && confined > 5, "{result:?} {confined}");
+}
+
+/// A snapshot has what the smoother keeps; ways with stops give the same transitions. The kick of
+/// the noise on a way is larger for the sigma points where the way has no stop.
+#[test]
+fn smoothing_goes_on_after_a_restore_and_over_predictions() {
+    for (kind, noise) in [
+        (FilterKind::Extended, 0.2),
+        (FilterKind::Unscented(SigmaPoints::default()), 0.0),
+    ] {
+        let settings = FilterSettings {
+            keep_history: true,
+            ..FilterSettings::of(kind)
+        };
+        let model = scalar(-0.3, noise, 0.1);
+        let new = || Estimator::filter(&model, settings.clone(), exact()).unwrap();
+        let (mut whole, mut stopped, mut restored) = (new(), new(), new());
+        for k in 0..12 {
+            let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
+            whole.push(t, &[y]).unwrap();
+            if k > 0 {
+                stopped.predict(t - 0.3).unwrap();
+                stopped.predict(t).unwrap();
+                stopped.update(&[y]).unwrap();
+            } else {
+                stopped.push(t, &[y]).unwrap();
+            }
+            if k == 6 {
+                restored.restore(&whole.snapshot()).unwrap();
+            } else if k > 6 {
+                restored.push(t, &[y]).unwrap();
+            }
+        }
+        let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
+        assert_eq!(smoothed(&restored), smoothed(&whole));
+        for (a, b) in smoothed(&stopped).iter().zip(smoothed(&whole)) {
+            assert!((a.estimate[0] - b.estimate[0]).abs() < 1e-9);
+            assert!((a.deviations[0] - b.deviations[0]).abs() < 1e-9);
+        }
+        assert_eq!(smoothed(&stopped).len(), 12);
+    }
+}
+
+/// An update that fails after its readings have corrected leaves nothing behind for the smoother.
+#[test]
+fn smoothing_knows_nothing_of_updates_that_failed() {
+    for kind in [
+        FilterKind::Extended,
+        FilterKind::Unscented(SigmaPoints::default()),
+    ] {
+        let settings = FilterSettings {
+            keep_history: true,
+            ..FilterSettings::of(kind)
+        };
+        let new = || Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings.clone(), exact()).unwrap();
+        let (mut whole, mut troubled) = (new(), new());
+        for k in 0..8 {
+            let (t, y) = (0.5 * f64::from(k), f64::from(k).sin());
+            whole.push(t, &[y]).unwrap();
+            if k % 3 == 1 {
+                let error = troubled.push(t, &[1e300]).unwrap_err();
+                assert!(matches!(error, Error::Diverged { .. }), "{error}");
+            }
+            troubled.push(t, &[y]).unwrap();
+        }
+        let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
+        assert_eq!(smoothed(&troubled), smoothed(&whole));
+    }
 }

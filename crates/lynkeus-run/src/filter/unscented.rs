@@ -8,6 +8,7 @@ use super::sensing::Sensing;
 use super::smooth::Correction;
 use super::spanned::{Rows, Spanned};
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator};
 
 /// How sigma points are spread and weighed, after Julier, Uhlmann and van der Merwe; the
@@ -270,13 +271,15 @@ impl Unscented {
         let slopes = |&(i, ..): &(usize, f64, f64)| self.row(&belief.root, &outputs.deviations, i);
         let column = |a: usize| gain.iter().map(|k| k[a]).collect();
         let unit = |a: usize| (0..m).map(|b| f64::from(u8::from(a == b))).collect();
-        let innovations = taken.iter().map(|t| t.2).collect();
-        sensing.corrections.push(Correction {
-            slopes: taken.iter().map(slopes).collect(),
-            gains: (0..m).map(column).collect(),
-            information: (0..m).flat_map(|a| solve(&lower, m, unit(a))).collect(),
-            weighed: solve(&lower, m, innovations),
-        });
+        let innovations = || taken.iter().map(|t| t.2).collect();
+        if let Some(corrections) = &mut sensing.corrections {
+            corrections.push(Correction {
+                slopes: taken.iter().map(slopes).collect(),
+                gains: (0..m).map(column).collect(),
+                information: (0..m).flat_map(|a| solve(&lower, m, unit(a))).collect(),
+                weighed: solve(&lower, m, innovations()),
+            });
+        }
         for (x, k) in belief.x.iter_mut().zip(&gain) {
             *x += taken.iter().zip(k).map(|((.., nu), k)| k * nu).sum::<f64>();
         }
@@ -299,6 +302,13 @@ impl Unscented {
             .map(|(a, (_, r, _))| gain.iter().map(|k| k[a] * r.sqrt()).collect());
         belief.root = self.spread(&left, noise.collect());
         Ok(())
+    }
+}
+
+impl Persist for Unscented {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.driven.walk(walk)?;
+        self.integrator.walk(walk)
     }
 }
 

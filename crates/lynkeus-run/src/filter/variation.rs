@@ -14,6 +14,7 @@ use super::spanned::Entry;
 use super::taylor::{Moments, Series};
 use crate::adaptive::resolution;
 use crate::driven::Driven;
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.
@@ -307,6 +308,14 @@ impl Variation {
         }
         let polynomial = fit.map(|fit| fit.iter().map(|c| self.sparse(c)).collect());
         Ok(Course { end, polynomial })
+    }
+}
+
+/// Units are chosen anew for every interval, and series keep room only.
+impl Persist for Variation {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.integrator.walk(walk)?;
+        walk.number(&mut self.step)
     }
 }
 

@@ -15,6 +15,7 @@ use lynkeus_expr::Tape;
 
 pub(crate) use extract::{Taken, take};
 
+use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error};
 
 /// A surface counts as reached this close to it, against the largest value of its function.
@@ -74,6 +75,28 @@ pub(crate) struct Sides {
     passes: Vec<usize>,
 }
 
+impl Sides {
+    /// Room for so many surfaces.
+    fn fit(&mut self, count: usize) {
+        self.sides.resize(count, 1.0);
+        self.sliding.resize(count, false);
+        self.largest.resize(count, 0.0);
+        self.passes.resize(count, 0);
+    }
+}
+
+impl Persist for Sides {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        // none before the first interval
+        let count = walk.length(self.sides.len())?;
+        self.fit(count);
+        walk.numbers(&mut self.sides)?;
+        walk.numbers(&mut self.largest)?;
+        self.sliding.iter_mut().try_for_each(|s| walk.flag(s))?;
+        self.passes.iter_mut().try_for_each(|p| walk.count(p))
+    }
+}
+
 /// A system on known sides of its surfaces.
 pub(crate) struct Switched<'a, D: Dynamics> {
     inner: &'a mut D,
@@ -89,10 +112,7 @@ impl<'a, D: Dynamics> Switched<'a, D> {
     /// At the start of an interval of the given length; decides on which sides it starts.
     pub fn new(inner: &'a mut D, at: &'a mut Sides, (t, x): (f64, &[f64]), length: f64) -> Self {
         let count = inner.surfaces();
-        at.sides.resize(count, 1.0);
-        at.sliding.resize(count, false);
-        at.largest.resize(count, 0.0);
-        at.passes.resize(count, 0);
+        at.fit(count);
         let mut switched = Self {
             inner,
             at,

@@ -5,6 +5,7 @@ use lynkeus_expr::Interval;
 use super::indicator::{Indicator, ORDER};
 use super::timeline::{apart, same};
 use crate::Error;
+use crate::snapshot::{Damaged, Persist, Walk};
 
 /// Switching instants allowed in one interval, over all indicators of a system.
 const SWITCHES: usize = 100_000;
@@ -41,6 +42,15 @@ impl Default for Allowance {
             granted: INTERVALS * SWITCHES,
             looks: INTERVALS * LOOKS,
         }
+    }
+}
+
+impl Persist for Allowance {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.optional(&mut self.since, Walk::number)?;
+        walk.count(&mut self.switches)?;
+        walk.count(&mut self.granted)?;
+        walk.count(&mut self.looks)
     }
 }
 

@@ -23,6 +23,7 @@ mod timeline;
 use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
 
 use crate::Error;
+use crate::snapshot::{Damaged, Persist, Walk};
 use indicator::Indicator;
 use isolate::Allowance;
 use timeline::Timeline;
@@ -94,6 +95,12 @@ impl Switches {
         }
         self.allowance.pay(&effort);
         Ok(())
+    }
+}
+
+impl Persist for Switches {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.allowance.walk(walk)
     }
 }
 

@@ -78,7 +78,7 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
         results.picture(path, report.to_svg())?;
     }
     if let Some(path) = &options.output {
-        results.put(path, output::table(path, &columns)?)?;
+        results.write(path, |to| output::table(path, &columns, to))?;
     }
     results.report(json, &report, || report.to_json());
     results.keep()?;

@@ -148,6 +148,9 @@ enum Command {
         log: PathBuf,
         #[command(flatten)]
         output: Output,
+        /// Keep the replay in this file while it runs: the same command goes on there after it was killed or a limit ended it. Removed once the result is written
+        #[arg(long, value_name = "FILE")]
+        checkpoint: Option<PathBuf>,
         #[command(flatten)]
         limits: Limits,
     },
@@ -282,10 +285,11 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             study,
             log,
             output,
+            checkpoint,
             limits,
         } => {
             let source = Source::load(&study)?.within(limits.budget());
-            run::estimate(&source, &log, &output)
+            run::estimate(&source, &log, &output, checkpoint.as_deref())
         }
         Command::Tune {
             study,

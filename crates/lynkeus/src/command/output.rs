@@ -8,23 +8,23 @@ use lynkeus::{Error, table, visible};
 use serde_json::Value;
 
 /// Columns as a CSV file, or as a Parquet file if it is called so.
-pub(super) fn table(path: &Path, columns: &[(String, &[f64])]) -> Result<Vec<u8>, Error> {
+pub(super) fn table(
+    path: &Path,
+    columns: &[(String, &[f64])],
+    mut to: &mut (dyn Write + Send),
+) -> io::Result<()> {
     let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
     let named: Vec<(&str, &[f64])> = names
         .iter()
         .zip(columns)
         .map(|(name, (_, values))| (name.as_ref(), *values))
         .collect();
-    let failed =
-        |e: &dyn std::fmt::Display| Error::input(format!("cannot write {}: {e}", path.display()));
-    let mut bytes = vec![];
     #[cfg(feature = "parquet")]
     if table::is_parquet(path) {
-        table::write_parquet(&mut bytes, &named).map_err(|e| failed(&e))?;
-        return Ok(bytes);
+        return table::write_parquet(&mut to, &named);
     }
-    table::write_csv(&mut bytes, &named).map_err(|e| failed(&e))?;
-    Ok(bytes)
+    let _ = path;
+    table::write_csv(&mut to, &named)
 }
 
 /// A JSON object as text.

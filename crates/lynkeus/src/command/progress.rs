@@ -100,7 +100,11 @@ impl Progress {
             if self.told.elapsed() >= LINES {
                 self.told = Instant::now();
                 let percent = (100.0 * fraction).floor();
-                line(&format!("{}: {percent} %", self.what));
+                let left = self.since.elapsed().as_secs_f64() * (1.0 / fraction - 1.0);
+                line(&format!(
+                    "{}: {percent} %, about {left:.0} s left",
+                    self.what
+                ));
             }
             return;
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Error, Outcome, Study};
+use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
 use serde_json::{Value, json};
 
 use super::inputs::{self, Source};
@@ -91,22 +91,45 @@ pub(super) fn simulate(
     if let Some(path) = log {
         let columns = outcome.log(&source.study.estimate);
         let columns = columns.map_err(|e| e.at(&source.study.file))?;
-        results.put(path, output::table(path, &columns)?)?;
+        results.write(path, |to| output::table(path, &columns, to))?;
     }
     let code = finish(&source.study, output, &outcome, true, results)?;
     Ok(limits::code(&source.study, code))
 }
 
-pub(super) fn estimate(source: &Source, log: &Path, output: &Output) -> Result<ExitCode, Error> {
+pub(super) fn estimate(
+    source: &Source,
+    log: &Path,
+    output: &Output,
+    checkpoint: Option<&Path>,
+) -> Result<ExitCode, Error> {
     let files = source.files().reads("the log", Some(log));
-    output.added_to(files).check()?;
+    let files = output.added_to(files).writes("--checkpoint", checkpoint);
+    files.check()?;
     let table = inputs::log(log)?;
+    let study = &source.study;
+    let mut checkpoint = checkpoint.map(Checkpoint::new);
     let mut progress = Progress::new("estimating", output.quiet);
-    let outcome = lynkeus::estimate(&source.study, &table, &mut progress.watch())?;
+    let outcome = match &mut checkpoint {
+        None => lynkeus::estimate(study, &table, &mut progress.watch())?,
+        Some(checkpoint) => {
+            lynkeus::estimate_resumed(study, &table, checkpoint, &mut progress.watch())?
+        }
+    };
     progress.finish();
     drop(table);
-    let code = finish(&source.study, output, &outcome, false, Results::default())?;
-    Ok(limits::code(&source.study, code))
+    if let Some(checkpoint) = checkpoint
+        .as_ref()
+        .filter(|c| c.resumed() > 0 && !output.quiet)
+    {
+        output::note(&format!("went on after row {}", checkpoint.resumed()));
+    }
+    let code = finish(study, output, &outcome, false, Results::default())?;
+    // a run that a limit ended goes on another time
+    if let Some(checkpoint) = checkpoint.filter(|_| study.budget.marked().is_none()) {
+        checkpoint.remove()?;
+    }
+    Ok(limits::code(study, code))
 }
 
 pub(super) fn compare(
@@ -156,9 +179,9 @@ fn finish(
     }
     let printed = Path::new("-");
     match &output.output {
-        Some(path) => results.put(path, output::table(path, &columns)?)?,
+        Some(path) => results.write(path, |to| output::table(path, &columns, to))?,
         None if !shown && !results.has_printed() => {
-            results.put(printed, output::table(printed, &columns)?)?
+            results.write(printed, |to| output::table(printed, &columns, to))?
         }
         None => {}
     }

@@ -5,7 +5,7 @@
 //! as its writer lives: one that is not locked was left by a run that was killed, and is removed.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use lynkeus::{Error, interrupt};
@@ -52,17 +52,33 @@ impl Results {
     /// Adds a result; "-" prints it.
     pub fn put(&mut self, path: &Path, content: impl Into<Vec<u8>>) -> Result<(), Error> {
         let bytes = content.into();
+        self.write(path, |to| to.write_all(&bytes))
+    }
+
+    /// Adds a result that is written piece by piece, straight to the disk where it is a file: a
+    /// table takes no room but its own.
+    pub fn write(
+        &mut self,
+        path: &Path,
+        write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+    ) -> Result<(), Error> {
+        let failed = |e: io::Error| refusal(path, &e);
+        let place = destination(path);
+        let is_device = std::fs::metadata(&place).is_ok_and(|data| !data.is_file());
+        if !is_standard(path) && !is_device {
+            let file = stage(&place, write).map_err(failed)?;
+            return self.stage(path, place, Content::Beside(file));
+        }
+        let mut bytes = vec![];
+        write(&mut bytes).map_err(failed)?;
         if is_standard(path) {
             self.print(&String::from_utf8_lossy(&bytes));
             return Ok(());
         }
-        let failed = |e: io::Error| refusal(path, &e);
-        let place = destination(path);
-        let is_device = std::fs::metadata(&place).is_ok_and(|data| !data.is_file());
-        let content = match is_device {
-            true => Content::Device(bytes),
-            false => Content::Beside(stage(&place, &bytes).map_err(failed)?),
-        };
+        self.stage(path, place, Content::Device(bytes))
+    }
+
+    fn stage(&mut self, path: &Path, place: PathBuf, content: Content) -> Result<(), Error> {
         let path = path.to_owned();
         self.files.push(Staged {
             path,
@@ -202,18 +218,35 @@ pub(super) fn folder(place: &Path) -> &Path {
     }
 }
 
-/// The bytes in a temporary file beside their place, on disk, with the permissions they will have.
-fn stage(place: &Path, bytes: &[u8]) -> io::Result<NamedTempFile> {
+/// A file that is written only as long as the user does not want to stop.
+struct Watched<'f>(&'f mut File);
+
+impl Write for Watched<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match interrupt::interrupted() {
+            true => Err(io::Error::other("interrupted")),
+            false => self.0.write(&bytes[..bytes.len().min(PIECE)]),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// The result in a temporary file beside its place, on disk, with the permissions it will have.
+fn stage(
+    place: &Path,
+    write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+) -> io::Result<NamedTempFile> {
     let folder = folder(place);
     remove_left(folder);
     let replaced = std::fs::metadata(place).ok();
     let mut file = temporary(folder, replaced.as_ref())?;
-    for piece in bytes.chunks(PIECE) {
-        if interrupt::interrupted() {
-            return Err(io::Error::other("interrupted"));
-        }
-        file.as_file_mut().write_all(piece)?;
-    }
+    let mut buffered = BufWriter::new(Watched(file.as_file_mut()));
+    write(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
     if let Some(replaced) = replaced {
         inherit(file.as_file(), &replaced)?;
     }

@@ -10,6 +10,7 @@ mod filters;
 mod hostile;
 mod how_well;
 mod limits;
+mod live;
 mod logs;
 mod messages;
 mod names;

@@ -1,5 +1,7 @@
 //! No result replaces what it was made from or another result, and none is ever half-written.
 
+#[cfg(unix)]
+mod checkpoint;
 mod interruption;
 mod standard;
 

@@ -71,8 +71,9 @@ fn differ(chain: &Chain, step: f64, ours: Method, reference: Method) -> f64 {
         };
         driven.aim(from, to, &[0.5 + 0.3 * f64::from(k)]);
         let mut other = x.clone();
-        let expected = joint
-            .advance(&mut driven.clone(), from, to, &mut other)
+        let mut expected = Moments::start(n, true);
+        joint
+            .advance(&mut driven.clone(), from, to, &mut other, &mut expected)
             .unwrap();
         let found = variation
             .advance(&mut driven, &belief, from, to, &mut x)

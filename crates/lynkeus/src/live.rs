@@ -1,0 +1,110 @@
+//! A study's estimator for samples that come one by one.
+
+use lynkeus_run::Estimator;
+
+use crate::course::Samples;
+use crate::estimate::{refuse_derivatives, run_settings};
+use crate::prepare::{self, Prepared};
+use crate::study::{BetweenSamples, EstimateSettings};
+use crate::{Error, Study, filter, sampled};
+
+/// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in
+/// the study's order. It runs on its own, as `[estimate]` says, and knows neither files nor graph.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/two-tanks");
+/// # let path = std::path::Path::new(folder).join("two_tanks.mo");
+/// let mut study = lynkeus::Study::parse(
+///     r#"
+///     sensors = { measured = ["level"], unknown = ["pump"], noise = { level = 0.02 } }
+///     process_noise = { pump = 0.001, lower = 1e-6, upper = 1e-6 }
+///     observer = { family = "ekf" }
+///     "#,
+///     "live.toml",
+/// )?;
+/// # study.plant = Some(path);
+/// let mut estimator = lynkeus::estimator(&study)?;
+/// assert_eq!(estimator.signals(), ["level"]);
+/// for k in 0..200 {
+///     // a sensor that is silent now and then
+///     let level = if k % 7 == 3 { f64::NAN } else { 4.0 };
+///     estimator.push(4.0 * f64::from(k), &[level])?;
+/// }
+/// let lower = estimator.names().iter().position(|name| name == "lower").unwrap_or(0);
+/// assert!((estimator.estimate()[lower] - 4.0).abs() < 0.1);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// A study that does not fit its plant, no family that fits, and what only a log could tell: the
+/// noise of a sensor or of an unknown input that the study does not declare, lines between
+/// samples, smoothing.
+pub fn estimator(study: &Study) -> Result<Estimator, Error> {
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let design = prepared.design()?;
+    refuse_derivatives(study, &design)?;
+    refuse_looking_ahead(study, &study.estimate)?;
+    let run = run_settings(&study.estimate);
+    let none = Samples::default();
+    // what is told of a log has no place here
+    let notes = &mut vec![];
+    if design.observer.filter.is_some() {
+        need_noises(&prepared, true)?;
+        return filter::estimator(study, prepared.extended(), &design, &none, run, notes);
+    }
+    if study.estimate.deviations {
+        need_noises(&prepared, false)?;
+    }
+    let observer = sampled::observer(&prepared, &design, &none, notes)?;
+    Estimator::sampled(&observer, run.method).map_err(Error::from_source)
+}
+
+fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<(), Error> {
+    let key = match (settings.between_samples, settings.smoothing) {
+        (BetweenSamples::Linear, _) => "between_samples = \"linear\"",
+        (_, Some(_)) => "`smooth` or `lag`",
+        _ => return Ok(()),
+    };
+    Err(Error::input(format!(
+        "{key} of [estimate] looks ahead: expected what live samples allow"
+    ))
+    .at(&study.file)
+    .hint("take between_samples = \"hold\" or \"predict\", and no smoothing"))
+}
+
+/// Without a log there is nothing to take a noise from.
+fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
+    let (study, extended) = (prepared.study(), prepared.extended());
+    let missing = |what: String, hint: String| {
+        let message =
+            format!("{what}: expected in the study, where there is no log to take it from");
+        Err(Error::input(message).at(&study.file).hint(hint))
+    };
+    let outputs = extended.outputs.iter().map(|o| &o.variable.name);
+    let declared = |name: &str| study.sensors.noise.iter().any(|(n, _)| n.text == name);
+    if let Some(name) = outputs.into_iter().find(|name| !declared(name)) {
+        return missing(
+            format!("the noise of {name}"),
+            format!("write noise = {{ {name} = … }} under [sensors]"),
+        );
+    }
+    let densities = filter::noise::declared(study, extended)?;
+    let unknown = extended.states.iter().zip(&densities);
+    let mut unknown = unknown.skip(extended.plant_states());
+    let asleep = unknown.find(|(_, density)| density.is_none());
+    match asleep.map(|(input, _)| input.name.as_str()) {
+        Some(name) if process => missing(
+            format!("how fast {name} wanders"),
+            format!("write {name} = … under [process_noise]"),
+        ),
+        None if process && study.process_noise.is_empty() => missing(
+            "what the model does not know".to_owned(),
+            "write a density for some state under [process_noise], 0 where the model is exact"
+                .to_owned(),
+        ),
+        _ => Ok(()),
+    }
+}

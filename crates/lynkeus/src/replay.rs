@@ -1,0 +1,128 @@
+//! Samples through an estimator, row by row, whatever kind of observer it is.
+
+use std::ops::ControlFlow;
+
+use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::{Error as RunError, Estimator};
+
+use crate::checkpoint::Checkpoint;
+use crate::course::{Course, Samples, add_row};
+use crate::{Error, Study};
+
+/// Who watches a replay: told the fraction done, and may stop it.
+pub(crate) struct Watch<'w> {
+    pub watch: &'w mut dyn FnMut(f64) -> ControlFlow<()>,
+    /// where the replay goes on after it was killed
+    pub checkpoint: Option<&'w mut Checkpoint>,
+}
+
+impl<'w> Watch<'w> {
+    /// Without a checkpoint.
+    pub fn only(watch: &'w mut dyn FnMut(f64) -> ControlFlow<()>) -> Self {
+        Self {
+            watch,
+            checkpoint: None,
+        }
+    }
+}
+
+/// The health of the sensors half-way through the rows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Halfway {
+    sensors: Vec<SensorHealth>,
+    /// the estimator then, where there is a checkpoint; empty before
+    pub snapshot: Vec<u8>,
+}
+
+impl Halfway {
+    fn at(estimator: &Estimator, has_checkpoint: bool) -> Self {
+        let snapshot = has_checkpoint.then(|| estimator.snapshot());
+        Self {
+            sensors: estimator.health().sensors.clone(),
+            snapshot: snapshot.unwrap_or_default(),
+        }
+    }
+
+    /// From the snapshot alone.
+    pub fn restored(snapshot: Vec<u8>, estimator: &Estimator) -> Result<Self, RunError> {
+        if snapshot.is_empty() {
+            return Ok(Self::default());
+        }
+        let mut then = estimator.clone();
+        then.restore(&snapshot)?;
+        Ok(Self {
+            sensors: then.health().sensors.clone(),
+            snapshot,
+        })
+    }
+}
+
+/// Runs an estimator over samples; the first `estimates` of its names are estimates, the rest
+/// monitors. What ends the run early is told in the course.
+///
+/// # Errors
+/// A checkpoint that cannot be used.
+pub(crate) fn replay(
+    estimator: &mut Estimator,
+    samples: &Samples<'_>,
+    estimates: usize,
+    course: &mut Course,
+    watch: &mut Watch<'_>,
+) -> Result<(), Error> {
+    let rows = samples.time.len();
+    let columns = |count: usize| vec![Vec::with_capacity(rows); count];
+    course.estimates = columns(estimates);
+    course.monitors = columns(estimator.names().len().saturating_sub(estimates));
+    course.deviations = estimator.deviations().map(|d| columns(d.len()));
+    let mut half = Halfway::default();
+    let first = match &mut watch.checkpoint {
+        None => 0,
+        Some(checkpoint) => checkpoint.resume(estimator, samples, course, &mut half)?,
+    };
+    let mut signals = vec![0.0; samples.readings.len() + samples.inputs.len()];
+    for row in first..rows {
+        samples.write_row(row, &mut signals);
+        if let Err(error) = estimator.push(samples.time[row], &signals) {
+            course.ended = Some(error);
+            break;
+        }
+        let (told, monitored) = estimator.estimate().split_at(estimates);
+        add_row(&mut course.estimates, told.iter().copied());
+        add_row(&mut course.monitors, monitored.iter().copied());
+        if let (Some(columns), Some(row)) = (&mut course.deviations, estimator.deviations()) {
+            add_row(columns, row.iter().copied());
+        }
+        if row == rows / 2 {
+            half = Halfway::at(estimator, watch.checkpoint.is_some());
+        }
+        let stopped = (watch.watch)((row + 1) as f64 / rows as f64).is_break();
+        if let Some(checkpoint) = &mut watch.checkpoint
+            && (stopped || checkpoint.is_due())
+        {
+            checkpoint.keep(estimator, course, &half)?;
+        }
+        if stopped {
+            let time = samples.time[row];
+            course.ended = Some(RunError::Cancelled { time });
+            break;
+        }
+    }
+    if !estimator.innovations().is_empty() {
+        course.sensors = estimator.health().sensors.clone();
+        let late = course.sensors.iter().zip(&half.sensors);
+        course.late = late.map(|(all, half)| all.since(half)).collect();
+    }
+    Ok(())
+}
+
+/// Later rows would have to be in a checkpoint, too.
+pub(crate) fn refuse_smoothing(study: &Study) -> Result<(), Error> {
+    match study.estimate.smoothing {
+        None => Ok(()),
+        Some(_) => Err(Error::input(
+            "`smooth` and `lag` of [estimate] look at later rows: such a replay has no checkpoint",
+        )
+        .at(&study.file)
+        .hint("leave --checkpoint out, or smooth in a run of its own")),
+    }
+}

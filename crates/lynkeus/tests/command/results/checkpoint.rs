@@ -1,0 +1,167 @@
+//! A replay that is killed goes on where it was, and gives the same bytes.
+
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::refused;
+use crate::Folder;
+
+const CHECKPOINT: &str = "run.checkpoint";
+const ARGUMENTS: [&str; 7] = [
+    "estimate",
+    "study.toml",
+    "log.csv",
+    "-o",
+    "e.csv",
+    "--checkpoint",
+    CHECKPOINT,
+];
+
+/// The two tanks, so slow that a run takes a second or more.
+fn slow(substeps: usize, changes: &[(&str, &str)]) -> Folder {
+    let folder = Folder::new();
+    folder.change(
+        "study.toml",
+        "substeps = 16",
+        &format!("substeps = {substeps}"),
+    );
+    for (from, to) in changes {
+        folder.change("study.toml", from, to);
+    }
+    folder
+}
+
+fn start(folder: &Folder) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_lynkeus"))
+        .args(ARGUMENTS)
+        .current_dir(&folder.path)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+fn size(folder: &Folder) -> u64 {
+    let path = folder.path.path().join(CHECKPOINT);
+    std::fs::metadata(path).map_or(0, |data| data.len())
+}
+
+/// Starts a run and kills it `later` after its checkpoint has grown; false where it ended first.
+fn killed(folder: &Folder, later: Duration) -> bool {
+    let before = size(folder);
+    let mut child = start(folder);
+    while size(folder) <= before {
+        if child.try_wait().unwrap().is_some() {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(later);
+    child.kill().unwrap();
+    !child.wait().unwrap().success()
+}
+
+/// Kills a run at several moments; what it ends with is what an uninterrupted one gives.
+#[track_caller]
+fn goes_on(folder: &Folder) {
+    let whole = folder.run(&["estimate", "study.toml", "log.csv"]);
+    assert_eq!(whole.code, 0, "{}", whole.err);
+    let moments = [0, 37, 210, 90];
+    let kills = moments
+        .iter()
+        .take_while(|ms| killed(folder, Duration::from_millis(**ms)))
+        .count();
+    assert!(kills >= 2, "too fast to be killed: {kills}");
+    assert!(!folder.files().contains(&"e.csv".to_owned()));
+    // a kill in the middle of a record
+    let torn = [
+        std::fs::read(folder.path.path().join(CHECKPOINT)).unwrap(),
+        vec![9; 21],
+    ]
+    .concat();
+    std::fs::write(folder.path.path().join(CHECKPOINT), torn).unwrap();
+    let ended = folder.run(&ARGUMENTS);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(ended.err.contains("went on after row"), "{}", ended.err);
+    assert!(folder.read("e.csv") == whole.out, "another result");
+    assert!(!folder.files().contains(&CHECKPOINT.to_owned()));
+}
+
+const FILTER: &str =
+    "[process_noise]\npump = 0.001\n[observer]\nfamily = \"mhe\"\nhorizon = 3\n[ignored]";
+
+#[test]
+fn a_killed_replay_of_an_observer_goes_on() {
+    goes_on(&slow(6000, &[]));
+}
+
+#[test]
+fn a_killed_replay_with_standard_deviations_goes_on() {
+    let held = (
+        "between_samples = \"linear\"",
+        "sd = true\nbetween_samples = \"predict\"",
+    );
+    goes_on(&slow(800, &[held]));
+}
+
+#[test]
+fn a_killed_replay_of_a_moving_horizon_goes_on() {
+    let folder = slow(120, &[]);
+    let study = folder.read("study.toml");
+    let from = study.find("[observer]").unwrap();
+    let to = study.find("[simulate]").unwrap();
+    let filter = FILTER.replace("[ignored]", "\n");
+    folder.write(
+        "study.toml",
+        &format!("{}{filter}{}", &study[..from], &study[to..]),
+    );
+    goes_on(&folder);
+}
+
+#[test]
+fn a_checkpoint_of_something_else_is_refused_and_stays() {
+    let folder = slow(6000, &[]);
+    assert!(killed(&folder, Duration::from_millis(300)));
+    let study = folder.read("study.toml");
+    folder.change("study.toml", "theta = 0.03", "theta = 0.04");
+    refused(&folder, &ARGUMENTS, &["run.checkpoint", "of another study"]);
+    folder.write("study.toml", &study);
+    folder.change("log.csv", "4,5.15621265697", "4,5.15621265698");
+    refused(&folder, &ARGUMENTS, &["run.checkpoint", "of another log"]);
+    folder.write(CHECKPOINT, "my notes, which are longer than a head\n");
+    refused(&folder, &ARGUMENTS, &["run.checkpoint", "is no checkpoint"]);
+    folder.write(CHECKPOINT, "notes\n");
+    refused(&folder, &ARGUMENTS, &["run.checkpoint", "is no checkpoint"]);
+    let same = [
+        "estimate",
+        "study.toml",
+        "log.csv",
+        "--checkpoint",
+        "log.csv",
+    ];
+    refused(&folder, &same, &["would replace the log"]);
+}
+
+#[test]
+fn a_smoother_has_no_checkpoint() {
+    let folder = Folder::new();
+    folder.change("study.toml", "[estimate]", "[estimate]\nsmooth = true");
+    refused(&folder, &ARGUMENTS, &["`smooth`", "no checkpoint"]);
+}
+
+/// What a limit of time ends goes on another time.
+#[test]
+fn a_run_that_a_limit_ended_goes_on() {
+    let folder = slow(6000, &[]);
+    let since = Instant::now();
+    let whole = folder.run(&["estimate", "study.toml", "log.csv"]);
+    let limit = format!("{}", 0.6 * since.elapsed().as_secs_f64());
+    let limited = [&ARGUMENTS[..], &["--time-limit", &limit]].concat();
+    let mut rows = vec![];
+    while folder.run(&limited).code == 3 {
+        rows.push(folder.read("e.csv").lines().count());
+        assert!(rows.len() < 100, "{rows:?}");
+    }
+    assert!(rows.windows(2).all(|w| w[0] <= w[1]), "{rows:?}");
+    assert!(folder.read("e.csv") == whole.out);
+}
