@@ -9,8 +9,8 @@
 //! decays, so does the error of any estimator that finds the rest: the plant is detectable
 //! there, for any unknown input (Hautus 1983, *Strong detectability and observers*).
 //!
-//! [`on_the_box`] eliminates δv and proves the decay by intervals, for every pair of solutions in the box;
-//! [`at_a_point`] finds the modes of the linearisation, which hold near that point only.
+//! `on_the_box` eliminates δv and proves the decay by intervals, for every pair of solutions in the box;
+//! `at_a_point` finds the modes of the linearisation, which hold near that point only.
 
 mod at_a_point;
 mod constraints;
