@@ -9,7 +9,7 @@ use std::fmt;
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
-use lynkeus_model::Plant;
+use lynkeus_model::{Diagnostic, Plant};
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Check, Examination, fit_word};
 use lynkeus_structure::{self as structure, Point, counted, determined, uniformity};
@@ -63,6 +63,8 @@ pub struct Report {
     pub uniform: Option<Uniform>,
     /// parameters are unknown constants
     pub parameters: bool,
+    /// what the model says that does not fit together, such as units
+    pub warnings: Vec<Diagnostic>,
     /// what ended the search for the places where states cannot be told apart
     ended: Option<Spent>,
 }
@@ -109,6 +111,7 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         answer,
         uniform: None,
         parameters: options.parameters,
+        warnings: symbolic.warnings.clone(),
         ended: None,
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
@@ -244,6 +247,7 @@ impl Report {
             "measured": self.measured,
             "unknown": self.unknown,
             "recommended": self.recommended,
+            "warnings": self.warnings.iter().map(Diagnostic::one_line).collect::<Vec<_>>(),
             "families": families,
             "visible": visible.collect::<serde_json::Map<_, _>>(),
         });
@@ -316,6 +320,9 @@ impl fmt::Display for Report {
             list(&self.measured),
             list(&self.unknown)
         )?;
+        for warning in &self.warnings {
+            write!(f, "\n{warning}")?;
+        }
         writeln!(f)?;
         observability::print(f, self)?;
         if let Some(uniform) = &self.uniform {

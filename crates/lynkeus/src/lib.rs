@@ -55,6 +55,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod accuracy;
+mod assertions;
 mod calibrate;
 mod certify;
 mod check;

@@ -6,6 +6,7 @@ use lynkeus_observers::{Design, Monitor, Signal};
 use lynkeus_run::Error as RunError;
 
 use crate::accuracy::{self, Accuracy};
+use crate::assertions;
 use crate::course::Course;
 use crate::credible::{self, Doubt};
 use crate::frozen::Frozen;
@@ -258,6 +259,7 @@ impl Raw<'_> {
         let sides = outside::sides(prepared.extended());
         let accuracies = accuracy::accuracies(time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
+        notes.extend(assertions::told(plant, time, &quantities));
         let itself = outside::time_itself(time);
         let all = || quantities.iter().chain([&itself]);
         let plant_outside = outside(time, all(), outside::PLANT, &sides);

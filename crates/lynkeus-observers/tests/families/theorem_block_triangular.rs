@@ -114,7 +114,7 @@ fn an_input_in_m_needs_a_bound_of_its_derivative() {
     assert!(
         hypothesis(&found, "Ṁ M⁻¹")
             .detail
-            .contains("input's derivative")
+            .contains("where M depends on an input no key bounds its derivative")
     );
     let classical = study(&plant, tuning(&[50.0], "classical")).certificate();
     assert_eq!(classical.verdict(), Standing::Proved);

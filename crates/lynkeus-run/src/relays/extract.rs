@@ -44,6 +44,25 @@ pub(crate) fn take(
     if relays.is_empty() {
         return Ok(None);
     }
+    // a kink on a surface that is located is smooth on each side, and no step is rejected for it
+    for node in graph.reachable(roots) {
+        let Some(kink) = kink(graph, node) else {
+            continue;
+        };
+        let quantity = graph.substitute(&[kink.quantity], &replaced)[0];
+        let Some((surface, is_reversed)) = found(graph, &surfaces, quantity) else {
+            continue;
+        };
+        let mode = graph.fresh(graph.render(node, 60)).node();
+        relays.push(Relay {
+            surface,
+            is_reversed,
+            is_sign: false,
+        });
+        modes.push(mode);
+        let branches = graph.substitute(&[kink.above, kink.below], &replaced);
+        replaced.insert(node, graph.select(mode, branches[0], branches[1]));
+    }
     let all: Vec<Node> = inputs.iter().chain(&modes).copied().collect();
     Ok(Some(Taken {
         roots: graph.substitute(roots, &replaced),
@@ -70,18 +89,48 @@ fn quantity(graph: &Graph, node: Node) -> Option<(Node, bool)> {
     }
 }
 
-/// The place of a surface, and whether it stands there with the other sign.
+/// An operation that is one expression where a quantity is positive and another one where it is
+/// negative.
+struct Kink {
+    quantity: Node,
+    above: Node,
+    below: Node,
+}
+
+fn kink(graph: &Graph, node: Node) -> Option<Kink> {
+    let between = |a: Node, b: Node, above: Node, below: Node| Kink {
+        quantity: graph.binary(Binary::Sub, a, b),
+        above,
+        below,
+    };
+    match graph.op(node) {
+        Op::Unary(Unary::Abs, a) => Some(Kink {
+            quantity: a,
+            above: a,
+            below: graph.unary(Unary::Neg, a),
+        }),
+        Op::Binary(Binary::Max, a, b) => Some(between(a, b, a, b)),
+        Op::Binary(Binary::Min, a, b) => Some(between(a, b, b, a)),
+        _ => None,
+    }
+}
+
+/// The place of a surface, and whether it stands there with the other sign; a new one where it
+/// is none yet.
 fn place(graph: &Graph, surfaces: &mut Vec<Node>, quantity: Node) -> (usize, bool) {
+    found(graph, surfaces, quantity).unwrap_or_else(|| {
+        surfaces.push(quantity);
+        (surfaces.len() - 1, false)
+    })
+}
+
+fn found(graph: &Graph, surfaces: &[Node], quantity: Node) -> Option<(usize, bool)> {
     let opposite = match graph.op(quantity) {
         Op::Unary(Unary::Neg, a) => a,
         Op::Binary(Binary::Sub, a, b) => graph.binary(Binary::Sub, b, a),
         _ => graph.unary(Unary::Neg, quantity),
     };
-    for (sought, is_reversed) in [(quantity, false), (opposite, true)] {
-        if let Some(surface) = surfaces.iter().position(|&known| known == sought) {
-            return (surface, is_reversed);
-        }
-    }
-    surfaces.push(quantity);
-    (surfaces.len() - 1, false)
+    let known = |sought: Node| surfaces.iter().position(|&known| known == sought);
+    let same = known(quantity).map(|surface| (surface, false));
+    same.or_else(|| known(opposite).map(|surface| (surface, true)))
 }

@@ -21,6 +21,9 @@ use crate::{Dynamics, Error};
 /// A surface counts as reached this close to it, against the largest value of its function.
 const REACHED: f64 = 1e-10;
 
+/// A margin this small beside those at the ends of a step may be negative where a cubic is not.
+const CLOSE: f64 = 0.05;
+
 /// A surface passed so often in a run is named where the steps run out.
 const OFTEN: usize = 1000;
 
@@ -186,8 +189,7 @@ impl<'a, D: Dynamics> Switched<'a, D> {
     }
 
     /// Where between two points the margin of a surface may be negative although it is not at
-    /// either: the part of the way to the least value of the cubic through both with their
-    /// speeds.
+    /// either.
     pub fn dip(&mut self, from: (f64, &[f64]), to: (f64, &[f64])) -> Option<f64> {
         let [(before, falls), (after, rises)] = [from, to].map(|(t, x)| {
             let mut dx = vec![0.0; x.len()];
@@ -202,13 +204,8 @@ impl<'a, D: Dynamics> Switched<'a, D> {
             let side = self.at.sides[i];
             let (a, b) = (side * before[i], side * after[i]);
             let (p, q) = (side * falls[i] * step, side * rises[i] * step);
-            let value = |s: f64| {
-                let r = 1.0 - s;
-                r * r * ((1.0 + 2.0 * s) * a + s * p) + s * s * ((3.0 - 2.0 * s) * b - r * q)
-            };
-            let parts = (1..16).map(|k| f64::from(k) / 16.0);
-            let least = parts.min_by(|x, y| value(*x).total_cmp(&value(*y)))?;
-            (p < 0.0 && q > 0.0 && value(least) < 0.0).then_some(least)
+            let dips = p < 0.0 && q > 0.0;
+            dips.then(|| least_of_cubic([a, p], [b, q])).flatten()
         });
         lowest.reduce(f64::min)
     }
@@ -266,6 +263,18 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         let name = self.inner.surface_names().into_iter().nth(i)?;
         (*count >= OFTEN).then(|| format!("{name} was passed {count} times; "))
     }
+}
+
+/// The part of the way at which the cubic through two values with their slopes is least, where it
+/// is negative there, or so close to it that only a look tells.
+fn least_of_cubic([a, p]: [f64; 2], [b, q]: [f64; 2]) -> Option<f64> {
+    let third = 2.0 * (a - b) + p + q;
+    let second = 3.0 * (b - a) - 2.0 * p - q;
+    // of the two roots of 3·third·s² + 2·second·s + p the one that is a minimum
+    let root = (second * second - 3.0 * third * p).max(0.0).sqrt();
+    let least = -p / (second + root);
+    let value = a + least * (p + least * (second + least * third));
+    (least > 0.0 && least < 1.0 && value < CLOSE * (a + b)).then_some(least)
 }
 
 impl<D: Dynamics> Drop for Switched<'_, D> {

@@ -298,3 +298,25 @@ fn the_picture_says_how_sure_and_what_later_rows_say() {
     let sure = picture();
     assert!(sure.contains("± 2 sd") && sure.contains("smoothed") && sure.contains("<polygon"));
 }
+
+/// An assertion of the model is followed along the run, and its warnings are told.
+#[test]
+fn assertions_are_followed() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model M Real x(start = 0, min = -9, max = 9, unit = \"m\"); input Real u(unit = \"s\"); output Real y = x;\n\
+         equation der(x) = u; assert(x < 2.5, \"too far\"); assert(x > -1, \"never\"); end M;",
+    );
+    folder.write(
+        "s.toml",
+        "plant = \"m.mo\"\n[observer]\nfamily = \"triangular\"\ntheta = 2\n[simulate]\nuntil = 4\noutput_step = 0.5\ninputs = { u = 1 }\n",
+    );
+    let ended = folder.run(&["simulate", "s.toml", "-o", "o.csv"]);
+    let told = "the plant breaks the assertion on line 2 of the model (\"too far\") at 4 of 9 rows, first at t = 2.5";
+    assert!(ended.err.contains(told), "{}", ended.err);
+    assert!(!ended.err.contains("never"), "{}", ended.err);
+    assert!(ended.err.contains("m.mo:2:"), "{}", ended.err);
+    let report = folder.run(&["check", "s.toml"]);
+    assert!(report.out.contains("warning"), "{}", report.out);
+}
