@@ -17,18 +17,33 @@ const ARGUMENTS: [&str; 7] = [
     CHECKPOINT,
 ];
 
-/// The two tanks, so slow that a run takes a second or more.
-fn slow(substeps: usize, changes: &[(&str, &str)]) -> Folder {
+/// Long enough to be killed a few times, whatever else the machine does.
+const LONG: Duration = Duration::from_secs(3);
+
+/// The two tanks with so many substeps that a run takes long, and what it gives in the end.
+struct Slow {
+    folder: Folder,
+    whole: String,
+}
+
+fn slow(prepare: impl Fn(&Folder)) -> Slow {
     let folder = Folder::new();
-    folder.change(
-        "study.toml",
-        "substeps = 16",
-        &format!("substeps = {substeps}"),
-    );
-    for (from, to) in changes {
-        folder.change("study.toml", from, to);
+    prepare(&folder);
+    let mut substeps = 16;
+    loop {
+        let since = Instant::now();
+        let whole = folder.run(&["estimate", "study.toml", "log.csv"]);
+        assert_eq!(whole.code, 0, "{}", whole.err);
+        if since.elapsed() > LONG {
+            let whole = whole.out;
+            return Slow { folder, whole };
+        }
+        let factor = (1.5 * LONG.as_secs_f64() / since.elapsed().as_secs_f64()).clamp(2.0, 50.0);
+        let more = (f64::from(substeps) * factor) as u32;
+        let [from, to] = [substeps, more].map(|count| format!("substeps = {count} "));
+        folder.change("study.toml", &from, &to);
+        substeps = more;
     }
-    folder
 }
 
 fn start(folder: &Folder) -> Child {
@@ -63,15 +78,13 @@ fn killed(folder: &Folder, later: Duration) -> bool {
 
 /// Kills a run at several moments; what it ends with is what an uninterrupted one gives.
 #[track_caller]
-fn goes_on(folder: &Folder) {
-    let whole = folder.run(&["estimate", "study.toml", "log.csv"]);
-    assert_eq!(whole.code, 0, "{}", whole.err);
-    let moments = [0, 37, 210, 90];
-    let kills = moments
-        .iter()
-        .take_while(|ms| killed(folder, Duration::from_millis(**ms)))
-        .count();
-    assert!(kills >= 2, "too fast to be killed: {kills}");
+fn goes_on(Slow { folder, whole }: &Slow) {
+    for later in [0, 37, 210, 90] {
+        assert!(
+            killed(folder, Duration::from_millis(later)),
+            "too fast to be killed after {later} ms"
+        );
+    }
     assert!(!folder.files().contains(&"e.csv".to_owned()));
     // a kill in the middle of a record
     let torn = [
@@ -83,7 +96,7 @@ fn goes_on(folder: &Folder) {
     let ended = folder.run(&ARGUMENTS);
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert!(ended.err.contains("went on after row"), "{}", ended.err);
-    assert!(folder.read("e.csv") == whole.out, "another result");
+    assert!(folder.read("e.csv") == *whole, "another result");
     assert!(!folder.files().contains(&CHECKPOINT.to_owned()));
 }
 
@@ -92,7 +105,7 @@ const FILTER: &str =
 
 #[test]
 fn a_killed_replay_of_an_observer_goes_on() {
-    goes_on(&slow(6000, &[]));
+    goes_on(&slow(|_| ()));
 }
 
 #[test]
@@ -101,26 +114,26 @@ fn a_killed_replay_with_standard_deviations_goes_on() {
         "between_samples = \"linear\"",
         "sd = true\nbetween_samples = \"predict\"",
     );
-    goes_on(&slow(800, &[held]));
+    goes_on(&slow(|folder| folder.change("study.toml", held.0, held.1)));
 }
 
 #[test]
 fn a_killed_replay_of_a_moving_horizon_goes_on() {
-    let folder = slow(120, &[]);
-    let study = folder.read("study.toml");
-    let from = study.find("[observer]").unwrap();
-    let to = study.find("[simulate]").unwrap();
-    let filter = FILTER.replace("[ignored]", "\n");
-    folder.write(
-        "study.toml",
-        &format!("{}{filter}{}", &study[..from], &study[to..]),
-    );
-    goes_on(&folder);
+    goes_on(&slow(|folder| {
+        let study = folder.read("study.toml");
+        let from = study.find("[observer]").unwrap();
+        let to = study.find("[simulate]").unwrap();
+        let filter = FILTER.replace("[ignored]", "\n");
+        folder.write(
+            "study.toml",
+            &format!("{}{filter}{}", &study[..from], &study[to..]),
+        );
+    }));
 }
 
 #[test]
 fn a_checkpoint_of_something_else_is_refused_and_stays() {
-    let folder = slow(6000, &[]);
+    let Slow { folder, .. } = slow(|_| ());
     assert!(killed(&folder, Duration::from_millis(300)));
     let study = folder.read("study.toml");
     folder.change("study.toml", "theta = 0.03", "theta = 0.04");
@@ -152,9 +165,9 @@ fn a_smoother_has_no_checkpoint() {
 /// What a limit of time ends goes on another time.
 #[test]
 fn a_run_that_a_limit_ended_goes_on() {
-    let folder = slow(6000, &[]);
+    let Slow { folder, whole } = slow(|_| ());
     let since = Instant::now();
-    let whole = folder.run(&["estimate", "study.toml", "log.csv"]);
+    folder.run(&["estimate", "study.toml", "log.csv"]);
     let limit = format!("{}", 0.6 * since.elapsed().as_secs_f64());
     let limited = [&ARGUMENTS[..], &["--time-limit", &limit]].concat();
     let mut rows = vec![];
@@ -163,5 +176,5 @@ fn a_run_that_a_limit_ended_goes_on() {
         assert!(rows.len() < 100, "{rows:?}");
     }
     assert!(rows.windows(2).all(|w| w[0] <= w[1]), "{rows:?}");
-    assert!(folder.read("e.csv") == whole.out);
+    assert!(folder.read("e.csv") == whole);
 }
