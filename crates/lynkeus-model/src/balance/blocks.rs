@@ -101,12 +101,16 @@ impl<'a> Solver<'a> {
             .iter()
             .map(|&(equation, unknown)| (&equations[equation], &unknowns[unknown]))
             .collect();
-        let core = self.core(&pairs)?;
+        let rows = self.rows(&pairs)?;
+        // what is not linear stays so whatever is taken out
+        if rows.iter().any(|row| !row.nonlinear.is_empty()) {
+            return self.implicit(block);
+        }
+        let span = pairs.first().map(|(equation, _)| equation.span);
+        let graph = self.system.graph;
+        let core = eliminate::core(graph, &self.budget, span.unwrap_or_default(), rows)?;
         if let Some((place, _)) = core.rows.iter().find(|(_, row)| row.len() == 0) {
             return Err(dependent(self.source, &pairs, *place));
-        }
-        if core.rows.iter().any(|(_, row)| !row.nonlinear.is_empty()) {
-            return self.implicit(block);
         }
         if core.columns.len() > MAX_COUPLED {
             return Err(too_many_coupled(&pairs, core.columns.len()));
@@ -153,7 +157,7 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn core(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Core> {
+    fn rows(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Vec<Row>> {
         let graph = self.system.graph;
         let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
         let rows = Rows {
@@ -167,9 +171,7 @@ impl<'a> Solver<'a> {
             let residual = graph.binary(Binary::Sub, equation.left, equation.right);
             rows.row(residual, equation.span)
         };
-        let found: Vec<Row> = pairs.iter().map(row).collect::<Result<_>>()?;
-        let span = pairs.first().map(|(equation, _)| equation.span);
-        eliminate::core(graph, &self.budget, span.unwrap_or_default(), found)
+        pairs.iter().map(row).collect()
     }
 
     fn linear_core(&mut self, core: &Core) -> Vec<Node> {
