@@ -195,21 +195,20 @@ impl<'a> Solver<'a> {
 
     /// The unknowns that were taken out, each behind those it needs.
     fn taken_out(&mut self, pairs: &[(&FlatEquation, &Unknown)], given: &[Given]) {
-        let graph = self.system.graph;
-        let of_symbol: HashMap<Node, usize> = given
+        let of_column: HashMap<usize, usize> = given
             .iter()
             .enumerate()
-            .map(|(place, g)| (pairs[g.column].1.symbol, place))
+            .map(|(place, g)| (g.column, place))
             .collect();
         let values: Vec<Node> = given
             .iter()
             .map(|given| self.value_of(pairs, given))
             .collect();
         let needs = |place: usize| -> Vec<usize> {
-            let symbols = graph.symbols_of(&values[place..=place]);
-            symbols
-                .iter()
-                .filter_map(|symbol| of_symbol.get(symbol).copied())
+            let Given { column, row, .. } = &given[place];
+            let others = row.coefficients.keys().filter(|&other| other != column);
+            others
+                .filter_map(|other| of_column.get(other).copied())
                 .collect()
         };
         let mut done = vec![false; given.len()];
