@@ -84,6 +84,13 @@ impl Rig {
         })
     }
 
+    /// Whether the runs of different seeds differ at all.
+    pub fn is_random(&self) -> bool {
+        let noise = &self.simulation.noise;
+        let is_noisy = noise.levels.values().any(|level| level.size() > 0.0);
+        is_noisy || noise.process.values().any(|q| *q > 0.0) || self.spread.is_random()
+    }
+
     /// The run of a seed: its noise, its start and its parameters. `prepared` is the study's.
     ///
     /// # Errors

@@ -50,6 +50,13 @@ impl Spread {
         Ok(found)
     }
 
+    /// Whether anything is drawn that is not zero.
+    pub fn is_random(&self) -> bool {
+        let parameters = self.parameters.iter().map(|p| p.deviation);
+        let mut all = self.starts.iter().map(|s| s.1).chain(parameters);
+        all.any(|deviation| deviation > 0.0)
+    }
+
     /// The plant of the run of a seed; `nominal` is the study's.
     ///
     /// # Errors

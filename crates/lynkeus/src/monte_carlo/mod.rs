@@ -290,6 +290,9 @@ fn gathered(
     let quantities = quantities.collect();
     let mut notes = rig.design.notes.clone();
     notes.append(&mut headers.notes);
+    if !rig.is_random() {
+        notes.push("nothing differs from run to run: `noise` of [sensors], [process_noise] and `spread` of [simulate] draw by the seed".to_owned());
+    }
     let done = seeds.len() + failures.len();
     notes.extend(ended.map(|spent| format!("{done} of {asked} runs: {spent}")));
     Ok(MonteCarlo {

@@ -135,6 +135,10 @@ fn an_unknown_name_a_negative_deviation_and_too_many_runs_are_refused() {
     );
     let one = study(&folder, "", "");
     assert!(runs(&one, 0).is_err());
+    let told = |study: &Study| runs(study, 2).unwrap().notes.join("\n");
+    assert!(told(&one).contains("nothing differs from run to run"));
+    let spread = self::study(&folder, "", "spread = { x = 0.1 }");
+    assert!(!told(&spread).contains("nothing differs"));
     let limited = Study {
         budget: lynkeus_expr::Budget::new(
             None,

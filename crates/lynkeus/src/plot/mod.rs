@@ -76,7 +76,7 @@ impl Extent {
     pub fn label(self) -> &'static str {
         match self {
             Self::TwoDeviations => "± 2 sd",
-            Self::Quantiles => "5–95 % of the runs",
+            Self::Quantiles => "5–95 %",
         }
     }
 }

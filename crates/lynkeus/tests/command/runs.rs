@@ -356,7 +356,7 @@ fn many_runs_give_bands() {
     // the start that is spread; the observer's is not
     assert!(rows[0][3] - rows[0][2] > 0.1, "{:?}", rows[0]);
     let svg = folder.read("b.svg");
-    for word in ["error of pump", "5–95 % of the runs", "worst run", "mean"] {
+    for word in ["error of pump", "5–95 %", "worst run", "mean"] {
         assert!(svg.contains(word), "{word}");
     }
     let pump = &found["quantities"]["pump"]["rms_last_half"];
