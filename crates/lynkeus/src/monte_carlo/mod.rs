@@ -10,6 +10,7 @@ mod report;
 mod statistics;
 
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 
 use lynkeus_expr::Spent;
 use lynkeus_model::{Plant, Variable};
@@ -109,7 +110,6 @@ struct Series {
 #[derive(Debug)]
 struct Single {
     seed: u64,
-    time: Vec<f64>,
     /// by quantity; none where a limit ended the run
     result: Result<Option<Vec<Series>>, Error>,
 }
@@ -149,17 +149,23 @@ pub fn monte_carlo(
     room(study, &rig, runs, followed.len())?;
     let seeds: Vec<u64> = (settings.seed..=last).collect();
     // what the design made comes with every clone of the plant
-    let shared = (plant.clone(), rig.clone(), followed.clone());
+    let shared = (plant.clone(), rig.clone());
+    let job = Job {
+        study,
+        followed: &followed,
+        time: OnceLock::new(),
+    };
     let singles = crew::every(
         runs,
         &shared,
-        &|(plant, rig, followed), k, watch| {
+        &|(plant, rig), k, watch| {
             let seed = seeds.get(k).copied().unwrap_or(settings.seed);
-            Ok(single(study, plant, rig, followed, seed, watch))
+            Ok(job.single(plant, rig, seed, watch))
         },
         watch,
     )?;
-    gathered(&prepared, &rig, &followed, singles)
+    let time = job.time.into_inner().unwrap_or_default();
+    gathered(&prepared, &rig, &followed, singles, time)
 }
 
 /// Estimates whose truth a run has.
@@ -176,7 +182,9 @@ fn followed(plant: &Plant, rig: &Rig) -> Vec<Followed> {
 fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), Error> {
     let run = &rig.simulation;
     let rows = ((run.until - run.start) / run.output_step).ceil() + 1.0;
-    let bytes = runs as f64 * rows * quantities as f64 * size_of::<[f64; 2]>() as f64;
+    let of_run = rows * quantities as f64 * size_of::<[f64; 2]>() as f64;
+    // a run is counted, and watched, whatever it gives
+    let bytes = runs as f64 * (of_run + 2.0 * size_of::<Single>() as f64);
     let room = study.budget.room().unwrap_or(usize::MAX);
     if bytes <= room as f64 {
         return Ok(());
@@ -192,42 +200,50 @@ fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), 
         .hint("a longer `output_step` of [simulate], fewer runs, or a greater limit of memory"))
 }
 
-fn single(
-    study: &Study,
-    plant: &Plant,
-    rig: &Rig,
-    followed: &[Followed],
-    seed: u64,
-    watch: &mut Watch<'_>,
-) -> Single {
-    let mut single = Single {
-        seed,
-        time: vec![],
-        result: Ok(None),
-    };
-    if study.budget.spent().is_some() {
-        return single;
+/// What all runs share.
+struct Job<'a> {
+    study: &'a Study,
+    followed: &'a [Followed],
+    /// the rows of every run that reaches its end
+    time: OnceLock<Vec<f64>>,
+}
+
+impl Job<'_> {
+    fn single(&self, plant: &Plant, rig: &Rig, seed: u64, watch: &mut Watch<'_>) -> Single {
+        let result = self.run(plant, rig, seed, watch);
+        Single { seed, result }
     }
-    let ran = Prepared::new(study, plant).and_then(|own| rig.run(&own, seed, watch));
-    match ran {
-        // a run that was ended says nothing of the study
-        Err(_) if study.budget.marked().is_some() => {}
-        Err(error) => single.result = Err(error),
-        Ok(mut ran) => {
-            let is_whole = ran.run.times().last() == Some(&rig.simulation.until);
-            if let Some(ended) = ran.course.ended {
-                single.result = Err(Error::refused(ended.to_string()).at(&study.file));
-            } else if is_whole {
-                let series = followed.iter().map(|f| Series {
-                    truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
-                    estimate: std::mem::take(&mut ran.course.estimates[f.estimate]),
-                });
-                single.result = Ok(Some(series.collect()));
-                single.time = ran.run.times().to_vec();
-            }
+
+    fn run(
+        &self,
+        plant: &Plant,
+        rig: &Rig,
+        seed: u64,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Vec<Series>>, Error> {
+        let study = self.study;
+        if study.budget.spent().is_some() {
+            return Ok(None);
         }
+        let ran = Prepared::new(study, plant).and_then(|own| rig.run(&own, seed, watch));
+        let mut ran = match ran {
+            // a run that was ended says nothing of the study
+            Err(_) if study.budget.marked().is_some() => return Ok(None),
+            ran => ran?,
+        };
+        if let Some(ended) = ran.course.ended {
+            return Err(Error::refused(ended.to_string()).at(&study.file));
+        }
+        if ran.run.times().last() != Some(&rig.simulation.until) {
+            return Ok(None);
+        }
+        self.time.get_or_init(|| ran.run.times().to_vec());
+        let series = self.followed.iter().map(|f| Series {
+            truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
+            estimate: std::mem::take(&mut ran.course.estimates[f.estimate]),
+        });
+        Ok(Some(series.collect()))
     }
-    single
 }
 
 /// All runs together.
@@ -236,18 +252,18 @@ fn gathered(
     rig: &Rig,
     followed: &[Followed],
     singles: Vec<Single>,
+    time: Vec<f64>,
 ) -> Result<MonteCarlo, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let asked = singles.len();
     let (mut seeds, mut runs, mut failures) = (vec![], vec![], vec![]);
-    let (mut time, mut first) = (vec![], None);
+    let mut first = None;
     for single in singles {
         match single.result {
             Ok(None) => {}
             Ok(Some(series)) => {
                 seeds.push(single.seed);
                 runs.push(series);
-                time = single.time;
             }
             Err(error) => {
                 failures.push(Failure {

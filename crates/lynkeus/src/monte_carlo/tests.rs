@@ -149,7 +149,7 @@ fn an_unknown_name_a_negative_deviation_and_too_many_runs_are_refused() {
         ),
         ..one
     };
-    // 41 rows of 16 bytes: 1598 runs have room
+    // 41 rows of 16 bytes in each
     assert!(runs(&limited, 3).is_ok());
     let text = runs(&limited, 1599).unwrap_err().to_string();
     assert!(
