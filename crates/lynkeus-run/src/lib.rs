@@ -119,7 +119,7 @@ pub use estimate::{Estimates, Log, estimate, estimate_watched};
 pub use estimator::{BetweenSamples, Estimator, EstimatorSettings};
 pub use integrator::{Integrator, StepAdvice};
 pub use method::{Method, Step, Tolerances};
-pub use noise::{Level, Noise};
+pub use noise::{Level, Noise, deviate};
 pub use rk4::Rk4;
 pub use routine::Backend;
 pub use sampled::SampledObserver;

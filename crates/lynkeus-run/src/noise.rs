@@ -92,6 +92,13 @@ fn stream(seed: u64, name: &str) -> ChaCha8Rng {
     stream
 }
 
+/// The standard normal deviate that a start or a parameter of this name has in the run of a seed,
+/// from a stream of its own: that of the name with `±` before it (as in [`Noise`]).
+#[must_use]
+pub fn deviate(seed: u64, name: &str) -> f64 {
+    StandardNormal.sample(&mut stream(seed, &format!("±{name}")))
+}
+
 impl Sensors {
     /// For a plant with these outputs and states, sampled every `step`.
     pub(crate) fn new(
@@ -261,6 +268,27 @@ mod tests {
         assert_eq!(draws(7, &["a"], 0, 50), draws(7, &["b", "a"], 1, 50));
         assert_ne!(draws(7, &["a"], 0, 50), draws(7, &["b", "a"], 0, 50));
         assert_ne!(draws(7, &["a"], 0, 50), draws(8, &["a"], 0, 50));
+    }
+
+    /// One draw per seed: mean 0, variance 1, and nothing in common with another name or the
+    /// noise of a sensor that is called so.
+    #[test]
+    fn deviates_of_names_are_normal_and_independent() {
+        let n = 20_000;
+        let of = |name: &str| -> Vec<f64> { (0..n).map(|seed| deviate(seed, name)).collect() };
+        let mean = |z: &mut dyn Iterator<Item = f64>| z.sum::<f64>() / n as f64;
+        let (a, b) = (of("a"), of("b"));
+        let noise: Vec<f64> = (0..n)
+            .map(|s| draws(s, &["a"], 0, 1)[0] / 2.0 - 5.0)
+            .collect();
+        let four = 4.0 / (n as f64).sqrt();
+        assert!(mean(&mut a.iter().copied()).abs() < four);
+        let variance = mean(&mut a.iter().map(|z| z * z));
+        assert!((variance - 1.0).abs() < four * 2.0_f64.sqrt(), "{variance}");
+        for other in [&b, &noise] {
+            let common = mean(&mut a.iter().zip(other).map(|(a, b)| a * b));
+            assert!(common.abs() < four, "{common}");
+        }
     }
 
     #[test]

@@ -1,11 +1,11 @@
 //! The picture of an outcome.
 
-use crate::plot::{Band, Curve, Figure, Kind, Panel, Span};
+use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use crate::study::Name;
 use crate::{Error, Outcome, Quantity};
 
 /// Panels drawn where the study does not say which.
-const PANELS: usize = 6;
+pub(crate) const PANELS: usize = 6;
 
 /// The picture: the quantities of `show`, else unknown inputs and hidden states
 /// first, then what is measured, six at most; then the monitors.
@@ -101,7 +101,7 @@ fn interesting(outcome: &Outcome) -> Vec<&Quantity> {
 }
 
 /// At most `count` of them, evenly spread: of a long chain the ends and the middle.
-fn spread<T: Copy>(all: Vec<T>, count: usize) -> Vec<T> {
+pub(crate) fn spread<T: Copy>(all: Vec<T>, count: usize) -> Vec<T> {
     if all.len() <= count || count < 2 {
         return all.into_iter().take(count).collect();
     }
@@ -152,6 +152,7 @@ fn band(outcome: &Outcome, quantity: &Quantity) -> Option<Band> {
         pairs.map(|(x, sd)| x + side * DEVIATIONS * sd).collect()
     };
     Some(Band {
+        extent: Extent::TwoDeviations,
         time: outcome.time.clone(),
         low: edge(-1.0),
         high: edge(1.0),

@@ -56,12 +56,17 @@ impl Quantity {
     /// √(mean (estimate − truth)²) over the last half of the rows.
     pub fn settled_error(&self) -> Option<f64> {
         let (truth, estimate) = (self.truth.as_ref()?, self.estimate.as_ref()?);
-        let half = truth.len() / 2;
-        let pairs = truth.iter().zip(estimate).skip(half);
-        let squares: Vec<f64> = pairs.map(|(x, hat)| (hat - x).powi(2)).collect();
-        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-        Some(mean.sqrt())
+        Some(settled_error(truth, estimate))
     }
+}
+
+/// √(mean (estimate − truth)²) over the last half of the rows.
+pub(crate) fn settled_error(truth: &[f64], estimate: &[f64]) -> f64 {
+    let half = truth.len() / 2;
+    let pairs = truth.iter().zip(estimate).skip(half);
+    let squares: Vec<f64> = pairs.map(|(x, hat)| (hat - x).powi(2)).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    mean.sqrt()
 }
 
 /// The trust in an estimate over time, and whether it was ever lost.

@@ -12,6 +12,7 @@ use crate::course::{Course, Samples};
 use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
+use crate::spread::Spread;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
 use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare};
@@ -36,23 +37,84 @@ pub(crate) fn simulated(
     prepared: &Prepared<'_>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
-    let settings = settings(study)?;
-    let design = prepared.design()?;
-    if design.observer.filter.is_some() {
-        return sampled(prepared, design, settings, watch);
+    let rig = Rig::new(prepared)?;
+    let Ran { run, course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
+    Ok(outcome(prepared, rig.design, &run, course))
+}
+
+/// A study's plant with its observer, ready for the run of any seed.
+#[derive(Clone, Debug)]
+pub(crate) struct Rig {
+    pub design: Design,
+    /// a filter works on what the plant's sensors show, and is not in it
+    pub simulation: Simulation,
+    spread: Spread,
+}
+
+/// One run of a [`Rig`].
+#[derive(Debug)]
+pub(crate) struct Ran {
+    /// the plant
+    pub run: Trajectory,
+    /// the estimates, row by row of the run
+    pub course: Course,
+}
+
+impl Rig {
+    /// Designs the observer of a study.
+    ///
+    /// # Errors
+    /// A study that cannot be run.
+    pub fn new(prepared: &Prepared<'_>) -> Result<Self, Error> {
+        let (study, plant) = (prepared.study(), prepared.plant());
+        let settings = settings(study)?;
+        let design = prepared.design()?;
+        let mut simulation = open_loop(study, settings, plant)?;
+        let observer = &design.observer;
+        if observer.filter.is_some() {
+            simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
+        } else {
+            simulation.observer = Some(systems::observer(plant, observer)?);
+            simulation.inputs = systems::inputs(study, plant, settings, observer)?;
+        }
+        Ok(Self {
+            spread: Spread::new(plant, settings)?,
+            simulation,
+            design,
+        })
     }
-    let simulation = Simulation {
-        observer: Some(systems::observer(plant, &design.observer)?),
-        inputs: systems::inputs(study, plant, settings, &design.observer)?,
-        ..open_loop(study, settings, plant)?
-    };
-    let (run, ended) = rows(simulation.run_watched(&mut within(&study.budget, watch)));
-    let reported = Reported::new(&design.observer, &run);
-    let mut course = Course::of_run(&design.observer, &reported);
-    course.ended = ended;
-    settle(&mut course, run.times().len(), study, &study.file)?;
-    Ok(outcome(prepared, design, &run, course))
+
+    /// Whether the runs of different seeds differ at all.
+    pub fn is_random(&self) -> bool {
+        let noise = &self.simulation.noise;
+        let is_noisy = noise.levels.values().any(|level| level.size() > 0.0);
+        is_noisy || noise.process.values().any(|q| *q > 0.0) || self.spread.is_random()
+    }
+
+    /// The run of a seed: its noise, its start and its parameters. `prepared` is the study's.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn run(
+        &self,
+        prepared: &Prepared<'_>,
+        seed: u64,
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Ran, Error> {
+        let study = prepared.study();
+        let mut simulation = self.simulation.clone();
+        simulation.noise.seed = seed;
+        simulation.plant = self.spread.drawn(study, &simulation.plant, seed)?;
+        if self.design.observer.filter.is_some() {
+            return sampled(prepared, &self.design, &simulation, watch);
+        }
+        let (run, ended) = rows(simulation.run_watched(&mut within(&study.budget, watch)));
+        let observer = &self.design.observer;
+        let mut course = Course::of_run(observer, &Reported::new(observer, &run));
+        course.ended = ended;
+        settle(&mut course, run.times().len(), study, &study.file)?;
+        Ok(Ran { run, course })
+    }
 }
 
 /// The rows of a run, and why it ended early.
@@ -66,13 +128,11 @@ fn rows(run: Result<Trajectory, Box<Interrupted>>) -> (Trajectory, Option<lynkeu
 /// The plant alone, then a filter on what its sensors show: every row is a sample.
 fn sampled(
     prepared: &Prepared<'_>,
-    design: Design,
-    settings: &SimulateSettings,
+    design: &Design,
+    simulation: &Simulation,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Outcome, Error> {
+) -> Result<Ran, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
-    let mut simulation = open_loop(study, settings, plant)?;
-    simulation.output_step = settings.sample_step.unwrap_or(simulation.output_step);
     let watch = &mut within(&study.budget, watch);
     let run = simulation
         .run_watched(&mut |done| watch(0.5 * done))
@@ -92,13 +152,13 @@ fn sampled(
             .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
             .collect(),
     };
-    let course = estimate::course(prepared, &design, &samples, &mut |done| {
+    let course = estimate::course(prepared, design, &samples, &mut |done| {
         watch(0.5 + 0.5 * done)
     })?;
     if let Some(error) = course.ended {
         return Err(interrupted(error, &study.file));
     }
-    Ok(outcome(prepared, design, &run, course))
+    Ok(Ran { run, course })
 }
 
 /// A watch that also ends a run whose budget is spent.

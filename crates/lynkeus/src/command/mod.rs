@@ -4,6 +4,7 @@ mod files;
 mod how_well;
 mod inputs;
 mod limits;
+mod monte_carlo;
 mod output;
 mod progress;
 mod run;
@@ -65,6 +66,7 @@ Examples:
   lynkeus design study.toml
   lynkeus certify study.toml
   lynkeus simulate study.toml -o run.csv --plot run.svg
+  lynkeus simulate study.toml --runs 1000 --plot spread.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
 
@@ -125,7 +127,7 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
-    /// Run the plant and its observer together, with noise
+    /// Run the plant and its observer together, with noise; many times with --runs
     Simulate {
         /// The study (TOML; "-": standard input)
         study: PathBuf,
@@ -137,6 +139,9 @@ enum Command {
         /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
         #[arg(long, value_name = "FILE.csv")]
         log: Option<PathBuf>,
+        /// Run it N times with the seeds S, S+1, … (S: the study's, or --seed), on all processors: means, quantiles and the worst. Run k is what --seed S+k gives alone; `spread` of [simulate] moves starts and parameters
+        #[arg(long, value_name = "N", conflicts_with = "log", value_parser = runs)]
+        runs: Option<usize>,
         #[command(flatten)]
         limits: Limits,
     },
@@ -273,13 +278,17 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             output,
             seed,
             log,
+            runs,
             limits,
         } => {
             let mut source = Source::load(&study)?.within(limits.budget());
             if let (Some(seed), Some(settings)) = (seed, &mut source.study.simulate) {
                 settings.seed = seed;
             }
-            run::simulate(&source, &output, log.as_deref())
+            match runs {
+                Some(runs) => monte_carlo::monte_carlo(&source, &output, runs),
+                None => run::simulate(&source, &output, log.as_deref()),
+            }
         }
         Command::Estimate {
             study,
@@ -318,4 +327,10 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             Ok(ExitCode::SUCCESS)
         }
     }
+}
+
+/// A number of runs.
+fn runs(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| *count > 0);
+    count.ok_or_else(|| "expected a whole number, 1 or above".to_owned())
 }

@@ -5,7 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::band::{band_style, mark_style};
 use super::render::{Area, Drawn, FONT, INK, LEFT, ORANGE, RIGHT, WIDTH, stroke};
-use super::{Figure, Kind};
+use super::{Extent, Figure, Kind};
 
 /// More entries than this take a line of their own.
 const BESIDE_TITLE: usize = 4;
@@ -15,7 +15,7 @@ const BESIDE_TITLE: usize = 4;
 pub(super) enum Entry {
     Curve(Kind),
     /// two standard deviations to either side
-    Band,
+    Band(Extent),
     /// an estimate outside of its declared range
     Outside,
 }
@@ -24,7 +24,7 @@ impl Entry {
     fn label(self) -> &'static str {
         match self {
             Self::Curve(kind) => kind.label(),
-            Self::Band => "± 2 sd",
+            Self::Band(extent) => extent.label(),
             Self::Outside => "outside its range",
         }
     }
@@ -33,8 +33,11 @@ impl Entry {
 /// What occurs in a figure, in the order of the legend.
 pub(super) fn entries(figure: &Figure) -> Vec<Entry> {
     let mut found: Vec<Entry> = figure.kinds().into_iter().map(Entry::Curve).collect();
-    if figure.panels.iter().any(|p| !p.bands.is_empty()) {
-        found.push(Entry::Band);
+    for band in figure.panels.iter().flat_map(|p| &p.bands) {
+        let entry = Entry::Band(band.extent);
+        if !found.contains(&entry) {
+            found.push(entry);
+        }
     }
     if figure.panels.iter().any(|p| !p.outside.is_empty()) {
         found.push(Entry::Outside);
@@ -78,7 +81,7 @@ fn sample(root: &Area<'_>, entry: Entry, from: i32, y: i32) -> Drawn {
             Ok(())
         }
         Entry::Curve(kind) => root.draw(&PathElement::new([(from, y), (to, y)], stroke(kind))),
-        Entry::Band => root.draw(&Rectangle::new([(from, y - 6), (to, y + 6)], band_style())),
+        Entry::Band(_) => root.draw(&Rectangle::new([(from, y - 6), (to, y + 6)], band_style())),
         Entry::Outside => root.draw(&Rectangle::new([(from, y - 2), (to, y + 2)], mark_style())),
     }
 }

@@ -45,8 +45,9 @@ impl Panel {
     }
 
     fn core(&self) -> Option<Range<f64>> {
-        let known = extremes(self.values(|kind| kind != Kind::Estimated));
-        let middle = middle(self.values(|kind| kind == Kind::Estimated));
+        let peaks = |kind| matches!(kind, Kind::Estimated | Kind::Worst | Kind::Mean);
+        let known = extremes(self.values(|kind| !peaks(kind)));
+        let middle = middle(self.values(peaks));
         let spans = known.into_iter().chain(middle).chain(self.bands());
         spans.reduce(|a, b| union(&a, &b))
     }

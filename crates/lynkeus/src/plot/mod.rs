@@ -52,12 +52,33 @@ pub struct Panel {
 /// Values between two curves; a NaN breaks it.
 #[derive(Clone, Debug)]
 pub struct Band {
+    /// What lies in it.
+    pub extent: Extent,
     /// Instants, increasing.
     pub time: Vec<f64>,
     /// Lower ends, as many as instants.
     pub low: Vec<f64>,
     /// Upper ends, as many as instants.
     pub high: Vec<f64>,
+}
+
+/// What a band reaches over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Two standard deviations to either side.
+    TwoDeviations,
+    /// From the 5 % to the 95 % quantile of many runs.
+    Quantiles,
+}
+
+impl Extent {
+    /// The words of the legend.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::TwoDeviations => "± 2 sd",
+            Self::Quantiles => "5–95 %",
+        }
+    }
 }
 
 /// A span of time.
@@ -91,6 +112,10 @@ pub enum Kind {
     Estimated,
     /// What it makes of it knowing later rows.
     Smoothed,
+    /// The worst of many runs.
+    Worst,
+    /// The mean of many runs.
+    Mean,
 }
 
 impl Kind {
@@ -101,6 +126,8 @@ impl Kind {
             Self::Measured => "measured",
             Self::Estimated => "estimated",
             Self::Smoothed => "smoothed",
+            Self::Worst => "worst run",
+            Self::Mean => "mean",
         }
     }
 }

@@ -85,6 +85,8 @@ pub(super) fn stroke(kind: Kind) -> ShapeStyle {
         Kind::Estimated => BLUE.stroke_width(2),
         Kind::Smoothed => GREEN.stroke_width(2),
         Kind::Measured => ORANGE.filled(),
+        Kind::Worst => ORANGE.stroke_width(1),
+        Kind::Mean => BLUE.stroke_width(2),
     }
 }
 
@@ -136,12 +138,14 @@ fn caption(area: &Area<'_>, panel: &Panel, limits: &Limits) -> Drawn {
     let Some(beyond) = limits.beyond else {
         return Ok(());
     };
+    let is_worst = panel.curves.iter().any(|c| c.kind == Kind::Worst);
+    let who = if is_worst { "worst run" } else { "estimate" };
     let note = (FONT, 13)
         .into_font()
         .color(&VERMILION)
         .pos(Pos::new(HPos::Right, VPos::Bottom));
     area.draw(&Text::new(
-        format!("estimate peaks at {} (axis cut)", tick(&rounded(beyond, 3))),
+        format!("{who} peaks at {} (axis cut)", tick(&rounded(beyond, 3))),
         ((WIDTH - RIGHT) as i32, baseline),
         note,
     ))
@@ -234,7 +238,7 @@ pub(super) fn titled(svg: String, title: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Band, Span};
+    use super::super::{Band, Extent, Span};
     use super::*;
 
     fn wave(kind: Kind, n: usize) -> Curve {
@@ -278,6 +282,7 @@ mod tests {
         let plain = picture.to_svg().unwrap();
         let time: Vec<f64> = (0..300).map(|i| f64::from(i) / 10.0).collect();
         let band = Band {
+            extent: Extent::TwoDeviations,
             low: vec![-3.0; 300],
             high: vec![f64::NAN; 300],
             time,

@@ -267,7 +267,7 @@ pub(super) const INTEGRATOR: [KeySpec; 5] = [
 ];
 
 /// `[simulate]` without the integrator.
-pub(super) const SIMULATE: [KeySpec; 7] = [
+pub(super) const SIMULATE: [KeySpec; 8] = [
     KeySpec {
         name: "until",
         kind: "number > `start`",
@@ -315,7 +315,14 @@ pub(super) const SIMULATE: [KeySpec; 7] = [
         kind: "whole number ≥ 0",
         shape: Shape::Whole(0),
         default: "0",
-        meaning: "seed of the noise",
+        meaning: "seed of the noise and of `spread`",
+    },
+    KeySpec {
+        name: "spread",
+        kind: "table: state or parameter (or an array of them) = number ≥ 0",
+        shape: Shape::Table(&Shape::NotNegative),
+        default: "none",
+        meaning: "standard deviation by which `simulate` moves where the plant starts, and the plant's parameters, from run to run (normal, by the seed); the observer keeps the values of the model",
     },
 ];
 

@@ -24,8 +24,11 @@ pub struct SimulateSettings {
     pub initial: Vec<(Name, f64)>,
     /// The integrator and its steps or tolerances.
     pub method: Method,
-    /// The seed of the noise.
+    /// The seed of the noise and of `spread`.
     pub seed: u64,
+    /// Standard deviations of the plant's starts and parameters from run to run, by the name of a
+    /// state or of a parameter, in its unit.
+    pub spread: Vec<(Name, f64)>,
 }
 
 /// Rows of a result whose study does not say how many.
@@ -131,7 +134,13 @@ pub(super) fn read(entry: Entry<'_>) -> Result<SimulateSettings, Error> {
         seed: section
             .optional("seed", |e| e.whole(0))?
             .unwrap_or_default(),
+        spread: pairs(section.take("spread"), deviation)?,
     })
+}
+
+fn deviation(entry: Entry<'_>) -> Result<f64, Error> {
+    let refusal = entry.wrong("a standard deviation, a number >= 0");
+    entry.number().ok().filter(|sd| *sd >= 0.0).ok_or(refusal)
 }
 
 /// Reads `method` with the keys that go with it.

@@ -30,6 +30,7 @@ initial = { "x[2]" = 0.25 }
 method = "rk4"
 step = 0.01
 seed = 7
+spread = { alpha = 0.02, "x[2]" = 0 }
 [estimate]
 between_samples = "linear"
 time = "time"
@@ -58,6 +59,8 @@ fn every_key_arrives() {
     assert_eq!(simulate.method, Method::Rk4(Rk4Step::Length(0.01)));
     assert_eq!(simulate.inputs[0].1.source.text, "4.69");
     assert_eq!(simulate.seed, 7);
+    assert_eq!(simulate.spread[0], ("alpha".into(), 0.02));
+    assert_eq!(simulate.spread[1].1, 0.0);
     assert_eq!(study.estimate.columns[0].1, "AI-101");
     assert_eq!(study.show.unwrap()[0].text, "Zf");
 }

@@ -5,7 +5,6 @@
 //! held-out samples on a log. `docs/tune.md` defines them all.
 
 mod axis;
-mod crew;
 pub(crate) mod errors;
 mod holdout;
 mod measures;
@@ -25,10 +24,10 @@ pub use axis::Axis;
 pub use measures::Measure;
 pub use rewrite::Change;
 
+use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
-use crew::Watch;
 use reference::Reference;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.

@@ -6,13 +6,13 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, System, Trajectory, estimate_watched};
 
-use super::crew::{Watch, part};
 use super::errors::{Errors, rms};
 use super::holdout::{HELD_OUT, Plan, predicted, switchable};
 use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
+use crate::crew::{Watch, part};
 use crate::estimate::{refuse_derivatives, refuse_stray_columns, run_settings, signal};
 use crate::headers::time_of;
 use crate::outcome::interrupted_on;

@@ -9,11 +9,11 @@ use lynkeus_run::{
     Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
 };
 
-use super::crew::{Watch, part};
 use super::errors::{Errors, rms};
 use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use super::{Peak, Row, measures};
+use crate::crew::{Watch, part};
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};

@@ -320,3 +320,61 @@ fn assertions_are_followed() {
     let report = folder.run(&["check", "s.toml"]);
     assert!(report.out.contains("warning"), "{}", report.out);
 }
+
+/// The table, the words, the picture and the object of many runs; one of them alone is the same.
+#[test]
+fn many_runs_give_bands() {
+    let folder = Folder::new();
+    folder.change(
+        "study.toml",
+        "seed = 1",
+        "seed = 1\nspread = { upper = 0.2, k1 = 0.001 }",
+    );
+    let ended = folder.run(&[
+        "simulate",
+        "study.toml",
+        "--runs",
+        "6",
+        "-q",
+        "-o",
+        "b.csv",
+        "--plot",
+        "b.svg",
+        "--json",
+    ]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let found = ended.json();
+    assert_eq!(
+        (&found["runs"], &found["completed"]),
+        (&6.into(), &6.into())
+    );
+    let (header, rows) = csv(&folder.read("b.csv"));
+    assert_eq!(header.len(), 1 + 3 * 7);
+    assert_eq!(header[1..4], ["upper_mean", "upper_q05", "upper_q95"]);
+    assert_eq!(header[7], "upper_error_worst");
+    assert_eq!(rows.len(), 1001);
+    // the start that is spread; the observer's is not
+    assert!(rows[0][3] - rows[0][2] > 0.1, "{:?}", rows[0]);
+    let svg = folder.read("b.svg");
+    for word in ["error of pump", "5–95 %", "worst run", "mean"] {
+        assert!(svg.contains(word), "{word}");
+    }
+    let pump = &found["quantities"]["pump"]["rms_last_half"];
+    let seed = pump["worst_seed"].to_string();
+    let alone = folder.run(&["simulate", "study.toml", "--seed", &seed, "-q", "--json"]);
+    assert_eq!(alone.json()["rms_error_last_half"]["pump"], pump["worst"]);
+    let told = folder.run(&["simulate", "study.toml", "--runs", "2", "-q"]);
+    assert!(
+        told.out.contains("2 of 2 runs to the end") && told.out.contains("95 % below"),
+        "{}",
+        told.out
+    );
+    let tight = ["--runs", "1000000", "--memory-limit", "300"];
+    let refused = folder.run(&[&["simulate", "study.toml", "-q"], &tight[..]].concat());
+    assert_eq!(refused.code, 2);
+    assert!(refused.err.contains("output_step"), "{}", refused.err);
+    assert_eq!(
+        folder.run(&["simulate", "study.toml", "--runs", "0"]).code,
+        2
+    );
+}

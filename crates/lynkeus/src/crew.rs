@@ -12,10 +12,11 @@ use crate::Error;
 const STEP: f64 = 0.02;
 
 /// What a run is told its progress by.
-pub(super) type Watch<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
+pub(crate) type Watch<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 
 /// Tells `watch` of the k-th of `parts` equal parts of a run.
-pub(super) fn part<'w, 'a>(
+#[cfg(feature = "tune")]
+pub(crate) fn part<'w, 'a>(
     watch: &'w mut Watch<'a>,
     k: u32,
     parts: u32,
@@ -71,7 +72,7 @@ impl Board {
 /// # Errors
 /// The error of the first run in order that has one: the runs before it are done to their ends,
 /// so that it is the same every time. Or that `watch` stopped them.
-pub(super) fn every<S: Clone + Send, T: Send>(
+pub(crate) fn every<S: Clone + Send, T: Send>(
     count: usize,
     shared: &S,
     run: &(impl Fn(&S, usize, &mut Watch<'_>) -> Result<T, Error> + Sync),
@@ -104,7 +105,7 @@ pub(super) fn every<S: Clone + Send, T: Send>(
             _ => receiver.iter().for_each(|news| desk.note(news)),
         }
     });
-    let stopped = || Error::input("the sweep was stopped");
+    let stopped = || Error::input("the runs were stopped");
     let is_stopped = desk.is_stopped;
     let results = desk.results.into_iter();
     let results: Result<Vec<T>, Error> = results
@@ -147,6 +148,8 @@ struct Desk<'d, 'w, T> {
     watch: &'d mut Watch<'w>,
     results: Vec<Option<Result<T, Error>>>,
     fractions: Vec<f64>,
+    /// their sum
+    done: f64,
     is_stopped: bool,
 }
 
@@ -157,6 +160,7 @@ impl<'d, 'w, T> Desk<'d, 'w, T> {
             watch,
             results: (0..board.count).map(|_| None).collect(),
             fractions: vec![0.0; board.count],
+            done: 0.0,
             is_stopped: false,
         }
     }
@@ -175,10 +179,10 @@ impl<'d, 'w, T> Desk<'d, 'w, T> {
             }
         };
         if let Some(slot) = self.fractions.get_mut(index) {
+            self.done += fraction - *slot;
             *slot = fraction;
         }
-        let done = self.fractions.iter().sum::<f64>() / self.board.count as f64;
-        if (self.watch)(done).is_break() {
+        if (self.watch)(self.done / self.board.count as f64).is_break() {
             self.is_stopped = true;
             self.board.end_at(0);
         }
@@ -222,7 +226,7 @@ mod tests {
             ControlFlow::Continue(()) => Ok(i),
         };
         let error = every(1000, &(), &slow, &mut |_| ControlFlow::Break(())).unwrap_err();
-        assert_eq!(error.to_string(), "the sweep was stopped");
+        assert_eq!(error.to_string(), "the runs were stopped");
     }
 
     /// Run 0 fails late, run 1 at once, and the others when they are told to stop.

@@ -1,0 +1,350 @@
+//! Many runs of a study: plant and observer with noise, starts and parameters of their own.
+//!
+//! Run k has the study's seed + k, so that [`simulate`](crate::simulate()) with that seed repeats it
+//! alone. What a run draws follows from its seed, and the runs are put together in order: the
+//! result does not depend on the number of processors.
+
+#[cfg(feature = "plot")]
+mod picture;
+mod report;
+mod statistics;
+
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+
+use lynkeus_expr::Spent;
+use lynkeus_model::{Plant, Variable};
+use lynkeus_run::Column;
+
+use crate::crew::{self, Watch};
+use crate::headers::Headers;
+use crate::prepare::Prepared;
+use crate::simulate::{self, Rig};
+use crate::systems::column_of;
+use crate::{Error, Study, prepare};
+pub use report::Settled;
+use statistics::of_runs;
+
+/// What many runs of a study give.
+#[derive(Clone, Debug)]
+pub struct MonteCarlo {
+    /// Name of the plant.
+    pub plant: String,
+    /// The family of the observer.
+    pub family: &'static str,
+    /// The study, for messages.
+    pub file: String,
+    /// How many runs were asked for.
+    pub asked: usize,
+    /// The seeds of the runs that reached the end, increasing: the figures are of these.
+    pub seeds: Vec<u64>,
+    /// The runs that did not, in the order of their seeds.
+    pub failures: Vec<Failure>,
+    /// Times of the rows.
+    pub time: Vec<f64>,
+    /// Header of their column.
+    pub time_header: String,
+    /// Everything that is estimated and whose true course is known.
+    pub quantities: Vec<Scattered>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// A run that did not reach its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// Its seed.
+    pub seed: u64,
+    /// Why.
+    pub reason: String,
+}
+
+/// One quantity over all runs.
+#[derive(Clone, Debug)]
+pub struct Scattered {
+    /// Its name in the plant.
+    pub name: String,
+    /// Its unit, if declared.
+    pub unit: Option<String>,
+    /// Its description, if declared.
+    pub description: Option<String>,
+    /// An input that nobody measures.
+    pub unknown_input: bool,
+    /// A sensor shows it.
+    pub is_measured: bool,
+    /// What it truly is.
+    pub truth: Bands,
+    /// Estimate − truth.
+    pub error: Bands,
+    /// The largest |error| of all runs, row by row.
+    pub error_worst: Vec<f64>,
+    /// √(mean error²) over the last half of the rows, by run, in the order of the seeds.
+    pub rms: Vec<f64>,
+    /// The run with the greatest of these, by its place among the seeds.
+    pub worst_run: usize,
+    /// The error of that run.
+    pub worst_course: Vec<f64>,
+    /// Headers of its columns: mean and quantiles of truth and error, then the largest |error|.
+    pub headers: [String; 7],
+}
+
+/// How a value scatters over the runs, row by row; NaN where no run has a value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bands {
+    /// The mean.
+    pub mean: Vec<f64>,
+    /// The 5 % quantile.
+    pub low: Vec<f64>,
+    /// The 95 % quantile.
+    pub high: Vec<f64>,
+}
+
+/// True course and estimate of one quantity in one run.
+#[derive(Clone, Debug)]
+struct Series {
+    truth: Vec<f64>,
+    estimate: Vec<f64>,
+}
+
+/// What one run gave.
+#[derive(Debug)]
+struct Single {
+    seed: u64,
+    /// by quantity; none where a limit ended the run
+    result: Result<Option<Vec<Series>>, Error>,
+}
+
+/// What is followed: an estimate by its place, beside the column of its true value.
+#[derive(Clone, Debug)]
+struct Followed {
+    estimate: usize,
+    truth: Column,
+}
+
+/// Runs the study's plant with its observer `runs` times, on all processors; `watch` is told the
+/// fraction done and may stop it. A run that diverges or is refused is counted, and in no figure.
+///
+/// # Errors
+/// A study that cannot be run, runs that would not fit into the memory, or no run that reached its
+/// end.
+pub fn monte_carlo(
+    study: &Study,
+    runs: usize,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<MonteCarlo, Error> {
+    let settings = simulate::settings(study)?;
+    let count = u64::try_from(runs).ok().filter(|count| *count > 0);
+    let last = count.and_then(|count| settings.seed.checked_add(count - 1));
+    let Some(last) = last else {
+        let message = format!(
+            "expected at least one run, and seeds from {} on that are numbers of 64 bits, found {runs} runs",
+            settings.seed
+        );
+        return Err(Error::input(message).at(&study.file));
+    };
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let rig = Rig::new(&prepared)?;
+    let followed = followed(&plant, &rig);
+    room(study, &rig, runs, followed.len())?;
+    let seeds: Vec<u64> = (settings.seed..=last).collect();
+    // what the design made comes with every clone of the plant
+    let shared = (plant.clone(), rig.clone());
+    let job = Job {
+        study,
+        followed: &followed,
+        time: OnceLock::new(),
+    };
+    let singles = crew::every(
+        runs,
+        &shared,
+        &|(plant, rig), k, watch| {
+            let seed = seeds.get(k).copied().unwrap_or(settings.seed);
+            Ok(job.single(plant, rig, seed, watch))
+        },
+        watch,
+    )?;
+    let time = job.time.into_inner().unwrap_or_default();
+    gathered(&prepared, &rig, &followed, singles, time)
+}
+
+/// Estimates whose truth a run has.
+fn followed(plant: &Plant, rig: &Rig) -> Vec<Followed> {
+    let estimates = rig.design.observer.estimates.iter().enumerate();
+    let known = estimates.filter_map(|(estimate, e)| {
+        let truth = column_of(plant, &e.variable)?;
+        Some(Followed { estimate, truth })
+    });
+    known.collect()
+}
+
+/// Refuses what would not fit into the memory that the study may take.
+fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), Error> {
+    let run = &rig.simulation;
+    let rows = ((run.until - run.start) / run.output_step).ceil() + 1.0;
+    let of_run = rows * quantities as f64 * size_of::<[f64; 2]>() as f64;
+    // a run is counted, and watched, whatever it gives
+    let bytes = runs as f64 * (of_run + 2.0 * size_of::<Single>() as f64);
+    let room = study.budget.room().unwrap_or(usize::MAX);
+    if bytes <= room as f64 {
+        return Ok(());
+    }
+    let mib = |bytes: f64| (bytes / f64::from(1 << 20)).ceil();
+    let message = format!(
+        "{runs} runs × {rows} rows × {quantities} quantities take {} MiB, and {} MiB are left",
+        mib(bytes),
+        mib(room as f64)
+    );
+    Err(Error::input(message)
+        .at(&study.file)
+        .hint("a longer `output_step` of [simulate], fewer runs, or a greater limit of memory"))
+}
+
+/// What all runs share.
+struct Job<'a> {
+    study: &'a Study,
+    followed: &'a [Followed],
+    /// the rows of every run that reaches its end
+    time: OnceLock<Vec<f64>>,
+}
+
+impl Job<'_> {
+    fn single(&self, plant: &Plant, rig: &Rig, seed: u64, watch: &mut Watch<'_>) -> Single {
+        let result = self.run(plant, rig, seed, watch);
+        Single { seed, result }
+    }
+
+    fn run(
+        &self,
+        plant: &Plant,
+        rig: &Rig,
+        seed: u64,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Vec<Series>>, Error> {
+        let study = self.study;
+        if study.budget.spent().is_some() {
+            return Ok(None);
+        }
+        let ran = Prepared::new(study, plant).and_then(|own| rig.run(&own, seed, watch));
+        let mut ran = match ran {
+            // a run that was ended says nothing of the study
+            Err(_) if study.budget.marked().is_some() => return Ok(None),
+            ran => ran?,
+        };
+        if let Some(ended) = ran.course.ended {
+            return Err(Error::refused(ended.to_string()).at(&study.file));
+        }
+        if ran.run.times().last() != Some(&rig.simulation.until) {
+            return Ok(None);
+        }
+        self.time.get_or_init(|| ran.run.times().to_vec());
+        let series = self.followed.iter().map(|f| Series {
+            truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
+            estimate: std::mem::take(&mut ran.course.estimates[f.estimate]),
+        });
+        Ok(Some(series.collect()))
+    }
+}
+
+/// All runs together.
+fn gathered(
+    prepared: &Prepared<'_>,
+    rig: &Rig,
+    followed: &[Followed],
+    singles: Vec<Single>,
+    time: Vec<f64>,
+) -> Result<MonteCarlo, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let asked = singles.len();
+    let (mut seeds, mut runs, mut failures) = (vec![], vec![], vec![]);
+    let mut first = None;
+    for single in singles {
+        match single.result {
+            Ok(None) => {}
+            Ok(Some(series)) => {
+                seeds.push(single.seed);
+                runs.push(series);
+            }
+            Err(error) => {
+                failures.push(Failure {
+                    seed: single.seed,
+                    reason: error.to_string(),
+                });
+                first = first.or(Some(error));
+            }
+        }
+    }
+    let ended = study.budget.marked();
+    match (ended, first) {
+        (Some(Spent::Cancelled), _) => return Err(Error::ended(Spent::Cancelled)),
+        (_, Some(first)) if seeds.is_empty() => return Err(first),
+        (Some(spent), None) if seeds.is_empty() => return Err(Error::ended(spent)),
+        _ => {}
+    }
+    let mut headers = Headers::beside(plant);
+    let time_header = headers.time();
+    let estimates = &rig.design.observer.estimates;
+    let quantities = followed.iter().enumerate().map(|(place, f)| {
+        let estimate = &estimates[f.estimate];
+        let variable = &estimate.variable;
+        let found = of_runs(&runs, place);
+        Scattered {
+            unknown_input: estimate.unknown_input,
+            is_measured: is_measured(prepared, variable),
+            headers: headers_of(&variable.name, &mut headers),
+            name: variable.name.clone(),
+            unit: variable.unit.clone(),
+            description: variable.description.clone(),
+            truth: found.truth,
+            error: found.error,
+            error_worst: found.error_worst,
+            rms: found.rms,
+            worst_run: found.worst_run,
+            worst_course: found.worst_course,
+        }
+    });
+    let quantities = quantities.collect();
+    let mut notes = rig.design.notes.clone();
+    notes.append(&mut headers.notes);
+    if !rig.is_random() {
+        notes.push("nothing differs from run to run: `noise` of [sensors], [process_noise] and `spread` of [simulate] draw by the seed".to_owned());
+    }
+    let done = seeds.len() + failures.len();
+    notes.extend(ended.map(|spent| format!("{done} of {asked} runs: {spent}")));
+    Ok(MonteCarlo {
+        plant: plant.name.clone(),
+        family: rig.design.observer.family,
+        file: study.file.clone(),
+        asked,
+        seeds,
+        failures,
+        time,
+        time_header,
+        quantities,
+        notes,
+    })
+}
+
+fn is_measured(prepared: &Prepared<'_>, variable: &Variable) -> bool {
+    let outputs = &prepared.extended().outputs;
+    outputs.iter().any(|o| o.variable.node == variable.node)
+}
+
+/// The headers of a quantity's columns.
+fn headers_of(name: &str, headers: &mut Headers) -> [String; 7] {
+    let columns = [
+        ("mean", "the mean"),
+        ("q05", "the 5 % quantile"),
+        ("q95", "the 95 % quantile"),
+        ("error_mean", "the mean error"),
+        ("error_q05", "the 5 % quantile of the error"),
+        ("error_q95", "the 95 % quantile of the error"),
+        ("error_worst", "the largest error"),
+    ];
+    columns.map(|(suffix, what)| {
+        headers.free(&format!("{name}_{suffix}"), &format!("{what} of {name}"))
+    })
+}
+
+#[cfg(test)]
+mod tests;

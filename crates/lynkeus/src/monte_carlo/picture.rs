@@ -1,0 +1,73 @@
+//! The scatter drawn: the error of each quantity over time.
+
+use super::{MonteCarlo, Scattered};
+use crate::Error;
+use crate::figure::{PANELS, spread};
+use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel};
+use crate::study::Name;
+
+impl MonteCarlo {
+    /// The errors of the quantities of `show`, else of unknown inputs and hidden states first, six at
+    /// most: the band from the 5 % to the 95 % quantile, the mean, and the run with the greatest RMS error.
+    ///
+    /// # Errors
+    /// `show` names something that is not estimated.
+    pub fn figure(&self, time_unit: Option<&str>, show: Option<&[Name]>) -> Result<Figure, Error> {
+        let chosen = match show {
+            Some(names) => self.shown(names)?,
+            None => {
+                let mut all: Vec<&Scattered> = self.quantities.iter().collect();
+                all.sort_by_key(|q| (q.is_measured, !q.unknown_input));
+                spread(all, PANELS)
+            }
+        };
+        let unit = time_unit.map_or(String::new(), |unit| format!(" ({unit})"));
+        Ok(Figure {
+            title: format!(
+                "{}: {} observer, {} runs",
+                self.plant,
+                self.family,
+                self.seeds.len()
+            ),
+            time_label: format!("time{unit}"),
+            panels: chosen.into_iter().map(|q| self.panel(q)).collect(),
+        })
+    }
+
+    fn shown(&self, names: &[Name]) -> Result<Vec<&Scattered>, Error> {
+        let find = |name: &Name| {
+            let mut own = self.quantities.iter().filter(|q| q.name == name.text);
+            own.next().ok_or_else(|| {
+                let names = self.quantities.iter().map(|q| q.name.as_str());
+                let message = format!("`show` of [plot]: nothing estimated is called \"{name}\"");
+                let hint = crate::near::suggest(&name.text, names);
+                name.blame(Error::input(message).hint(hint))
+            })
+        };
+        names.iter().map(find).collect()
+    }
+
+    fn panel(&self, quantity: &Scattered) -> Panel {
+        let unit = quantity.unit.as_ref().filter(|unit| *unit != "1");
+        let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
+        let curve = |kind, values: &[f64]| Curve {
+            kind,
+            time: self.time.clone(),
+            values: values.to_vec(),
+        };
+        Panel {
+            caption: format!("error of {}{unit}", quantity.name),
+            curves: vec![
+                curve(Kind::Worst, &quantity.worst_course),
+                curve(Kind::Mean, &quantity.error.mean),
+            ],
+            bands: vec![Band {
+                extent: Extent::Quantiles,
+                time: self.time.clone(),
+                low: quantity.error.low.clone(),
+                high: quantity.error.high.clone(),
+            }],
+            ..Panel::default()
+        }
+    }
+}

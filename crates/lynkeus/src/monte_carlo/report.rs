@@ -1,0 +1,157 @@
+//! The runs in words, as JSON and as columns.
+
+use std::fmt;
+
+use lynkeus_structure::figures;
+use serde_json::{Map, Value, json};
+
+use super::statistics::{HIGH, mean, quantile};
+use super::{MonteCarlo, Scattered};
+use crate::Error;
+
+/// Seeds of failed runs that are told one by one.
+const TOLD: usize = 20;
+
+/// The errors of a quantity over the last half of the rows, in one figure per run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settled {
+    /// The mean over the runs.
+    pub mean: f64,
+    /// 95 % of the runs are below.
+    pub q95: f64,
+    /// The worst run.
+    pub worst: f64,
+}
+
+impl Scattered {
+    /// The RMS errors of the runs in three figures.
+    #[must_use]
+    pub fn settled(&self) -> Settled {
+        let mut sorted = self.rms.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        Settled {
+            mean: mean(&self.rms),
+            q95: quantile(&sorted, HIGH),
+            worst: sorted.last().copied().unwrap_or(f64::NAN),
+        }
+    }
+}
+
+impl MonteCarlo {
+    /// The columns of the table: the time; of every quantity the mean, the 5 % and the 95 % quantile of its
+    /// true value (`<name>_mean`, `_q05`, `_q95`) and of its error (`<name>_error_mean`, …), and the largest
+    /// |error| (`<name>_error_worst`).
+    #[must_use]
+    pub fn columns(&self) -> Vec<(String, &[f64])> {
+        let mut columns: Vec<(String, &[f64])> = vec![(self.time_header.clone(), &self.time)];
+        for q in &self.quantities {
+            let (truth, error) = (&q.truth, &q.error);
+            let values: [&[f64]; 7] = [
+                &truth.mean,
+                &truth.low,
+                &truth.high,
+                &error.mean,
+                &error.low,
+                &error.high,
+                &q.error_worst,
+            ];
+            columns.extend(q.headers.iter().cloned().zip(values));
+        }
+        columns
+    }
+
+    /// The answer "no" where a run diverged or was refused.
+    #[must_use]
+    pub fn refusal(&self) -> Option<Error> {
+        let first = self.failures.first()?;
+        let message = format!(
+            "{} of {} runs did not reach their end; the first, of seed {}: {}",
+            self.failures.len(),
+            self.asked,
+            first.seed,
+            first.reason
+        );
+        let again = format!("`lynkeus simulate --seed {}` repeats it alone", first.seed);
+        Some(Error::refused(message).hint(again))
+    }
+
+    fn worst_seed(&self, quantity: &Scattered) -> Option<u64> {
+        self.seeds.get(quantity.worst_run).copied()
+    }
+
+    /// For machines.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let quantities = self.quantities.iter().map(|q| {
+            let Settled { mean, q95, worst } = q.settled();
+            let entry = json!({
+                "unit": q.unit,
+                "columns": q.headers,
+                "rms_last_half": {
+                    "mean": mean,
+                    "q95": q95,
+                    "worst": worst,
+                    "worst_seed": self.worst_seed(q),
+                },
+            });
+            (q.name.clone(), entry)
+        });
+        let seeds: Vec<u64> = self.failures.iter().map(|f| f.seed).collect();
+        json!({
+            "plant": self.plant,
+            "family": self.family,
+            "runs": self.asked,
+            "completed": self.seeds.len(),
+            "failed": {
+                "count": seeds.len(),
+                "seeds": seeds,
+                "first_reason": self.failures.first().map(|f| &f.reason),
+            },
+            "rows": self.time.len(),
+            "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
+            "notes": self.notes,
+        })
+    }
+}
+
+impl fmt::Display for MonteCarlo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { plant, family, .. } = self;
+        let (done, asked) = (self.seeds.len(), self.asked);
+        writeln!(
+            f,
+            "{plant}: {family} observer, {done} of {asked} runs to the end"
+        )?;
+        if let (Some(first), Some(last)) = (self.seeds.first(), self.seeds.last()) {
+            writeln!(f, "seeds {first} to {last}; --seed repeats one alone")?;
+        }
+        writeln!(f, "RMS errors over the last half of the rows:")?;
+        let width = self.quantities.iter().map(|q| q.name.chars().count());
+        let width = width.max().unwrap_or(0).max("quantity".len());
+        writeln!(
+            f,
+            "  {:width$}  {:>10}  {:>10}  {:>10}  seed of the worst",
+            "quantity", "mean", "95 % below", "worst"
+        )?;
+        for q in &self.quantities {
+            let Settled { mean, q95, worst } = q.settled();
+            let [mean, q95, worst] = [mean, q95, worst].map(|x| figures(x, 3));
+            let seed = self.worst_seed(q).map_or(String::new(), |s| s.to_string());
+            writeln!(
+                f,
+                "  {:width$}  {mean:>10}  {q95:>10}  {worst:>10}  {seed}",
+                q.name
+            )?;
+        }
+        if self.failures.is_empty() {
+            return Ok(());
+        }
+        let seeds: Vec<String> = self.failures.iter().map(|x| x.seed.to_string()).collect();
+        let more = match seeds.len().saturating_sub(TOLD) {
+            0 => String::new(),
+            more => format!(", … ({more} more)"),
+        };
+        let told = seeds.into_iter().take(TOLD).collect::<Vec<_>>().join(", ");
+        writeln!(f, "not in these figures, ended early: seeds {told}{more}")
+    }
+}
