@@ -78,6 +78,6 @@ mod units;
 pub use builder::{Attributes, Model, ModelError};
 pub use diagnostic::{Diagnostic, LoadError};
 pub use language::model_names;
-pub use plant::{Assertion, LoadOptions, Parameter, Plant, Variable};
+pub use plant::{Assertion, LoadOptions, Parameter, Plant, Tables, Variable};
 pub use study::parse_expression;
 pub use syntax::Span;

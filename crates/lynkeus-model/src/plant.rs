@@ -89,6 +89,17 @@ pub struct Parameter {
     pub value: Option<f64>,
 }
 
+/// What `Modelica.Math.Vectors.interpolate` is between the points of its table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tables {
+    /// straight lines, as the Modelica library has it; outside, along the first and the last
+    #[default]
+    Linear,
+    /// cubics with one slope at each point (Fritsch and Carlson): monotone where the points are; outside,
+    /// along the tangents at the ends
+    Monotone,
+}
+
 /// How a model text becomes a plant.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
@@ -99,6 +110,8 @@ pub struct LoadOptions {
     /// keep parameters of type Real as symbols, and allow them to have no value. Sizes,
     /// loop bounds and attributes still use the values.
     pub symbolic_parameters: bool,
+    /// what tables are between their points
+    pub tables: Tables,
     /// when to stop; the graph of the plant keeps it
     pub budget: Budget,
 }

@@ -47,6 +47,7 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
         model: study.model.clone(),
         parameters: study.parameters.clone(),
         symbolic_parameters,
+        tables: study.tables,
         budget: study.budget.clone(),
     };
     let plant = Plant::load(path, &options);

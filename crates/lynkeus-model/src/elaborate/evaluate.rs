@@ -8,6 +8,7 @@ use super::frame::Frame;
 use super::scope::{Mode, Scope};
 use super::symbols::Context;
 use super::value::{Scalar, Value};
+use crate::Tables;
 use crate::flat::Classes;
 use crate::limits::Budget;
 use crate::names::did_you_mean;
@@ -40,6 +41,8 @@ pub(crate) struct Evaluator<'a> {
     pub(super) conditions: Vec<Node>,
     /// what is to hold along a run
     pub(super) claims: Vec<Claim>,
+    /// what tables are between their points
+    pub(super) tables: Tables,
 }
 
 impl<'a> Evaluator<'a> {
@@ -68,12 +71,14 @@ impl<'a> Evaluator<'a> {
             calls: vec![],
             conditions: vec![],
             claims: vec![],
+            tables: Tables::Linear,
         }
     }
 
     /// With the functions and records of a text.
     pub(super) fn within(mut self, context: &Context<'a>) -> Self {
         self.classes = Some(context.classes);
+        self.tables = context.options.tables;
         self.scopes = context.model.scopes.iter().map(String::as_str).collect();
         self
     }

@@ -13,6 +13,7 @@ mod flatten;
 mod frame;
 mod functions;
 mod inline;
+mod monotone;
 mod names;
 mod operators;
 mod order;

@@ -3,13 +3,16 @@
 use lynkeus_expr::Node;
 
 use super::evaluate::Evaluator;
+use super::monotone::monotone_cubic;
 use super::value::{Scalar, Value};
+use crate::Tables;
 use crate::syntax::ast::{Call, ExprId};
 use crate::syntax::{Problem, Result, Span};
 
 impl<'a> Evaluator<'a> {
     /// `Vectors.interpolate(x, y, xi)`: linear between the points (x[i], y[i]) and, as the
-    /// Modelica library has it, along the first and the last piece outside of them.
+    /// Modelica library has it, along the first and the last piece outside of them; or, where
+    /// the options ask for it, the monotone cubic.
     pub(super) fn interpolate(&mut self, call: &'a Call, span: Span) -> Result<Value> {
         let [abscissas, ordinates, at] = match call.arguments.len() {
             // the index of the piece found last is a hint for the library's search
@@ -31,7 +34,10 @@ impl<'a> Evaluator<'a> {
         let at = self.value(at)?;
         self.map(at, span, |evaluator, at, span| {
             let at = evaluator.real(at, span)?;
-            Ok(Scalar::Real(evaluator.piecewise_linear(&x, &y, at)))
+            Ok(Scalar::Real(match evaluator.tables {
+                Tables::Linear => evaluator.piecewise_linear(&x, &y, at),
+                Tables::Monotone => monotone_cubic(evaluator.graph, &x, &y, at),
+            }))
         })
     }
 

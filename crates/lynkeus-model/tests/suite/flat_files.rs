@@ -1,5 +1,7 @@
 //! What flat files bring: units on every variable, and thousands of equations.
 
+use lynkeus_expr::Tape;
+
 use crate::support::{plant, refused};
 
 #[test]
@@ -48,9 +50,8 @@ fn units_that_do_not_fit_are_told() {
     assert_eq!(warnings(quiet, equations), Vec::<String>::new());
 }
 
-#[test]
-fn ten_thousand_flat_equations_are_read_soon() {
-    let n = 10_000;
+/// A chain of n equations as compilers write them.
+fn chain(n: usize) -> String {
     let mut text = String::from("model Chain\n  Real x(start = 1, fixed = true);\n");
     for i in 0..n {
         text += &format!("  Real 'part[{i}].p.v'(start = 0.0, unit = \"V\") \"Potential\";\n");
@@ -59,7 +60,33 @@ fn ten_thousand_flat_equations_are_read_soon() {
     for i in 0..n - 1 {
         text += &format!("  0.0 = ('part[{i}].p.v' - (0.5*'part[{}].p.v'));\n", i + 1);
     }
-    text += &format!("  'part[{}].p.v' = x;\nend Chain;\n", n - 1);
+    text + &format!("  'part[{}].p.v' = x;\nend Chain;\n", n - 1)
+}
+
+/// The best of ten times from text to tape. Ask for it with
+/// `cargo test --release -p lynkeus-model --test suite text_to_tape -- --ignored --nocapture`.
+#[test]
+#[ignore = "measures time"]
+fn text_to_tape_of_flat_equations() {
+    for n in [1_000, 10_000] {
+        let text = chain(n);
+        let time = || {
+            let start = std::time::Instant::now();
+            let plant = plant(&text);
+            let tape = Tape::new(&plant.graph, &[plant.states[0].node], &plant.derivatives);
+            assert!(tape.is_ok());
+            start.elapsed()
+        };
+        let best = (0..10).map(|_| time()).min().unwrap();
+        println!("{n} equations: {best:?}");
+        assert!(best.as_secs_f64() < 0.5, "{best:?}");
+    }
+}
+
+#[test]
+fn ten_thousand_flat_equations_are_read_soon() {
+    let n = 10_000;
+    let text = chain(n);
     let start = std::time::Instant::now();
     let read = plant(&text);
     let elapsed = start.elapsed();

@@ -5,11 +5,13 @@ use std::collections::HashMap;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Binary, Graph, Interval, Node, Op, Tape, Unary};
 
+use super::sums::are_one;
 use crate::Region;
 
 /// Whether both branches of a selection by an inequality p < q or p ≤ q have one value
 /// where p = q. There p may be written as q, wherever the node p stands: the branches
-/// then have to become one expression, or one number on the whole region.
+/// then have to become one expression, one number on the whole region, or one sum: for the
+/// last the branches must have values, which is asked of them anyway.
 pub(super) fn meets(graph: &Graph, node: Node, region: &Region) -> bool {
     let Op::Select(condition, a, b) = graph.op(node) else {
         return false;
@@ -22,7 +24,9 @@ pub(super) fn meets(graph: &Graph, node: Node, region: &Region) -> bool {
         .filter(|(from, _)| !matches!(graph.op(*from), Op::Constant(_)))
         .any(|image| {
             let there = graph.substitute(&[a, b], &HashMap::from([image]));
-            there[0] == there[1] || same_number(graph, &there, region)
+            there[0] == there[1]
+                || same_number(graph, &there, region)
+                || are_one(graph, there[0], there[1])
         })
 }
 

@@ -8,6 +8,7 @@
 //! derivative beside it is.
 
 mod glue;
+mod sums;
 mod walk;
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};

@@ -8,7 +8,7 @@ use lynkeus_run::Tolerances;
 const EXPRESSION: Shape = Shape::Either(&[Shape::Number, Shape::Text]);
 
 /// The keys of the top level.
-pub(super) const KEYS: [KeySpec; 3] = [
+pub(super) const KEYS: [KeySpec; 4] = [
     KeySpec {
         name: "plant",
         kind: "text",
@@ -29,6 +29,13 @@ pub(super) const KEYS: [KeySpec; 3] = [
         shape: Shape::Table(&Shape::Number),
         default: "none",
         meaning: "values that replace those of the plant",
+    },
+    KeySpec {
+        name: "tables",
+        kind: "`\"linear\"`, `\"monotone\"`",
+        shape: Shape::Word(&["linear", "monotone"]),
+        default: "`\"linear\"`",
+        meaning: "what the plant's [tables](modelica.md#tables) are between their points: straight lines, or monotone cubics, whose slopes do not jump",
     },
 ];
 

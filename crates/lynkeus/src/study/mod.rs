@@ -48,6 +48,7 @@ pub use source::{Name, Place};
 pub use tune::{Scale, TuneSettings, Values};
 
 use lynkeus_expr::Budget;
+use lynkeus_model::Tables;
 
 use crate::Error;
 use section::Section;
@@ -64,6 +65,8 @@ pub struct Study {
     pub model: Option<String>,
     /// Parameter values that replace those of the plant.
     pub parameters: BTreeMap<String, f64>,
+    /// What the plant's tables are between their points.
+    pub tables: Tables,
     /// What is measured and what is not.
     pub sensors: Sensors,
     /// White noise on states' derivatives: (name, spectral density), in the square of the state's
@@ -157,6 +160,7 @@ impl Study {
                 .optional("model", section::Entry::name)?
                 .map(|name| name.text),
             parameters: top.optional("parameters", parameters)?.unwrap_or_default(),
+            tables: top.optional("tables", tables)?.unwrap_or_default(),
             sensors: top.optional("sensors", sensors::read)?.unwrap_or_default(),
             process_noise: simulate::pairs(top.take("process_noise"), density)?,
             observer: top
@@ -198,6 +202,10 @@ fn parameters(entry: section::Entry<'_>) -> Result<BTreeMap<String, f64>, Error>
         .into_iter()
         .map(|(name, value)| Ok((name.text, value.number()?)))
         .collect()
+}
+
+fn tables(entry: section::Entry<'_>) -> Result<Tables, Error> {
+    entry.choice(&[("linear", Tables::Linear), ("monotone", Tables::Monotone)])
 }
 
 /// `families` of `[compare]`.

@@ -20,6 +20,7 @@ mod references;
 mod results;
 mod runs;
 mod story;
+mod tables;
 mod tune;
 
 use std::path::{Path, PathBuf};
