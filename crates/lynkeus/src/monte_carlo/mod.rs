@@ -195,9 +195,15 @@ fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), 
         mib(bytes),
         mib(room as f64)
     );
-    Err(Error::input(message)
-        .at(&study.file)
-        .hint("a longer `output_step` of [simulate], fewer runs, or a greater limit of memory"))
+    // a filter's rows are its samples
+    let is_sampled = rig.design.observer.filter.is_some() && run.noise.sample_step.is_some();
+    let step = match is_sampled {
+        true => "sample_step",
+        false => "output_step",
+    };
+    Err(Error::input(message).at(&study.file).hint(format!(
+        "a longer `{step}` of [simulate], fewer runs, or a greater limit of memory"
+    )))
 }
 
 /// What all runs share.
