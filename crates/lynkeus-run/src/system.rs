@@ -103,8 +103,9 @@ impl System {
         let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
         let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
         let extracted = Switches::extract(&own, image[&time], &roots)?;
-        let jumping = take(&own, &inputs, &extracted.roots)?;
+        let moving = inputs.clone();
         inputs.extend(&extracted.modes);
+        let jumping = take(&own, &moving, &inputs, &extracted.roots)?;
         let held = |taken| HeldCode::new(&own, &inputs, taken, derivatives.len());
         let held = jumping.map(held).transpose()?;
         let (dx, y) = extracted.roots.split_at(derivatives.len());

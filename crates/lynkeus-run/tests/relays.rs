@@ -1,7 +1,7 @@
 //! Systems that jump with their state: crossed, slid along, left again; against solutions by
 //! hand.
 
-use lynkeus_expr::{Expr, Graph, Node};
+use lynkeus_expr::{Binary, Expr, Graph, Node};
 use lynkeus_run::{Integrator, Method, System, Tolerances};
 
 /// x' = f of named states, from a start, at some times.
@@ -226,4 +226,22 @@ fn a_motor_with_dry_friction_agrees_with_a_regularised_reference() {
         }
         assert!(rows[0][1].abs() < 1e-12, "at rest: {:?}", rows[0]);
     }
+}
+
+/// A right-hand side that jumps with time and with the state.
+#[test]
+fn jumps_of_time_and_of_the_state_go_together() {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+    let late = g.expr(g.binary(Binary::Less, g.constant(1.0).node(), time.node()));
+    let dx = late - (x - 0.5).sign();
+    let states = [("x".to_string(), x.node(), 0.0)];
+    let system = System::new(&g, time.node(), &states, &[], &[dx.node()], &[]).unwrap();
+    let mut state = [0.0];
+    let mut integrator = Integrator::new(Method::default(), 1).unwrap();
+    // up to 0.5 at t = 0.5, along it, and along it still: the push of 1 is held
+    integrator
+        .advance(&mut system.evaluation(), 0.0, 2.0, &mut state)
+        .unwrap();
+    assert!((state[0] - 0.5).abs() < 1e-6, "{state:?}");
 }

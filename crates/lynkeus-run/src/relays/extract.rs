@@ -15,10 +15,12 @@ pub(crate) struct Taken {
 }
 
 /// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots; none
-/// where there is none. Several that change on one surface change together.
+/// where there is none. Several that change on one surface change together. The surfaces are
+/// functions of `arguments`, which hold the inputs and what else the roots read.
 pub(crate) fn take(
     graph: &Graph,
     inputs: &[Node],
+    arguments: &[Node],
     roots: &[Node],
 ) -> Result<Option<Taken>, MissingInput> {
     let mut replaced: HashMap<Node, Node> = HashMap::new();
@@ -63,7 +65,7 @@ pub(crate) fn take(
         let branches = graph.substitute(&[kink.above, kink.below], &replaced);
         replaced.insert(node, graph.select(mode, branches[0], branches[1]));
     }
-    let all: Vec<Node> = inputs.iter().chain(&modes).copied().collect();
+    let all: Vec<Node> = arguments.iter().chain(&modes).copied().collect();
     Ok(Some(Taken {
         roots: graph.substitute(roots, &replaced),
         modes,
