@@ -41,6 +41,13 @@ pub enum Spent {
     Digits,
 }
 
+impl Spent {
+    /// Whether more time or memory could end it otherwise.
+    pub fn is_limit(self) -> bool {
+        !matches!(self, Self::Digits)
+    }
+}
+
 /// The same budget, not an equal one.
 impl PartialEq for Budget {
     fn eq(&self, other: &Self) -> bool {

@@ -20,7 +20,7 @@ use lynkeus_proof::matrix::points;
 use lynkeus_proof::{lyapunov, vertices};
 use nalgebra::{DMatrix, DVector};
 
-use crate::vandermonde;
+use crate::{spectrum, vandermonde};
 
 /// (k_i1, k_i2) of each block, from the first.
 pub type Coefficients = Vec<[f64; 2]>;
@@ -125,13 +125,7 @@ fn matrix(K: &[[f64; 2]], ratios: &[f64]) -> DMatrix<f64> {
 
 /// The largest real part of an eigenvalue of M; NaN where a coefficient is not finite.
 pub fn abscissa(K: &[[f64; 2]]) -> f64 {
-    if !K.iter().flatten().all(|k| k.is_finite()) {
-        return f64::NAN;
-    }
-    let eigenvalues = matrix(K, &vec![1.0; K.len()]).complex_eigenvalues();
-    eigenvalues
-        .iter()
-        .fold(f64::NEG_INFINITY, |m, λ| m.max(λ.re))
+    spectrum::abscissa(matrix(K, &vec![1.0; K.len()])).unwrap_or(f64::NAN)
 }
 
 /// Blocks beyond which [`tolerates`] gives up: it visits 2^blocks vertices.

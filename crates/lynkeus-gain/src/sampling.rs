@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::spectrum::eigenvalues;
+
 /// Factor between two intervals that are looked at.
 const FINER: f64 = 1.1;
 /// Intervals from this one on are looked at, in units of the fastest mode,
@@ -45,14 +47,14 @@ pub fn limits(M: &[Vec<f64>], C: &[Vec<f64>]) -> Option<Limits> {
     }
     let M = DMatrix::from_fn(size, size, |i, j| M[i][j]);
     let C = DMatrix::from_fn(sensors, n, |i, j| C[i][j]);
-    let hold = 2.0 / radius(&(C * M.view((0, n), (n, sensors))));
-    let fastest = radius(&M.view((0, 0), (n, n)).into_owned());
+    let hold = 2.0 / radius(C * M.view((0, n), (n, sensors)))?;
+    let fastest = radius(M.view((0, 0), (n, n)).into_owned())?;
     if fastest <= 0.0 || !fastest.is_finite() {
         return None;
     }
     let shrinks = |interval: f64| {
         let flow = (&M * interval).exp();
-        radius(&flow.view((0, 0), (n, n)).into_owned()) < 1.0 - ROUNDING
+        radius(flow.view((0, 0), (n, n)).into_owned()).is_some_and(|radius| radius < 1.0 - ROUNDING)
     };
     let mut interval = SHORTEST / fastest;
     if !shrinks(interval) {
@@ -85,14 +87,10 @@ fn between(mut shrinking: f64, mut growing: f64, shrinks: impl Fn(f64) -> bool) 
     shrinking
 }
 
-/// The largest modulus of an eigenvalue.
-fn radius(matrix: &DMatrix<f64>) -> f64 {
-    let is_finite = matrix.iter().all(|x| x.is_finite());
-    if !is_finite {
-        return f64::INFINITY;
-    }
-    let eigenvalues = matrix.complex_eigenvalues();
-    eigenvalues.iter().map(|λ| λ.norm()).fold(0.0, f64::max)
+/// The largest modulus of an eigenvalue; none where it cannot be told.
+fn radius(matrix: DMatrix<f64>) -> Option<f64> {
+    let eigenvalues = eigenvalues(matrix)?;
+    Some(eigenvalues.iter().map(|λ| λ.norm()).fold(0.0, f64::max))
 }
 
 #[cfg(test)]

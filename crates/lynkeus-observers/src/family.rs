@@ -261,10 +261,11 @@ pub enum DesignError {
 }
 
 fn refusal(examination: &Examination) -> String {
-    let mut text = format!(
-        "the family '{}' does not fit: {}",
-        examination.family, examination.summary
-    );
+    let (family, summary) = (examination.family, &examination.summary);
+    let mut text = match examination.spent() {
+        Some(_) => format!("whether the family '{family}' fits is {summary}"),
+        None => format!("the family '{family}' does not fit: {summary}"),
+    };
     if let Some(check) = examination.refuted() {
         text += &format!("\n  {check}");
     }

@@ -383,7 +383,8 @@ impl Report {
 
     /// That there is no observer, or that a limit ended the search for one.
     fn none(&self) -> String {
-        let undecided = self.examinations.iter().filter(|e| e.spent().is_some());
+        let is_open = |e: &&Examination| e.spent().is_some_and(Spent::is_limit);
+        let undecided = self.examinations.iter().filter(is_open);
         let names: Vec<&str> = undecided.map(|e| e.family).collect();
         match names.is_empty() {
             true => "no observer of this version fits these sensors".to_owned(),

@@ -42,9 +42,13 @@ impl Error {
         Self::new(ErrorKind::Refused, message.into())
     }
 
-    /// A limit that ended the work before there was an answer.
+    /// What ended the work before there was an answer: a limit, or else a refusal.
     pub fn ended(spent: lynkeus_expr::Spent) -> Self {
-        Self::new(ErrorKind::Ended, format!("undecided: {spent}")).caused_by(spent)
+        let kind = match spent.is_limit() {
+            true => ErrorKind::Ended,
+            false => ErrorKind::Refused,
+        };
+        Self::new(kind, format!("undecided: {spent}")).caused_by(spent)
     }
 
     /// An error in what the user gave, in the words of the error that tells it; that error

@@ -335,7 +335,8 @@ pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
 }
 
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
-    if let Some(spent) = examinations.iter().find_map(Examination::spent) {
+    let mut ended = examinations.iter().filter_map(Examination::spent);
+    if let Some(spent) = ended.find(|spent| spent.is_limit()) {
         return Error::ended(spent)
             .at(&study.file)
             .hint("`--time-limit` and `--memory-limit` move the limits");

@@ -14,13 +14,14 @@ use std::cmp::Ordering;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Interval, MissingInput, Node, Tape, jacobian};
+use lynkeus_gain::spectrum;
 use lynkeus_proof::decay::is_unstable;
 use lynkeus_structure::{Extended, Point};
 use nalgebra::{DMatrix, DVector};
 
 use super::edges::edges;
 use super::error_system::ErrorSystem;
-use super::refute::{Side, abscissa, spread};
+use super::refute::{Side, spread};
 use crate::Observer;
 
 /// Points from which an equilibrium is sought.
@@ -198,7 +199,7 @@ impl<'a> Search<'a> {
 
     fn abscissa(&mut self, z: &[f64]) -> Option<f64> {
         let full = self.full(z, 0.0);
-        abscissa(self.system.at(&mut self.right, &full))
+        spectrum::abscissa(self.system.at(&mut self.right, &full))
     }
 
     /// Along the equilibria to one that repels more.

@@ -6,17 +6,16 @@
 //! instants make a stable whole, nor unstable ones an unstable one. The error grows for
 //! certain where A is the same whatever the plant does, and where the plant can rest.
 
-use crate::statement::refuted;
-use crate::{Check, Inequality};
-use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
-use lynkeus_proof::decay::is_unstable;
-use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
-use nalgebra::DMatrix;
-
 use super::edges::edges;
 use super::equilibrium;
 use super::error_system::ErrorSystem;
 use crate::Observer;
+use crate::statement::refuted;
+use crate::{Check, Inequality};
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
+use lynkeus_gain::spectrum;
+use lynkeus_proof::decay::is_unstable;
+use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
@@ -186,25 +185,10 @@ pub(super) fn spread(sides: &[Side], index: usize) -> Vec<f64> {
         .collect()
 }
 
-/// The largest real part of an eigenvalue.
-pub(super) fn abscissa(A: DMatrix<f64>) -> Option<f64> {
-    if !A.iter().all(|x| x.is_finite()) {
-        return None;
-    }
-    // a bounded number of sweeps: a matrix that does not converge is skipped
-    let schur = nalgebra::linalg::Schur::try_new(A, f64::EPSILON, 10_000)?;
-    let eigenvalues = schur.complex_eigenvalues();
-    let largest = eigenvalues
-        .iter()
-        .map(|λ| λ.re)
-        .fold(f64::NEG_INFINITY, f64::max);
-    largest.is_finite().then_some(largest)
-}
-
 impl Search<'_> {
     /// The largest real part of an eigenvalue of A there.
     fn abscissa(&mut self, point: &[f64]) -> Option<f64> {
-        abscissa(self.system.at(&mut self.evaluator, point))
+        spectrum::abscissa(self.system.at(&mut self.evaluator, point))
     }
 
     /// Coordinate by coordinate to a worse point, with ever smaller steps.

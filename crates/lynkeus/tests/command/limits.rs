@@ -181,3 +181,23 @@ fn a_run_that_is_ended_tells_its_rows() {
     );
     assert!(folder.read("rows.csv").lines().count() > 2);
 }
+
+/// No limit was asked for and none would help: a refusal, not a run that was cut short.
+#[test]
+fn digits_that_are_missing_are_no_limit() {
+    let folder = Folder::empty();
+    let cells = "model H Real x[30](each start=0.5, each min=-1, each max=1); output Real y=x[1];
+equation
+  der(x[1])=x[2]-x[1];
+  for i in 2:29 loop der(x[i])=x[i+1]-2*x[i]+x[i-1]; end for;
+  der(x[30])=x[29]-x[30]^3;
+end H;";
+    folder.write("h.mo", cells);
+    let study = "plant=\"h.mo\"\n[observer]\nfamily=\"drift-observable\"\nalpha=1\ngamma=1\n[simulate]\nuntil=1\n";
+    folder.write("h.toml", study);
+    let ended = folder.run(&["simulate", "h.toml", "-o", "o.csv"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    let told = "whether the family 'drift-observable' fits is undecided: rounding hides it";
+    assert!(ended.err.contains(told), "{}", ended.err);
+    assert!(!ended.err.contains("--time-limit"), "{}", ended.err);
+}
