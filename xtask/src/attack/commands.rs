@@ -98,7 +98,7 @@ const ABOUT: &[&str] = &[
 /// One command, or a simulation whose log another reads.
 pub fn choose(numbers: &mut Numbers, base: &Base) -> Vec<Command> {
     let study = base.study();
-    match numbers.below(8) {
+    match numbers.below(9) {
         0 | 1 => vec![check(numbers, base)],
         2 => vec![report(numbers, base, "design")],
         3 => vec![report(numbers, base, "certify")],
@@ -110,6 +110,7 @@ pub fn choose(numbers: &mut Numbers, base: &Base) -> Vec<Command> {
                 run(numbers, base, &["estimate", study, "made.csv"]),
             ],
         },
+        7 => vec![compare(numbers, base)],
         _ => vec![tune(numbers, base)],
     }
 }
@@ -175,7 +176,23 @@ fn run(numbers: &mut Numbers, base: &Base, words: &[&str]) -> Command {
         command.result(numbers, 0.4, "--log", Form::Csv, base);
         let seed = *numbers.of(&["0", "7", "18446744073709551615"]);
         command.flag(numbers, 0.2, &["--seed", seed]);
+        let runs = *numbers.of(&["0", "1", "3", "70"]);
+        command.flag(numbers, 0.2, &["--runs", runs]);
     }
+    let backend = *numbers.of(&["interpreter", "native"]);
+    command.flag(numbers, 0.4, &["--backend", backend]);
+    command
+}
+
+fn compare(numbers: &mut Numbers, base: &Base) -> Command {
+    let mut command = Command::new(&["compare", base.study()], base, Form::Text);
+    if let Some(log) = base.log()
+        && command.flag(numbers, 0.5, &[log])
+    {
+        command.inputs.push(log.to_owned());
+    }
+    command.json(numbers);
+    command.result(numbers, 0.3, "--plot", Form::Svg, base);
     command
 }
 
