@@ -210,6 +210,25 @@ fn start_and_range_choose_the_root() {
     }
 }
 
+/// A loop that is flat far from where its variable may be.
+#[test]
+fn whether_a_loop_is_singular_is_asked_where_its_variables_may_be() {
+    for attributes in [
+        "start = 400",
+        "min = 350, max = 500",
+        "max = 500, start = 450",
+    ] {
+        let plant = plant(&model(
+            &format!("Real x; Real T({attributes});"),
+            "der(x) = T; max(T - 300, 0)^2 = x;",
+        ));
+        let found = slopes(&plant, &[("x", 1e4)])[0];
+        assert!((found - 400.0).abs() < 1e-9, "{attributes}: {found}");
+    }
+    let found = refused(&model("Real x; Real T;", "der(x) = T; min(T, -3)^2 = x;"));
+    assert!(found.message.contains("do not determine `T`"), "{found}");
+}
+
 #[test]
 fn long_loops_are_torn() {
     let text = "model M parameter Integer n = 20000; Real a[n]; Real x; equation der(x) = a[1]; \
