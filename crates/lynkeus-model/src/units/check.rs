@@ -208,10 +208,17 @@ impl Walk<'_> {
         let (operator, _) = *rest.first()?;
         if is_sum(operator) {
             let mut unit = self.unit(head);
-            for &(_, operand) in rest {
+            for &(operator, operand) in rest {
                 let next = self.unit(operand);
                 let place = span(self, head).to(span(self, operand));
+                let has_offset = |unit: &Option<Unit>| unit.as_ref().is_some_and(|u| u.has_offset);
+                let is_difference = matches!(operator, B::Subtract | B::ElementSubtract)
+                    && has_offset(&unit)
+                    && has_offset(&next);
                 unit = self.compare(unit, next, place, "what is added");
+                if is_difference {
+                    unit = unit.map(|unit| unit.difference());
+                }
             }
             return unit;
         }
