@@ -19,6 +19,8 @@ pub(crate) const MAX_ELABORATED: u64 = 1_000_000;
 pub(crate) const MAX_SCALARS: u64 = 200_000;
 /// Most bytes of names, units and descriptions when arrays are written out.
 pub(crate) const MAX_TEXT: u64 = 32 << 20;
+/// Most imports of one class: each may mean any name in it.
+pub(crate) const MAX_IMPORTS: usize = 1_000;
 /// Longest name in bytes.
 pub(crate) const MAX_NAME: usize = 250;
 /// Most dimensions of an array.

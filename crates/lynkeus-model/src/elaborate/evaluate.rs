@@ -3,6 +3,7 @@
 use lynkeus_expr::{Graph, Node, Unary};
 
 use super::arithmetic::unequal_sizes;
+use super::branches::{Branches, OnPath};
 use super::execute::Claim;
 use super::frame::Frame;
 use super::scope::{Mode, Scope};
@@ -38,7 +39,7 @@ pub(crate) struct Evaluator<'a> {
     /// functions around, innermost last
     pub(super) calls: Vec<usize>,
     /// conditions of the `if`s around
-    pub(super) conditions: Vec<Node>,
+    pub(super) conditions: Vec<OnPath>,
     /// what is to hold along a run
     pub(super) claims: Vec<Claim>,
     /// what tables are between their points
@@ -257,35 +258,31 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The truth value of a condition.
-    pub(crate) fn condition(&mut self, id: ExprId) -> Result<lynkeus_expr::Node> {
+    pub(crate) fn condition(&mut self, id: ExprId) -> Result<Node> {
         let value = self.value(id)?;
         self.boolean(&value, self.span(id))
     }
 
-    /// A known condition takes one branch and leaves the others unread, so that a loop may
-    /// hold `if i == 1 then … else x[i - 1]`.
     fn conditional(
         &mut self,
         branches: &'a [(ExprId, ExprId)],
         otherwise: ExprId,
     ) -> Result<Value> {
-        let mut open = vec![];
-        let mut last = otherwise;
-        for &(condition, value) in branches {
-            let node = self.condition(condition)?;
-            match self.graph.constant_value(node) {
-                Some(0.0) => {}
-                Some(_) => {
-                    last = value;
-                    break;
-                }
-                None => open.push((node, value)),
-            }
-        }
-        let mut result = self.value(last)?;
-        for (condition, value) in open.into_iter().rev() {
+        let branches = self.branches(branches.iter().copied(), otherwise)?;
+        let around = self.pass(&branches);
+        let result = self.chosen(branches);
+        self.conditions.truncate(around);
+        result
+    }
+
+    /// The values of the branches, joined.
+    fn chosen(&mut self, branches: Branches<ExprId>) -> Result<Value> {
+        let mut result = self.value(branches.last)?;
+        for (condition, value) in branches.open.into_iter().rev() {
             let span = self.span(value);
+            self.enter();
             let value = self.value(value)?;
+            self.conditions.pop();
             if value.dims() != result.dims() {
                 return Err(unequal_sizes(value.dims(), result.dims(), span));
             }

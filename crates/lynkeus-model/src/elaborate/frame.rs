@@ -52,6 +52,12 @@ impl Local {
 }
 
 impl Frame {
+    /// What a copy costs.
+    pub(super) fn size(&self) -> usize {
+        let elements = self.locals.values().map(|local| local.elements.len());
+        self.locals.len() + elements.sum::<usize>()
+    }
+
     /// What holds behind an `if`: the values of one branch or the other.
     pub(super) fn joined(condition: Node, yes: Frame, mut no: Frame, graph: &Graph) -> Frame {
         for (name, local) in &mut no.locals {

@@ -6,6 +6,7 @@ mod array_functions;
 mod arrays;
 mod assemble;
 mod attributes;
+mod branches;
 mod claims;
 mod evaluate;
 mod execute;

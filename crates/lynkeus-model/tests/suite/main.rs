@@ -7,6 +7,7 @@ mod flat_files;
 mod hostile;
 mod language;
 mod linear_loops;
+mod long_algorithms;
 mod ode_model;
 mod parameters;
 mod refusals;
