@@ -75,6 +75,9 @@ pub(super) fn parts<'a>(
     };
     let inputs: HashSet<Node> = inputs.into_iter().collect();
     for (place, (declaration, component)) in symbols.all().enumerate() {
+        if declaration.package.is_some() {
+            continue;
+        }
         let attributes = Attributes::new(context, symbols, declaration, component)?;
         let sorter = Sorter {
             context,

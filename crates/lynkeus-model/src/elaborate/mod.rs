@@ -14,6 +14,7 @@ mod flatten;
 mod frame;
 mod functions;
 mod inline;
+mod locals;
 mod monotone;
 mod names;
 mod operators;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::symbols::Context;
-use crate::flat::FlatModel;
+use crate::flat::{FlatModel, constant_label};
 use crate::syntax::ast::{Declaration, Kind, Variability};
 use crate::syntax::{Problem, Result, plain};
 
@@ -45,14 +45,24 @@ fn needs(
 ) -> Vec<usize> {
     let is_known = declaration.prefix.variability != Variability::Continuous;
     let binding = declaration.binding.filter(|_| is_known);
+    let own: Vec<&str> = context.model.scopes.iter().map(String::as_str).collect();
+    let package = declaration.package.as_deref();
+    let scopes = package.map_or(own, |package| vec![package]);
     let mut found = vec![];
     for root in declaration.dimensions.iter().copied().chain(binding) {
         for expression in context.ast.parts(root) {
             if matches!(expression.kind, Kind::Name | Kind::Path(_)) {
                 let name = plain(expression.span.text(context.source));
-                match by_name.get(&*name) {
-                    Some(&place) => found.push(place),
-                    None => members(context.model, by_name, &name, &mut found),
+                let before = found.len();
+                if package.is_none() {
+                    named(context.model, by_name, &name, &mut found);
+                }
+                let full = context.classes.full_names(&name, &scopes);
+                let mut constants = full.iter().map(|full| constant_label(full));
+                while found.len() == before
+                    && let Some(label) = constants.next()
+                {
+                    named(context.model, by_name, &label, &mut found);
                 }
             }
         }
@@ -60,6 +70,13 @@ fn needs(
     found.sort_unstable();
     found.dedup();
     found
+}
+
+fn named(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {
+    match by_name.get(name) {
+        Some(&place) => found.push(place),
+        None => members(model, by_name, name, found),
+    }
 }
 
 /// Declarations of the members of a record, and of elements that are declared by themselves.
@@ -73,10 +90,7 @@ fn members(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found:
     }
     for member in model.records.get(base).into_iter().flatten() {
         let full = format!("{base}.{member}");
-        match by_name.get(full.as_str()) {
-            Some(&place) => found.push(place),
-            None => members(model, by_name, &full, found),
-        }
+        named(model, by_name, &full, found);
     }
 }
 

@@ -6,12 +6,13 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Graph, Node};
 
 use super::evaluate::Evaluator;
+use super::frame::Frame;
 use super::order::{Order, order};
 use super::overrides::Overrides;
 use super::scope::{Mode, Named, Scope};
 use super::value::{Scalar, element_count, element_name};
 use crate::LoadOptions;
-use crate::flat::{Classes, FlatModel};
+use crate::flat::{Classes, FlatModel, constant_label};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
 use crate::syntax::ast::{Ast, Causality, Declaration, Kind, TypeName, Variability};
 use crate::syntax::{Problem, Result};
@@ -111,6 +112,21 @@ impl<'a> Symbols<'a> {
         Evaluator::new(source, ast, graph, budget, self, mode).within(context)
     }
 
+    /// For the declaration of a name: of a package, only what it knows.
+    pub(super) fn evaluator_of<'e>(
+        &'e self,
+        context: &'e Context<'a>,
+        declaration: &'e Declaration,
+        mode: Mode,
+    ) -> Evaluator<'e> {
+        let mut evaluator = self.evaluator(context, mode);
+        if let Some(package) = &declaration.package {
+            evaluator.scopes = vec![package];
+            evaluator.frame = Some(Frame::closed());
+        }
+        evaluator
+    }
+
     /// The symbols of parameters with their values, where they have one.
     pub(super) fn parameter_values(&self) -> HashMap<Node, Option<f64>> {
         let mut found = HashMap::new();
@@ -190,7 +206,7 @@ impl<'a> Symbols<'a> {
         context: &Context<'a>,
         declaration: &Declaration,
     ) -> Result<Vec<Option<usize>>> {
-        let mut evaluator = self.evaluator(context, Mode::Structural);
+        let mut evaluator = self.evaluator_of(context, declaration, Mode::Structural);
         let length = |&id| match context.ast.expression(id).kind {
             Kind::All => Ok(None),
             _ => evaluator.length(id).map(Some),
@@ -257,6 +273,28 @@ impl Scope for Symbols<'_> {
         }
     }
 
+    /// One of a package, or of the model and its bases; flat texts declare those of packages in
+    /// the model, by their names in full.
+    fn constant(&self, full: &str, mode: Mode) -> Named<'_> {
+        match self.named(&constant_label(full), mode) {
+            Named::Unknown => {}
+            found => return found,
+        }
+        let in_class = |class: &String| full.strip_prefix(class.as_str())?.strip_prefix('.');
+        let own = self.model.scopes.iter().find_map(in_class);
+        let own = own.or(full.contains('.').then_some(full));
+        let place = own.and_then(|name| self.by_name.get(name));
+        let declaration = place.and_then(|&place| self.declarations.get(place));
+        match (own, declaration) {
+            (Some(name), Some(declaration))
+                if declaration.prefix.variability == Variability::Constant =>
+            {
+                self.named(name, mode)
+            }
+            _ => Named::Unknown,
+        }
+    }
+
     fn dims(&self, name: &str) -> Option<&[usize]> {
         let place = self.by_name.get(name).copied();
         let declared = place.and_then(|place| self.components.get(place)?.as_ref());
@@ -282,7 +320,10 @@ impl Scope for Symbols<'_> {
     }
 
     fn names(&self) -> Vec<&str> {
-        self.by_name.keys().copied().collect()
+        let names = self.by_name.keys();
+        names
+            .map(|name| name.strip_prefix('.').unwrap_or(name))
+            .collect()
     }
 
     fn time(&self, mode: Mode) -> Option<Node> {

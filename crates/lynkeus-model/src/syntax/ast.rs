@@ -251,6 +251,8 @@ pub(crate) struct Declaration {
     pub attributes: Vec<Attribute>,
     pub binding: Option<ExprId>,
     pub description: Option<String>,
+    /// the package that it is a constant of: where the names in it are looked up
+    pub package: Option<String>,
 }
 
 /// `start = 1` in a declaration, or `x(start = 1) = 2` where it is a record.

@@ -27,7 +27,8 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> 
             .get(&declaration.label)
             .map(|known| known.unit.to_owned());
         if let Some(unit) = text.or(library).and_then(|text| Unit::parse(&text)) {
-            declared.insert(declaration.label.as_str(), unit);
+            let label = declaration.label.as_str();
+            declared.insert(label.strip_prefix('.').unwrap_or(label), unit);
         }
     }
     if declared.is_empty() {
@@ -40,7 +41,8 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> 
         tick: None,
         found: vec![],
     };
-    for declaration in &model.declarations {
+    // a package has names of its own
+    for declaration in model.declarations.iter().filter(|d| d.package.is_none()) {
         let Some(id) = declaration.binding else {
             continue;
         };

@@ -11,6 +11,7 @@ mod long_algorithms;
 mod ode_model;
 mod parameters;
 mod refusals;
+mod scopes;
 mod soup;
 mod support;
 mod tables;

@@ -318,6 +318,18 @@ fn assertions_count_where_their_branch_is_taken() {
 }
 
 #[test]
+fn sizes_of_variables_without_a_value_yet() {
+    let plant = plant(
+        "package P
+           function f input Real x[:]; output Real y[size(x, 1)];
+           algorithm for i in 1:size(y, 1) loop y[i] := i*x[i]; end for; end f;
+           model M Real x; Real v[3]; equation v = f({x, 2, 3}); der(x) = sum(v); end M;
+         end P;",
+    );
+    assert_eq!(slopes(&plant, &[("x", 1.0)]), [1.0 + 4.0 + 9.0]);
+}
+
+#[test]
 fn derivatives_of_expressions() {
     let plant = plant(
         "model M Real y(start = 1); Real T(start = 2); input Real w;
