@@ -9,6 +9,8 @@ use crate::syntax::{Problem, Result, Span};
 pub(crate) const MAX_SOURCE_BYTES: usize = 64 << 20;
 /// Deepest nesting of expressions and equations.
 pub(crate) const MAX_NESTING: usize = 200;
+/// Deepest nesting of expressions and statements with those of the functions that they call.
+pub(crate) const MAX_CALL_DEPTH: usize = 400;
 /// Most iterators of one loop or comprehension.
 pub(crate) const MAX_ITERATORS: usize = 32;
 /// Most expressions, equations and declarations in one file.

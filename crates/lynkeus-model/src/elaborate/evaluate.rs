@@ -11,7 +11,7 @@ use super::symbols::Context;
 use super::value::{Scalar, Value};
 use crate::Tables;
 use crate::flat::Classes;
-use crate::limits::Budget;
+use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
 use crate::syntax::{Problem, Result, Span};
@@ -38,6 +38,8 @@ pub(crate) struct Evaluator<'a> {
     pub(super) frame: Option<Frame>,
     /// functions around, innermost last
     pub(super) calls: Vec<usize>,
+    /// expressions and statements around, those of the callers included
+    pub(super) depth: usize,
     /// conditions of the `if`s around
     pub(super) conditions: Vec<OnPath>,
     /// what is to hold along a run
@@ -70,6 +72,7 @@ impl<'a> Evaluator<'a> {
             scopes: vec![],
             frame: None,
             calls: vec![],
+            depth: 0,
             conditions: vec![],
             claims: vec![],
             tables: Tables::Linear,
@@ -92,8 +95,31 @@ impl<'a> Evaluator<'a> {
         span.text(self.source)
     }
 
+    /// Goes one level deeper.
+    pub(super) fn deeper<T>(
+        &mut self,
+        span: Span,
+        run: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
+        if self.depth >= MAX_CALL_DEPTH {
+            let message = format!(
+                "nested more than {MAX_CALL_DEPTH} levels deep where functions are written out"
+            );
+            return Err(Problem::new(span, message)
+                .hint("name the inner parts with variables of their own"));
+        }
+        self.depth += 1;
+        let done = run(self);
+        self.depth -= 1;
+        done
+    }
+
     /// The value of an expression.
     pub(crate) fn value(&mut self, id: ExprId) -> Result<Value> {
+        self.deeper(self.span(id), |evaluator| evaluator.value_here(id))
+    }
+
+    fn value_here(&mut self, id: ExprId) -> Result<Value> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         self.budget.charge(1, span)?;

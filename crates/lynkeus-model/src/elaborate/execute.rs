@@ -69,7 +69,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn execute(&mut self, statements: &'a [Statement]) -> Result<Ended> {
         for statement in statements {
             self.budget.charge(1, statement.span)?;
-            let ended = self.statement(statement)?;
+            let ended = self.deeper(statement.span, |evaluator| evaluator.statement(statement))?;
             if ended != Ended::AtItsEnd {
                 return Ok(ended);
             }

@@ -37,6 +37,10 @@ impl Record {
 impl<'a> Evaluator<'a> {
     /// The record that an expression is; `None` where it is a number or an array.
     pub(super) fn record(&mut self, id: ExprId) -> Result<Option<Record>> {
+        self.deeper(self.span(id), |evaluator| evaluator.record_here(id))
+    }
+
+    fn record_here(&mut self, id: ExprId) -> Result<Option<Record>> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         match &expression.kind {
