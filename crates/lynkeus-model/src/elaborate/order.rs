@@ -1,10 +1,11 @@
 //! The order in which declarations can be given their sizes and values.
 
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 
 use super::symbols::Context;
 use crate::flat::{FlatModel, constant_label};
-use crate::syntax::ast::{Declaration, Kind, Variability};
+use crate::syntax::ast::{Declaration, ExprId, Kind, Variability};
 use crate::syntax::{Problem, Result, plain};
 
 /// What the declarations need of each other.
@@ -50,26 +51,49 @@ fn needs(
     let scopes = package.map_or(own, |package| vec![package]);
     let mut found = vec![];
     for root in declaration.dimensions.iter().copied().chain(binding) {
-        for expression in context.ast.parts(root) {
-            if matches!(expression.kind, Kind::Name | Kind::Path(_)) {
-                let name = plain(expression.span.text(context.source));
-                let before = found.len();
-                if package.is_none() {
-                    named(context.model, by_name, &name, &mut found);
-                }
-                let full = context.classes.full_names(&name, &scopes);
-                let mut constants = full.iter().map(|full| constant_label(full));
-                while found.len() == before
-                    && let Some(label) = constants.next()
-                {
-                    named(context.model, by_name, &label, &mut found);
-                }
+        for name in names(context, by_name, root) {
+            let before = found.len();
+            if package.is_none() {
+                named(context.model, by_name, &name, &mut found);
+            }
+            if found.len() > before {
+                continue;
+            }
+            let full = context.classes.full_names(&name, &scopes);
+            let mut constants = full.iter().map(|full| constant_label(full));
+            while found.len() == before
+                && let Some(label) = constants.next()
+            {
+                named(context.model, by_name, &label, &mut found);
             }
         }
     }
     found.sort_unstable();
     found.dedup();
     found
+}
+
+/// The names in an expression: `p[2]` where that is declared by itself, and not `p`.
+fn names<'a>(
+    context: &Context<'a>,
+    by_name: &HashMap<&str, usize>,
+    root: ExprId,
+) -> Vec<Cow<'a, str>> {
+    let text = |id: ExprId| plain(context.ast.expression(id).span.text(context.source));
+    let mut elements = HashSet::new();
+    for id in context.ast.ids(root) {
+        if let Kind::Index(base, _) = context.ast.expression(id).kind
+            && by_name.contains_key(&*text(id))
+        {
+            elements.insert(base);
+            elements.insert(id);
+        }
+    }
+    let is_name = |id: &ExprId| match context.ast.expression(*id).kind {
+        Kind::Name | Kind::Path(_) => !elements.contains(id),
+        _ => elements.contains(id),
+    };
+    context.ast.ids(root).filter(is_name).map(text).collect()
 }
 
 fn named(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {

@@ -69,10 +69,13 @@ fn names_among_many_imports() {
     assert_eq!(found.message, "a class with more than 1,000 imports");
 }
 
+/// Statements that give a value to `y`, so many levels deep.
+type Body<'a> = &'a dyn Fn(&str, usize) -> String;
+
 /// Functions that call each other, each from as deep as a text may be nested.
 #[test]
 fn depth_adds_up_over_calls() {
-    let text = |count: usize, levels: usize, body: &dyn Fn(&str, usize) -> String| {
+    let text = |count: usize, levels: usize, body: Body<'_>| {
         let mut text = String::from("package P ");
         for k in 0..count {
             let value = match k {
@@ -94,12 +97,24 @@ fn depth_adds_up_over_calls() {
         |v: &str, n: usize| around("for i in 1:1 loop ", &format!("y := {v};"), "end for; ", n);
     let branches =
         |v: &str, n: usize| around("if x > 0 then ", &format!("y := {v};"), "end if; ", n);
-    let bodies: [&dyn Fn(&str, usize) -> String; 3] = [&value, &loops, &branches];
-    for body in bodies {
+    for body in [&value as Body<'_>, &loops, &branches] {
         let found = read(&text(39, 190, body)).unwrap_err();
         let limit = "nested more than 400 levels";
         assert!(found.message.starts_with(limit), "{}", found.message);
         assert!(read(&text(39, 3, body)).is_ok());
         assert!(read(&text(1, 190, body)).is_ok());
     }
+}
+
+#[test]
+fn a_chain_of_parameters_declared_one_by_one() {
+    let mut text = String::from("model M parameter Real p[1] = 1; ");
+    for i in 2..=20_000 {
+        write!(text, "parameter Real p[{i}] = p[{}] + 1; ", i - 1).unwrap();
+    }
+    let plant = read(&(text + "Real x; equation der(x) = p[20000]; end M;")).unwrap();
+    assert_eq!(
+        plant.graph.constant_value(plant.derivatives[0]),
+        Some(20_000.0)
+    );
 }

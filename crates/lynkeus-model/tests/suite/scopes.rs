@@ -128,3 +128,20 @@ fn a_type_may_begin_like_a_derivative() {
     let model = "derating d = 2; derating dx; equation der(x) = dx; dx = d*x;";
     assert_eq!(slope(types, model), 2.0);
 }
+
+#[test]
+fn elements_declared_by_themselves_are_made_from_each_other() {
+    let model =
+        "parameter Real p[1] = 3; parameter Real p[2] = p[3] + p[1]; parameter Real p[3] = 2*p[1];
+                 parameter Real c[1,2] = p[ 2 ]; parameter Integer i = 2; parameter Real c[1,1] = 1;
+                 equation der(x) = p[i] + 100*sum(c);";
+    assert_eq!(slope("", model), 9.0 + 1000.0);
+    let found = refused(
+        "model M parameter Real p[1] = p[2]; parameter Real p[2] = p[1]; Real x; equation der(x) = p[1]; end M;",
+    );
+    assert!(
+        found
+            .message
+            .starts_with("these declarations need each other: `p[1]` → `p[2]`")
+    );
+}
