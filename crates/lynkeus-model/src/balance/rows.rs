@@ -1,6 +1,6 @@
-//! Equations of a block as sparse linear rows, with what is not linear apart.
+//! Equations of a block as sparse linear rows.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
@@ -14,14 +14,12 @@ pub(super) struct Row {
     /// by place of the unknown in the block
     pub coefficients: BTreeMap<usize, Node>,
     pub rest: Option<Node>,
-    /// unknowns that stand in `rest`, where it is not linear in them
-    pub nonlinear: BTreeSet<usize>,
 }
 
 impl Row {
     /// Number of unknowns.
     pub(super) fn len(&self) -> usize {
-        self.coefficients.len() + self.nonlinear.len()
+        self.coefficients.len()
     }
 }
 
@@ -34,8 +32,8 @@ pub(super) struct Rows<'a> {
 
 impl Rows<'_> {
     /// The row of a residual, in one walk from the root to the unknowns: every node passes its
-    /// factor on.
-    pub(super) fn row(&self, residual: Node, span: Span) -> Result<Row> {
+    /// factor on. None where it is not linear.
+    pub(super) fn row(&self, residual: Node, span: Span) -> Result<Option<Row>> {
         let graph = self.linear.graph;
         let below = self.linear.below(residual, span)?;
         let mut holds: HashSet<Node> = HashSet::new();
@@ -63,28 +61,14 @@ impl Rows<'_> {
                 }
                 None => {
                     if !walk.through(node, passed) {
-                        walk.add_rest(node, passed);
-                        self.collect(node, &walk.holds, &mut walk.row.nonlinear);
+                        return Ok(None);
                     }
                 }
             }
         }
         let is_zero = |factor: &Node| graph.constant_value(*factor) == Some(0.0);
         walk.row.coefficients.retain(|_, factor| !is_zero(factor));
-        Ok(walk.row)
-    }
-
-    /// Places of the unknowns in an expression.
-    fn collect(&self, root: Node, holds: &HashSet<Node>, into: &mut BTreeSet<usize>) {
-        let mut seen: HashSet<Node> = HashSet::new();
-        let mut stack = vec![root];
-        while let Some(node) = stack.pop() {
-            if !holds.contains(&node) || !seen.insert(node) {
-                continue;
-            }
-            into.extend(self.place.get(&node));
-            stack.extend(arguments(self.linear.graph.op(node)));
-        }
+        Ok(Some(walk.row))
     }
 }
 
