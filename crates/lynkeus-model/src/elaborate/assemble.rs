@@ -74,7 +74,7 @@ pub(super) fn parts<'a>(
         warnings: vec![],
     };
     let inputs: HashSet<Node> = inputs.into_iter().collect();
-    for (place, (declaration, component)) in symbols.all().enumerate() {
+    for (place, declaration, component) in symbols.placed() {
         if declaration.package.is_some() {
             continue;
         }

@@ -149,6 +149,11 @@ impl<'a> Evaluator<'a> {
             Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
             _ => match self.builtin(name) {
                 Some(scalar) => Ok(Value::Scalar(scalar)),
+                None if self.scope.dims(name).is_some() => {
+                    let message = format!("`{name}` is not a variable of this function");
+                    Err(Problem::new(span, message)
+                        .hint("functions read their own variables and constants: add an input"))
+                }
                 None => Err(self.unknown_name(span)),
             },
         }

@@ -79,7 +79,11 @@ impl<'a> Symbols<'a> {
         };
         let sizes = Sizes::new();
         for place in sequence {
-            let component = symbols.component(context, &overrides, &sizes, place)?;
+            let component = symbols.component(context, &overrides, &sizes, place);
+            if component.is_err() && model.possible.contains(&model.declarations[place].label) {
+                continue;
+            }
+            let component = component?;
             if component.is_known {
                 let elements = component
                     .elements
@@ -97,8 +101,16 @@ impl<'a> Symbols<'a> {
 
     /// Declarations with their components, in order of the text.
     pub(crate) fn all(&self) -> impl Iterator<Item = (&'a Declaration, &Component)> {
-        let pairs = self.declarations.iter().zip(&self.components);
-        pairs.filter_map(|(declaration, component)| Some((declaration, component.as_ref()?)))
+        self.placed()
+            .map(|(_, declaration, component)| (declaration, component))
+    }
+
+    /// The same with their places among the declarations.
+    pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &'a Declaration, &Component)> {
+        let pairs = self.declarations.iter().zip(&self.components).enumerate();
+        pairs.filter_map(|(place, (declaration, component))| {
+            Some((place, declaration, component.as_ref()?))
+        })
     }
 
     pub(crate) fn evaluator<'e>(&'e self, context: &'e Context<'a>, mode: Mode) -> Evaluator<'e> {

@@ -24,14 +24,21 @@ impl Flattening<'_> {
                 let full = format!("{}.{}", package.path, constant.label);
                 let label = label(&full);
                 let is_constant = constant.prefix.variability != Variability::Continuous;
-                if !is_constant || !is_named(&named, &full) || self.declared.contains(&label) {
+                let meaning = meaning(&named, &full);
+                if !is_constant || meaning == Meaning::None || self.declared.contains(&label) {
                     continue;
                 }
                 let mut copy = constant.clone();
-                copy.label = label;
+                copy.label.clone_from(&label);
                 copy.package = Some(package.path.clone());
                 copy.prefix.variability = Variability::Constant;
-                self.declaration(copy, &package.path)?;
+                let declared = self.declaration(copy, &package.path);
+                // what nobody may mean must not end the reading
+                if meaning == Meaning::Possible {
+                    self.model.possible.insert(label);
+                } else {
+                    declared?;
+                }
             }
         }
         Ok(())
@@ -73,14 +80,26 @@ fn insert(names: &mut HashSet<String>, name: &str) {
     }
 }
 
-/// Whether a name in full, or what is behind one of its dots, is among the names.
-fn is_named(names: &HashSet<String>, full: &str) -> bool {
-    let mut rest = Some(full);
-    while let Some(name) = rest {
-        if names.contains(name) {
-            return true;
+/// Whether a constant is meant by a name of the text.
+#[derive(Clone, Copy, PartialEq)]
+enum Meaning {
+    None,
+    /// its last part stands there alone, which may be the name of a variable
+    Possible,
+    Certain,
+}
+
+/// The meaning of a name in full that stands in the text as it is, or behind one of its dots.
+fn meaning(names: &HashSet<String>, full: &str) -> Meaning {
+    let mut rest = full;
+    while let Some((_, below)) = rest.split_once('.') {
+        if names.contains(rest) {
+            return Meaning::Certain;
         }
-        rest = name.split_once('.').map(|(_, below)| below);
+        rest = below;
     }
-    false
+    match names.contains(rest) {
+        true => Meaning::Possible,
+        false => Meaning::None,
+    }
 }

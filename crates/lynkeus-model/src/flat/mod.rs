@@ -40,6 +40,8 @@ pub(crate) struct FlatModel {
     pub library: HashMap<String, &'static LibraryType>,
     /// names of the members of each record, by its label
     pub records: HashMap<String, Vec<String>>,
+    /// labels of constants that the text may not mean
+    pub possible: HashSet<String>,
     pub equations: Vec<Equation>,
     pub initial: Vec<Equation>,
     pub algorithms: Vec<Vec<Statement>>,

@@ -25,7 +25,7 @@ fn a_function_reads_the_constants_of_its_package() {
            function f input Real x; output Real y; algorithm y := k*x; end f; end P;
          model M parameter Real k = 5; Real x; equation der(x) = P.f(x) + k; end M; end A;",
     );
-    assert_eq!(found.message, "unknown name `k`");
+    assert_eq!(found.message, "`k` is not a variable of this function");
     // but the constants of a model around it
     let inside = "constant Real k = 4;
                   function f input Real x; output Real y; algorithm y := k*x; end f;
@@ -144,4 +144,35 @@ fn elements_declared_by_themselves_are_made_from_each_other() {
             .message
             .starts_with("these declarations need each other: `p[1]` → `p[2]`")
     );
+}
+
+/// Names that a package shares with the model, and that only the model means.
+#[test]
+fn constants_that_nobody_means_need_no_value() {
+    let package = "package P constant Real k; constant Real m = f(2); constant Foreign q = 1;
+                     function f input Real x; output Real y; external \"C\"; end f; end P;";
+    let model = "parameter Real k = 5; Real m = 2; Real q = 1; equation der(x) = k + m + q;";
+    assert_eq!(slope(package, model), 8.0);
+    let text = format!(
+        "package A {package} model M parameter Real k = 5; parameter Real l = 2*k; parameter Real m = 1;
+         Real x; equation der(x) = k + l + m; end M; end A;"
+    );
+    let options = lynkeus_model::LoadOptions {
+        symbolic_parameters: true,
+        ..Default::default()
+    };
+    let plant = lynkeus_model::Plant::from_modelica(&text, "m.mo", &options).unwrap();
+    let parameters = plant.parameters.iter().map(|p| p.variable.name.as_str());
+    assert_eq!(parameters.collect::<Vec<_>>(), ["k", "m"]);
+    let used = |name: &str| {
+        refused(&format!(
+            "package A {package} model M Real x; equation der(x) = {name}; end M; end A;"
+        ))
+    };
+    assert_eq!(used("P.k").message, "parameter `A.P.k` has no value");
+    assert_eq!(
+        used("P.m").message,
+        "function `A.P.f` has no algorithm in this text"
+    );
+    assert_eq!(used("P.q").message, "unknown type `Foreign`");
 }
