@@ -72,7 +72,26 @@ pub enum Binary {
     Or,
 }
 
+impl Unary {
+    /// Every operation.
+    pub const ALL: [Self; 17] = {
+        use Unary::*;
+        [
+            Neg, Abs, Sign, Floor, Sqrt, Exp, Ln, Sin, Cos, Tan, Asin, Acos, Atan, Sinh, Cosh,
+            Tanh, Not,
+        ]
+    };
+}
+
 impl Binary {
+    /// Every operation, the arithmetic ones first.
+    pub const ALL: [Self; 13] = {
+        use Binary::*;
+        [
+            Add, Sub, Mul, Div, Pow, Atan2, Min, Max, Less, LessEq, Equal, And, Or,
+        ]
+    };
+
     /// True where exchanging the arguments gives the same value.
     pub(crate) fn commutes(self) -> bool {
         use Binary::*;

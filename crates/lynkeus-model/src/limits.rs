@@ -9,6 +9,8 @@ use crate::syntax::{Problem, Result, Span};
 pub(crate) const MAX_SOURCE_BYTES: usize = 64 << 20;
 /// Deepest nesting of expressions and equations.
 pub(crate) const MAX_NESTING: usize = 200;
+/// Deepest nesting of expressions and statements with those of the functions that they call.
+pub(crate) const MAX_CALL_DEPTH: usize = 400;
 /// Most iterators of one loop or comprehension.
 pub(crate) const MAX_ITERATORS: usize = 32;
 /// Most expressions, equations and declarations in one file.
@@ -19,6 +21,8 @@ pub(crate) const MAX_ELABORATED: u64 = 1_000_000;
 pub(crate) const MAX_SCALARS: u64 = 200_000;
 /// Most bytes of names, units and descriptions when arrays are written out.
 pub(crate) const MAX_TEXT: u64 = 32 << 20;
+/// Most imports of one class: each may mean any name in it.
+pub(crate) const MAX_IMPORTS: usize = 1_000;
 /// Longest name in bytes.
 pub(crate) const MAX_NAME: usize = 250;
 /// Most dimensions of an array.

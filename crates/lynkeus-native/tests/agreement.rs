@@ -4,42 +4,6 @@ use lynkeus_expr::{Binary, Graph, Node, Tape, Unary};
 use lynkeus_native::Function;
 use proptest::prelude::*;
 
-const UNARY: [Unary; 17] = [
-    Unary::Neg,
-    Unary::Abs,
-    Unary::Sign,
-    Unary::Floor,
-    Unary::Sqrt,
-    Unary::Exp,
-    Unary::Ln,
-    Unary::Sin,
-    Unary::Cos,
-    Unary::Tan,
-    Unary::Asin,
-    Unary::Acos,
-    Unary::Atan,
-    Unary::Sinh,
-    Unary::Cosh,
-    Unary::Tanh,
-    Unary::Not,
-];
-
-const BINARY: [Binary; 13] = [
-    Binary::Add,
-    Binary::Sub,
-    Binary::Mul,
-    Binary::Div,
-    Binary::Pow,
-    Binary::Atan2,
-    Binary::Min,
-    Binary::Max,
-    Binary::Less,
-    Binary::LessEq,
-    Binary::Equal,
-    Binary::And,
-    Binary::Or,
-];
-
 /// One step of a random program: what to do with which earlier values.
 #[derive(Clone, Debug)]
 struct Draw {
@@ -85,7 +49,7 @@ fn build(g: &Graph, inputs: &[Node], draws: &[Draw]) -> Vec<Node> {
             nodes[nodes.len() - 1 - draw.from[i] % span]
         };
         match draw.kind {
-            0..5 => nodes.push(g.unary(UNARY[draw.op % UNARY.len()], pick(0))),
+            0..5 => nodes.push(g.unary(Unary::ALL[draw.op % Unary::ALL.len()], pick(0))),
             5 => nodes.push(g.powi(pick(0), draw.power)),
             6 => nodes.push(g.select(pick(0), pick(1), pick(2))),
             7 => {
@@ -94,8 +58,8 @@ fn build(g: &Graph, inputs: &[Node], draws: &[Draw]) -> Vec<Node> {
                 nodes.push(solution.rcond);
             }
             8 => nodes.push(g.constant(draw.constant).node()),
-            9..14 => nodes.push(g.binary(BINARY[draw.op % 4], pick(0), pick(1))),
-            _ => nodes.push(g.binary(BINARY[draw.op % BINARY.len()], pick(0), pick(1))),
+            9..14 => nodes.push(g.binary(Binary::ALL[draw.op % 4], pick(0), pick(1))),
+            _ => nodes.push(g.binary(Binary::ALL[draw.op % Binary::ALL.len()], pick(0), pick(1))),
         }
     }
     let mut outputs: Vec<Node> = nodes.iter().rev().step_by(7).copied().collect();

@@ -1,5 +1,7 @@
 //! Linear systems and implicit functions as nodes.
 
+use std::collections::HashSet;
+
 use super::{Graph, Inner, Key, Node};
 use crate::{Binary, Implicit, Nodes, Op, Unary};
 
@@ -164,19 +166,20 @@ impl Graph {
     /// The roots, and of every implicit function below them what it makes zero, there: what
     /// happens inside is then seen among the nodes.
     pub fn with_residuals(&self, roots: &[Node]) -> Vec<Node> {
-        let (mut all, mut seen) = (roots.to_vec(), 0);
+        let (mut all, mut seen) = (roots.to_vec(), HashSet::new());
         loop {
             let nodes = self.reachable(&all).into_iter();
+            // a loop within a loop may be a node that was made before those seen so far
             let calls = nodes.filter_map(|node| Some((node, self.implicit_call(node)?)));
-            let calls: Vec<(Node, ImplicitCall)> = calls.collect();
-            for (node, call) in &calls[seen..] {
-                let at = call.at(self, *node);
-                all.extend(call.function.residual(&Nodes(self), &at));
-            }
-            if calls.len() == seen {
+            let calls: Vec<(Node, ImplicitCall)> =
+                calls.filter(|(node, _)| seen.insert(*node)).collect();
+            if calls.is_empty() {
                 return all;
             }
-            seen = calls.len();
+            for (node, call) in calls {
+                let at = call.at(self, node);
+                all.extend(call.function.residual(&Nodes(self), &at));
+            }
         }
     }
 

@@ -186,13 +186,16 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Whether g may vanish within a few roundings of z. NaN is none.
-    fn is_root(&self, z: &[f64]) -> bool {
+    /// Whether g may vanish within a few roundings of z. NaN is none; nor is a jump over zero.
+    fn is_root(&mut self, z: &[f64]) -> bool {
         let n = z.len();
         let near = |z: f64| Interval::point(z).inflate(LAST * z.abs());
-        let z = z.iter().map(|&z| near(z));
         let p = self.at[n..].iter().map(|&p| near(p));
-        let at: Vec<Interval> = z.chain(p).collect();
+        let at: Vec<Interval> = z.iter().map(|&z| near(z)).chain(p).collect();
+        let steps = self.function.steps_in(&Intervals, &at);
+        if steps.iter().any(|step| !step.is_point()) {
+            return self.residual(z).iter().all(|&g| g == 0.0);
+        }
         let g = self.function.residual(&Intervals, &at);
         g.iter()
             .all(|g| g.contains_zero() && g.lo().is_finite() && g.hi().is_finite())

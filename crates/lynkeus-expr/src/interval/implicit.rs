@@ -141,10 +141,13 @@ impl Search<'_> {
             let terms = g.iter().zip(&c[i * n..]);
             terms.fold(Interval::ZERO, |sum, (&g, &c)| sum + Interval::point(c) * g)
         };
-        (0..n).all(|i| {
+        let changes = (0..n).all(|i| {
             let (low, high) = (face(i, sides[i].lo()), face(i, sides[i].hi()));
             !low.is_empty() && !high.is_empty() && low.hi() <= 0.0 && high.lo() >= 0.0
-        })
+        });
+        // where C were singular, C g could vanish and g not
+        let exact: Sides = c.iter().map(|&c| Interval::point(c)).collect();
+        changes && solve(&exact, &vec![Interval::ZERO; n]).1
     }
 
     /// A point of the box: the declared start where a side has no end.

@@ -1,7 +1,7 @@
 //! Interval operations hold the exact value at every member, and the value `f64` arithmetic finds there.
 
 use crate::exact::{Exact, holds};
-use crate::sample::{BINARY, POWERS, UNARY, interval_and_member};
+use crate::sample::{POWERS, interval_and_member};
 use astro_float::BigFloat;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Binary, Interval, Reals, Unary};
@@ -61,7 +61,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1500))]
 
     #[test]
-    fn unary((x, member) in interval_and_member(), op in prop::sample::select(&UNARY[..])) {
+    fn unary((x, member) in interval_and_member(), op in prop::sample::select(&Unary::ALL[..])) {
         let result = Intervals.unary(op, &x);
         let float = Reals.unary(op, &member);
         let exact = exact_unary(op, member).unwrap_or_else(|| FUNCTIONS.constant(float));
@@ -73,7 +73,7 @@ proptest! {
     fn binary(
         (x, a) in interval_and_member(),
         (y, b) in interval_and_member(),
-        op in prop::sample::select(&BINARY[..]),
+        op in prop::sample::select(&Binary::ALL[..]),
     ) {
         let result = Intervals.binary(op, &x, &y);
         let float = Reals.binary(op, &a, &b);
@@ -86,7 +86,7 @@ proptest! {
     fn binary_at_bounds(
         ends in prop::array::uniform4(-2_i8..=2),
         place in prop::array::uniform2(prop::bool::ANY),
-        op in prop::sample::select(&BINARY[..]),
+        op in prop::sample::select(&Binary::ALL[..]),
     ) {
         let [p, q, r, s] = ends.map(f64::from);
         let x = Interval::new(p.min(q), p.max(q)).expect("in order");
@@ -125,7 +125,7 @@ proptest! {
     #[test]
     fn halves_stay_inside_the_whole(
         (x, _) in interval_and_member(),
-        op in prop::sample::select(&UNARY[..]),
+        op in prop::sample::select(&Unary::ALL[..]),
     ) {
         let whole = Intervals.unary(op, &x);
         let (left, right) = x.bisect();
@@ -153,11 +153,11 @@ proptest! {
 #[test]
 fn the_empty_set_stays_empty() {
     let x = Interval::new(1.0, 2.0).expect("in order");
-    for op in UNARY {
+    for op in Unary::ALL {
         let result = Intervals.unary(op, &Interval::EMPTY);
         assert!(result.is_empty() && !result.is_defined(), "{op:?}");
     }
-    for op in BINARY {
+    for op in Binary::ALL {
         for (a, b) in [(x, Interval::EMPTY), (Interval::EMPTY, x)] {
             let result = Intervals.binary(op, &a, &b);
             assert!(result.is_empty() && !result.is_defined(), "{op:?}");

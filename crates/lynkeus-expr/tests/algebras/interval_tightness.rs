@@ -1,6 +1,6 @@
 //! Enclosures that are not wider than the rounding explains.
 
-use crate::sample::{BINARY, UNARY, number};
+use crate::sample::number;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Algebra, Binary, Interval, Reals, Unary};
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
 
     #[test]
-    fn images_of_points(x in number(), op in prop::sample::select(&UNARY[..])) {
+    fn images_of_points(x in number(), op in prop::sample::select(&Unary::ALL[..])) {
         let result = Intervals.unary(op, &Interval::point(x));
         let value = Reals.unary(op, &x);
         prop_assume!(value.is_finite() && x.abs() < 1e6);
@@ -59,7 +59,7 @@ proptest! {
     fn images_of_two_points(
         x in number(),
         y in number(),
-        op in prop::sample::select(&BINARY[..]),
+        op in prop::sample::select(&Binary::ALL[..]),
     ) {
         let result = Intervals.binary(op, &Interval::point(x), &Interval::point(y));
         let value = Reals.binary(op, &x, &y);
@@ -79,7 +79,7 @@ proptest! {
     fn images_of_intervals(
         lo in -6.0_f64..6.0,
         width in 0.0_f64..8.0,
-        op in prop::sample::select(&UNARY[..]),
+        op in prop::sample::select(&Unary::ALL[..]),
     ) {
         let x = Interval::new(lo, lo + width).expect("in order");
         let result = Intervals.unary(op, &x);

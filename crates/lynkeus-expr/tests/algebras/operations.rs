@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Binary, Expr, Graph, Node, Tape, Unary};
 
-use crate::sample::{BINARY, POWERS, UNARY};
+use crate::sample::POWERS;
 
 /// One operation as a function of some symbols.
 pub struct Case {
@@ -43,14 +43,14 @@ impl Case {
 
 /// Every operation; those with kinks appear on either side of them.
 pub fn cases() -> Vec<Case> {
-    let unary = UNARY.iter().flat_map(|&op| {
+    let unary = Unary::ALL.iter().flat_map(|&op| {
         unary_domains(op).iter().map(move |&domain| {
             Case::new(format!("{op:?}"), &[domain], |g, x| {
                 g.unary(op, x[0].node())
             })
         })
     });
-    let binary = BINARY.iter().flat_map(|&op| {
+    let binary = Binary::ALL.iter().flat_map(|&op| {
         binary_domains(op).iter().map(move |domain| {
             Case::new(format!("{op:?}"), domain, |g, x| {
                 g.binary(op, x[0].node(), x[1].node())

@@ -1,6 +1,5 @@
 //! Random graphs: recipes that can be followed again and again, on any graph.
 
-use crate::sample::{BINARY, UNARY};
 use lynkeus_expr::{Algebra, Binary, Expr, Graph, Node, Nodes, Unary};
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -39,8 +38,8 @@ pub fn recipe(steps: usize) -> impl Strategy<Value = Vec<Step>> {
     let kind = prop_oneof![
         1 => (-2.0..2.0).prop_map(Kind::Constant),
         1 => prop::sample::select(vec![0.0, 1.0, -1.0, 2.0]).prop_map(Kind::Constant),
-        8 => prop::sample::select(&UNARY[..]).prop_map(Kind::Unary),
-        10 => prop::sample::select(&BINARY[..]).prop_map(Kind::Binary),
+        8 => prop::sample::select(&Unary::ALL[..]).prop_map(Kind::Unary),
+        10 => prop::sample::select(&Binary::ALL[..]).prop_map(Kind::Binary),
         // Powers in which the order of the products makes no difference.
         2 => prop::sample::select(vec![-1, 0, 2, 3]).prop_map(Kind::Powi),
         1 => Just(Kind::Select),

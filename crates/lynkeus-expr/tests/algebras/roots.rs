@@ -81,6 +81,24 @@ fn a_jump_in_the_loop_is_not_overlooked() {
     );
 }
 
+/// Where g jumps over zero there is no root, wherever the jump is.
+#[test]
+fn a_jump_over_zero_is_no_root() {
+    for place in [0.0, 1.5, -7.25e3] {
+        let jump = single(0.3, (-1e4, 1e4), |z, x| {
+            let step = (z - place).greater(z.graph().constant(0.0));
+            z - place + step.select(x, -x)
+        });
+        let root = |x: f64| jump.eval_in(&Reals, &[x])[0];
+        assert!(((root(-2.0) - place).abs() - 2.0).abs() < 1e-9, "{place}");
+        assert_eq!(root(0.0), place);
+        assert!(root(3.0).is_nan(), "{place}: {}", root(3.0));
+        let floor = single(place + 0.3, (-1e4, 1e4), |z, x| (z - place).floor() - x);
+        assert!(floor.eval_in(&Reals, &[0.5])[0].is_nan(), "{place}");
+        assert_eq!((floor.eval_in(&Reals, &[0.0])[0] - place).floor(), 0.0);
+    }
+}
+
 #[test]
 fn an_unbounded_range_is_no_obstacle_where_the_slope_has_one_sign() {
     let root = single(0.0, ALL, |z, x| z + z.exp() - x);
@@ -180,6 +198,13 @@ fn loops_are_rebuilt_over_other_arguments() {
         value(&graph, x.node(), outer, 1.4),
     );
     assert_eq!(found, expected);
+    // the loop within is seen as well where another one was made after it
+    let alone = graph.with_residuals(&[outer]);
+    let late = Implicit::solve(&graph, &[unknown(u)], &[(u + u.exp() - x).node()])
+        .expect("it is well-formed")[0];
+    let both = graph.with_residuals(&[outer, late]);
+    assert!(alone.len() == 3 && both.len() == 5);
+    assert!(alone.iter().all(|node| both.contains(node)));
     let copy = Graph::new();
     let image = copy.copied(&graph, &[outer, x.node()]);
     assert_eq!(value(&copy, image[&x.node()], image[&outer], 1.4), expected);

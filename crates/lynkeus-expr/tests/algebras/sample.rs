@@ -1,43 +1,7 @@
 //! Random numbers and intervals of every kind.
 
-use lynkeus_expr::{Binary, Interval, Unary};
+use lynkeus_expr::Interval;
 use proptest::prelude::*;
-
-pub const UNARY: [Unary; 17] = [
-    Unary::Neg,
-    Unary::Abs,
-    Unary::Sign,
-    Unary::Floor,
-    Unary::Sqrt,
-    Unary::Exp,
-    Unary::Ln,
-    Unary::Sin,
-    Unary::Cos,
-    Unary::Tan,
-    Unary::Asin,
-    Unary::Acos,
-    Unary::Atan,
-    Unary::Sinh,
-    Unary::Cosh,
-    Unary::Tanh,
-    Unary::Not,
-];
-
-pub const BINARY: [Binary; 13] = [
-    Binary::Add,
-    Binary::Sub,
-    Binary::Mul,
-    Binary::Div,
-    Binary::Pow,
-    Binary::Atan2,
-    Binary::Min,
-    Binary::Max,
-    Binary::Less,
-    Binary::LessEq,
-    Binary::Equal,
-    Binary::And,
-    Binary::Or,
-];
 
 pub const POWERS: [i32; 12] = [-9, -4, -3, -2, -1, 0, 1, 2, 3, 4, 7, 12];
 

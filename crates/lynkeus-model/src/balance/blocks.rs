@@ -101,11 +101,9 @@ impl<'a> Solver<'a> {
             .iter()
             .map(|&(equation, unknown)| (&equations[equation], &unknowns[unknown]))
             .collect();
-        let rows = self.rows(&pairs)?;
-        // what is not linear stays so whatever is taken out
-        if rows.iter().any(|row| !row.nonlinear.is_empty()) {
+        let Some(rows) = self.rows(&pairs)? else {
             return self.implicit(block);
-        }
+        };
         let span = pairs.first().map(|(equation, _)| equation.span);
         let graph = self.system.graph;
         let core = eliminate::core(graph, &self.budget, span.unwrap_or_default(), rows)?;
@@ -157,7 +155,8 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn rows(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Vec<Row>> {
+    /// The equations as rows; none where one of them is not linear.
+    fn rows(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Option<Vec<Row>>> {
         let graph = self.system.graph;
         let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
         let rows = Rows {

@@ -55,7 +55,7 @@ struct Elimination<'a> {
     span: Span,
     /// `None` once a row gives its unknown
     rows: Vec<Option<Row>>,
-    /// rows that hold each unknown, linearly and otherwise
+    /// rows that hold each unknown
     holding: Vec<BTreeSet<usize>>,
     queue: BTreeSet<(usize, usize)>,
     given: Vec<Given>,
@@ -67,7 +67,7 @@ impl<'a> Elimination<'a> {
         let mut queue = BTreeSet::new();
         for (place, row) in rows.iter().enumerate() {
             queue.insert((row.len(), place));
-            for &column in row.coefficients.keys().chain(&row.nonlinear) {
+            for &column in row.coefficients.keys() {
                 holding[column].insert(place);
             }
         }
@@ -101,8 +101,7 @@ impl<'a> Elimination<'a> {
     fn pivot(&self, row: &Row) -> Option<(usize, f64)> {
         let factors = row.coefficients.iter().filter_map(|(&column, &node)| {
             let value = self.graph.constant_value(node)?;
-            let apart = !row.nonlinear.contains(&column);
-            (value != 0.0 && apart).then_some((column, value))
+            (value != 0.0).then_some((column, value))
         });
         let factors: Vec<(usize, f64)> = factors.collect();
         let largest = factors
@@ -116,7 +115,7 @@ impl<'a> Elimination<'a> {
     }
 
     fn take_out(&mut self, place: usize, column: usize, factor: f64, row: Row) -> Result<()> {
-        for &other in row.coefficients.keys().chain(&row.nonlinear) {
+        for &other in row.coefficients.keys() {
             self.holding[other].remove(&place);
         }
         let others: Vec<usize> = self.holding[column].iter().copied().collect();
@@ -127,13 +126,11 @@ impl<'a> Elimination<'a> {
             };
             self.queue.remove(&(changed.len(), other));
             self.substitute(&mut changed, column, factor, &row);
-            for &now in changed.coefficients.keys().chain(&changed.nonlinear) {
+            for &now in changed.coefficients.keys() {
                 self.holding[now].insert(other);
             }
             for &before in row.coefficients.keys() {
-                if !changed.coefficients.contains_key(&before)
-                    && !changed.nonlinear.contains(&before)
-                {
+                if !changed.coefficients.contains_key(&before) {
                     self.holding[before].remove(&other);
                 }
             }
@@ -151,11 +148,6 @@ impl<'a> Elimination<'a> {
 
     /// Puts what a row gives for an unknown into another row.
     fn substitute(&self, into: &mut Row, column: usize, factor: f64, row: &Row) {
-        if into.nonlinear.remove(&column) {
-            let unknowns = row.coefficients.keys().chain(&row.nonlinear);
-            into.nonlinear
-                .extend(unknowns.filter(|&&other| other != column));
-        }
         let Some(own) = into.coefficients.remove(&column) else {
             return;
         };
@@ -175,7 +167,6 @@ impl<'a> Elimination<'a> {
             let term = graph.binary(Binary::Mul, ratio, rest);
             into.rest = self.difference(into.rest, term);
         }
-        into.nonlinear.extend(&row.nonlinear);
     }
 
     /// a − b; `None` where nothing is left but rounding.

@@ -12,7 +12,7 @@ pub(super) struct Incidence {
     pub of_equation: Vec<Vec<usize>>,
     /// place of each unknown by its symbol
     pub place: HashMap<Node, usize>,
-    /// by index of the node: true where it contains an unknown
+    /// by index of the node: false for those of the equations that contain no unknown
     contains: Vec<bool>,
 }
 
@@ -22,7 +22,8 @@ impl Incidence {
         let place = symbols
             .map(|(place, unknown)| (unknown.symbol, place))
             .collect();
-        let contains = vec![false; system.graph.len()];
+        // what stands elsewhere, as in an assertion, may be met again in a solution
+        let contains = vec![true; system.graph.len()];
         let mut incidence = Self {
             of_equation: vec![],
             place,

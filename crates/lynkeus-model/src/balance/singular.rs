@@ -4,8 +4,8 @@
 use lynkeus_expr::{Graph, Node, Tape, jacobian};
 
 use super::diagnose::lines;
-use super::listed;
 use super::loops::Torn;
+use super::{Unknown, listed};
 use crate::syntax::{Problem, Result, Span};
 
 /// Points looked at.
@@ -25,7 +25,7 @@ pub(super) fn check(graph: &Graph, torn: &Torn<'_>, source: &str) -> Result<()> 
     };
     let mut dependent = None;
     for turn in 1..=POINTS {
-        let values = tape.eval_in(&lynkeus_expr::Reals, &point(symbols.len(), turn));
+        let values = tape.eval_in(&lynkeus_expr::Reals, &point(torn, &symbols, turn));
         if !values.iter().all(|value| value.is_finite()) {
             continue;
         }
@@ -44,11 +44,27 @@ pub(super) fn check(graph: &Graph, torn: &Torn<'_>, source: &str) -> Result<()> 
     }
 }
 
-/// Numbers in which no relation hides: multiples of √2, √3, … modulo 1, off zero.
-fn point(size: usize, turn: usize) -> Vec<f64> {
-    let root = |i: usize| ((i + 2) as f64 + 0.1 * turn as f64).sqrt();
-    (0..size)
-        .map(|i| 0.3 + (turn as f64 * root(i)).fract())
+/// Numbers in which no relation hides: multiples of √2, √3, … modulo 1, off zero; of the unknowns
+/// within their ranges, or beyond their starts.
+fn point(torn: &Torn<'_>, symbols: &[Node], turn: usize) -> Vec<f64> {
+    let part = |i: usize| (turn as f64 * ((i + 2) as f64 + 0.1 * turn as f64).sqrt()).fract();
+    let within = |unknown: &Unknown, part: f64| {
+        let (low, high) = (unknown.range.lo(), unknown.range.hi());
+        match (low.is_finite(), high.is_finite()) {
+            (true, true) => low + part * (high - low),
+            (false, true) => unknown.start - 0.3 - part,
+            _ => unknown.start + 0.3 + part,
+        }
+    };
+    let places = symbols.iter().enumerate();
+    places
+        .map(|(i, symbol)| {
+            let mut unknowns = torn.unknowns.iter();
+            match unknowns.find(|unknown| unknown.symbol == *symbol) {
+                Some(unknown) => within(unknown, part(i)),
+                None => 0.3 + part(i),
+            }
+        })
         .collect()
 }
 

@@ -62,11 +62,15 @@ impl<'a> Evaluator<'a> {
 
     /// Sizes of an expression; of a declared name also where its value is not known.
     fn dims_of(&mut self, argument: ExprId) -> Result<Vec<usize>> {
-        if matches!(self.ast.expression(argument).kind, Kind::Name)
-            && self.frame.is_none()
-            && let Some(dims) = self.scope.dims(&plain(self.text(self.span(argument))))
-        {
-            return Ok(dims.to_vec());
+        if matches!(self.ast.expression(argument).kind, Kind::Name) {
+            let name = plain(self.text(self.span(argument)));
+            let known = match self.local(&name) {
+                Some(local) => local.ok().map(|local| local.dims.as_slice()),
+                None => self.scope.dims(&name),
+            };
+            if let Some(dims) = known.filter(|_| self.iterator(&name).is_none()) {
+                return Ok(dims.to_vec());
+            }
         }
         Ok(self.value(argument)?.dims().to_vec())
     }

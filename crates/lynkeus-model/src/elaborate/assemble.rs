@@ -74,7 +74,10 @@ pub(super) fn parts<'a>(
         warnings: vec![],
     };
     let inputs: HashSet<Node> = inputs.into_iter().collect();
-    for (place, (declaration, component)) in symbols.all().enumerate() {
+    for (place, declaration, component) in symbols.placed() {
+        if declaration.package.is_some() {
+            continue;
+        }
         let attributes = Attributes::new(context, symbols, declaration, component)?;
         let sorter = Sorter {
             context,

@@ -3,6 +3,7 @@
 use lynkeus_expr::{Graph, Node, Unary};
 
 use super::arithmetic::unequal_sizes;
+use super::branches::{Branches, OnPath};
 use super::execute::Claim;
 use super::frame::Frame;
 use super::scope::{Mode, Scope};
@@ -10,7 +11,7 @@ use super::symbols::Context;
 use super::value::{Scalar, Value};
 use crate::Tables;
 use crate::flat::Classes;
-use crate::limits::Budget;
+use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
 use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
 use crate::syntax::{Problem, Result, Span};
@@ -37,8 +38,10 @@ pub(crate) struct Evaluator<'a> {
     pub(super) frame: Option<Frame>,
     /// functions around, innermost last
     pub(super) calls: Vec<usize>,
+    /// expressions and statements around, those of the callers included
+    pub(super) depth: usize,
     /// conditions of the `if`s around
-    pub(super) conditions: Vec<Node>,
+    pub(super) conditions: Vec<OnPath>,
     /// what is to hold along a run
     pub(super) claims: Vec<Claim>,
     /// what tables are between their points
@@ -69,6 +72,7 @@ impl<'a> Evaluator<'a> {
             scopes: vec![],
             frame: None,
             calls: vec![],
+            depth: 0,
             conditions: vec![],
             claims: vec![],
             tables: Tables::Linear,
@@ -91,8 +95,31 @@ impl<'a> Evaluator<'a> {
         span.text(self.source)
     }
 
+    /// Goes one level deeper.
+    pub(super) fn deeper<T>(
+        &mut self,
+        span: Span,
+        run: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
+        if self.depth >= MAX_CALL_DEPTH {
+            let message = format!(
+                "nested more than {MAX_CALL_DEPTH} levels deep where functions are written out"
+            );
+            return Err(Problem::new(span, message)
+                .hint("name the inner parts with variables of their own"));
+        }
+        self.depth += 1;
+        let done = run(self);
+        self.depth -= 1;
+        done
+    }
+
     /// The value of an expression.
     pub(crate) fn value(&mut self, id: ExprId) -> Result<Value> {
+        self.deeper(self.span(id), |evaluator| evaluator.value_here(id))
+    }
+
+    fn value_here(&mut self, id: ExprId) -> Result<Value> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         self.budget.charge(1, span)?;
@@ -257,35 +284,31 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The truth value of a condition.
-    pub(crate) fn condition(&mut self, id: ExprId) -> Result<lynkeus_expr::Node> {
+    pub(crate) fn condition(&mut self, id: ExprId) -> Result<Node> {
         let value = self.value(id)?;
         self.boolean(&value, self.span(id))
     }
 
-    /// A known condition takes one branch and leaves the others unread, so that a loop may
-    /// hold `if i == 1 then … else x[i - 1]`.
     fn conditional(
         &mut self,
         branches: &'a [(ExprId, ExprId)],
         otherwise: ExprId,
     ) -> Result<Value> {
-        let mut open = vec![];
-        let mut last = otherwise;
-        for &(condition, value) in branches {
-            let node = self.condition(condition)?;
-            match self.graph.constant_value(node) {
-                Some(0.0) => {}
-                Some(_) => {
-                    last = value;
-                    break;
-                }
-                None => open.push((node, value)),
-            }
-        }
-        let mut result = self.value(last)?;
-        for (condition, value) in open.into_iter().rev() {
+        let branches = self.branches(branches.iter().copied(), otherwise)?;
+        let around = self.pass(&branches);
+        let result = self.chosen(branches);
+        self.conditions.truncate(around);
+        result
+    }
+
+    /// The values of the branches, joined.
+    fn chosen(&mut self, branches: Branches<ExprId>) -> Result<Value> {
+        let mut result = self.value(branches.last)?;
+        for (condition, value) in branches.open.into_iter().rev() {
             let span = self.span(value);
+            self.enter();
             let value = self.value(value)?;
+            self.conditions.pop();
             if value.dims() != result.dims() {
                 return Err(unequal_sizes(value.dims(), result.dims(), span));
             }

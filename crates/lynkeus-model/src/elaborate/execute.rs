@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Binary, Node, Unary};
 
+use super::branches::Branches;
 use super::evaluate::Evaluator;
 use super::frame::{Frame, Local};
 use super::inline::Outcome;
@@ -68,7 +69,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn execute(&mut self, statements: &'a [Statement]) -> Result<Ended> {
         for statement in statements {
             self.budget.charge(1, statement.span)?;
-            let ended = self.statement(statement)?;
+            let ended = self.deeper(statement.span, |evaluator| evaluator.statement(statement))?;
             if ended != Ended::AtItsEnd {
                 return Ok(ended);
             }
@@ -94,11 +95,14 @@ impl<'a> Evaluator<'a> {
 
     /// Notes an `assert`; one that is known to fail is refused.
     pub(super) fn claim(&mut self, assert: &Assert, span: Span) -> Result<()> {
-        let node = self.condition(assert.condition)?;
-        let mut condition = node;
-        for &on_path in &self.conditions {
-            let not = self.graph.unary(Unary::Not, on_path);
-            condition = self.graph.binary(Binary::Or, not, condition);
+        let mut condition = self.condition(assert.condition)?;
+        self.budget.charge(self.conditions.len() as u64, span)?;
+        for on_path in &self.conditions {
+            let elsewhere = match on_path.holds {
+                true => self.graph.unary(Unary::Not, on_path.condition),
+                false => on_path.condition,
+            };
+            condition = self.graph.binary(Binary::Or, elsewhere, condition);
         }
         match self.graph.constant_value(condition) {
             Some(0.0) if !assert.is_warning => {
@@ -166,52 +170,51 @@ impl<'a> Evaluator<'a> {
     }
 
     /// A known condition takes its branch; otherwise each variable takes the value of one
-    /// branch or the other.
+    /// branch or another.
     fn branched(
         &mut self,
         branches: &'a [(ExprId, Vec<Statement>)],
         otherwise: &'a [Statement],
         span: Span,
     ) -> Result<Ended> {
-        let Some(((condition, body), rest)) = branches.split_first() else {
-            return self.execute(otherwise);
-        };
-        let node = self.condition(*condition)?;
-        match self.graph.constant_value(node) {
-            Some(0.0) => return self.branched(rest, otherwise, span),
-            Some(_) => return self.execute(body),
-            None => {}
+        let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
+        let branches = self.branches(pairs, otherwise)?;
+        if branches.open.is_empty() {
+            return self.execute(branches.last);
         }
-        let before = self.frame.clone();
-        let size = before.as_ref().map_or(0, |frame| frame.locals.len());
-        self.budget.charge(size as u64, span)?;
-        let yes = self.on_path(node, span, |evaluator| evaluator.execute(body))?;
-        let after = std::mem::replace(&mut self.frame, before);
-        let not = self.graph.unary(Unary::Not, node);
-        let no = self.on_path(not, span, |evaluator| {
-            evaluator.branched(rest, otherwise, span)
-        })?;
-        if yes != Ended::AtItsEnd || no != Ended::AtItsEnd {
-            let message = "`break` or `return` under a condition that depends on variables";
-            return Err(Problem::new(span, message).hint("use `if … else …` without them"));
-        }
-        if let (Some(yes), Some(no)) = (after, self.frame.take()) {
-            self.frame = Some(Frame::joined(node, yes, no, self.graph));
-        }
-        Ok(Ended::AtItsEnd)
+        let around = self.pass(&branches);
+        let done = self.each_branch(branches, span);
+        self.conditions.truncate(around);
+        done.map(|()| Ended::AtItsEnd)
     }
 
-    fn on_path(
-        &mut self,
-        condition: Node,
-        span: Span,
-        run: impl FnOnce(&mut Self) -> Result<Ended>,
-    ) -> Result<Ended> {
-        self.budget.charge(1, span)?;
-        self.conditions.push(condition);
-        let ended = run(self);
-        self.conditions.pop();
-        ended
+    fn each_branch(&mut self, branches: Branches<&'a [Statement]>, span: Span) -> Result<()> {
+        let Some(before) = self.frame.clone() else {
+            return Ok(());
+        };
+        self.whole(branches.last, span)?;
+        for (condition, body) in branches.open.into_iter().rev() {
+            self.budget.charge(before.size() as u64, span)?;
+            self.enter();
+            let no = self.frame.replace(before.clone());
+            self.whole(body, span)?;
+            self.conditions.pop();
+            if let (Some(yes), Some(no)) = (self.frame.take(), no) {
+                self.frame = Some(Frame::joined(condition, yes, no, self.graph));
+            }
+        }
+        Ok(())
+    }
+
+    /// Statements from which nothing leads away.
+    fn whole(&mut self, statements: &'a [Statement], span: Span) -> Result<()> {
+        match self.execute(statements)? {
+            Ended::AtItsEnd => Ok(()),
+            Ended::ByBreak | Ended::ByReturn => {
+                let message = "`break` or `return` under a condition that depends on variables";
+                Err(Problem::new(span, message).hint("use `if … else …` without them"))
+            }
+        }
     }
 
     fn assign_all(

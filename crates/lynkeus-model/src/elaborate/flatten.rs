@@ -1,7 +1,8 @@
 //! Equations of the text to scalar equations over the graph.
 
-use lynkeus_expr::{Binary, Node, Unary};
+use lynkeus_expr::{Binary, Node};
 
+use super::branches::Branches;
 use super::evaluate::Evaluator;
 use super::execute::{self, Claim};
 use super::frame::{Frame, Local};
@@ -259,28 +260,27 @@ impl<'a> Flattener<'a> {
         otherwise: &'a [Equation],
         span: Span,
     ) -> Result<()> {
-        let mut open = vec![];
-        let mut last = otherwise;
-        for (condition, body) in branches {
-            let node = self.evaluator.condition(*condition)?;
-            match self.evaluator.graph.constant_value(node) {
-                Some(0.0) => {}
-                Some(_) => {
-                    last = body;
-                    break;
-                }
-                None => open.push((node, body)),
-            }
-        }
-        let mut conditions: Vec<Node> = open.iter().map(|(node, _)| *node).collect();
-        let negated = |node: &mut Node| *node = self.evaluator.graph.unary(Unary::Not, *node);
-        conditions.iter_mut().for_each(negated);
-        let mut joined = self.apart(&conditions, last)?;
-        for (condition, body) in open.into_iter().rev() {
-            conditions.pop();
-            conditions.push(condition);
-            let branch = self.apart(&conditions, body)?;
-            conditions.pop();
+        let pairs = branches.iter().map(|(c, body)| (*c, body.as_slice()));
+        let branches = self.evaluator.branches(pairs, otherwise)?;
+        let around = self.evaluator.pass(&branches);
+        let joined = self.joined(branches, span);
+        self.evaluator.conditions.truncate(around);
+        let joined = joined?;
+        self.evaluator.budget.charge(joined.len() as u64, span)?;
+        self.equations.extend(joined);
+        Ok(())
+    }
+
+    fn joined(
+        &mut self,
+        branches: Branches<&'a [Equation]>,
+        span: Span,
+    ) -> Result<Vec<FlatEquation>> {
+        let mut joined = self.apart(branches.last)?;
+        for (condition, body) in branches.open.into_iter().rev() {
+            self.evaluator.enter();
+            let branch = self.apart(body)?;
+            self.evaluator.conditions.pop();
             if branch.len() != joined.len() {
                 let (one, two) = (branch.len(), joined.len());
                 let message = format!("the branches have {one} and {two} equations");
@@ -292,18 +292,13 @@ impl<'a> Flattener<'a> {
                 .map(|(yes, no)| self.join(condition, yes, no))
                 .collect();
         }
-        self.evaluator.budget.charge(joined.len() as u64, span)?;
-        self.equations.extend(joined);
-        Ok(())
+        Ok(joined)
     }
 
-    /// The equations of a branch by themselves, and the conditions under which it is taken.
-    fn apart(&mut self, conditions: &[Node], body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
+    /// The equations of a branch by themselves.
+    fn apart(&mut self, body: &'a [Equation]) -> Result<Vec<FlatEquation>> {
         let outside = std::mem::take(&mut self.equations);
-        let depth = self.evaluator.conditions.len();
-        self.evaluator.conditions.extend(conditions);
         let done = self.all(body);
-        self.evaluator.conditions.truncate(depth);
         let inside = std::mem::replace(&mut self.equations, outside);
         done.map(|()| inside)
     }

@@ -34,6 +34,15 @@ impl Local {
         }
     }
 
+    /// A Real with this value.
+    pub(super) fn of(value: &Value) -> Self {
+        Self {
+            dims: value.dims().to_vec(),
+            elements: value.elements().iter().copied().map(Some).collect(),
+            is_integer: false,
+        }
+    }
+
     /// All elements; `None` where one has no value.
     pub(super) fn value(&self) -> Option<Value> {
         let elements: Option<Vec<Scalar>> = self.elements.iter().copied().collect();
@@ -52,6 +61,20 @@ impl Local {
 }
 
 impl Frame {
+    /// Nothing has a value, and names outside of it are constants only.
+    pub(super) fn closed() -> Self {
+        Self {
+            is_function: true,
+            ..Self::default()
+        }
+    }
+
+    /// What a copy costs.
+    pub(super) fn size(&self) -> usize {
+        let elements = self.locals.values().map(|local| local.elements.len());
+        self.locals.len() + elements.sum::<usize>()
+    }
+
     /// What holds behind an `if`: the values of one branch or the other.
     pub(super) fn joined(condition: Node, yes: Frame, mut no: Frame, graph: &Graph) -> Frame {
         for (name, local) in &mut no.locals {

@@ -3,8 +3,8 @@
 use super::evaluate::Evaluator;
 use super::frame::{Frame, Local};
 use super::records::Record;
-use super::value::{Value, describe_dims};
-use crate::syntax::ast::{Call, Causality, Class, ClassKind, Declaration, ExprId, Kind, TypeName};
+use super::value::Value;
+use crate::syntax::ast::{Call, Causality, Class, ClassKind, Declaration, ExprId, Kind};
 use crate::syntax::{Problem, Result, Span, plain, shortened};
 
 /// Most functions that may stand in each other.
@@ -115,15 +115,6 @@ impl<'a> Evaluator<'a> {
         first.is_some_and(|first| self.record_type(first, path).is_some())
     }
 
-    /// The record that a variable is declared as.
-    fn record_type(&self, declaration: &Declaration, path: &str) -> Option<usize> {
-        let TypeName::Named(name) = declaration.prefix.type_name else {
-            return None;
-        };
-        let place = self.classes?.class(&plain(self.text(name)), &[path])?;
-        (self.ast.classes.get(place)?.kind == ClassKind::Record).then_some(place)
-    }
-
     /// Carries out a function for the arguments of a call; gives its outputs in order.
     pub(super) fn inlined(
         &mut self,
@@ -138,15 +129,24 @@ impl<'a> Evaluator<'a> {
         let parts = self.with_bases(place)?;
         let declarations = self.declarations_of(place)?;
         let given = self.given(&declarations, class, call, span)?;
+        self.calls.push(place);
+        let done = self.inside(class, |evaluator| {
+            evaluator.carried_out(class, &parts, &declarations, given, span)
+        });
+        self.calls.pop();
+        done
+    }
+
+    /// What stands in a class that knows nothing of what is around it but constants.
+    pub(super) fn inside<T>(
+        &mut self,
+        class: &'a Class,
+        run: impl FnOnce(&mut Self) -> Result<T>,
+    ) -> Result<T> {
         let scopes = std::mem::replace(&mut self.scopes, vec![&class.path]);
         let loops = std::mem::take(&mut self.loops);
-        let outside = self.frame.replace(Frame {
-            is_function: true,
-            ..Frame::default()
-        });
-        self.calls.push(place);
-        let done = self.carried_out(class, &parts, &declarations, given, span);
-        self.calls.pop();
+        let outside = self.frame.replace(Frame::closed());
+        let done = run(self);
         self.frame = outside;
         self.loops = loops;
         self.scopes = scopes;
@@ -184,14 +184,13 @@ impl<'a> Evaluator<'a> {
         let inputs = declarations
             .iter()
             .filter(|d| d.prefix.causality == Causality::Input);
-        let mut positional = call.arguments.iter().copied();
+        let inputs: Vec<&Declaration> = inputs.copied().collect();
         let mut found = vec![];
-        let mut count = 0;
-        for input in inputs {
-            let by_name = |(name, _): &&(Span, ExprId)| plain(self.text(*name)) == input.label;
-            let named = call.named.iter().find(by_name).map(|(_, id)| *id);
-            count += usize::from(named.is_some());
-            let Some(id) = positional.next().or(named) else {
+        for (input, id) in inputs
+            .iter()
+            .zip(self.arguments_of(class, &inputs, call, span)?)
+        {
+            let Some(id) = id else {
                 found.push(None);
                 continue;
             };
@@ -201,14 +200,41 @@ impl<'a> Evaluator<'a> {
                 None => Outcome::Value(self.value(id)?),
             }));
         }
-        let (name, takes, given) = (&class.path, found.len(), call.arguments.len());
+        Ok(found)
+    }
+
+    /// The expressions that a call gives to each input of a function or member of a record, in
+    /// order or by name.
+    pub(super) fn arguments_of(
+        &self,
+        class: &Class,
+        declarations: &[&Declaration],
+        call: &Call,
+        span: Span,
+    ) -> Result<Vec<Option<ExprId>>> {
+        let (kind, part) = match class.kind {
+            ClassKind::Function => ("function", "input"),
+            _ => ("record", "member"),
+        };
+        let (name, takes, given) = (&class.path, declarations.len(), call.arguments.len());
         if given > takes {
-            let message = format!("function `{name}` takes {takes} arguments, found {given}");
+            let message = format!("{kind} `{name}` takes {takes} arguments, found {given}");
             return Err(Problem::new(span, message));
         }
-        if count < call.named.len() {
-            let message = format!("function `{name}` has no input of this name");
-            return Err(Problem::new(span, message));
+        let positional = call.arguments.iter().map(|&id| Some(id));
+        let mut found: Vec<Option<ExprId>> = positional.collect();
+        found.resize(takes, None);
+        for &(label, id) in &call.named {
+            let text = plain(self.text(label));
+            let place = declarations.iter().position(|d| d.label == text);
+            let Some(slot) = place.and_then(|place| found.get_mut(place)) else {
+                let message = format!("{kind} `{name}` has no {part} of this name");
+                return Err(Problem::new(label, message));
+            };
+            if slot.replace(id).is_some() {
+                let message = format!("{part} `{text}` of {kind} `{name}` is given twice");
+                return Err(Problem::new(label, message));
+            }
         }
         Ok(found)
     }
@@ -266,133 +292,5 @@ impl<'a> Evaluator<'a> {
         Ok(Outcome::Record(Record {
             members: members.collect::<Result<_>>()?,
         }))
-    }
-
-    /// A variable of a function with its argument, or with the value it is declared with.
-    fn introduce(
-        &mut self,
-        class: &'a Class,
-        declaration: &'a Declaration,
-        given: Option<Outcome>,
-        span: Span,
-    ) -> Result<()> {
-        let name = declaration.label.clone();
-        if let Some(record) = self.record_type(declaration, &class.path) {
-            return self.introduce_record(record, &name, given);
-        }
-        if let TypeName::Named(type_name) = declaration.prefix.type_name {
-            self.check_number(class, type_name)?;
-        }
-        let value = match (given, declaration.binding) {
-            (Some(Outcome::Value(value)), _) => Some(value),
-            (Some(Outcome::Record(_)), _) => {
-                let message = format!("`{name}` takes a number, found a record");
-                return Err(Problem::new(span, message));
-            }
-            (None, Some(id)) => Some(self.value(id)?),
-            (None, None) if declaration.prefix.causality == Causality::Input => {
-                let message = format!("input `{name}` of function `{}` is not given", class.path);
-                return Err(Problem::new(span, message));
-            }
-            (None, None) => None,
-        };
-        let dims = self.dims_declared(declaration, value.as_ref(), span)?;
-        let mut local = Local::without_value(dims, declaration.prefix.is_integer());
-        if let Some(value) = value {
-            if value.dims() != local.dims {
-                let (has, found) = (describe_dims(&local.dims), describe_dims(value.dims()));
-                let message = format!("`{name}` has the size {has}, its value has {found}");
-                return Err(Problem::new(span, message));
-            }
-            let elements = value.into_array().elements.into_iter();
-            let graph = self.graph;
-            local.elements = elements
-                .map(|scalar| Some(local.converted(scalar, graph)))
-                .collect();
-        }
-        self.budget.charge(local.elements.len() as u64, span)?;
-        if let Some(frame) = self.frame.as_mut() {
-            frame.locals.insert(name, local);
-        }
-        Ok(())
-    }
-
-    /// Refuses variables of functions that are no numbers.
-    fn check_number(&self, class: &Class, type_name: Span) -> Result<()> {
-        let name = plain(self.text(type_name));
-        let place = self
-            .classes
-            .and_then(|classes| classes.class(&name, &[&class.path]));
-        let kind = place.and_then(|place| Some(self.ast.classes.get(place)?.kind));
-        match kind {
-            None | Some(ClassKind::Type) => Ok(()),
-            Some(_) => {
-                let message = format!("`{name}` is not a type of numbers");
-                Err(Problem::new(type_name, message).hint("write the formula where it is used"))
-            }
-        }
-    }
-
-    fn introduce_record(
-        &mut self,
-        record: usize,
-        name: &str,
-        given: Option<Outcome>,
-    ) -> Result<()> {
-        let mut names = vec![];
-        match given {
-            Some(Outcome::Record(given)) => {
-                for (member, value) in given.members {
-                    let full = format!("{name}.{member}");
-                    let mut local = Local::without_value(value.dims().to_vec(), false);
-                    local.elements = value.elements().iter().copied().map(Some).collect();
-                    names.push((member, full, local));
-                }
-            }
-            _ => {
-                for declaration in self.declarations_of(record)? {
-                    let full = format!("{name}.{}", declaration.label);
-                    let dims = self.dims_declared(declaration, None, declaration.name)?;
-                    let local = Local::without_value(dims, declaration.prefix.is_integer());
-                    names.push((declaration.label.clone(), full, local));
-                }
-            }
-        }
-        if let Some(frame) = self.frame.as_mut() {
-            let members = names.iter().map(|(member, ..)| member.clone()).collect();
-            frame.records.insert(name.to_owned(), members);
-            frame
-                .locals
-                .extend(names.into_iter().map(|(_, full, local)| (full, local)));
-        }
-        Ok(())
-    }
-
-    /// The size of a variable of a function; `:` is taken from its value.
-    fn dims_declared(
-        &mut self,
-        declaration: &'a Declaration,
-        value: Option<&Value>,
-        span: Span,
-    ) -> Result<Vec<usize>> {
-        let mut dims = vec![];
-        for (axis, &id) in declaration.dimensions.iter().enumerate() {
-            let open = matches!(self.ast.expression(id).kind, Kind::All);
-            dims.push(
-                match (open, value.and_then(|value| value.dims().get(axis))) {
-                    (true, Some(&dim)) => dim,
-                    (true, None) => {
-                        let name = &declaration.label;
-                        let message =
-                            format!("the size `:` of `{name}` needs a value to be taken from");
-                        return Err(Problem::new(declaration.name, message));
-                    }
-                    (false, _) => self.length(id)?,
-                },
-            );
-        }
-        let count = super::value::element_count(&dims).unwrap_or(u64::MAX);
-        self.budget.charge(count, span)?;
-        Ok(dims)
     }
 }

@@ -114,18 +114,25 @@ impl<'a> Evaluator<'a> {
     pub(super) fn named(&self, name: &str) -> Named<'a> {
         // The scope outlives this evaluator.
         let scope = self.scope;
-        match scope.named(name, self.mode) {
-            Named::Unknown => {}
-            found => return found,
+        if !self.is_closed() {
+            match scope.named(name, self.mode) {
+                Named::Unknown => {}
+                found => return found,
+            }
         }
         let full = self.full_names(name).into_iter();
-        let mut found = full.map(|full| scope.named(&full, self.mode));
+        let mut found = full.map(|full| scope.constant(&full, self.mode));
         found
             .find(|found| !matches!(found, Named::Unknown))
             .unwrap_or(Named::Unknown)
     }
 
-    fn full_names(&self, name: &str) -> Vec<String> {
+    /// In a function the model's own names mean nothing.
+    pub(super) fn is_closed(&self) -> bool {
+        self.frame.as_ref().is_some_and(|frame| frame.is_function)
+    }
+
+    pub(super) fn full_names(&self, name: &str) -> Vec<String> {
         match self.classes {
             Some(classes) if !self.scopes.is_empty() => classes.full_names(name, &self.scopes),
             _ => vec![],
@@ -142,6 +149,11 @@ impl<'a> Evaluator<'a> {
             Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
             _ => match self.builtin(name) {
                 Some(scalar) => Ok(Value::Scalar(scalar)),
+                None if self.scope.dims(name).is_some() => {
+                    let message = format!("`{name}` is not a variable of this function");
+                    Err(Problem::new(span, message)
+                        .hint("functions read their own variables and constants: add an input"))
+                }
                 None => Err(self.unknown_name(span)),
             },
         }

@@ -1,10 +1,11 @@
 //! The order in which declarations can be given their sizes and values.
 
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 
 use super::symbols::Context;
-use crate::flat::FlatModel;
-use crate::syntax::ast::{Declaration, Kind, Variability};
+use crate::flat::{FlatModel, constant_label};
+use crate::syntax::ast::{Declaration, ExprId, Kind, Variability};
 use crate::syntax::{Problem, Result, plain};
 
 /// What the declarations need of each other.
@@ -45,21 +46,61 @@ fn needs(
 ) -> Vec<usize> {
     let is_known = declaration.prefix.variability != Variability::Continuous;
     let binding = declaration.binding.filter(|_| is_known);
+    let own: Vec<&str> = context.model.scopes.iter().map(String::as_str).collect();
+    let package = declaration.package.as_deref();
+    let scopes = package.map_or(own, |package| vec![package]);
     let mut found = vec![];
     for root in declaration.dimensions.iter().copied().chain(binding) {
-        for expression in context.ast.parts(root) {
-            if matches!(expression.kind, Kind::Name | Kind::Path(_)) {
-                let name = plain(expression.span.text(context.source));
-                match by_name.get(&*name) {
-                    Some(&place) => found.push(place),
-                    None => members(context.model, by_name, &name, &mut found),
-                }
+        for name in names(context, by_name, root) {
+            let before = found.len();
+            if package.is_none() {
+                named(context.model, by_name, &name, &mut found);
+            }
+            if found.len() > before {
+                continue;
+            }
+            let full = context.classes.full_names(&name, &scopes);
+            let mut constants = full.iter().map(|full| constant_label(full));
+            while found.len() == before
+                && let Some(label) = constants.next()
+            {
+                named(context.model, by_name, &label, &mut found);
             }
         }
     }
     found.sort_unstable();
     found.dedup();
     found
+}
+
+/// The names in an expression: `p[2]` where that is declared by itself, and not `p`.
+fn names<'a>(
+    context: &Context<'a>,
+    by_name: &HashMap<&str, usize>,
+    root: ExprId,
+) -> Vec<Cow<'a, str>> {
+    let text = |id: ExprId| plain(context.ast.expression(id).span.text(context.source));
+    let mut elements = HashSet::new();
+    for id in context.ast.ids(root) {
+        if let Kind::Index(base, _) = context.ast.expression(id).kind
+            && by_name.contains_key(&*text(id))
+        {
+            elements.insert(base);
+            elements.insert(id);
+        }
+    }
+    let is_name = |id: &ExprId| match context.ast.expression(*id).kind {
+        Kind::Name | Kind::Path(_) => !elements.contains(id),
+        _ => elements.contains(id),
+    };
+    context.ast.ids(root).filter(is_name).map(text).collect()
+}
+
+fn named(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found: &mut Vec<usize>) {
+    match by_name.get(name) {
+        Some(&place) => found.push(place),
+        None => members(model, by_name, name, found),
+    }
 }
 
 /// Declarations of the members of a record, and of elements that are declared by themselves.
@@ -73,10 +114,7 @@ fn members(model: &FlatModel, by_name: &HashMap<&str, usize>, name: &str, found:
     }
     for member in model.records.get(base).into_iter().flatten() {
         let full = format!("{base}.{member}");
-        match by_name.get(full.as_str()) {
-            Some(&place) => found.push(place),
-            None => members(model, by_name, &full, found),
-        }
+        named(model, by_name, &full, found);
     }
 }
 

@@ -17,7 +17,8 @@ impl<'a> Symbols<'a> {
         place: usize,
     ) -> Result<Component> {
         let (declaration, dependent) = (&self.declarations[place], self.dependent[place]);
-        let name = declaration.label.as_str();
+        let label = declaration.label.as_str();
+        let name = label.strip_prefix('.').unwrap_or(label);
         if declaration.prefix.causality == Causality::Input {
             let message = format!("`{name}` is both a parameter and an input");
             return Err(Problem::new(declaration.name, message).hint("choose one of the two"));
@@ -79,7 +80,7 @@ impl<'a> Symbols<'a> {
         let Some(id) = declaration.binding else {
             return Ok(None);
         };
-        let mut evaluator = self.evaluator(context, mode);
+        let mut evaluator = self.evaluator_of(context, declaration, mode);
         match evaluator.value(id) {
             Ok(value) => Ok(Some((value.into_array(), id))),
             Err(_) if evaluator.valueless && context.options.symbolic_parameters => Ok(None),

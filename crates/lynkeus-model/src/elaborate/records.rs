@@ -1,10 +1,12 @@
 //! Records while a model is written out: values by the names of their members.
 
 use super::evaluate::Evaluator;
+use super::frame::Local;
 use super::inline::Outcome;
 use super::names::joined;
 use super::value::Value;
-use crate::syntax::ast::{Call, ClassKind, ExprId, Kind, TypeName};
+use crate::flat::constant_label;
+use crate::syntax::ast::{Call, Class, ClassKind, Declaration, ExprId, Kind, TypeName};
 use crate::syntax::{Problem, Result, Span, plain};
 
 /// The members of a record, those of inner records by their names in full, as `z.re`.
@@ -35,6 +37,10 @@ impl Record {
 impl<'a> Evaluator<'a> {
     /// The record that an expression is; `None` where it is a number or an array.
     pub(super) fn record(&mut self, id: ExprId) -> Result<Option<Record>> {
+        self.deeper(self.span(id), |evaluator| evaluator.record_here(id))
+    }
+
+    fn record_here(&mut self, id: ExprId) -> Result<Option<Record>> {
         let expression = self.ast.expression(id);
         let span = expression.span;
         match &expression.kind {
@@ -82,9 +88,14 @@ impl<'a> Evaluator<'a> {
             .frame
             .as_ref()
             .and_then(|frame| frame.records.get(name));
-        of_frame
-            .cloned()
-            .or_else(|| self.scope.members(name).map(<[String]>::to_vec))
+        let of_model = || self.scope.members(name).filter(|_| !self.is_closed());
+        let of_package = || {
+            let full = self.full_names(name).into_iter();
+            let mut labels = full.map(|full| constant_label(&full));
+            labels.find_map(|label| self.scope.members(&label))
+        };
+        let members = of_frame.map(Vec::as_slice).or_else(of_model);
+        members.or_else(of_package).map(<[String]>::to_vec)
     }
 
     fn record_named(
@@ -162,30 +173,82 @@ impl<'a> Evaluator<'a> {
         if class.kind != ClassKind::Record {
             return Ok(None);
         }
+        self.constructed(place, class, call, span).map(Some)
+    }
+
+    fn constructed(
+        &mut self,
+        place: usize,
+        class: &'a Class,
+        call: &'a Call,
+        span: Span,
+    ) -> Result<Record> {
         let declarations = self.declarations_of(place)?;
-        let mut given = call.arguments.iter().copied();
-        let mut members = vec![];
-        for declaration in declarations {
-            let label = &declaration.label;
-            let by_name = |(name, _): &&(Span, ExprId)| plain(self.text(*name)) == *label;
-            let named = call.named.iter().find(by_name).map(|(_, id)| *id);
-            let Some(id) = given.next().or(named).or(declaration.binding) else {
-                let message = format!("the member `{label}` of the record is not given");
-                return Err(Problem::new(span, message));
-            };
-            if let TypeName::Named(_) = declaration.prefix.type_name
-                && let Some(inner) = self.record(id)?
-            {
-                let inner = inner.members.into_iter();
-                members.extend(inner.map(|(rest, value)| (format!("{label}.{rest}"), value)));
-                continue;
+        let given = self.arguments_of(class, &declarations, call, span)?;
+        let mut found = vec![];
+        for (declaration, id) in declarations.iter().zip(&given) {
+            let value = id.map(|id| self.member_value(declaration, id));
+            found.push(value.transpose()?);
+        }
+        // what is not given may be made from what is
+        let members = self.inside(class, |evaluator| {
+            found
+                .iter()
+                .flatten()
+                .for_each(|value| evaluator.know(value));
+            let mut members = vec![];
+            for (declaration, value) in declarations.iter().zip(found) {
+                members.extend(match value {
+                    Some(value) => value,
+                    None => evaluator.default(declaration, span)?,
+                });
             }
-            members.push((label.clone(), self.value(id)?));
-        }
-        if given.next().is_some() {
-            let message = "the record has fewer members than are given here";
+            Ok(members)
+        })?;
+        Ok(Record { members })
+    }
+
+    /// What a member is where nothing is given to it.
+    fn default(
+        &mut self,
+        declaration: &'a Declaration,
+        span: Span,
+    ) -> Result<Vec<(String, Value)>> {
+        let Some(id) = declaration.binding else {
+            let label = &declaration.label;
+            let message = format!("the member `{label}` of the record is not given");
             return Err(Problem::new(span, message));
+        };
+        let value = self.member_value(declaration, id)?;
+        self.know(&value);
+        Ok(value)
+    }
+
+    /// A member of a record with its value, or those of the record that it is.
+    fn member_value(
+        &mut self,
+        declaration: &Declaration,
+        id: ExprId,
+    ) -> Result<Vec<(String, Value)>> {
+        let label = &declaration.label;
+        if let TypeName::Named(_) = declaration.prefix.type_name
+            && let Some(inner) = self.record(id)?
+        {
+            let inner = inner.members.into_iter();
+            return Ok(inner
+                .map(|(rest, value)| (format!("{label}.{rest}"), value))
+                .collect());
         }
-        Ok(Some(Record { members }))
+        Ok(vec![(label.clone(), self.value(id)?)])
+    }
+
+    /// Makes values known by their names to what is evaluated next.
+    fn know(&mut self, members: &[(String, Value)]) {
+        let Some(frame) = &mut self.frame else {
+            return;
+        };
+        for (name, value) in members {
+            frame.locals.insert(name.clone(), Local::of(value));
+        }
     }
 }

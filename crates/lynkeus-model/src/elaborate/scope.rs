@@ -30,6 +30,11 @@ pub(crate) enum Named<'a> {
 pub(crate) trait Scope {
     fn named(&self, name: &str, mode: Mode) -> Named<'_>;
 
+    /// A constant by its name in full.
+    fn constant(&self, _full: &str, _mode: Mode) -> Named<'_> {
+        Named::Unknown
+    }
+
     /// Dimensions of a declared name.
     fn dims(&self, name: &str) -> Option<&[usize]>;
 

@@ -51,12 +51,11 @@ impl<'a> Evaluator<'a> {
         span: Span,
     ) -> Result<Value> {
         if let Some(Ok(local)) = self.local(text) {
-            let local = local.clone();
-            let (kept, offsets) = self.selected(text, &local.dims, subscripts, span)?;
-            let elements = offsets
-                .iter()
-                .map(|&offset| local.elements.get(offset).copied()?);
-            let elements: Option<Vec<Scalar>> = elements.collect();
+            let dims = local.dims.clone();
+            let (kept, offsets) = self.selected(text, &dims, subscripts, span)?;
+            let local = self.local(text).and_then(std::result::Result::ok);
+            let element = |&offset: &usize| local?.elements.get(offset).copied()?;
+            let elements: Option<Vec<Scalar>> = offsets.iter().map(element).collect();
             let elements = elements.ok_or_else(|| self.unassigned(text, name))?;
             return Ok(Value::new(kept, elements));
         }

@@ -6,12 +6,13 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Graph, Node};
 
 use super::evaluate::Evaluator;
+use super::frame::Frame;
 use super::order::{Order, order};
 use super::overrides::Overrides;
 use super::scope::{Mode, Named, Scope};
 use super::value::{Scalar, element_count, element_name};
 use crate::LoadOptions;
-use crate::flat::{Classes, FlatModel};
+use crate::flat::{Classes, FlatModel, constant_label};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
 use crate::syntax::ast::{Ast, Causality, Declaration, Kind, TypeName, Variability};
 use crate::syntax::{Problem, Result};
@@ -78,7 +79,11 @@ impl<'a> Symbols<'a> {
         };
         let sizes = Sizes::new();
         for place in sequence {
-            let component = symbols.component(context, &overrides, &sizes, place)?;
+            let component = symbols.component(context, &overrides, &sizes, place);
+            if component.is_err() && model.possible.contains(&model.declarations[place].label) {
+                continue;
+            }
+            let component = component?;
             if component.is_known {
                 let elements = component
                     .elements
@@ -96,8 +101,16 @@ impl<'a> Symbols<'a> {
 
     /// Declarations with their components, in order of the text.
     pub(crate) fn all(&self) -> impl Iterator<Item = (&'a Declaration, &Component)> {
-        let pairs = self.declarations.iter().zip(&self.components);
-        pairs.filter_map(|(declaration, component)| Some((declaration, component.as_ref()?)))
+        self.placed()
+            .map(|(_, declaration, component)| (declaration, component))
+    }
+
+    /// The same with their places among the declarations.
+    pub(crate) fn placed(&self) -> impl Iterator<Item = (usize, &'a Declaration, &Component)> {
+        let pairs = self.declarations.iter().zip(&self.components).enumerate();
+        pairs.filter_map(|(place, (declaration, component))| {
+            Some((place, declaration, component.as_ref()?))
+        })
     }
 
     pub(crate) fn evaluator<'e>(&'e self, context: &'e Context<'a>, mode: Mode) -> Evaluator<'e> {
@@ -109,6 +122,21 @@ impl<'a> Symbols<'a> {
             ..
         } = context;
         Evaluator::new(source, ast, graph, budget, self, mode).within(context)
+    }
+
+    /// For the declaration of a name: of a package, only what it knows.
+    pub(super) fn evaluator_of<'e>(
+        &'e self,
+        context: &'e Context<'a>,
+        declaration: &'e Declaration,
+        mode: Mode,
+    ) -> Evaluator<'e> {
+        let mut evaluator = self.evaluator(context, mode);
+        if let Some(package) = &declaration.package {
+            evaluator.scopes = vec![package];
+            evaluator.frame = Some(Frame::closed());
+        }
+        evaluator
     }
 
     /// The symbols of parameters with their values, where they have one.
@@ -190,7 +218,7 @@ impl<'a> Symbols<'a> {
         context: &Context<'a>,
         declaration: &Declaration,
     ) -> Result<Vec<Option<usize>>> {
-        let mut evaluator = self.evaluator(context, Mode::Structural);
+        let mut evaluator = self.evaluator_of(context, declaration, Mode::Structural);
         let length = |&id| match context.ast.expression(id).kind {
             Kind::All => Ok(None),
             _ => evaluator.length(id).map(Some),
@@ -257,6 +285,28 @@ impl Scope for Symbols<'_> {
         }
     }
 
+    /// One of a package, or of the model and its bases; flat texts declare those of packages in
+    /// the model, by their names in full.
+    fn constant(&self, full: &str, mode: Mode) -> Named<'_> {
+        match self.named(&constant_label(full), mode) {
+            Named::Unknown => {}
+            found => return found,
+        }
+        let in_class = |class: &String| full.strip_prefix(class.as_str())?.strip_prefix('.');
+        let own = self.model.scopes.iter().find_map(in_class);
+        let own = own.or(full.contains('.').then_some(full));
+        let place = own.and_then(|name| self.by_name.get(name));
+        let declaration = place.and_then(|&place| self.declarations.get(place));
+        match (own, declaration) {
+            (Some(name), Some(declaration))
+                if declaration.prefix.variability == Variability::Constant =>
+            {
+                self.named(name, mode)
+            }
+            _ => Named::Unknown,
+        }
+    }
+
     fn dims(&self, name: &str) -> Option<&[usize]> {
         let place = self.by_name.get(name).copied();
         let declared = place.and_then(|place| self.components.get(place)?.as_ref());
@@ -282,7 +332,10 @@ impl Scope for Symbols<'_> {
     }
 
     fn names(&self) -> Vec<&str> {
-        self.by_name.keys().copied().collect()
+        let names = self.by_name.keys();
+        names
+            .map(|name| name.strip_prefix('.').unwrap_or(name))
+            .collect()
     }
 
     fn time(&self, mode: Mode) -> Option<Node> {

@@ -1,6 +1,6 @@
 //! Where the names of classes lead: inner classes first, then those around, then imports.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::syntax::ast::{Class, Import};
 
@@ -9,6 +9,8 @@ use crate::syntax::ast::{Class, Import};
 pub(crate) struct Classes<'a> {
     by_path: HashMap<&'a str, usize>,
     imports: HashMap<&'a str, &'a [Import]>,
+    /// last parts of the names that lead to classes
+    last: HashSet<&'a str>,
     /// ordinals of the literals of enumerations, from 1
     literals: HashMap<String, i64>,
 }
@@ -18,6 +20,9 @@ impl<'a> Classes<'a> {
         let mut index = Self::default();
         for (place, class) in classes.iter().enumerate() {
             index.by_path.entry(&class.path).or_insert(place);
+            index.last.insert(last(&class.path));
+            let shorts = class.imports.iter().filter_map(|i| i.short.as_deref());
+            index.last.extend(shorts);
             if !class.imports.is_empty() {
                 index.imports.insert(&class.path, &class.imports);
             }
@@ -32,6 +37,9 @@ impl<'a> Classes<'a> {
 
     /// The class that a name means in the first of some scopes that know it.
     pub(crate) fn class(&self, name: &str, scopes: &[&str]) -> Option<usize> {
+        if !self.last.contains(last(name)) {
+            return None;
+        }
         let candidates = self.full_names(name, scopes);
         let mut found = candidates
             .iter()
@@ -77,4 +85,8 @@ impl<'a> Classes<'a> {
         found.push(name.to_owned());
         found
     }
+}
+
+fn last(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }

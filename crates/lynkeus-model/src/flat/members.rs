@@ -1,7 +1,7 @@
 //! Members of records, and modifications of declarations.
 
 use super::Flattening;
-use crate::syntax::ast::{Attribute, Class, Declaration, Variability};
+use crate::syntax::ast::{Attribute, Class, Declaration, Kind, Variability};
 use crate::syntax::{Problem, Result, plain, shortened};
 
 /// Attributes that a number may have.
@@ -44,7 +44,11 @@ impl Flattening<'_> {
         self.model.records.insert(record.label.clone(), names);
         for (mut member, path) in members {
             let name = member.label.clone();
+            let default = member.binding;
             modify(self.source, &mut member, &record.attributes);
+            if record.binding.is_none() && member.binding == default {
+                self.check_default(&member, class)?;
+            }
             member.label = format!("{}.{name}", record.label);
             let sized = !record.dimensions.is_empty();
             let mut dimensions = record.dimensions.clone();
@@ -61,8 +65,31 @@ impl Flattening<'_> {
             member.prefix.is_final |= record.prefix.is_final;
             member.prefix.causality = record.prefix.causality;
             member.name = record.name;
+            member.package.clone_from(&record.package);
             if !self.declared.contains(&member.label) {
                 self.declaration(member, &path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a default whose names would lead to the model instead of to the record.
+    fn check_default(&self, member: &Declaration, class: &Class) -> Result<()> {
+        let Some(default) = member.binding else {
+            return Ok(());
+        };
+        let is_sibling = |name: &str| class.declarations.iter().any(|d| d.label == name);
+        for part in self.ast.parts(default) {
+            let name = plain(part.span.text(self.source));
+            let first = name.split(['.', '[']).next().unwrap_or_default();
+            if matches!(part.kind, Kind::Name)
+                && (is_sibling(first) || self.declared.contains(first))
+            {
+                let (label, record) = (&member.label, &class.path);
+                let message = format!("the default of `{label}` in `{record}` needs `{first}`");
+                return Err(Problem::new(part.span, message).hint(format!(
+                    "give `{label}` a value where the record is declared: `r({label} = …)`"
+                )));
             }
         }
         Ok(())
@@ -92,17 +119,18 @@ impl Flattening<'_> {
     }
 }
 
-/// Applies what a modification says of a declaration, if it does.
+/// Applies what modifications say of a declaration, if they do; outer ones stand first and win.
 pub(super) fn modify(source: &str, declaration: &mut Declaration, modification: &[Attribute]) {
-    let of_it = |attribute: &&Attribute| plain(attribute.name.text(source)) == declaration.label;
-    let Some(given) = modification.iter().find(of_it) else {
-        return;
-    };
-    if given.value.is_some() {
-        declaration.binding = given.value;
+    for given in modification.iter().rev() {
+        if plain(given.name.text(source)) != declaration.label {
+            continue;
+        }
+        if given.value.is_some() {
+            declaration.binding = given.value;
+        }
+        let own = std::mem::replace(&mut declaration.attributes, given.nested.clone());
+        inherit(source, &mut declaration.attributes, &own);
     }
-    let own = std::mem::replace(&mut declaration.attributes, given.nested.clone());
-    inherit(source, &mut declaration.attributes, &own);
 }
 
 /// Adds attributes that are not given yet.

@@ -2,6 +2,7 @@
 //! written out; components of other models are refused, with the commands that flatten them.
 
 mod classes;
+mod constants;
 mod library;
 mod members;
 
@@ -10,6 +11,7 @@ use std::collections::{HashMap, HashSet};
 use crate::limits::{MAX_SCALARS, grouped};
 
 pub(crate) use classes::Classes;
+pub(crate) use constants::label as constant_label;
 pub(crate) use library::{LibraryType, constant};
 
 use crate::syntax::ast::{
@@ -38,6 +40,8 @@ pub(crate) struct FlatModel {
     pub library: HashMap<String, &'static LibraryType>,
     /// names of the members of each record, by its label
     pub records: HashMap<String, Vec<String>>,
+    /// labels of constants that the text may not mean
+    pub possible: HashSet<String>,
     pub equations: Vec<Equation>,
     pub initial: Vec<Equation>,
     pub algorithms: Vec<Vec<Statement>>,
@@ -84,8 +88,8 @@ impl<'a> Flattening<'a> {
         self.model.title = title(&class.path).to_owned();
         let own = |declaration: &Declaration| declaration.label.clone();
         self.declared = class.declarations.iter().map(own).collect();
+        self.constants()?;
         self.contents(class, &[], &mut vec![])?;
-        self.constants(class)?;
         elements_by_themselves(self.source, self.ast, &mut self.model.declarations);
         Ok(())
     }
@@ -245,41 +249,6 @@ impl<'a> Flattening<'a> {
         }
         self.declared.insert(declaration.label.clone());
         self.model.declarations.push(declaration);
-        Ok(())
-    }
-
-    /// Constants of packages that some expression of the text names.
-    fn constants(&mut self, class: &Class) -> Result<()> {
-        let mut named: HashSet<String> = HashSet::new();
-        for expression in &self.ast.expressions {
-            if matches!(expression.kind, Kind::Name) {
-                named.insert(plain(expression.span.text(self.source)).into_owned());
-            }
-        }
-        let classes = self.classes;
-        let packages = classes
-            .iter()
-            .filter(|class| class.kind == ClassKind::Package);
-        for package in packages.rev() {
-            let is_around = class.path.starts_with(&format!("{}.", package.path));
-            for constant in &package.declarations {
-                if constant.prefix.variability == Variability::Continuous {
-                    continue;
-                }
-                let full = format!("{}.{}", package.path, constant.label);
-                let short = constant.label.clone();
-                let last = full.rsplit('.').nth(1).unwrap_or_default();
-                let partly = format!("{last}.{}", constant.label);
-                for label in [full, partly].into_iter().chain(is_around.then_some(short)) {
-                    if named.contains(&label) && !self.declared.contains(&label) {
-                        let mut copy = constant.clone();
-                        copy.label = label;
-                        copy.prefix.variability = Variability::Constant;
-                        self.declaration(copy, &package.path)?;
-                    }
-                }
-            }
-        }
         Ok(())
     }
 }

@@ -4,7 +4,7 @@
 use super::Span;
 
 /// Index of an expression in [`Ast::expressions`]; operands come before their users.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct ExprId(pub(crate) u32);
 
 /// A parsed text.
@@ -22,6 +22,11 @@ impl Ast {
 
     /// The expressions that an expression is made of, itself included.
     pub(crate) fn parts(&self, root: ExprId) -> impl std::iter::Iterator<Item = &Expression> {
+        self.ids(root).map(|id| self.expression(id))
+    }
+
+    /// Their ids, operands before their users.
+    pub(crate) fn ids(&self, root: ExprId) -> impl std::iter::Iterator<Item = ExprId> + use<> {
         // The parts of an expression lie side by side in the arena; what was added to a record
         // later stands behind them.
         let root = match self.expression(root).kind {
@@ -29,7 +34,7 @@ impl Ast {
             _ => root,
         };
         let first = self.expression(root).first;
-        (first.0..=root.0).map(|id| self.expression(ExprId(id)))
+        (first.0..=root.0).map(ExprId)
     }
 
     /// The member of a record, as an expression.
@@ -251,6 +256,8 @@ pub(crate) struct Declaration {
     pub attributes: Vec<Attribute>,
     pub binding: Option<ExprId>,
     pub description: Option<String>,
+    /// the package that it is a constant of: where the names in it are looked up
+    pub package: Option<String>,
 }
 
 /// `start = 1` in a declaration, or `x(start = 1) = 2` where it is a record.

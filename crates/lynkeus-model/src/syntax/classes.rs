@@ -5,7 +5,7 @@ use super::names::plain;
 use super::parser::Parser;
 use super::token::{Keyword, Symbol, Token};
 use super::{Problem, Result, Span};
-use crate::limits::MAX_NAME;
+use crate::limits::{MAX_IMPORTS, MAX_NAME, grouped};
 
 /// The section of a class that is being read.
 #[derive(Clone, Copy, PartialEq)]
@@ -283,6 +283,13 @@ impl Parser<'_> {
         }
         if self.accept_word(Keyword::Import)? {
             let import = self.import()?;
+            if class.imports.len() >= MAX_IMPORTS {
+                let message = format!(
+                    "a class with more than {} imports",
+                    grouped(MAX_IMPORTS as u64)
+                );
+                return Err(Problem::new(self.last, message).hint("write names in full"));
+            }
             class.imports.push(import);
             return Ok(());
         }

@@ -106,7 +106,7 @@ impl Parser<'_> {
             Token::Identifier
                 | Token::Symbol(Symbol::OpenBracket | Symbol::OpenParen | Symbol::Semicolon)
                 | Token::Text
-        ) && !name.starts_with("der")
+        ) && name != "der"
         {
             return Ok(TypeName::Named(span));
         }
@@ -148,6 +148,7 @@ impl Parser<'_> {
             attributes,
             binding,
             description,
+            package: None,
         })
     }
 

@@ -27,7 +27,8 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> 
             .get(&declaration.label)
             .map(|known| known.unit.to_owned());
         if let Some(unit) = text.or(library).and_then(|text| Unit::parse(&text)) {
-            declared.insert(declaration.label.as_str(), unit);
+            let label = declaration.label.as_str();
+            declared.insert(label.strip_prefix('.').unwrap_or(label), unit);
         }
     }
     if declared.is_empty() {
@@ -40,7 +41,8 @@ pub(crate) fn check(source: &str, ast: &Ast, model: &FlatModel) -> Vec<Problem> 
         tick: None,
         found: vec![],
     };
-    for declaration in &model.declarations {
+    // a package has names of its own
+    for declaration in model.declarations.iter().filter(|d| d.package.is_none()) {
         let Some(id) = declaration.binding else {
             continue;
         };
@@ -208,10 +210,17 @@ impl Walk<'_> {
         let (operator, _) = *rest.first()?;
         if is_sum(operator) {
             let mut unit = self.unit(head);
-            for &(_, operand) in rest {
+            for &(operator, operand) in rest {
                 let next = self.unit(operand);
                 let place = span(self, head).to(span(self, operand));
+                let has_offset = |unit: &Option<Unit>| unit.as_ref().is_some_and(|u| u.has_offset);
+                let is_difference = matches!(operator, B::Subtract | B::ElementSubtract)
+                    && has_offset(&unit)
+                    && has_offset(&next);
                 unit = self.compare(unit, next, place, "what is added");
+                if is_difference {
+                    unit = unit.map(|unit| unit.difference());
+                }
             }
             return unit;
         }

@@ -67,12 +67,18 @@ impl Unit {
         Some(product)
     }
 
+    /// A difference of degrees Celsius is one of kelvin.
+    pub(super) fn difference(&self) -> Self {
+        Self {
+            has_offset: false,
+            text: None,
+            ..self.clone()
+        }
+    }
+
     /// A part of time, behind `der`.
     pub(super) fn per_tick(&self) -> Option<Self> {
-        let mut rate = self.clone();
-        // a difference of degrees Celsius is one of kelvin
-        rate.has_offset = false;
-        rate.text = None;
+        let mut rate = self.difference();
         rate.ticks -= 1.0;
         rate.powers[2] -= 1.0;
         Some(rate)

@@ -210,6 +210,25 @@ fn start_and_range_choose_the_root() {
     }
 }
 
+/// A loop that is flat far from where its variable may be.
+#[test]
+fn whether_a_loop_is_singular_is_asked_where_its_variables_may_be() {
+    for attributes in [
+        "start = 400",
+        "min = 350, max = 500",
+        "max = 500, start = 450",
+    ] {
+        let plant = plant(&model(
+            &format!("Real x; Real T({attributes});"),
+            "der(x) = T; max(T - 300, 0)^2 = x;",
+        ));
+        let found = slopes(&plant, &[("x", 1e4)])[0];
+        assert!((found - 400.0).abs() < 1e-9, "{attributes}: {found}");
+    }
+    let found = refused(&model("Real x; Real T;", "der(x) = T; min(T, -3)^2 = x;"));
+    assert!(found.message.contains("do not determine `T`"), "{found}");
+}
+
 #[test]
 fn long_loops_are_torn() {
     let text = "model M parameter Integer n = 20000; Real a[n]; Real x; equation der(x) = a[1]; \
@@ -267,4 +286,27 @@ fn terms_that_cancel() {
 fn a_model_without_states() {
     let found = refused(&model("Real y; input Real u;", "y = u;"));
     assert!(found.message.contains("no state"));
+}
+
+#[test]
+fn states_that_follow_from_states_that_follow() {
+    let plant = plant(&model(
+        "Real w1(start = 1, fixed = true); Real w2; Real w3; Real a; Real b; Real s;",
+        "der(w1) = -w1; w1 = 4*w2; w2 = 2*w3; der(w2) = a; der(w3) = b; der(s) = w3;",
+    ));
+    assert_eq!(slopes(&plant, &[("w1", 8.0)]), [-8.0, 1.0]);
+}
+
+/// What stands in no equation, but looks like a part of a solution.
+#[test]
+fn variables_are_replaced_whatever_else_is_said_of_them() {
+    for aside in [
+        "equation assert(y - 3 < 100, \"\");",
+        "initial equation x = 0*(y - 3) + 1;",
+    ] {
+        let text = format!(
+            "model M Real x; Real y; Real z; {aside} equation y = 2*x; 3 - z = y; der(x) = z; end M;"
+        );
+        assert_eq!(slopes(&plant(&text), &[("x", 1.0)]), [1.0], "{aside}");
+    }
 }

@@ -42,6 +42,15 @@ fn units_that_do_not_fit_are_told() {
         ),
         ["5: this equation takes 1 s as the unit of time, line 4 takes 3600 s"]
     );
+    // a difference of degrees Celsius is one of kelvin
+    assert_eq!(
+        warnings(
+            "Real C(unit = \"degC\"); Real D(unit = \"degC\"); Real d(unit = \"K\"); \
+             parameter Real G(unit = \"W/K\") = 1; Real Q(unit = \"W\"); Real m(unit = \"m\");",
+            "D = 3; d = C - D; Q = G*(C - D); m = G*(C - D);\nder(C) = 1;"
+        ),
+        ["4: units differ: one is m, the other side is kg.m2.s-3"]
+    );
     // what fits, or says nothing, is left alone
     let quiet = "Real v(unit = \"V\"); parameter Real R(unit = \"Ohm\") = 2; parameter Real C(unit = \"F\") = 1; \
                  Real i(unit = \"A\"); Real P(unit = \"W\"); Real e; Real cells(unit = \"cells\");";

@@ -8,7 +8,7 @@ use lynkeus_expr::{Interval, Jets, Node, Op, Reals, Tape};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestRunner};
 
-use crate::support::plant;
+use crate::support::{plant, slopes};
 
 const ORDER: usize = 5;
 
@@ -149,6 +149,42 @@ fn ranges(known: &Loop, tape: &Tape, at: f64) {
                 );
                 assert!(bound.width() < 1e4 * radius, "{bound} for {radius}");
             }
+        }
+    }
+}
+
+/// What stands in a branch counts where the branch is taken, and has a value only there.
+#[test]
+fn branches_that_are_not_taken_have_no_influence() {
+    let text = |a: &str, b: &str| {
+        format!(
+            "model M Real x; Real v; Real i; equation der(x) = i; v + i = 6;
+             v = if x > 0 then {a} elseif x > -4 then {b} else 2*i; end M;"
+        )
+    };
+    // v = r i + e and v + i = 6: i = (6 - e)/(r + 1)
+    let exact = |r: f64, e: f64| (6.0 - e) / (r + 1.0);
+    for (a, b) in [
+        ("2*i + sqrt(x)", "i + log(-x)"),
+        ("i*2*sqrt(x)/sqrt(x) + sqrt(x)", "(i/log(-x) + 1)*log(-x)"),
+        ("3*i - (i - sqrt(x))", "-(-i - log(-x))"),
+        (
+            "(if x > 1 then sqrt(x - 1) + i else i) + i + sqrt(x) - (if x > 1 then sqrt(x - 1) else 0)",
+            "v + i - v + log(-x)",
+        ),
+    ] {
+        let plant = plant(&text(a, b));
+        for (x, expected) in [
+            (4.0, exact(2.0, 2.0)),
+            (0.25, exact(2.0, 0.5)),
+            (-2.0, exact(1.0, 2f64.ln())),
+            (-5.0, exact(2.0, 0.0)),
+        ] {
+            let found = slopes(&plant, &[("x", x)])[0];
+            assert!(
+                (found - expected).abs() < 1e-13,
+                "{a}; {b} at {x}: {found}, {expected}"
+            );
         }
     }
 }

@@ -284,6 +284,52 @@ fn assertions_are_conditions_over_the_states() {
 }
 
 #[test]
+fn assertions_count_where_their_branch_is_taken() {
+    let text = |slope: &str| {
+        format!(
+            "package A function f input Real x; output Real y; algorithm assert(x > 1, \"low\"); y := x; end f;
+             model M Real x(start = -1); Real a;
+             algorithm a := 1; if x > 5 then a := 2; elseif x > 4 then a := f(x - 4.5); end if;
+             equation der(x) = {slope}; end M; end A;"
+        )
+    };
+    for slope in [
+        "a + (if x > 2 then 1 elseif x > 0 then f(x) else 2)",
+        "a + (if x <= 0 then 2 elseif x > 2 then 1 else f(x))",
+    ] {
+        let plant = plant(&text(slope));
+        assert_eq!(plant.warnings.len(), 0, "{slope}");
+        assert_eq!(plant.assertions.len(), 2);
+        let conditions: Vec<_> = plant.assertions.iter().map(|a| a.condition).collect();
+        for (x, holds) in [
+            (-1.0, [1.0, 1.0]),
+            (0.5, [0.0, 1.0]),
+            (1.5, [1.0, 1.0]),
+            (4.2, [1.0, 0.0]),
+            (6.0, [1.0, 1.0]),
+        ] {
+            let mut found = values(&plant, &conditions, &[("x", x)]);
+            found.sort_by(f64::total_cmp);
+            let mut holds = holds.to_vec();
+            holds.sort_by(f64::total_cmp);
+            assert_eq!(found, holds, "{slope} at {x}");
+        }
+    }
+}
+
+#[test]
+fn sizes_of_variables_without_a_value_yet() {
+    let plant = plant(
+        "package P
+           function f input Real x[:]; output Real y[size(x, 1)];
+           algorithm for i in 1:size(y, 1) loop y[i] := i*x[i]; end for; end f;
+           model M Real x; Real v[3]; equation v = f({x, 2, 3}); der(x) = sum(v); end M;
+         end P;",
+    );
+    assert_eq!(slopes(&plant, &[("x", 1.0)]), [1.0 + 4.0 + 9.0]);
+}
+
+#[test]
 fn derivatives_of_expressions() {
     let plant = plant(
         "model M Real y(start = 1); Real T(start = 2); input Real w;
