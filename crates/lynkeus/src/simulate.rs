@@ -274,7 +274,8 @@ fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
     densities
 }
 
-fn outcome(
+/// A run with what is to be said of it.
+pub(crate) fn outcome(
     prepared: &Prepared<'_>,
     design: Design,
     run: &Trajectory,
