@@ -127,9 +127,9 @@ pub(crate) fn refuse_seconds(study: &Study, table: &Table, time: &str) -> Result
 
 /// Whether it is the name of another unit of time.
 fn is_no_second(unit: &str) -> bool {
-    const OTHERS: [&str; 16] = [
+    const OTHERS: [&str; 19] = [
         "ns", "us", "µs", "ms", "min", "mins", "minute", "minutes", "h", "hr", "hour", "hours",
-        "d", "day", "days", "weeks",
+        "d", "day", "days", "week", "weeks", "year", "years",
     ];
     OTHERS.contains(&unit.trim().to_lowercase().as_str())
 }
