@@ -204,9 +204,9 @@ fn a_truth_with_gaps_has_errors() {
     let v = |line: &str| line.split(',').nth(2).unwrap().to_owned();
     let rows = |until: usize| -> String {
         let lines = log.lines().zip(all.lines()).enumerate();
-        let cell = |k: usize, line: &str| match (k, (k - 1) % 5 == 0 && k <= until) {
-            (_, true) => v(line),
-            (_, false) => String::new(),
+        let cell = |k: usize, line: &str| match (k - 1).is_multiple_of(5) && k <= until {
+            true => v(line),
+            false => String::new(),
         };
         let rows = lines
             .skip(1)
