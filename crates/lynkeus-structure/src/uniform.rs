@@ -7,16 +7,17 @@
 //! Where their determinant is not zero the state is seen, at once and for any small error.
 //! Where it is zero, that many derivatives do not show it.
 
-use std::collections::HashMap;
+mod blind;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 
 use crate::indices::Codistribution;
 use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
-use crate::points::inside;
 use crate::region::Cell;
 use crate::{Extended, Finding, Place, Region, Regularity, Side, Verdict, sign, vanishes};
+pub use blind::Blind;
+use blind::blind;
 
 /// A determinant of more states has too many terms.
 const STATES: usize = 6;
@@ -41,20 +42,6 @@ pub struct Uniformity {
     pub blind: Vec<Blind>,
     /// ranges of the states
     pub sides: Place,
-}
-
-/// A constant input that blinds the outputs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Blind {
-    /// name of the input
-    pub input: String,
-    /// its value
-    pub value: f64,
-    /// states that then act on no output, not even through others: two states of the
-    /// plant that differ only in these cannot be told apart
-    pub hidden: Vec<String>,
-    /// two such states, where there is a hidden one: by name, in the box
-    pub alike: Option<[Vec<(String, f64)>; 2]>,
 }
 
 /// Examines the box; none where the model has too many states, or where its outputs
@@ -250,94 +237,6 @@ fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64)
         open.iter().map(|(cell, _)| region.named(cell)).collect(),
         share,
     ))
-}
-
-/// Constant inputs, of zero and the ends and middles of their ranges, for which the
-/// determinant is zero whatever the state.
-fn blind(extended: &Extended<'_>, node: Node, region: &Region) -> Result<Vec<Blind>, MissingInput> {
-    let graph = extended.graph();
-    let mut found = vec![];
-    for input in &extended.inputs {
-        let ends = [
-            0.0,
-            input.min,
-            input.max,
-            match input.integer {
-                true => f64::midpoint(input.min, input.max).floor(),
-                false => f64::midpoint(input.min, input.max),
-            },
-        ];
-        let inside = |x: &f64| {
-            let whole = !input.integer || x.fract() == 0.0;
-            x.is_finite() && *x >= input.min && *x <= input.max && whole
-        };
-        let mut tried: Vec<f64> = vec![];
-        for value in ends.into_iter().filter(inside) {
-            if tried.contains(&value) {
-                continue;
-            }
-            tried.push(value);
-            let fixed = HashMap::from([(input.node, graph.constant(value).node())]);
-            let there = graph.substitute(&[node], &fixed)[0];
-            if vanishes(graph, there, region)? == Verdict::Proved {
-                let hidden = hidden(extended, &fixed, region)?;
-                found.push(Blind {
-                    input: input.name.clone(),
-                    value,
-                    alike: (!hidden.is_empty()).then(|| alike(extended, &hidden)),
-                    hidden,
-                });
-            }
-        }
-    }
-    Ok(found)
-}
-
-/// Two states that differ in the hidden ones only: a quarter and three quarters up
-/// their ranges, the others in the middle.
-fn alike(extended: &Extended<'_>, hidden: &[String]) -> [Vec<(String, f64)>; 2] {
-    [0.25, 0.75].map(|share| {
-        let value = |v: &lynkeus_model::Variable| {
-            let share = if hidden.contains(&v.name) { share } else { 0.5 };
-            (v.name.clone(), inside(v.min, v.max, share))
-        };
-        extended.states.iter().map(value).collect()
-    })
-}
-
-/// States from which no path of dependencies leads to an output.
-fn hidden(
-    extended: &Extended<'_>,
-    fixed: &HashMap<Node, Node>,
-    region: &Region,
-) -> Result<Vec<String>, MissingInput> {
-    let graph = extended.graph();
-    let symbols = extended.symbols();
-    let outputs = extended.outputs.iter().map(|o| o.variable.node);
-    let functions: Vec<Node> = outputs
-        .chain(extended.derivatives.iter().copied())
-        .collect();
-    let partials = jacobian_rows(graph, &functions, &symbols);
-    let first = extended.outputs.len();
-    let mut seen = vec![false; symbols.len()];
-    let mut open: Vec<usize> = (0..first).collect();
-    while let Some(row) = open.pop() {
-        for (state, partial) in partials[row].iter().enumerate() {
-            let Some(partial) = partial.filter(|_| !seen[state]) else {
-                continue;
-            };
-            let there = graph.substitute(&[partial], fixed)[0];
-            if vanishes(graph, there, region)? != Verdict::Proved {
-                seen[state] = true;
-                open.push(first + state);
-            }
-        }
-    }
-    let names = extended.states.iter().zip(&seen);
-    Ok(names
-        .filter(|(_, seen)| !**seen)
-        .map(|(s, _)| s.name.clone())
-        .collect())
 }
 
 #[cfg(test)]

@@ -17,8 +17,9 @@ const TOLD: usize = 6;
 pub struct Accuracy {
     /// its name in the plant
     pub quantity: String,
-    /// root of the mean square error over the last half of the rows, in its unit
-    pub rms: f64,
+    /// root of the mean square error over the last half of the rows, in its unit; none where its
+    /// true value is known in the first half only
+    pub rms: Option<f64>,
     /// largest error after the first row, in its unit
     pub peak: f64,
     /// time of the largest error
@@ -53,8 +54,6 @@ fn accuracy(time: &[f64], quantity: &Quantity, side: Option<&Side>) -> Option<Ac
         .map(|(t, (x, hat))| (*t, (hat - x).abs()))
         .filter(|(_, e)| e.is_finite())
         .collect();
-    let late = &errors[errors.len() / 2..];
-    let squares: f64 = late.iter().map(|(_, e)| e * e).sum();
     let after_start = errors.iter().skip(usize::from(errors.len() > 1));
     let (peak_at, peak) = *after_start.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let width = side
@@ -62,7 +61,7 @@ fn accuracy(time: &[f64], quantity: &Quantity, side: Option<&Side>) -> Option<Ac
         .filter(|w| w.is_finite() && *w > 0.0);
     Some(Accuracy {
         quantity: quantity.name.clone(),
-        rms: (squares / late.len().max(1) as f64).sqrt(),
+        rms: quantity.settled_error(),
         peak,
         peak_at,
         settling: width.map_or(Settling::NoRange, |width| {
@@ -101,10 +100,13 @@ impl Accuracy {
             Settling::Never => "; not within 5 % of its range at the end".to_owned(),
             Settling::NoRange => String::new(),
         };
+        let late = match self.rms {
+            Some(rms) => format!("RMS {} in the last half", figures(rms, 3)),
+            None => "not known in the last half".to_owned(),
+        };
         format!(
-            "error of {}: RMS {} in the last half, at most {} (t = {}){settled}",
+            "error of {}: {late}, at most {} (t = {}){settled}",
             self.quantity,
-            figures(self.rms, 3),
             figures(self.peak, 3),
             number(self.peak_at),
         )
@@ -141,12 +143,31 @@ mod tests {
         let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         let of = |max| accuracy(&time, &quantity, Some(&side(max))).unwrap();
         let found = of(8.0);
-        // 0.3, 0.4, 0.3 are the last three of the five that are known
-        assert!((found.rms - (0.34_f64 / 3.0).sqrt()).abs() < 1e-12);
+        // 0.3, 0.4, 0.3 in the last three rows
+        assert!((found.rms.unwrap() - (0.34_f64 / 3.0).sqrt()).abs() < 1e-12);
         assert_eq!((found.peak, found.peak_at), (4.0, 1.0));
         assert_eq!(found.settling, Settling::From(3.0));
         assert_eq!(of(7.0).settling, Settling::From(5.0));
         assert_eq!(of(5.0).settling, Settling::Never);
         assert_eq!(of(f64::INFINITY).settling, Settling::NoRange);
+    }
+
+    /// A laboratory's value now and then: the last half is that of the rows, as everywhere.
+    #[test]
+    fn rows_without_truth_count_nowhere() {
+        let quantity = |truth: [f64; 6]| Quantity {
+            truth: Some(truth.to_vec()),
+            estimate: Some(vec![2.0; 6]),
+            ..Quantity::default()
+        };
+        let nan = f64::NAN;
+        let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let late = quantity([0.0, 0.0, 0.0, nan, 1.0, nan]);
+        assert_eq!(accuracy(&time, &late, None).unwrap().rms, Some(1.0));
+        assert_eq!(late.settled_error(), Some(1.0));
+        let early = accuracy(&time, &quantity([0.0, 1.0, nan, nan, nan, nan]), None).unwrap();
+        assert_eq!((early.rms, early.peak), (None, 1.0));
+        assert!(early.words().contains("not known in the last half"));
+        assert!(early.to_json()["rms_last_half"].is_null());
     }
 }

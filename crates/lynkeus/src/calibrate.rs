@@ -62,6 +62,9 @@ pub(crate) fn as_states(study: &Study, mut plant: Plant, valued: bool) -> Result
         for variable in plant.outputs.iter_mut().chain(&mut plant.algebraics) {
             variable.node = plant.graph.substitute(&[variable.node], &values)[0];
         }
+        for assertion in &mut plant.assertions {
+            assertion.condition = plant.graph.substitute(&[assertion.condition], &values)[0];
+        }
     }
     plant.parameters = known;
     for parameter in unknown {

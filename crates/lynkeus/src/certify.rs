@@ -110,7 +110,7 @@ impl<'a> Task<'a> {
                 let assumptions = assumptions::of(self.study, place)?;
                 let tuning = Tuning {
                     clamp: false,
-                    ..self.study.observer.tuning.clone()
+                    ..self.prepared.tuning()?
                 };
                 let theorem = family.theorem(place, &tuning, &assumptions);
                 Some(theorem.map_err(|error| self.prepared.refusal(error))?)

@@ -1,5 +1,6 @@
 //! What can be estimated from these sensors, by which observer, and what fails where.
 
+mod json;
 mod knowledge;
 mod next;
 mod observability;
@@ -11,14 +12,14 @@ use std::time::Duration;
 use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::{Diagnostic, Plant};
 use lynkeus_observability::{Answer, Verdict};
-use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{self as structure, Point, counted, determined, uniformity};
-use serde_json::{Value, json};
+use lynkeus_observers::{Examination, fit_word};
+use lynkeus_structure::{counted, determined, uniformity};
 
 use crate::choice::Choice;
 use crate::prepare::Prepared;
 use crate::words::conditions;
 use crate::{Error, Study, calibrate, prepare};
+pub(crate) use json::point;
 pub use knowledge::{Assumption, Knowledge, Known};
 pub use next::Next;
 pub use uniform::Uniform;
@@ -231,76 +232,6 @@ impl Report {
             ))),
         }
     }
-
-    /// The report for machines.
-    pub fn to_json(&self) -> Value {
-        let families: Vec<Value> = self.examinations.iter().map(family).collect();
-        let visible = self.answer.quantities.iter().map(|(asked, _)| {
-            (
-                asked.name.clone(),
-                json!(asked.verdict == Verdict::Observable),
-            )
-        });
-        let mut report = json!({
-            "plant": self.plant,
-            "states": self.states,
-            "measured": self.measured,
-            "unknown": self.unknown,
-            "recommended": self.recommended,
-            "warnings": self.warnings.iter().map(Diagnostic::one_line).collect::<Vec<_>>(),
-            "families": families,
-            "visible": visible.collect::<serde_json::Map<_, _>>(),
-        });
-        observability::add_json(&self.answer, &mut report);
-        report["uniform"] = json!(
-            self.uniform
-                .as_ref()
-                .and_then(Uniform::said)
-                .map(uniform::json)
-        );
-        report["knowledge"] = self.knowledge.iter().map(Knowledge::to_json).collect();
-        report["choice"] = json!(self.choice.as_ref().map(Choice::to_json));
-        report["next"] = json!(self.next.as_ref().map(Next::to_json));
-        report
-    }
-}
-
-fn family(examination: &Examination) -> Value {
-    let check = |check: &Check| {
-        let mut entry = json!({
-            "name": check.statement.to_string(),
-            "verdict": check.verdict.word(),
-            "detail": check.detail,
-        });
-        match &check.verdict {
-            structure::Verdict::Proved => {}
-            structure::Verdict::Refuted(witness) => {
-                entry["witness"] = witness.points.iter().map(point).collect();
-            }
-            structure::Verdict::Undecided(sides) => {
-                let sides = sides
-                    .iter()
-                    .map(|side| (side.name.clone(), json!([side.min, side.max])));
-                entry["box"] = Value::Object(sides.collect());
-            }
-        }
-        entry
-    };
-    json!({
-        "family": examination.family,
-        "fit": fit_word(examination.fit()),
-        "summary": examination.summary,
-        "chains": examination.chains,
-        "checks": examination.conditions().map(check).collect::<Vec<_>>(),
-    })
-}
-
-pub(crate) fn point(point: &Point) -> Value {
-    let at = point
-        .coordinates
-        .iter()
-        .map(|c| (c.name.clone(), json!(c.value)));
-    json!({ "value": point.value, "at": Value::Object(at.collect()) })
 }
 
 impl fmt::Display for Report {

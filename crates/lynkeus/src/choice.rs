@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use lynkeus_observers::{Design, DesignError, Examination, Value, find};
+use lynkeus_observers::{Design, DesignError, Examination, Tuning, Value, find};
 use lynkeus_structure::Standing;
 use serde_json::{Value as Json, json};
 
@@ -255,6 +255,16 @@ fn too_slow(rate: f64, run: &SimulateSettings) -> String {
 }
 
 impl Choice {
+    /// A tuning with what is proposed where it says nothing.
+    pub(crate) fn completed(&self, tuning: &Tuning) -> Tuning {
+        let mut tuned = tuning.clone();
+        if let Some(Proposal { value, .. }) = self.proposal {
+            let slot = tuned.values.entry(Proposal::KEY.to_owned());
+            slot.or_insert(Value::Number(value));
+        }
+        tuned
+    }
+
     /// For machines.
     pub(crate) fn to_json(&self) -> Json {
         json!({

@@ -113,8 +113,8 @@ pub fn compare(
         let first = reasons.next().cloned().unwrap_or_default();
         return Err(Error::refused(format!("no family can be run: {first}")).at(&study.file));
     }
-    let known = rows.iter().filter_map(|row| row.run.as_ref().ok());
-    let known = known.flat_map(|run| &run.settled).any(|s| s.rms.is_some());
+    let mut runs = rows.iter().filter_map(|row| row.run.as_ref().ok());
+    let known = runs.any(|run| run.peak.is_some());
     Ok(Comparison {
         plant: plant.name.clone(),
         rows,
@@ -207,7 +207,8 @@ fn timed<'p>(
     prepared: &'p Prepared<'p>,
     run: impl FnOnce(&'p Prepared<'p>) -> Result<Outcome, Error>,
 ) -> Result<Run, Error> {
-    // the design is found once more inside; it is not what is timed
+    // the choice is made once; the design is found once more inside, which is not what is timed
+    prepared.choice()?;
     let since = Instant::now();
     prepared.design()?;
     let designing = since.elapsed();

@@ -10,7 +10,7 @@ use lynkeus_run::{Estimator, EstimatorSettings};
 use crate::checkpoint::Checkpoint;
 use crate::course::{Course, Samples};
 use crate::frozen::{Channel, Frozen, frozen};
-use crate::headers::time_of;
+use crate::headers::{refuse_seconds, time_of};
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
@@ -77,6 +77,7 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
         .chain(&design.observer.inputs);
     let names = read.map(|signal| signal.name.as_str());
     let time_header = time_of(table, plant, settings, names)?;
+    refuse_seconds(study, table, &time_header)?;
     let ordered = match settings.strict {
         true => None,
         false => table.in_order(&time_header, settings.late)?,

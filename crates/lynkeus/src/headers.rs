@@ -8,7 +8,7 @@ use lynkeus_model::{Plant, Variable};
 
 use crate::estimate::header;
 use crate::study::EstimateSettings;
-use crate::{Error, Table};
+use crate::{Error, Study, Table};
 
 /// The header of time, and what it is where a column of data is called so.
 const TIME: &str = "t";
@@ -107,6 +107,31 @@ pub(crate) fn time_of<'s>(
         .hint("if it has another name, set `time` in [estimate] of the study"));
     }
     Ok(time)
+}
+
+/// Refuses dates where the study's time has another unit than the seconds that they become.
+///
+/// # Errors
+/// The unit, and what to do.
+pub(crate) fn refuse_seconds(study: &Study, table: &Table, time: &str) -> Result<(), Error> {
+    let unit = study.time_unit.as_deref().filter(|unit| is_no_second(unit));
+    match (unit, table.origin(time)) {
+        (Some(unit), Some(date)) => Err(Error::input(format!(
+            "the times of the log are dates such as {date}, which count in seconds, but `time_unit` of [plot] says that the plant's are in {unit}"
+        ))
+        .at(table.file())
+        .hint(format!("write them as numbers in {unit}, or the model in seconds"))),
+        _ => Ok(()),
+    }
+}
+
+/// Whether it is the name of another unit of time.
+fn is_no_second(unit: &str) -> bool {
+    const OTHERS: [&str; 19] = [
+        "ns", "us", "µs", "ms", "min", "mins", "minute", "minutes", "h", "hr", "hour", "hours",
+        "d", "day", "days", "week", "weeks", "year", "years",
+    ];
+    OTHERS.contains(&unit.trim().to_lowercase().as_str())
 }
 
 #[cfg(test)]

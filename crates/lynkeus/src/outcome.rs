@@ -53,20 +53,21 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// √(mean (estimate − truth)²) over the last half of the rows.
+    /// √(mean (estimate − truth)²) over the last half of the rows, where the truth is known; none
+    /// where it is not.
     pub fn settled_error(&self) -> Option<f64> {
-        let (truth, estimate) = (self.truth.as_ref()?, self.estimate.as_ref()?);
-        Some(settled_error(truth, estimate))
+        settled_error(self.truth.as_ref()?, self.estimate.as_ref()?)
     }
 }
 
-/// √(mean (estimate − truth)²) over the last half of the rows.
-pub(crate) fn settled_error(truth: &[f64], estimate: &[f64]) -> f64 {
+/// √(mean (estimate − truth)²) over the last half of the rows; rows without a value count nowhere.
+pub(crate) fn settled_error(truth: &[f64], estimate: &[f64]) -> Option<f64> {
     let half = truth.len() / 2;
-    let pairs = truth.iter().zip(estimate).skip(half);
-    let squares: Vec<f64> = pairs.map(|(x, hat)| (hat - x).powi(2)).collect();
-    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
-    mean.sqrt()
+    let errors = truth.iter().zip(estimate).skip(half);
+    let squares = errors.map(|(x, hat)| (hat - x).powi(2));
+    let squares: Vec<f64> = squares.filter(|e| e.is_finite()).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    (!squares.is_empty()).then(|| mean.sqrt())
 }
 
 /// The trust in an estimate over time, and whether it was ever lost.

@@ -9,7 +9,6 @@ use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value}
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
 use crate::choice::{Choice, choose};
-use crate::propose::Proposal;
 use crate::study::Name;
 use crate::{Error, Study, calibrate, systems};
 
@@ -165,6 +164,16 @@ impl<'a> Prepared<'a> {
         Ok(self.choice.get_or_init(|| found).as_ref())
     }
 
+    /// The tuning of the study, with what is proposed.
+    ///
+    /// # Errors
+    /// As [`Prepared::choice`].
+    pub(crate) fn tuning(&self) -> Result<Tuning, Error> {
+        let given = &self.study.observer.tuning;
+        let choice = self.choice()?;
+        Ok(choice.map_or_else(|| given.clone(), |choice| choice.completed(given)))
+    }
+
     /// The same with another tuning.
     pub(crate) fn design_with(&self, tuning: &Tuning) -> Result<Design, Error> {
         let examinations = self.examinations()?;
@@ -187,11 +196,7 @@ impl<'a> Prepared<'a> {
         let Some(chosen) = examinations.iter().find(|e| e.family == choice.family) else {
             return Err(none_fits(self.study, examinations));
         };
-        let mut tuned = tuning.clone();
-        if let Some(Proposal { value, .. }) = choice.proposal {
-            let slot = tuned.values.entry(Proposal::KEY.to_owned());
-            slot.or_insert(Value::Number(value));
-        }
+        let tuned = choice.completed(tuning);
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
             true => Some(self.narrowed(&self.simulated_inputs()?)?),

@@ -134,9 +134,11 @@ fn sampled(
 ) -> Result<Ran, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let watch = &mut within(&study.budget, watch);
-    let run = simulation
-        .run_watched(&mut |done| watch(0.5 * done))
-        .map_err(|error| interrupted(error.error, &study.file))?;
+    let plant_alone = simulation.run_watched(&mut |done| watch(0.5 * done));
+    let mut run = plant_alone.map_err(|error| match study.budget.marked() {
+        Some(spent) => Error::ended(spent).at(&study.file),
+        None => interrupted(error.error, &study.file),
+    })?;
     let observer = &design.observer;
     let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
     let column =
@@ -152,12 +154,12 @@ fn sampled(
             .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
             .collect(),
     };
-    let course = estimate::course(prepared, design, &samples, &mut |done| {
+    let mut course = estimate::course(prepared, design, &samples, &mut |done| {
         watch(0.5 + 0.5 * done)
     })?;
-    if let Some(error) = course.ended {
-        return Err(interrupted(error, &study.file));
-    }
+    let rows = course.estimates.first().map_or(0, Vec::len);
+    settle(&mut course, rows, study, &study.file)?;
+    run.truncate(rows);
     Ok(Ran { run, course })
 }
 
@@ -274,7 +276,8 @@ fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
     densities
 }
 
-fn outcome(
+/// A run with what is to be said of it.
+pub(crate) fn outcome(
     prepared: &Prepared<'_>,
     design: Design,
     run: &Trajectory,

@@ -6,11 +6,15 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod normal;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use lynkeus::run::{Dynamics, Evaluation, Rk4, System};
 use lynkeus::{Outcome, Study, Table, estimate, prepare};
+
+use normal::Normal;
 
 /// A study beside the truth that it is tried on.
 struct Case {
@@ -139,23 +143,6 @@ const UKF: Case = filter(
 const MHE: Case = filter(
     "family = \"mhe\"\nhorizon = 4\ninitial_variance = { default = 0.01 }\ninitial = { x1 = 2, x2 = 1, x3 = 3, x4 = 3.5 }",
 );
-
-/// Deviates by the sum of twelve uniform ones.
-struct Normal(u64);
-
-impl Normal {
-    fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-
-    fn uniform(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// The plant with its unknown inputs as states, and what the study says of it.
 struct Truth {

@@ -157,8 +157,11 @@ impl Linear {
             let across = null_space(&V.transpose());
             let stays = equilibrated(&(across.transpose() * &flow), ZERO * flow.amax());
             let pairs = null_space(&stacked(&stays, &seen));
+            // of columns of length one: where no state moves, rounding moves none
+            let pairs = pairs.map(|x| if x.abs() > ZERO { x } else { 0.0 });
             let next = image(&pairs.rows(0, n).into_owned());
-            if next.ncols() == V.ncols() {
+            // it never grows, but by rounding
+            if next.ncols() >= V.ncols() {
                 return Traceless { pairs, V };
             }
             V = next;
@@ -169,6 +172,10 @@ impl Linear {
     fn fates(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<Fate>> {
         let Traceless { pairs, V } = self.traceless();
         let n = self.F.nrows();
+        if pairs.ncols() == 0 {
+            // frozen at the point, everything is seen
+            return None;
+        }
         let (x, v) = (
             pairs.rows(0, n).into_owned(),
             pairs.rows(n, pairs.nrows() - n).into_owned(),
@@ -252,6 +259,9 @@ fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
 /// An orthonormal basis of the null space; a matrix without rows has all of it.
 fn null_space(a: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
+    if n == 0 {
+        return DMatrix::zeros(0, 0);
+    }
     // rows of zeros, so that every direction is listed
     let square = DMatrix::from_fn(a.nrows().max(n), n, |i, j| {
         if i < a.nrows() { a[(i, j)] } else { 0.0 }
@@ -293,7 +303,8 @@ fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
             }
         });
         let next = image(&both);
-        if next.ncols() == space.ncols() {
+        // it never shrinks, but by rounding
+        if next.ncols() <= space.ncols() {
             return space;
         }
         space = next;

@@ -6,7 +6,7 @@ struct Case {
     text: String,
     hidden: &'static [&'static str],
     directions: usize,
-    unknown: bool,
+    unknown: Vec<String>,
 }
 
 /// A plant with a measured state, two more, a known and an unknown input.
@@ -23,7 +23,7 @@ fn case(equations: &str, hidden: &'static [&'static str], directions: usize) -> 
         ),
         hidden,
         directions,
-        unknown: true,
+        unknown: vec!["w".to_owned()],
     }
 }
 
@@ -31,11 +31,7 @@ impl Case {
     fn fate(&self, name: &str) -> Option<Fate> {
         let plant = Plant::from_modelica(&self.text, "p.mo", &LoadOptions::default()).unwrap();
         let sensors = Sensors {
-            unknown: if self.unknown {
-                vec!["w".into()]
-            } else {
-                vec![]
-            },
+            unknown: self.unknown.clone(),
             ..Sensors::default()
         };
         let extended = Extended::new(&plant, &sensors).unwrap();
@@ -56,7 +52,7 @@ impl Case {
     }
 
     fn known(mut self) -> Self {
-        self.unknown = false;
+        self.unknown.clear();
         self
     }
 }
@@ -201,4 +197,50 @@ fn a_linearisation_that_hides_something_else_is_no_answer() {
     found.text = found.text.replace("b(start = 0.5", "b(start = 0");
     // judged in the middle of the box, where c = 0 is marginal
     assert_eq!(found.fate("c"), Some(Fate::Stays));
+}
+
+/// Of b·c only the product shows; frozen at a point both do, as they move at rates of their own, and there is
+/// nothing left to move without a trace, beside the unknown input that acts on nothing.
+#[test]
+fn what_a_frozen_point_sees_is_told_of_no_point() {
+    let product = || {
+        case(
+            "der(a) = -a + b*c; der(b) = 0.1*b; der(c) = -2*c;",
+            &["b", "c", "w"],
+            2,
+        )
+    };
+    for name in ["b", "w"] {
+        assert_eq!(product().fate(name), Some(Fate::Undecided), "{name}");
+    }
+    assert_eq!(product().known().fate("b"), Some(Fate::Undecided));
+    // c alone is proved to decay
+    assert!((rate(product().known().fate("c"), Ground::Box) - 2.0).abs() < 1e-9);
+}
+
+/// b follows from a', and b' is all that shows of two unknown inputs: one moves with the other. The states that
+/// can move without a trace are none, which rounding must not hide.
+#[test]
+fn two_unknown_inputs_in_one_equation_move_each_other() {
+    let mut found = case(
+        "der(a) = -2*b^2 - 2 + 0.1*b; der(b) = 0.5*w^2 + 0.5*u + 2*u^2; der(c) = a - c;",
+        &["c", "u", "w"],
+        2,
+    );
+    found.unknown.push("u".to_owned());
+    for name in ["u", "w"] {
+        assert_eq!(found.fate(name), Some(Fate::Moved), "{name}");
+    }
+    assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+    // nor rounding make the search for them endless
+    let alone = Case {
+        text: "model M input Real w0(start=1,min=-2,max=2); input Real w1(start=0.5,min=-2,max=2);
+          Real x0(start=0.5,min=-2,max=2); Real x1(start=1,min=-2,max=2); output Real y0 = x0; output Real y1 = x0;
+          equation der(x0) = -2*x1^2-2+0.1*x1; der(x1) = 0.5*w1^2+0.5*w0+2*w0*w0; end M;"
+            .to_owned(),
+        hidden: &["w0", "w1"],
+        directions: 1,
+        unknown: vec!["w0".to_owned(), "w1".to_owned()],
+    };
+    assert_eq!(alone.fate("w0"), Some(Fate::Moved));
 }

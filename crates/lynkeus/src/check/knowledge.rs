@@ -16,6 +16,9 @@ use crate::words::number;
 pub enum Known {
     /// on the whole box and for all inputs of the assumption: proved
     Everywhere,
+    /// on the whole box while known inputs stay constant: proved; at almost every state and input
+    /// else
+    WhileConstant,
     /// at almost every state and input; everywhere is not decided
     AlmostEverywhere,
     /// not while this input has this value
@@ -171,10 +174,15 @@ impl Found<'_> {
         let is_regular = self
             .uniform
             .is_some_and(|u| u.regular.verdict == structure::Verdict::Proved);
-        // the box was examined with unknown inputs that stay constant
-        let regular = is_regular && assumption != Assumption::Arbitrary;
-        if self.determined.get(place) == Some(&true) || regular {
+        if self.determined.get(place) == Some(&true) {
             return Known::Everywhere;
+        }
+        // the box was examined with inputs that stay constant, known ones and unknown ones
+        if is_regular && assumption != Assumption::Arbitrary {
+            return match extended.inputs.is_empty() {
+                true => Known::Everywhere,
+                false => Known::WhileConstant,
+            };
         }
         let blind = self.uniform.into_iter().flat_map(|u| &u.blind);
         let mut hides = blind.filter(|b| b.hidden.is_empty() || b.hidden.contains(name));
@@ -192,7 +200,10 @@ impl Known {
     /// 0: known; 1: known in the end; 2: not known.
     fn class(&self) -> usize {
         match self {
-            Known::Everywhere | Known::AlmostEverywhere | Known::WhileExcited { .. } => 0,
+            Known::Everywhere
+            | Known::WhileConstant
+            | Known::AlmostEverywhere
+            | Known::WhileExcited { .. } => 0,
             Known::Hidden(Fate::Decays { .. }) => 1,
             Known::Hidden(_) | Known::Undecided => 2,
         }
@@ -201,6 +212,7 @@ impl Known {
     fn word(&self) -> &'static str {
         match self {
             Known::Everywhere => "everywhere",
+            Known::WhileConstant => "everywhere while inputs are constant",
             Known::AlmostEverywhere => "almost everywhere",
             Known::WhileExcited { .. } => "while excited",
             Known::Hidden(Fate::Decays { .. }) => "decays",
@@ -230,6 +242,9 @@ impl Known {
     fn line(&self, unit: &str) -> String {
         match self {
             Known::Everywhere => "known everywhere (proved on the box)".to_owned(),
+            Known::WhileConstant => {
+                "known everywhere while inputs are constant (proved on the box), and for almost every other input".to_owned()
+            }
             Known::AlmostEverywhere => {
                 "known at almost every state and input (everywhere is not proved)".to_owned()
             }

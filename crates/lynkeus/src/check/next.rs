@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use lynkeus_model::Variable;
-use lynkeus_observers::Value as Tuned;
+use lynkeus_observers::{Initial, Tuning, Value as Tuned};
 use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
@@ -101,9 +101,14 @@ fn commands(study: &Study, bare: bool, choice: &Choice, file: &str) -> Vec<(Stri
 }
 
 fn quoted_for_shell(file: &str) -> String {
-    match file.contains(char::is_whitespace) {
-        true => format!("\"{file}\""),
-        false => file.to_owned(),
+    let plain = |c: char| c.is_alphanumeric() || "/\\.:_-+,=@%".contains(c);
+    match (
+        file.chars().all(plain),
+        file.chars().all(|c| plain(c) || c == ' '),
+    ) {
+        (true, _) => file.to_owned(),
+        (false, true) => format!("\"{file}\""),
+        (false, false) => format!("'{}'", file.replace('\'', "'\\''")),
     }
 }
 
@@ -152,10 +157,29 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
     let given = study.observer.tuning.values.iter();
     let given = given.filter(|(name, _)| family.is_some_and(|family| family.owns(name)));
     lines.extend(given.map(|(name, value)| format!("{} = {}", key(name), toml(value))));
+    lines.extend(common(&study.observer.tuning));
     if choice.grounds == Grounds::Filter && study.process_noise.is_empty() {
         lines.extend(process_noise(prepared));
     }
     lines.join("\n") + "\n"
+}
+
+/// The keys of every family, as the study has them.
+fn common(tuning: &Tuning) -> Vec<String> {
+    let Initial { default, values } = &tuning.initial;
+    let default = default.iter().map(|value| format!("default = {value}"));
+    let values = values
+        .iter()
+        .map(|(name, value)| format!("{} = {value}", key(name)));
+    let starts: Vec<String> = default.chain(values).collect();
+    let mut lines = vec![];
+    if !starts.is_empty() {
+        lines.push(format!("initial = {{ {} }}", starts.join(", ")));
+    }
+    if tuning.clamp {
+        lines.push("clamp = true".to_owned());
+    }
+    lines
 }
 
 /// What the filter takes where nothing is declared, to be edited.
@@ -282,5 +306,23 @@ fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
         rounded
     } else {
         10.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted_for_shell;
+
+    #[test]
+    fn a_shell_reads_the_name_that_was_meant() {
+        for (name, typed) in [
+            ("plants/s-1.toml", "plants/s-1.toml"),
+            ("größe.toml", "größe.toml"),
+            ("a b.toml", "\"a b.toml\""),
+            ("d$x (1).toml", "'d$x (1).toml'"),
+            ("it's.toml", "'it'\\''s.toml'"),
+        ] {
+            assert_eq!(quoted_for_shell(name), typed);
+        }
     }
 }

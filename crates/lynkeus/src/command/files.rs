@@ -30,6 +30,16 @@ struct Named {
     /// "the log", "--plot"
     role: &'static str,
     path: PathBuf,
+    content: Content,
+}
+
+/// What a file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Content {
+    /// anything that its name says
+    Any,
+    /// SVG, whatever its name says
+    Picture,
 }
 
 impl Files {
@@ -45,6 +55,16 @@ impl Files {
         self
     }
 
+    /// Adds a picture that is drawn.
+    pub fn draws(mut self, option: &'static str, path: Option<&Path>) -> Self {
+        let pictures = named(option, path).into_iter().map(|named| Named {
+            content: Content::Picture,
+            ..named
+        });
+        self.results.extend(pictures);
+        self
+    }
+
     /// With `--json` the object is printed, beside everything that is written.
     pub fn prints_json(mut self, json: bool) -> Self {
         self.printed = json.then_some("--json");
@@ -54,7 +74,7 @@ impl Files {
     /// Refuses what would lose a file or mix two results.
     ///
     /// # Errors
-    /// A result is an input or another result, two of them go to standard output or come from standard input,
+    /// A result is an input or another result, a picture has the name of another format, two of them go to standard output or come from standard input,
     /// or a result cannot be written.
     pub fn check(&self) -> Result<(), Error> {
         self.standard()?;
@@ -71,6 +91,9 @@ impl Files {
                 return Err(result.meets(other));
             }
         }
+        self.results
+            .iter()
+            .try_for_each(Named::is_called_as_it_is)?;
         let mut to_files = self.results.iter().filter(|r| !is_standard(&r.path));
         to_files.try_for_each(|r| save::probe(&r.path))
     }
@@ -103,7 +126,12 @@ impl Files {
 
 fn named(role: &'static str, path: Option<&Path>) -> Option<Named> {
     let path = path?.to_owned();
-    Some(Named { role, path })
+    let content = Content::Any;
+    Some(Named {
+        role,
+        path,
+        content,
+    })
 }
 
 impl Named {
@@ -126,6 +154,23 @@ impl Named {
             self.path.display()
         ))
         .hint("give each result a name of its own")
+    }
+
+    /// Refuses a picture whose name says another format.
+    fn is_called_as_it_is(&self) -> Result<(), Error> {
+        let kind = self
+            .path
+            .extension()
+            .filter(|_| self.content == Content::Picture);
+        match kind {
+            Some(kind) if !kind.eq_ignore_ascii_case("svg") => Err(Error::input(format!(
+                "{} {}: pictures are SVG, found the name of another format",
+                self.role,
+                self.path.display()
+            ))
+            .hint("name it *.svg, which browsers and editors open and convert")),
+            _ => Ok(()),
+        }
     }
 
     /// None where nothing can be lost: a device, a pipe, a terminal.

@@ -54,7 +54,7 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
     source
         .files()
         .writes("-o", options.output.as_deref())
-        .writes("--plot", options.plot.as_deref())
+        .draws("--plot", options.plot.as_deref())
         .prints_json(json)
         .check()?;
     let asked = precision::Options {

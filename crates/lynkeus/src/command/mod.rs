@@ -211,7 +211,7 @@ impl Output {
     fn added_to(&self, files: Files) -> Files {
         files
             .writes("-o", self.output.as_deref())
-            .writes("--plot", self.plot.as_deref())
+            .draws("--plot", self.plot.as_deref())
             .prints_json(self.json)
     }
 }

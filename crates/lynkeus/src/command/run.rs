@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
 use serde_json::{Value, json};
 
+use super::files::is_standard;
 use super::inputs::{self, Source};
 use super::output;
 use super::progress::{Alive, Progress};
@@ -18,7 +19,7 @@ pub(super) fn check(
     singular: Option<&Path>,
     json: bool,
 ) -> Result<ExitCode, Error> {
-    let files = source.files().writes("--singular", singular);
+    let files = source.files().draws("--singular", singular);
     files.prints_json(json).check()?;
     let alive = Alive::new("examining");
     let report = lynkeus::check(&source.study, options);
@@ -103,6 +104,10 @@ pub(super) fn estimate(
     output: &Output,
     checkpoint: Option<&Path>,
 ) -> Result<ExitCode, Error> {
+    if checkpoint.is_some_and(is_standard) {
+        let message = "--checkpoint needs a file, found -, which is standard output";
+        return Err(Error::input(message).hint("name a file after --checkpoint"));
+    }
     let files = source.files().reads("the log", Some(log));
     let files = output.added_to(files).writes("--checkpoint", checkpoint);
     files.check()?;

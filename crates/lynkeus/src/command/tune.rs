@@ -51,7 +51,7 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
     files
         .reads("the log", options.log.as_deref())
         .writes("-o", options.output.as_deref())
-        .writes("--plot", options.plot.as_deref())
+        .draws("--plot", options.plot.as_deref())
         .prints_json(options.json)
         .check()?;
     let log = options.log.as_deref().map(inputs::log).transpose()?;

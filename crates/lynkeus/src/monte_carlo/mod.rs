@@ -40,6 +40,8 @@ pub struct MonteCarlo {
     pub seeds: Vec<u64>,
     /// The runs that did not, in the order of their seeds.
     pub failures: Vec<Failure>,
+    /// Those among `seeds` whose estimates are not credible.
+    pub doubtful: Vec<Failure>,
     /// Times of the rows.
     pub time: Vec<f64>,
     /// Header of their column.
@@ -50,7 +52,7 @@ pub struct MonteCarlo {
     pub notes: Vec<String>,
 }
 
-/// A run that did not reach its end.
+/// A run that did not reach its end, or whose estimate is not credible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
     /// Its seed.
@@ -110,8 +112,17 @@ struct Series {
 #[derive(Debug)]
 struct Single {
     seed: u64,
-    /// by quantity; none where a limit ended the run
-    result: Result<Option<Vec<Series>>, Error>,
+    /// none where a limit ended the run
+    result: Result<Option<Whole>, Error>,
+}
+
+/// A run that reached its end.
+#[derive(Debug)]
+struct Whole {
+    /// by quantity
+    series: Vec<Series>,
+    /// why its estimate is not credible, where it is not
+    doubt: Option<String>,
 }
 
 /// What is followed: an estimate by its place, beside the column of its true value.
@@ -226,18 +237,18 @@ impl Job<'_> {
         rig: &Rig,
         seed: u64,
         watch: &mut Watch<'_>,
-    ) -> Result<Option<Vec<Series>>, Error> {
+    ) -> Result<Option<Whole>, Error> {
         let study = self.study;
         if study.budget.spent().is_some() {
             return Ok(None);
         }
-        let ran = Prepared::new(study, plant).and_then(|own| rig.run(&own, seed, watch));
-        let mut ran = match ran {
+        let own = Prepared::new(study, plant)?;
+        let ran = match rig.run(&own, seed, watch) {
             // a run that was ended says nothing of the study
             Err(_) if study.budget.marked().is_some() => return Ok(None),
             ran => ran?,
         };
-        if let Some(ended) = ran.course.ended {
+        if let Some(ended) = &ran.course.ended {
             return Err(Error::refused(ended.to_string()).at(&study.file));
         }
         if ran.run.times().last() != Some(&rig.simulation.until) {
@@ -246,9 +257,13 @@ impl Job<'_> {
         self.time.get_or_init(|| ran.run.times().to_vec());
         let series = self.followed.iter().map(|f| Series {
             truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
-            estimate: std::mem::take(&mut ran.course.estimates[f.estimate]),
+            estimate: ran.course.estimates[f.estimate].clone(),
         });
-        Ok(Some(series.collect()))
+        let series = series.collect();
+        // as `simulate` judges this run alone
+        let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course);
+        let doubt = alone.refusal().map(|refusal| refusal.to_string());
+        Ok(Some(Whole { series, doubt }))
     }
 }
 
@@ -262,20 +277,21 @@ fn gathered(
 ) -> Result<MonteCarlo, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let asked = singles.len();
-    let (mut seeds, mut runs, mut failures) = (vec![], vec![], vec![]);
+    let (mut seeds, mut runs) = (vec![], vec![]);
+    let (mut failures, mut doubtful) = (vec![], vec![]);
     let mut first = None;
     for single in singles {
+        let seed = single.seed;
         match single.result {
             Ok(None) => {}
-            Ok(Some(series)) => {
-                seeds.push(single.seed);
+            Ok(Some(Whole { series, doubt })) => {
+                seeds.push(seed);
                 runs.push(series);
+                doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
             }
             Err(error) => {
-                failures.push(Failure {
-                    seed: single.seed,
-                    reason: error.to_string(),
-                });
+                let reason = error.to_string();
+                failures.push(Failure { seed, reason });
                 first = first.or(Some(error));
             }
         }
@@ -324,6 +340,7 @@ fn gathered(
         asked,
         seeds,
         failures,
+        doubtful,
         time,
         time_header,
         quantities,

@@ -6,10 +6,10 @@ use lynkeus_structure::figures;
 use serde_json::{Map, Value, json};
 
 use super::statistics::{HIGH, mean, quantile};
-use super::{MonteCarlo, Scattered};
+use super::{Failure, MonteCarlo, Scattered};
 use crate::Error;
 
-/// Seeds of failed runs that are told one by one.
+/// Seeds of runs that are told one by one.
 const TOLD: usize = 20;
 
 /// The errors of a quantity over the last half of the rows, in one figure per run.
@@ -60,13 +60,17 @@ impl MonteCarlo {
         columns
     }
 
-    /// The answer "no" where a run diverged or was refused.
+    /// The answer "no" where a run diverged or was refused, or its estimate is not credible.
     #[must_use]
     pub fn refusal(&self) -> Option<Error> {
-        let first = self.failures.first()?;
+        let (runs, what) = match self.failures.is_empty() {
+            true => (&self.doubtful, "have estimates that are not credible"),
+            false => (&self.failures, "did not reach their end"),
+        };
+        let first = runs.first()?;
         let message = format!(
-            "{} of {} runs did not reach their end; the first, of seed {}: {}",
-            self.failures.len(),
+            "{} of {} runs {what}; the first, of seed {}: {}",
+            runs.len(),
             self.asked,
             first.seed,
             first.reason
@@ -96,17 +100,20 @@ impl MonteCarlo {
             });
             (q.name.clone(), entry)
         });
-        let seeds: Vec<u64> = self.failures.iter().map(|f| f.seed).collect();
+        let counted = |runs: &[Failure]| {
+            json!({
+                "count": runs.len(),
+                "seeds": runs.iter().map(|f| f.seed).collect::<Vec<_>>(),
+                "first_reason": runs.first().map(|f| &f.reason),
+            })
+        };
         json!({
             "plant": self.plant,
             "family": self.family,
             "runs": self.asked,
             "completed": self.seeds.len(),
-            "failed": {
-                "count": seeds.len(),
-                "seeds": seeds,
-                "first_reason": self.failures.first().map(|f| &f.reason),
-            },
+            "failed": counted(&self.failures),
+            "not_credible": counted(&self.doubtful),
             "rows": self.time.len(),
             "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
             "notes": self.notes,
@@ -143,15 +150,24 @@ impl fmt::Display for MonteCarlo {
                 q.name
             )?;
         }
-        if self.failures.is_empty() {
-            return Ok(());
+        for (runs, what) in [
+            (&self.failures, "not in these figures, ended early"),
+            (&self.doubtful, "in these figures, but not credible"),
+        ] {
+            if !runs.is_empty() {
+                writeln!(f, "{what}: seeds {}", told(runs))?;
+            }
         }
-        let seeds: Vec<String> = self.failures.iter().map(|x| x.seed.to_string()).collect();
-        let more = match seeds.len().saturating_sub(TOLD) {
-            0 => String::new(),
-            more => format!(", … ({more} more)"),
-        };
-        let told = seeds.into_iter().take(TOLD).collect::<Vec<_>>().join(", ");
-        writeln!(f, "not in these figures, ended early: seeds {told}{more}")
+        Ok(())
+    }
+}
+
+/// The first seeds, and how many more there are.
+fn told(runs: &[Failure]) -> String {
+    let seeds = runs.iter().take(TOLD).map(|run| run.seed.to_string());
+    let told = seeds.collect::<Vec<_>>().join(", ");
+    match runs.len().saturating_sub(TOLD) {
+        0 => told,
+        more => format!("{told}, … ({more} more)"),
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn of_runs(runs: &[Vec<Series>], place: usize) -> Found {
     }
     let rms: Vec<f64> = own
         .iter()
-        .map(|s| settled_error(&s.truth, &s.estimate))
+        .map(|s| settled_error(&s.truth, &s.estimate).unwrap_or(f64::NAN))
         .collect();
     let worst_run = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
     let worst_run = worst_run.unwrap_or(0);

@@ -190,3 +190,40 @@ fn runs_that_do_not_reach_their_end_are_counted() {
     assert!(found.to_string().contains("not in these figures"));
     assert_eq!(found.to_json()["failed"]["count"], failed.len());
 }
+
+/// y = x, x' = k·v: the observer, which has k = 1, settles at k times the true v = 1. Beyond 1.2, a tenth of
+/// the range [−1, 1] outside of it, that is not credible.
+#[test]
+fn estimates_that_are_not_credible_are_told() {
+    let folder = folder();
+    let model = "model Cart parameter Real k = 1; Real x(start = 0, min = -99, max = 99); Real v(start = 1, min = -1, max = 1);
+      output Real y = x; equation der(x) = k*v; der(v) = 0; end Cart;";
+    std::fs::write(folder.path().join("decay.mo"), model).unwrap();
+    let mut study = study(&folder, "", "spread = { k = 0.3 }");
+    study.observer.tuning.values.remove("S");
+    let speed = lynkeus_observers::Value::Number(20.0);
+    study.observer.tuning.values.insert("theta".into(), speed);
+    let found = runs(&study, 20).unwrap();
+    assert_eq!((found.seeds.len(), found.failures.len()), (20, 0));
+    let beyond = (5..25).filter(|seed| 1.0 + 0.3 * deviate(*seed, "k") > 1.2);
+    let beyond: Vec<u64> = beyond.collect();
+    assert!(!beyond.is_empty(), "the seeds show nothing");
+    let told: Vec<u64> = found.doubtful.iter().map(|run| run.seed).collect();
+    assert_eq!(told, beyond);
+    for seed in 5..25 {
+        let is_credible = alone(&study, seed).is_credible();
+        assert_eq!(is_credible, !beyond.contains(&seed), "{seed}");
+    }
+    let refusal = found.refusal().unwrap().to_string();
+    let words = format!(
+        "{} of 20 runs have estimates that are not credible",
+        told.len()
+    );
+    assert!(refusal.contains(&words), "{refusal}");
+    assert!(
+        found
+            .to_string()
+            .contains("in these figures, but not credible: seeds")
+    );
+    assert_eq!(found.to_json()["not_credible"]["count"], told.len());
+}

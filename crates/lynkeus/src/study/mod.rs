@@ -94,6 +94,12 @@ pub struct Study {
     pub budget: Budget,
 }
 
+/// Whether a file is a model by its name.
+fn is_model(path: &Path) -> bool {
+    let kind = path.extension().and_then(|e| e.to_str());
+    matches!(kind, Some("mo" | "jl"))
+}
+
 impl Study {
     /// Reads a study file.
     ///
@@ -104,6 +110,13 @@ impl Study {
         let path = path.as_ref();
         let file = path.display().to_string();
         let text = crate::files::read_text(path, "study")?;
+        if is_model(path) {
+            return Err(Error::input("expected a study (TOML), found a model")
+                .at(&file)
+                .hint(format!(
+                    "`lynkeus check {file}` makes a study to begin with"
+                )));
+        }
         let mut study = Self::parse(&text, &file)?;
         if let (Some(plant), Some(folder)) = (study.plant.as_mut(), path.parent()) {
             *plant = folder.join(&*plant);
@@ -118,9 +131,7 @@ impl Study {
     /// As [`Study::load`].
     pub fn load_or_bare(path: impl AsRef<Path>, model: Option<String>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let kind = path.extension().and_then(|e| e.to_str());
-        let bare = matches!(kind, Some("mo" | "jl"));
-        let mut study = match bare {
+        let mut study = match is_model(path) {
             true => Self {
                 file: path.display().to_string(),
                 plant: Some(path.to_owned()),

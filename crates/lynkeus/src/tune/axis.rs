@@ -104,9 +104,8 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
             .map(|(name, values)| axis(study, name, values))
             .collect();
     }
-    let tuning = &study.observer.tuning.values;
-    match SPEED.iter().find(|key| tuning.contains_key(**key)) {
-        Some(key) => Ok(vec![axis(study, &Name::from(*key), &Values::default())?]),
+    match speed(study) {
+        Some(key) => Ok(vec![axis(study, &Name::from(key), &Values::default())?]),
         None => Err(Error::input(format!(
             "nothing to sweep: [observer] sets none of {}",
             SPEED.join(", ")
@@ -114,6 +113,24 @@ pub(super) fn axes(study: &Study) -> Result<Vec<Axis>, Error> {
         .at(&study.file)
         .hint("add [tune] with keys = { KEY = { from = …, to = … } }")),
     }
+}
+
+/// The keys of `[observer]` that a study sweeps, without indices; none where there is nothing to sweep.
+pub(super) fn swept(study: &Study) -> Vec<String> {
+    let given = study.tune.keys.iter().map(|(name, _)| name.text.as_str());
+    let bases = given.filter_map(|key| Some(parsed(key)?.0.to_owned()));
+    let bases: Vec<String> = bases.collect();
+    match bases.is_empty() {
+        true => speed(study).into_iter().map(str::to_owned).collect(),
+        false => bases,
+    }
+}
+
+/// The key that is swept where the study does not say which.
+fn speed(study: &Study) -> Option<&'static str> {
+    let tuning = &study.observer.tuning.values;
+    let mut keys = SPEED.iter().copied();
+    keys.find(|key| tuning.contains_key(*key))
 }
 
 /// Every combination of values, the last key's fastest, each with its study.

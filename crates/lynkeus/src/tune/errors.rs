@@ -83,7 +83,8 @@ impl Errors {
                 let rows = errors.iter().enumerate().skip(1);
                 rows.map(move |(row, e)| (row, quantity, e.abs()))
             });
-        all.max_by(|a, b| a.2.total_cmp(&b.2))
+        let known = all.filter(|(.., e)| !e.is_nan());
+        known.max_by(|a, b| a.2.total_cmp(&b.2))
     }
 
     /// What makes the difference to `other`, which has the same rows.

@@ -10,6 +10,7 @@ mod holdout;
 mod measures;
 #[cfg(feature = "plot")]
 mod picture;
+mod pinned;
 mod reference;
 mod replay;
 mod report;
@@ -28,6 +29,7 @@ use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
+use pinned::{Pinned, pinned};
 use reference::Reference;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.
@@ -115,9 +117,16 @@ pub fn tune(
     log: Option<&Table>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Sweep, Error> {
+    // what the study says wrongly is told before anything is computed
+    let given = axis::axes(study);
+    if !study.tune.keys.is_empty() {
+        given?;
+    }
+    let plant = prepare::plant(study)?;
+    let Pinned { study, note } = pinned(&Prepared::new(study, &plant)?)?;
+    let study = &study;
     let axes = axis::axes(study)?;
     let grid = axis::grid(study, &axes)?;
-    let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let bench = Bench::new(&prepared, log)?;
     // what is proved here comes with every clone of the plant; a refusal is the rows' to tell
@@ -144,7 +153,8 @@ pub fn tune(
         },
         watch,
     )?;
-    let mut notes = bench.notes().to_vec();
+    let mut notes: Vec<String> = note.into_iter().collect();
+    notes.extend_from_slice(bench.notes());
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));
     let knee = least(&rows);

@@ -14,7 +14,7 @@ use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::crew::{Watch, part};
 use crate::estimate::{refuse_derivatives, refuse_stray_columns, run_settings, signal};
-use crate::headers::time_of;
+use crate::headers::{refuse_seconds, time_of};
 use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
 use crate::systems::{self, Reported};
@@ -77,6 +77,7 @@ impl<'a> Replay<'a> {
         let mut read = names(&design.observer.inputs);
         read.extend(measured.iter().cloned());
         let header_of_time = time_of(table, plant, settings, read.iter().map(String::as_str))?;
+        refuse_seconds(study, table, &header_of_time)?;
         let time = table.time(&header_of_time)?;
         let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
         let measured: Result<Vec<_>, Error> = measured.iter().map(|n| column(n)).collect();

@@ -68,12 +68,21 @@ struct Edit {
 
 fn put(text: &str, axis: &Axis, value: f64) -> Result<(String, Change), Error> {
     let document = parsed(text)?;
-    let item = document.get("observer");
-    let (Some(item), Some(observer)) = (item, item.and_then(Item::as_table_like)) else {
-        return Err(Error::input("the study has no [observer] to write to"));
-    };
     let (base, path) = axis.path();
     let key = axis.key.clone();
+    let Some(item) = document.get("observer") else {
+        let (end, to) = (line_end(text), shown(value));
+        let change = Change {
+            key,
+            from: None,
+            to: to.clone(),
+        };
+        let section = format!("{text}{end}[observer]{end}{base} = {to}{end}");
+        return Ok((section, change));
+    };
+    let Some(observer) = item.as_table_like() else {
+        return Err(Error::input("[observer] of the study is no table"));
+    };
     let Some(present) = observer.get(base) else {
         let to = shown(value);
         let edit = addition(text, item, &format!("{base} = {to}"))
@@ -320,11 +329,22 @@ mod tests {
         assert_eq!(new, "[observer]\r\npoles = [{ re = -4, im = 2 }, -6]\r\n");
     }
 
+    /// The θ that is swept may be one that the study leaves out.
+    #[test]
+    fn a_study_without_a_section_gets_one() {
+        let sweep = sweep("observer = { theta = 1 }", &[2.0]);
+        for (text, end) in [("plant = 'p'", "\n"), ("plant = 'p'\r\n", "\r\n")] {
+            let (new, changes) = sweep.rewritten(text).unwrap();
+            assert_eq!(new, format!("{text}{end}[observer]{end}theta = 2{end}"));
+            assert_eq!(changes[0].to_string(), "theta = 2 is new");
+        }
+    }
+
     #[test]
     fn another_study_is_refused() {
         let sweep = sweep("observer = { theta = 1 }", &[2.0]);
         let refusal = |text: &str| sweep.rewritten(text).unwrap_err().to_string();
-        assert!(refusal("plant = 'p'").contains("no [observer]"));
+        assert!(refusal("observer = 3").contains("no table"));
         assert!(refusal("observer.theta = 'x'").contains("no longer a number"));
         assert!(refusal("observer.theta = ").contains("not a TOML file"));
     }

@@ -192,3 +192,70 @@ fn the_papers_examples_are_not_judged_by_their_tables() {
         assert!(row["rms"]["x3"].as_f64().unwrap() < 0.02, "{row:#}");
     }
 }
+
+/// A laboratory's value in every fifth row: the figures are of these rows, and those of `estimate`.
+#[test]
+fn a_truth_with_gaps_has_errors() {
+    let folder = spring();
+    folder.change("s.toml", "output_step = 0.25", "output_step = 0.1");
+    let ended = folder.run(&["simulate", "s.toml", "-o", "all.csv", "--log", "log.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (all, log) = (folder.read("all.csv"), folder.read("log.csv"));
+    let v = |line: &str| line.split(',').nth(2).unwrap().to_owned();
+    let rows = |until: usize| -> String {
+        let lines = log.lines().zip(all.lines()).enumerate();
+        let cell = |k: usize, line: &str| match (k - 1).is_multiple_of(5) && k <= until {
+            true => v(line),
+            false => String::new(),
+        };
+        let rows = lines
+            .skip(1)
+            .map(|(k, (log, all))| format!("{log},{}\n", cell(k, all)));
+        format!(
+            "{},v\n{}",
+            log.lines().next().unwrap(),
+            rows.collect::<String>()
+        )
+    };
+    folder.write("lab.csv", &rows(usize::MAX));
+    let found = compared(&folder, &["lab.csv"]);
+    assert_eq!(found["against"], "log");
+    assert!(found["families"][0]["peak"].as_f64().unwrap() > 0.0);
+    folder.change("s.toml", "theta = 3", "theta = 3\nfamily = \"triangular\"");
+    let alone = ["estimate", "s.toml", "lab.csv", "--json", "-o", "e.csv"];
+    let alone = folder.run(&alone).json();
+    let error = rms(&found, 0, "v");
+    assert!(error > 0.0);
+    assert_eq!(alone["rms_error_last_half"]["v"], error);
+    assert_eq!(alone["errors"]["v"]["rms_last_half"], error);
+    // known at the start only: there is a peak, and no error of the last half
+    folder.write("lab.csv", &rows(50));
+    let alone = folder.run(&["estimate", "s.toml", "lab.csv", "--json", "-o", "e.csv"]);
+    assert!(
+        alone.err.contains("error of v: not known in the last half"),
+        "{}",
+        alone.err
+    );
+    let alone = alone.json();
+    assert!(alone["errors"]["v"]["peak"].as_f64().unwrap() > 0.0);
+    assert!(alone["rms_error_last_half"].get("v").is_none(), "{alone}");
+}
+
+/// A θ that is proposed costs nothing of the time per sample.
+#[test]
+fn the_cost_of_a_sample_is_that_of_the_run() {
+    let folder = spring();
+    folder.change("s.toml", "theta = 3", "");
+    folder.change(
+        "s.toml",
+        "[simulate]",
+        "[sensors.noise]\ny = 0.01\n[simulate]",
+    );
+    let found = compared(&folder, &[]);
+    for family in 0..2 {
+        let cost = found["families"][family]["seconds_per_sample"]
+            .as_f64()
+            .unwrap();
+        assert!(cost > 0.0, "{family}: {found}");
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use crate::normal::Normal;
 use crate::{Folder, csv, run, shared};
 
 /// Against independent filters (SciPy), sensors at two rates with gaps, to 1e-9 at every row.
@@ -344,22 +345,5 @@ fn standard_deviations_are_those_of_many_runs() {
                 "{observer}: {name} {found} against {said}"
             );
         }
-    }
-}
-
-/// Deviates by the sum of twelve uniform ones.
-struct Normal(u64);
-
-impl Normal {
-    fn next(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-
-    fn uniform(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

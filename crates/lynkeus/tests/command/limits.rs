@@ -201,3 +201,36 @@ end H;";
     assert!(ended.err.contains(told), "{}", ended.err);
     assert!(!ended.err.contains("--time-limit"), "{}", ended.err);
 }
+
+/// The rows that a filter made by then are written, as those of any observer.
+#[test]
+fn a_filter_that_a_limit_ends_keeps_its_rows() {
+    let folder = Folder::empty();
+    let model = "model M Real x(start = 1, min = -2, max = 2); Real v(start = 0, min = -2, max = 2); output Real y = x;
+      equation der(x) = v; der(v) = -sin(x); end M;";
+    folder.write("m.mo", model);
+    let study = "plant = \"m.mo\"\n[sensors]\nnoise = { y = 0.01 }\n[observer]\nfamily = \"mhe\"\nhorizon = 40\n[simulate]\nuntil = 2000\noutput_step = 0.1\n";
+    folder.write("s.toml", study);
+    let ended = limited(&folder, &["simulate", "s.toml", "-o", "o.csv"]);
+    assert_eq!(ended.code, 3, "{}", ended.err);
+    assert!(
+        ended
+            .err
+            .contains("the run is not whole: the limit of 2 s ended it"),
+        "{}",
+        ended.err
+    );
+    let (header, rows) = crate::csv(&folder.read("o.csv"));
+    assert_eq!(header, ["t", "x", "v", "x_hat", "v_hat"]);
+    assert!(rows.len() > 1 && rows.len() < 20_001, "{}", rows.len());
+    assert!(rows.iter().all(|row| row.iter().all(|x| x.is_finite())));
+    // where not even the plant's run is whole there is nothing to write
+    folder.change(
+        "s.toml",
+        "until = 2000\noutput_step = 0.1",
+        "until = 1e7\noutput_step = 1",
+    );
+    let ended = limited(&folder, &["simulate", "s.toml", "-o", "p.csv"]);
+    assert_eq!(ended.code, 3, "{}", ended.err);
+    assert!(!folder.files().contains(&"p.csv".to_owned()));
+}

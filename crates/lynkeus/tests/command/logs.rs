@@ -197,3 +197,34 @@ fn a_log_that_is_too_coarse_for_the_gain_is_told() {
         assert!(20.0 < limit && limit < 40.0, "{limit}");
     }
 }
+
+/// Dates count in seconds: a plant in minutes would run sixty times too fast.
+#[test]
+fn dates_beside_a_plant_in_minutes_are_refused() {
+    let folder = oscillator("0");
+    let row = |k: usize| format!("2026-11-22T01:00:{k:02}Z,1,0\n");
+    folder.write(
+        "log.csv",
+        &format!("t,y,u\n{}", (0..30).map(row).collect::<String>()),
+    );
+    let seconds = folder.run(&["estimate", "s.toml", "log.csv"]);
+    assert_eq!(seconds.code, 0, "{}", seconds.err);
+    let study = folder.read("s.toml");
+    folder.write("s.toml", &format!("{study}[plot]\ntime_unit = \"s\"\n"));
+    assert_eq!(
+        folder.run(&["estimate", "s.toml", "log.csv"]).out,
+        seconds.out
+    );
+    folder.write("s.toml", &format!("{study}[plot]\ntime_unit = \"min\"\n"));
+    for command in [
+        &["estimate", "s.toml", "log.csv"][..],
+        &["tune", "s.toml", "--log", "log.csv"],
+    ] {
+        let ended = folder.run(command);
+        let text = format!("{}{}", ended.out, ended.err);
+        assert!(
+            ended.code > 0 && text.contains("says that the plant's are in min"),
+            "{text}"
+        );
+    }
+}

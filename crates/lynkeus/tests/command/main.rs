@@ -14,8 +14,11 @@ mod live;
 mod logs;
 mod messages;
 mod names;
+#[path = "../normal/mod.rs"]
+mod normal;
 mod observability;
 mod outside;
+mod random;
 mod references;
 mod results;
 mod runs;

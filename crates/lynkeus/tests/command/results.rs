@@ -241,3 +241,41 @@ fn a_study_keeps_its_line_ends() {
         "{changed:?}"
     );
 }
+
+/// A picture is SVG whatever it is called, and a checkpoint is no stream.
+#[test]
+fn names_that_say_something_else_are_refused() {
+    let folder = Folder::new();
+    for name in ["a.png", "a.svg.pdf"] {
+        for command in [
+            &["estimate", "study.toml", "log.csv", "--plot", name][..],
+            &["check", "study.toml", "--singular", name],
+            &["check", "study.toml", "--plot", name],
+        ] {
+            refused(&folder, command, &["pictures are SVG", name]);
+        }
+    }
+    let stream = [
+        "estimate",
+        "study.toml",
+        "log.csv",
+        "-o",
+        "e.csv",
+        "--checkpoint",
+        "-",
+    ];
+    refused(&folder, &stream, &["--checkpoint needs a file"]);
+    refused(
+        &folder,
+        &["simulate", "two_tanks.mo"],
+        &[
+            "expected a study (TOML), found a model",
+            "lynkeus check two_tanks.mo",
+        ],
+    );
+    for name in ["picture", "A.SVG"] {
+        let ended = folder.run(&["estimate", "study.toml", "log.csv", "--plot", name]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        assert!(folder.read(name).starts_with("<svg"));
+    }
+}

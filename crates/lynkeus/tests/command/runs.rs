@@ -319,6 +319,21 @@ fn assertions_are_followed() {
     assert!(ended.err.contains("m.mo:2:"), "{}", ended.err);
     let report = folder.run(&["check", "s.toml"]);
     assert!(report.out.contains("warning"), "{}", report.out);
+    // parameters in the condition, while another one is calibrated
+    folder.change(
+        "m.mo",
+        "model M",
+        "model M parameter Real k = 1; parameter Real most = 2.5;",
+    );
+    folder.change("m.mo", "= u; assert(x < 2.5", "= k*u; assert(x < most");
+    folder.change(
+        "s.toml",
+        "[observer]",
+        "[sensors]\nunknown = [\"k\"]\nnoise = { y = 0.1 }\n[observer]",
+    );
+    folder.change("s.toml", "\"triangular\"\ntheta = 2", "\"ekf\"");
+    let ended = folder.run(&["simulate", "s.toml", "-o", "o.csv"]);
+    assert!(ended.err.contains(told), "{}", ended.err);
 }
 
 /// The table, the words, the picture and the object of many runs; one of them alone is the same.

@@ -129,6 +129,38 @@ fn an_input_at_rest_hides_what_it_excites() {
     assert_eq!(found["b"]["hidden_by"]["input"], "u");
 }
 
+/// y' = u·b + v·c with b ~ e^−t and c ~ e^−2t tells both for every constant u and v; with
+/// u = eᵗ, v = e²ᵗ, in their ranges for a while, it is the constant b₀ + c₀.
+#[test]
+fn what_constant_inputs_show_moving_ones_may_hide() {
+    let model = |v: &str| {
+        format!(
+            "model M input Real u(min = 1, max = 2); {v} Real a(min = -1, max = 1); Real b(min = -1, max = 1);
+      Real c(min = -1, max = 1); output Real y = a; equation der(a) = u*b + v*c; der(b) = -b; der(c) = -2*c; end M;"
+        )
+    };
+    let moving = folder(&model("input Real v(min = 1, max = 2);"), "");
+    let report = moving.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["uniform"]["verdict"], "proved");
+    let found = known(&report, "none");
+    assert_eq!(found["a"]["known"], "everywhere");
+    for name in ["b", "c"] {
+        let word = &found[name]["known"];
+        assert_eq!(word, "everywhere while inputs are constant", "{name}");
+    }
+    let text = moving.run(&["check", "study.toml"]).out;
+    assert!(
+        text.contains("b, c: known everywhere while inputs are constant (proved on the box)"),
+        "{text}"
+    );
+    // without inputs there is nothing that could move
+    let model = model("parameter Real v = 1;")
+        .replace("input Real u(min = 1, max = 2);", "parameter Real u = 1;");
+    let still = folder(&model, "");
+    let report = still.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(known(&report, "none")["c"]["known"], "everywhere");
+}
+
 /// A cart: position measured, and a chain that the triangular family takes.
 const CART: &str = "model Cart
   input Real u(start = 0, min = -1, max = 1);
@@ -170,6 +202,31 @@ fn a_speed_is_proposed_and_told_everywhere() {
     assert_eq!(pasted.code, 0, "{}", pasted.err);
     assert!(!pasted.err.contains("is proposed"), "{}", pasted.err);
     assert_eq!(folder.read("a.csv"), folder.read("b.csv"));
+    // the gain and what is proved of it, too
+    for command in ["design", "certify"] {
+        let [own, named] = ["study.toml", "pasted.toml"].map(|study| {
+            let ended = folder.run(&[command, study, "--json"]);
+            assert_eq!(ended.code, 0, "{command} {study}: {}", ended.err);
+            let mut found = ended.json();
+            found["notes"] = Value::Null;
+            found
+        });
+        assert_eq!(own, named, "{command}");
+    }
+    // and a sweep is around it
+    let ended = folder.run(&["tune", "study.toml", "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let sweep = ended.json();
+    assert_eq!(sweep["rows"][10]["keys"]["theta"], theta, "{sweep}");
+    let ended = folder.run(&["tune", "study.toml", "--write", "-q"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let written = folder.read("study.toml");
+    assert!(
+        written.starts_with(&format!("plant = \"m.mo\"\n{RUN}")),
+        "{written}"
+    );
+    assert!(written.contains("\n[observer]\ntheta = "), "{written}");
+    folder.write("study.toml", &format!("plant = \"m.mo\"\n{RUN}"));
     // a family asked for by name gets the same
     folder.write(
         "named.toml",
@@ -177,6 +234,24 @@ fn a_speed_is_proposed_and_told_everywhere() {
     );
     let named = folder.run(&["simulate", "named.toml", "-o", "c.csv"]);
     assert_eq!(folder.read("a.csv"), folder.read("c.csv"), "{}", named.err);
+}
+
+/// What is to be pasted holds what the study says of every family, too.
+#[test]
+fn what_is_pasted_keeps_the_start() {
+    let own = "[observer]\nclamp = true\ninitial = { v = 1.5, default = 0.25 }\n";
+    let folder = folder(CART, &format!("{RUN}{own}"));
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let observer = report["next"]["observer"].as_str().unwrap();
+    folder.write(
+        "pasted.toml",
+        &format!("plant = \"m.mo\"\n{RUN}\n{observer}"),
+    );
+    for (study, table) in [("study.toml", "a.csv"), ("pasted.toml", "b.csv")] {
+        let run = folder.run(&["simulate", study, "-o", table]);
+        assert_eq!(run.code, 0, "{}", run.err);
+    }
+    assert_eq!(folder.read("a.csv"), folder.read("b.csv"), "{observer}");
 }
 
 /// What `check` proposes for a bare model runs.

@@ -123,3 +123,32 @@ fn a_disturbance_raises_the_bound_and_wrong_keys_are_refused() {
         assert!(ended.err.contains("study.toml:"), "{}", ended.err);
     }
 }
+
+/// θ = 0.05 is too slow for the triangular family and for a run of 40, and not so four times of it: the
+/// family that is taken for the study is that of every value.
+#[test]
+fn a_sweep_is_of_one_family() {
+    let model = "model M input Real u(min = -1, max = 1); Real x(start = 0, min = -9, max = 9); Real v(start = 0, min = -9, max = 9);
+      output Real y = x; equation der(x) = v; der(v) = u; end M;";
+    let study = "plant = \"m.mo\"\nobserver = { theta = 0.05, initial = { x = 1 } }\nsensors = { noise = { y = 0.01 } }\nsimulate = { until = 40, output_step = 0.2, inputs = { u = \"sin(time)\" } }\n";
+    let folder = Folder::empty();
+    folder.write("m.mo", model);
+    folder.write("auto.toml", study);
+    let ended = folder.run(&["tune", "auto.toml", "-o", "auto.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let taken = folder.run(&["check", "auto.toml", "--json"]).json();
+    let taken = taken["recommended"].as_str().unwrap().to_owned();
+    assert_ne!(taken, "triangular", "nothing is shown");
+    assert!(
+        ended
+            .err
+            .contains(&format!("every value is one of the family {taken}")),
+        "{}",
+        ended.err
+    );
+    let named = study.replace("theta =", &format!("family = \"{taken}\", theta ="));
+    folder.write("named.toml", &named);
+    let ended = folder.run(&["tune", "named.toml", "-o", "named.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_eq!(folder.read("auto.csv"), folder.read("named.csv"));
+}

@@ -1,0 +1,106 @@
+//! How runs are judged and shown: `[tune]`, `[compare]` and `[plot]`.
+
+use lynkeus_observers::{KeySpec, Shape};
+
+use super::EXPRESSION;
+
+/// `[tune]`
+pub(in crate::study) const TUNE: [KeySpec; 5] = [
+    KeySpec {
+        name: "keys",
+        kind: "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
+        shape: Shape::Table(&Shape::Either(&[
+            Shape::List(&Shape::Number),
+            Shape::Section(&[&RANGE]),
+        ])),
+        default: "see [tuning](tune.md)",
+        meaning: "what is swept; several keys make a grid. The values of a key that is a list are factors on all its numbers. `points` is 21, `scale` `\"log\"` (or `\"linear\"`)",
+    },
+    KeySpec {
+        name: "tolerance",
+        kind: "number between 0 and 1",
+        shape: Shape::Share,
+        default: "0.05",
+        meaning: "error, as a share of the range, below which an estimate is settled",
+    },
+    KeySpec {
+        name: "disturbance",
+        kind: "table: input = number, or expression of `time`",
+        shape: Shape::Table(&EXPRESSION),
+        default: "none",
+        meaning: "added to inputs of the plant, unseen by the observer, for the ultimate bound",
+    },
+    KeySpec {
+        name: "held_out",
+        kind: "number between 0 and 1",
+        shape: Shape::Share,
+        default: "0.25",
+        meaning: "on a log: share of each block that is held out",
+    },
+    KeySpec {
+        name: "blocks",
+        kind: "whole number ≥ 2",
+        shape: Shape::Whole(2),
+        default: "20",
+        meaning: "on a log: number of blocks",
+    },
+];
+
+/// A range of values in `keys` of `[tune]`.
+pub(in crate::study) const RANGE: [KeySpec; 4] = [
+    KeySpec {
+        name: "from",
+        kind: "number",
+        shape: Shape::Number,
+        default: "a quarter of the study's value",
+        meaning: "the first value",
+    },
+    KeySpec {
+        name: "to",
+        kind: "number",
+        shape: Shape::Number,
+        default: "four times the study's value",
+        meaning: "the last value",
+    },
+    KeySpec {
+        name: "points",
+        kind: "whole number ≥ 2",
+        shape: Shape::Whole(2),
+        default: "21",
+        meaning: "how many, ends included",
+    },
+    KeySpec {
+        name: "scale",
+        kind: "`\"log\"`, `\"linear\"`",
+        shape: Shape::Word(&["log", "linear"]),
+        default: "`\"log\"`",
+        meaning: "equal ratios, or equal differences",
+    },
+];
+
+/// `[compare]`
+pub(in crate::study) const COMPARE: [KeySpec; 1] = [KeySpec {
+    name: "families",
+    kind: "list of families",
+    shape: Shape::NAMES,
+    default: "every family that is not refuted, and the filters",
+    meaning: "what `compare` runs; each gets the keys of `[observer]` that it owns",
+}];
+
+/// `[plot]`
+pub(in crate::study) const PLOT: [KeySpec; 2] = [
+    KeySpec {
+        name: "show",
+        kind: "list of names",
+        shape: Shape::NAMES,
+        default: "unknown inputs, hidden states, then what is measured; six at most",
+        meaning: "the quantities to draw, one panel each",
+    },
+    KeySpec {
+        name: "time_unit",
+        kind: "text",
+        shape: Shape::Text,
+        default: "none",
+        meaning: "the unit on the time axis",
+    },
+];

@@ -1,0 +1,60 @@
+//! The study of a sweep: one family for all values.
+
+use lynkeus_observers::Examination;
+use lynkeus_structure::Standing;
+
+use super::axis;
+use crate::prepare::Prepared;
+use crate::study::Name;
+use crate::{Error, Study};
+
+/// A study that names its family.
+pub(super) struct Pinned {
+    pub study: Study,
+    /// which family that is, where the study leaves it open
+    pub note: Option<String>,
+}
+
+/// The study with its family named and with what is proposed for it: else each value could be
+/// judged on a family of its own. It is the one that every command takes, if that has the keys that
+/// are swept; else the first that may fit and has them.
+///
+/// # Errors
+/// Keys of `[observer]` that cannot be used.
+pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
+    let mut study = prepared.study().clone();
+    let mut note = None;
+    let swept = axis::swept(&study);
+    if study.observer.family.is_some() && !swept.is_empty() {
+        return Ok(Pinned { study, note });
+    }
+    let Some(choice) = prepared.choice()? else {
+        return Ok(Pinned { study, note });
+    };
+    let owns = |name: &str| {
+        let family = lynkeus_observers::find(name);
+        family.is_some_and(|family| swept.iter().all(|key| family.owns(key)))
+    };
+    let may_fit = |e: &&Examination| e.fit() != Standing::Refuted && owns(e.family);
+    let family = match owns(choice.family) {
+        true => Some(choice.family),
+        false => prepared
+            .examinations()?
+            .iter()
+            .find(may_fit)
+            .map(|e| e.family),
+    };
+    let Some(family) = family else {
+        return Ok(Pinned { study, note });
+    };
+    if family == choice.family {
+        study.observer.tuning = choice.completed(&study.observer.tuning);
+    }
+    if study.observer.family.is_none() {
+        note = Some(format!(
+            "every value is one of the family {family}; `family` of [observer] names another"
+        ));
+    }
+    study.observer.family = Some(Name::from(family));
+    Ok(Pinned { study, note })
+}
