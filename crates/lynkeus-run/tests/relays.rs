@@ -245,3 +245,82 @@ fn jumps_of_time_and_of_the_state_go_together() {
         .unwrap();
     assert!((state[0] - 0.5).abs() < 1e-6, "{state:?}");
 }
+
+/// What rests exactly on a surface has the values of equality, interval after interval: `u >= 0`
+/// holds at u = 0, `u > 0` does not and sign(0) is 0.
+#[test]
+fn at_a_threshold_relations_are_what_they_say() {
+    for method in methods() {
+        let start = [("u", 0.0), ("a", 0.0), ("b", 0.0), ("c", 0.0)];
+        let rows = run(method, &start, &[1.0, 2.0, 3.0], |_, x| {
+            let (u, one) = (x[0], x[0].graph().constant(1.0));
+            let zero = u.graph().constant(0.0);
+            let at_least = zero.less_eq(u).select(one, -one);
+            let above = zero.less(u).select(one, -one);
+            vec![zero, at_least, above, u.sign() + u.abs()]
+        });
+        for (row, t) in rows.iter().zip([1.0, 2.0, 3.0]) {
+            for (found, expected) in row[1..].iter().zip([t, -t, 0.0]) {
+                close(*found, expected);
+            }
+        }
+    }
+}
+
+/// From rest on a surface: u = t²/2 leaves it at once, u = max(t − 1, 0) at t = 1, and
+/// u' = y⁴ with y' = max(t − 1, 0) then too; z' = sign(u).
+#[test]
+fn what_rests_on_a_surface_leaves_it_in_time() {
+    for method in methods() {
+        let rows = run(
+            method,
+            &[("v", 0.0), ("u", 0.0), ("z", 0.0)],
+            &[2.0],
+            |_, x| vec![x[0].graph().constant(1.0), x[0], x[1].sign()],
+        );
+        close(rows[0][2], 2.0);
+        let late = |t: Expr<'_>| {
+            let g = t.graph();
+            g.expr(g.binary(Binary::Max, (t - 1.0).node(), g.constant(0.0).node()))
+                .node()
+        };
+        let rows = run(method, &[("u", 0.0), ("z", 0.0)], &[3.0], |t, x| {
+            vec![t.graph().expr(late(t)), x[0].sign()]
+        });
+        close(rows[0][0], 2.0);
+        close(rows[0][1], 2.0);
+    }
+}
+
+/// z' = sign(x − r) where r is 5 or 1 by the sign of y: from the start on the right side, and on the
+/// other one as soon as y has changed.
+#[test]
+fn a_threshold_that_jumps_with_another_one() {
+    fn threshold<'g>(x: Expr<'g>, y: Expr<'g>) -> Expr<'g> {
+        let [five, one, zero] = [5.0, 1.0, 0.0].map(|c| x.graph().constant(c));
+        (x - zero.less(y).select(five, one)).sign()
+    }
+    for method in methods() {
+        let start = [("x", 4.0), ("y", -3.0), ("z", 0.0)];
+        let rows = run(method, &start, &[4.0], |_, x| {
+            let one = x[0].graph().constant(1.0);
+            vec![-one, 0.0 * one, threshold(x[0], x[1])]
+        });
+        close(rows[0][2], 3.0 - 1.0);
+        let start = [("x", 2.0), ("y", 1.5), ("z", 0.0)];
+        let rows = run(method, &start, &[3.0], |_, x| {
+            let one = x[0].graph().constant(1.0);
+            vec![-0.1 * one, -one, threshold(x[0], x[1])]
+        });
+        close(rows[0][2], 0.0);
+        // along x = 5 until y changes, then down to 1
+        let start = [("x", 4.0), ("y", 1.5)];
+        let rows = run(method, &start, &[1.4, 2.5, 9.0], |_, x| {
+            let one = x[0].graph().constant(1.0);
+            vec![-2.0 * threshold(x[0], x[1]), -one]
+        });
+        for (row, expected) in rows.iter().zip([5.0, 3.0, 1.0]) {
+            close(row[0], expected);
+        }
+    }
+}

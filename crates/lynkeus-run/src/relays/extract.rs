@@ -26,19 +26,20 @@ pub(crate) fn take(
     let mut replaced: HashMap<Node, Node> = HashMap::new();
     let (mut relays, mut modes, mut surfaces) = (vec![], vec![], vec![]);
     for node in graph.reachable(roots) {
-        let Some((quantity, is_sign)) = quantity(graph, node) else {
+        let Some(jump) = Jump::of(graph, node) else {
             continue;
         };
         if !graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s)) {
             continue;
         }
-        let quantity = graph.substitute(&[quantity], &replaced)[0];
+        let quantity = graph.substitute(&[jump.quantity], &replaced)[0];
         let mode = graph.fresh(graph.render(node, 60)).node();
         let (surface, is_reversed) = place(graph, &mut surfaces, quantity);
         relays.push(Relay {
             surface,
             is_reversed,
-            is_sign,
+            is_sign: jump.is_sign,
+            at_zero: jump.at_zero,
         });
         modes.push(mode);
         replaced.insert(node, mode);
@@ -60,6 +61,8 @@ pub(crate) fn take(
             surface,
             is_reversed,
             is_sign: false,
+            // both branches are the same there
+            at_zero: 1.0,
         });
         modes.push(mode);
         let branches = graph.substitute(&[kink.above, kink.below], &replaced);
@@ -80,14 +83,33 @@ pub(crate) fn take(
     }))
 }
 
-/// What changes its sign where the operation jumps, and whether the operation is that sign.
-fn quantity(graph: &Graph, node: Node) -> Option<(Node, bool)> {
-    match graph.op(node) {
-        Op::Unary(Unary::Sign, a) => Some((a, true)),
-        Op::Binary(Binary::Less | Binary::LessEq, a, b) => {
-            Some((graph.binary(Binary::Sub, b, a), false))
+/// An operation that jumps.
+struct Jump {
+    /// what changes its sign there
+    quantity: Node,
+    /// the operation is that sign
+    is_sign: bool,
+    /// its value where the quantity is zero
+    at_zero: f64,
+}
+
+impl Jump {
+    fn of(graph: &Graph, node: Node) -> Option<Self> {
+        let relation = |a: Node, b: Node, at_zero: f64| Self {
+            quantity: graph.binary(Binary::Sub, b, a),
+            is_sign: false,
+            at_zero,
+        };
+        match graph.op(node) {
+            Op::Unary(Unary::Sign, quantity) => Some(Self {
+                quantity,
+                is_sign: true,
+                at_zero: 0.0,
+            }),
+            Op::Binary(Binary::Less, a, b) => Some(relation(a, b, 0.0)),
+            Op::Binary(Binary::LessEq, a, b) => Some(relation(a, b, 1.0)),
+            _ => None,
         }
-        _ => None,
     }
 }
 
