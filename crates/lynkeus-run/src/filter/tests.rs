@@ -141,6 +141,19 @@ fn what_cannot_be_is_refused() {
     };
     let unscented = FilterSettings::of(FilterKind::Unscented(points));
     assert!(new(unscented).unwrap_err().to_string().contains("kappa"));
+    let g = Graph::new();
+    let nothing = FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: g.symbol("time").node(),
+        states: vec![],
+        derivatives: vec![],
+        inputs: vec![],
+        sensors: vec![],
+        process_noise: vec![],
+        initial_variance: vec![],
+        confined: None,
+    });
+    assert!(nothing.unwrap_err().to_string().contains("states"));
     let mut filter = new(FilterSettings::of(FilterKind::Extended)).unwrap();
     filter.push(1.0, &[0.0]).unwrap();
     assert!(matches!(
