@@ -324,3 +324,31 @@ fn a_threshold_that_jumps_with_another_one() {
         }
     }
 }
+
+/// Both sides of x = 0 let the state go; at 0 the equations say x' = ±0.7.
+#[test]
+fn where_both_sides_let_go_the_equations_decide() {
+    for method in methods() {
+        for push in [0.7, -0.7] {
+            let rows = run(method, &[("x", 0.0)], &[0.5, 1.0], |_, x| {
+                vec![push + x[0].sign()]
+            });
+            close(rows[1][0], push + push.signum());
+        }
+    }
+}
+
+/// x' = −½ − sign(2x)·0.7 slides along x = 0 with a seventh of the time above: what another relation
+/// of a multiple of x says is taken by the same share.
+#[test]
+fn multiples_vanish_on_one_surface() {
+    for method in methods() {
+        let rows = run(method, &[("x", 0.0), ("z", 0.0)], &[0.5, 1.0], |_, x| {
+            let [seven, zero] = [7.0, 0.0].map(|c| x[0].graph().constant(c));
+            let above = zero.less(x[0] * 0.5).select(seven, zero);
+            vec![-0.5 - (x[0] * 2.0).sign() * 0.7, above]
+        });
+        close(rows[1][0], 0.0);
+        close(rows[1][1], 1.0);
+    }
+}

@@ -103,14 +103,12 @@ impl<D: Dynamics> Switched<'_, D> {
             self.derivatives(t, x, &mut dx);
             self.speeds(t, x, &dx)[i]
         };
-        if value == 0.0 && speed_on(0.0) == 0.0 {
+        // exactly on the surface the equations say where it goes, if both sides let it go
+        let tends = if value == 0.0 { speed_on(0.0) } else { value };
+        if tends == 0.0 {
             return;
         }
-        let first = match value == 0.0 {
-            true if sides[i] > 0.0 => -1.0,
-            true => 1.0,
-            false => side_of(value),
-        };
+        let first = side_of(tends);
         // a side that does not push back is not left for the one that was
         if first * speed_on(first) >= 0.0 || -first * speed_on(-first) > 0.0 {
             return;

@@ -143,18 +143,49 @@ fn kink(graph: &Graph, node: Node) -> Option<Kink> {
 /// is none yet.
 fn place(graph: &Graph, surfaces: &mut Vec<Node>, quantity: Node) -> (usize, bool) {
     found(graph, surfaces, quantity).unwrap_or_else(|| {
+        let (quantity, is_reversed) = bare(graph, quantity);
         surfaces.push(quantity);
-        (surfaces.len() - 1, false)
+        (surfaces.len() - 1, is_reversed)
     })
 }
 
 fn found(graph: &Graph, surfaces: &[Node], quantity: Node) -> Option<(usize, bool)> {
-    let opposite = match graph.op(quantity) {
-        Op::Unary(Unary::Neg, a) => a,
-        Op::Binary(Binary::Sub, a, b) => graph.binary(Binary::Sub, b, a),
-        _ => graph.unary(Unary::Neg, quantity),
-    };
+    let (quantity, is_reversed) = bare(graph, quantity);
     let known = |sought: Node| surfaces.iter().position(|&known| known == sought);
-    let same = known(quantity).map(|surface| (surface, false));
-    same.or_else(|| known(opposite).map(|surface| (surface, true)))
+    let same = known(quantity).map(|surface| (surface, is_reversed));
+    same.or_else(|| match graph.op(quantity) {
+        Op::Binary(Binary::Sub, a, b) => {
+            let opposite = graph.binary(Binary::Sub, b, a);
+            known(opposite).map(|surface| (surface, !is_reversed))
+        }
+        _ => None,
+    })
+}
+
+/// A quantity without its constant factors, and whether they change its sign: multiples of one
+/// another vanish on one surface.
+fn bare(graph: &Graph, mut quantity: Node) -> (Node, bool) {
+    let factor = |node: Node| graph.constant_value(node).filter(|c| c.is_normal());
+    let is_zero = |node: Node| graph.constant_value(node) == Some(0.0);
+    let mut is_reversed = false;
+    loop {
+        let (inner, sign) = match graph.op(quantity) {
+            Op::Unary(Unary::Neg, a) => (a, -1.0),
+            Op::Binary(Binary::Mul, a, b) => match (factor(a), factor(b)) {
+                (Some(c), _) => (b, c),
+                (_, Some(c)) => (a, c),
+                _ => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Div, a, b) => match factor(b) {
+                Some(c) => (a, c),
+                None => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Add | Binary::Sub, a, b) if is_zero(b) => (a, 1.0),
+            Op::Binary(Binary::Add, a, b) if is_zero(a) => (b, 1.0),
+            Op::Binary(Binary::Sub, a, b) if is_zero(a) => (b, -1.0),
+            _ => return (quantity, is_reversed),
+        };
+        is_reversed ^= sign < 0.0;
+        quantity = inner;
+    }
 }
