@@ -325,6 +325,24 @@ fn a_threshold_that_jumps_with_another_one() {
     }
 }
 
+/// z' = sign(x/2 + 0.3 − r) where r jumps by 0.6 at x = 0, and x' = −1.5(x + z'): from ½ down to 0, and along it,
+/// where only the threshold of what pushes back jumps.
+#[test]
+fn sliding_where_a_threshold_jumps() {
+    for method in methods() {
+        let rows = run(method, &[("x", 0.5), ("z", 0.0)], &[1.0, 3.0], |_, x| {
+            let [zero, jump] = [0.0, 0.6].map(|c| x[0].graph().constant(c));
+            let r = zero.less_eq(x[0]).select(zero, jump);
+            let push = (x[0] * 0.5 + 0.3 - r).sign();
+            vec![(x[0] + push) * -1.5, push]
+        });
+        for row in &rows {
+            close(row[0], 0.0);
+            close(row[1], 1.5_f64.ln() / 1.5);
+        }
+    }
+}
+
 /// Both sides of x = 0 let the state go; at 0 the equations say x' = ±0.7.
 #[test]
 fn where_both_sides_let_go_the_equations_decide() {
