@@ -2,7 +2,7 @@
 //! hand.
 
 use lynkeus_expr::{Binary, Expr, Graph, Node};
-use lynkeus_run::{Integrator, Method, System, Tolerances};
+use lynkeus_run::{Dynamics, Integrator, Method, System, Tolerances};
 
 /// x' = f of named states, from a start, at some times.
 fn run(
@@ -368,5 +368,61 @@ fn multiples_vanish_on_one_surface() {
         });
         close(rows[1][0], 0.0);
         close(rows[1][1], 1.0);
+    }
+}
+
+/// A system that counts how often it is evaluated.
+struct Counted(lynkeus_run::Evaluation, usize);
+
+impl Dynamics for Counted {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.1 += 1;
+        self.0.derivatives(t, x, dx);
+    }
+
+    fn surfaces(&self) -> usize {
+        self.0.surfaces()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.0.read_surfaces(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.0.hold(sides);
+    }
+}
+
+/// An oscillation that comes close to a surface again and again: the looks whether it is crossed
+/// cost some evaluations, and no accuracy.
+#[test]
+fn what_is_not_crossed_costs_little() {
+    let count = |method: Method, level: f64| {
+        let g = Graph::new();
+        let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
+        let dx = [v.node(), (-x * (x + level).sign()).node()];
+        let states = [
+            ("x".to_string(), x.node(), 1.0),
+            ("v".to_string(), v.node(), 0.0),
+        ];
+        let system =
+            System::new(&g, time.node(), &states, &[], &dx, &[]).expect("it is well-formed");
+        let mut counted = Counted(system.evaluation(), 0);
+        let mut state = system.start().to_vec();
+        let mut integrator = Integrator::new(method, 2).expect("it is well-formed");
+        integrator
+            .advance(&mut counted, 0.0, 40.0, &mut state)
+            .expect("it is well-formed");
+        close(state[0], 40.0_f64.cos());
+        counted.1
+    };
+    for method in methods() {
+        let (near, far) = (count(method, 1.000_000_1), count(method, 5.0));
+        // six approaches
+        assert!(near < far + 6 * 25, "{near} against {far}");
     }
 }
