@@ -126,6 +126,39 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
     assert_eq!(hanging.health().sensors[0].rejected, 55);
 }
 
+/// y = x² about 0, P = 2, with weights 5 of the points ±√0.2 and −9 of the centre: P_yy = 2·5·1.8² − 9·2² = −3.6.
+#[test]
+fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+    let model = FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 0.0)],
+        derivatives: vec![g.constant(0.0).node()],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: (x * x).node(),
+            noise: Level::Absolute(0.1),
+            limits: None,
+        }],
+        process_noise: vec![0.0],
+        initial_variance: vec![2.0],
+        confined: None,
+    });
+    let points = SigmaPoints {
+        kappa: -0.9,
+        ..SigmaPoints::default()
+    };
+    let settings = FilterSettings::of(FilterKind::Unscented(points));
+    let mut filter = Estimator::filter(&model.unwrap(), settings, exact()).unwrap();
+    filter.push(0.0, &[1.0]).unwrap();
+    let health = filter.health().sensors[0];
+    assert_eq!((health.taken, health.rejected), (0, 1));
+    assert_eq!(filter.innovations()[0].deviation, 0.0);
+}
+
 #[test]
 fn what_cannot_be_is_refused() {
     let model = scalar(0.0, 1.0, 1.0);
