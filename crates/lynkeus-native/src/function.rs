@@ -12,6 +12,10 @@ use crate::memory::Executable;
 /// Most instructions of a tape that is compiled.
 const LARGEST: usize = 1_000_000;
 
+/// Most bytes of inputs, of outputs and of a frame: addresses are offsets of 31 bits, and every
+/// evaluator has a frame of its own.
+const LARGEST_PLACE: usize = 1 << 28;
+
 /// A tape as machine code. A clone shares the code.
 #[derive(Clone, Debug)]
 pub struct Function<const LANES: usize> {
@@ -71,6 +75,13 @@ impl Compiled {
     #[cfg(target_arch = "x86_64")]
     fn new<const LANES: usize>(program: &Program) -> Option<Self> {
         let emitted = crate::emit::emit::<LANES>(program);
+        let places = [program.inputs, program.outputs.len(), emitted.frame + 1];
+        if places
+            .iter()
+            .any(|count| *count > LARGEST_PLACE / (8 * LANES))
+        {
+            return None;
+        }
         Some(Self {
             inputs: program.inputs,
             outputs: program.outputs.len(),

@@ -112,3 +112,13 @@ proptest! {
         agrees(&draws, &rows)?;
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
+    /// Long ones, with values that wait in the frame for thousands of operations.
+    #[test]
+    fn long_programs_agree(draws in prop::collection::vec(draw(), 10_000..30_000), rows in rows()) {
+        agrees(&draws, &rows)?;
+    }
+}

@@ -81,7 +81,9 @@ impl Adaptive {
     ) -> Result<f64, Error> {
         let (reached, t, to, tolerances) = (leg.x.to_vec(), leg.t, leg.to, self.tolerances);
         let purse = leg.purse;
+        let mut has_tried = false;
         let attempt = |f: &mut Switched<'_, _>, step: f64, _: &mut Option<Point>| {
+            has_tried = true;
             let mut x = start.to_vec();
             let mut again = Leg {
                 t,
@@ -95,6 +97,10 @@ impl Adaptive {
         };
         let crossing = self.crossing(f, leg, start, (step, &reached), attempt)?;
         let Some(Reach { step, x, margins }) = crossing else {
+            if has_tried {
+                // what it keeps is of the steps tried
+                radau.restart(f, t + step, leg.x);
+            }
             return Ok(step);
         };
         leg.x.copy_from_slice(&x);

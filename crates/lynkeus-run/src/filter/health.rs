@@ -10,7 +10,7 @@ pub enum Reading {
     Missing,
     /// it corrected the estimate
     Taken,
-    /// the gate kept it out
+    /// the gate kept it out, or sigma points of negative weight gave it no variance
     Rejected,
     /// at a limit of the sensor, on which the estimate is beyond it
     AtLimit,

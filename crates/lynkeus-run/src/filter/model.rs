@@ -92,7 +92,7 @@ impl FilterModel {
     ///
     /// # Errors
     /// [`Error::MissingInput`] for an expression that reads another symbol; [`Error::Setting`]
-    /// for a noise or a variance that is negative or not finite, and for wrong numbers of them.
+    /// for a plant without states, a noise or a variance that is negative or not finite, and for wrong numbers of them.
     pub fn new(plant: &FilterPlant<'_>) -> Result<Self, Error> {
         check(plant)?;
         let graph = plant.graph;
@@ -206,6 +206,9 @@ fn linear(plant: &FilterPlant<'_>, derivatives: &[Node]) -> Result<(System, Entr
 
 fn check(plant: &FilterPlant<'_>) -> Result<(), Error> {
     let n = plant.states.len();
+    if n == 0 {
+        return Err(Error::setting("number of states", "1 at least", n));
+    }
     let lists = [
         ("process noise", &plant.process_noise),
         ("initial variance", &plant.initial_variance),

@@ -198,13 +198,16 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
     let count = rows.len() / n.max(1);
     for k in 0..n.min(count) {
+        let Some(unit) = unit((k..count).map(|i| rows[i * n + k])) else {
+            continue;
+        };
+        // in units in which squares neither vanish nor overflow: what decays without noise comes
+        // to any size, and must not spoil what it is correlated with
+        (k..count).for_each(|i| rows[i * n + k] /= unit);
         let norm = (k..count)
             .map(|i| rows[i * n + k].powi(2))
             .sum::<f64>()
             .sqrt();
-        if norm == 0.0 {
-            continue;
-        }
         let pivot = rows[k * n + k];
         let head = if pivot > 0.0 { -norm } else { norm };
         // the reflector v = (pivot − head, the rest), H = I − v vᵀ/β
@@ -226,8 +229,16 @@ fn triangularise(rows: &mut [f64], n: usize, sums: &mut [f64]) {
                 *a -= factor * sum;
             }
         }
-        rows[k * n + k] = head;
+        rows[k * n + k] = head * unit;
     }
+}
+
+/// The power of two of the largest of some numbers; none where all are as good as zero.
+fn unit(numbers: impl Iterator<Item = f64>) -> Option<f64> {
+    const EXPONENT: u64 = 0x7ff << 52;
+    let largest = numbers.fold(0.0, |m: f64, x| if x.abs() <= m { m } else { x.abs() });
+    let power = f64::from_bits(largest.to_bits() & EXPONENT);
+    (power > 0.0).then_some(power)
 }
 
 /// The lower triangular factor of a matrix that has no negative eigenvalue but by rounding: a
@@ -322,6 +333,18 @@ mod tests {
             &[1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 3.0, 6.0, 9.0],
             1e-14,
         );
+    }
+
+    /// What has decayed to any size takes nothing from what it is correlated with.
+    #[test]
+    fn tiny_and_huge_columns_leave_the_others_alone() {
+        for exponent in -1080..=1000 {
+            let tiny = 1.3 * 2.0_f64.powi(exponent);
+            let mut root = Root::diagonal(&[0.0; 2]);
+            root.of_rows(&mut [tiny, 0.6, 0.5 * tiny, 1.2, 0.0, 0.7]);
+            let found = root.deviation(1).powi(2);
+            assert!((found - 2.29).abs() < 1e-14, "{found} beside {tiny:e}");
+        }
     }
 
     /// Against P − P c cᵀ P/(cᵀPc + r), by hand for P = [[2, 1], [1, 3]], c = (1, 0), r = 2.

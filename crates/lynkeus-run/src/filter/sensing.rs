@@ -106,9 +106,10 @@ impl Sensing {
         self.sensors[i].noise.variance(predicted)
     }
 
-    /// Decides what becomes of a reading whose innovation has the given variance.
+    /// Decides what becomes of a reading whose innovation has the given variance. Sigma points of
+    /// negative weight may give a negative one, by which no reading can be weighed.
     pub fn judge(&mut self, i: usize, reading: f64, predicted: f64, variance: f64) -> Innovation {
-        let deviation = variance.sqrt();
+        let deviation = variance.max(0.0).sqrt();
         let mut innovation = Innovation {
             value: 0.0,
             deviation,
@@ -119,7 +120,9 @@ impl Sensing {
             innovation.value = reading - predicted;
             innovation.reading = match self.sensors[i].limits {
                 Some(limits) if says_nothing(limits, reading, predicted) => Reading::AtLimit,
-                _ if self.is_outlier(i, innovation.value, deviation) => Reading::Rejected,
+                _ if variance < 0.0 || self.is_outlier(i, innovation.value, deviation) => {
+                    Reading::Rejected
+                }
                 _ => Reading::Taken,
             };
         }

@@ -138,7 +138,7 @@ impl History {
             Some(lag) => {
                 for k in 0..count {
                     let mut adjoint = self.nothing(deviations);
-                    for later in (k + 1..=(k + lag).min(count - 1)).rev() {
+                    for later in (k + 1..=k.saturating_add(lag).min(count - 1)).rev() {
                         self.back(later, &mut adjoint);
                     }
                     result.push(self.at(k, &adjoint));

@@ -93,6 +93,8 @@ fn the_smoother_of_a_constant_is_its_last_estimate() {
     let lagged = filter.smoothed(Some(3), false).unwrap();
     assert!((lagged[6].estimate[0] - last).abs() < 1e-12);
     assert!((lagged[0].estimate[0] - last).abs() > 1e-3);
+    let all = filter.smoothed(Some(usize::MAX), false).unwrap();
+    assert!((all[0].estimate[0] - last).abs() < 1e-12);
 }
 
 #[test]
@@ -124,6 +126,39 @@ fn a_gate_keeps_outliers_out_and_gives_way_in_the_end() {
     assert_eq!(hanging.health().sensors[0].rejected, 55);
 }
 
+/// y = x² about 0, P = 2, with weights 5 of the points ±√0.2 and −9 of the centre: P_yy = 2·5·1.8² − 9·2² = −3.6.
+#[test]
+fn a_reading_that_sigma_points_cannot_weigh_is_not_taken() {
+    let g = Graph::new();
+    let [time, x] = ["time", "x"].map(|name| g.symbol(name));
+    let model = FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 0.0)],
+        derivatives: vec![g.constant(0.0).node()],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: (x * x).node(),
+            noise: Level::Absolute(0.1),
+            limits: None,
+        }],
+        process_noise: vec![0.0],
+        initial_variance: vec![2.0],
+        confined: None,
+    });
+    let points = SigmaPoints {
+        kappa: -0.9,
+        ..SigmaPoints::default()
+    };
+    let settings = FilterSettings::of(FilterKind::Unscented(points));
+    let mut filter = Estimator::filter(&model.unwrap(), settings, exact()).unwrap();
+    filter.push(0.0, &[1.0]).unwrap();
+    let health = filter.health().sensors[0];
+    assert_eq!((health.taken, health.rejected), (0, 1));
+    assert_eq!(filter.innovations()[0].deviation, 0.0);
+}
+
 #[test]
 fn what_cannot_be_is_refused() {
     let model = scalar(0.0, 1.0, 1.0);
@@ -139,6 +174,19 @@ fn what_cannot_be_is_refused() {
     };
     let unscented = FilterSettings::of(FilterKind::Unscented(points));
     assert!(new(unscented).unwrap_err().to_string().contains("kappa"));
+    let g = Graph::new();
+    let nothing = FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: g.symbol("time").node(),
+        states: vec![],
+        derivatives: vec![],
+        inputs: vec![],
+        sensors: vec![],
+        process_noise: vec![],
+        initial_variance: vec![],
+        confined: None,
+    });
+    assert!(nothing.unwrap_err().to_string().contains("states"));
     let mut filter = new(FilterSettings::of(FilterKind::Extended)).unwrap();
     filter.push(1.0, &[0.0]).unwrap();
     assert!(matches!(
@@ -183,6 +231,53 @@ fn the_moving_horizon_keeps_to_the_bounds() {
         "{:?}",
         horizon.estimate()
     );
+}
+
+/// A place and its velocity, both within bounds, the whole log in the window: the last row of the
+/// bounded least squares over all rows so far (SciPy's `lsq_linear`, method `bvls`).
+#[test]
+fn the_moving_horizon_solves_the_bounded_problem() {
+    let g = Graph::new();
+    let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
+    let model = FilterModel::new(&FilterPlant {
+        graph: &g,
+        time: time.node(),
+        states: vec![("x".into(), x.node(), 0.0), ("v".into(), v.node(), 0.2)],
+        derivatives: vec![v.node(), (v * -0.2).node()],
+        inputs: vec![],
+        sensors: vec![Sensor {
+            name: "y".into(),
+            output: x.node(),
+            noise: Level::Absolute(0.2),
+            limits: None,
+        }],
+        process_noise: vec![0.01, 0.3],
+        initial_variance: vec![1.0, 0.5],
+        confined: None,
+    });
+    let bounds = [(-0.3, 1.5), (0.0, 0.6)].map(|(low, high)| Bounds { low, high });
+    let settings = FilterSettings::of(FilterKind::MovingHorizon(20, bounds.to_vec()));
+    let mut horizon = Estimator::filter(&model.unwrap(), settings, exact()).unwrap();
+    let rows = [
+        (0.1, [0.0961538462, 0.2]),
+        (0.9, [0.6671166495, 0.6]),
+        (1.4, [1.1512251583, 0.6]),
+        (1.2, [1.3071660906, 0.3942843598]),
+        (2.2, [1.5, 0.3629228087]),
+        (2.6, [1.5, 0.0]),
+        (1.0, [1.4156113761, 0.0]),
+        (0.2, [1.0861276645, 0.0]),
+        (-0.5, [0.5394517021, 0.0]),
+        (-0.9, [0.0206741737, 0.0]),
+        (-0.4, [-0.1312098949, 0.0]),
+        (0.3, [0.1127414980, 0.2993984118]),
+    ];
+    for (k, (y, expected)) in rows.into_iter().enumerate() {
+        let found = horizon.push(0.5 * k as f64, &[y]).unwrap();
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-8, "{k}: {found} {expected}");
+        }
+    }
 }
 
 /// x' = −√x, read below zero: where the plant has no value the filter goes on inside the range.

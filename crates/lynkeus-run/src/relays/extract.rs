@@ -26,19 +26,20 @@ pub(crate) fn take(
     let mut replaced: HashMap<Node, Node> = HashMap::new();
     let (mut relays, mut modes, mut surfaces) = (vec![], vec![], vec![]);
     for node in graph.reachable(roots) {
-        let Some((quantity, is_sign)) = quantity(graph, node) else {
+        let Some(jump) = Jump::of(graph, node) else {
             continue;
         };
         if !graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s)) {
             continue;
         }
-        let quantity = graph.substitute(&[quantity], &replaced)[0];
+        let quantity = graph.substitute(&[jump.quantity], &replaced)[0];
         let mode = graph.fresh(graph.render(node, 60)).node();
         let (surface, is_reversed) = place(graph, &mut surfaces, quantity);
         relays.push(Relay {
             surface,
             is_reversed,
-            is_sign,
+            is_sign: jump.is_sign,
+            at_zero: jump.at_zero,
         });
         modes.push(mode);
         replaced.insert(node, mode);
@@ -60,6 +61,8 @@ pub(crate) fn take(
             surface,
             is_reversed,
             is_sign: false,
+            // both branches are the same there
+            at_zero: 1.0,
         });
         modes.push(mode);
         let branches = graph.substitute(&[kink.above, kink.below], &replaced);
@@ -80,14 +83,33 @@ pub(crate) fn take(
     }))
 }
 
-/// What changes its sign where the operation jumps, and whether the operation is that sign.
-fn quantity(graph: &Graph, node: Node) -> Option<(Node, bool)> {
-    match graph.op(node) {
-        Op::Unary(Unary::Sign, a) => Some((a, true)),
-        Op::Binary(Binary::Less | Binary::LessEq, a, b) => {
-            Some((graph.binary(Binary::Sub, b, a), false))
+/// An operation that jumps.
+struct Jump {
+    /// what changes its sign there
+    quantity: Node,
+    /// the operation is that sign
+    is_sign: bool,
+    /// its value where the quantity is zero
+    at_zero: f64,
+}
+
+impl Jump {
+    fn of(graph: &Graph, node: Node) -> Option<Self> {
+        let relation = |a: Node, b: Node, at_zero: f64| Self {
+            quantity: graph.binary(Binary::Sub, b, a),
+            is_sign: false,
+            at_zero,
+        };
+        match graph.op(node) {
+            Op::Unary(Unary::Sign, quantity) => Some(Self {
+                quantity,
+                is_sign: true,
+                at_zero: 0.0,
+            }),
+            Op::Binary(Binary::Less, a, b) => Some(relation(a, b, 0.0)),
+            Op::Binary(Binary::LessEq, a, b) => Some(relation(a, b, 1.0)),
+            _ => None,
         }
-        _ => None,
     }
 }
 
@@ -121,18 +143,49 @@ fn kink(graph: &Graph, node: Node) -> Option<Kink> {
 /// is none yet.
 fn place(graph: &Graph, surfaces: &mut Vec<Node>, quantity: Node) -> (usize, bool) {
     found(graph, surfaces, quantity).unwrap_or_else(|| {
+        let (quantity, is_reversed) = bare(graph, quantity);
         surfaces.push(quantity);
-        (surfaces.len() - 1, false)
+        (surfaces.len() - 1, is_reversed)
     })
 }
 
 fn found(graph: &Graph, surfaces: &[Node], quantity: Node) -> Option<(usize, bool)> {
-    let opposite = match graph.op(quantity) {
-        Op::Unary(Unary::Neg, a) => a,
-        Op::Binary(Binary::Sub, a, b) => graph.binary(Binary::Sub, b, a),
-        _ => graph.unary(Unary::Neg, quantity),
-    };
+    let (quantity, is_reversed) = bare(graph, quantity);
     let known = |sought: Node| surfaces.iter().position(|&known| known == sought);
-    let same = known(quantity).map(|surface| (surface, false));
-    same.or_else(|| known(opposite).map(|surface| (surface, true)))
+    let same = known(quantity).map(|surface| (surface, is_reversed));
+    same.or_else(|| match graph.op(quantity) {
+        Op::Binary(Binary::Sub, a, b) => {
+            let opposite = graph.binary(Binary::Sub, b, a);
+            known(opposite).map(|surface| (surface, !is_reversed))
+        }
+        _ => None,
+    })
+}
+
+/// A quantity without its constant factors, and whether they change its sign: multiples of one
+/// another vanish on one surface.
+fn bare(graph: &Graph, mut quantity: Node) -> (Node, bool) {
+    let factor = |node: Node| graph.constant_value(node).filter(|c| c.is_normal());
+    let is_zero = |node: Node| graph.constant_value(node) == Some(0.0);
+    let mut is_reversed = false;
+    loop {
+        let (inner, sign) = match graph.op(quantity) {
+            Op::Unary(Unary::Neg, a) => (a, -1.0),
+            Op::Binary(Binary::Mul, a, b) => match (factor(a), factor(b)) {
+                (Some(c), _) => (b, c),
+                (_, Some(c)) => (a, c),
+                _ => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Div, a, b) => match factor(b) {
+                Some(c) => (a, c),
+                None => return (quantity, is_reversed),
+            },
+            Op::Binary(Binary::Add | Binary::Sub, a, b) if is_zero(b) => (a, 1.0),
+            Op::Binary(Binary::Add, a, b) if is_zero(a) => (b, 1.0),
+            Op::Binary(Binary::Sub, a, b) if is_zero(a) => (b, -1.0),
+            _ => return (quantity, is_reversed),
+        };
+        is_reversed ^= sign < 0.0;
+        quantity = inner;
+    }
 }

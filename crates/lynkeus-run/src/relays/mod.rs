@@ -6,8 +6,11 @@
 //! Righthand Sides*, § 4): if the other side carries the state on, it is crossed; if both push
 //! the state back, it slides along the surface with the combination of both right-hand sides
 //! that keeps it there, until one of them ceases to push. Without that an integrator creeps
-//! from one side to the other in steps as short as time resolves.
+//! from one side to the other in steps as short as time resolves. What is on a surface and stays
+//! there by the equations as they are written (an input that is held at a threshold) is on
+//! neither side: operations have the value then that they have at zero.
 
+mod decide;
 mod extract;
 mod slide;
 
@@ -17,9 +20,6 @@ pub(crate) use extract::{Taken, take};
 
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error};
-
-/// A surface counts as reached this close to it, against the largest value of its function.
-const REACHED: f64 = 1e-10;
 
 /// A margin this small beside those at the ends of a step may be negative where a cubic is not.
 const CLOSE: f64 = 0.05;
@@ -35,6 +35,8 @@ pub(crate) struct Relay {
     is_reversed: bool,
     /// its value is −1 or 1 instead of 0 or 1
     is_sign: bool,
+    /// its value on the surface
+    at_zero: f64,
 }
 
 /// The jumps of a system and the surfaces on which they happen.
@@ -56,6 +58,7 @@ impl Held {
                 false => sides[relay.surface],
             };
             *mode = match relay.is_sign {
+                _ if side == 0.0 => relay.at_zero,
                 true => side,
                 false => f64::from(u8::from(side > 0.0)),
             };
@@ -66,7 +69,7 @@ impl Held {
 /// What is remembered of the surfaces from one interval to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sides {
-    /// −1 or 1
+    /// −1 or 1; 0 on a surface on which the state stays
     sides: Vec<f64>,
     sliding: Vec<bool>,
     /// the largest values seen of their functions
@@ -131,31 +134,6 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         self.values.is_empty()
     }
 
-    fn start(&mut self, t: f64, x: &[f64]) {
-        self.hold();
-        self.look(t, x);
-        let mut dx = vec![0.0; x.len()];
-        self.derivatives(t, x, &mut dx);
-        let speeds = self.speeds(t, x, &dx);
-        let reached = self.values.iter().zip(&self.at.largest).zip(&speeds);
-        let reached: Vec<bool> = reached
-            .map(|((value, largest), speed)| {
-                let size = largest.max(speed.abs() * self.length);
-                value.abs() <= REACHED * size
-            })
-            .collect();
-        for (i, reached) in reached.iter().enumerate() {
-            if !reached {
-                self.at.sliding[i] = false;
-                self.at.sides[i] = if self.values[i] < 0.0 { -1.0 } else { 1.0 };
-            }
-        }
-        for (i, _) in reached.iter().enumerate().filter(|(_, reached)| **reached) {
-            self.decide(i, t, x);
-        }
-        self.hold();
-    }
-
     /// Tells the system on which sides it is.
     fn hold(&mut self) {
         self.inner.hold(Some(&self.at.sides));
@@ -183,6 +161,7 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         for (i, value) in self.values.iter().enumerate() {
             margins.push(match self.at.sliding[i] {
                 true => self.parts[i].min(1.0 - self.parts[i]),
+                false if self.at.sides[i] == 0.0 => -value.abs(),
                 false => self.at.sides[i] * value,
             });
         }
@@ -208,43 +187,6 @@ impl<'a, D: Dynamics> Switched<'a, D> {
             dips.then(|| least_of_cubic([a, p], [b, q])).flatten()
         });
         lowest.reduce(f64::min)
-    }
-
-    /// Goes on where margins have become negative: across, along, or off the surface.
-    pub fn pass(&mut self, t: f64, x: &[f64], margins: &[f64]) {
-        for (i, _) in margins.iter().enumerate().filter(|(_, m)| **m < 0.0) {
-            self.at.passes[i] += 1;
-            match self.at.sliding[i] {
-                true => {
-                    self.at.sliding[i] = false;
-                    if self.parts[i] > 0.5 {
-                        self.at.sides[i] = -self.at.sides[i];
-                    }
-                }
-                false => self.decide(i, t, x),
-            }
-        }
-        self.hold();
-    }
-
-    /// Which side of a surface that is reached carries the state away from it: that one
-    /// holds; or neither, and the state slides.
-    fn decide(&mut self, i: usize, t: f64, x: &[f64]) {
-        self.at.sliding[i] = false;
-        let first = -self.at.sides[i];
-        for side in [first, -first] {
-            self.at.sides[i] = side;
-            self.hold();
-            let mut dx = vec![0.0; x.len()];
-            self.derivatives(t, x, &mut dx);
-            let speed = side * self.speeds(t, x, &dx)[i];
-            // a side that does not push back is not left for the one that was
-            if speed > 0.0 || (side == first && speed == 0.0) {
-                return;
-            }
-        }
-        self.at.sliding[i] = true;
-        self.hold();
     }
 
     /// A branch need have no value beyond its side: f as the state says, then.

@@ -36,18 +36,18 @@ impl<D: Dynamics> Switched<'_, D> {
         let mut matrix = DMatrix::zeros(along.len(), along.len());
         for (column, &i) in along.iter().enumerate() {
             let mut other = vec![0.0; x.len()];
-            self.at.sides[i] = -self.at.sides[i];
-            self.hold();
+            let sides = self.at.sides.clone();
+            self.turn(i, t, x);
             self.inner.derivatives(t, x, &mut other);
             self.mend(t, x, &mut other);
             let there = self.speeds(t, x, &other);
-            self.at.sides[i] = -self.at.sides[i];
+            self.at.sides.copy_from_slice(&sides);
+            self.hold();
             for (row, &j) in along.iter().enumerate() {
                 matrix[(row, column)] = there[j] - here[j];
             }
             others.push(other);
         }
-        self.hold();
         let right = DVector::from_iterator(along.len(), along.iter().map(|&j| -here[j]));
         // where both sides move alike nothing decides between them
         let parts = matrix
@@ -62,5 +62,27 @@ impl<D: Dynamics> Switched<'_, D> {
                 *dx += part * (other - f);
             }
         }
+    }
+
+    /// The other side of a surface that is slid along, and of those that jump with it.
+    fn turn(&mut self, i: usize, t: f64, x: &[f64]) {
+        let count = self.parts.len();
+        let [mut before, mut after] = [vec![0.0; count], vec![0.0; count]];
+        let is_alone = count == 1;
+        if !is_alone {
+            self.inner.read_surfaces(t, x, &mut before);
+        }
+        self.at.sides[i] = -self.at.sides[i];
+        self.hold();
+        if is_alone {
+            return;
+        }
+        self.inner.read_surfaces(t, x, &mut after);
+        for j in (0..count).filter(|&j| !self.at.sliding[j]) {
+            if before[j] * after[j] < 0.0 {
+                self.at.sides[j] = -self.at.sides[j];
+            }
+        }
+        self.hold();
     }
 }

@@ -1,6 +1,8 @@
 //! Systems that jump with their state: crossed, slid along, left again; against solutions by
 //! hand.
 
+mod thresholds;
+
 use lynkeus_expr::{Binary, Expr, Graph, Node};
 use lynkeus_run::{Integrator, Method, System, Tolerances};
 
