@@ -16,7 +16,7 @@ use lynkeus_expr::Tape;
 pub(crate) use extract::{Taken, take};
 
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error};
+use crate::{Dynamics, Error, Slopes};
 
 /// A surface counts as reached this close to it, against the largest value of its function.
 const REACHED: f64 = 1e-10;
@@ -296,6 +296,11 @@ impl<D: Dynamics> Dynamics for Switched<'_, D> {
         }
         self.inner.derivatives(t, x, dx);
         self.mend(t, x, dx);
+    }
+
+    /// How the parts of both sides change along a surface is not known.
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        !self.at.sliding.contains(&true) && self.inner.slopes(t, x, slopes)
     }
 
     fn enter(&mut self, t: f64) {
