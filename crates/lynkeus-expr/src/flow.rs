@@ -1,5 +1,9 @@
 //! Derivatives of outputs along the solutions of x' = f(t, x, u).
 
+mod gradients;
+
+pub use gradients::gradients;
+
 use crate::{Graph, Jets, MissingInput, Node, Nodes, Tape};
 
 /// An input as a function of time, given by the expressions of u, u', u'', …;
@@ -38,19 +42,8 @@ pub fn derivatives(
     outputs: &[Node],
     order: usize,
 ) -> Result<Vec<Vec<Node>>, MissingInput> {
-    let right = Program::new(graph, flow, flow.derivatives)?;
     let read = Program::new(graph, flow, outputs)?;
-    let mut x: Vec<Vec<Node>> = flow.states.iter().map(|&s| vec![s]).collect();
-    for k in 0..order {
-        if graph.is_spent() {
-            break;
-        }
-        let f = right.run(graph, flow, &x, k);
-        for (jet, f) in x.iter_mut().zip(f) {
-            let next = coefficient(graph, &f, k);
-            jet.push((graph.expr(next) / (k + 1) as f64).node());
-        }
-    }
+    let x = states(graph, flow, order)?;
     let mut y = read.run(graph, flow, &x, order);
     for jet in &mut y {
         let mut factorial = 1.0;
@@ -62,6 +55,23 @@ pub fn derivatives(
             .collect();
     }
     Ok(y)
+}
+
+/// The Taylor coefficients of the states along the flow.
+fn states(graph: &Graph, flow: &Flow<'_>, order: usize) -> Result<Vec<Vec<Node>>, MissingInput> {
+    let right = Program::new(graph, flow, flow.derivatives)?;
+    let mut x: Vec<Vec<Node>> = flow.states.iter().map(|&s| vec![s]).collect();
+    for k in 0..order {
+        if graph.is_spent() {
+            break;
+        }
+        let f = right.run(graph, flow, &x, k);
+        for (jet, f) in x.iter_mut().zip(f) {
+            let next = coefficient(graph, &f, k);
+            jet.push((graph.expr(next) / (k + 1) as f64).node());
+        }
+    }
+    Ok(x)
 }
 
 fn coefficient(graph: &Graph, jet: &[Node], k: usize) -> Node {

@@ -274,6 +274,40 @@ fn solve_adjoints(
     }
 }
 
+/// How many derivatives [`forward`] writes down: for each operation one for each input that it
+/// depends on, and for a linear or an implicit system one for each entry of its matrix. None
+/// where there are more than `most`; finding that out takes no more work than that.
+pub fn size(graph: &Graph, outputs: &[Node], inputs: &[Node], most: usize) -> Option<usize> {
+    let mut columns: HashMap<Node, Vec<usize>> = HashMap::new();
+    for (column, &input) in inputs.iter().enumerate() {
+        columns.insert(input, vec![column]);
+    }
+    let mut size: usize = 0;
+    for node in graph.reachable(outputs) {
+        if columns.contains_key(&node) {
+            continue;
+        }
+        let arguments = graph.arguments(node);
+        let below = arguments.iter().filter_map(|a| columns.get(a));
+        let mut own: Vec<usize> = below.flatten().copied().collect();
+        own.sort_unstable();
+        own.dedup();
+        let weight = if graph.op(node).is_system() {
+            arguments.len()
+        } else {
+            1
+        };
+        size = size.saturating_add(weight.saturating_mul(own.len()));
+        if size > most {
+            return None;
+        }
+        if !own.is_empty() {
+            columns.insert(node, own);
+        }
+    }
+    Some(size)
+}
+
 /// Which inputs each output depends on, as a graph, without derivatives: row by
 /// row the sorted indices into `inputs`.
 pub fn pattern(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Vec<Vec<usize>> {
@@ -306,4 +340,26 @@ fn local_symbols(graph: &Graph, root: Node) -> Vec<Node> {
         );
     }
     symbols
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain has one derivative for each operation and each of the few inputs below it; a sum
+    /// of all of them has all.
+    #[test]
+    fn the_size_counts_what_each_operation_depends_on() {
+        let g = Graph::new();
+        let x: Vec<_> = (0..5).map(|i| g.symbol(&format!("x{i}"))).collect();
+        let inputs: Vec<Node> = x.iter().map(|x| x.node()).collect();
+        let chain: Vec<Node> = x.windows(2).map(|w| (w[0] * w[1]).sin().node()).collect();
+        // four products and four sines of two inputs each
+        assert_eq!(size(&g, &chain, &inputs, 100), Some(16));
+        assert_eq!(size(&g, &chain, &inputs, 15), None);
+        let sum = x.iter().copied().reduce(|a, b| a + b).unwrap();
+        assert_eq!(size(&g, &[sum.node()], &inputs, 100), Some(2 + 3 + 4 + 5));
+        let parameter = g.symbol("p").exp().node();
+        assert_eq!(size(&g, &[parameter, inputs[0]], &inputs, 0), Some(0));
+    }
 }

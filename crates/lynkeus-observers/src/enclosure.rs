@@ -2,13 +2,13 @@
 //! of proofs, outward rounded.
 
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
 use lynkeus_proof::matrix::IntervalMatrix;
-use lynkeus_structure::{Dimension, Matrix, Region, range_within};
+use lynkeus_structure::{Dimension, Matrix, Region, enclosure_within};
 
 /// Cells examined per end of the range of an entry.
 const CELLS: usize = 600;
@@ -18,6 +18,8 @@ pub(crate) struct Enclosure<'g> {
     graph: &'g Graph,
     region: Region,
     open: RefCell<BTreeSet<String>>,
+    /// largest absolute values, found once for every part that expressions share
+    sizes: RefCell<HashMap<Node, f64>>,
 }
 
 impl<'g> Enclosure<'g> {
@@ -26,6 +28,7 @@ impl<'g> Enclosure<'g> {
             graph,
             region: region.clone(),
             open: RefCell::default(),
+            sizes: RefCell::default(),
         }
     }
 
@@ -44,6 +47,7 @@ impl<'g> Enclosure<'g> {
 
     /// A further variable of the box.
     pub fn add(&mut self, name: String, symbol: Node, min: f64, max: f64) {
+        self.sizes.get_mut().clear();
         self.region.dimensions.push(Dimension {
             name,
             symbol,
@@ -69,8 +73,8 @@ impl<'g> Enclosure<'g> {
 
     /// Smallest and largest value.
     pub fn range(&self, node: Node) -> Result<(f64, f64), MissingInput> {
-        let found = range_within(self.graph, node, &self.region, CELLS)?;
-        let bounds = (found.enclosure.lo(), found.enclosure.hi());
+        let found = enclosure_within(self.graph, node, &self.region, CELLS)?;
+        let bounds = (found.lo(), found.hi());
         if bounds.0.is_finite() && bounds.1.is_finite() {
             return Ok(bounds);
         }
@@ -114,8 +118,8 @@ impl<'g> Enclosure<'g> {
             let size = match entry {
                 // it is such an entry itself
                 Some(entry) if entry != node => {
-                    let found = range_within(self.graph, entry, &self.region, CELLS)?;
-                    times(found.enclosure.magnitude(), self.magnitude_of(b)?)
+                    let found = enclosure_within(self.graph, entry, &self.region, CELLS)?;
+                    times(found.magnitude(), self.magnitude_of(b)?)
                 }
                 _ => f64::INFINITY,
             };
@@ -126,12 +130,17 @@ impl<'g> Enclosure<'g> {
 
     /// The largest absolute value, of which nothing is noted where there is none.
     fn magnitude_of(&self, node: Node) -> Result<f64, MissingInput> {
-        let found = range_within(self.graph, node, &self.region, CELLS)?;
-        let size = found.enclosure.magnitude();
-        match size.is_finite() {
-            true => Ok(size),
-            false => self.of_parts(node),
+        if let Some(known) = self.sizes.borrow().get(&node) {
+            return Ok(*known);
         }
+        let found = enclosure_within(self.graph, node, &self.region, CELLS)?;
+        let whole = found.magnitude();
+        let size = match whole.is_finite() {
+            true => whole,
+            false => self.of_parts(node)?,
+        };
+        self.sizes.borrow_mut().insert(node, size);
+        Ok(size)
     }
 
     fn note(&self, node: Node) {

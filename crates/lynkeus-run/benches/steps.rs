@@ -1,8 +1,8 @@
-//! Time of one evaluation and of one Runge–Kutta step.
+//! Time of one evaluation, of one Runge–Kutta step, and of a stiff run.
 
 use divan::{Bencher, black_box};
 use lynkeus_expr::Graph;
-use lynkeus_run::{Dynamics, Evaluation, Rk4, System};
+use lynkeus_run::{Dynamics, Evaluation, Integrator, Method, Rk4, System, Tolerances};
 
 fn main() {
     divan::main();
@@ -40,4 +40,17 @@ fn rk4_step(bencher: Bencher, n: usize) {
     let mut rk4 = Rk4::new(n);
     let mut x = vec![0.4; n];
     bencher.bench_local(|| rk4.step(&mut chain, 0.0, 1e-6, black_box(&mut x)));
+}
+
+/// From one steady state to another, by implicit steps.
+#[divan::bench(args = [12, 100, 1000, 10_000], sample_count = 5)]
+fn stiff_run(bencher: Bencher, n: usize) {
+    let mut chain = chain(n);
+    let method = Method::Stiff(Tolerances::default());
+    bencher.bench_local(|| {
+        let mut x = vec![0.4; n];
+        chain.signals_mut()[0] = black_box(0.5);
+        let mut integrator = Integrator::new(method, n).expect("a known method");
+        integrator.advance(&mut chain, 0.0, 10.0, &mut x)
+    });
 }

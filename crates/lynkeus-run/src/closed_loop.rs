@@ -3,7 +3,7 @@
 use crate::joint::Parts;
 use crate::noise::Sensors;
 use crate::routine::Runner;
-use crate::{Dynamics, Error, Evaluation, Role, Simulation, Trajectory};
+use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, Trajectory};
 
 /// Where a signal of the observer comes from.
 #[derive(Clone, Copy, Debug)]
@@ -262,6 +262,14 @@ impl Dynamics for Loop {
         if let Some(observer) = &mut self.observer {
             observer.derivatives(t, observer_x, observer_dx);
         }
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        if self.is_held {
+            return false;
+        }
+        self.place(t, x);
+        self.joint.slopes(&self.arguments, x.len(), slopes)
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {

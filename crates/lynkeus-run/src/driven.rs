@@ -1,7 +1,7 @@
 //! Signals between two samples.
 
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{BetweenSamples, Dynamics, Error, Evaluation, System};
+use crate::{BetweenSamples, Dynamics, Error, Evaluation, Slopes, System};
 
 /// A system with its signals between two samples.
 #[derive(Clone, Debug)]
@@ -50,6 +50,12 @@ impl Driven {
         }
     }
 
+    /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
+    pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.read_signals(t);
+        self.evaluation.output_slopes(t, x, slopes)
+    }
+
     /// The interval is over: its last sample is the present one.
     pub(crate) fn arrive(&mut self) {
         self.last.copy_from_slice(&self.next);
@@ -73,6 +79,11 @@ impl Dynamics for Driven {
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         self.read_signals(t);
         self.evaluation.derivatives(t, x, dx);
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.read_signals(t);
+        self.evaluation.slopes(t, x, slopes)
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {

@@ -1,7 +1,7 @@
 //! What an integrator sees of a system.
 
-use crate::Error;
 use crate::error::state_text;
+use crate::{Error, Slopes};
 
 /// A right-hand side x' = f(t, x), with the instants at which f jumps because
 /// of time alone.
@@ -14,6 +14,12 @@ pub trait Dynamics {
 
     /// Writes f(t, x) to `dx`; both slices have [`Dynamics::dimension`] entries.
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]);
+
+    /// Writes ∂f/∂x at (t, x), where f knows its own derivatives; false where it does not, and
+    /// whoever needs them takes differences.
+    fn slopes(&mut self, _t: f64, _x: &[f64], _slopes: &mut Slopes) -> bool {
+        false
+    }
 
     /// Takes `x` at `t` to `next` at `t + h` by the classical Runge–Kutta method, where that is
     /// known as one function; false where it is not, and nothing is done.
@@ -80,6 +86,10 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         (**self).derivatives(t, x, dx);
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        (**self).slopes(t, x, slopes)
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {

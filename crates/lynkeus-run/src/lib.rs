@@ -66,7 +66,10 @@
 //!
 //! [`Method::Adaptive`] starts explicit, looks at the spectral radius of the
 //! Jacobian every 40 steps, and changes to the implicit method where stability and
-//! not accuracy holds the explicit one back, and back again.
+//! not accuracy holds the explicit one back, and back again. The Jacobian is that of the
+//! graph ([`Slopes`]), compiled when it is first asked for; where it is sparse its factors are,
+//! too. Only right-hand sides that do not know it (closures, a state that slides along a surface,
+//! dense equations of very many operations) are looked at by differences.
 //!
 //! The explicit method is DOP853 (order 8) of the `differential-equations` crate,
 //! driven step by step; the implicit one is our Radau IIA of order 5 (three stages,
@@ -106,6 +109,7 @@ mod routine;
 mod runner;
 mod sampled;
 mod simulate;
+mod slopes;
 mod snapshot;
 mod spectral;
 mod spread;
@@ -124,6 +128,7 @@ pub use rk4::Rk4;
 pub use routine::Backend;
 pub use sampled::SampledObserver;
 pub use simulate::Simulation;
+pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};
 pub use spectral::spectral_radius;
 pub use spread::{ErrorModel, ErrorNoise};

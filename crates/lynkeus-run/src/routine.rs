@@ -6,6 +6,9 @@ use std::sync::{Arc, OnceLock};
 use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
 use lynkeus_native::Function;
 
+use crate::Slopes;
+use crate::slopes::Differentiated;
+
 /// What evaluates systems. All give the same values to the bit, so that it is a matter of speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Backend {
@@ -48,6 +51,7 @@ pub(crate) struct Routine {
     tape: Tape,
     native: OnceLock<Option<Function<1>>>,
     step: OnceLock<Option<Function<1>>>,
+    slopes: OnceLock<Option<Differentiated>>,
 }
 
 impl Routine {
@@ -56,6 +60,7 @@ impl Routine {
             tape,
             native: OnceLock::new(),
             step: OnceLock::new(),
+            slopes: OnceLock::new(),
         })
     }
 
@@ -76,12 +81,20 @@ impl Routine {
         self.step.get_or_init(compile).as_ref()
     }
 
+    /// The derivatives by the states, which follow time among the inputs. They are found when
+    /// they are first asked for.
+    fn slopes(&self, states: usize) -> Option<&Differentiated> {
+        let find = || Differentiated::new(&self.tape, states);
+        self.slopes.get_or_init(find).as_ref()
+    }
+
     pub fn runner(self: &Arc<Self>) -> Runner {
         Runner {
             interpreter: self.tape.evaluator(),
             routine: self.clone(),
             native: Engine::default(),
             step: Engine::default(),
+            slopes: None,
             inputs: vec![],
         }
     }
@@ -166,6 +179,8 @@ pub(crate) struct Runner {
     interpreter: lynkeus_expr::Evaluator,
     native: Engine,
     step: Engine,
+    /// of the derivatives, once they were asked for
+    slopes: Option<Box<Runner>>,
     /// of a step
     inputs: Vec<f64>,
 }
@@ -178,6 +193,18 @@ impl Runner {
             Some(native) => native.eval(inputs.as_chunks().0, outputs.as_chunks_mut().0),
             None => self.interpreter.eval(inputs, outputs),
         }
+    }
+
+    /// Writes the derivatives of the outputs by the states at `inputs`, where they are known.
+    pub fn slopes(&mut self, inputs: &[f64], states: usize, slopes: &mut Slopes) -> bool {
+        let Some(known) = self.routine.slopes(states) else {
+            return false;
+        };
+        let runner = self
+            .slopes
+            .get_or_insert_with(|| Box::new(known.routine.runner()));
+        runner.eval(inputs, slopes.at(&known.places));
+        true
     }
 
     /// For a routine (t, x, w) → dx: one step of length `h` of the classical Runge–Kutta method

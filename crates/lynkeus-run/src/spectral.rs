@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::Dynamics;
+use crate::{Dynamics, Slopes};
 
 /// Squarings of the Jacobian: the norm of its 2^8-th power has forgotten all
 /// but 1/256 of the logarithm of its departure from normality.
@@ -16,39 +16,20 @@ const ITERATIONS: (usize, usize) = (40, 16);
 
 /// Estimates the spectral radius of ∂f/∂x at (t, x), in 1/(unit of time).
 ///
-/// The Jacobian is taken by finite differences and its radius from Gelfand's
-/// formula ρ = lim ‖Jᵏ‖^(1/k), which needs no eigenvalue iteration and takes
-/// strongly non-normal matrices (high gain) as well as complex pairs. Not finite
-/// where the derivative is not.
+/// The Jacobian is the system's own ([`Dynamics::slopes`]) or taken by finite
+/// differences, and its radius from Gelfand's formula ρ = lim ‖Jᵏ‖^(1/k), which needs
+/// no eigenvalue iteration and takes strongly non-normal matrices (high gain) as well
+/// as complex pairs. Not finite where the derivative is not.
 pub fn spectral_radius(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
     if x.is_empty() {
         0.0
     } else if x.len() <= SMALL {
-        gelfand(jacobian(f, t, x))
+        let mut slopes = Slopes::default();
+        slopes.look(f, t, x);
+        gelfand(slopes.dense(x.len()))
     } else {
         power(f, t, x)
     }
-}
-
-/// ∂f/∂x by one-sided differences.
-pub(crate) fn jacobian(f: &mut impl Dynamics, t: f64, x: &[f64]) -> DMatrix<f64> {
-    let n = x.len();
-    let mut base = vec![0.0; n];
-    f.derivatives(t, x, &mut base);
-    let mut moved = x.to_vec();
-    let mut column = vec![0.0; n];
-    let mut j = DMatrix::zeros(n, n);
-    for k in 0..n {
-        moved[k] = x[k] + f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
-        // the difference that the rounded sum really makes
-        let step = moved[k] - x[k];
-        f.derivatives(t, &moved, &mut column);
-        for i in 0..n {
-            j[(i, k)] = (column[i] - base[i]) / step;
-        }
-        moved[k] = x[k];
-    }
-    j
 }
 
 fn gelfand(mut power: DMatrix<f64>) -> f64 {
@@ -67,28 +48,42 @@ fn gelfand(mut power: DMatrix<f64>) -> f64 {
     ((log + power.norm().ln()) / exponent).exp()
 }
 
-/// The power method on directional differences, for systems too large to square.
+/// The power method: products with the Jacobian where it is known, else differences in the
+/// direction of v.
 fn power(f: &mut impl Dynamics, t: f64, x: &[f64]) -> f64 {
     let n = x.len();
-    let (mut base, mut moved, mut image) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let mut slopes = Slopes::default();
+    if f.slopes(t, x, &mut slopes) && slopes.are_finite() {
+        return growth(n, |v, image| slopes.times(v, image));
+    }
+    let (mut base, mut moved) = (vec![0.0; n], vec![0.0; n]);
     f.derivatives(t, x, &mut base);
+    let step = f64::EPSILON.sqrt() * (1.0 + norm(x));
+    growth(n, |v, image| {
+        for i in 0..n {
+            moved[i] = x[i] + step * v[i];
+        }
+        f.derivatives(t, &moved, image);
+        for (image, base) in image.iter_mut().zip(&base) {
+            *image = (*image - base) / step;
+        }
+    })
+}
+
+/// How much a linear map of unit vectors stretches them in the long run.
+fn growth(n: usize, mut map: impl FnMut(&[f64], &mut [f64])) -> f64 {
     // any direction that has a part along every mode will do
     let mut v: Vec<f64> = (0..n).map(|i| 1.0 + (i as f64 * 0.7).sin()).collect();
-    let scale = f64::EPSILON.sqrt() * (1.0 + norm(x));
+    let mut image = vec![0.0; n];
     let mut logs = 0.0;
     for iteration in 0..ITERATIONS.0 {
         let length = norm(&v);
         if length == 0.0 || !length.is_finite() {
             return length;
         }
-        let step = scale / length;
-        for i in 0..n {
-            moved[i] = x[i] + step * v[i];
-        }
-        f.derivatives(t, &moved, &mut image);
-        for i in 0..n {
-            v[i] = (image[i] - base[i]) / scale;
-        }
+        v.iter_mut().for_each(|v| *v /= length);
+        map(&v, &mut image);
+        std::mem::swap(&mut v, &mut image);
         if iteration >= ITERATIONS.0 - ITERATIONS.1 {
             logs += norm(&v).ln();
         }

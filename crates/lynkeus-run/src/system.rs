@@ -10,7 +10,7 @@ use crate::relays::{Held, Taken, take};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
-use crate::{Dynamics, Error};
+use crate::{Dynamics, Error, Slopes};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
 /// (without states) inputs as functions of time.
@@ -301,6 +301,18 @@ impl Evaluation {
         }
     }
 
+    /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
+    pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.outputs.slopes(&held.inputs, x.len(), slopes)
+            }
+            _ => self.outputs.slopes(&self.inputs, x.len(), slopes),
+        }
+    }
+
     /// Writes what an observer reports at (t, x), in the order of
     /// [`System::estimates`].
     pub fn estimates(&mut self, t: f64, x: &[f64], estimates: &mut [f64]) {
@@ -342,6 +354,17 @@ impl Dynamics for Evaluation {
                 held.derivatives.eval(&held.inputs, dx);
             }
             _ => self.derivatives.eval(&self.inputs, dx),
+        }
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.derivatives.slopes(&held.inputs, x.len(), slopes)
+            }
+            _ => self.derivatives.slopes(&self.inputs, x.len(), slopes),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Integrators against solutions that are known.
 
-use lynkeus_run::{Error, Function, Integrator, Method, Step, Tolerances};
+use lynkeus_expr::Graph;
+use lynkeus_run::{Error, Function, Integrator, Method, Step, System, Tolerances};
 
 fn tight() -> Tolerances {
     Tolerances {
@@ -258,5 +259,39 @@ fn impossible_settings_are_refused() {
     for method in bad {
         let error = Integrator::new(method, 1).unwrap_err();
         assert!(matches!(error, Error::Setting { .. }), "{error}");
+    }
+}
+
+/// Heat in a rod of 400 cells: an eigenmode decays at its own rate, −2(1 − cos(π/401))·10⁴ beside
+/// rates up to 4·10⁴, which takes a Jacobian of the graph and factors of three bands.
+#[test]
+fn a_stiff_rod_of_many_cells_cools_like_its_slowest_mode() {
+    let (n, pace) = (400, 1e4);
+    let g = Graph::new();
+    let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
+    let wave = std::f64::consts::PI / (n + 1) as f64;
+    let mode = |i: usize| (wave * (i + 1) as f64).sin();
+    let end = g.constant(0.0);
+    let around = |i: usize| {
+        let left = if i > 0 { x[i - 1] } else { end };
+        let right = x.get(i + 1).copied().unwrap_or(end);
+        ((left - x[i] * 2.0 + right) * pace).node()
+    };
+    let dx: Vec<_> = (0..n).map(around).collect();
+    let states = x.iter().enumerate();
+    let states: Vec<_> = states
+        .map(|(i, x)| (format!("x{i}"), x.node(), mode(i)))
+        .collect();
+    let time = g.symbol("time").node();
+    let rod = System::new(&g, time, &states, &[], &dx, &[]).unwrap();
+    let rate = 2.0 * (1.0 - wave.cos()) * pace;
+    for method in [Method::Adaptive(tight()), Method::Stiff(tight())] {
+        let mut x = rod.start().to_vec();
+        let mut integrator = Integrator::new(method, n).unwrap();
+        let mut f = rod.evaluation();
+        integrator.advance(&mut f, 0.0, 2.0, &mut x).unwrap();
+        for (i, x) in x.iter().enumerate() {
+            close(*x, mode(i) * (-2.0 * rate).exp(), 1e-7);
+        }
     }
 }

@@ -103,6 +103,25 @@ pub fn output_derivatives(
     along(extended, &extended.derivatives, &jets, order)
 }
 
+/// The gradients of [`lie_derivatives`] by the states, output by output.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn lie_gradients(
+    extended: &Extended<'_>,
+    form: &AffineForm,
+    order: usize,
+) -> Result<Vec<Rows>, MissingInput> {
+    let outputs: Vec<Node> = extended.outputs.iter().map(|o| o.variable.node).collect();
+    let flow = Flow {
+        time: extended.plant.time,
+        states: &extended.symbols(),
+        derivatives: &form.drift,
+        inputs: &[],
+    };
+    flow::gradients(extended.graph(), &flow, &outputs, order)
+}
+
 fn along(
     extended: &Extended<'_>,
     right: &[Node],

@@ -59,6 +59,41 @@ pub fn range_within(
     Ok(found)
 }
 
+/// The [enclosure](Range::enclosure) of [`range_within`] without the points: nothing is searched
+/// where the expression may lack a value.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn enclosure_within(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    budget: usize,
+) -> Result<Interval, MissingInput> {
+    let own = region.restricted(&graph.symbols_of(&[node]));
+    let question = Glance(Question::new(node, &own, 0));
+    let regular = match graph.noted(&question) {
+        Some(known) => known,
+        None => {
+            let mut whole = [Interval::ENTIRE];
+            let tape = Tape::new(graph, &own.symbols(), &[node])?;
+            tape.evaluator_in(Intervals).eval(&own.cell(), &mut whole);
+            let regular =
+                whole[0].is_defined() || Regularity::of(graph, &[node], &[], &own)?.holds();
+            graph.note(question, regular);
+            regular
+        }
+    };
+    match regular {
+        true => Ok(range_within(graph, node, region, budget)?.enclosure),
+        false => Ok(Interval::UNKNOWN),
+    }
+}
+
+/// Whether an expression has values on the whole box.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Glance(Question);
+
 /// What a range depends on; the graph keeps the answers.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Question {
@@ -248,4 +283,41 @@ fn close(bound: f64, best: Option<&Point>) -> bool {
         // equal infinities are as close as can be
         best.value == bound || gap <= TOLERANCE * best.value.abs()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where it has values everywhere it is that of the search; beside a pole there is none, and
+    /// a root that interval arithmetic loses only on the whole box is there all the same.
+    #[test]
+    fn an_enclosure_is_that_of_the_range() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let region = Region {
+            dimensions: vec![Dimension {
+                name: "x".into(),
+                symbol: x.node(),
+                min: 0.0,
+                max: 1.0,
+                integer: false,
+            }],
+        };
+        let both = |node: Node| {
+            let quick = enclosure_within(&g, node, &region, 600).unwrap();
+            (
+                quick,
+                range_within(&g, node, &region, 600).unwrap().enclosure,
+            )
+        };
+        for node in [x * (1.0 - x), (x * (x - 1.0) + 0.3).sqrt()] {
+            let (quick, searched) = both(node.node());
+            assert!(quick == searched && quick.is_defined());
+            assert!(quick.magnitude() < 0.6);
+        }
+        let (quick, searched) = both((1.0 / (x - 0.5)).node());
+        assert!(!quick.is_defined() && !searched.is_defined());
+        assert_eq!(quick.magnitude(), f64::INFINITY);
+    }
 }

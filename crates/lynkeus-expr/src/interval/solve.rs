@@ -37,6 +37,10 @@ pub fn solve(a: &[Interval], b: &[Interval]) -> (Vec<Interval>, bool) {
 }
 
 fn enclose(a: &[Interval], b: &[Interval]) -> Option<Vec<Interval>> {
+    if let ([a], [b]) = (a, b) {
+        // the quotients of all their numbers: no method has a smaller range
+        return (!a.contains_zero()).then(|| vec![*b / *a]);
+    }
     let eliminated = elimination::solve(a, b);
     let preconditioned = preconditioned::solve(a, b);
     match (eliminated, preconditioned) {
@@ -112,6 +116,13 @@ mod tests {
         let unbounded = interval(1.0, f64::INFINITY);
         let (x, regular) = solve(&[unbounded], &[Interval::ONE]);
         assert!(regular && x[0] == interval(0.0, 1.0));
+    }
+
+    #[test]
+    fn one_equation_is_a_quotient() {
+        let (x, regular) = solve(&[interval(-4.0, -2.0)], &[interval(1.0, 6.0)]);
+        assert!(regular && x[0] == interval(-3.0, -0.25) && x[0].is_defined());
+        assert!(!solve(&[interval(0.0, 1.0)], &points(&[1.0])).1);
     }
 
     #[test]

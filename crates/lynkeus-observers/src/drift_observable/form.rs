@@ -36,7 +36,6 @@ impl Map {
         asked: Option<Variant>,
         region: &Region,
     ) -> Result<Result<Self, Examination>, DesignError> {
-        let graph = extended.graph();
         let affine = match output_map::affine_form(extended)? {
             Ok(affine) => affine,
             Err(why) => return Ok(Err(unfit(why))),
@@ -44,12 +43,8 @@ impl Map {
         size::affordable(extended, &affine)?;
         let order = extended.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(extended, &affine, order)?;
-        let x = extended.symbols();
-        let mut gradients = vec![];
-        for h in &lie {
-            lasts(extended)?;
-            gradients.push(output_map::jacobian_rows(graph, h, &x));
-        }
+        let gradients = output_map::lie_gradients(extended, &affine, order)?;
+        lasts(extended)?;
         Ok(Ok(Self {
             affine,
             gradients,

@@ -1,5 +1,7 @@
 //! Why there is no proof, or no gain: which range stands in the way.
 
+use std::time::Duration;
+
 use lynkeus_expr::Budget;
 use lynkeus_proof::decay::{self, ErrorModel, Request};
 use lynkeus_structure::{Slopes, short};
@@ -11,6 +13,8 @@ use super::expanded;
 const HALVINGS: usize = 6;
 /// Slopes up to which each is tried alone.
 const SINGLES: usize = 12;
+/// What an explanation may take.
+const EXPLAINING: Duration = Duration::from_secs(15);
 
 /// The models with every slope's range cut by a factor that may depend on the slope.
 fn cut(slopes: &Slopes, factor: impl Fn(usize) -> f64 + Copy) -> Vec<ErrorModel> {
@@ -49,8 +53,16 @@ pub(super) fn provable_share(system: &ErrorSystem, budget: &Budget) -> Option<f6
 /// In words: what keeps every gain from a proof of the requested rate.
 pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
     let slopes = &system.slopes;
+    let request = &Request {
+        budget: request.budget.within(EXPLAINING),
+        ..request.clone()
+    };
     let works = |models: &[ErrorModel]| decay::is_reachable(models, request);
-    let Some(share) = share(slopes, works) else {
+    let share = share(slopes, works);
+    if request.budget.marked().is_some() {
+        return "which range stands in the way takes longer to find out: narrow the box or lower the rate".into();
+    }
+    let Some(share) = share else {
         return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
     };
     let range = |k: usize| {

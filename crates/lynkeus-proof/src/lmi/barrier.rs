@@ -12,6 +12,8 @@ const CENTRAL: f64 = 0.1;
 /// Near enough to the central path to move on along it. Steps far from the centre
 /// lower the merit by a constant each, and centring every time would take many.
 const NEAR: f64 = 1.0;
+/// Columns of a Cholesky factor that are found before the rest is told of them.
+const PANEL: usize = 64;
 /// Newton steps altogether.
 const STEPS: usize = 400;
 
@@ -28,12 +30,19 @@ struct Term {
     /// entries (i, j, value) with i ≤ j
     entries: Vec<(usize, usize, f64)>,
     /// F_k = Σ e_i vᵀ + v e_iᵀ over few rows i
-    rows: Vec<(usize, DVector<f64>)>,
+    rows: Vec<Row>,
+}
+
+/// A row of a symmetric matrix, and the column that mirrors it.
+struct Row {
+    place: usize,
+    /// the entries of v that are not zero
+    entries: Vec<(usize, f64)>,
 }
 
 impl Term {
     fn new(unknown: usize, entries: Vec<(usize, usize, f64)>, n: usize) -> Self {
-        let mut rows: Vec<(usize, DVector<f64>)> = vec![];
+        let mut rows = vec![];
         let mut left = entries.clone();
         while !left.is_empty() {
             let mut counts = vec![0; n];
@@ -42,17 +51,20 @@ impl Term {
                 counts[j] += 1;
             }
             let fullest = (0..n).max_by_key(|&i| counts[i]).unwrap_or(0);
-            let mut v = DVector::zeros(n);
+            let mut row = vec![];
             left.retain(|&(i, j, value)| {
                 match (i == fullest, j == fullest) {
-                    (true, true) => v[i] += 0.5 * value,
-                    (true, false) => v[j] += value,
-                    (false, true) => v[i] += value,
+                    (true, true) => row.push((i, 0.5 * value)),
+                    (true, false) => row.push((j, value)),
+                    (false, true) => row.push((i, value)),
                     (false, false) => return true,
                 }
                 false
             });
-            rows.push((fullest, v));
+            rows.push(Row {
+                place: fullest,
+                entries: row,
+            });
         }
         Self {
             unknown,
@@ -73,13 +85,16 @@ impl Term {
     fn sandwiched(&self, W: &DMatrix<f64>) -> DMatrix<f64> {
         let n = W.ncols();
         let mut G = DMatrix::zeros(n, n);
-        for (i, v) in &self.rows {
-            let (a, b) = (W.column(*i), W * v);
-            for column in 0..n {
-                let (x, y) = (a[column], b[column]);
-                for row in 0..=column {
-                    G[(row, column)] += a[row] * y + b[row] * x;
-                }
+        for row in &self.rows {
+            let a = W.column(row.place);
+            let mut b = DVector::zeros(n);
+            for &(j, value) in &row.entries {
+                b.axpy(value, &W.column(j), 1.0);
+            }
+            for (column, mut into) in G.column_iter_mut().enumerate() {
+                let mut upper = into.rows_range_mut(..column + 1);
+                upper.axpy(b[column], &a.rows_range(..column + 1), 1.0);
+                upper.axpy(a[column], &b.rows_range(..column + 1), 1.0);
             }
         }
         G
@@ -293,15 +308,32 @@ fn newton(mut H: DMatrix<f64>, g: &DVector<f64>, budget: &Budget) -> Option<DVec
     None
 }
 
-/// The factor of a matrix that may be large, column by column; none where it has none, or
+/// The factor of a matrix that may be large, panel by panel; none where it has none, or
 /// the budget ends.
 fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> {
     let n = L.ncols();
-    for j in 0..n {
+    for from in (0..n).step_by(PANEL) {
         if budget.spent().is_some() {
             return None;
         }
-        for k in 0..j {
+        let to = (from + PANEL).min(n);
+        panel(&mut L, from, to)?;
+        let below = L.view((to, from), (n - to, to - from)).into_owned();
+        for first in (to..n).step_by(PANEL) {
+            let width = PANEL.min(n - first);
+            let mirrored = below.rows(first - to, width).transpose();
+            let taken = below.rows_range(first - to..);
+            let mut rest = L.view_mut((first, first), (n - first, width));
+            rest.gemm(-1.0, &taken, &mirrored, 1.0);
+        }
+    }
+    Some(Cholesky::pack_dirty(L))
+}
+
+/// Some columns of the factor, from which those before have been taken.
+fn panel(L: &mut DMatrix<f64>, from: usize, to: usize) -> Option<()> {
+    for j in from..to {
+        for k in from..j {
             let factor = -L[(j, k)];
             let (mut column, before) = L.columns_range_pair_mut(j, k);
             let before = before.rows_range(j..);
@@ -315,5 +347,47 @@ fn cholesky(mut L: DMatrix<f64>, budget: &Budget) -> Option<Cholesky<f64, Dyn>> 
         let mut below = column.rows_range_mut(j..);
         below /= pivot.sqrt();
     }
-    Some(Cholesky::pack_dirty(L))
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fewer rows than a panel, just as many, and several panels, against the matrix itself.
+    #[test]
+    fn factors_give_the_matrix_back() {
+        for n in [1, PANEL - 1, PANEL, PANEL + 1, 3 * PANEL + 7] {
+            let random = DMatrix::from_fn(n, n, |i, j| ((7 * i + 3 * j + i * j) as f64).sin());
+            let matrix = &random * random.transpose() + DMatrix::identity(n, n);
+            let factor = cholesky(matrix.clone(), &Budget::default()).unwrap();
+            let off = factor.l() * factor.l().transpose() - &matrix;
+            assert!(off.amax() < 1e-12 * matrix.amax() * n as f64);
+            let mut indefinite = matrix;
+            indefinite[(n - 1, n - 1)] = -1.0;
+            assert!(cholesky(indefinite, &Budget::default()).is_none());
+        }
+    }
+
+    /// tr(F W) and W F W of a term with several rows against the whole matrices.
+    #[test]
+    fn a_term_is_what_its_entries_say() {
+        let n = 5;
+        let entries = vec![(0, 3, 2.0), (1, 1, -1.0), (1, 4, 0.5), (2, 3, 1.5)];
+        let mut F = DMatrix::zeros(n, n);
+        for &(i, j, value) in &entries {
+            F[(i, j)] = value;
+            F[(j, i)] = value;
+        }
+        let term = Term::new(0, entries, n);
+        let W = DMatrix::from_fn(n, n, |i, j| ((i * j) as f64).cos());
+        let expected = &W * &F * &W;
+        let found = term.sandwiched(&W);
+        for j in 0..n {
+            for i in 0..=j {
+                assert!((found[(i, j)] - expected[(i, j)]).abs() < 1e-13);
+            }
+        }
+        assert!((term.inner(&W) - (&F * &W).trace()).abs() < 1e-13);
+    }
 }

@@ -1,9 +1,10 @@
 //! The estimate and how its error spreads, integrated together.
 
+use super::curvature::{Curvature, Layout};
 use super::taylor::Moments;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error, Integrator, Method};
+use crate::{Dynamics, Error, Integrator, Method, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.
 #[derive(Clone, Debug)]
@@ -11,6 +12,7 @@ pub(super) struct Joint {
     integrator: Integrator,
     entries: Vec<(usize, usize)>,
     slopes: Vec<f64>,
+    curvature: Curvature,
     /// Q/q, empty where Q = 0
     noise: Vec<f64>,
     /// q, the largest entry of Q
@@ -37,6 +39,7 @@ impl Joint {
             integrator: Integrator::new(method, dimension)?,
             entries: entries.to_vec(),
             slopes: vec![0.0; outputs],
+            curvature: Curvature::default(),
             noise,
             scale,
             z: vec![],
@@ -60,6 +63,7 @@ impl Joint {
             driven,
             entries: &self.entries,
             slopes: &mut self.slopes,
+            curvature: &mut self.curvature,
             noise: &self.noise,
         };
         self.integrator.advance(&mut flow, from, to, &mut self.z)?;
@@ -94,6 +98,7 @@ struct Linearised<'a> {
     entries: &'a [(usize, usize)],
     /// values of the entries of F
     slopes: &'a mut [f64],
+    curvature: &'a mut Curvature,
     /// diagonal of Q/q, empty where Q = 0
     noise: &'a [f64],
 }
@@ -149,6 +154,19 @@ impl Dynamics for Linearised<'_> {
         }
     }
 
+    fn slopes(&mut self, t: f64, z: &[f64], slopes: &mut Slopes) -> bool {
+        let n = self.driven.dimension();
+        let width = Self::width(n, !self.noise.is_empty());
+        if !(self.driven).output_slopes(t, &z[..n], &mut self.curvature.second) {
+            return false;
+        }
+        self.driven.evaluation.outputs(t, &z[..n], self.slopes);
+        let layout = Layout { n, width };
+        self.curvature
+            .write(layout, self.entries, self.slopes, z, slopes);
+        true
+    }
+
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
         self.driven.switches(from, to, times)
     }
@@ -181,5 +199,57 @@ impl Dynamics for Linearised<'_> {
     fn not_finite(&mut self, t: f64, z: &[f64]) -> Error {
         let n = self.driven.dimension();
         self.driven.not_finite(t, &z[..n.min(z.len())])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BetweenSamples, Function, System};
+    use lynkeus_expr::{Graph, Node, jacobian};
+
+    /// The Jacobian of x̂, Φ and W together against differences, where F depends on x̂ and W is
+    /// not even symmetric; with and without W.
+    #[test]
+    fn the_jacobian_of_the_variational_equation_is_exact() {
+        let g = Graph::new();
+        let [time, w] = ["time", "w"].map(|name| g.symbol(name));
+        let x = ["x", "y", "z"].map(|name| g.symbol(name));
+        let dx = [
+            x[1] * x[2] + w,
+            (x[0] * 3.0).sin(),
+            x[2] * x[2] * x[0] - x[1],
+        ];
+        let symbols = x.map(|x| x.node());
+        let derivatives = dx.map(|dx| dx.node());
+        let F = jacobian::forward(&g, &derivatives, &symbols).entries;
+        let entries: Vec<(usize, usize)> = F.iter().map(|e| (e.0, e.1)).collect();
+        let outputs: Vec<(String, Node)> = F.iter().map(|e| (String::new(), e.2)).collect();
+        let states = x.map(|x| ("x".to_owned(), x.node(), 0.0));
+        let signals = [("w".to_owned(), w.node())];
+        let flow = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
+        let mut driven = Driven::new(&flow.unwrap(), BetweenSamples::Hold);
+        driven.start(&[0.7]);
+        for noise in [vec![], vec![0.3, 1.0, 0.5]] {
+            let mut linearised = Linearised {
+                driven: &mut driven,
+                entries: &entries,
+                slopes: &mut vec![0.0; entries.len()],
+                curvature: &mut Curvature::default(),
+                noise: &noise,
+            };
+            let dimension = linearised.dimension();
+            let z: Vec<f64> = (0..dimension)
+                .map(|i| 1.5 + (1.3 * i as f64).sin())
+                .collect();
+            let (mut exact, mut differences) = (Slopes::default(), Slopes::default());
+            assert!(linearised.slopes(0.0, &z, &mut exact));
+            let mut f = Function::new(dimension, |t, z: &[f64], dz: &mut [f64]| {
+                linearised.derivatives(t, z, dz);
+            });
+            differences.look(&mut f, 0.0, &z);
+            let off = exact.dense(dimension) - differences.dense(dimension);
+            assert!(off.amax() < 1e-6, "{}", off.amax());
+        }
     }
 }

@@ -37,6 +37,7 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
+mod curvature;
 mod doubling;
 pub(crate) mod extended;
 mod flow;

@@ -19,7 +19,7 @@ use lynkeus_expr::Tape;
 pub(crate) use extract::{Taken, take};
 
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Dynamics, Error};
+use crate::{Dynamics, Error, Slopes};
 
 /// A margin this small beside those at the ends of a step may be negative where a cubic is not.
 const CLOSE: f64 = 0.05;
@@ -238,6 +238,11 @@ impl<D: Dynamics> Dynamics for Switched<'_, D> {
         }
         self.inner.derivatives(t, x, dx);
         self.mend(t, x, dx);
+    }
+
+    /// How the parts of both sides change along a surface is not known.
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        !self.at.sliding.contains(&true) && self.inner.slopes(t, x, slopes)
     }
 
     fn enter(&mut self, t: f64) {

@@ -5,14 +5,17 @@
 //! eigenvalues of A⁻¹, E₁ = γ/h·I − J, E₂ = (α + iβ)/h·I − J.
 
 mod newton;
+mod ordering;
+mod shifted;
+mod sparse;
 
-use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
+use nalgebra::{Complex, DVector};
 
 use newton::{NEWTON_ITERATIONS, Newton};
+use shifted::Shifted;
 
 use super::{Leg, Point};
-use crate::spectral::jacobian;
-use crate::{Dynamics, Tolerances};
+use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;
 const C: [f64; 3] = [(4.0 - SQRT_6) / 10.0, (4.0 + SQRT_6) / 10.0, 1.0];
@@ -45,7 +48,10 @@ pub(super) struct Radau {
     stage: DVector<f64>,
     k: [DVector<f64>; 3],
     scale: DVector<f64>,
-    jacobian: Option<DMatrix<f64>>,
+    /// J, where it is known
+    slopes: Slopes,
+    is_known: bool,
+    shifted: Shifted,
     factors: Option<Factors>,
     /// step, stages of the last accepted step (to extrapolate), its error
     last: Option<(f64, [DVector<f64>; 3], f64)>,
@@ -58,8 +64,8 @@ pub(super) struct Radau {
 #[derive(Clone, Debug)]
 struct Factors {
     h: f64,
-    e1: LU<f64, Dyn, Dyn>,
-    e2: LU<Complex<f64>, Dyn, Dyn>,
+    e1: shifted::Factors<f64>,
+    e2: shifted::Factors<Complex<f64>>,
 }
 
 impl Radau {
@@ -73,7 +79,9 @@ impl Radau {
             stage: zero(),
             k: three(),
             scale: zero(),
-            jacobian: None,
+            slopes: Slopes::default(),
+            is_known: false,
+            shifted: Shifted::new(n),
             factors: None,
             last: None,
             θ: 1.0,
@@ -84,7 +92,7 @@ impl Radau {
     /// Forgets what a jump of f makes wrong.
     pub(super) fn restart(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
         f.derivatives(t, x, self.f0.as_mut_slice());
-        self.jacobian = None;
+        self.is_known = false;
         self.factors = None;
         self.last = None;
         self.bad = None;
@@ -121,7 +129,7 @@ impl Radau {
         tolerances: &Tolerances,
     ) -> (bool, f64) {
         self.set_scale(leg.x, tolerances);
-        let fresh = self.jacobian.is_none();
+        let fresh = !self.is_known;
         let Some(factors) = self.factors_for(f, leg.t, leg.x, h) else {
             return (false, 0.25 * h);
         };
@@ -132,7 +140,7 @@ impl Radau {
             Newton::Failed { shrink } => {
                 // an old Jacobian may be the cause: a new one for the next try
                 if !fresh {
-                    self.jacobian = None;
+                    self.is_known = false;
                 }
                 self.last = None;
                 return (false, shrink * h);
@@ -158,28 +166,26 @@ impl Radau {
 
     /// Factors of E₁ and E₂ for this step, kept ones where they fit.
     fn factors_for(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64], h: f64) -> Option<Factors> {
-        if self.jacobian.is_none() {
-            let j = jacobian(f, t, x);
-            if j.iter().any(|v| !v.is_finite()) {
+        if !self.is_known {
+            self.slopes.look(f, t, x);
+            if !self.slopes.are_finite() {
                 self.bad = Some((t, x.to_vec()));
                 return None;
             }
-            self.jacobian = Some(j);
+            self.shifted.fit(&self.slopes);
+            self.is_known = true;
             self.factors = None;
         }
         let kept = self.factors.take().filter(|factors| factors.h == h);
         if kept.is_some() {
             return kept;
         }
-        let j = self.jacobian.as_ref()?;
-        let mut e1 = -j;
-        let mut e2 = j.map(|v| Complex::new(-v, 0.0));
-        for i in 0..j.nrows() {
-            e1[(i, i)] += GAMMA / h;
-            e2[(i, i)] += Complex::new(ALPHA / h, BETA / h);
-        }
-        let (e1, e2) = (e1.lu(), e2.lu());
-        (e1.is_invertible() && e2.is_invertible()).then_some(Factors { h, e1, e2 })
+        let (one, pair) = (GAMMA / h, Complex::new(ALPHA / h, BETA / h));
+        Some(Factors {
+            h,
+            e1: self.shifted.factors(one, &self.slopes)?,
+            e2: self.shifted.factors(pair, &self.slopes)?,
+        })
     }
 
     /// The local error relative to the tolerance.
@@ -194,7 +200,7 @@ impl Radau {
         let [z1, z2, z3] = &self.z;
         let from_stages = (ERROR[0] * z1 + ERROR[1] * z2 + ERROR[2] * z3) / h;
         let mut estimate = &from_stages + &self.f0;
-        factors.e1.solve_mut(&mut estimate);
+        factors.e1.solve(&mut estimate);
         let error = rms(&estimate, &self.scale);
         if error < 1.0 || !careful {
             return error.max(1e-10);
@@ -205,7 +211,7 @@ impl Radau {
         }
         f.derivatives(leg.t, self.stage.as_slice(), self.k[0].as_mut_slice());
         let mut sharper = &from_stages + &self.k[0];
-        factors.e1.solve_mut(&mut sharper);
+        factors.e1.solve(&mut sharper);
         let sharper = rms(&sharper, &self.scale);
         if sharper.is_finite() {
             sharper.max(1e-10)
@@ -241,7 +247,7 @@ impl Radau {
         leg.x.copy_from_slice(self.stage.as_slice());
         self.last = Some((h, self.z.clone(), error.max(1e-2)));
         if self.θ >= KEEP_JACOBIAN {
-            self.jacobian = None;
+            self.is_known = false;
         }
         true
     }

@@ -146,7 +146,7 @@ impl Radau {
             Complex::new(r[1][i], r[2][i])
                 - Complex::new(ALPHA / h, BETA / h) * Complex::new(w2[i], w3[i])
         });
-        if !factors.e1.solve_mut(&mut first) || !factors.e2.solve_mut(&mut pair) {
+        if !factors.e1.solve(&mut first) || !factors.e2.solve(&mut pair) {
             return None;
         }
         let mut sum = 0.0;
