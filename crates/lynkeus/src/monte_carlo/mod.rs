@@ -232,7 +232,7 @@ impl Job<'_> {
             return Ok(None);
         }
         let ran = Prepared::new(study, plant).and_then(|own| rig.run(&own, seed, watch));
-        let mut ran = match ran {
+        let ran = match ran {
             // a run that was ended says nothing of the study
             Err(_) if study.budget.marked().is_some() => return Ok(None),
             ran => ran?,
@@ -246,7 +246,7 @@ impl Job<'_> {
         self.time.get_or_init(|| ran.run.times().to_vec());
         let series = self.followed.iter().map(|f| Series {
             truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
-            estimate: std::mem::take(&mut ran.course.estimates[f.estimate]),
+            estimate: ran.course.estimates[f.estimate].to_vec(),
         });
         Ok(Some(series.collect()))
     }
