@@ -51,7 +51,7 @@ fn peak(folder: &Folder, arguments: &[&str]) -> u64 {
 #[test]
 fn memory_does_not_grow_with_the_rows() {
     const SHORT: usize = 80_000;
-    const LONG: usize = 400_000;
+    const LONG: usize = 300_000;
     let folder = Folder::new();
     let columns = ["t", "level", "pump"];
     let peaks = |rows: usize| {
