@@ -119,6 +119,20 @@ impl Series {
         self.iter().collect()
     }
 
+    /// All numbers at once, where they are needed in any order.
+    ///
+    /// # Errors
+    /// They do not fit into memory.
+    pub(crate) fn held(&self) -> Result<Vec<f64>, Error> {
+        let mut values = vec![];
+        values.try_reserve_exact(self.len()).map_err(|_| {
+            Error::input(format!("{} rows do not fit into memory", self.len()))
+                .hint("take fewer rows at a time, or allow more memory")
+        })?;
+        values.extend(self);
+        Ok(values)
+    }
+
     /// The first so many rows of it.
     pub(crate) fn shortened(&self, rows: usize) -> Self {
         let whole = rows / BLOCK;

@@ -48,10 +48,11 @@ impl Table {
             count += usize::from(t < latest);
             latest = latest.max(t);
         }
-        let groups = Groups::of(times);
+        let groups = Groups::of(times)?;
         let timeless = times.len() - groups.rows.len();
         let repeated = groups.rows.len() - groups.count;
-        let merged = |column: &Column| column.with(groups.merged(&column.values));
+        let merged = |column: &Column| Ok(column.with(groups.merged(&column.values)?));
+        let columns: Result<Vec<Column>, Error> = self.columns.iter().map(merged).collect();
         let notes = [
             (count, "came late and were put in their place"),
             (
@@ -63,7 +64,7 @@ impl Table {
         Ok(Some(Ordered {
             table: Table {
                 file: self.file.clone(),
-                columns: self.columns.iter().map(merged).collect(),
+                columns: columns?,
                 lines: Lines::counted(groups.count),
                 store: self.store.clone(),
             },
@@ -100,8 +101,8 @@ struct Groups {
 }
 
 impl Groups {
-    fn of(times: &Series) -> Self {
-        let times = times.to_vec();
+    fn of(times: &Series) -> Result<Self, Error> {
+        let times = times.held()?;
         let mut rows: Vec<usize> = (0..times.len())
             .filter(|&row| times[row].is_finite())
             .collect();
@@ -112,13 +113,12 @@ impl Groups {
             .map(|(&row, after)| after != Some(times[row]))
             .collect();
         let count = ends.iter().filter(|end| **end).count();
-        Self { rows, ends, count }
+        Ok(Self { rows, ends, count })
     }
 
     /// A column over the groups: of each the last value that is there.
-    fn merged(&self, values: &Series) -> Series {
-        // at once: rows are taken in any order
-        let of_row = values.to_vec();
+    fn merged(&self, values: &Series) -> Result<Series, Error> {
+        let of_row = values.held()?;
         let mut merged = Series::within(values.store());
         let mut last = f64::NAN;
         for (&row, &is_end) in self.rows.iter().zip(&self.ends) {
@@ -130,7 +130,7 @@ impl Groups {
                 last = f64::NAN;
             }
         }
-        merged
+        Ok(merged)
     }
 }
 

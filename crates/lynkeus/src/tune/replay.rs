@@ -70,7 +70,7 @@ impl<'a> Replay<'a> {
         let run = run_settings(settings);
         refuse_derivatives(study, design)?;
         refuse_stray_columns(plant, settings)?;
-        let column = |name: &str| Ok(signal(table, settings, &design.observer, name)?.to_vec());
+        let column = |name: &str| signal(table, settings, &design.observer, name)?.held();
         let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
             signals.iter().map(|s| s.name.clone()).collect()
         };
@@ -78,7 +78,7 @@ impl<'a> Replay<'a> {
         let mut read = names(&design.observer.inputs);
         read.extend(measured.iter().cloned());
         let header_of_time = time_of(table, plant, settings, read.iter().map(String::as_str))?;
-        let time = table.time(&header_of_time)?.to_vec();
+        let time = table.time(&header_of_time)?.held()?;
         let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
         let measured: Result<Vec<_>, Error> = measured.iter().map(|n| column(n)).collect();
         let switchable = switchable(plant, &design.observer);
