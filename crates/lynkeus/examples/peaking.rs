@@ -183,7 +183,7 @@ fn shown<'o>(case: &Case, outcome: &'o Outcome) -> impl Iterator<Item = (f64, f6
         .time
         .iter()
         .zip(rows)
-        .map(|(t, (x, hat))| (*t, *x, *hat))
+        .map(|(t, (x, hat))| (t, x, hat))
 }
 
 fn row(case: &Case, name: &str, quiet: &Outcome, noisy: &Outcome) -> String {
@@ -207,8 +207,8 @@ fn panel(name: &str, case: &Case, outcome: &Outcome) -> Panel {
     let time: Vec<f64> = rows.iter().map(|row| row.0).collect();
     let curve = |kind: Kind, values: Vec<f64>| Curve {
         kind,
-        time: time.clone(),
-        values,
+        time: time.clone().into(),
+        values: values.into(),
     };
     let truth = rows.iter().map(|row| row.1).collect();
     let estimate = rows.iter().map(|row| row.2).collect();

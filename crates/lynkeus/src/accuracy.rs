@@ -3,8 +3,8 @@
 use lynkeus_structure::{Side, figures};
 use serde_json::{Value, json};
 
-use crate::Quantity;
 use crate::words::number;
+use crate::{Quantity, Series};
 
 /// Settled is an error below this share of the declared range.
 const SETTLED: f64 = 0.05;
@@ -40,22 +40,22 @@ pub enum Settling {
 }
 
 /// Of all quantities whose true values are known, unknown inputs first.
-pub(crate) fn accuracies(time: &[f64], quantities: &[Quantity], sides: &[Side]) -> Vec<Accuracy> {
+pub(crate) fn accuracies(time: &Series, quantities: &[Quantity], sides: &[Side]) -> Vec<Accuracy> {
     let mut known: Vec<&Quantity> = quantities.iter().collect();
     known.sort_by_key(|q| (!q.unknown_input, q.measured.is_some()));
     let of = |q: &&Quantity| accuracy(time, q, sides.iter().find(|s| s.name == q.name));
     known.iter().filter_map(of).collect()
 }
 
-fn accuracy(time: &[f64], quantity: &Quantity, side: Option<&Side>) -> Option<Accuracy> {
+fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Side>) -> Option<Accuracy> {
     let (truth, estimate) = (quantity.truth.as_ref()?, quantity.estimate.as_ref()?);
-    let errors = time.iter().zip(truth.iter().zip(estimate));
-    let errors: Vec<(f64, f64)> = errors
-        .map(|(t, (x, hat))| (*t, (hat - x).abs()))
-        .filter(|(_, e)| e.is_finite())
-        .collect();
-    let after_start = errors.iter().skip(usize::from(errors.len() > 1));
-    let (peak_at, peak) = *after_start.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let errors = || {
+        let pairs = truth.iter().zip(estimate);
+        let errors = pairs.map(|(x, hat)| (hat - x).abs());
+        time.iter().zip(errors).filter(|(_, e)| e.is_finite())
+    };
+    let after_start = errors().skip(usize::from(errors().nth(1).is_some()));
+    let (peak_at, peak) = after_start.max_by(|a, b| a.1.total_cmp(&b.1))?;
     let width = side
         .map(|s| s.max - s.min)
         .filter(|w| w.is_finite() && *w > 0.0);
@@ -65,17 +65,21 @@ fn accuracy(time: &[f64], quantity: &Quantity, side: Option<&Side>) -> Option<Ac
         peak,
         peak_at,
         settling: width.map_or(Settling::NoRange, |width| {
-            settling(&errors, SETTLED * width)
+            settling(errors(), SETTLED * width)
         }),
     })
 }
 
-fn settling(errors: &[(f64, f64)], most: f64) -> Settling {
-    let last = errors.iter().rposition(|(_, e)| *e > most);
-    let from = last.map_or(0, |row| row + 1);
-    errors
-        .get(from)
-        .map_or(Settling::Never, |(t, _)| Settling::From(*t))
+fn settling(errors: impl Iterator<Item = (f64, f64)>, most: f64) -> Settling {
+    let mut settling = Settling::Never;
+    for (t, e) in errors {
+        settling = match settling {
+            _ if e > most => Settling::Never,
+            Settling::Never => Settling::From(t),
+            settled => settled,
+        };
+    }
+    settling
 }
 
 impl Accuracy {
@@ -131,8 +135,8 @@ mod tests {
     fn an_error_is_told_by_its_end_its_peak_and_when_it_is_small() {
         let quantity = Quantity {
             name: "x".to_owned(),
-            truth: Some(vec![0.0, 0.0, f64::NAN, 0.0, 1.0, 1.0]),
-            estimate: Some(vec![9.0, -4.0, 1.0, 0.3, 1.4, 1.3]),
+            truth: Some(vec![0.0, 0.0, f64::NAN, 0.0, 1.0, 1.0].into()),
+            estimate: Some(vec![9.0, -4.0, 1.0, 0.3, 1.4, 1.3].into()),
             ..Quantity::default()
         };
         let side = |max| Side {
@@ -140,7 +144,7 @@ mod tests {
             min: 0.0,
             max,
         };
-        let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let time = Series::from(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         let of = |max| accuracy(&time, &quantity, Some(&side(max))).unwrap();
         let found = of(8.0);
         // 0.3, 0.4, 0.3 in the last three rows
@@ -156,12 +160,12 @@ mod tests {
     #[test]
     fn rows_without_truth_count_nowhere() {
         let quantity = |truth: [f64; 6]| Quantity {
-            truth: Some(truth.to_vec()),
-            estimate: Some(vec![2.0; 6]),
+            truth: Some(truth.to_vec().into()),
+            estimate: Some(vec![2.0; 6].into()),
             ..Quantity::default()
         };
         let nan = f64::NAN;
-        let time = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let time = Series::from(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         let late = quantity([0.0, 0.0, 0.0, nan, 1.0, nan]);
         assert_eq!(accuracy(&time, &late, None).unwrap().rms, Some(1.0));
         assert_eq!(late.settled_error(), Some(1.0));

@@ -4,11 +4,12 @@ use lynkeus_expr::{Node, Tape};
 use lynkeus_model::{Assertion, Diagnostic, Plant, Variable};
 use lynkeus_structure::short;
 
-use crate::Quantity;
 use crate::outside::{ESTIMATE, Of, PLANT};
+use crate::series::Iter;
+use crate::{Quantity, Series};
 
 /// The model's warnings, and its assertions that do not hold at every row, in words.
-pub(crate) fn told(plant: &Plant, time: &[f64], quantities: &[Quantity]) -> Vec<String> {
+pub(crate) fn told(plant: &Plant, time: &Series, quantities: &[Quantity]) -> Vec<String> {
     let mut told: Vec<String> = plant.warnings.iter().map(Diagnostic::one_line).collect();
     let found = [PLANT, ESTIMATE].map(|of| broken(plant, time, quantities, of));
     for (who, broken) in ["the plant", "the estimate"].into_iter().zip(found) {
@@ -41,29 +42,33 @@ impl Broken<'_> {
 
 /// The assertions that do not hold at every row of the values that `of` gives, of the inputs that
 /// it does not give as they are known; none where a value is missing.
-fn broken<'p>(plant: &'p Plant, time: &[f64], quantities: &[Quantity], of: Of) -> Vec<Broken<'p>> {
+fn broken<'p>(plant: &'p Plant, time: &Series, quantities: &[Quantity], of: Of) -> Vec<Broken<'p>> {
+    if plant.assertions.is_empty() {
+        return vec![];
+    }
     let variables: Vec<&Variable> = plant.states.iter().chain(&plant.inputs).collect();
     let column = |(i, variable): (usize, &&Variable)| {
         let own = quantities.iter().find(|q| q.name == variable.name)?;
         let known = || PLANT(own).filter(|_| i >= plant.states.len());
-        of(own).or_else(known).map(Vec::as_slice)
+        of(own).or_else(known).map(Series::iter)
     };
-    let columns: Option<Vec<&[f64]>> = variables.iter().enumerate().map(column).collect();
+    let columns: Option<Vec<Iter<'_>>> = variables.iter().enumerate().map(column).collect();
     let symbols = std::iter::once(plant.time).chain(variables.iter().map(|v| v.node));
     let symbols: Vec<Node> = symbols.collect();
     let conditions: Vec<Node> = plant.assertions.iter().map(|a| a.condition).collect();
-    let (Some(columns), Ok(tape)) = (columns, Tape::new(&plant.graph, &symbols, &conditions))
+    let (Some(mut columns), Ok(tape)) = (columns, Tape::new(&plant.graph, &symbols, &conditions))
     else {
         return vec![];
     };
     let mut evaluator = tape.evaluator();
     let mut holds = vec![0.0; conditions.len()];
     let mut counts: Vec<(usize, Option<f64>)> = vec![(0, None); conditions.len()];
-    for (row, &t) in time.iter().enumerate() {
-        let values = columns
-            .iter()
-            .map(|c| c.get(row).copied().unwrap_or(f64::NAN));
-        let values: Vec<f64> = std::iter::once(t).chain(values).collect();
+    let mut values = vec![];
+    for t in time {
+        values.clear();
+        values.push(t);
+        let columns = columns.iter_mut();
+        values.extend(columns.map(|c| c.next().unwrap_or(f64::NAN)));
         evaluator.eval(&values, &mut holds);
         for ((count, first), holds) in counts.iter_mut().zip(&holds) {
             if *holds == 0.0 {

@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 
 use lynkeus_run::{Digest, Estimator};
 
-use crate::Error;
 use crate::course::{Course, Samples};
 use crate::replay::Halfway;
+use crate::{Error, Series};
 
 const MAGIC: &[u8; 8] = b"LYNKCHK1";
 /// Magic, fingerprint of the observer, digest of the log.
@@ -74,7 +74,7 @@ impl Checkpoint {
     pub(crate) fn resume(
         &mut self,
         estimator: &mut Estimator,
-        samples: &Samples<'_>,
+        samples: &Samples,
         course: &mut Course,
         half: &mut Halfway,
     ) -> Result<usize, Error> {
@@ -143,14 +143,14 @@ impl Checkpoint {
     /// Appends the rows since the last record, and where the estimator is.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written, or rows were lost.
     pub(crate) fn keep(
         &mut self,
         estimator: &Estimator,
         course: &Course,
         half: &Halfway,
     ) -> Result<(), Error> {
-        let rows = columns(course).next().map_or(0, Vec::len);
+        let rows = columns(course).next().map_or(0, Series::len);
         let mut payload = vec![];
         for part in [&half.snapshot, &estimator.snapshot()] {
             payload.extend_from_slice(&(part.len() as u64).to_le_bytes());
@@ -158,10 +158,12 @@ impl Checkpoint {
         }
         payload.extend_from_slice(&(rows as u64).to_le_bytes());
         for column in columns(course) {
-            for x in &column[self.rows..] {
+            for x in column.iter_from(self.rows) {
                 payload.extend_from_slice(&x.to_le_bytes());
             }
         }
+        // what a resumed run would take for its own rows
+        course.check()?;
         let mut record = (payload.len() as u64).to_le_bytes().to_vec();
         record.extend_from_slice(&payload);
         record.extend_from_slice(&sum(&payload).to_le_bytes());
@@ -176,7 +178,7 @@ impl Checkpoint {
 }
 
 /// What every record has rows of.
-fn columns(course: &Course) -> impl Iterator<Item = &Vec<f64>> {
+fn columns(course: &Course) -> impl Iterator<Item = &Series> {
     let deviations = course.deviations.iter().flatten();
     course
         .estimates
@@ -185,7 +187,7 @@ fn columns(course: &Course) -> impl Iterator<Item = &Vec<f64>> {
         .chain(deviations)
 }
 
-fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Vec<f64>> {
+fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Series> {
     let deviations = course.deviations.iter_mut().flatten();
     course
         .estimates
@@ -202,11 +204,11 @@ struct Head {
 }
 
 impl Head {
-    fn of(estimator: &Estimator, samples: &Samples<'_>) -> Self {
+    fn of(estimator: &Estimator, samples: &Samples) -> Self {
         let mut log = Digest::default();
-        log.numbers(samples.time);
-        for column in samples.readings.iter().chain(&samples.inputs) {
-            log.numbers(column);
+        for column in std::iter::once(&samples.time).chain(samples.columns()) {
+            log.word(column.len() as u64);
+            column.iter().for_each(|x| log.word(x.to_bits()));
         }
         Self {
             observer: estimator.fingerprint(),
@@ -279,7 +281,7 @@ impl Record {
             let size = until.checked_sub(rows)?.checked_mul(8)?;
             let (own, others) = numbers.split_at_checked(size)?;
             let read = own.chunks_exact(8).filter_map(|x| x.try_into().ok());
-            column.extend(read.map(f64::from_le_bytes));
+            read.for_each(|x| column.push(f64::from_le_bytes(x)));
             numbers = others;
         }
         estimator.restore(snapshot).ok()?;

@@ -242,14 +242,14 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
         )
     });
     let errors = Errors {
-        time: outcome.time.clone(),
+        time: outcome.time.to_vec(),
         scaled: scaled.collect(),
     };
     let is_known = !errors.scaled.is_empty();
     let half = outcome.time.len() / 2;
     let rough = estimated().filter_map(|q| {
         let estimate = q.estimate.as_ref()?;
-        let found = crate::filter::noise::scatter(&outcome.time[half..], &estimate[half..])?;
+        let found = crate::filter::noise::scatter(&outcome.time, estimate, half)?;
         Some(found / width(q))
     });
     Run {
@@ -265,7 +265,7 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
             .time
             .first()
             .filter(|_| is_known)
-            .and_then(|first| errors.settling(&[*first], SETTLED)),
+            .and_then(|first| errors.settling(&[first], SETTLED)),
         roughness: rough.reduce(f64::max),
         per_sample: seconds / outcome.time.len().max(1) as f64,
         doubt: outcome.refusal().map(|e| e.to_string()),
@@ -276,7 +276,7 @@ fn judged(prepared: &Prepared<'_>, outcome: Outcome, seconds: f64) -> Run {
 /// The span of a quantity without a declared range.
 fn size(quantity: &Quantity) -> f64 {
     let values = quantity.truth.iter().chain(&quantity.estimate).flatten();
-    let finite = || values.clone().copied().filter(|x| x.is_finite());
+    let finite = || values.clone().filter(|x| x.is_finite());
     let (low, high) = (
         finite().fold(f64::INFINITY, f64::min),
         finite().fold(f64::NEG_INFINITY, f64::max),

@@ -4,35 +4,63 @@ use lynkeus_observers::Observer;
 use lynkeus_run::Error as RunError;
 use lynkeus_run::filter::SensorHealth;
 
-use crate::Quantity;
+use crate::series::{Iter, Store};
 use crate::systems::Reported;
+use crate::{Error, Quantity, Series};
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Samples<'a> {
-    pub time: &'a [f64],
+pub(crate) struct Samples {
+    pub time: Series,
     /// one per measured output
-    pub readings: Vec<&'a [f64]>,
+    pub readings: Vec<Series>,
     /// one per known input
-    pub inputs: Vec<&'a [f64]>,
+    pub inputs: Vec<Series>,
 }
 
-impl Samples<'_> {
-    /// Values of row k, column by column: the readings, then the inputs.
-    pub fn write_row(&self, k: usize, row: &mut [f64]) {
-        let columns = self.readings.iter().chain(&self.inputs);
-        for (value, column) in row.iter_mut().zip(columns) {
-            *value = column[k];
+/// The rows of samples, one after the other.
+pub(crate) struct Rows<'s> {
+    time: Iter<'s>,
+    columns: Vec<Iter<'s>>,
+}
+
+impl Rows<'_> {
+    /// The next row's values, column by column (the readings, then the inputs), and its time.
+    pub fn next(&mut self, values: &mut [f64]) -> Option<f64> {
+        for (value, column) in values.iter_mut().zip(&mut self.columns) {
+            *value = column.next().unwrap_or(f64::NAN);
         }
+        self.time.next()
+    }
+}
+
+impl Samples {
+    /// The rows from one of them on.
+    pub fn rows_from(&self, row: usize) -> Rows<'_> {
+        Rows {
+            time: self.time.iter_from(row),
+            columns: self.columns().map(|c| c.iter_from(row)).collect(),
+        }
+    }
+
+    /// The readings, then the inputs.
+    pub fn columns(&self) -> impl Iterator<Item = &Series> {
+        self.readings.iter().chain(&self.inputs)
+    }
+
+    /// Whether every number is what it was.
+    ///
+    /// # Errors
+    /// The disk was full, or failed.
+    pub fn check(&self) -> Result<(), Error> {
+        std::iter::once(&self.time)
+            .chain(self.columns())
+            .try_for_each(Series::check)
     }
 
     /// Whether a reading is missing somewhere.
     pub fn have_gaps(&self) -> bool {
-        let mut all = self
-            .readings
-            .iter()
-            .chain(&self.inputs)
-            .flat_map(|c| c.iter());
+        let mut all = self.columns().flatten();
         all.any(|x| !x.is_finite())
     }
 }
@@ -41,13 +69,13 @@ impl Samples<'_> {
 #[derive(Debug, Default)]
 pub(crate) struct Course {
     /// by estimate, then by row
-    pub estimates: Vec<Vec<f64>>,
+    pub estimates: Vec<Series>,
     /// by monitor, then by row
-    pub monitors: Vec<Vec<f64>>,
+    pub monitors: Vec<Series>,
     /// standard deviations of the estimates
-    pub deviations: Option<Vec<Vec<f64>>>,
+    pub deviations: Option<Vec<Series>>,
     /// estimates given later rows, too
-    pub smoothed: Option<Vec<Vec<f64>>>,
+    pub smoothed: Option<Vec<Series>>,
     /// how readings and model went together, by sensor; none where it was not followed
     pub sensors: Vec<SensorHealth>,
     /// the same over the last half of the rows
@@ -58,25 +86,45 @@ pub(crate) struct Course {
     pub notes: Vec<String>,
     /// why the run ended early, with the rows before
     pub ended: Option<RunError>,
+    /// keeps what is long of the columns
+    pub store: Store,
 }
 
 impl Course {
     /// Of a run of the observer's own system.
     pub fn of_run(observer: &Observer, reported: &Reported<'_>) -> Self {
-        let column = |values: Option<&[f64]>| values.unwrap_or_default().to_vec();
+        let store = Store::default();
+        let column = |values: Option<&[f64]>| {
+            let values = values.unwrap_or_default();
+            Series::gathered(&store, values.iter().copied())
+        };
         let estimates = (0..observer.estimates.len()).map(|i| column(reported.estimate(i)));
         let monitors = (0..observer.monitors.len()).map(|i| column(reported.monitor(i)));
         Self {
             estimates: estimates.collect(),
             monitors: monitors.collect(),
+            store: store.clone(),
             ..Self::default()
         }
+    }
+
+    /// So many columns without rows.
+    pub fn columns(&self, count: usize) -> Vec<Series> {
+        vec![Series::within(&self.store); count]
+    }
+
+    /// Whether every number of the columns is what it was.
+    ///
+    /// # Errors
+    /// The disk was full, or failed.
+    pub fn check(&self) -> Result<(), Error> {
+        self.store.check()
     }
 
     /// What was found of estimate `i`, to the quantity that it is of.
     pub fn give(&mut self, i: usize, with_deviation: bool, quantity: &mut Quantity) {
         quantity.estimate = self.estimates.get_mut(i).map(std::mem::take);
-        let of = |columns: &mut Option<Vec<Vec<f64>>>| {
+        let of = |columns: &mut Option<Vec<Series>>| {
             columns
                 .as_mut()
                 .and_then(|c| c.get_mut(i))
@@ -88,7 +136,7 @@ impl Course {
 }
 
 /// Adds a row to columns.
-pub(crate) fn add_row(columns: &mut [Vec<f64>], row: impl IntoIterator<Item = f64>) {
+pub(crate) fn add_row(columns: &mut [Series], row: impl IntoIterator<Item = f64>) {
     for (column, x) in columns.iter_mut().zip(row) {
         column.push(x);
     }

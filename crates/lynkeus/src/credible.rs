@@ -5,7 +5,7 @@ use lynkeus_structure::figures;
 
 use crate::innovations::Innovations;
 use crate::words::{number, side};
-use crate::{Error, Quantity};
+use crate::{Error, Quantity, Series};
 
 /// An estimate that keeps this far away, over the whole of this last share of the rows, is not
 /// credible. A peak is allowed: it comes back.
@@ -84,7 +84,7 @@ fn largest(quantities: &[Quantity]) -> f64 {
 
 /// The doubt about a quantity without a range.
 fn of_none(declared: &Variable, quantity: &Quantity, largest: f64) -> Option<Doubt> {
-    let last = *quantity.estimate.as_ref()?.last()?;
+    let last = quantity.estimate.as_ref()?.last()?;
     let doubt = Doubt {
         name: declared.name.clone(),
         min: declared.min,
@@ -102,8 +102,8 @@ fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Doubt> {
     let estimate = quantity.estimate.as_ref().filter(|_| width > 0.0)?;
     let rows = estimate.len();
     let least = |from: usize| {
-        let away = (from..rows).map(|row| distance(declared, quantity, row) / width);
-        away.fold(f64::INFINITY, f64::min)
+        let away = distances(declared, quantity, from).take(rows - from);
+        away.fold(f64::INFINITY, |least, away| least.min(away / width))
     };
     let exceeded = LIMITS.iter().find_map(|limit| {
         let count = ((limit.last * rows as f64).ceil() as usize).max(1);
@@ -115,25 +115,30 @@ fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Doubt> {
         name: declared.name.clone(),
         min: declared.min,
         max: declared.max,
-        last: *estimate.last()?,
+        last: estimate.last()?,
         rows,
         widths,
     })
 }
 
-/// How far an estimate is at a row from the declared range, widened to where the plant is known
-/// to be: a range that is too narrow makes no right estimate wrong.
-fn distance(declared: &Variable, quantity: &Quantity, row: usize) -> f64 {
-    let at = |values: &Option<Vec<f64>>| values.as_ref().and_then(|v| v.get(row).copied());
-    let known = [at(&quantity.truth), at(&quantity.measured)];
-    let known = known.into_iter().flatten().filter(|x| x.is_finite());
-    let (low, high) = known.fold((declared.min, declared.max), |(low, high), x| {
-        (low.min(x), high.max(x))
-    });
-    match at(&quantity.estimate) {
-        Some(x) => (low - x).max(x - high),
-        None => 0.0,
-    }
+/// How far an estimate is at each row from one on from the declared range, widened to where the
+/// plant is known to be: a range that is too narrow makes no right estimate wrong.
+fn distances<'q>(
+    declared: &'q Variable,
+    quantity: &'q Quantity,
+    from: usize,
+) -> impl Iterator<Item = f64> + 'q {
+    let of = |values: &'q Option<Series>| values.as_ref().map(|v| v.iter_from(from));
+    let mut known = [of(&quantity.truth), of(&quantity.measured)];
+    let estimate = of(&quantity.estimate).into_iter().flatten();
+    estimate.map(move |x| {
+        let known = known.iter_mut().flatten().filter_map(Iterator::next);
+        let known = known.filter(|x| x.is_finite());
+        let (low, high) = known.fold((declared.min, declared.max), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        (low - x).max(x - high)
+    })
 }
 
 /// The answer where an estimate is not credible; none where all are.
@@ -224,7 +229,7 @@ mod tests {
 
     fn estimate(values: impl Iterator<Item = f64>) -> Quantity {
         Quantity {
-            estimate: Some(values.collect()),
+            estimate: Some(values.collect::<Vec<f64>>().into()),
             ..Quantity::default()
         }
     }
@@ -259,7 +264,7 @@ mod tests {
     #[test]
     fn a_range_that_the_plant_leaves_is_no_fault_of_the_estimate() {
         let with = |truth: Option<f64>, measured: Option<f64>| {
-            let constant = |value| vec![value; 40];
+            let constant = |value| Series::from(vec![value; 40]);
             let quantity = Quantity {
                 truth: truth.map(constant),
                 measured: measured.map(constant),

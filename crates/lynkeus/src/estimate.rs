@@ -1,13 +1,12 @@
 //! A log through the study's observer.
 
-use std::borrow::Cow;
 use std::ops::ControlFlow;
 
-use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::{Estimator, EstimatorSettings};
 
 use crate::checkpoint::Checkpoint;
+use crate::columns::{self, refuse_stray_columns};
 use crate::course::{Course, Samples};
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::headers::{refuse_seconds, time_of};
@@ -17,7 +16,9 @@ use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
-use crate::{Error, Outcome, Quantity, Study, Table, filter, interval, prepare, sampled};
+use crate::{
+    Error, Outcome, Quantity, Series, Study, Table, filter, interval, lines, prepare, sampled,
+};
 
 /// Replays a log; `watch` is told the fraction done and may stop the replay.
 ///
@@ -84,22 +85,19 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
     };
     let order_notes = ordered.as_ref().map_or(&[][..], |o| &o.notes).to_vec();
     let table = ordered.as_ref().map_or(table, |o| &o.table);
-    let signals = Signals::of(table, &time_header, settings, &design.observer)?;
-    start_at_readings(prepared, &signals, &mut design);
-    // the log, the estimates, and both as the outcome has them
-    let read = 1 + signals.readings.len() + signals.inputs.len();
-    table.check_room(2 * read + 2 * (1 + design.observer.estimates.len()))?;
+    let samples = columns::samples(table, &time_header, settings, &design.observer)?;
+    start_at_readings(prepared, &samples, &mut design);
     let watch = &mut Watch {
         watch: &mut within(&study.budget, watch.watch),
         checkpoint: watch.checkpoint,
     };
-    let mut course = course_of(prepared, &design, &signals.samples(), watch)?;
-    let rows = course.estimates.first().map_or(0, Vec::len);
+    let mut course = course_of(prepared, &design, &samples, watch)?;
+    let rows = course.estimates.first().map_or(0, Series::len);
     settle(&mut course, rows, study, table.file())?;
-    let intervals = interval::intervals(prepared, &design, &signals.samples(), &course);
+    let intervals = interval::intervals(prepared, &design, &samples, &course);
     let logged = |name: &str| {
-        let values = logged(table, settings, &time_header, name)?;
-        Some(values[..rows].to_vec())
+        let values = columns::logged(table, settings, &time_header, name)?;
+        Some(values.shortened(rows))
     };
     let estimated = design.observer.estimates.iter().enumerate();
     let estimated = estimated.map(|(i, e)| {
@@ -124,11 +122,11 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
     });
     let mut notes = design.notes.clone();
     notes.extend(order_notes);
-    notes.extend(gaps(table, settings, &time_header, &design));
+    notes.extend(columns::gaps(table, settings, &time_header, &design));
     let raw = Raw {
         intervals,
-        frozen: hanging(study, &design.observer, &signals),
-        time: &signals.time[..rows],
+        frozen: hanging(study, &design.observer, &samples),
+        time: samples.time.shortened(rows),
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
         notes,
@@ -136,13 +134,13 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
         prepared,
         design,
     };
-    Ok(raw.finish())
+    raw.finish()
 }
 
 /// Where the sensors that an observer reads hang.
-fn hanging(study: &Study, observer: &Observer, signals: &Signals<'_>) -> Vec<Frozen> {
-    let sensors = observer.measured.iter().zip(&signals.readings);
-    let of = |(signal, readings): (&Signal, &&[f64])| {
+fn hanging(study: &Study, observer: &Observer, samples: &Samples) -> Vec<Frozen> {
+    let sensors = observer.measured.iter().zip(&samples.readings);
+    let of = |(signal, readings): (&Signal, &Series)| {
         let noises = &mut study.sensors.noise.iter();
         let limits = &mut study.sensors.limits.iter();
         let channel = Channel {
@@ -151,18 +149,18 @@ fn hanging(study: &Study, observer: &Observer, signals: &Signals<'_>) -> Vec<Fro
                 .find(|(n, ..)| n.text == signal.name)
                 .map(|(_, low, high)| (*low, *high)),
         };
-        frozen(&signal.name, signals.time, readings, channel)
+        frozen(&signal.name, &samples.time, readings, channel)
     };
     sensors.flat_map(of).collect()
 }
 
 /// A measured state for which neither the study nor the model says where it starts begins at its
 /// sensor's first reading.
-fn start_at_readings(prepared: &Prepared<'_>, signals: &Signals<'_>, design: &mut Design) {
+fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
     let extended = prepared.extended();
     let initial = &prepared.study().observer.tuning.initial;
     let number = |node| extended.graph().constant_value(node);
-    for (output, readings) in extended.outputs.iter().zip(&signals.readings) {
+    for (output, readings) in extended.outputs.iter().zip(&samples.readings) {
         let Some((i, slope, offset)) = output.state else {
             continue;
         };
@@ -193,49 +191,12 @@ fn start_at_readings(prepared: &Prepared<'_>, signals: &Signals<'_>, design: &mu
     }
 }
 
-/// The columns of a log that an observer reads.
-struct Signals<'t> {
-    time: &'t [f64],
-    readings: Vec<&'t [f64]>,
-    inputs: Vec<Cow<'t, [f64]>>,
-}
-
-impl<'t> Signals<'t> {
-    fn of(
-        table: &'t Table,
-        time_header: &str,
-        settings: &EstimateSettings,
-        observer: &Observer,
-    ) -> Result<Self, Error> {
-        let reading = |name: &str| match settings.strict {
-            true => table.column(header(settings, name)),
-            false => table.readings(header(settings, name)),
-        };
-        let readings = observer.measured.iter().map(|s| reading(&s.name));
-        let inputs = observer.inputs.iter();
-        let inputs = inputs.map(|s| signal(table, settings, observer, &s.name));
-        Ok(Self {
-            time: table.time(time_header)?,
-            readings: readings.collect::<Result<_, _>>()?,
-            inputs: inputs.collect::<Result<_, _>>()?,
-        })
-    }
-
-    fn samples(&self) -> Samples<'_> {
-        Samples {
-            time: self.time,
-            readings: self.readings.clone(),
-            inputs: self.inputs.iter().map(|u| &**u).collect(),
-        }
-    }
-}
-
 /// The observer's run over samples: a filter takes readings when they are there; an observer
 /// whose correction is in its flow needs a stand-in for those that are not.
 pub(crate) fn course(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Course, Error> {
     course_of(prepared, design, samples, &mut Watch::only(watch))
@@ -244,7 +205,7 @@ pub(crate) fn course(
 fn course_of(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let study = prepared.study();
@@ -275,18 +236,18 @@ fn course_of(
 fn across_gaps(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     run: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
-    let filled = |columns: &[&[f64]]| -> Vec<Vec<f64>> {
-        columns.iter().map(|c| on_lines(samples.time, c)).collect()
+    let filled = |columns: &[Series]| -> Vec<Series> {
+        let time = &samples.time;
+        columns.iter().map(|c| lines::between(time, c)).collect()
     };
-    let (readings, inputs) = (filled(&samples.readings), filled(&samples.inputs));
     let whole = Samples {
-        time: samples.time,
-        readings: readings.iter().map(Vec::as_slice).collect(),
-        inputs: inputs.iter().map(Vec::as_slice).collect(),
+        time: samples.time.clone(),
+        readings: filled(&samples.readings),
+        inputs: filled(&samples.inputs),
     };
     let mut course = plain(prepared, design, &whole, run, watch)?;
     course
@@ -295,32 +256,10 @@ fn across_gaps(
     Ok(course)
 }
 
-/// Values with those that are not finite on the line between their neighbours; before the first
-/// and after the last the nearest one.
-fn on_lines(time: &[f64], values: &[f64]) -> Vec<f64> {
-    let known: Vec<usize> = (0..values.len())
-        .filter(|&k| values[k].is_finite())
-        .collect();
-    let at = |k: usize| {
-        let next = known.partition_point(|&i| i < k);
-        match (next.checked_sub(1).map(|i| known[i]), known.get(next)) {
-            (_, Some(&j)) if j == k => values[k],
-            (Some(i), Some(&j)) => {
-                let share = (time[k] - time[i]) / (time[j] - time[i]);
-                values[i] + share * (values[j] - values[i])
-            }
-            (Some(i), None) => values[i],
-            (None, Some(&j)) => values[j],
-            (None, None) => values[k],
-        }
-    };
-    (0..values.len()).map(at).collect()
-}
-
 fn plain(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     run: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
@@ -367,112 +306,4 @@ pub(crate) fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), E
     ))
     .at(&study.file)
     .hint("set variant = \"practical\" in [observer], which estimates it"))
-}
-
-/// The header under which the log has a signal of the plant.
-pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
-    let given = settings
-        .columns
-        .iter()
-        .find(|(plant, _)| plant.text == name);
-    given.map_or(name, |(_, header)| header)
-}
-
-pub(crate) fn refuse_stray_columns(
-    plant: &Plant,
-    settings: &EstimateSettings,
-) -> Result<(), Error> {
-    let names = || {
-        plant
-            .outputs
-            .iter()
-            .chain(&plant.inputs)
-            .map(|v| v.name.as_str())
-    };
-    match settings
-        .columns
-        .iter()
-        .find(|(name, _)| !names().any(|n| n == name.text))
-    {
-        None => Ok(()),
-        Some((name, _)) => Err(name.blame(
-            Error::input(format!(
-                "columns: the plant '{}' has no output or input named \"{name}\"",
-                plant.name
-            ))
-            .hint(crate::near::suggest(&name.text, names())),
-        )),
-    }
-}
-
-/// What the observer reads under a plant's name: an input's last value stands where its cell is
-/// missing, unless the study is strict.
-pub(crate) fn signal<'t>(
-    table: &'t Table,
-    settings: &EstimateSettings,
-    observer: &Observer,
-    name: &str,
-) -> Result<Cow<'t, [f64]>, Error> {
-    let header = header(settings, name);
-    let is_input = observer.inputs.iter().any(|input| input.name == name);
-    match is_input && !settings.strict {
-        true => table.held(header),
-        false => table.column(header).map(Cow::Borrowed),
-    }
-}
-
-/// What the log lacks in words, and where its times count from.
-fn gaps(table: &Table, settings: &EstimateSettings, time: &str, design: &Design) -> Vec<String> {
-    let origin = table.origin(time);
-    let mut notes: Vec<String> = origin
-        .map(|origin| format!("times are seconds since {origin}"))
-        .into_iter()
-        .collect();
-    let observer = &design.observer;
-    for signal in observer.inputs.iter().chain(&observer.measured) {
-        let header = header(settings, &signal.name);
-        let places: Vec<String> = table
-            .faults(header)
-            .iter()
-            .map(|fault| format!("{fault} in line {}", fault.line))
-            .collect();
-        if !places.is_empty() {
-            notes.push(format!(
-                "column \"{header}\": {} of {} cells are missing, first {}",
-                table.missing(header),
-                table.rows(),
-                places.join(", ")
-            ));
-        }
-    }
-    notes
-}
-
-/// A column of the log, if it has one with numbers, and only one, that is not the one of time.
-fn logged<'t>(
-    table: &'t Table,
-    settings: &EstimateSettings,
-    time: &str,
-    name: &str,
-) -> Option<&'t [f64]> {
-    let header = header(settings, name);
-    let mut named = table.names().filter(|name| *name == header);
-    let is_own = named.next().is_some() && named.next().is_none() && header != time;
-    let values = table.get(header).filter(|_| is_own)?;
-    values.iter().any(|x| x.is_finite()).then_some(values)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::on_lines;
-
-    #[test]
-    fn gaps_lie_on_the_line_between_their_neighbours() {
-        let nan = f64::NAN;
-        let found = on_lines(
-            &[0.0, 1.0, 2.0, 4.0, 5.0, 6.0],
-            &[nan, 1.0, nan, 7.0, nan, nan],
-        );
-        assert_eq!(found, [1.0, 1.0, 3.0, 7.0, 7.0, 7.0]);
-    }
 }

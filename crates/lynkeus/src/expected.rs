@@ -3,41 +3,41 @@
 use lynkeus_expr::{Node, Tape};
 use lynkeus_structure::Extended;
 
-use crate::Quantity;
+use crate::series::Iter;
+use crate::{Quantity, Series};
 
 /// Evaluates each measured output that is a quantity of its own at the estimates and the known
 /// inputs. Where one of them is not there, nothing is said.
-pub(crate) fn give(extended: &Extended<'_>, time: &[f64], quantities: &mut [Quantity]) {
+pub(crate) fn give(extended: &Extended<'_>, time: &Series, quantities: &mut [Quantity]) {
     let mut symbols = vec![extended.plant.time];
     symbols.extend(extended.symbols());
     symbols.extend(extended.inputs.iter().map(|input| input.node));
-    let columns = columns(extended, time, quantities);
-    let Some(columns) = columns else {
-        return;
-    };
+    let is_own = |q: &Quantity, name: &str| q.name == name && q.estimate.is_none();
     for output in &extended.outputs {
         let name = &output.variable.name;
-        let own = |q: &&mut Quantity| q.name == *name && q.estimate.is_none();
-        let Some(quantity) = quantities.iter_mut().find(own) else {
+        let Some(place) = quantities.iter().position(|q| is_own(q, name)) else {
             continue;
         };
-        quantity.expected = evaluated(extended, &symbols, output.variable.node, &columns);
+        let Some(columns) = columns(extended, time, quantities) else {
+            return;
+        };
+        quantities[place].expected = evaluated(extended, &symbols, output.variable.node, &columns);
     }
 }
 
 /// Time, estimates and known inputs.
-fn columns(
+fn columns<'q>(
     extended: &Extended<'_>,
-    time: &[f64],
-    quantities: &[Quantity],
-) -> Option<Vec<Vec<f64>>> {
+    time: &'q Series,
+    quantities: &'q [Quantity],
+) -> Option<Vec<&'q Series>> {
     let named = |name: &str| quantities.iter().find(|q| q.name == name);
     let estimates = extended.states.iter();
-    let estimates = estimates.map(|s| named(&s.name)?.estimate.clone());
+    let estimates = estimates.map(|s| named(&s.name)?.estimate.as_ref());
     let inputs = extended.inputs.iter();
-    let inputs = inputs.map(|u| named(&u.name)?.truth.clone());
-    let all = std::iter::once(Some(time.to_vec()));
-    let all: Option<Vec<Vec<f64>>> = all.chain(estimates).chain(inputs).collect();
+    let inputs = inputs.map(|u| named(&u.name)?.truth.as_ref());
+    let all = std::iter::once(Some(time));
+    let all: Option<Vec<&Series>> = all.chain(estimates).chain(inputs).collect();
     all.filter(|columns| columns.iter().all(|c| c.len() == time.len()))
 }
 
@@ -45,19 +45,20 @@ fn evaluated(
     extended: &Extended<'_>,
     symbols: &[Node],
     node: Node,
-    columns: &[Vec<f64>],
-) -> Option<Vec<f64>> {
+    columns: &[&Series],
+) -> Option<Series> {
     let tape = Tape::new(extended.graph(), symbols, &[node]).ok()?;
     let mut evaluator = tape.evaluator();
     let mut values = vec![0.0; columns.len()];
     let mut value = [0.0];
-    let rows = columns.first()?.len();
-    let at = |row: usize| {
-        for (value, column) in values.iter_mut().zip(columns) {
-            *value = column[row];
+    let time = columns.first()?;
+    let mut rows: Vec<Iter<'_>> = columns.iter().map(|c| c.iter()).collect();
+    let at = |_| {
+        for (value, column) in values.iter_mut().zip(&mut rows) {
+            *value = column.next().unwrap_or(f64::NAN);
         }
         evaluator.eval(&values, &mut value);
         value[0]
     };
-    Some((0..rows).map(at).collect())
+    Some(Series::gathered(time.store(), (0..time.len()).map(at)))
 }

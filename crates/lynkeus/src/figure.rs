@@ -2,7 +2,7 @@
 
 use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use crate::study::Name;
-use crate::{Error, Outcome, Quantity};
+use crate::{Error, Outcome, Quantity, Series};
 
 /// Panels drawn where the study does not say which.
 pub(crate) const PANELS: usize = 6;
@@ -149,7 +149,8 @@ fn band(outcome: &Outcome, quantity: &Quantity) -> Option<Band> {
     let (estimate, deviation) = (quantity.estimate.as_ref()?, quantity.deviation.as_ref()?);
     let edge = |side: f64| {
         let pairs = estimate.iter().zip(deviation);
-        pairs.map(|(x, sd)| x + side * DEVIATIONS * sd).collect()
+        let edge = pairs.map(|(x, sd)| x + side * DEVIATIONS * sd);
+        Series::gathered(estimate.store(), edge)
     };
     Some(Band {
         extent: Extent::TwoDeviations,
@@ -164,7 +165,7 @@ fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Span> {
     let excursions = outcome.estimate_outside.iter().flat_map(|o| &o.quantities);
     let mut own = excursions.filter(|e| e.name == quantity.name);
     let stretches = own.next().map_or(&[][..], |e| &e.stretches);
-    let at = |row: usize| outcome.time.get(row).copied();
+    let at = |row: usize| outcome.time.get(row);
     let spans = stretches.iter().filter_map(|rows| {
         Some(Span {
             from: at(*rows.start())?,
@@ -174,10 +175,10 @@ fn outside(outcome: &Outcome, quantity: &Quantity) -> Vec<Span> {
     spans.collect()
 }
 
-fn curve(outcome: &Outcome, kind: Kind, values: &[f64]) -> Curve {
+fn curve(outcome: &Outcome, kind: Kind, values: &Series) -> Curve {
     Curve {
         kind,
         time: outcome.time.clone(),
-        values: values.to_vec(),
+        values: values.clone(),
     }
 }

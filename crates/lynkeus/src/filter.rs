@@ -11,8 +11,9 @@ use lynkeus_structure::Extended;
 
 use crate::course::{Course, Samples};
 use crate::replay::{Watch, replay};
+use crate::series::Store;
 use crate::study::{Name, Smoothing};
-use crate::{Error, Study};
+use crate::{Error, Series, Study};
 
 pub(crate) mod noise;
 
@@ -24,7 +25,7 @@ pub(crate) fn run(
     study: &Study,
     extended: &Extended<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     settings: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
@@ -46,7 +47,7 @@ pub(crate) fn run(
         Some(Smoothing::Interval) => filter.smoothed(None, false),
         Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), false),
     };
-    course.smoothed = smoothed.map(|rows| columns(n, &rows));
+    course.smoothed = smoothed.map(|rows| columns(&course.store, n, &rows));
     Ok(course)
 }
 
@@ -58,7 +59,7 @@ pub(crate) fn estimator(
     study: &Study,
     extended: &Extended<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     settings: EstimatorSettings,
     notes: &mut Vec<String>,
 ) -> Result<Estimator, Error> {
@@ -78,8 +79,8 @@ pub(crate) fn estimator(
     Estimator::filter(&model, settings_of_filter, settings).map_err(Error::from_source)
 }
 
-fn columns(count: usize, rows: &[Smoothed]) -> Vec<Vec<f64>> {
-    let column = |i: usize| rows.iter().map(|row| row.estimate[i]).collect();
+fn columns(store: &Store, count: usize, rows: &[Smoothed]) -> Vec<Series> {
+    let column = |i: usize| Series::gathered(store, rows.iter().map(|row| row.estimate[i]));
     (0..count).map(column).collect()
 }
 
@@ -89,7 +90,7 @@ fn model(
     extended: &Extended<'_>,
     design: &Design,
     tuning: &FilterTuning,
-    samples: &Samples<'_>,
+    samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<FilterModel, Error> {
     let observer = &design.observer;
@@ -98,7 +99,7 @@ fn model(
         .iter()
         .map(|(s, start)| (s.name.clone(), s.symbol, *start));
     let named = |s: &Signal| (s.name.clone(), s.symbol);
-    let span = samples.time.last().unwrap_or(&0.0) - samples.time.first().unwrap_or(&0.0);
+    let span = samples.time.last().unwrap_or(0.0) - samples.time.first().unwrap_or(0.0);
     let limits = limits(study, extended)?;
     let levels = noise::levels(study, extended, samples, notes)?;
     let sensors = observer

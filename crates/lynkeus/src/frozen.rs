@@ -3,6 +3,8 @@
 use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
+use crate::Series;
+use crate::series::points;
 use crate::study::Noise;
 use crate::words::number;
 
@@ -49,45 +51,96 @@ pub(crate) struct Channel {
 /// millionth of them is expected are not by chance.
 pub(crate) fn frozen(
     output: &str,
-    time: &[f64],
-    readings: &[f64],
+    time: &Series,
+    readings: &Series,
     channel: Channel,
 ) -> Vec<Frozen> {
-    let points = time.iter().zip(readings).filter(|(_, y)| y.is_finite());
-    let points: Vec<(f64, f64)> = points.map(|(t, y)| (*t, *y)).collect();
-    let runs: Vec<&[(f64, f64)]> = points.chunk_by(|a, b| a.1 == b.1).collect();
-    if !runs.iter().any(|run| run.len() >= FEWEST) {
+    let all = Totals::of(runs(time, readings));
+    if !all.has_long {
         return vec![];
     }
-    let Some(noise) = Scatter::of(&runs) else {
+    let Some(noise) = Scatter::of(runs(time, readings)) else {
         return vec![];
     };
-    let equal: usize = runs.iter().map(|run| run.len() - 1).sum();
-    let extreme = |pick: fn(f64, f64) -> f64| points.iter().map(|p| p.1).reduce(pick);
-    let (low, high) = (extreme(f64::min), extreme(f64::max));
-    let is_improbable = |run: &&&[(f64, f64)]| {
-        let own = run.len() - 1;
-        let others = (points.len() - 1 - own) as f64;
-        let share = ((equal - own) as f64 + 1.0) / (others + 2.0);
+    let is_improbable = |run: &Run| {
+        let own = run.rows - 1;
+        let others = (all.points - 1 - own) as f64;
+        let share = ((all.equal - own) as f64 + 1.0) / (others + 2.0);
         let chance = share.max(noise.chance);
-        points.len() as f64 * chance.powf(own as f64) < ALARMS
+        all.points as f64 * chance.powf(own as f64) < ALARMS
     };
-    runs.iter()
-        .filter(|run| run.len() >= FEWEST)
+    runs(time, readings)
+        .filter(|run| run.rows >= FEWEST)
         .filter(is_improbable)
-        .filter_map(|run| {
-            let (first, last) = (run.first()?, run.last()?);
-            let value = first.1;
-            (!channel.explains(value, noise.step)).then(|| Frozen {
-                output: output.to_owned(),
-                value,
-                from: first.0,
-                to: last.0,
-                rows: run.len(),
-                at_end: low == Some(value) || high == Some(value),
-            })
+        .filter(|run| !channel.explains(run.value, noise.step))
+        .map(|run| Frozen {
+            output: output.to_owned(),
+            value: run.value,
+            from: run.from,
+            to: run.to,
+            rows: run.rows,
+            at_end: all.low == run.value || all.high == run.value,
         })
         .collect()
+}
+
+/// Equal readings, one after the other.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    from: f64,
+    to: f64,
+    value: f64,
+    rows: usize,
+}
+
+/// The readings that are there as runs, one long or longer.
+fn runs(time: &Series, readings: &Series) -> impl Iterator<Item = Run> {
+    let mut points = points(time, readings).peekable();
+    std::iter::from_fn(move || {
+        let (from, value) = points.next()?;
+        let mut run = Run {
+            from,
+            to: from,
+            value,
+            rows: 1,
+        };
+        while let Some((to, _)) = points.next_if(|(_, y)| *y == value) {
+            run.to = to;
+            run.rows += 1;
+        }
+        Some(run)
+    })
+}
+
+/// What all runs are together.
+struct Totals {
+    points: usize,
+    /// readings that equal the one before them
+    equal: usize,
+    low: f64,
+    high: f64,
+    /// some run is long enough to be looked at
+    has_long: bool,
+}
+
+impl Totals {
+    fn of(runs: impl Iterator<Item = Run>) -> Self {
+        let mut all = Self {
+            points: 0,
+            equal: 0,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            has_long: false,
+        };
+        for run in runs {
+            all.points += run.rows;
+            all.equal += run.rows - 1;
+            all.low = all.low.min(run.value);
+            all.high = all.high.max(run.value);
+            all.has_long |= run.rows >= FEWEST;
+        }
+        all
+    }
 }
 
 impl Channel {
@@ -115,19 +168,16 @@ struct Scatter {
 
 impl Scatter {
     /// None where the channel shows no white noise above its quantisation.
-    fn of(runs: &[&[(f64, f64)]]) -> Option<Self> {
-        // what is left where nothing hangs, in pieces
-        let pieces = runs.split(|run| run.len() >= FEWEST);
-        let pieces: Vec<Vec<f64>> = pieces
-            .map(|piece| piece.concat().iter().map(|p| p.1).collect())
-            .collect();
-        let thirds = pieces.iter().flat_map(|piece| {
-            let third = |w: &[f64]| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
-            piece
-                .windows(5)
-                .map(move |w| (third(&w[..4]), third(&w[1..])))
-        });
-        let pairs: Vec<(f64, f64)> = thirds.take(LOOKED_AT).collect();
+    fn of(runs: impl Iterator<Item = Run>) -> Option<Self> {
+        let mut seen = Differences::default();
+        for run in runs {
+            match run.rows >= FEWEST {
+                // what is left where nothing hangs, in pieces
+                true => seen.last.clear(),
+                false => (0..run.rows).for_each(|_| seen.take(run.value)),
+            }
+        }
+        let Differences { pairs, step, .. } = seen;
         if pairs.len() < ENOUGH {
             return None;
         }
@@ -136,14 +186,41 @@ impl Scatter {
         sizes.sort_unstable_by(f64::total_cmp);
         // the third difference of white noise has 20 times its variance
         let deviation = 1.4826 * sizes[sizes.len() / 2] / 20_f64.sqrt();
-        let steps = pieces
-            .iter()
-            .flat_map(|piece| piece.windows(2).map(|w| (w[1] - w[0]).abs()));
-        let step = steps.filter(|d| *d > 0.0).reduce(f64::min)?;
+        let step = step?;
         let is_noise = alternating as f64 >= ALTERNATING * pairs.len() as f64 && deviation >= step;
         // a difference of deviation √2 σ that rounds to none
         let chance = step / (2.0 * deviation * std::f64::consts::PI.sqrt());
         is_noise.then_some(Self { step, chance })
+    }
+}
+
+/// Differences between neighbours, reading by reading.
+#[derive(Debug, Default)]
+struct Differences {
+    /// the readings before, at most four
+    last: Vec<f64>,
+    /// third differences of neighbours, the first of them
+    pairs: Vec<(f64, f64)>,
+    /// the smallest first difference that is none
+    step: Option<f64>,
+}
+
+impl Differences {
+    fn take(&mut self, value: f64) {
+        if let Some(before) = self.last.last() {
+            let step = (value - before).abs();
+            if step > 0.0 {
+                self.step = Some(self.step.map_or(step, |least| least.min(step)));
+            }
+        }
+        self.last.push(value);
+        if let &[a, b, c, d, e] = &self.last[..] {
+            if self.pairs.len() < LOOKED_AT {
+                let third = |a: f64, b: f64, c: f64, d: f64| d - 3.0 * c + 3.0 * b - a;
+                self.pairs.push((third(a, b, c, d), third(b, c, d, e)));
+            }
+            self.last.remove(0);
+        }
     }
 }
 
@@ -201,7 +278,7 @@ mod tests {
     /// First row and number of rows of what hangs.
     fn with(readings: &[f64], channel: Channel) -> Vec<(usize, usize)> {
         let time: Vec<f64> = (0..readings.len()).map(|k| k as f64).collect();
-        let found = frozen("y", &time, readings, channel);
+        let found = frozen("y", &time.into(), &readings.to_vec().into(), channel);
         found.iter().map(|f| (f.from as usize, f.rows)).collect()
     }
 
@@ -267,7 +344,12 @@ mod tests {
     fn an_end_of_the_range_is_told_from_hanging() {
         let clipped: Vec<f64> = wave(1.0).into_iter().map(|y| y.min(0.8)).collect();
         let time: Vec<f64> = (0..600).map(f64::from).collect();
-        let hung = frozen("y", &time, &clipped, Channel::default());
+        let hung = frozen(
+            "y",
+            &time.into(),
+            &clipped.clone().into(),
+            Channel::default(),
+        );
         assert!(!hung.is_empty() && hung.iter().all(|f| f.at_end && f.value == 0.8));
         assert!(hung[0].words().contains("limits under [sensors]"));
         let limits = Some((-2.0, 0.8));

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use lynkeus_model::{Plant, Variable};
 
-use crate::estimate::header;
+use crate::columns::header;
 use crate::study::EstimateSettings;
 use crate::{Error, Study, Table};
 

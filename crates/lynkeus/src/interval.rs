@@ -6,8 +6,10 @@ use lynkeus_observers::{Design, Sampled};
 use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
+use crate::Series;
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
+use crate::series::{Sorted, points, steps};
 use crate::study::BetweenSamples;
 
 /// Rows of the log at which the error is linearised.
@@ -32,7 +34,7 @@ pub struct Intervals {
 pub(crate) fn intervals(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     course: &Course,
 ) -> Option<Intervals> {
     let extended = prepared.extended();
@@ -62,13 +64,14 @@ pub(crate) fn intervals(
     let expected = Tape::new(graph, &symbols, &outputs).ok()?;
     let sensors = outputs.len();
     let rows = course.estimates.first()?.len();
+    let value = |column: &Series, row| column.get(row).unwrap_or(f64::NAN);
     let stride = rows.div_ceil(PLACES).max(1);
     let at = |row: usize| {
-        let mut values = vec![samples.time[row]];
-        values.extend(course.estimates.iter().map(|column| column[row]));
+        let mut values = vec![value(&samples.time, row)];
+        values.extend(course.estimates.iter().map(|column| value(column, row)));
         let first = values.len();
         values.extend(std::iter::repeat_n(0.0, sensors));
-        values.extend(samples.inputs.iter().map(|u| u[row]));
+        values.extend(samples.inputs.iter().map(|u| value(u, row)));
         // every measurement follows the model
         values.extend(std::iter::repeat_n(1.0, sensors));
         let mut y = vec![0.0; sensors];
@@ -98,13 +101,10 @@ pub(crate) fn intervals(
 }
 
 /// The median time from one reading of a sensor to its next, of the slowest sensor.
-fn median_interval(samples: &Samples<'_>) -> Option<f64> {
-    let of = |readings: &&[f64]| {
-        let pairs = samples.time.iter().zip(*readings);
-        let times: Vec<f64> = pairs.filter(|(_, y)| y.is_finite()).map(|p| *p.0).collect();
-        let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-        steps.sort_unstable_by(f64::total_cmp);
-        steps.get(steps.len() / 2).copied()
+fn median_interval(samples: &Samples) -> Option<f64> {
+    let of = |readings: &Series| {
+        let times = points(&samples.time, readings).map(|p| p.0);
+        Sorted::new(samples.time.store(), steps(times)).median()
     };
     samples.readings.iter().filter_map(of).reduce(f64::max)
 }

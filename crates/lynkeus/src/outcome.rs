@@ -17,58 +17,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::systems::hat;
-use crate::{Error, Study, estimate, expected};
-
-/// One quantity of the result with everything that is known of it.
-#[derive(Clone, Debug, Default)]
-pub struct Quantity {
-    /// name in the plant
-    pub name: String,
-    /// unit, if declared
-    pub unit: Option<String>,
-    /// description, if declared
-    pub description: Option<String>,
-    /// what it truly is: simulated, or logged although it is not used
-    pub truth: Option<Vec<f64>>,
-    /// what the sensor reads
-    pub measured: Option<Vec<f64>>,
-    /// what the observer makes of it
-    pub estimate: Option<Vec<f64>>,
-    /// what the estimate says of a measured output that is no state
-    pub expected: Option<Vec<f64>>,
-    /// its standard deviation, where it is asked for
-    pub deviation: Option<Vec<f64>>,
-    /// the estimate given later rows, too
-    pub smoothed: Option<Vec<f64>>,
-    /// header of the estimate's column: `<name>_hat` unless the model has that name
-    pub estimate_header: String,
-    /// header of the standard deviation's column
-    pub deviation_header: String,
-    /// header of the column of the estimate given later rows
-    pub smoothed_header: String,
-    /// an input that nobody measures
-    pub unknown_input: bool,
-    /// an input of the plant
-    pub is_input: bool,
-}
-
-impl Quantity {
-    /// √(mean (estimate − truth)²) over the last half of the rows, where the truth is known; none
-    /// where it is not.
-    pub fn settled_error(&self) -> Option<f64> {
-        settled_error(self.truth.as_ref()?, self.estimate.as_ref()?)
-    }
-}
-
-/// √(mean (estimate − truth)²) over the last half of the rows; rows without a value count nowhere.
-pub(crate) fn settled_error(truth: &[f64], estimate: &[f64]) -> Option<f64> {
-    let half = truth.len() / 2;
-    let errors = truth.iter().zip(estimate).skip(half);
-    let squares = errors.map(|(x, hat)| (hat - x).powi(2));
-    let squares: Vec<f64> = squares.filter(|e| e.is_finite()).collect();
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    (!squares.is_empty()).then(|| mean.sqrt())
-}
+use crate::{Error, Quantity, Series, Study, columns, expected};
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]
@@ -78,7 +27,7 @@ pub struct Watch {
     /// header of its column: the monitor's name unless the model has that name
     pub header: String,
     /// its values
-    pub values: Vec<f64>,
+    pub values: Series,
     /// first time at which it was below its alarm
     pub alarm: Option<f64>,
 }
@@ -100,7 +49,7 @@ pub struct Outcome {
     /// the observer that ran
     pub design: Design,
     /// times of the rows
-    pub time: Vec<f64>,
+    pub time: Series,
     /// header of their column: `t` unless the model has that name
     pub time_header: String,
     /// header of the column of times in a log
@@ -108,7 +57,7 @@ pub struct Outcome {
     /// every state, input and measured output
     pub quantities: Vec<Quantity>,
     /// the measured outputs by name, noise included, where they are known
-    pub measurements: Vec<(String, Vec<f64>)>,
+    pub measurements: Vec<(String, Series)>,
     /// the observer's monitors
     pub watches: Vec<Watch>,
     /// where the plant, as far as it is known, leaves the box of the study
@@ -138,8 +87,8 @@ impl Outcome {
     /// The columns of the CSV: `t`; true states and inputs where they were
     /// simulated; `<name>_hat` for everything estimated; monitors. No two have the same
     /// header: what the model calls so itself keeps its name, and the others give way.
-    pub fn columns(&self, with_truth: bool) -> Vec<(String, &[f64])> {
-        let mut columns: Vec<(String, &[f64])> = vec![(self.time_header.clone(), &self.time)];
+    pub fn columns(&self, with_truth: bool) -> Vec<(String, &Series)> {
+        let mut columns: Vec<(String, &Series)> = vec![(self.time_header.clone(), &self.time)];
         for quantity in self.quantities.iter().filter(|_| with_truth) {
             if let Some(truth) = &quantity.truth {
                 columns.push((quantity.name.clone(), truth));
@@ -161,7 +110,7 @@ impl Outcome {
             }
         }
         let watches = self.watches.iter();
-        columns.extend(watches.map(|w| (w.header.clone(), &w.values[..])));
+        columns.extend(watches.map(|w| (w.header.clone(), &w.values)));
         columns
     }
 
@@ -170,12 +119,12 @@ impl Outcome {
     ///
     /// # Errors
     /// The study's `[estimate]` gives two of them the same header.
-    pub fn log(&self, settings: &EstimateSettings) -> Result<Vec<(String, &[f64])>, Error> {
-        let header = |name: &str| estimate::header(settings, name).to_owned();
+    pub fn log(&self, settings: &EstimateSettings) -> Result<Vec<(String, &Series)>, Error> {
+        let header = |name: &str| columns::header(settings, name).to_owned();
         let inputs = self.quantities.iter().filter(|q| q.is_input);
-        let inputs = inputs.filter_map(|q| Some((&q.name, &q.truth.as_ref()?[..])));
-        let measured = self.measurements.iter().map(|(n, values)| (n, &values[..]));
-        let mut columns = vec![(self.log_time.clone(), &self.time[..])];
+        let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
+        let measured = self.measurements.iter().map(|(n, values)| (n, values));
+        let mut columns = vec![(self.log_time.clone(), &self.time)];
         for (name, values) in measured.chain(inputs) {
             let header = header(name);
             if columns.iter().any(|(known, _)| *known == header) {
@@ -215,10 +164,10 @@ pub(crate) struct Raw<'r> {
     pub prepared: &'r Prepared<'r>,
     pub design: Design,
     /// times of the rows
-    pub time: &'r [f64],
+    pub time: Series,
     pub course: Course,
     pub quantities: Vec<Quantity>,
-    pub measurements: Vec<(String, Vec<f64>)>,
+    pub measurements: Vec<(String, Series)>,
     pub frozen: Vec<Frozen>,
     pub intervals: Option<Intervals>,
     pub notes: Vec<String>,
@@ -226,7 +175,10 @@ pub(crate) struct Raw<'r> {
 
 impl Raw<'_> {
     /// The outcome: headers, alarms, and what is to be said of it.
-    pub fn finish(self) -> Outcome {
+    ///
+    /// # Errors
+    /// The disk that keeps a long run was full, or failed.
+    pub fn finish(self) -> Result<Outcome, Error> {
         let Self {
             prepared,
             design,
@@ -259,17 +211,17 @@ impl Raw<'_> {
                     headers.free(&wanted, &format!("{what} given later rows"));
             }
         }
-        let watches = watches(&design, &mut course.monitors, time, &mut headers);
+        let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
-        expected::give(prepared.extended(), time, &mut quantities);
+        expected::give(prepared.extended(), &time, &mut quantities);
         let sides = outside::sides(prepared.extended());
-        let accuracies = accuracy::accuracies(time, &quantities, &sides);
+        let accuracies = accuracy::accuracies(&time, &quantities, &sides);
         notes.extend(accuracy::told(&accuracies));
-        notes.extend(assertions::told(plant, time, &quantities));
-        let itself = outside::time_itself(time);
+        notes.extend(assertions::told(plant, &time, &quantities));
+        let itself = outside::time_itself(&time);
         let all = || quantities.iter().chain([&itself]);
-        let plant_outside = outside(time, all(), outside::PLANT, &sides);
-        let estimate_outside = outside(time, all(), outside::ESTIMATE, &sides);
+        let plant_outside = outside(&time, all(), outside::PLANT, &sides);
+        let estimate_outside = outside(&time, all(), outside::ESTIMATE, &sides);
         notes.extend(headers.notes);
         notes.extend(alarms(&watches));
         let left = [("plant", &plant_outside), ("estimate", &estimate_outside)];
@@ -279,10 +231,14 @@ impl Raw<'_> {
                 "the {who} is outside of the declared box {words}: nothing is proved there"
             ))
         }));
-        Outcome {
+        let doubts = credible::doubts(plant, &quantities);
+        // nothing of this counts where a number was lost
+        course.check()?;
+        time.check()?;
+        Ok(Outcome {
             plant: plant.name.clone(),
             log_time: log_time(plant, &prepared.study().estimate),
-            doubts: credible::doubts(plant, &quantities),
+            doubts,
             contradictions: credible::contradictions(&innovations),
             ended: course.ended.map(|error| Ended {
                 message: error.to_string(),
@@ -292,7 +248,7 @@ impl Raw<'_> {
             accuracies,
             frozen,
             intervals,
-            time: time.to_vec(),
+            time,
             time_header,
             design,
             quantities,
@@ -301,23 +257,23 @@ impl Raw<'_> {
             plant_outside,
             estimate_outside,
             notes,
-        }
+        })
     }
 }
 
 /// The observer's monitors as they went.
 fn watches(
     design: &Design,
-    monitors: &mut [Vec<f64>],
-    time: &[f64],
+    monitors: &mut [Series],
+    time: &Series,
     headers: &mut Headers,
 ) -> Vec<Watch> {
     let watch = |(i, monitor): (usize, &Monitor)| {
         let values = monitors.get_mut(i).map(std::mem::take).unwrap_or_default();
-        let low = values.iter().position(|x| *x < monitor.alarm_below);
+        let low = values.iter().position(|x| x < monitor.alarm_below);
         let what = format!("the monitor {}", monitor.name);
         Watch {
-            alarm: low.and_then(|row| time.get(row).copied()),
+            alarm: low.and_then(|row| time.get(row)),
             header: headers.free(&monitor.name, &what),
             monitor: monitor.clone(),
             values,
@@ -402,8 +358,8 @@ pub(crate) fn interrupted(error: RunError, place: &str) -> Error {
 /// The measured outputs of which `values` knows the values.
 pub(crate) fn measurements(
     design: &Design,
-    values: impl Fn(&Signal) -> Option<Vec<f64>>,
-) -> Vec<(String, Vec<f64>)> {
+    values: impl Fn(&Signal) -> Option<Series>,
+) -> Vec<(String, Series)> {
     let measured = design.observer.measured.iter();
     measured
         .filter_map(|signal| Some((signal.name.clone(), values(signal)?)))
@@ -414,7 +370,7 @@ pub(crate) fn measurements(
 /// a quantity of its own.
 fn show_measurements(
     plant: &Plant,
-    measurements: &[(String, Vec<f64>)],
+    measurements: &[(String, Series)],
     quantities: &mut Vec<Quantity>,
 ) {
     for (name, values) in measurements {

@@ -5,8 +5,9 @@ use std::ops::RangeInclusive;
 use lynkeus_structure::{Extended, Side, figures};
 use serde_json::{Map, Value, json};
 
-use crate::Quantity;
+use crate::series::Iter;
 use crate::words::number;
+use crate::{Quantity, Series};
 
 /// What is beyond an end by no more than this share of the side's width is on it: integration
 /// and noise-free sensors round.
@@ -62,16 +63,16 @@ pub(crate) fn sides(extended: &Extended<'_>) -> Vec<Side> {
 }
 
 /// Time as a quantity: a side of the box, too.
-pub(crate) fn time_itself(time: &[f64]) -> Quantity {
+pub(crate) fn time_itself(time: &Series) -> Quantity {
     Quantity {
         name: "time".to_owned(),
-        truth: Some(time.to_vec()),
+        truth: Some(time.clone()),
         ..Quantity::default()
     }
 }
 
 /// Some of the values of the quantities at every row.
-pub(crate) type Of = fn(&Quantity) -> Option<&Vec<f64>>;
+pub(crate) type Of = fn(&Quantity) -> Option<&Series>;
 
 /// What the plant does, as far as it is known.
 pub(crate) const PLANT: Of = |quantity| quantity.truth.as_ref();
@@ -80,77 +81,112 @@ pub(crate) const ESTIMATE: Of = |quantity| quantity.estimate.as_ref();
 
 /// Where values of quantities leave the box; none where they stay.
 pub(crate) fn outside<'q>(
-    time: &[f64],
+    time: &Series,
     quantities: impl IntoIterator<Item = &'q Quantity>,
     of: Of,
     sides: &[Side],
 ) -> Option<Outside> {
-    let mut any = vec![false; time.len()];
-    let mut excursions = vec![];
-    for quantity in quantities {
-        let side = sides.iter().find(|side| side.name == quantity.name);
-        let (Some(side), Some(values)) = (side, of(quantity)) else {
-            continue;
-        };
-        excursions.extend(excursion(time, side, values, &mut any));
+    let followed = quantities.into_iter().filter_map(|quantity| {
+        let side = sides.iter().find(|side| side.name == quantity.name)?;
+        Some(Followed::new(side, of(quantity)?))
+    });
+    let mut followed: Vec<Followed<'_>> = followed.collect();
+    let mut any = 0;
+    for (row, t) in time.iter().enumerate() {
+        let mut is_outside = false;
+        for quantity in &mut followed {
+            is_outside |= quantity.take(row, t);
+        }
+        any += usize::from(is_outside);
     }
+    let rows = time.len();
+    let excursions = followed.into_iter().filter_map(|f| f.excursion(rows));
+    let mut excursions: Vec<Excursion> = excursions.collect();
     excursions.sort_by(|a, b| a.first.total_cmp(&b.first));
     Some(Outside {
-        share: share(&any),
+        share: share(any, rows),
         first: excursions.first()?.first,
         quantities: excursions,
     })
 }
 
-fn excursion(time: &[f64], side: &Side, values: &[f64], any: &mut [bool]) -> Option<Excursion> {
-    let slack = slack(side, values);
-    let beyond = |x: f64| (side.min - x).max(x - side.max);
-    let is_outside: Vec<bool> = values.iter().map(|x| beyond(*x) > slack).collect();
-    let first = is_outside.iter().position(|out| *out)?;
-    for (any, out) in any.iter_mut().zip(&is_outside) {
-        *any |= out;
-    }
-    let farthest = values.iter().copied();
-    Some(Excursion {
-        name: side.name.clone(),
-        min: side.min,
-        max: side.max,
-        share: share(&is_outside),
-        first: *time.get(first)?,
-        value: *values.get(first)?,
-        stretches: stretches(&is_outside),
-        farthest: farthest.max_by(|a, b| beyond(*a).total_cmp(&beyond(*b)))?,
-    })
+/// A quantity beside its side of the box, row by row.
+struct Followed<'q> {
+    side: &'q Side,
+    values: Iter<'q>,
+    slack: f64,
+    /// rows at which it is outside
+    count: usize,
+    /// time and value at the first of them
+    first: Option<(f64, f64)>,
+    farthest: f64,
+    stretches: Vec<RangeInclusive<usize>>,
 }
 
-/// The rows in a row at which it is so.
-fn stretches(is_so: &[bool]) -> Vec<RangeInclusive<usize>> {
-    let mut row = 0;
-    let mut found = vec![];
-    for stretch in is_so.chunk_by(|a, b| a == b) {
-        let next = row + stretch.len();
-        if stretch[0] {
-            found.push(row..=next - 1);
+impl<'q> Followed<'q> {
+    fn new(side: &'q Side, values: &'q Series) -> Self {
+        Self {
+            side,
+            values: values.iter(),
+            slack: slack(side, values),
+            count: 0,
+            first: None,
+            farthest: values.first().unwrap_or(f64::NAN),
+            stretches: vec![],
         }
-        row = next;
     }
-    found
+
+    /// Whether it is outside at the next row.
+    fn take(&mut self, row: usize, t: f64) -> bool {
+        let Some(x) = self.values.next() else {
+            return false;
+        };
+        let beyond = |x: f64| (self.side.min - x).max(x - self.side.max);
+        // the last of several
+        if beyond(self.farthest).total_cmp(&beyond(x)).is_le() {
+            self.farthest = x;
+        }
+        if beyond(x) <= self.slack || x.is_nan() {
+            return false;
+        }
+        self.count += 1;
+        self.first.get_or_insert((t, x));
+        match self.stretches.last_mut() {
+            Some(last) if *last.end() + 1 == row => *last = *last.start()..=row,
+            _ => self.stretches.push(row..=row),
+        }
+        true
+    }
+
+    fn excursion(self, rows: usize) -> Option<Excursion> {
+        let (first, value) = self.first?;
+        Some(Excursion {
+            name: self.side.name.clone(),
+            min: self.side.min,
+            max: self.side.max,
+            share: share(self.count, rows),
+            first,
+            value,
+            farthest: self.farthest,
+            stretches: self.stretches,
+        })
+    }
 }
 
 /// What counts as rounding beside a side: a share of its width, or where that is none of the
 /// numbers around it. NaN, in a log's column of truth, is not outside.
-fn slack(side: &Side, values: &[f64]) -> f64 {
+fn slack(side: &Side, values: &Series) -> f64 {
     let width = side.max - side.min;
     if width.is_finite() && width > 0.0 {
         return ROUNDING * width;
     }
     let ends = [side.min, side.max].into_iter().filter(|x| x.is_finite());
-    let sizes = ends.chain(values.iter().copied().filter(|x| x.is_finite()));
+    let sizes = ends.chain(values.iter().filter(|x| x.is_finite()));
     ROUNDING * sizes.fold(0.0, |m: f64, x| m.max(x.abs()))
 }
 
-fn share(rows: &[bool]) -> f64 {
-    rows.iter().filter(|out| **out).count() as f64 / rows.len().max(1) as f64
+fn share(count: usize, rows: usize) -> f64 {
+    count as f64 / rows.max(1) as f64
 }
 
 /// A share as people read it.
@@ -226,9 +262,10 @@ mod tests {
 
     fn found(declared: &str, values: &[f64]) -> Option<Outside> {
         let time: Vec<f64> = (0..values.len()).map(|k| k as f64).collect();
+        let time = Series::from(time);
         let quantity = Quantity {
             name: "x".to_owned(),
-            estimate: Some(values.to_vec()),
+            estimate: Some(values.to_vec().into()),
             ..Quantity::default()
         };
         let sides = [side_of(declared)];

@@ -9,6 +9,9 @@ use crate::checkpoint::Checkpoint;
 use crate::course::{Course, Samples, add_row};
 use crate::{Error, Study};
 
+/// Rows between two looks at whether there is room for them.
+const LOOK: usize = 1 << 16;
+
 /// Who watches a replay: told the fraction done, and may stop it.
 pub(crate) struct Watch<'w> {
     pub watch: &'w mut dyn FnMut(f64) -> ControlFlow<()>,
@@ -61,28 +64,35 @@ impl Halfway {
 /// monitors. What ends the run early is told in the course.
 ///
 /// # Errors
-/// A checkpoint that cannot be used.
+/// A checkpoint that cannot be used, or no room for the rows.
 pub(crate) fn replay(
     estimator: &mut Estimator,
-    samples: &Samples<'_>,
+    samples: &Samples,
     estimates: usize,
     course: &mut Course,
     watch: &mut Watch<'_>,
 ) -> Result<(), Error> {
     let rows = samples.time.len();
-    let columns = |count: usize| vec![Vec::with_capacity(rows); count];
-    course.estimates = columns(estimates);
-    course.monitors = columns(estimator.names().len().saturating_sub(estimates));
-    course.deviations = estimator.deviations().map(|d| columns(d.len()));
+    course.estimates = course.columns(estimates);
+    course.monitors = course.columns(estimator.names().len().saturating_sub(estimates));
+    course.deviations = estimator.deviations().map(|d| course.columns(d.len()));
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
         None => 0,
         Some(checkpoint) => checkpoint.resume(estimator, samples, course, &mut half)?,
     };
     let mut signals = vec![0.0; samples.readings.len() + samples.inputs.len()];
+    let mut left = samples.rows_from(first);
     for row in first..rows {
-        samples.write_row(row, &mut signals);
-        if let Err(error) = estimator.push(samples.time[row], &signals) {
+        if row.is_multiple_of(LOOK) {
+            course.check()?;
+        }
+        let Some(time) = left.next(&mut signals) else {
+            break;
+        };
+        if let Err(error) = estimator.push(time, &signals) {
+            // a sample that was lost is no fault of the log
+            samples.check()?;
             course.ended = Some(error);
             break;
         }
@@ -102,7 +112,6 @@ pub(crate) fn replay(
             checkpoint.keep(estimator, course, &half)?;
         }
         if stopped {
-            let time = samples.time[row];
             course.ended = Some(RunError::Cancelled { time });
             break;
         }

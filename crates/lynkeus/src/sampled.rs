@@ -18,7 +18,7 @@ use crate::{Error, Study};
 pub(crate) fn run(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     method: Method,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
@@ -48,7 +48,7 @@ pub(crate) fn run(
 pub(crate) fn observer(
     prepared: &Prepared<'_>,
     design: &Design,
-    samples: &Samples<'_>,
+    samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<SampledObserver, Error> {
     let (study, extended) = (prepared.study(), prepared.extended());
@@ -118,7 +118,7 @@ fn error_noise(
     study: &Study,
     prepared: &Prepared<'_>,
     states: &[(String, Node, f64)],
-    samples: &Samples<'_>,
+    samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<ErrorNoise, Error> {
     let extended = prepared.extended();

@@ -15,7 +15,7 @@ use crate::prepare::Prepared;
 use crate::spread::Spread;
 use crate::study::{Noise, SimulateSettings};
 use crate::systems::{self, Reported, method};
-use crate::{Error, Outcome, Quantity, Study, Table, estimate, prepare};
+use crate::{Error, Outcome, Quantity, Series, Study, Table, columns, estimate, prepare};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
 /// and may stop the run.
@@ -39,7 +39,7 @@ pub(crate) fn simulated(
 ) -> Result<Outcome, Error> {
     let rig = Rig::new(prepared)?;
     let Ran { run, course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
-    Ok(outcome(prepared, rig.design, &run, course))
+    outcome(prepared, rig.design, &run, course)
 }
 
 /// A study's plant with its observer, ready for the run of any seed.
@@ -141,12 +141,14 @@ fn sampled(
     })?;
     let observer = &design.observer;
     let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
-    let column =
-        |role: Role, at: Option<usize>| at.and_then(|i| run.column(role.at(i))).unwrap_or_default();
+    let column = |role: Role, at: Option<usize>| {
+        let values = at.and_then(|i| run.column(role.at(i)));
+        Series::from(values.unwrap_or_default().to_vec())
+    };
     let readings = observer.measured.iter();
     let inputs = observer.inputs.iter();
     let samples = Samples {
-        time: run.times(),
+        time: run.times().to_vec().into(),
         readings: readings
             .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
             .collect(),
@@ -157,7 +159,7 @@ fn sampled(
     let mut course = estimate::course(prepared, design, &samples, &mut |done| {
         watch(0.5 + 0.5 * done)
     })?;
-    let rows = course.estimates.first().map_or(0, Vec::len);
+    let rows = course.estimates.first().map_or(0, Series::len);
     settle(&mut course, rows, study, &study.file)?;
     run.truncate(rows);
     Ok(Ran { run, course })
@@ -195,15 +197,15 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
         (&plant.states, Role::State),
     ];
     let time = log_time(plant, &study.estimate);
-    let mut columns = vec![(time, run.times().to_vec())];
+    let mut found = vec![(time, run.times().to_vec())];
     for (variables, role) in groups {
         for (i, variable) in variables.iter().enumerate() {
             let values = run.column(role.at(i)).unwrap_or_default();
-            let header = estimate::header(&study.estimate, &variable.name);
-            columns.push((header.to_owned(), values.to_vec()));
+            let header = columns::header(&study.estimate, &variable.name);
+            found.push((header.to_owned(), values.to_vec()));
         }
     }
-    Table::from_columns(columns)
+    Table::from_columns(found)
 }
 
 /// The study's `[simulate]`.
@@ -282,8 +284,10 @@ pub(crate) fn outcome(
     design: Design,
     run: &Trajectory,
     mut course: Course,
-) -> Outcome {
+) -> Result<Outcome, Error> {
     let plant = prepared.plant();
+    let store = course.store.clone();
+    let kept = |values: &[f64]| Series::gathered(&store, values.iter().copied());
     let deviations = prepared.study().estimate.deviations;
     let mut quantity = |variable: &Variable, role: Role, place: usize| {
         let estimates = &design.observer.estimates;
@@ -293,7 +297,7 @@ pub(crate) fn outcome(
             name: variable.name.clone(),
             unit: variable.unit.clone(),
             description: variable.description.clone(),
-            truth: run.column(role.at(place)).map(<[f64]>::to_vec),
+            truth: run.column(role.at(place)).map(kept),
             unknown_input: estimated.is_some_and(|i| estimates[i].unknown_input),
             is_input: role == Role::Input,
             ..Quantity::default()
@@ -310,10 +314,10 @@ pub(crate) fn outcome(
     let measured = |signal: &lynkeus_observers::Signal| {
         let output = systems::output_of(plant, signal)?;
         let values = run.column(Role::Measured.at(output))?;
-        Some(values.to_vec())
+        Some(kept(values))
     };
     Raw {
-        time: run.times(),
+        time: kept(run.times()),
         quantities,
         measurements: measurements(&design, measured),
         frozen: vec![],

@@ -348,10 +348,10 @@ fn add(outcome: &Outcome, rows: usize, all: &mut Vec<Scatter>) {
             all.len() - 1
         });
         for (moments, k) in all[place].rows.iter_mut().zip(first..) {
-            let error = hat[k] - truth[k];
+            let error = hat.get(k).unwrap() - truth.get(k).unwrap();
             moments.error += error;
             moments.square += error * error;
-            moments.variance += sd[k] * sd[k];
+            moments.variance += sd.get(k).unwrap().powi(2);
         }
     }
 }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
-use crate::{Quantity, simulate};
+use crate::{Quantity, Series, simulate};
 
 /// Where the study's own plant and estimate are outside of the box.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +52,7 @@ impl Strays {
         }
     }
 
-    fn along(time: &[f64], quantities: &[Quantity], place: &Extended<'_>) -> Self {
+    fn along(time: &Series, quantities: &[Quantity], place: &Extended<'_>) -> Self {
         let sides = outside::sides(place);
         let itself = outside::time_itself(time);
         let of = |of| outside(time, quantities.iter().chain([&itself]), of, &sides);
@@ -76,12 +76,12 @@ impl Strays {
         let quantities: Vec<Quantity> = variables
             .map(|variable| Quantity {
                 name: variable.name.clone(),
-                truth: variable.start.map(|x| vec![x]),
-                estimate: estimated(variable).map(|(_, start)| vec![*start]),
+                truth: variable.start.map(|x| vec![x].into()),
+                estimate: estimated(variable).map(|(_, start)| vec![*start].into()),
                 ..Quantity::default()
             })
             .collect();
-        Self::along(&[0.0], &quantities, place)
+        Self::along(&vec![0.0].into(), &quantities, place)
     }
 
     /// What the reader of a certificate has to know; none where all that it asks for is in

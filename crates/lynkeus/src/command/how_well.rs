@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
-use lynkeus::Error;
 use lynkeus::precision::{self, Candidates};
+use lynkeus::{Error, Series};
 
 use super::inputs::Source;
 use super::output;
@@ -69,9 +69,13 @@ pub(super) fn how_well(source: &Source, options: &Options, json: bool) -> Result
     drop(alive);
     let report = report?;
     let columns = report.columns();
-    let columns: Vec<(String, &[f64])> = columns
+    let columns: Vec<(String, Series)> = columns
+        .into_iter()
+        .map(|(name, values)| (name, values.into()))
+        .collect();
+    let columns: Vec<(String, &Series)> = columns
         .iter()
-        .map(|(name, values)| (name.clone(), &values[..]))
+        .map(|(name, values)| (name.clone(), values))
         .collect();
     let mut results = Results::default();
     if let Some(path) = &options.plot {

@@ -62,7 +62,7 @@ impl Source {
 /// A log.
 pub(super) fn log(path: &Path) -> Result<Table, Error> {
     match is_standard(path) {
-        true => Table::parse(&standard_input()?, STANDARD),
+        true => Table::read(io::stdin().lock(), STANDARD),
         false => Table::load(path),
     }
 }

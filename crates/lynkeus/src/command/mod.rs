@@ -323,7 +323,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             run::compare(&source, log.as_deref(), &output)
         }
         Command::Schema => {
-            output::print(&output::json(&lynkeus::schema()))?;
+            output::print(output::json(&lynkeus::schema()).as_bytes())?;
             Ok(ExitCode::SUCCESS)
         }
     }

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use lynkeus::Error;
+use lynkeus::{Error, Series};
 
 use super::inputs::Source;
 use super::progress::Progress;
@@ -29,7 +29,14 @@ pub(super) fn monte_carlo(
         results.picture(path, figure.and_then(|figure| figure.to_svg()))?;
     }
     if let Some(path) = &output.output {
-        let columns = found.columns();
+        let columns = found.columns().into_iter();
+        let columns: Vec<(String, Series)> = columns
+            .map(|(name, values)| (name, values.to_vec().into()))
+            .collect();
+        let columns: Vec<(String, &Series)> = columns
+            .iter()
+            .map(|(name, values)| (name.clone(), values))
+            .collect();
         results.write(path, |to| output::table(path, &columns, to))?;
     }
     results.report(output.json, &found, || found.to_json());

@@ -1,20 +1,20 @@
 //! Words for people, and columns as text.
 
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use lynkeus::model::Diagnostic;
-use lynkeus::{Error, table, visible};
+use lynkeus::{Error, Series, table, visible};
 use serde_json::Value;
 
 /// Columns as a CSV file, or as a Parquet file if it is called so.
 pub(super) fn table(
     path: &Path,
-    columns: &[(String, &[f64])],
+    columns: &[(String, &Series)],
     mut to: &mut (dyn Write + Send),
 ) -> io::Result<()> {
     let names: Vec<_> = columns.iter().map(|c| visible::line(&c.0)).collect();
-    let named: Vec<(&str, &[f64])> = names
+    let named: Vec<(&str, &Series)> = names
         .iter()
         .zip(columns)
         .map(|(name, (_, values))| (name.as_ref(), *values))
@@ -38,9 +38,9 @@ pub(super) fn text(report: &impl std::fmt::Display) -> String {
 }
 
 /// Text to standard output; a reader that went away (`| head`) is no error.
-pub(super) fn print(text: &str) -> Result<(), Error> {
+pub(super) fn print(mut text: impl Read) -> Result<(), Error> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match io::copy(&mut text, &mut out).and_then(|_| out.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Error::input(format!(
             "cannot write to standard output: {e}"
         ))),

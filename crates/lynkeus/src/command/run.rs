@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
+use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Series, Study};
 use serde_json::{Value, json};
 
 use super::files::is_standard;
@@ -203,10 +203,10 @@ fn finish(
     }
 }
 
-fn summary(outcome: &Outcome, columns: &[(String, &[f64])]) -> Value {
+fn summary(outcome: &Outcome, columns: &[(String, &Series)]) -> Value {
     let object = |pairs: Vec<(String, Value)>| Value::Object(pairs.into_iter().collect());
     let estimated = || outcome.quantities.iter().filter(|q| q.estimate.is_some());
-    let last = |q: &lynkeus::Quantity| json!(q.estimate.as_ref().and_then(|values| values.last()));
+    let last = |q: &lynkeus::Quantity| json!(q.estimate.as_ref().and_then(Series::last));
     let settled = |q: &lynkeus::Quantity| Some((q.name.clone(), json!(q.settled_error()?)));
     let gains = outcome.design.gains.iter().map(|gain| {
         let entries = gain

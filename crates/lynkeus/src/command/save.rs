@@ -5,11 +5,11 @@
 //! as its writer lives: one that is not locked was left by a run that was killed, and is removed.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use lynkeus::{Error, interrupt};
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, SpooledTempFile};
 
 use super::files::is_standard;
 use super::{output, signals};
@@ -22,6 +22,9 @@ const RANDOM: usize = 10;
 /// Links of links that are followed.
 const MOST_LINKS: usize = 40;
 
+/// Bytes for standard output or a device that are kept in memory.
+const SPOOLED: usize = 1 << 20;
+
 /// Bytes written between two looks at whether the user wants to stop.
 const PIECE: usize = 1 << 20;
 
@@ -29,6 +32,8 @@ const PIECE: usize = 1 << 20;
 #[derive(Debug, Default)]
 pub(super) struct Results {
     files: Vec<Staged>,
+    /// a table for standard output
+    table: Option<SpooledTempFile>,
     printed: String,
     undrawn: Option<Error>,
 }
@@ -45,7 +50,7 @@ struct Staged {
 enum Content {
     Beside(NamedTempFile),
     /// For a device or a pipe, which is written to and never replaced.
-    Device(Vec<u8>),
+    Device(SpooledTempFile),
 }
 
 impl Results {
@@ -69,13 +74,12 @@ impl Results {
             let file = stage(&place, write).map_err(failed)?;
             return self.stage(path, place, Content::Beside(file));
         }
-        let mut bytes = vec![];
-        write(&mut bytes).map_err(failed)?;
+        let content = spool(write).map_err(failed)?;
         if is_standard(path) {
-            self.print(&String::from_utf8_lossy(&bytes));
+            self.table = Some(content);
             return Ok(());
         }
-        self.stage(path, place, Content::Device(bytes))
+        self.stage(path, place, Content::Device(content))
     }
 
     fn stage(&mut self, path: &Path, place: PathBuf, content: Content) -> Result<(), Error> {
@@ -101,7 +105,7 @@ impl Results {
 
     /// Whether a result goes to standard output.
     pub fn has_printed(&self) -> bool {
-        !self.printed.is_empty()
+        self.table.is_some() || !self.printed.is_empty()
     }
 
     /// Adds text to standard output.
@@ -138,8 +142,11 @@ impl Results {
             let path = staged.path;
             take_place(staged.content, &staged.place).map_err(|e| refusal(&path, &e))?;
         }
+        if let Some(table) = self.table {
+            output::print(table)?;
+        }
         if !self.printed.is_empty() {
-            output::print(&self.printed)?;
+            output::print(self.printed.as_bytes())?;
         }
         self.undrawn.map_or(Ok(()), Err)
     }
@@ -254,6 +261,17 @@ fn stage(
     Ok(file)
 }
 
+/// What can only be shown once it is whole, from its beginning: in memory, or, where it is long, in a
+/// temporary file without a name.
+fn spool(
+    write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
+) -> io::Result<SpooledTempFile> {
+    let mut content = tempfile::spooled_tempfile_in(SPOOLED, lynkeus::series::folder());
+    write(&mut content)?;
+    content.rewind()?;
+    Ok(content)
+}
+
 /// A new locked file. One that replaces none has the permissions that the user's mask leaves to new files.
 fn temporary(folder: &Path, replaced: Option<&std::fs::Metadata>) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
@@ -322,11 +340,11 @@ fn on_disk(file: &File) -> io::Result<()> {
 
 fn take_place(content: Content, place: &Path) -> io::Result<()> {
     match content {
-        Content::Device(bytes) => {
+        Content::Device(mut content) => {
             let written = OpenOptions::new()
                 .write(true)
                 .open(place)
-                .and_then(|mut device| device.write_all(&bytes));
+                .and_then(|mut device| io::copy(&mut content, &mut device).map(drop));
             match written {
                 // a reader that went away is no error
                 Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),

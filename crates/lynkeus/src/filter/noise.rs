@@ -5,15 +5,16 @@ use lynkeus_run::Level;
 use lynkeus_structure::{Extended, short};
 
 use crate::course::Samples;
+use crate::series::{Sorted, steps};
 use crate::study::Noise;
-use crate::{Error, Study};
+use crate::{Error, Series, Study};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own
 /// readings scatter.
 pub(crate) fn levels(
     study: &Study,
     extended: &Extended<'_>,
-    samples: &Samples<'_>,
+    samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Level>, Error> {
     let mut levels = vec![];
@@ -25,8 +26,8 @@ pub(crate) fn levels(
             Some(Noise::Relative(share)) => Level::Relative(share),
             Some(Noise::Uniform(bound)) => Level::Uniform(bound),
             None => {
-                let readings = samples.readings[i];
-                let found = scatter(samples.time, readings).unwrap_or_else(|| even(readings));
+                let readings = &samples.readings[i];
+                let found = scatter(&samples.time, readings, 0).unwrap_or_else(|| even(readings));
                 notes.push(format!(
                     "noise of {name}: {} (standard deviation), from the scatter of its readings; noise = {{ {name} = … }} under [sensors] says better",
                     short(found)
@@ -39,8 +40,8 @@ pub(crate) fn levels(
 }
 
 /// Readings that do not scatter: a thousandth of their range, or of their size.
-fn even(readings: &[f64]) -> f64 {
-    let finite = || readings.iter().copied().filter(|y| y.is_finite());
+fn even(readings: &Series) -> f64 {
+    let finite = || readings.iter().filter(|y| y.is_finite());
     let (low, high) = (
         finite().fold(f64::INFINITY, f64::min),
         finite().fold(f64::NEG_INFINITY, f64::max),
@@ -54,36 +55,28 @@ fn even(readings: &[f64]) -> f64 {
 }
 
 /// The standard deviation of white noise on a smooth signal, from the distance of each reading
-/// to the line between its neighbours: robust, by the median. None for fewer than five
-/// readings, or readings that lie on one line.
-pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
-    let points: Vec<(f64, f64)> = time
-        .iter()
-        .zip(readings)
-        .filter(|(_, y)| y.is_finite())
-        .map(|(t, y)| (*t, *y))
-        .collect();
-    if points.len() < 5 {
+/// from row `from` on to the line between its neighbours: robust, by the median. None for fewer
+/// than five readings, or readings that lie on one line.
+pub(crate) fn scatter(time: &Series, readings: &Series, from: usize) -> Option<f64> {
+    let points = || {
+        let pairs = time.iter_from(from).zip(readings.iter_from(from));
+        pairs.filter(|(_, y)| y.is_finite())
+    };
+    if points().take(5).count() < 5 {
         return None;
     }
-    let mut residuals: Vec<f64> = points
-        .windows(3)
-        .filter(|w| w[2].0 > w[0].0)
-        .map(|w| {
-            let share = (w[1].0 - w[0].0) / (w[2].0 - w[0].0);
-            let line = w[0].1 + share * (w[2].1 - w[0].1);
-            let weight = 1.0 + share.powi(2) + (1.0 - share).powi(2);
-            (w[1].1 - line).abs() / weight.sqrt()
-        })
-        .collect();
-    residuals.sort_unstable_by(f64::total_cmp);
+    let triples = points().zip(points().skip(1)).zip(points().skip(2));
+    let residuals = triples
+        .filter(|((a, _), c)| c.0 > a.0)
+        .map(|((a, b), c)| off_line(a, b, c));
+    let residuals = Sorted::new(time.store(), residuals);
     // 1.4826 times the median of |normal deviates| is their standard deviation
-    let median = 1.4826 * residuals.get(residuals.len() / 2)?;
+    let median = 1.4826 * residuals.median()?;
+    drop(residuals);
     // readings in steps: most of them on a line, and the step's own error
-    let mut values: Vec<f64> = points.iter().map(|p| p.1).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    let steps = values.windows(2).map(|w| w[1] - w[0]).filter(|d| *d > 0.0);
-    let step = steps.fold(f64::INFINITY, f64::min);
+    let values = Sorted::new(time.store(), points().map(|p| p.1));
+    let step = steps(values.iter()).filter(|d| *d > 0.0);
+    let step = step.fold(f64::INFINITY, f64::min);
     let quantised = if step.is_finite() {
         step / 12_f64.sqrt()
     } else {
@@ -91,6 +84,14 @@ pub(crate) fn scatter(time: &[f64], readings: &[f64]) -> Option<f64> {
     };
     let found = median.max(quantised);
     (found > 0.0).then_some(found)
+}
+
+/// How far b is from the line from a to c, scaled to the deviation of one of them.
+fn off_line(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
+    let share = (b.0 - a.0) / (c.0 - a.0);
+    let line = a.1 + share * (c.1 - a.1);
+    let weight = 1.0 + share.powi(2) + (1.0 - share).powi(2);
+    (b.1 - line).abs() / weight.sqrt()
 }
 
 /// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
@@ -199,9 +200,11 @@ mod tests {
             .collect();
         y[77] = 50.0;
         y[10] = f64::NAN;
+        let scatter =
+            |time: &[f64], y: &[f64]| scatter(&time.to_vec().into(), &y.to_vec().into(), 0);
         let found = scatter(&time, &y).unwrap();
         assert!(0.1 < found && found < 0.4, "{found}");
-        assert_eq!(scatter(&time, &vec![3.0; 200]), None);
+        assert_eq!(scatter(&time, &[3.0; 200]), None);
         assert_eq!(scatter(&time[..3], &y[..3]), None);
         // whole numbers: the error of rounding
         let counted: Vec<f64> = time.iter().map(|t| (0.2 * t).floor()).collect();

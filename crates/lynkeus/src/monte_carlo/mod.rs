@@ -257,11 +257,11 @@ impl Job<'_> {
         self.time.get_or_init(|| ran.run.times().to_vec());
         let series = self.followed.iter().map(|f| Series {
             truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
-            estimate: ran.course.estimates[f.estimate].clone(),
+            estimate: ran.course.estimates[f.estimate].to_vec(),
         });
         let series = series.collect();
         // as `simulate` judges this run alone
-        let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course);
+        let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
         let doubt = alone.refusal().map(|refusal| refusal.to_string());
         Ok(Some(Whole { series, doubt }))
     }

@@ -52,8 +52,8 @@ impl MonteCarlo {
         let unit = unit.map_or(String::new(), |unit| format!(" ({unit})"));
         let curve = |kind, values: &[f64]| Curve {
             kind,
-            time: self.time.clone(),
-            values: values.to_vec(),
+            time: self.time.clone().into(),
+            values: values.to_vec().into(),
         };
         Panel {
             caption: format!("error of {}{unit}", quantity.name),
@@ -63,9 +63,9 @@ impl MonteCarlo {
             ],
             bands: vec![Band {
                 extent: Extent::Quantiles,
-                time: self.time.clone(),
-                low: quantity.error.low.clone(),
-                high: quantity.error.high.clone(),
+                time: self.time.clone().into(),
+                low: quantity.error.low.clone().into(),
+                high: quantity.error.high.clone().into(),
             }],
             ..Panel::default()
         }

@@ -1,7 +1,7 @@
 //! Means, quantiles and the worst of many runs.
 
 use super::{Bands, Series};
-use crate::outcome::settled_error;
+use crate::quantity::settled_error;
 
 /// The quantiles that a band reaches over.
 const LOW: f64 = 0.05;
@@ -34,7 +34,10 @@ pub(super) fn of_runs(runs: &[Vec<Series>], place: usize) -> Found {
     }
     let rms: Vec<f64> = own
         .iter()
-        .map(|s| settled_error(&s.truth, &s.estimate).unwrap_or(f64::NAN))
+        .map(|s| {
+            let pairs = s.truth.iter().copied().zip(s.estimate.iter().copied());
+            settled_error(pairs).unwrap_or(f64::NAN)
+        })
         .collect();
     let worst_run = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
     let worst_run = worst_run.unwrap_or(0);

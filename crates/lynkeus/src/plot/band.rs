@@ -7,6 +7,7 @@ use plotters::prelude::*;
 use super::decimate::decimated;
 use super::render::{BLUE, Chart, Drawn, VERMILION};
 use super::{Band, Span};
+use crate::Series;
 
 /// Height of a mark as a share of the panel's.
 const MARK: f64 = 0.03;
@@ -27,7 +28,7 @@ pub(super) fn draw_band(
     shown: &Range<f64>,
     columns: usize,
 ) -> Drawn {
-    let edge = |values: &[f64]| decimated(&band.time, values, columns);
+    let edge = |values: &Series| decimated(&band.time, values, columns);
     let (low, high) = (edge(&band.low), edge(&band.high));
     let pieces = finite_pieces(&low).into_iter().zip(finite_pieces(&high));
     for (low, high) in pieces {

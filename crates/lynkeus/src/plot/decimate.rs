@@ -2,38 +2,81 @@
 
 use std::ops::Range;
 
+use crate::Series;
+
+/// A point on a picture's plane.
+type Point = (f64, f64);
+
 /// Points of a curve, at most four for each of `columns` equal spans of time: the first, the
 /// lowest, the highest and the last, in their order. A curve with few points stays as it is.
 /// Non-finite values are kept, one for each gap: they break the line.
-pub(super) fn decimated(time: &[f64], values: &[f64], columns: usize) -> Vec<(f64, f64)> {
-    let points: Vec<(f64, f64)> = time.iter().copied().zip(values.iter().copied()).collect();
-    let (Some(first), Some(last)) = (points.first(), points.last()) else {
-        return points;
+pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<(f64, f64)> {
+    let points = || time.iter().zip(values);
+    let count = time.len().min(values.len());
+    let (first, last) = (time.get(0), count.checked_sub(1).and_then(|i| time.get(i)));
+    let (Some(first), Some(last)) = (first, last) else {
+        return vec![];
     };
-    let width = (last.0 - first.0) / columns as f64;
-    if points.len() <= 4 * columns || width.is_nan() || width <= 0.0 {
-        return points;
+    let width = (last - first) / columns as f64;
+    if count <= 4 * columns || width.is_nan() || width <= 0.0 {
+        return points().collect();
     }
-    let column = |p: &(f64, f64)| ((p.0 - first.0) / width).floor();
-    points
-        .chunk_by(|a, b| column(a) == column(b) && a.1.is_finite() == b.1.is_finite())
-        .flat_map(corners)
-        .collect()
+    let column = |p: Point| ((p.0 - first) / width).floor();
+    let are_together =
+        |a: Point, b: Point| column(a) == column(b) && a.1.is_finite() == b.1.is_finite();
+    let mut kept = vec![];
+    let mut few: Option<Few> = None;
+    for point in points().enumerate() {
+        match &mut few {
+            Some(few) if are_together(few.last.1, point.1) => few.take(point),
+            _ => {
+                kept.extend(few.replace(Few::new(point)).iter().flat_map(Few::corners));
+            }
+        }
+    }
+    kept.extend(few.iter().flat_map(Few::corners));
+    kept
 }
 
-/// The first, lowest, highest and last point of a few, in their order, each once.
-fn corners(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let by_value = |a: &(usize, &(f64, f64)), b: &(usize, &(f64, f64))| a.1.1.total_cmp(&b.1.1);
-    let low = points.iter().enumerate().min_by(by_value);
-    let high = points.iter().enumerate().max_by(by_value);
-    let mut kept = vec![0, points.len().saturating_sub(1)];
-    kept.extend(low.map(|(i, _)| i));
-    kept.extend(high.map(|(i, _)| i));
-    kept.sort_unstable();
-    kept.dedup();
-    kept.into_iter()
-        .filter_map(|i| points.get(i).copied())
-        .collect()
+/// A point of a curve with its row.
+type Numbered = (usize, Point);
+
+/// What is drawn of points that are close together.
+struct Few {
+    first: Numbered,
+    low: Numbered,
+    high: Numbered,
+    last: Numbered,
+}
+
+impl Few {
+    fn new(point: Numbered) -> Self {
+        Self {
+            first: point,
+            low: point,
+            high: point,
+            last: point,
+        }
+    }
+
+    fn take(&mut self, point: Numbered) {
+        let y = |p: Numbered| p.1.1;
+        if y(point).total_cmp(&y(self.low)).is_lt() {
+            self.low = point;
+        }
+        if y(point).total_cmp(&y(self.high)).is_ge() {
+            self.high = point;
+        }
+        self.last = point;
+    }
+
+    /// The first, lowest, highest and last point, in their order, each once.
+    fn corners(&self) -> Vec<Point> {
+        let mut kept = vec![self.first, self.low, self.high, self.last];
+        kept.sort_by_key(|p| p.0);
+        kept.dedup_by_key(|p| p.0);
+        kept.into_iter().map(|p| p.1).collect()
+    }
 }
 
 /// The pieces of a line inside a band of values: a line that leaves the band ends at its edge.
@@ -54,9 +97,6 @@ pub(super) fn clipped(points: &[(f64, f64)], band: &Range<f64>) -> Vec<Vec<(f64,
     }
     pieces
 }
-
-/// A point on a picture's plane.
-type Point = (f64, f64);
 
 /// The part of a segment inside the band.
 fn segment(a: Point, b: Point, band: &Range<f64>) -> Option<(Point, Point)> {
@@ -86,7 +126,7 @@ mod tests {
         let time: Vec<f64> = (0..n).map(f64::from).collect();
         let mut values = vec![0.0; n as usize];
         values[54_321] = 7.0;
-        let kept = decimated(&time, &values, 500);
+        let kept = decimated(&time.into(), &values.into(), 500);
         assert!(kept.len() <= 2000, "{}", kept.len());
         assert!(kept.contains(&(54_321.0, 7.0)));
         assert_eq!(kept.last().unwrap().0, f64::from(n - 1));

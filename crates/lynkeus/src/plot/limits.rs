@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use super::{Band, Kind, Panel};
+use crate::Series;
+use crate::series::{Sorted, Store};
 
 /// A panel is cut when its curves span more than this many times what is worth seeing.
 const TOO_TALL: f64 = 4.0;
@@ -47,7 +49,8 @@ impl Panel {
     fn core(&self) -> Option<Range<f64>> {
         let peaks = |kind| matches!(kind, Kind::Estimated | Kind::Worst | Kind::Mean);
         let known = extremes(self.values(|kind| !peaks(kind)));
-        let middle = middle(self.values(peaks));
+        let store = self.curves.first().map(|c| c.values.store());
+        let middle = store.and_then(|store| middle(store, self.values(peaks)));
         let spans = known.into_iter().chain(middle).chain(self.bands());
         spans.reduce(|a, b| union(&a, &b))
     }
@@ -55,8 +58,8 @@ impl Panel {
     /// What a band spans at 90 % of the instants.
     fn bands(&self) -> impl Iterator<Item = Range<f64>> {
         let span = |band: &Band| {
-            let low = middle(band.low.iter().copied())?;
-            Some(union(&low, &middle(band.high.iter().copied())?))
+            let middle = |edge: &Series| middle(edge.store(), edge.iter());
+            Some(union(&middle(&band.low)?, &middle(&band.high)?))
         };
         self.bands.iter().filter_map(span)
     }
@@ -65,17 +68,17 @@ impl Panel {
         self.curves
             .iter()
             .filter(move |c| of(c.kind))
-            .flat_map(|c| c.values.iter().copied())
+            .flat_map(|c| &c.values)
             .filter(|v| v.is_finite())
     }
 }
 
 /// The span of the middle 90 % of the finite values.
-fn middle(values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
-    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
-    values.sort_by(f64::total_cmp);
-    let cut = values.len() / 20;
-    extremes(values.iter().copied().take(values.len() - cut).skip(cut))
+fn middle(store: &Store, values: impl Iterator<Item = f64>) -> Option<Range<f64>> {
+    let sorted = Sorted::new(store, values.filter(|v| v.is_finite()));
+    let cut = sorted.len() / 20;
+    let last = sorted.len().checked_sub(1 + cut)?;
+    Some(sorted.at(cut)?..sorted.at(last)?)
 }
 
 fn union(a: &Range<f64>, b: &Range<f64>) -> Range<f64> {
@@ -109,8 +112,11 @@ mod tests {
     fn curve(kind: Kind, values: Vec<f64>) -> Curve {
         Curve {
             kind,
-            time: (0..values.len()).map(|i| i as f64).collect(),
-            values,
+            time: (0..values.len())
+                .map(|i| i as f64)
+                .collect::<Vec<_>>()
+                .into(),
+            values: values.into(),
         }
     }
 

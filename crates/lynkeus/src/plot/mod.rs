@@ -25,6 +25,8 @@ pub use bars::{Bar, Bars};
 pub use chart::{Chart, Line, Look, Plot, Upright};
 pub use plane::Plane;
 
+use crate::Series;
+
 /// A picture: panels that share the time axis.
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
@@ -55,11 +57,11 @@ pub struct Band {
     /// What lies in it.
     pub extent: Extent,
     /// Instants, increasing.
-    pub time: Vec<f64>,
+    pub time: Series,
     /// Lower ends, as many as instants.
-    pub low: Vec<f64>,
+    pub low: Series,
     /// Upper ends, as many as instants.
-    pub high: Vec<f64>,
+    pub high: Series,
 }
 
 /// What a band reaches over.
@@ -96,9 +98,9 @@ pub struct Curve {
     /// What the values are.
     pub kind: Kind,
     /// Instants, increasing.
-    pub time: Vec<f64>,
+    pub time: Series,
     /// Values, as many as instants.
-    pub values: Vec<f64>,
+    pub values: Series,
 }
 
 /// What the values of a curve are; it decides colour and line.
@@ -136,15 +138,21 @@ impl Figure {
     /// The picture as SVG text.
     ///
     /// # Errors
-    /// There is nothing finite to draw.
+    /// There is nothing finite to draw, or a curve cannot be read again.
     pub fn to_svg(&self) -> Result<String, crate::Error> {
-        render::svg(self)
+        let svg = render::svg(self)?;
+        let curves = self.panels.iter().flat_map(|p| &p.curves);
+        let bands = self.panels.iter().flat_map(|p| &p.bands);
+        let drawn = curves.flat_map(|c| [&c.time, &c.values]);
+        let mut drawn = drawn.chain(bands.flat_map(|b| [&b.time, &b.low, &b.high]));
+        drawn.try_for_each(Series::check)?;
+        Ok(svg)
     }
 
     /// The span of time that all curves cover together.
     fn time_range(&self) -> Option<Range<f64>> {
         let times = self.panels.iter().flat_map(|p| &p.curves);
-        limits::extremes(times.flat_map(|c| c.time.iter().copied()))
+        limits::extremes(times.flat_map(|c| &c.time))
     }
 
     /// The kinds of curves that occur, in the order of the legend.

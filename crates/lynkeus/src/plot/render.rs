@@ -243,8 +243,12 @@ mod tests {
 
     fn wave(kind: Kind, n: usize) -> Curve {
         let time: Vec<f64> = (0..n).map(|i| i as f64 / 10.0).collect();
-        let values = time.iter().map(|t| (t / 3.0).sin()).collect();
-        Curve { kind, time, values }
+        let values: Vec<f64> = time.iter().map(|t| (t / 3.0).sin()).collect();
+        Curve {
+            kind,
+            time: time.into(),
+            values: values.into(),
+        }
     }
 
     fn figure(curves: Vec<Curve>) -> Figure {
@@ -283,12 +287,15 @@ mod tests {
         let time: Vec<f64> = (0..300).map(|i| f64::from(i) / 10.0).collect();
         let band = Band {
             extent: Extent::TwoDeviations,
-            low: vec![-3.0; 300],
-            high: vec![f64::NAN; 300],
-            time,
+            low: vec![-3.0; 300].into(),
+            high: time
+                .iter()
+                .map(|t| 3.0 + t.sin())
+                .collect::<Vec<_>>()
+                .into(),
+            time: time.into(),
         };
-        let high: Vec<f64> = band.time.iter().map(|t| 3.0 + t.sin()).collect();
-        picture.panels[0].bands = vec![Band { high, ..band }];
+        picture.panels[0].bands = vec![band];
         picture.panels[0].outside = vec![Span { from: 3.0, to: 4.0 }];
         let svg = picture.to_svg().unwrap();
         for words in ["± 2 sd", "outside its range", "smoothed", "estimated"] {

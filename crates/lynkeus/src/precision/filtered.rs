@@ -49,16 +49,24 @@ pub(super) fn filtered(
     let design = own.design()?;
     let observer = &design.observer;
     let samples = Samples {
-        time: truth.times(),
+        time: truth.times().to_vec().into(),
         readings: observer
             .measured
             .iter()
-            .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
+            .map(|s| {
+                column(Role::Measured, place(&plant.outputs, &s.name))
+                    .to_vec()
+                    .into()
+            })
             .collect(),
         inputs: observer
             .inputs
             .iter()
-            .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
+            .map(|s| {
+                column(Role::Input, place(&plant.inputs, &s.name))
+                    .to_vec()
+                    .into()
+            })
             .collect(),
     };
     let course = estimate::course(&own, &design, &samples, &mut within(&budget, watch))?;
@@ -66,7 +74,7 @@ pub(super) fn filtered(
     let at = |&horizon: &usize| -> Option<Vec<f64>> {
         deviations
             .iter()
-            .map(|column| column.get(horizon).copied())
+            .map(|column| column.get(horizon))
             .collect()
     };
     Ok(window.horizons.iter().map(at).collect())

@@ -5,6 +5,7 @@ use std::fmt;
 use super::cell::{self, Cell, Mark};
 use super::instant::Instant;
 use super::marks::{FileMarks, Marks, Refusal, ShortComma};
+use crate::series::{Series, Store};
 
 /// Missing cells that are kept with their line.
 const KEPT: usize = 5;
@@ -45,7 +46,7 @@ pub(super) struct Origin {
 pub(super) struct Column {
     pub name: String,
     /// NaN where missing
-    pub values: Vec<f64>,
+    pub values: Series,
     pub missing: usize,
     /// the first missing cells
     pub faults: Vec<Fault>,
@@ -53,52 +54,53 @@ pub(super) struct Column {
     pub origin: Option<Origin>,
     marks: Marks,
     /// rows that say `1,234`, which waits for another cell to tell what that is
-    open: Vec<usize>,
+    open: Rows,
     /// a plain number was seen
     has_number: bool,
 }
 
-/// No room for another value.
-#[derive(Debug)]
-pub(super) struct OutOfMemory;
-
 impl Column {
-    pub(super) fn new(name: &str) -> Self {
+    pub(super) fn new(name: &str, store: &Store) -> Self {
         Self {
             name: name.to_owned(),
+            values: Series::within(store),
             ..Self::default()
         }
     }
 
     /// Of values that are not read from a file.
     pub(super) fn computed(name: String, mut values: Vec<f64>) -> Self {
-        let mut column = Self::new(&name);
+        let mut column = Self {
+            name,
+            ..Self::default()
+        };
         for (row, value) in values.iter_mut().enumerate() {
             if !value.is_finite() {
                 column.miss(row as u64 + 1, &value.to_string());
                 *value = f64::NAN;
             }
         }
-        Self { values, ..column }
+        column.values = values.into();
+        column
     }
 
-    /// Makes room for so many values in all.
-    pub(super) fn reserve(&mut self, rows: usize) -> Result<(), OutOfMemory> {
-        let more = rows.saturating_sub(self.values.len());
-        self.values.try_reserve_exact(more).map_err(|_| OutOfMemory)
-    }
-
-    fn grow(&mut self) -> Result<(), OutOfMemory> {
-        match self.values.len() == self.values.capacity() {
-            true => self.reserve(self.values.len() / 2 * 3 + 1024),
-            false => Ok(()),
+    /// The same with other values.
+    pub(super) fn with(&self, values: Series) -> Self {
+        let missing = values.iter().filter(|x| !x.is_finite()).count();
+        Self {
+            values,
+            missing,
+            faults: match missing {
+                0 => vec![],
+                _ => self.faults.clone(),
+            },
+            ..self.clone()
         }
     }
 
     /// Takes the next row's number; one that is not finite is missing.
     #[cfg(feature = "parquet")]
-    pub(super) fn put(&mut self, value: f64) -> Result<(), OutOfMemory> {
-        self.grow()?;
+    pub(super) fn put(&mut self, value: f64) {
         let value = match value.is_finite() {
             true => value,
             false => {
@@ -108,32 +110,28 @@ impl Column {
             }
         };
         self.values.push(value);
-        Ok(())
     }
 
     /// Takes the next row's point in time.
     #[cfg(feature = "parquet")]
-    pub(super) fn put_instant(&mut self, instant: Instant) -> Result<(), OutOfMemory> {
-        self.grow()?;
+    pub(super) fn put_instant(&mut self, instant: Instant) {
         let line = self.values.len() as u64 + 1;
         let seconds = match &self.origin {
             Some(origin) => instant.seconds_since(origin.instant),
             None => self.instant(instant, line, &instant.to_string()),
         };
         self.values.push(seconds);
-        Ok(())
     }
 
     /// Takes the next row's cell.
-    pub(super) fn push(&mut self, text: &str, line: u64) -> Result<(), OutOfMemory> {
-        self.grow()?;
+    pub(super) fn push(&mut self, text: &str, line: u64) {
         let value = match cell::read(text) {
             Cell::Number(value) => {
                 self.marks.see_plain(value);
                 self.number(value, line, text)
             }
             Cell::Marked(value, mark) => {
-                let value = self.marked(value, mark, line, text)?;
+                let value = self.marked(value, mark, line, text);
                 self.number(value, line, text)
             }
             Cell::Instant(instant) => self.instant(instant, line, text),
@@ -151,7 +149,6 @@ impl Column {
             }
         };
         self.values.push(value);
-        Ok(())
     }
 
     fn number(&mut self, value: f64, line: u64, text: &str) -> f64 {
@@ -164,33 +161,29 @@ impl Column {
     }
 
     /// The value that a marked cell has as far as the column tells.
-    fn marked(
-        &mut self,
-        value: f64,
-        mark: Mark,
-        line: u64,
-        text: &str,
-    ) -> Result<f64, OutOfMemory> {
+    fn marked(&mut self, value: f64, mark: Mark, line: u64, text: &str) -> f64 {
         self.marks.see(mark, line, text);
         match (mark, self.marks.own()) {
-            (Mark::ShortComma, Some(meaning)) => return Ok(meaning.of(value)),
-            (Mark::ShortComma, None) => {
-                self.open.try_reserve(1).map_err(|_| OutOfMemory)?;
-                self.open.push(self.values.len());
-            }
+            (Mark::ShortComma, Some(meaning)) => return meaning.of(value),
+            (Mark::ShortComma, None) => self.open.insert(self.values.len()),
             (_, Some(meaning)) => self.settle(meaning),
             (_, None) => {}
         }
-        Ok(value)
+        value
     }
 
     /// Gives the cells that waited for it their meaning.
     fn settle(&mut self, meaning: ShortComma) {
-        for row in std::mem::take(&mut self.open) {
-            if let Some(value) = self.values.get_mut(row) {
-                *value = meaning.of(*value);
-            }
+        let open = std::mem::take(&mut self.open);
+        if open.is_empty() {
+            return;
         }
+        let settled = self.values.iter().enumerate();
+        let settled = settled.map(|(row, value)| match open.contains(row) {
+            true => meaning.of(value),
+            false => value,
+        });
+        self.values = Series::gathered(self.values.store(), settled);
     }
 
     fn instant(&mut self, instant: Instant, line: u64, text: &str) -> f64 {
@@ -246,6 +239,28 @@ impl Column {
                 self.refusal.get_or_insert(refusal);
             }
         }
-        self.values.shrink_to_fit();
+    }
+}
+
+/// Rows of a column, a bit for each.
+#[derive(Clone, Debug, Default)]
+struct Rows(Vec<u64>);
+
+impl Rows {
+    fn insert(&mut self, row: usize) {
+        let word = row / 64;
+        if self.0.len() <= word {
+            self.0.resize(word + 1, 0);
+        }
+        self.0[word] |= 1 << (row % 64);
+    }
+
+    fn contains(&self, row: usize) -> bool {
+        let word = self.0.get(row / 64);
+        word.is_some_and(|word| word >> (row % 64) & 1 == 1)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }

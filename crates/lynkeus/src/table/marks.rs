@@ -157,7 +157,7 @@ mod tests {
     /// The column `y` of a log whose rows are `t;y`.
     fn y(text: &str) -> Result<Vec<f64>, String> {
         let table = Table::parse(&format!("t;y\n{text}\n"), "log.csv").unwrap();
-        let values = table.readings("y").map(<[f64]>::to_vec);
+        let values = table.readings("y").map(crate::Series::to_vec);
         values.map_err(|e| e.to_string())
     }
 

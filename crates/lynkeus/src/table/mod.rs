@@ -18,10 +18,9 @@ mod read;
 mod row;
 mod write;
 
-use std::borrow::Cow;
-
-use crate::Error;
 use crate::near::{list, nearest};
+use crate::series::Store;
+use crate::{Error, Series};
 use column::Column;
 use lines::Lines;
 
@@ -38,7 +37,8 @@ pub fn is_parquet(path: &std::path::Path) -> bool {
         .is_some_and(|extension| extension.eq_ignore_ascii_case("parquet"))
 }
 
-/// A table of named columns of equal length, all numbers.
+/// A table of named columns of equal length, all numbers. What is long of it is in a temporary
+/// file, so that it takes little memory however many rows it has.
 ///
 /// Asking for a column is an error where its cells cannot be told, so that columns nobody asks
 /// for may hold anything.
@@ -47,6 +47,7 @@ pub struct Table {
     file: String,
     columns: Vec<Column>,
     lines: Lines,
+    store: Store,
 }
 
 impl Table {
@@ -69,6 +70,7 @@ impl Table {
                 .map(|(name, values)| Column::computed(name, values))
                 .collect(),
             lines: Lines::counted(rows),
+            store: Store::default(),
         })
     }
 
@@ -88,7 +90,7 @@ impl Table {
     }
 
     /// A column if there is one of that name whose cells can be told; missing ones are NaN.
-    pub fn get(&self, name: &str) -> Option<&[f64]> {
+    pub fn get(&self, name: &str) -> Option<&Series> {
         let column = self.columns.iter().find(|c| c.name == name)?;
         column.refusal.is_none().then_some(&column.values)
     }
@@ -118,7 +120,7 @@ impl Table {
     /// There is no such column (the message lists those found), there are two, a cell begins like
     /// a number and is none, a decimal mark cannot be told (the message gives the line), or every
     /// cell is missing.
-    pub fn readings(&self, name: &str) -> Result<&[f64], Error> {
+    pub fn readings(&self, name: &str) -> Result<&Series, Error> {
         let column = self.find(name)?;
         if let Some(refusal) = &column.refusal {
             return Err(
@@ -141,24 +143,24 @@ impl Table {
     ///
     /// # Errors
     /// As [`Table::readings`].
-    pub fn held(&self, name: &str) -> Result<Cow<'_, [f64]>, Error> {
+    pub fn held(&self, name: &str) -> Result<Series, Error> {
         let values = self.readings(name)?;
         if self.find(name)?.missing == 0 {
-            return Ok(Cow::Borrowed(values));
+            return Ok(values.clone());
         }
-        let mut last = values.iter().copied().find(|x| x.is_finite());
-        let held = values.iter().map(|&x| {
+        let mut last = values.iter().find(|x| x.is_finite());
+        let held = values.iter().map(|x| {
             last = Some(x).filter(|x| x.is_finite()).or(last);
             last.unwrap_or(f64::NAN)
         });
-        Ok(Cow::Owned(held.collect()))
+        Ok(Series::gathered(&self.store, held))
     }
 
     /// A column without missing cells.
     ///
     /// # Errors
     /// As [`Table::readings`], or a cell is missing (the message gives the first one's line).
-    pub fn column(&self, name: &str) -> Result<&[f64], Error> {
+    pub fn column(&self, name: &str) -> Result<&Series, Error> {
         let values = self.readings(name);
         let column = self.find(name)?;
         if let (None, Some(fault)) = (&column.refusal, column.faults.first()) {
@@ -179,14 +181,15 @@ impl Table {
     ///
     /// # Errors
     /// As [`Table::column`], or a row's time is not after the one before it.
-    pub fn time(&self, name: &str) -> Result<&[f64], Error> {
+    pub fn time(&self, name: &str) -> Result<&Series, Error> {
         if !self.names().any(|n| n == name) {
             return Err(self.without_time(name));
         }
         let time = self.column(name)?;
-        let back = time.windows(2).position(|pair| pair[1] <= pair[0]);
-        let Some(i) = back else { return Ok(time) };
-        let (at, before) = (&time[i + 1], &time[i]);
+        let mut pairs = time.iter().zip(time.iter().skip(1)).enumerate();
+        let Some((i, (before, at))) = pairs.find(|(_, (a, b))| b <= a) else {
+            return Ok(time);
+        };
         let line = |row: usize| self.lines.of(row);
         Err(Error::input(format!(
             "time must increase from row to row, found \"{name}\" = {at} after {before} in line {}",
@@ -194,25 +197,6 @@ impl Table {
         ))
         .at(format!("{}:{}", self.file, line(i + 1)))
         .hint("sort the rows by time and remove doubles"))
-    }
-
-    /// Makes sure that there is memory for so many more columns of this table's length, so that a
-    /// replay ends with a line before it starts and not in its middle.
-    ///
-    /// # Errors
-    /// There is not.
-    pub fn check_room(&self, columns: usize) -> Result<(), Error> {
-        let values = self.rows().checked_mul(columns);
-        let fits = values.is_some_and(|values| Vec::<f64>::new().try_reserve_exact(values).is_ok());
-        match fits {
-            true => Ok(()),
-            false => Err(Error::input(format!(
-                "the replay of {} rows does not fit into memory: it makes {columns} more columns",
-                self.rows()
-            ))
-            .at(&self.file)
-            .hint("replay fewer rows at a time, or allow more memory")),
-        }
     }
 
     fn find(&self, name: &str) -> Result<&Column, Error> {

@@ -3,7 +3,8 @@
 use super::Table;
 use super::column::Column;
 use super::lines::Lines;
-use crate::Error;
+use crate::series::{Sorted, steps};
+use crate::{Error, Series};
 
 /// A row may be so many times the usual step late where the study does not say.
 const LATE: f64 = 10.0;
@@ -30,27 +31,28 @@ impl Table {
             return Err(self.without_time(time));
         }
         let times = self.readings(time)?;
-        if times.iter().all(|t| t.is_finite()) && times.windows(2).all(|w| w[0] < w[1]) {
+        let mut before = f64::NEG_INFINITY;
+        if times
+            .iter()
+            .all(|t| t.is_finite() && std::mem::replace(&mut before, t) < t)
+        {
             return Ok(None);
         }
         let late = late.unwrap_or_else(|| LATE * usual_step(times));
         let mut latest = f64::NEG_INFINITY;
         let mut count = 0;
-        for (row, &t) in times.iter().enumerate().filter(|(_, t)| t.is_finite()) {
+        for (row, t) in times.iter().enumerate().filter(|(_, t)| t.is_finite()) {
             if latest - t > late {
                 return Err(self.jumped(time, row, t, latest));
             }
             count += usize::from(t < latest);
             latest = latest.max(t);
         }
-        let mut rows: Vec<usize> = (0..times.len())
-            .filter(|&row| times[row].is_finite())
-            .collect();
-        let timeless = times.len() - rows.len();
-        rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
-        let groups: Vec<&[usize]> = rows.chunk_by(|&a, &b| times[a] == times[b]).collect();
-        let repeated = rows.len() - groups.len();
-        let columns = self.columns.iter().map(|column| merged(column, &groups));
+        let groups = Groups::of(times)?;
+        let timeless = times.len() - groups.rows.len();
+        let repeated = groups.rows.len() - groups.count;
+        let merged = |column: &Column| Ok(column.with(groups.merged(&column.values)?));
+        let columns: Result<Vec<Column>, Error> = self.columns.iter().map(merged).collect();
         let notes = [
             (count, "came late and were put in their place"),
             (
@@ -62,8 +64,9 @@ impl Table {
         Ok(Some(Ordered {
             table: Table {
                 file: self.file.clone(),
-                columns: columns.collect(),
-                lines: Lines::counted(groups.len()),
+                columns: columns?,
+                lines: Lines::counted(groups.count),
+                store: self.store.clone(),
             },
             notes: notes
                 .into_iter()
@@ -83,29 +86,52 @@ impl Table {
 }
 
 /// The median of the steps that go forward.
-fn usual_step(times: &[f64]) -> f64 {
-    let steps = times.windows(2).map(|w| w[1] - w[0]);
-    let mut steps: Vec<f64> = steps.filter(|step| *step > 0.0).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+fn usual_step(times: &Series) -> f64 {
+    let forward = steps(times.iter()).filter(|step| *step > 0.0);
+    let sorted = Sorted::new(times.store(), forward);
+    sorted.median().unwrap_or(0.0)
 }
 
-/// A column over groups of rows: the last value that is there.
-fn merged(column: &Column, groups: &[&[usize]]) -> Column {
-    let value = |group: &&[usize]| {
-        let values = group.iter().rev().map(|&row| column.values[row]);
-        values
-            .into_iter()
-            .find(|x| x.is_finite())
-            .unwrap_or(f64::NAN)
-    };
-    let mut merged = column.clone();
-    merged.values = groups.iter().map(value).collect();
-    merged.missing = merged.values.iter().filter(|x| !x.is_finite()).count();
-    if merged.missing == 0 {
-        merged.faults.clear();
+/// The rows that have a time, in the order of their times; those of one time are a group.
+struct Groups {
+    rows: Vec<usize>,
+    /// whether a row is the last one of its time
+    ends: Vec<bool>,
+    count: usize,
+}
+
+impl Groups {
+    fn of(times: &Series) -> Result<Self, Error> {
+        let times = times.held()?;
+        let mut rows: Vec<usize> = (0..times.len())
+            .filter(|&row| times[row].is_finite())
+            .collect();
+        rows.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+        let after = rows.iter().skip(1).map(|&row| Some(times[row]));
+        let pairs = rows.iter().zip(after.chain([None]));
+        let ends: Vec<bool> = pairs
+            .map(|(&row, after)| after != Some(times[row]))
+            .collect();
+        let count = ends.iter().filter(|end| **end).count();
+        Ok(Self { rows, ends, count })
     }
-    merged
+
+    /// A column over the groups: of each the last value that is there.
+    fn merged(&self, values: &Series) -> Result<Series, Error> {
+        let of_row = values.held()?;
+        let mut merged = Series::within(values.store());
+        let mut last = f64::NAN;
+        for (&row, &is_end) in self.rows.iter().zip(&self.ends) {
+            if of_row[row].is_finite() {
+                last = of_row[row];
+            }
+            if is_end {
+                merged.push(last);
+                last = f64::NAN;
+            }
+        }
+        Ok(merged)
+    }
 }
 
 #[cfg(test)]
@@ -120,9 +146,9 @@ mod tests {
     fn late_rows_find_their_place_and_doubles_become_one() {
         let text = "t,y,u\n0,1,5\n2,3,5\n1,2,6\n2,,7\n,9,9\n3,4,8\n";
         let Ordered { table, notes } = read(text, None).unwrap().unwrap();
-        assert_eq!(table.time("t").unwrap(), [0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(table.readings("y").unwrap(), [1.0, 2.0, 3.0, 4.0]);
-        assert_eq!(table.readings("u").unwrap(), [5.0, 6.0, 7.0, 8.0]);
+        assert_eq!(table.time("t").unwrap().to_vec(), [0.0, 1.0, 2.0, 3.0]);
+        assert_eq!(table.readings("y").unwrap().to_vec(), [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(table.readings("u").unwrap().to_vec(), [5.0, 6.0, 7.0, 8.0]);
         assert_eq!(notes.len(), 3, "{notes:?}");
         assert!(read("t,y\n0,1\n1,2\n", None).unwrap().is_none());
     }

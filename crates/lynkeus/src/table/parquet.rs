@@ -16,13 +16,14 @@ use ::parquet::file::writer::SerializedFileWriter;
 use ::parquet::schema::types::{ColumnDescriptor, Type};
 
 use super::Table;
-use super::column::{Column, OutOfMemory};
+use super::column::Column;
 use super::instant::Instant;
 use super::lines::Lines;
 use super::marks::FileMarks;
-use crate::Error;
+use crate::series::{Iter, Store};
+use crate::{Error, Series};
 
-/// Rows that are read at a time.
+/// Rows that are read or written at a time.
 const BATCH: usize = 8192;
 
 /// Rows of a group that is written.
@@ -48,7 +49,7 @@ enum Meaning {
 /// Reads a Parquet file; its rows count from 1 in messages.
 ///
 /// # Errors
-/// The file is no Parquet file or cut short, has no rows, or does not fit into memory.
+/// The file is no Parquet file or cut short, has no rows, or there is no room for its numbers.
 pub(super) fn load(file: File, name: &str) -> Result<Table, Error> {
     let broken = |e: ParquetError| {
         Error::input(format!("cannot read the Parquet file: {e}"))
@@ -59,29 +60,22 @@ pub(super) fn load(file: File, name: &str) -> Result<Table, Error> {
     let metadata = reader.metadata();
     let rows = usize::try_from(metadata.file_metadata().num_rows()).unwrap_or(usize::MAX);
     let schema = metadata.file_metadata().schema_descr();
-    let full = |_: OutOfMemory| {
-        Error::input(format!("the log does not fit into memory: {rows} rows"))
-            .at(name)
-            .hint("keep the columns that the study reads, or fewer rows at a time")
-    };
     if rows == 0 {
         return Err(Error::input("expected rows, found none").at(name));
     }
+    let store = Store::default();
     let mut columns = Vec::new();
     for (index, described) in schema.columns().iter().enumerate() {
-        let mut column = Column::new(&described.path().string());
+        let mut column = Column::new(&described.path().string(), &store);
         if described.max_rep_level() > 0 {
             // a list in every row: no column of numbers
             continue;
         }
-        column.reserve(rows).map_err(full)?;
         for group in 0..metadata.num_row_groups() {
             let group = reader.get_row_group(group).map_err(broken)?;
             let chunk = group.get_column_reader(index).map_err(broken)?;
-            read(chunk, described, &mut column).map_err(|failure| match failure {
-                Failure::Broken(e) => broken(e),
-                Failure::Full => full(OutOfMemory),
-            })?;
+            read(chunk, described, &mut column).map_err(broken)?;
+            store.check()?;
         }
         column.finish(FileMarks::default());
         columns.push(column);
@@ -90,20 +84,15 @@ pub(super) fn load(file: File, name: &str) -> Result<Table, Error> {
         file: name.to_owned(),
         columns,
         lines: Lines::counted(rows),
+        store,
     })
-}
-
-/// Why a column could not be read.
-enum Failure {
-    Broken(ParquetError),
-    Full,
 }
 
 fn read(
     chunk: ColumnReader,
     described: &ColumnDescriptor,
     column: &mut Column,
-) -> Result<(), Failure> {
+) -> Result<(), ParquetError> {
     let meaning = meaning(described);
     let levels = described.max_def_level();
     match chunk {
@@ -131,16 +120,14 @@ fn each<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     most: i16,
     column: &mut Column,
-    mut take: impl FnMut(&mut Column, &T::T) -> Result<(), OutOfMemory>,
-) -> Result<(), Failure> {
+    mut take: impl FnMut(&mut Column, &T::T),
+) -> Result<(), ParquetError> {
     let (mut values, mut levels) = (Vec::new(), Vec::new());
     loop {
         values.clear();
         levels.clear();
         let room = (most > 0).then_some(&mut levels);
-        let (rows, ..) = reader
-            .read_records(BATCH, room, None, &mut values)
-            .map_err(Failure::Broken)?;
+        let (rows, ..) = reader.read_records(BATCH, room, None, &mut values)?;
         if rows == 0 {
             return Ok(());
         }
@@ -152,15 +139,14 @@ fn each<T: DataType>(
                 Some(value) => take(column, value),
                 None => column.put(f64::NAN),
             }
-            .map_err(|_| Failure::Full)?;
         }
     }
 }
 
-fn text(column: &mut Column, bytes: &impl AsBytes) -> Result<(), OutOfMemory> {
+fn text(column: &mut Column, bytes: &impl AsBytes) {
     let line = column.values.len() as u64 + 1;
     let text = std::str::from_utf8(bytes.as_bytes()).unwrap_or("bytes");
-    column.push(text.trim(), line)
+    column.push(text.trim(), line);
 }
 
 /// What both kinds of byte arrays are made of.
@@ -180,11 +166,11 @@ impl AsBytes for ::parquet::data_type::FixedLenByteArray {
     }
 }
 
-fn whole(column: &mut Column, value: i64, bits: u32, meaning: Meaning) -> Result<(), OutOfMemory> {
+fn whole(column: &mut Column, value: i64, bits: u32, meaning: Meaning) {
     match meaning {
         Meaning::Time { unit, zoned } => {
             let nanoseconds = i128::from(value) * i128::from(unit);
-            column.put_instant(Instant::at(nanoseconds, zoned))
+            column.put_instant(Instant::at(nanoseconds, zoned));
         }
         Meaning::Number { scale, unsigned } => {
             let value = match (unsigned, bits) {
@@ -192,7 +178,7 @@ fn whole(column: &mut Column, value: i64, bits: u32, meaning: Meaning) -> Result
                 (true, _) => value.cast_unsigned() as f64,
                 _ => value as f64,
             };
-            column.put(value / 10_f64.powi(scale))
+            column.put(value / 10_f64.powi(scale));
         }
     }
 }
@@ -230,13 +216,13 @@ fn meaning(described: &ColumnDescriptor) -> Meaning {
 /// What the writer reports.
 pub fn write_parquet(
     to: &mut (impl Write + Send),
-    columns: &[(&str, &[f64])],
+    columns: &[(&str, &Series)],
 ) -> std::io::Result<()> {
     write(to, columns).map_err(std::io::Error::other)
 }
 
-fn write(to: &mut (impl Write + Send), columns: &[(&str, &[f64])]) -> Result<(), ParquetError> {
-    let field = |(name, _): &(&str, &[f64])| {
+fn write(to: &mut (impl Write + Send), columns: &[(&str, &Series)]) -> Result<(), ParquetError> {
+    let field = |(name, _): &(&str, &Series)| {
         let field = Type::primitive_type_builder(name, Physical::DOUBLE);
         let field = field.with_repetition(Repetition::OPTIONAL).build()?;
         Ok(Arc::new(field))
@@ -248,23 +234,34 @@ fn write(to: &mut (impl Write + Send), columns: &[(&str, &[f64])]) -> Result<(),
     let schema = Arc::new(schema.build()?);
     let mut writer = SerializedFileWriter::new(to, schema, Arc::new(properties.build()))?;
     let rows = columns.iter().map(|(_, v)| v.len()).min().unwrap_or(0);
+    let mut rest: Vec<Iter<'_>> = columns.iter().map(|(_, values)| values.iter()).collect();
     for from in (0..rows).step_by(GROUP) {
-        let to = rows.min(from + GROUP);
         let mut group = writer.next_row_group()?;
-        for (_, values) in columns {
-            let values = values.get(from..to).unwrap_or_default();
-            let present: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
-            let levels: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
-            if let Some(mut column) = group.next_column()? {
+        for values in &mut rest {
+            let Some(mut column) = group.next_column()? else {
+                continue;
+            };
+            let mut left = GROUP.min(rows - from);
+            while left > 0 {
+                let values: Vec<f64> = values.take(left.min(BATCH)).collect();
+                let present: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+                let levels: Vec<i16> = values.iter().map(|x| i16::from(!x.is_nan())).collect();
                 let typed = column.typed::<DoubleType>();
                 typed.write_batch(&present, Some(&levels), None)?;
-                column.close()?;
+                left -= values.len().max(1);
             }
+            column.close()?;
         }
         group.close()?;
+        columns.iter().try_for_each(|(_, values)| checked(values))?;
     }
     writer.close()?;
     Ok(())
+}
+
+fn checked(values: &Series) -> Result<(), ParquetError> {
+    let failed = |e: Error| ParquetError::External(Box::new(e));
+    values.check().map_err(failed)
 }
 
 #[cfg(test)]

@@ -4,14 +4,13 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::Table;
-use super::column::{Column, OutOfMemory};
-use super::lines::Lines;
+use super::column::Column;
 use super::marks::FileMarks;
 use super::row::{Broken, Rows};
 use crate::Error;
 
-/// Rows after which the length of the file tells how many there will be.
-const SAMPLE: usize = 4096;
+/// Rows between two looks at whether there is room for them.
+const SAMPLE: usize = 1 << 16;
 
 /// Most columns of a log.
 const MOST_COLUMNS: usize = 100_000;
@@ -21,11 +20,12 @@ impl Table {
     ///
     /// The delimiter is a comma, a semicolon or a tab, whichever the header has most of; headers
     /// and cells are trimmed. Decimal commas, marks between thousands, and dates are understood
-    /// where they leave no doubt. The file is read as a stream: only the numbers are kept.
+    /// where they leave no doubt. The file is read as a stream: only the numbers are kept, those of
+    /// a long log in a temporary file.
     ///
     /// # Errors
-    /// The file is missing, no file, not UTF-8 text, empty, has no rows, does not fit into memory,
-    /// or a row has more or fewer cells than the header.
+    /// The file is missing, no file, not UTF-8 text, empty, has no rows, there is no room for its
+    /// numbers, or a row has more or fewer cells than the header.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let file = crate::files::open(path, "log")?;
@@ -33,9 +33,8 @@ impl Table {
         if super::is_parquet(path) {
             return super::parquet::load(file, &path.display().to_string());
         }
-        let length = file.metadata().map_or(0, |data| data.len());
         let input = BufReader::with_capacity(1 << 16, file);
-        read(input, &path.display().to_string(), Some(length))
+        Self::read(input, &path.display().to_string())
     }
 
     /// Reads CSV text; `file` names it in messages.
@@ -43,7 +42,28 @@ impl Table {
     /// # Errors
     /// As [`Table::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
-        read(text.as_bytes(), file, None)
+        Self::read(text.as_bytes(), file)
+    }
+
+    /// Reads CSV text as it comes; `file` names it in messages.
+    ///
+    /// # Errors
+    /// As [`Table::load`].
+    pub fn read(input: impl BufRead, file: &str) -> Result<Self, Error> {
+        let mut reading = Reading {
+            rows: Rows::new(input),
+            table: Table {
+                file: file.to_owned(),
+                ..Self::default()
+            },
+            delimiter: b',',
+            scratch: String::new(),
+        };
+        reading.header()?;
+        while reading.next()? {
+            reading.row()?;
+        }
+        reading.finish()
     }
 }
 
@@ -52,31 +72,7 @@ struct Reading<R> {
     rows: Rows<R>,
     table: Table,
     delimiter: u8,
-    /// bytes of the file
-    length: Option<u64>,
-    /// bytes of the rows so far
-    seen: u64,
     scratch: String,
-}
-
-fn read(input: impl BufRead, file: &str, length: Option<u64>) -> Result<Table, Error> {
-    let mut reading = Reading {
-        rows: Rows::new(input),
-        table: Table {
-            file: file.to_owned(),
-            columns: Vec::new(),
-            lines: Lines::default(),
-        },
-        delimiter: b',',
-        length,
-        seen: 0,
-        scratch: String::new(),
-    };
-    reading.header()?;
-    while reading.next()? {
-        reading.row()?;
-    }
-    reading.finish()
 }
 
 impl<R: BufRead> Reading<R> {
@@ -96,7 +92,8 @@ impl<R: BufRead> Reading<R> {
         for index in 0..count {
             let name = self.rows.cell(index, &mut self.scratch);
             let name = name.map_err(|_| not_utf8(&self.table.file, self.rows.number()))?;
-            self.table.columns.push(Column::new(name));
+            let column = Column::new(name, &self.table.store);
+            self.table.columns.push(column);
         }
         if !any || self.table.names().all(str::is_empty) {
             return Err(Error::input(
@@ -120,29 +117,12 @@ impl<R: BufRead> Reading<R> {
         for (index, column) in self.table.columns.iter_mut().enumerate() {
             let text = self.rows.cell(index, &mut self.scratch);
             let text = text.map_err(|_| not_utf8(&self.table.file, line))?;
-            column
-                .push(text, line)
-                .map_err(|_| too_large(&self.table.file, &self.table.lines, count))?;
+            column.push(text, line);
         }
-        self.seen += self.rows.raw().len() as u64 + 1;
-        match self.table.rows() == SAMPLE {
-            true => self.reserve(),
+        match self.table.rows().is_multiple_of(SAMPLE) {
+            true => self.table.store.check(),
             false => Ok(()),
         }
-    }
-
-    /// Makes room for the rows that the file seems to have.
-    fn reserve(&mut self) -> Result<(), Error> {
-        let length = self.length.unwrap_or(0);
-        // a little more than needed costs nothing: it is given back at the end
-        let rows = 1.02 * length as f64 / (self.seen as f64 / SAMPLE as f64);
-        let columns = self.table.columns.len();
-        for column in &mut self.table.columns {
-            column
-                .reserve(rows as usize)
-                .map_err(|OutOfMemory| too_large(&self.table.file, &self.table.lines, columns))?;
-        }
-        Ok(())
     }
 
     fn finish(self) -> Result<Table, Error> {
@@ -160,6 +140,7 @@ impl<R: BufRead> Reading<R> {
         };
         table.columns.iter().for_each(|c| c.tell(&mut file));
         table.columns.iter_mut().for_each(|c| c.finish(file));
+        table.store.check()?;
         Ok(table)
     }
 
@@ -196,13 +177,4 @@ fn not_utf8(file: &str, line: u64) -> Error {
     Error::input("the log file must be UTF-8 text, found other bytes")
         .at(format!("{file}:{line}"))
         .hint("save it as UTF-8")
-}
-
-fn too_large(file: &str, lines: &Lines, columns: usize) -> Error {
-    Error::input(format!(
-        "the log does not fit into memory: {columns} columns, {} rows read",
-        lines.rows()
-    ))
-    .at(file)
-    .hint("keep the columns that the study reads, or fewer rows at a time")
 }

@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 
 use super::number::{write_exact, write_significant};
+use crate::Series;
+use crate::series::Iter;
 
 /// Bytes that are gathered before they are written.
 const BLOCK: usize = 1 << 16;
@@ -14,8 +16,8 @@ const BLOCK: usize = 1 << 16;
 /// so a table takes no room but its own.
 ///
 /// # Errors
-/// What the writer reports.
-pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<()> {
+/// What the writer reports; a column that cannot be read again.
+pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &Series)]) -> io::Result<()> {
     let mut text = Vec::with_capacity(2 * BLOCK);
     for (place, (name, _)) in columns.iter().enumerate() {
         if place > 0 {
@@ -25,9 +27,10 @@ pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<(
     }
     text.push(b'\n');
     let rows = columns.iter().map(|(_, v)| v.len()).min().unwrap_or(0);
-    for row in 0..rows {
-        for (place, (_, values)) in columns.iter().enumerate() {
-            let value = values.get(row).copied().unwrap_or(f64::NAN);
+    let mut rest: Vec<Iter<'_>> = columns.iter().map(|(_, values)| values.iter()).collect();
+    for _ in 0..rows {
+        for (place, values) in rest.iter_mut().enumerate() {
+            let value = values.next().unwrap_or(f64::NAN);
             match place {
                 0 => write_exact(&mut text, value),
                 _ => {
@@ -44,6 +47,8 @@ pub fn write_csv(to: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<(
             text.clear();
         }
     }
+    let checked = columns.iter().try_for_each(|(_, values)| values.check());
+    checked.map_err(io::Error::other)?;
     to.write_all(&text)?;
     to.flush()
 }

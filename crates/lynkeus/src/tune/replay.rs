@@ -12,8 +12,9 @@ use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
+use crate::columns::{refuse_stray_columns, signal};
 use crate::crew::{Watch, part};
-use crate::estimate::{refuse_derivatives, refuse_stray_columns, run_settings, signal};
+use crate::estimate::{refuse_derivatives, run_settings};
 use crate::headers::{refuse_seconds, time_of};
 use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
@@ -43,7 +44,7 @@ struct Replay<'a> {
     switchable: Observer,
     /// the same, compiled
     observer: System,
-    time: &'a [f64],
+    time: Vec<f64>,
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
     /// values of the measured outputs
@@ -69,7 +70,7 @@ impl<'a> Replay<'a> {
         let run = run_settings(settings);
         refuse_derivatives(study, design)?;
         refuse_stray_columns(plant, settings)?;
-        let column = |name: &str| Ok(signal(table, settings, &design.observer, name)?.into_owned());
+        let column = |name: &str| signal(table, settings, &design.observer, name)?.held();
         let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
             signals.iter().map(|s| s.name.clone()).collect()
         };
@@ -78,7 +79,7 @@ impl<'a> Replay<'a> {
         read.extend(measured.iter().cloned());
         let header_of_time = time_of(table, plant, settings, read.iter().map(String::as_str))?;
         refuse_seconds(study, table, &header_of_time)?;
-        let time = table.time(&header_of_time)?;
+        let time = table.time(&header_of_time)?.held()?;
         let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
         let measured: Result<Vec<_>, Error> = measured.iter().map(|n| column(n)).collect();
         let switchable = switchable(plant, &design.observer);
@@ -86,7 +87,6 @@ impl<'a> Replay<'a> {
             observer: systems::observer(plant, &switchable)?,
             switchable,
             plan: Plan::new(study, time.len())?,
-            time,
             names: read,
             columns: columns?,
             measured: measured?,
@@ -94,6 +94,7 @@ impl<'a> Replay<'a> {
                 method: thrifty(run.method, time.len() as f64),
                 ..run
             },
+            time,
             file: table.file(),
             study: &study.file,
         })

@@ -12,6 +12,7 @@ mod how_well;
 mod limits;
 mod live;
 mod logs;
+mod long;
 mod messages;
 mod names;
 #[path = "../normal/mod.rs"]
