@@ -46,6 +46,10 @@ pub(crate) fn run(
         Some(Smoothing::Interval) => filter.smoothed(None, false),
         Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), false),
     };
+    if study.estimate.smoothing.is_some() && smoothed.is_none() {
+        let note = "nothing is smoothed: the model has no value along the last window";
+        course.notes.push(note.to_owned());
+    }
     course.smoothed = smoothed.map(|rows| columns(n, &rows));
     Ok(course)
 }
@@ -65,10 +69,7 @@ pub(crate) fn estimator(
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
-    if study.estimate.smoothing.is_some() && matches!(tuning.kind, FilterKind::MovingHorizon(..)) {
-        let message = "`smooth` and `lag` of [estimate] need family = \"ekf\" or \"ukf\"";
-        return Err(Error::input(message).at(&study.file));
-    }
+    refuse_longer_lag(study, &tuning.kind)?;
     let model = model(study, extended, design, tuning, samples, notes)?;
     let settings_of_filter = FilterSettings {
         kind: tuning.kind.clone(),
@@ -76,6 +77,24 @@ pub(crate) fn estimator(
         keep_history: study.estimate.smoothing.is_some(),
     };
     Estimator::filter(&model, settings_of_filter, settings).map_err(Error::from_source)
+}
+
+/// A window has no row older than its horizon.
+fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
+    let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon, _)) =
+        (study.estimate.smoothing, kind)
+    else {
+        return Ok(());
+    };
+    if lag <= *horizon {
+        return Ok(());
+    }
+    let message = format!(
+        "`lag` of [estimate]: expected at most the {horizon} samples of the window of family = \"mhe\", found {lag}"
+    );
+    Err(Error::input(message)
+        .at(&study.file)
+        .hint("raise `horizon` of [observer], or take smooth = true"))
 }
 
 fn columns(count: usize, rows: &[Smoothed]) -> Vec<Vec<f64>> {

@@ -125,7 +125,7 @@ pub use monte_carlo::monte_carlo;
 pub use outcome::{Outcome, Quantity, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
-pub use propose::Proposal;
+pub use propose::{Proposal, Speed};
 pub use simulate::simulate;
 pub use study::{Study, schema};
 pub use systems::observer as observer_system;

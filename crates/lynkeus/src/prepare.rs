@@ -188,8 +188,8 @@ impl<'a> Prepared<'a> {
             return Err(none_fits(self.study, examinations));
         };
         let mut tuned = tuning.clone();
-        if let Some(Proposal { value, .. }) = choice.proposal {
-            let slot = tuned.values.entry(Proposal::KEY.to_owned());
+        if let Some(Proposal { speed, value, .. }) = choice.proposal {
+            let slot = tuned.values.entry(speed.key().to_owned());
             slot.or_insert(Value::Number(value));
         }
         // a certified gain holds for the known inputs as the study simulates them

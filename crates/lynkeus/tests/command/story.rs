@@ -193,10 +193,17 @@ fn the_study_for_a_bare_model_runs() {
         text.contains(study) && text.contains("lynkeus simulate study.toml"),
         "{text}"
     );
+    // poles as well as a θ
+    folder.write("m.mo", &CART.replace("y = x;", "y = x + 0.2*v;"));
+    let report = folder.run(&["check", "m.mo", "--json"]).json();
+    let study = report["next"]["study"].as_str().unwrap();
+    assert!(study.contains("poles = -"), "{study}");
+    folder.write("new.toml", study);
+    let run = folder.run(&["simulate", "new.toml", "-o", "a.csv"]);
+    assert_eq!(run.code, 0, "{}\n{study}", run.err);
 }
 
-/// A key of the filters leaves the families with a theorem out, by name; it is no refusal. Poles that
-/// are missing are named, and the next family is taken.
+/// A key of the filters leaves the families with a theorem out, by name; it is no refusal.
 #[test]
 fn a_family_without_a_key_is_named() {
     let gated = folder(CART, &format!("{RUN}[observer]\ngate = 5\n"));
@@ -210,23 +217,55 @@ fn a_family_without_a_key_is_named() {
         ended.out
     );
     assert!(ended.out.contains("by ekf"), "{}", ended.out);
-    // y = x + v fits no chain
+}
+
+/// y = x + 0.2v fits no chain: the slowest pole is proposed like θ where it can be tried. Where it
+/// cannot it is named as missing, and the next family is taken.
+#[test]
+fn poles_are_proposed_where_they_can_be_tried() {
     let summed = CART.replace("y = x;", "y = x + 0.2*v;");
-    let folder = folder(&summed, RUN);
-    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let tried = folder(&summed, RUN);
+    let report = tried.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["recommended"], "drift-observable", "{report}");
+    let proposed = &report["choice"]["proposed"];
+    assert_eq!(proposed["key"], "poles");
+    let pole = proposed["value"].as_f64().unwrap();
+    assert!(-20.0 < pole && pole < -0.1, "{pole}");
+    let run = tried.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
+    assert_eq!(run.json()["family"], "drift-observable");
+    let words = format!("poles = {pole} is proposed: the knee of 13 values in simulation");
+    assert!(run.err.contains(&words), "{}", run.err);
+    let observer = report["next"]["observer"].as_str().unwrap();
+    tried.write(
+        "pasted.toml",
+        &format!("plant = \"m.mo\"\n{RUN}\n{observer}"),
+    );
+    let pasted = tried.run(&["simulate", "pasted.toml", "-o", "b.csv"]);
+    assert_eq!(pasted.code, 0, "{}", pasted.err);
+    assert_eq!(tried.read("a.csv"), tried.read("b.csv"));
+    // a value ten times as fast does worse: it passes more noise
+    let rms = |table: &str| {
+        let (header, rows) = csv(&tried.read(table));
+        let at = |name: &str| header.iter().position(|h| h == name).unwrap();
+        let (hat, truth) = (at("v_hat"), at("v"));
+        let late = rows.iter().skip(rows.len() / 2);
+        late.map(|row| (row[hat] - row[truth]).powi(2)).sum::<f64>()
+    };
+    let faster = format!("poles = {}", 10.0 * pole);
+    tried.change("pasted.toml", &format!("poles = {pole}"), &faster);
+    tried.run(&["simulate", "pasted.toml", "-o", "c.csv"]);
+    assert!(rms("c.csv") > 2.0 * rms("a.csv"));
+
+    let untried = folder(&summed, "[sensors]\nnoise = { y = 0.02 }\n");
+    let report = untried.run(&["check", "study.toml", "--json"]).json();
     assert_eq!(report["recommended"], "ekf", "{report}");
     let passed = report["choice"]["passed_over"].to_string();
-    assert!(
-        passed.contains("drift-observable fits, but it needs `poles`"),
-        "{passed}"
-    );
-    let run = folder.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
-    assert_eq!(run.json()["family"], "ekf");
-    assert!(
-        run.err.contains("it needs `poles`") && run.err.contains("nothing is proved"),
-        "{}",
-        run.err
-    );
+    for words in [
+        "drift-observable fits, but it needs `poles`",
+        "with [simulate] one is proposed",
+    ] {
+        assert!(passed.contains(words), "{passed}");
+    }
 }
 
 /// A tail that nothing corrects and that decays in 1000 s is no observer for a run of 4 s.

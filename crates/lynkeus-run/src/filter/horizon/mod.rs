@@ -9,18 +9,21 @@
 //! present trajectory, so that its band structure is used and no noise need be invertible. A
 //! bound that is met is an exact reading of that state; it is let go where it would pull inward.
 
+mod pass;
+mod row;
+
 use std::collections::VecDeque;
 
 use super::extended::Extended;
-use super::health::Reading;
 use super::model::FilterModel;
-use super::root::{Packed, Root, dot};
+use super::root::Root;
 use super::sensing::Sensing;
-use super::smooth::{Adjoint, Correction};
-use super::spanned::Rows;
+use super::smooth::Step;
 use super::{Belief, Bounds, confine};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
+use pass::{Pass, Smooth, backward, corrected, judged, predicted};
+use row::{Met, Row};
 
 /// Most Gauss–Newton steps and changes of the bounds that are met, per sample.
 const STEPS: usize = 8;
@@ -36,19 +39,19 @@ pub(super) struct Horizon {
     /// what was known before the first row of the window
     prior: Belief,
     rows: VecDeque<Row>,
+    /// what a smoother needs is kept
+    keep: bool,
+    /// what the last correction leaves for a smoother
+    done: Done,
 }
 
-/// A sample in the window.
+/// What a correction leaves for a smoother.
 #[derive(Clone, Debug, Default)]
-struct Row {
-    t: f64,
-    inputs: Vec<f64>,
-    /// (sensor, reading, variance of its noise)
-    readings: Vec<(usize, f64, f64)>,
-    /// the trajectory about which the problem is linearised
-    guess: Vec<f64>,
-    /// (state, bound) that are met
-    met: Vec<(usize, f64)>,
+pub(super) struct Done {
+    /// the states of the window, row after row
+    pub window: Vec<f64>,
+    /// the row that left
+    pub left: Option<Step>,
 }
 
 impl Persist for Horizon {
@@ -61,54 +64,11 @@ impl Persist for Horizon {
         self.rows.resize_with(count, Row::default);
         for row in &mut self.rows {
             // a row that was not there yet has no room
-            row.inputs.resize(inputs, 0.0);
-            row.guess.resize(states, 0.0);
+            row.make_room(inputs, states);
             row.walk(walk, self.sensors)?;
         }
         Ok(())
     }
-}
-
-impl Row {
-    fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
-        walk.number(&mut self.t)?;
-        walk.numbers(&mut self.inputs)?;
-        walk.numbers(&mut self.guess)?;
-        let count = walk.length(self.readings.len())?;
-        self.readings.resize(count, (0, 0.0, 0.0));
-        for (sensor, reading, variance) in &mut self.readings {
-            walk.below(sensor, sensors)?;
-            walk.number(reading)?;
-            walk.number(variance)?;
-        }
-        let count = walk.length(self.met.len())?;
-        self.met.resize(count, (0, 0.0));
-        for (state, bound) in &mut self.met {
-            walk.below(state, self.guess.len())?;
-            walk.number(bound)?;
-        }
-        Ok(())
-    }
-}
-
-/// A row given the whole window.
-struct Smooth {
-    x: Vec<f64>,
-    /// how hard each bound that is met (its place among `met`) pushes its state upward
-    forces: Vec<(usize, f64)>,
-}
-
-/// One row of a forward pass.
-struct Pass {
-    before: Belief,
-    after: Belief,
-    /// the root before the bounds
-    by_readings: Root,
-    /// Φ from the row before; none of the first
-    transition: Option<Rows>,
-    readings: Vec<Correction>,
-    /// one per bound that is met, with its place among `met`
-    bounds: Vec<(usize, Correction)>,
 }
 
 impl Horizon {
@@ -117,6 +77,7 @@ impl Horizon {
         length: usize,
         bounds: Vec<Bounds>,
         run: EstimatorSettings,
+        keep: bool,
     ) -> Result<Self, Error> {
         if length == 0 {
             return Err(Error::setting("horizon", "at least 1 sample", 0));
@@ -135,6 +96,8 @@ impl Horizon {
                 root: Root::diagonal(&model.initial_variance),
             },
             rows: VecDeque::new(),
+            keep,
+            done: Done::default(),
         })
     }
 
@@ -147,46 +110,109 @@ impl Horizon {
         readings: &[f64],
         inputs: &[f64],
     ) -> Result<(), Error> {
+        self.done = Done::default();
         let taken = judged(sensing, belief, t, readings, inputs)?;
         self.rows.push_back(Row {
             t,
             inputs: inputs.to_vec(),
             readings: taken,
             guess: belief.x.clone(),
-            met: vec![],
+            ..Row::default()
         });
         let passes = self.solve(sensing)?;
         if let Some(last) = passes.last() {
             belief.x.copy_from_slice(&last.after.x);
-            belief.root = last.after.root.clone();
+            belief.root = match self.meets_bounds() {
+                true => self.free_root(sensing)?,
+                false => last.after.root.clone(),
+            };
             // rounding may leave an estimate a last digit outside
             confine(&mut belief.x, &self.bounds);
         }
+        if self.keep {
+            let guesses = self.rows.iter().flat_map(|row| &row.guess);
+            self.done.window = guesses.copied().collect();
+        }
         if self.rows.len() > self.length {
-            self.prior = self.shortened(passes)?;
-            self.rows.pop_front();
+            self.shorten(passes)?;
         }
         // the flow goes on from the newest row
         self.engine.driven.start(inputs);
         Ok(())
     }
 
-    /// What is known before the second row: the states as the window has them. A bound that was
-    /// met there told where the state is, and not that it will never leave.
-    fn shortened(&mut self, passes: Vec<Pass>) -> Result<Belief, Error> {
+    /// What the last correction leaves for a smoother.
+    pub fn take_done(&mut self) -> Done {
+        std::mem::take(&mut self.done)
+    }
+
+    /// The rows of the window for a smoother; none where the problem has no value about them.
+    pub fn steps(&self, sensing: &Sensing) -> Option<Vec<Step>> {
+        let mut own = self.clone();
+        let passes = own.forward(&mut sensing.clone()).ok()?;
+        let mut steps: Vec<Step> = passes.into_iter().map(Pass::kept).collect();
+        if let (Some(first), Some(row)) = (steps.first_mut(), self.rows.front()) {
+            first.transition.clone_from(&row.entered);
+        }
+        Some(steps)
+    }
+
+    pub fn bounds(&self) -> &[Bounds] {
+        &self.bounds
+    }
+
+    /// How many samples before the newest a window reaches.
+    pub fn length(&self) -> usize {
+        self.length
+    }
+
+    /// The first row leaves. What is known before the second are the states as the window has
+    /// them. A bound that was met there told where the state is, and not that it will never leave.
+    fn shorten(&mut self, passes: Vec<Pass>) -> Result<(), Error> {
         let mut passes = passes.into_iter();
         let (Some(first), Some(second)) = (passes.next(), passes.next()) else {
-            return Ok(self.prior.clone());
+            return Ok(());
         };
-        if self.rows[0].met.is_empty() {
-            return Ok(second.before);
+        let mut step = first.leaving();
+        self.prior = match self.rows[0].met.is_empty() {
+            true => second.before,
+            false => {
+                let free = Belief {
+                    x: first.after.x,
+                    root: first.by_readings,
+                };
+                let (from, to) = (&self.rows[0], &self.rows[1]);
+                predicted(&mut self.engine, &free, from, to)?.0
+            }
+        };
+        let left = self.rows.pop_front();
+        if self.keep {
+            step.transition = left.and_then(|row| row.entered);
+            self.done.left = Some(step);
+            self.rows[0].entered = second.transition;
         }
-        let free = Belief {
-            x: first.after.x,
-            root: first.by_readings,
-        };
-        let (from, to) = (&self.rows[0], &self.rows[1]);
-        Ok(predicted(&mut self.engine, &free, from, to)?.0)
+        Ok(())
+    }
+
+    fn meets_bounds(&self) -> bool {
+        self.rows.iter().any(|row| !row.met.is_empty())
+    }
+
+    /// The root of the newest row's covariance by the readings alone. A bound that is met says
+    /// where the estimate is, and not how sure it is: taken for an exact reading it would leave no
+    /// variance, and a gate that keeps every later reading out.
+    fn free_root(&mut self, sensing: &mut Sensing) -> Result<Root, Error> {
+        let met: Vec<Vec<Met>> = self
+            .rows
+            .iter_mut()
+            .map(|row| std::mem::take(&mut row.met))
+            .collect();
+        let passes = self.forward(sensing);
+        for (row, met) in self.rows.iter_mut().zip(met) {
+            row.met = met;
+        }
+        let newest = passes?.pop();
+        Ok(newest.map_or_else(|| self.prior.root.clone(), |pass| pass.after.root))
     }
 
     fn solve(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {
@@ -223,8 +249,9 @@ impl Horizon {
             let before = row.met.len();
             let bounds = &self.bounds;
             let mut place = 0;
-            row.met.retain(|&(state, bound)| {
-                let force = forces.iter().find(|f| f.0 == place).map_or(0.0, |f| f.1);
+            row.met.retain(|&Met { state, bound }| {
+                let force = forces.iter().find(|f| f.place == place);
+                let force = force.map_or(0.0, |f| f.push);
                 place += 1;
                 let outward = if bound == bounds[state].low {
                     -force
@@ -241,8 +268,11 @@ impl Horizon {
                     (_, true) => bounds.high,
                     _ => continue,
                 };
-                if !row.met.iter().any(|m| m.0 == i) {
-                    row.met.push((i, exceeded));
+                if !row.met.iter().any(|m| m.state == i) {
+                    row.met.push(Met {
+                        state: i,
+                        bound: exceeded,
+                    });
                     changed = true;
                 }
             }
@@ -266,127 +296,4 @@ impl Horizon {
         }
         Ok(passes)
     }
-}
-
-/// Readings of a new sample that are believed.
-fn judged(
-    sensing: &mut Sensing,
-    belief: &Belief,
-    t: f64,
-    readings: &[f64],
-    inputs: &[f64],
-) -> Result<Vec<(usize, f64, f64)>, Error> {
-    let h = sensing.evaluate(t, &belief.x, inputs)?.to_vec();
-    let mut projected = vec![0.0; belief.x.len()];
-    let mut taken = vec![];
-    for (i, reading) in readings.iter().enumerate() {
-        belief
-            .root
-            .transposed_times(&sensing.slopes(i), &mut projected);
-        let r = sensing.noise(i, h[i]);
-        let variance = dot(&projected, &projected) + r;
-        if sensing.judge(i, *reading, h[i], variance).reading == Reading::Taken {
-            taken.push((i, *reading, r));
-        }
-    }
-    Ok(taken)
-}
-
-/// x⁻ = φ(x̃) + Φ(x − x̃), P⁻ = ΦPΦᵀ + W, linearised at the guess x̃.
-fn predicted(
-    engine: &mut Extended,
-    after: &Belief,
-    from: &Row,
-    to: &Row,
-) -> Result<(Belief, Rows), Error> {
-    let mut belief = Belief {
-        x: from.guess.clone(),
-        root: after.root.clone(),
-    };
-    if to.t <= from.t {
-        // the same instant again
-        return Ok((after.clone(), Rows::identity(belief.x.len())));
-    }
-    engine.driven.start(&from.inputs);
-    engine.driven.aim(from.t, to.t, &to.inputs);
-    let transition = engine.predict(&mut belief, from.t, to.t, true)?;
-    let off: Vec<f64> = after
-        .x
-        .iter()
-        .zip(&from.guess)
-        .map(|(x, g)| x - g)
-        .collect();
-    for (x, (first, row)) in belief.x.iter_mut().zip(transition.iter()) {
-        *x += dot(row, &off[first..]);
-    }
-    Ok((belief, transition))
-}
-
-fn corrected(
-    sensing: &mut Sensing,
-    row: &Row,
-    before: Belief,
-    transition: Option<Rows>,
-) -> Result<Pass, Error> {
-    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
-    let mut after = before.clone();
-    let mut readings = vec![];
-    for &(i, reading, r) in &row.readings {
-        let c = sensing.slopes(i);
-        // h linearised at the guess
-        let offset = h[i] - dot(&c, &row.guess);
-        readings.extend(take(&mut after, c, reading - offset, r));
-    }
-    let by_readings = after.root.clone();
-    let mut bounds = vec![];
-    for (place, &(state, bound)) in row.met.iter().enumerate() {
-        let mut c = vec![0.0; after.x.len()];
-        c[state] = 1.0;
-        bounds.extend(take(&mut after, c, bound, 0.0).map(|b| (place, b)));
-    }
-    Ok(Pass {
-        before,
-        after,
-        by_readings,
-        transition,
-        readings,
-        bounds,
-    })
-}
-
-/// Corrects by cᵀx = y with noise of variance r.
-fn take(belief: &mut Belief, c: Vec<f64>, y: f64, r: f64) -> Option<Correction> {
-    let mut projected = vec![0.0; c.len()];
-    belief.root.transposed_times(&c, &mut projected);
-    let variance = dot(&projected, &projected) + r;
-    let innovation = y - dot(&c, &belief.x);
-    let gain = belief.root.update(&projected, r)?;
-    for (x, k) in belief.x.iter_mut().zip(&gain) {
-        *x += k * innovation;
-    }
-    Some(Correction::single(c, innovation, variance, gain))
-}
-
-/// The window's rows given all of it.
-fn backward(passes: &[Pass]) -> Vec<Smooth> {
-    let n = passes.first().map_or(0, |p| p.after.x.len());
-    let mut adjoint = Adjoint::nothing(n);
-    let mut rows = vec![];
-    for pass in passes.iter().rev() {
-        let shift = Packed::of(&pass.after.root).covariance_times(&adjoint.vector);
-        let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
-        let x = x.collect();
-        let bounds = pass.bounds.iter().rev();
-        let forces = bounds.map(|(place, b)| (*place, adjoint.over_vector(b).iter().sum()));
-        let forces = forces.collect();
-        rows.push(Smooth { x, forces });
-        for reading in pass.readings.iter().rev() {
-            adjoint.over_vector(reading);
-        }
-        if let Some(transition) = &pass.transition {
-            adjoint.vector_through(transition);
-        }
-    }
-    rows.reverse();
-    rows
 }
