@@ -17,6 +17,7 @@ mod names;
 mod observability;
 mod outside;
 mod references;
+mod refused;
 mod results;
 mod runs;
 mod story;
