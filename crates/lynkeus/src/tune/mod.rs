@@ -24,8 +24,11 @@ pub use axis::Axis;
 pub use measures::Measure;
 pub use rewrite::Change;
 
+use lynkeus_observers::Value;
+
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
+use crate::propose::Proposal;
 use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
 use reference::Reference;
@@ -115,6 +118,12 @@ pub fn tune(
     log: Option<&Table>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Sweep, Error> {
+    let proposal = match axis::are_missing(study) {
+        true => proposed(study)?,
+        false => None,
+    };
+    let own = proposal.as_ref().map(|proposal| with(study, proposal));
+    let study = own.as_ref().unwrap_or(study);
     let axes = axis::axes(study)?;
     let grid = axis::grid(study, &axes)?;
     let plant = prepare::plant(study)?;
@@ -145,6 +154,9 @@ pub fn tune(
         watch,
     )?;
     let mut notes = bench.notes().to_vec();
+    notes.extend(proposal.map(|proposal| {
+        format!("the study has no speed; swept around what is proposed: {proposal}")
+    }));
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));
     let knee = least(&rows);
@@ -159,6 +171,22 @@ pub fn tune(
         time_unit: study.time_unit.clone(),
         notes,
     })
+}
+
+/// The speed of a study that has none.
+fn proposed(study: &Study) -> Result<Option<Proposal>, Error> {
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let choice = prepared.choice()?;
+    Ok(choice.and_then(|choice| choice.proposal.clone()))
+}
+
+fn with(study: &Study, proposal: &Proposal) -> Study {
+    let mut own = study.clone();
+    let key = proposal.speed.key().to_owned();
+    let value = Value::Number(proposal.value);
+    own.observer.tuning.values.insert(key, value);
+    own
 }
 
 /// What a value is judged on.

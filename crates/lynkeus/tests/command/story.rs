@@ -179,6 +179,27 @@ fn a_speed_is_proposed_and_told_everywhere() {
     assert_eq!(folder.read("a.csv"), folder.read("c.csv"), "{}", named.err);
 }
 
+/// `tune` begins where `check` ends: around the speed that is proposed, on its own side of zero.
+#[test]
+fn a_study_without_a_speed_is_tuned_around_the_proposal() {
+    let summed = CART.replace("y = x;", "y = x + 0.2*v;");
+    for (model, key) in [(CART, "theta"), (summed.as_str(), "poles")] {
+        let folder = folder(model, &format!("{RUN}[observer]\nclamp = false\n"));
+        let report = folder.run(&["check", "study.toml", "--json"]).json();
+        let value = report["choice"]["proposed"]["value"].as_f64().unwrap();
+        let ended = folder.run(&["tune", "study.toml", "-o", "t.csv", "--write"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let words = format!("{key} = {value} is proposed");
+        assert!(ended.err.contains(&words), "{}", ended.err);
+        let table = folder.read("t.csv");
+        let mut cells = table.lines().filter_map(|line| line.split(',').next());
+        assert_eq!(cells.next(), Some(key));
+        let shares: Vec<f64> = cells.map(|x| x.parse::<f64>().unwrap() / value).collect();
+        assert!(shares.len() == 21 && shares.iter().all(|x| (0.249..4.01).contains(x)));
+        assert!(folder.read("study.toml").contains(&format!("{key} = ")));
+    }
+}
+
 /// What `check` proposes for a bare model runs.
 #[test]
 fn the_study_for_a_bare_model_runs() {
