@@ -29,6 +29,8 @@ use row::{Met, Row};
 const STEPS: usize = 8;
 /// A step smaller than this, in standard deviations, is the last.
 const SMALL: f64 = 1e-6;
+/// Below this a step that is no longer half of the one before is the integration's own error.
+const NOISE: f64 = 1e-3;
 
 #[derive(Clone, Debug)]
 pub(super) struct Horizon {
@@ -217,13 +219,16 @@ impl Horizon {
 
     fn solve(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {
         let mut passes = self.forward(sensing)?;
+        let mut before = f64::INFINITY;
         for _ in 0..STEPS {
             let found = backward(&passes);
             let step = self.move_to(&found, &passes);
             let changed = self.change_bounds(&found);
-            if !changed && step < SMALL {
+            let is_last = step < SMALL || (step < NOISE && step > 0.5 * before);
+            if !changed && is_last {
                 break;
             }
+            before = step;
             passes = self.forward(sensing)?;
         }
         Ok(passes)

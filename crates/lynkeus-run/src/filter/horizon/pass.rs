@@ -180,7 +180,7 @@ pub(super) fn backward(passes: &[Pass]) -> Vec<Smooth> {
     let mut adjoint = Adjoint::nothing(n);
     let mut rows = vec![];
     for pass in passes.iter().rev() {
-        let shift = Packed::of(&pass.after.root).covariance_times(&adjoint.vector);
+        let shift = pass.after.root.covariance_times(&adjoint.vector);
         let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
         let x = x.collect();
         let forces = pass.bounds.iter().rev().map(|at| Force {
