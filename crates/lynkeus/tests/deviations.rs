@@ -87,6 +87,7 @@ const LTAIEF: Case = Case {
     rows: 600,
 };
 
+/// Up to 7.2 s: before 4 s what is said of x5 is still the quarter of its range that it began with.
 const FARZA: Case = Case {
     model: "farza/farza.mo",
     observer: "family = \"unknown-input\"\ntheta = [60, 15]\ninitial = { x1 = 1, x2 = 1, x3 = 1, x4 = 2, x5 = 10, v = 0 }",
@@ -98,7 +99,7 @@ const FARZA: Case = Case {
     wander: &[("v", 1e-2)],
     start: 0.0,
     step: 0.004,
-    rows: 1250,
+    rows: 1800,
 };
 
 /// Up to 1.5 s: later x3 passes through zero, where the output hides it and nothing linear holds.
@@ -395,8 +396,11 @@ fn agree(case: &Case) {
 
 /// 500 runs, within 15 %.
 fn hold(name: &str, case: &Case) {
-    for (quantity, ratio) in ratios(case, 500) {
+    let ratios = ratios(case, 500);
+    for (quantity, ratio) in &ratios {
         println!("{name:>16} {quantity:>6} {ratio:.3}");
+    }
+    for (quantity, ratio) in ratios {
         assert!((0.85..1.15).contains(&ratio), "{name}, {quantity}: {ratio}");
     }
 }
