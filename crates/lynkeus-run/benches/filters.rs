@@ -80,7 +80,7 @@ fn ukf(bencher: Bencher, n: usize) {
 }
 
 /// A window of ten samples.
-#[divan::bench(args = [2, 8, 25, 61], sample_count = 30)]
+#[divan::bench(args = [2, 8, 25, 61, 200], sample_count = 20)]
 fn mhe(bencher: Bencher, n: usize) {
     let bounds = Bounds {
         low: 0.0,

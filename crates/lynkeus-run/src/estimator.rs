@@ -268,7 +268,8 @@ impl Estimator {
     }
 
     /// The estimate at each update given all of them, or those up to `lag` updates later, with
-    /// standard deviations if asked for; none for an estimator that keeps no history.
+    /// standard deviations if asked for; none for an estimator that keeps no history, and for a
+    /// moving horizon that reaches back by fewer than `lag` samples.
     #[must_use]
     pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
         match &self.core {

@@ -5,7 +5,7 @@
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::filter::{
-    FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints, Smoothed,
+    Bounds, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, SigmaPoints, Smoothed,
 };
 use lynkeus_run::{Estimator, EstimatorSettings, Level, Method, Tolerances};
 use numeris::estimate::{Ckf, Ekf, EkfStep, Ukf, rts_smooth};
@@ -282,5 +282,80 @@ fn ukf() {
         }
         let smoothed = cubature.smoothed(None, true).unwrap();
         smoothers_agree(&smoothed, &steps);
+    }
+}
+
+impl Plant {
+    /// The filter of the plant linearised along a trajectory.
+    fn linearised(&self, about: &[State]) -> Vec<EkfStep<f64, 2>> {
+        let (x, P) = start();
+        let mut theirs = Ekf::<f64, 2, 2>::new(x, P);
+        let mut steps = vec![];
+        for (k, y) in readings().into_iter().enumerate() {
+            let before_it = about[k.saturating_sub(1)];
+            let flown = self.flown(&before_it);
+            if k > 0 {
+                let flow = |x: &State| flown.x + flown.transition * (*x - before_it);
+                theirs.predict(flow, |_| flown.transition, Some(&flown.noise));
+            }
+            let before = (*theirs.state(), *theirs.covariance());
+            let C = (self.slopes)(&about[k]);
+            let h = |x: &State| (self.h)(&about[k]) + C * (*x - about[k]);
+            let z = Vector::from_array(y);
+            theirs.update(&z, h, |_| C, &noise()).unwrap();
+            steps.push(EkfStep {
+                x_predicted: before.0,
+                p_predicted: before.1,
+                x_updated: *theirs.state(),
+                p_updated: *theirs.covariance(),
+                f_jacobian: flown.transition,
+            });
+        }
+        steps
+    }
+}
+
+/// A window over everything is the smoother that is linearised about its own result; a short
+/// one comes close to it.
+#[test]
+fn mhe_smoother() {
+    let wide = || {
+        vec![
+            Bounds {
+                low: -100.0,
+                high: 100.0,
+            };
+            2
+        ]
+    };
+    for plant in [LINEAR, PENDULUM] {
+        let [all, few] = [100, 6].map(|length| {
+            let mut ours = plant.filter(FilterKind::MovingHorizon(length, wide()));
+            let mut filtered = vec![];
+            for (k, y) in readings().into_iter().enumerate() {
+                let x = ours.push(STEP * k as f64, &y).unwrap();
+                filtered.push(Vector::from_array([x[0], x[1]]));
+            }
+            (ours.smoothed(None, true).unwrap(), filtered)
+        });
+        let mut about = all.1;
+        let mut theirs = vec![];
+        for _ in 0..40 {
+            theirs = rts_smooth(&plant.linearised(&about)).unwrap();
+            about = theirs.iter().map(|(x, _)| *x).collect();
+        }
+        for (k, ((x, P), (ours, few))) in theirs.iter().zip(all.0.iter().zip(few.0)).enumerate() {
+            for i in 0..2 {
+                let sd = P[(i, i)].sqrt();
+                let off = (ours.estimate[i] - x[i]) / sd;
+                let spread = ours.deviations[i] / sd - 1.0;
+                assert!(
+                    off.abs() < 1e-5 && spread.abs() < 1e-5,
+                    "row {k}: {off} {spread}"
+                );
+                let off = (few.estimate[i] - x[i]) / sd;
+                assert!(off.abs() < 0.2, "row {k}, six samples: {off}");
+            }
+        }
     }
 }

@@ -73,7 +73,7 @@ fn chain(n: usize, kind: FilterKind, method: Method) -> Estimator {
         confined: None,
     };
     let of_filter = FilterSettings {
-        keep_history: !matches!(kind, FilterKind::MovingHorizon(..)),
+        keep_history: true,
         ..FilterSettings::of(kind)
     };
     let model = FilterModel::new(&plant).unwrap();

@@ -12,7 +12,7 @@ use serde_json::{Value as Json, json};
 
 use crate::modes::decay;
 use crate::prepare::{Prepared, is_certified_gain};
-use crate::propose::{Proposal, propose};
+use crate::propose::{Proposal, Speed, propose};
 use crate::words::number;
 use crate::{Error, study::SimulateSettings};
 
@@ -96,8 +96,7 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
         let family = examination.family;
         match tried(prepared, examination) {
             Trial::Good(design, proposal)
-                if has_keys(prepared, examination)
-                    || proposal.as_ref().is_some_and(|p| p.is_tried) =>
+                if has_keys(prepared, examination) || proposal.as_ref().is_some_and(settles_it) =>
             {
                 return Ok(Some(chosen(
                     examination,
@@ -146,10 +145,8 @@ fn chosen(
 /// The family that the study names; what its keys lack is proposed where that can be done.
 fn asked_for(prepared: &Prepared<'_>, examination: &Examination) -> Result<Choice, Error> {
     let tuning = &prepared.study().observer.tuning;
-    let proposal = match lacks_speed(prepared, examination) && !is_certified_gain(tuning) {
-        true => propose(prepared, examination),
-        false => None,
-    };
+    let lacked = lacked_speed(prepared, examination).filter(|_| !is_certified_gain(tuning));
+    let proposal = lacked.and_then(|speed| propose(prepared, examination, speed));
     Ok(Choice {
         family: examination.family,
         is_asked_for: true,
@@ -166,17 +163,24 @@ fn asked_for(prepared: &Prepared<'_>, examination: &Examination) -> Result<Choic
     })
 }
 
-/// Whether the design fails for want of a θ.
-fn lacks_speed(prepared: &Prepared<'_>, examination: &Examination) -> bool {
+/// Whether a family that is not proved to fit is taken with this value: a θ that did well in
+/// simulation. Poles are no such sign, as a map that may be singular is met only somewhere.
+fn settles_it(proposal: &Proposal) -> bool {
+    proposal.is_tried && proposal.speed == Speed::Theta
+}
+
+/// The speed for want of which the design fails.
+fn lacked_speed(prepared: &Prepared<'_>, examination: &Examination) -> Option<Speed> {
     let tuning = &prepared.study().observer.tuning;
-    let owns = find(examination.family).is_some_and(|family| family.owns(Proposal::KEY));
-    let absent = || {
-        prepared
-            .designed(examination, prepared.extended(), tuning)
-            .err()
-    };
-    owns && !tuning.values.contains_key(Proposal::KEY)
-        && matches!(absent(), Some(DesignError::Tuning(e)) if e.absent && e.key == Proposal::KEY)
+    let family = find(examination.family)?;
+    let absent =
+        |speed: &Speed| family.owns(speed.key()) && !tuning.values.contains_key(speed.key());
+    let speed = Speed::ALL.into_iter().find(absent)?;
+    // it may be given in other words
+    match prepared.designed(examination, prepared.extended(), tuning) {
+        Err(DesignError::Tuning(e)) if e.absent && e.key == speed.key() => Some(speed),
+        _ => None,
+    }
 }
 
 /// Families that do not take every key of the study, and so were not examined.
@@ -209,20 +213,23 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
     let tuning = &prepared.study().observer.tuning;
     let mut proposal = None;
     let mut tuned = tuning.clone();
-    if !is_certified_gain(tuning) && lacks_speed(prepared, examination) {
+    if !is_certified_gain(tuning)
+        && let Some(speed) = lacked_speed(prepared, examination)
+    {
         // a value that nothing was tried with is for a bare model only, which has no run
         let is_bare = prepared.study().is_bare();
-        proposal = propose(prepared, examination).filter(|p| p.is_tried || is_bare);
+        proposal = propose(prepared, examination, speed).filter(|p| p.is_tried || is_bare);
         if let Some(Proposal { value, .. }) = &proposal {
             tuned
                 .values
-                .insert(Proposal::KEY.to_owned(), Value::Number(*value));
+                .insert(speed.key().to_owned(), Value::Number(*value));
         }
     }
     let design = match prepared.designed(examination, prepared.extended(), &tuned) {
         Ok(design) => design,
         Err(DesignError::Tuning(e)) if e.absent => {
-            let remedy = match e.key == Proposal::KEY && prepared.study().simulate.is_none() {
+            let can_be_tried = Speed::ALL.iter().any(|speed| e.key == speed.key());
+            let remedy = match can_be_tried && prepared.study().simulate.is_none() {
                 true => "; with [simulate] one is proposed",
                 false => "",
             };
@@ -258,8 +265,8 @@ impl Choice {
     /// A tuning with what is proposed where it says nothing.
     pub(crate) fn completed(&self, tuning: &Tuning) -> Tuning {
         let mut tuned = tuning.clone();
-        if let Some(Proposal { value, .. }) = self.proposal {
-            let slot = tuned.values.entry(Proposal::KEY.to_owned());
+        if let Some(Proposal { speed, value, .. }) = self.proposal {
+            let slot = tuned.values.entry(speed.key().to_owned());
             slot.or_insert(Value::Number(value));
         }
         tuned

@@ -215,7 +215,7 @@ fn course_of(
         return filter::run(study, prepared.extended(), design, samples, run, watch);
     }
     if settings.smoothing.is_some() {
-        return Err(Error::input("`smooth` and `lag` of [estimate] need family = \"ekf\": this observer has no covariance to smooth with").at(&study.file));
+        return Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file));
     }
     let is_linear = settings.between_samples == BetweenSamples::Linear;
     if is_linear && samples.have_gaps() && !settings.deviations {

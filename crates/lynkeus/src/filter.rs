@@ -7,7 +7,7 @@ use lynkeus_run::filter::{
     Smoothed,
 };
 use lynkeus_run::{Estimator, EstimatorSettings};
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, short};
 
 use crate::course::{Course, Samples};
 use crate::replay::{Watch, replay};
@@ -47,6 +47,14 @@ pub(crate) fn run(
         Some(Smoothing::Interval) => filter.smoothed(None, false),
         Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), false),
     };
+    if is_window(design) {
+        let held = held_at_an_end(extended, &course.estimates);
+        course.notes.extend(held);
+    }
+    if study.estimate.smoothing.is_some() && smoothed.is_none() {
+        let note = "nothing is smoothed: the model has no value along the last window";
+        course.notes.push(note.to_owned());
+    }
     course.smoothed = smoothed.map(|rows| columns(&course.store, n, &rows));
     Ok(course)
 }
@@ -66,10 +74,7 @@ pub(crate) fn estimator(
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
-    if study.estimate.smoothing.is_some() && matches!(tuning.kind, FilterKind::MovingHorizon(..)) {
-        let message = "`smooth` and `lag` of [estimate] need family = \"ekf\" or \"ukf\"";
-        return Err(Error::input(message).at(&study.file));
-    }
+    refuse_longer_lag(study, &tuning.kind)?;
     let model = model(study, extended, design, tuning, samples, notes)?;
     let settings_of_filter = FilterSettings {
         kind: tuning.kind.clone(),
@@ -77,6 +82,52 @@ pub(crate) fn estimator(
         keep_history: study.estimate.smoothing.is_some(),
     };
     Estimator::filter(&model, settings_of_filter, settings).map_err(Error::from_source)
+}
+
+fn is_window(design: &Design) -> bool {
+    let filter = design.observer.filter.as_ref();
+    filter.is_some_and(|filter| matches!(filter.kind, FilterKind::MovingHorizon(..)))
+}
+
+/// A share of the rows in which an estimate at an end of its range is worth a word.
+const HELD: f64 = 0.01;
+
+/// The quantity that the moving horizon keeps at an end of its range in most rows.
+fn held_at_an_end(extended: &Extended<'_>, estimates: &[Series]) -> Option<String> {
+    let share = |(state, column): &(&Variable, &Series)| {
+        let at_end = column.iter().filter(|x| *x <= state.min || *x >= state.max);
+        at_end.count() as f64 / column.len().max(1) as f64
+    };
+    let all = extended.states.iter().zip(estimates);
+    let held = all.map(|pair| (share(&pair), pair.0));
+    let (share, state) = held.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (share >= HELD).then(|| {
+        format!(
+            "{} is kept at an end of its range [{}, {}] in {} % of the rows: if the plant goes further, declare a wider one",
+            state.name,
+            short(state.min),
+            short(state.max),
+            short((100.0 * share).round())
+        )
+    })
+}
+
+/// A window has no row older than its horizon.
+fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
+    let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon, _)) =
+        (study.estimate.smoothing, kind)
+    else {
+        return Ok(());
+    };
+    if lag <= *horizon {
+        return Ok(());
+    }
+    let message = format!(
+        "`lag` of [estimate]: expected at most the {horizon} samples of the window of family = \"mhe\", found {lag}"
+    );
+    Err(Error::input(message)
+        .at(&study.file)
+        .hint("raise `horizon` of [observer], or take smooth = true"))
 }
 
 fn columns(store: &Store, count: usize, rows: &[Smoothed]) -> Vec<Series> {

@@ -129,7 +129,7 @@ pub use monte_carlo::monte_carlo;
 pub use outcome::{Outcome, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
-pub use propose::Proposal;
+pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 pub use series::Series;
 pub use simulate::simulate;

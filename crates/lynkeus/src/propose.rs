@@ -1,4 +1,4 @@
-//! A value for θ where the study leaves it out.
+//! How fast an observer is to be, where the study leaves it out.
 
 use std::fmt;
 
@@ -26,10 +26,42 @@ const ROWS: f64 = 5000.0;
 #[cfg(feature = "tune")]
 const TIME: std::time::Duration = std::time::Duration::from_secs(30);
 
+/// The key that says how fast an observer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Speed {
+    /// `theta`
+    Theta,
+    /// `poles`: a number is the slowest pole of every output
+    Poles,
+}
+
+impl Speed {
+    pub(crate) const ALL: [Self; 2] = [Self::Theta, Self::Poles];
+
+    /// Its name.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Theta => "theta",
+            Self::Poles => "poles",
+        }
+    }
+
+    /// The value for an error that decays like e^(−rate t).
+    fn value(self, rate: f64) -> f64 {
+        match self {
+            Self::Theta => rate,
+            Self::Poles => -rate,
+        }
+    }
+}
+
 /// A value that the study leaves out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposal {
-    /// of `theta`, in 1/(unit of time)
+    /// what it is of
+    pub speed: Speed,
+    /// in 1/(unit of time)
     pub value: f64,
     /// where it comes from
     pub why: String,
@@ -38,17 +70,14 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// The key.
-    pub const KEY: &'static str = "theta";
-
     pub(crate) fn to_json(&self) -> Json {
-        json!({ "key": Self::KEY, "value": self.value, "why": self.why })
+        json!({ "key": self.speed.key(), "value": self.value, "why": self.why })
     }
 }
 
 impl fmt::Display for Proposal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (key, value) = (Self::KEY, number(self.value));
+        let (key, value) = (self.speed.key(), number(self.value));
         write!(
             f,
             "{key} = {value} is proposed: {}; write it, or another, into [observer]",
@@ -58,10 +87,15 @@ impl fmt::Display for Proposal {
 }
 
 /// The knee of a short sweep where the study has a simulation, else twice the mean rate of the plant.
-pub(crate) fn propose(prepared: &Prepared<'_>, examination: &Examination) -> Option<Proposal> {
+pub(crate) fn propose(
+    prepared: &Prepared<'_>,
+    examination: &Examination,
+    speed: Speed,
+) -> Option<Proposal> {
     #[cfg(feature = "tune")]
-    if let Some(value) = knee(prepared, examination) {
+    if let Some(value) = knee(prepared, examination, speed) {
         return Some(Proposal {
+            speed,
             value,
             is_tried: true,
             why: format!("the knee of {POINTS} values in simulation, which `lynkeus tune` refines"),
@@ -69,11 +103,11 @@ pub(crate) fn propose(prepared: &Prepared<'_>, examination: &Examination) -> Opt
     }
     #[cfg(not(feature = "tune"))]
     let _ = examination;
-    time_scales(prepared)
+    time_scales(prepared, speed)
 }
 
 #[cfg(feature = "tune")]
-fn knee(prepared: &Prepared<'_>, examination: &Examination) -> Option<f64> {
+fn knee(prepared: &Prepared<'_>, examination: &Examination, speed: Speed) -> Option<f64> {
     use crate::study::{Name, Values};
     use std::ops::ControlFlow;
 
@@ -94,9 +128,10 @@ fn knee(prepared: &Prepared<'_>, examination: &Examination) -> Option<f64> {
         SLOWEST / span,
         (1.0 / step).min(FASTEST / span).max(4.0 * SLOWEST / span),
     );
-    let value = |k: usize| rounded(low * (high / low).powf(k as f64 / (POINTS - 1) as f64));
+    let rate = |k: usize| low * (high / low).powf(k as f64 / (POINTS - 1) as f64);
+    let value = |k: usize| rounded(speed.value(rate(k)));
     own.tune.keys = vec![(
-        Name::from(Proposal::KEY),
+        Name::from(speed.key()),
         Values::Listed((0..POINTS).map(value).collect()),
     )];
     let found = crate::tune::tune(&own, None, &mut |_| ControlFlow::Continue(())).ok()?;
@@ -129,7 +164,7 @@ fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
     }
 }
 
-fn time_scales(prepared: &Prepared<'_>) -> Option<Proposal> {
+fn time_scales(prepared: &Prepared<'_>, speed: Speed) -> Option<Proposal> {
     let extended = prepared.extended();
     let modes = Start::of(extended)
         .jacobian(extended)?
@@ -143,15 +178,16 @@ fn time_scales(prepared: &Prepared<'_>) -> Option<Proposal> {
         .simulate
         .as_ref()
         .map(|run| run.until - run.start);
-    let (value, why): (f64, String) = match (moving.len(), span) {
+    let (rate, why): (f64, String) = match (moving.len(), span) {
         (0, None) => (1.0, "the plant has no time scale of its own, and the study no [simulate] to try values on".to_owned()),
         (0, Some(span)) => (30.0 / span, "thirty decays in the run of [simulate]".to_owned()),
         (count, _) => (2.0 * (logs / count as f64).exp(), "twice the mean rate of the plant's modes at its start; with [simulate] it is the knee of a sweep".to_owned()),
     };
-    let limited = span.map_or(value, |span| value.clamp(3.0 / span, FASTEST / span));
+    let limited = span.map_or(rate, |span| rate.clamp(3.0 / span, FASTEST / span));
     limited.is_finite().then(|| Proposal {
+        speed,
         is_tried: false,
-        value: rounded(limited),
+        value: rounded(speed.value(limited)),
         why,
     })
 }

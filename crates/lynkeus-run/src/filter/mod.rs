@@ -42,6 +42,7 @@ mod doubling;
 pub(crate) mod extended;
 mod flow;
 mod health;
+mod hindsight;
 mod horizon;
 mod model;
 mod nodes;
@@ -67,9 +68,9 @@ use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
 use model::ConfinedFlow;
-use root::{Packed, Root};
+use root::Root;
 use sensing::Sensing;
-use smooth::{History, Step};
+use smooth::History;
 use spanned::Rows;
 use unscented::Unscented;
 
@@ -171,6 +172,8 @@ impl Filter {
                 gate,
             ));
         }
+        let is_window = matches!(settings.kind, FilterKind::MovingHorizon(..));
+        let keep_corrections = settings.keep_history && !is_window;
         let engine = match settings.kind {
             FilterKind::Extended => Engine::Extended(Box::new(Extended::new(
                 &model.flow,
@@ -182,7 +185,9 @@ impl Filter {
                 Engine::Unscented(Box::new(Unscented::new(model, points, run)?))
             }
             FilterKind::MovingHorizon(length, bounds) => {
-                Engine::MovingHorizon(Box::new(Horizon::new(model, length, bounds, run)?))
+                let keep = settings.keep_history;
+                let horizon = Horizon::new(model, length, bounds, run, keep)?;
+                Engine::MovingHorizon(Box::new(horizon))
             }
         };
         let x = model.flow.start().to_vec();
@@ -205,7 +210,7 @@ impl Filter {
                 root: Root::diagonal(&model.initial_variance),
                 x: x.clone(),
             },
-            sensing: Sensing::new(model, settings.gate, settings.keep_history),
+            sensing: Sensing::new(model, settings.gate, keep_corrections),
             inputs: vec![0.0; model.inputs().len()],
             bound: Bound::new(&x),
             history: settings.keep_history.then(History::default),
@@ -216,26 +221,6 @@ impl Filter {
     /// The estimate after the last sample.
     pub fn estimate(&self) -> &[f64] {
         &self.belief.x
-    }
-
-    /// The estimate at each update given later ones, up to `lag` of them; none without history.
-    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
-        let history = self.history.as_ref()?;
-        Some(history.smoothed(lag, deviations))
-    }
-
-    /// Keeps the last update for the smoother.
-    pub fn remember(&mut self) {
-        let corrections = self.sensing.take_corrections();
-        let transition = self.pending.take();
-        if let Some(history) = &mut self.history {
-            history.push(Step {
-                transition,
-                x: self.belief.x.clone(),
-                root: Packed::of(&self.belief.root),
-                corrections,
-            });
-        }
     }
 
     fn driven(&mut self) -> &mut Driven {
@@ -250,7 +235,8 @@ impl Filter {
     /// value on the way, inside the declared ranges.
     fn predict(&mut self, from: f64, to: f64, inputs: &[f64]) -> Result<Rows, Error> {
         self.driven().aim(from, to, inputs);
-        let (belief, keep) = (&mut self.belief, self.history.is_some());
+        let keep = self.keeps_transitions();
+        let belief = &mut self.belief;
         let result = match &mut self.engine {
             Engine::Extended(engine) => engine.predict(belief, from, to, keep),
             Engine::Unscented(engine) => engine.predict(belief, from, to, keep),
@@ -313,7 +299,7 @@ impl Runner for Filter {
         self.bound.see(&self.inputs);
         let transition = self.predict(from, sample.t, sample.inputs)?;
         self.driven().arrive();
-        if self.history.is_some() {
+        if self.keeps_transitions() {
             self.pending = Some(match self.pending.take() {
                 None => transition,
                 Some(earlier) => transition.after(&earlier),

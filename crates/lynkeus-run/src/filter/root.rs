@@ -47,6 +47,11 @@ impl Root {
         }
     }
 
+    /// P v.
+    pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
+        covariance_times(v, |i| &self.row(i)[..=i])
+    }
+
     /// φ with φS = b; components along which P has no variance are 0.
     pub fn against(&self, b: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; self.n];
@@ -160,16 +165,21 @@ impl Packed {
         &self.entries[i * (i + 1) / 2..(i + 1) * (i + 2) / 2]
     }
 
-    /// P v = S (Sᵀ v).
+    /// P v.
     pub fn covariance_times(&self, v: &[f64]) -> Vec<f64> {
-        let mut half = vec![0.0; self.n];
-        for (i, v) in v.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-            for (half, s) in half.iter_mut().zip(self.row(i)) {
-                *half += v * s;
-            }
-        }
-        (0..self.n).map(|i| dot(self.row(i), &half[..=i])).collect()
+        covariance_times(v, |i| self.row(i))
     }
+}
+
+/// S (Sᵀ v) for the rows of S, each up to its diagonal.
+fn covariance_times<'s>(v: &[f64], row: impl Fn(usize) -> &'s [f64]) -> Vec<f64> {
+    let mut half = vec![0.0; v.len()];
+    for (i, v) in v.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+        for (half, s) in half.iter_mut().zip(row(i)) {
+            *half += v * s;
+        }
+    }
+    (0..v.len()).map(|i| dot(row(i), &half[..=i])).collect()
 }
 
 impl Persist for Packed {

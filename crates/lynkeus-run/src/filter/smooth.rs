@@ -69,6 +69,37 @@ impl Step {
         }
     }
 
+    /// Given what later samples say.
+    fn given(&self, adjoint: &Adjoint) -> Smoothed {
+        let Self { x, root, .. } = self;
+        let n = x.len();
+        let shift = root.covariance_times(&adjoint.vector);
+        let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
+        // without Λ there is nothing to tell
+        let told = if adjoint.matrix.is_empty() { 0 } else { n };
+        let deviations = (0..told).map(|i| {
+            let mut unit = vec![0.0; n];
+            unit[i] = 1.0;
+            let column = root.covariance_times(&unit);
+            let less = quadratic(&adjoint.matrix, &column);
+            (column[i] - less).max(0.0).sqrt()
+        });
+        Smoothed {
+            estimate,
+            deviations: deviations.collect(),
+        }
+    }
+
+    /// From after this sample to after the one before it.
+    fn back(&self, adjoint: &mut Adjoint) {
+        for correction in self.corrections.iter().rev() {
+            adjoint.over(correction);
+        }
+        if let Some(transition) = &self.transition {
+            adjoint.through(transition);
+        }
+    }
+
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         let n = self.x.len();
         walk.numbers(&mut self.x)?;
@@ -97,6 +128,8 @@ pub struct Smoothed {
 #[derive(Clone, Debug, Default)]
 pub(super) struct History {
     steps: Vec<Step>,
+    /// of a moving horizon: the states of the window at each sample, row after row
+    windows: Vec<Vec<f64>>,
 }
 
 /// What later samples say: x̂ˢ = x̂⁺ − P⁺λ, Pˢ = P⁺ − P⁺ΛP⁺.
@@ -111,11 +144,26 @@ impl History {
     pub fn walk(&mut self, walk: &mut Walk<'_>, n: usize) -> Result<(), Damaged> {
         let count = walk.length(self.steps.len())?;
         self.steps.resize_with(count, || Step::nothing(n));
-        self.steps.iter_mut().try_for_each(|step| step.walk(walk))
+        self.steps.iter_mut().try_for_each(|step| step.walk(walk))?;
+        let count = walk.length(self.windows.len())?;
+        self.windows.resize_with(count, Vec::new);
+        self.windows.iter_mut().try_for_each(|window| {
+            let count = walk.length(window.len())?;
+            if n == 0 || !count.is_multiple_of(n) {
+                return Err(Damaged);
+            }
+            window.resize(count, 0.0);
+            walk.numbers(window)
+        })
     }
 
     pub fn push(&mut self, step: Step) {
         self.steps.push(step);
+    }
+
+    /// Of a moving horizon.
+    pub fn push_window(&mut self, window: Vec<f64>) {
+        self.windows.push(window);
     }
 
     /// By the recursion of Bryson and Frazier, backward from the last sample or from `lag`
@@ -123,68 +171,52 @@ impl History {
     /// λ ← (I − KC)ᵀλ − CᵀA⁻¹ν, Λ ← (I − KC)ᵀΛ(I − KC) + CᵀA⁻¹C, then over the flow
     /// λ ← Φᵀλ, Λ ← ΦᵀΛΦ. It equals the smoother of Rauch, Tung and Striebel,
     /// x̂ˢ = x̂⁺ + P⁺Φᵀ(P⁻)⁻¹(x̂ˢ' − x̂⁻'), and never inverts P⁻.
-    pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
-        let count = self.steps.len();
+    ///
+    /// `newest` are samples after those that are kept.
+    pub fn smoothed(&self, newest: &[Step], lag: Option<usize>, deviations: bool) -> Vec<Smoothed> {
+        let steps: Vec<&Step> = self.steps.iter().chain(newest).collect();
+        let count = steps.len();
         let mut result = vec![];
         match lag {
             None => {
-                let mut adjoint = self.nothing(deviations);
-                for k in (0..count).rev() {
-                    result.push(self.at(k, &adjoint));
-                    self.back(k, &mut adjoint);
+                let mut adjoint = nothing(&steps, deviations);
+                for step in steps.iter().rev() {
+                    result.push(step.given(&adjoint));
+                    step.back(&mut adjoint);
                 }
                 result.reverse();
             }
             Some(lag) => {
-                for k in 0..count {
-                    let mut adjoint = self.nothing(deviations);
-                    for later in (k + 1..=k.saturating_add(lag).min(count - 1)).rev() {
-                        self.back(later, &mut adjoint);
+                for (k, step) in steps.iter().enumerate() {
+                    let mut adjoint = nothing(&steps, deviations);
+                    let last = k.saturating_add(lag).min(count - 1);
+                    for later in steps[k + 1..=last].iter().rev() {
+                        later.back(&mut adjoint);
                     }
-                    result.push(self.at(k, &adjoint));
+                    result.push(step.given(&adjoint));
                 }
             }
         }
         result
     }
 
-    fn nothing(&self, deviations: bool) -> Adjoint {
-        let n = self.steps.first().map_or(0, |s| s.x.len());
-        match deviations {
-            true => Adjoint::with_matrix(n),
-            false => Adjoint::nothing(n),
-        }
+    /// The estimates, as each window has its rows: of n states, given up to `lag` later samples.
+    pub fn in_windows(&self, n: usize, lag: usize) -> impl Iterator<Item = &[f64]> {
+        let count = self.windows.len();
+        (0..count).filter_map(move |k| {
+            let last = (k + lag).min(count - 1);
+            let window = &self.windows[last];
+            let end = window.len().checked_sub((last - k) * n)?;
+            window.get(end.checked_sub(n)?..end)
+        })
     }
+}
 
-    fn at(&self, k: usize, adjoint: &Adjoint) -> Smoothed {
-        let Step { x, root, .. } = &self.steps[k];
-        let n = x.len();
-        let shift = root.covariance_times(&adjoint.vector);
-        let estimate = x.iter().zip(&shift).map(|(x, s)| x - s).collect();
-        // without Λ there is nothing to tell
-        let told = if adjoint.matrix.is_empty() { 0 } else { n };
-        let deviations = (0..told).map(|i| {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            let column = root.covariance_times(&unit);
-            let less = quadratic(&adjoint.matrix, &column);
-            (column[i] - less).max(0.0).sqrt()
-        });
-        Smoothed {
-            estimate,
-            deviations: deviations.collect(),
-        }
-    }
-
-    /// From after sample k to after the sample before it.
-    fn back(&self, k: usize, adjoint: &mut Adjoint) {
-        let step = &self.steps[k];
-        for correction in step.corrections.iter().rev() {
-            adjoint.over(correction);
-        }
-        if let Some(transition) = &step.transition {
-            adjoint.through(transition);
-        }
+fn nothing(steps: &[&Step], deviations: bool) -> Adjoint {
+    let n = steps.first().map_or(0, |s| s.x.len());
+    match deviations {
+        true => Adjoint::with_matrix(n),
+        false => Adjoint::nothing(n),
     }
 }
 

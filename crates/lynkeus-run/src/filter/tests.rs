@@ -330,6 +330,7 @@ fn smoothing_goes_on_after_a_restore_and_over_predictions() {
     for (kind, noise) in [
         (FilterKind::Extended, 0.2),
         (FilterKind::Unscented(SigmaPoints::default()), 0.0),
+        (window(4, 100.0), 0.2),
     ] {
         let settings = FilterSettings {
             keep_history: true,
@@ -370,6 +371,7 @@ fn smoothing_knows_nothing_of_updates_that_failed() {
     for kind in [
         FilterKind::Extended,
         FilterKind::Unscented(SigmaPoints::default()),
+        window(3, 1e301),
     ] {
         let settings = FilterSettings {
             keep_history: true,
@@ -389,4 +391,82 @@ fn smoothing_knows_nothing_of_updates_that_failed() {
         let smoothed = |estimator: &Estimator| estimator.smoothed(None, true).unwrap();
         assert_eq!(smoothed(&troubled), smoothed(&whole));
     }
+}
+
+/// Of one state that reaches as far as `bound`.
+fn window(length: usize, bound: f64) -> FilterKind {
+    let bounds = Bounds {
+        low: -bound,
+        high: bound,
+    };
+    FilterKind::MovingHorizon(length, vec![bounds])
+}
+
+/// Of a linear plant without bounds a window is the filter, and looking back its smoother: as far
+/// as the window reaches with a lag, and over everything.
+#[test]
+fn a_window_looks_back_as_the_smoother_does() {
+    let run = |kind: FilterKind| {
+        let settings = FilterSettings {
+            keep_history: true,
+            ..FilterSettings::of(kind)
+        };
+        let mut filter = Estimator::filter(&scalar(-0.3, 0.2, 0.1), settings, exact()).unwrap();
+        for k in 0..15 {
+            let y = if k % 4 == 2 {
+                f64::NAN
+            } else {
+                f64::from(k).sin()
+            };
+            filter.push(0.5 * f64::from(k), &[y]).unwrap();
+        }
+        filter
+    };
+    let (filter, horizon) = (run(FilterKind::Extended), run(window(4, 100.0)));
+    for lag in [None, Some(0), Some(1), Some(3), Some(4)] {
+        let [expected, found] = [&filter, &horizon].map(|f| f.smoothed(lag, true).unwrap());
+        assert_eq!(found.len(), 15);
+        for (k, (a, b)) in found.iter().zip(expected).enumerate() {
+            let off = a.estimate[0] - b.estimate[0];
+            let spread = a.deviations[0] - b.deviations[0];
+            assert!(
+                off.abs() < 1e-9 && spread.abs() < 1e-9,
+                "{lag:?}, row {k}: {off} {spread}"
+            );
+        }
+    }
+    assert!(horizon.smoothed(Some(5), false).is_none());
+}
+
+/// x' = −x/10 seen with little noise at −0.5, where x ≥ 0 was declared: it is at its bound from
+/// the first row on, and as sure as the readings make it. A gate lets the next reading in.
+#[test]
+fn a_bound_says_where_and_not_how_sure() {
+    let bounds = vec![Bounds {
+        low: 0.0,
+        high: 2.0,
+    }];
+    let settings = FilterSettings {
+        gate: Some(5.0),
+        keep_history: true,
+        ..FilterSettings::of(FilterKind::MovingHorizon(3, bounds))
+    };
+    let model = scalar(-0.1, 1e-3, 0.04);
+    let mut filter = Estimator::filter(&model, settings, exact()).unwrap();
+    let mut free =
+        Estimator::filter(&model, FilterSettings::of(FilterKind::Extended), exact()).unwrap();
+    for k in 0..8 {
+        for estimator in [&mut filter, &mut free] {
+            estimator.push(0.5 * f64::from(k), &[-0.5]).unwrap();
+        }
+        let [found, expected] = [&filter, &free].map(|e| e.deviations().unwrap()[0]);
+        assert!((found - expected).abs() < 1e-9, "{k}: {found} {expected}");
+    }
+    assert_eq!(filter.estimate(), [0.0]);
+    let rows = filter.smoothed(None, false).unwrap();
+    assert!(rows.iter().all(|row| row.estimate[0] >= 0.0), "{rows:?}");
+    // then it moves: 0.6 is three deviations of the reading off, and not three million
+    filter.push(4.5, &[0.6]).unwrap();
+    assert_eq!(filter.health().sensors[0].rejected, 0);
+    assert!(filter.estimate()[0] > 0.0);
 }

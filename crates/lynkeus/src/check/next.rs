@@ -150,8 +150,11 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
         "[observer]".to_owned(),
         format!("family = {}", text(choice.family)),
     ];
-    if let Some(Proposal { value, why, .. }) = &choice.proposal {
-        lines.push(format!("{} = {value}  # {why}", Proposal::KEY));
+    if let Some(Proposal {
+        speed, value, why, ..
+    }) = &choice.proposal
+    {
+        lines.push(format!("{} = {value}  # {why}", speed.key()));
     }
     let family = lynkeus_observers::find(choice.family);
     let given = study.observer.tuning.values.iter();

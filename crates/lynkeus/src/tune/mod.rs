@@ -123,7 +123,7 @@ pub fn tune(
         given?;
     }
     let plant = prepare::plant(study)?;
-    let Pinned { study, note } = pinned(&Prepared::new(study, &plant)?)?;
+    let Pinned { study, notes: told } = pinned(&Prepared::new(study, &plant)?)?;
     let study = &study;
     let axes = axis::axes(study)?;
     let grid = axis::grid(study, &axes)?;
@@ -153,7 +153,7 @@ pub fn tune(
         },
         watch,
     )?;
-    let mut notes: Vec<String> = note.into_iter().collect();
+    let mut notes = told;
     notes.extend_from_slice(bench.notes());
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));

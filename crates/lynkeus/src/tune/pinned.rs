@@ -11,8 +11,8 @@ use crate::{Error, Study};
 /// A study that names its family.
 pub(super) struct Pinned {
     pub study: Study,
-    /// which family that is, where the study leaves it open
-    pub note: Option<String>,
+    /// which family that is, and which speed, where the study leaves them open
+    pub notes: Vec<String>,
 }
 
 /// The study with its family named and with what is proposed for it: else each value could be
@@ -23,13 +23,13 @@ pub(super) struct Pinned {
 /// Keys of `[observer]` that cannot be used.
 pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
     let mut study = prepared.study().clone();
-    let mut note = None;
+    let mut notes = vec![];
     let swept = axis::swept(&study);
     if study.observer.family.is_some() && !swept.is_empty() {
-        return Ok(Pinned { study, note });
+        return Ok(Pinned { study, notes });
     }
     let Some(choice) = prepared.choice()? else {
-        return Ok(Pinned { study, note });
+        return Ok(Pinned { study, notes });
     };
     let owns = |name: &str| {
         let family = lynkeus_observers::find(name);
@@ -45,16 +45,17 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
             .map(|e| e.family),
     };
     let Some(family) = family else {
-        return Ok(Pinned { study, note });
+        return Ok(Pinned { study, notes });
     };
     if family == choice.family {
         study.observer.tuning = choice.completed(&study.observer.tuning);
+        notes.extend(choice.proposal.as_ref().map(ToString::to_string));
     }
     if study.observer.family.is_none() {
-        note = Some(format!(
+        notes.push(format!(
             "every value is one of the family {family}; `family` of [observer] names another"
         ));
     }
     study.observer.family = Some(Name::from(family));
-    Ok(Pinned { study, note })
+    Ok(Pinned { study, notes })
 }

@@ -347,3 +347,30 @@ fn standard_deviations_are_those_of_many_runs() {
         }
     }
 }
+
+/// A plant that goes further than was declared: the window keeps to the range, and says so.
+#[test]
+fn a_range_that_is_too_narrow_for_the_window_is_told() {
+    let observer = "[observer]\nfamily = \"mhe\"\nhorizon = 3\n[estimate]\nsmooth = true";
+    let folder = folder(observer, |_| false);
+    let least = |ended: &crate::Ended, name: &str| {
+        let (header, rows) = csv(&ended.out);
+        let at = header.iter().position(|n| n == name).unwrap();
+        rows.iter().map(|row| row[at]).fold(0.0, f64::min)
+    };
+    let words = "x is kept at an end of its range [-0.2, 2]";
+    let wide = folder.run(&["estimate", "drift.toml", "log.csv"]);
+    assert!(!wide.err.contains("at an end of its range"), "{}", wide.err);
+    let goes_to = (0..200)
+        .map(|k| drift(0.1 * f64::from(k)))
+        .fold(0.0, f64::min);
+    for name in ["x_hat", "x_smooth"] {
+        assert!((least(&wide, name) - goes_to).abs() < 5e-3, "{name}");
+    }
+    folder.change("drift.toml", "[sensors]", "[box]\nx = [-0.2, 2]\n[sensors]");
+    let narrow = folder.run(&["estimate", "drift.toml", "log.csv"]);
+    assert!(narrow.err.contains(words), "{}", narrow.err);
+    for name in ["x_hat", "x_smooth"] {
+        assert_eq!(least(&narrow, name), -0.2, "{name}");
+    }
+}

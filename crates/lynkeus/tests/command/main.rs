@@ -21,6 +21,7 @@ mod observability;
 mod outside;
 mod random;
 mod references;
+mod refused;
 mod results;
 mod runs;
 mod story;

@@ -254,6 +254,27 @@ fn what_is_pasted_keeps_the_start() {
     assert_eq!(folder.read("a.csv"), folder.read("b.csv"), "{observer}");
 }
 
+/// `tune` begins where `check` ends: around the speed that is proposed, on its own side of zero.
+#[test]
+fn a_study_without_a_speed_is_tuned_around_the_proposal() {
+    let summed = CART.replace("y = x;", "y = x + 0.2*v;");
+    for (model, key) in [(CART, "theta"), (summed.as_str(), "poles")] {
+        let folder = folder(model, &format!("{RUN}[observer]\nclamp = false\n"));
+        let report = folder.run(&["check", "study.toml", "--json"]).json();
+        let value = report["choice"]["proposed"]["value"].as_f64().unwrap();
+        let ended = folder.run(&["tune", "study.toml", "-o", "t.csv", "--write"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let words = format!("{key} = {value} is proposed");
+        assert!(ended.err.contains(&words), "{}", ended.err);
+        let table = folder.read("t.csv");
+        let mut cells = table.lines().filter_map(|line| line.split(',').next());
+        assert_eq!(cells.next(), Some(key));
+        let shares: Vec<f64> = cells.map(|x| x.parse::<f64>().unwrap() / value).collect();
+        assert!(shares.len() == 21 && shares.iter().all(|x| (0.249..4.01).contains(x)));
+        assert!(folder.read("study.toml").contains(&format!("{key} = ")));
+    }
+}
+
 /// What `check` proposes for a bare model runs.
 #[test]
 fn the_study_for_a_bare_model_runs() {
@@ -268,10 +289,17 @@ fn the_study_for_a_bare_model_runs() {
         text.contains(study) && text.contains("lynkeus simulate study.toml"),
         "{text}"
     );
+    // poles as well as a θ
+    folder.write("m.mo", &CART.replace("y = x;", "y = x + 0.2*v;"));
+    let report = folder.run(&["check", "m.mo", "--json"]).json();
+    let study = report["next"]["study"].as_str().unwrap();
+    assert!(study.contains("poles = -"), "{study}");
+    folder.write("new.toml", study);
+    let run = folder.run(&["simulate", "new.toml", "-o", "a.csv"]);
+    assert_eq!(run.code, 0, "{}\n{study}", run.err);
 }
 
-/// A key of the filters leaves the families with a theorem out, by name; it is no refusal. Poles that
-/// are missing are named, and the next family is taken.
+/// A key of the filters leaves the families with a theorem out, by name; it is no refusal.
 #[test]
 fn a_family_without_a_key_is_named() {
     let gated = folder(CART, &format!("{RUN}[observer]\ngate = 5\n"));
@@ -285,23 +313,55 @@ fn a_family_without_a_key_is_named() {
         ended.out
     );
     assert!(ended.out.contains("by ekf"), "{}", ended.out);
-    // y = x + v fits no chain
+}
+
+/// y = x + 0.2v fits no chain: the slowest pole is proposed like θ where it can be tried. Where it
+/// cannot it is named as missing, and the next family is taken.
+#[test]
+fn poles_are_proposed_where_they_can_be_tried() {
     let summed = CART.replace("y = x;", "y = x + 0.2*v;");
-    let folder = folder(&summed, RUN);
-    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let tried = folder(&summed, RUN);
+    let report = tried.run(&["check", "study.toml", "--json"]).json();
+    assert_eq!(report["recommended"], "drift-observable", "{report}");
+    let proposed = &report["choice"]["proposed"];
+    assert_eq!(proposed["key"], "poles");
+    let pole = proposed["value"].as_f64().unwrap();
+    assert!(-20.0 < pole && pole < -0.1, "{pole}");
+    let run = tried.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
+    assert_eq!(run.json()["family"], "drift-observable");
+    let words = format!("poles = {pole} is proposed: the knee of 13 values in simulation");
+    assert!(run.err.contains(&words), "{}", run.err);
+    let observer = report["next"]["observer"].as_str().unwrap();
+    tried.write(
+        "pasted.toml",
+        &format!("plant = \"m.mo\"\n{RUN}\n{observer}"),
+    );
+    let pasted = tried.run(&["simulate", "pasted.toml", "-o", "b.csv"]);
+    assert_eq!(pasted.code, 0, "{}", pasted.err);
+    assert_eq!(tried.read("a.csv"), tried.read("b.csv"));
+    // a value ten times as fast does worse: it passes more noise
+    let rms = |table: &str| {
+        let (header, rows) = csv(&tried.read(table));
+        let at = |name: &str| header.iter().position(|h| h == name).unwrap();
+        let (hat, truth) = (at("v_hat"), at("v"));
+        let late = rows.iter().skip(rows.len() / 2);
+        late.map(|row| (row[hat] - row[truth]).powi(2)).sum::<f64>()
+    };
+    let faster = format!("poles = {}", 10.0 * pole);
+    tried.change("pasted.toml", &format!("poles = {pole}"), &faster);
+    tried.run(&["simulate", "pasted.toml", "-o", "c.csv"]);
+    assert!(rms("c.csv") > 2.0 * rms("a.csv"));
+
+    let untried = folder(&summed, "[sensors]\nnoise = { y = 0.02 }\n");
+    let report = untried.run(&["check", "study.toml", "--json"]).json();
     assert_eq!(report["recommended"], "ekf", "{report}");
     let passed = report["choice"]["passed_over"].to_string();
-    assert!(
-        passed.contains("drift-observable fits, but it needs `poles`"),
-        "{passed}"
-    );
-    let run = folder.run(&["simulate", "study.toml", "--json", "-o", "a.csv"]);
-    assert_eq!(run.json()["family"], "ekf");
-    assert!(
-        run.err.contains("it needs `poles`") && run.err.contains("nothing is proved"),
-        "{}",
-        run.err
-    );
+    for words in [
+        "drift-observable fits, but it needs `poles`",
+        "with [simulate] one is proposed",
+    ] {
+        assert!(passed.contains(words), "{passed}");
+    }
 }
 
 /// A tail that nothing corrects and that decays in 1000 s is no observer for a run of 4 s.

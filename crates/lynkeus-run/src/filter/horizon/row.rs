@@ -1,0 +1,64 @@
+//! A sample in the window.
+
+use crate::filter::spanned::Rows;
+use crate::snapshot::{Damaged, Walk};
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Row {
+    pub t: f64,
+    pub inputs: Vec<f64>,
+    pub readings: Vec<Believed>,
+    /// the trajectory about which the problem is linearised
+    pub guess: Vec<f64>,
+    pub met: Vec<Met>,
+    /// Φ from the row before, which has left; where a smoother will ask for it
+    pub entered: Option<Rows>,
+}
+
+/// A reading that corrects.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Believed {
+    pub sensor: usize,
+    pub reading: f64,
+    /// of its noise
+    pub variance: f64,
+}
+
+/// A bound that is met.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Met {
+    pub state: usize,
+    pub bound: f64,
+}
+
+impl Row {
+    /// Of so many inputs and states, for a walk over it.
+    pub fn make_room(&mut self, inputs: usize, states: usize) {
+        self.inputs.resize(inputs, 0.0);
+        self.guess.resize(states, 0.0);
+    }
+
+    /// Of a plant with so many sensors.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
+        let states = self.guess.len();
+        walk.number(&mut self.t)?;
+        walk.numbers(&mut self.inputs)?;
+        walk.numbers(&mut self.guess)?;
+        let count = walk.length(self.readings.len())?;
+        self.readings.resize(count, Believed::default());
+        for believed in &mut self.readings {
+            walk.below(&mut believed.sensor, sensors)?;
+            walk.number(&mut believed.reading)?;
+            walk.number(&mut believed.variance)?;
+        }
+        let count = walk.length(self.met.len())?;
+        self.met.resize(count, Met::default());
+        for met in &mut self.met {
+            walk.below(&mut met.state, states)?;
+            walk.number(&mut met.bound)?;
+        }
+        walk.optional(&mut self.entered, |walk, entered| {
+            entered.walk(walk, states)
+        })
+    }
+}
