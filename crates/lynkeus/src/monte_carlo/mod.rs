@@ -8,6 +8,7 @@
 mod picture;
 mod report;
 mod statistics;
+mod together;
 
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -23,7 +24,8 @@ use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
 pub use report::Settled;
-use statistics::of_runs;
+use statistics::{Found, of_runs};
+use together::Together;
 
 /// What many runs of a study give.
 #[derive(Clone, Debug)]
@@ -146,8 +148,16 @@ pub fn monte_carlo(
     let prepared = Prepared::new(study, &plant)?;
     let rig = Rig::new(&prepared)?;
     let followed = followed(&plant, &rig);
-    room(study, &rig, runs, followed.len())?;
     let seeds: Vec<u64> = (settings.seed..=last).collect();
+    let together = Together {
+        prepared: &prepared,
+        rig: &rig,
+        followed: &followed,
+    };
+    if let Some(figures) = together.figures(&seeds, watch)? {
+        return Ok(reported(&prepared, &rig, &followed, runs, figures));
+    }
+    room(study, &rig, runs, followed.len())?;
     // what the design made comes with every clone of the plant
     let shared = (plant.clone(), rig.clone());
     let job = Job {
@@ -165,7 +175,8 @@ pub fn monte_carlo(
         watch,
     )?;
     let time = job.time.into_inner().unwrap_or_default();
-    gathered(&prepared, &rig, &followed, singles, time)
+    let figures = gathered(study, &followed, singles, time)?;
+    Ok(reported(&prepared, &rig, &followed, runs, figures))
 }
 
 /// Estimates whose truth a run has.
@@ -252,16 +263,23 @@ impl Job<'_> {
     }
 }
 
-/// All runs together.
+/// What all runs together give.
+struct Figures {
+    /// of the runs that reached their end
+    seeds: Vec<u64>,
+    failures: Vec<Failure>,
+    time: Vec<f64>,
+    /// by quantity
+    found: Vec<Found>,
+}
+
+/// The figures of runs that were done one by one.
 fn gathered(
-    prepared: &Prepared<'_>,
-    rig: &Rig,
+    study: &Study,
     followed: &[Followed],
     singles: Vec<Single>,
     time: Vec<f64>,
-) -> Result<MonteCarlo, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
-    let asked = singles.len();
+) -> Result<Figures, Error> {
     let (mut seeds, mut runs, mut failures) = (vec![], vec![], vec![]);
     let mut first = None;
     for single in singles {
@@ -287,13 +305,36 @@ fn gathered(
         (Some(spent), None) if seeds.is_empty() => return Err(Error::ended(spent)),
         _ => {}
     }
+    let found = (0..followed.len()).map(|place| of_runs(&runs, place));
+    Ok(Figures {
+        found: found.collect(),
+        seeds,
+        failures,
+        time,
+    })
+}
+
+/// The figures under their names.
+fn reported(
+    prepared: &Prepared<'_>,
+    rig: &Rig,
+    followed: &[Followed],
+    asked: usize,
+    figures: Figures,
+) -> MonteCarlo {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let Figures {
+        seeds,
+        failures,
+        time,
+        found,
+    } = figures;
     let mut headers = Headers::beside(plant);
     let time_header = headers.time();
     let estimates = &rig.design.observer.estimates;
-    let quantities = followed.iter().enumerate().map(|(place, f)| {
+    let quantities = followed.iter().zip(found).map(|(f, found)| {
         let estimate = &estimates[f.estimate];
         let variable = &estimate.variable;
-        let found = of_runs(&runs, place);
         Scattered {
             unknown_input: estimate.unknown_input,
             is_measured: is_measured(prepared, variable),
@@ -316,8 +357,13 @@ fn gathered(
         notes.push("nothing differs from run to run: `noise` of [sensors], [process_noise] and `spread` of [simulate] draw by the seed".to_owned());
     }
     let done = seeds.len() + failures.len();
-    notes.extend(ended.map(|spent| format!("{done} of {asked} runs: {spent}")));
-    Ok(MonteCarlo {
+    notes.extend(
+        study
+            .budget
+            .marked()
+            .map(|spent| format!("{done} of {asked} runs: {spent}")),
+    );
+    MonteCarlo {
         plant: plant.name.clone(),
         family: rig.design.observer.family,
         file: study.file.clone(),
@@ -328,7 +374,7 @@ fn gathered(
         time_header,
         quantities,
         notes,
-    })
+    }
 }
 
 fn is_measured(prepared: &Prepared<'_>, variable: &Variable) -> bool {

@@ -1,0 +1,222 @@
+//! All runs at once, where their steps are fixed: row by row, so that no more than some rows of
+//! them are in memory.
+
+use lynkeus_run::{Batch, Column, Member, Role};
+
+use super::statistics::{Found, Scatter};
+use super::{Failure, Figures, Followed};
+use crate::crew::{self, Watch};
+use crate::prepare::Prepared;
+use crate::simulate::Rig;
+use crate::{Error, Study};
+
+/// Bytes of the rows that are in memory at a time.
+const WINDOW: usize = 32 << 20;
+
+/// The runs of many seeds.
+pub(super) struct Together<'a> {
+    pub prepared: &'a Prepared<'a>,
+    pub rig: &'a Rig,
+    pub followed: &'a [Followed],
+}
+
+impl Together<'_> {
+    /// The figures of the runs of these seeds; none where each run has steps of its own, or a
+    /// program.
+    ///
+    /// # Errors
+    /// A study that cannot be run, runs that would not fit into the memory, no run that reached its
+    /// end, or a limit.
+    pub fn figures(&self, seeds: &[u64], watch: &mut Watch<'_>) -> Result<Option<Figures>, Error> {
+        if self.rig.design.observer.filter.is_some() || self.rig.has_own_programs() {
+            return Ok(None);
+        }
+        let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
+        let mut watch = watch;
+        let Some(first) = self.pass(seeds, &columns, &mut *watch)? else {
+            return Ok(None);
+        };
+        let failures = self.failures(seeds, &first, watch)?;
+        let seeds: Vec<u64> = seeds
+            .iter()
+            .copied()
+            .filter(|seed| failures.iter().all(|f| f.seed != *seed))
+            .collect();
+        // the rows of runs that ended are in these figures: once more without them
+        let pass = match failures.is_empty() {
+            true => first,
+            false => match self.pass(&seeds, &columns, &mut *watch)? {
+                Some(pass) => pass,
+                None => return Ok(None),
+            },
+        };
+        let rows = pass.time.len();
+        let scatters = pass.scatters.into_iter();
+        let mut found: Vec<Found> = scatters.map(|s| s.found(rows)).collect();
+        self.worst_courses(&seeds, &columns, &mut found)?;
+        Ok(Some(Figures {
+            seeds,
+            failures,
+            time: pass.time,
+            found,
+        }))
+    }
+
+    fn batch(&self, seeds: &[u64], columns: &[Column]) -> Result<Option<Batch>, Error> {
+        let simulation = &self.rig.simulation;
+        let members = seeds.iter().map(|&seed| Member {
+            seed,
+            start: self.rig.start(seed),
+        });
+        let members: Vec<Member> = members.collect();
+        Batch::new(simulation, &members, columns).map_err(Error::from_source)
+    }
+
+    /// All runs from start to end.
+    fn pass(
+        &self,
+        seeds: &[u64],
+        columns: &[Column],
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<Pass>, Error> {
+        let study = self.prepared.study();
+        let row = seeds.len() * columns.len() * size_of::<f64>();
+        let Some(mut batch) = self.batch(seeds, columns)? else {
+            return Ok(None);
+        };
+        room(study, &batch, row, self.followed.len())?;
+        let (rows, threads) = (batch.rows(), crew::threads());
+        let mut pass = Pass {
+            time: Vec::with_capacity(rows),
+            scatters: vec![Scatter::new(seeds.len()); self.followed.len()],
+            ended: vec![],
+        };
+        let window = (WINDOW / row.max(1)).max(1);
+        while batch.advance(window, threads).map_err(Error::from_source)? {
+            let first = pass.time.len();
+            pass.time.extend(batch.times());
+            crew::each(&mut pass.scatters, threads, &|place, scatter| {
+                for k in 0..batch.times().len() {
+                    let truth = batch.values(k, 2 * place);
+                    let estimate = batch.values(k, 2 * place + 1);
+                    scatter.add(truth.zip(estimate), first + k >= rows / 2);
+                }
+            });
+            if let Some(spent) = study.budget.spent() {
+                return Err(Error::ended(spent));
+            }
+            if watch(pass.time.len() as f64 / rows as f64).is_break() {
+                return Err(Error::input("the runs were stopped"));
+            }
+        }
+        pass.ended = batch.ended().cloned().collect();
+        Ok(Some(pass))
+    }
+
+    /// The runs that did not reach their end. The first one is done alone, which says more.
+    fn failures(
+        &self,
+        seeds: &[u64],
+        pass: &Pass,
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Failure>, Error> {
+        let file = &self.prepared.study().file;
+        let mut failures: Vec<Failure> = pass
+            .ended
+            .iter()
+            .filter_map(|ended| {
+                let error = Error::refused(ended.error.to_string()).at(file);
+                Some(Failure {
+                    seed: *seeds.get(ended.run)?,
+                    reason: error.to_string(),
+                })
+            })
+            .collect();
+        failures.sort_by_key(|f| f.seed);
+        let Some(first) = failures.first_mut() else {
+            return Ok(failures);
+        };
+        let alone = self.rig.run(self.prepared, first.seed, watch);
+        let error = match alone {
+            Ok(ran) => ran
+                .course
+                .ended
+                .map(|e| Error::refused(e.to_string()).at(file)),
+            Err(error) => Some(error),
+        };
+        if let Some(error) = &error {
+            first.reason = error.to_string();
+        }
+        if failures.len() < seeds.len() {
+            return Ok(failures);
+        }
+        let told = || Error::refused(failures[0].reason.clone()).at(file);
+        Err(error.unwrap_or_else(told))
+    }
+
+    /// The courses of the worst runs, which are done once more.
+    fn worst_courses(
+        &self,
+        seeds: &[u64],
+        columns: &[Column],
+        found: &mut [Found],
+    ) -> Result<(), Error> {
+        let mut worst: Vec<usize> = found.iter().map(|f| f.worst_run).collect();
+        worst.sort_unstable();
+        worst.dedup();
+        let own: Vec<u64> = worst
+            .iter()
+            .filter_map(|k| seeds.get(*k).copied())
+            .collect();
+        let Some(mut batch) = self.batch(&own, columns)? else {
+            return Ok(());
+        };
+        while batch.advance(batch.rows(), 1).map_err(Error::from_source)? {
+            for (place, found) in found.iter_mut().enumerate() {
+                let run = worst.iter().position(|k| *k == found.worst_run);
+                for k in 0..batch.times().len() {
+                    let value = |column| batch.values(k, column).nth(run.unwrap_or(0));
+                    let pair = value(2 * place + 1).zip(value(2 * place));
+                    found.worst_course.extend(pair.map(|(hat, x)| hat - x));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Followed {
+    /// True value and estimate.
+    fn columns(&self) -> [Column; 2] {
+        [self.truth, Role::Estimate.at(self.estimate)]
+    }
+}
+
+/// What the rows of all runs gave.
+struct Pass {
+    time: Vec<f64>,
+    scatters: Vec<Scatter>,
+    ended: Vec<lynkeus_run::Ended>,
+}
+
+/// Refuses what would not fit into the memory that the study may take.
+fn room(study: &Study, batch: &Batch, row: usize, quantities: usize) -> Result<(), Error> {
+    let figures = batch.rows() * quantities * size_of::<[f64; 8]>();
+    let runs = batch.len() * quantities * size_of::<[f64; 3]>();
+    let bytes = row.max(WINDOW) + figures + runs;
+    let room = study.budget.room().unwrap_or(usize::MAX);
+    if bytes <= room {
+        return Ok(());
+    }
+    let mib = |bytes: usize| bytes.div_ceil(1 << 20);
+    let message = format!(
+        "{} runs of {} rows take {} MiB, and {} MiB are left",
+        batch.len(),
+        batch.rows(),
+        mib(bytes),
+        mib(room)
+    );
+    Err(Error::input(message)
+        .at(&study.file)
+        .hint("fewer runs, a longer `output_step` of [simulate], or a greater limit of memory"))
+}
