@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use lynkeus_expr::lanes::Vector;
 
-/// To be used where the processor has AVX2: by functions that are only called from code that was
+/// To be used where the processor has AVX2 and FMA: by functions that are only called from code that was
 /// compiled for it. Everything is inlined there.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx(pub __m256d);
@@ -37,6 +37,18 @@ macro_rules! bitwise {
 
 impl Vector for Avx {
     bitwise!(and _mm256_and_pd, or _mm256_or_pd, xor _mm256_xor_pd);
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        // SAFETY: the processor has FMA
+        Self(unsafe { _mm256_fmadd_pd(self.0, factor.0, term.0) })
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        // SAFETY: the processor has FMA
+        Self(unsafe { _mm256_fmsub_pd(self.0, factor.0, term.0) })
+    }
 
     #[inline(always)]
     fn splat(x: f64) -> Self {

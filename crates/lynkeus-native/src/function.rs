@@ -45,7 +45,7 @@ struct Compiled {
 
 impl<const LANES: usize> Function<LANES> {
     /// Compiles a tape, for 1 lane or 4. None on machines that are not compiled for (other than
-    /// x86-64 with AVX2), where the system does not let programs make code, for tapes with
+    /// x86-64 with AVX2 and FMA), where the system does not let programs make code, for tapes with
     /// operations that are not compiled, and for other numbers of lanes.
     pub fn compile(tape: &Tape) -> Option<Self> {
         let program = recorded::<LANES>(tape)?;
@@ -90,7 +90,7 @@ fn recorded<const LANES: usize>(tape: &Tape) -> Option<Program> {
 
 #[cfg(target_arch = "x86_64")]
 fn is_supported() -> bool {
-    std::arch::is_x86_feature_detected!("avx2")
+    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
 }
 
 #[cfg(not(target_arch = "x86_64"))]

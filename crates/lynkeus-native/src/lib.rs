@@ -9,7 +9,7 @@
 //!
 //! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
 //! values are then placed in registers in one pass (`emit`), operation by operation
-//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 is compiled for: elsewhere
+//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 and FMA is compiled for: elsewhere
 //! [`Function::compile`] gives none and the interpreter does the work.
 //!
 //! This is the only crate of the workspace with `unsafe`: to call the code that it wrote, and for

@@ -33,7 +33,7 @@ macro_rules! unary {
                     }
                     // with AVX the System V ABI passes it in a register
                     #[allow(improper_ctypes_definitions)]
-                    #[target_feature(enable = "avx2")]
+                    #[target_feature(enable = "avx2,fma")]
                     extern "sysv64" fn side_by_side(x: __m256d) -> __m256d {
                         lanes::$function(Avx(x)).0
                     }
@@ -61,7 +61,7 @@ macro_rules! binary {
                     }
                     // with AVX the System V ABI passes it in a register
                     #[allow(improper_ctypes_definitions)]
-                    #[target_feature(enable = "avx2")]
+                    #[target_feature(enable = "avx2,fma")]
                     extern "sysv64" fn side_by_side(x: __m256d, y: __m256d) -> __m256d {
                         lanes::$function(Avx(x), Avx(y)).0
                     }

@@ -131,7 +131,7 @@ fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
             prop_assert!(same(e, found), "output {i}, lane {lane}: {e} and {found}");
         }
     }
-    for (lane, row) in rows.iter().enumerate() {
+    for row in rows {
         let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![[0.0]; outputs.len()]);
         interpreter.eval(row, &mut expected);
         single.eval(&row.map(|x| [x]), &mut found);

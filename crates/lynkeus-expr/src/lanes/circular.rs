@@ -1,26 +1,22 @@
 //! sin, cos and tan, after fdlibm (Sun Microsystems, 1993): the argument less k·π/2, then two
 //! polynomials on [−π/4, π/4].
 
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use super::Vector;
 use super::exponential::MAGIC;
 use super::vector::polynomial;
 
-/// π/2 in three parts, the first two of 33 bits.
-const HALF_TURN: [f64; 3] = [
-    1.570_796_326_734_125_6,
-    6.077_100_506_303_966e-11,
-    2.022_266_248_795_950_6e-21,
-];
+/// π/2 in two parts.
+const HALF_TURN: [f64; 2] = [FRAC_PI_2, 6.123_233_995_736_766e-17];
 
-/// Up to here k·π/2 is exact in its first two parts: k < 2²⁰.
+/// Up to here x less k times the first part is exact.
 const LARGE: f64 = 1.6e6;
 
-/// x − k·π/2 = r + tail.
+/// x − k·π/2 = r − over.
 struct Reduced<V> {
     r: V,
-    tail: V,
+    over: V,
     /// k + [`MAGIC`]
     shifted: V,
     /// where r has all its digits
@@ -29,20 +25,14 @@ struct Reduced<V> {
 
 #[inline(always)]
 fn reduced<V: Vector>(x: V) -> Reduced<V> {
-    let shifted = x * V::splat(FRAC_2_PI) + V::splat(MAGIC);
+    let shifted = x.mul_add(V::splat(FRAC_2_PI), V::splat(MAGIC));
     let k = shifted - V::splat(MAGIC);
-    let a = x - k * V::splat(HALF_TURN[0]);
-    let b = k * V::splat(HALF_TURN[1]);
-    // s + e = a − b (D. E. Knuth: The Art of Computer Programming 2, 4.2.2)
-    let s = a - b;
-    let back = s - a;
-    let e = (a - (s - back)) - (b + back);
-    let low = k * V::splat(HALF_TURN[2]) - e;
-    let r = s - low;
-    // what is missing of π/2 is k·2⁻¹¹⁹
-    let resolved = (k.abs() * V::splat(2e-19)).at_most(r.abs());
+    let s = k.mul_add(V::splat(-HALF_TURN[0]), x);
+    let r = k.mul_add(V::splat(-HALF_TURN[1]), s);
+    // r is to s − k·low what rounding left of it, unless nearly all of s was cancelled
+    let resolved = (k * V::splat(2e-16)).abs().at_most(r.abs());
     Reduced {
-        tail: (s - r) - low,
+        over: k.mul_add(V::splat(HALF_TURN[1]), r - s),
         inside: x.abs().at_most(V::splat(LARGE)).and(resolved),
         r,
         shifted,
@@ -63,29 +53,33 @@ impl<V: Vector> Reduced<V> {
         quadrant.up::<62>().signs()
     }
 
-    /// sin(r + tail).
+    /// sin(r − over).
     #[inline(always)]
     fn sin(&self) -> V {
-        let Self { r, tail, .. } = *self;
+        let Self { r, over, .. } = *self;
         let z = r * r;
-        let v = z * r;
-        let rest = polynomial(
+        let slope = polynomial(
             z,
             [
-                8.333_333_333_322_489e-3,
-                2.755_731_370_707_006_8e-6,
-                1.589_690_995_211_55e-10,
+                1.666_666_666_666_663_2e-1,
+                1.984_126_982_985_795e-4,
+                2.505_076_025_340_686_3e-8,
             ],
-            [-1.984_126_982_985_795e-4, -2.505_076_025_340_686_3e-8],
+            [
+                -8.333_333_333_322_489e-3,
+                -2.755_731_370_707_006_8e-6,
+                -1.589_690_995_211_55e-10,
+            ],
         );
-        let curve = z * (V::splat(0.5) * tail - v * rest) - tail;
-        r - (curve - v * V::splat(-1.666_666_666_666_663_2e-1))
+        // over times cos r
+        let turned = over * z.mul_add(V::splat(-0.5), V::splat(1.0));
+        r - slope.mul_add(z * r, turned)
     }
 
-    /// cos(r + tail).
+    /// cos(r − over).
     #[inline(always)]
     fn cos(&self) -> V {
-        let Self { r, tail, .. } = *self;
+        let Self { r, over, .. } = *self;
         let z = r * r;
         let rest = polynomial(
             z,
@@ -102,7 +96,8 @@ impl<V: Vector> Reduced<V> {
         );
         let half = V::splat(0.5) * z;
         let w = V::splat(1.0) - half;
-        w + (((V::splat(1.0) - w) - half) + (z * (z * rest) - r * tail))
+        let lost = (V::splat(1.0) - w) - half;
+        w + rest.mul_add(z * z, r.mul_add(over, lost))
     }
 }
 

@@ -22,12 +22,18 @@ pub(super) struct Parts<V> {
     pub shifted: V,
 }
 
-/// e^(x + tail), for |x| below 10⁶.
+/// x − k ln 2, and k + [`MAGIC`], for |x| below 10⁶.
 #[inline(always)]
-pub(super) fn parts<V: Vector>(x: V, tail: V) -> Parts<V> {
-    let shifted = x * V::splat(LOG2_E) + V::splat(MAGIC);
+pub(super) fn reduced<V: Vector>(x: V) -> [V; 2] {
+    let shifted = x.mul_add(V::splat(LOG2_E), V::splat(MAGIC));
     let k = shifted - V::splat(MAGIC);
-    let r = ((x - k * V::splat(LN_2[0])) - k * V::splat(LN_2[1])) + tail;
+    let r = k.mul_add(V::splat(-LN_2[1]), k.mul_add(V::splat(-LN_2[0]), x));
+    [r, shifted]
+}
+
+/// eʳ·2ᵏ, from r of at most ½ ln 2 and k + [`MAGIC`].
+#[inline(always)]
+pub(super) fn parts<V: Vector>([r, shifted]: [V; 2]) -> Parts<V> {
     // (eʳ − 1 − r)/r² for |r| ≤ ½ ln 2, from Chebyshev's nodes
     let rest = polynomial(
         r,
@@ -47,7 +53,7 @@ pub(super) fn parts<V: Vector>(x: V, tail: V) -> Parts<V> {
         ],
     );
     Parts {
-        p: V::splat(1.0) + (r + r * r * rest),
+        p: V::splat(1.0) + rest.mul_add(r * r, r),
         shifted,
     }
 }
@@ -70,7 +76,7 @@ impl<V: Vector> Parts<V> {
 #[inline(always)]
 fn scaled<V: Vector>(x: V, unit: f64) -> V {
     if x.abs().below(V::splat(LARGE)).all() {
-        return parts(x, V::splat(0.0)).value(unit);
+        return parts(reduced(x)).value(unit);
     }
     extreme(x, unit)
 }
@@ -80,9 +86,9 @@ fn scaled<V: Vector>(x: V, unit: f64) -> V {
 fn extreme<V: Vector>(x: V, unit: f64) -> V {
     let x = V::splat(760.0).smaller(x);
     let x = V::choose(x.below(V::splat(-760.0)), V::splat(-760.0), x);
-    let Parts { p, shifted } = parts(x, V::splat(0.0));
+    let Parts { p, shifted } = parts(reduced(x));
     let k = shifted - V::splat(MAGIC);
-    let half = k * V::splat(0.5) + V::splat(MAGIC);
+    let half = k.mul_add(V::splat(0.5), V::splat(MAGIC));
     let rest = (k - (half - V::splat(MAGIC))) + V::splat(MAGIC);
     p * power(half, 1.0) * power(rest, unit)
 }
@@ -122,7 +128,7 @@ pub fn sinh<V: Vector>(x: V) -> V {
             2.844_526_416_989_528_5e-15,
         ],
     );
-    let small = a + a * (z * rest);
+    let small = rest.mul_add(a * z, a);
     let y = V::choose(a.below(V::splat(1.0)), small, growing - fading);
     y.or(x.signs())
 }
@@ -158,8 +164,8 @@ pub fn tanh<V: Vector>(x: V) -> V {
             8.511_313_685_577_672e-5,
         ],
     );
-    let small = a + a * (z * rest);
-    let square = parts(a + a, V::splat(0.0)).value(1.0);
+    let small = rest.mul_add(a * z, a);
+    let square = parts(reduced(a + a)).value(1.0);
     let large = V::splat(1.0) - V::splat(2.0) / (square + V::splat(1.0));
     V::choose(a.below(V::splat(0.55)), small, large).or(x.signs())
 }

@@ -65,7 +65,8 @@ impl<V: Vector> Angle<V> {
     #[inline(always)]
     fn value(self) -> V {
         let low = self.quarters * V::splat(QUARTER_LOW);
-        self.quarters * V::splat(FRAC_PI_4) - ((self.curve - low) - self.t)
+        let own = self.t - (self.curve - low);
+        self.quarters.mul_add(V::splat(FRAC_PI_4), own)
     }
 }
 

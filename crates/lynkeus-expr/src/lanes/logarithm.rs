@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::Vector;
-use super::exponential::{LN_2, parts};
+use super::exponential::{LN_2, parts, reduced};
 use super::vector::polynomial;
 
 const TWO_52: f64 = 4_503_599_627_370_496.0;
@@ -54,8 +54,8 @@ pub fn ln<V: Vector>(x: V) -> V {
         ],
     );
     let half = V::splat(0.5) * f * f;
-    let curve = s * (half + rest) + k * V::splat(LN_2[1]);
-    let y = k * V::splat(LN_2[0]) - ((half - curve) - f);
+    let curve = s.mul_add(half + rest, k * V::splat(LN_2[1]));
+    let y = k.mul_add(V::splat(LN_2[0]), f - (half - curve));
     if inside.all() {
         return y;
     }
@@ -79,20 +79,13 @@ fn sum<V: Vector>(x: V, y: V) -> Double<V> {
     }
 }
 
-/// A product, exactly (T. J. Dekker: A floating-point technique for extending the available
-/// precision, 1971).
+/// A product, exactly.
 #[inline(always)]
 fn product<V: Vector>(x: V, y: V) -> Double<V> {
-    let upper = |x: V| {
-        let c = x * V::splat(134_217_729.0);
-        c - (c - x)
-    };
     let high = x * y;
-    let (x1, y1) = (upper(x), upper(y));
-    let (x2, y2) = (x - x1, y - y1);
     Double {
         high,
-        low: (((x1 * y1 - high) + x1 * y2) + x2 * y1) + x2 * y2,
+        low: x.mul_sub(y, high),
     }
 }
 
@@ -100,9 +93,10 @@ impl<V: Vector> Double<V> {
     #[inline(always)]
     fn times(self, other: Self) -> Self {
         let exact = product(self.high, other.high);
+        let low = self.low.mul_add(other.high, exact.low);
         Double {
             high: exact.high,
-            low: exact.low + (self.high * other.low + self.low * other.high),
+            low: self.high.mul_add(other.low, low),
         }
     }
 }
@@ -116,11 +110,11 @@ fn precise<V: Vector>(k: V, m: V) -> Double<V> {
     let missing = f - (whole - V::splat(2.0));
     // s = f/(2 + f); ln m = 2 artanh s
     let quotient = f / whole;
-    let back = product(quotient, whole);
-    let rest = ((f - back.high) - back.low) - quotient * missing;
+    // f less quotient times whole and missing, both signs turned
+    let short = quotient.mul_add(missing, quotient.mul_sub(whole, f));
     let s = Double {
         high: quotient,
-        low: rest / whole,
+        low: (V::splat(0.0) - short) / whole,
     };
     let w = s.times(s);
     // ((artanh s / s − 1)/s² − ⅓)/s² for |s| ≤ 0.1716, from Chebyshev's nodes
@@ -161,11 +155,11 @@ pub fn pow<V: Vector>(x: V, y: V) -> V {
     let Split { k, m, inside } = split(x);
     let ln = precise(k, m);
     let exponent = product(y, ln.high);
-    let power = parts(exponent.high, exponent.low + y * ln.low).value(1.0);
+    let [r, shifted] = reduced(exponent.high);
+    let r = r + y.mul_add(ln.low, exponent.low);
+    let power = parts([r, shifted]).value(1.0);
     let is_normal = exponent.high.abs().below(V::splat(708.0));
-    // larger factors cannot be split
-    let is_split = y.abs().at_most(V::splat(1e290));
-    let inside = inside.and(is_normal).and(is_split);
+    let inside = inside.and(is_normal);
     if inside.all() {
         return power;
     }

@@ -46,6 +46,16 @@ impl<const N: usize> Vector for Portable<N> {
     }
 
     #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        Self(from_fn(|i| self.0[i].mul_add(factor.0[i], term.0[i])))
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        Self(from_fn(|i| self.0[i].mul_add(factor.0[i], -term.0[i])))
+    }
+
+    #[inline(always)]
     fn and(self, other: Self) -> Self {
         self.bits(other, |x, y| x & y)
     }

@@ -2,8 +2,8 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// Numbers side by side that know the operations of IEEE 754 and a few on their bits. Every
-/// implementation gives the same bits, lane by lane: nothing is fused and nothing reordered.
+/// Numbers side by side that know the operations of IEEE 754, the fused one among them, and a few on
+/// their bits. Every implementation gives the same bits, lane by lane.
 ///
 /// A mask is a value whose lanes have all bits set or none.
 pub trait Vector:
@@ -11,6 +11,10 @@ pub trait Vector:
 {
     /// The same number in every lane.
     fn splat(x: f64) -> Self;
+    /// self·factor + term, rounded once.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// self·factor − term, rounded once.
+    fn mul_sub(self, factor: Self, term: Self) -> Self;
     /// Bits that both have.
     fn and(self, other: Self) -> Self;
     /// Bits that either has.
@@ -62,7 +66,7 @@ pub(super) fn horner<V: Vector, const N: usize>(x: V, c: [f64; N]) -> V {
     let mut i = N - 1;
     while i > 0 {
         i -= 1;
-        sum = sum * x + V::splat(c[i]);
+        sum = sum.mul_add(x, V::splat(c[i]));
     }
     sum
 }
@@ -75,5 +79,5 @@ pub(super) fn polynomial<V: Vector, const E: usize, const O: usize>(
     odd: [f64; O],
 ) -> V {
     let square = x * x;
-    horner(square, even) + x * horner(square, odd)
+    horner(square, odd).mul_add(x, horner(square, even))
 }

@@ -15,7 +15,7 @@ use crate::rk4::instant;
 const CACHE: usize = 24 * 1024;
 
 /// Most groups of lanes in a block.
-const GROUPS: usize = 16;
+const GROUPS: usize = 64;
 
 /// Steps for which what is shared is computed ahead.
 const AHEAD: usize = 64;
@@ -213,63 +213,102 @@ impl Block {
     fn record(&mut self, desk: &mut Desk<'_>, time: f64, modes: &[f64], columns: &[usize]) {
         let program = desk.program;
         let rows = desk.read(time, modes, self.groups, self.now.values());
-        let at = |place: usize, column: usize| {
-            rows[place / LANES * program.columns + column][place % LANES]
-        };
         let own = program.states + program.disturbances;
-        let x = self.now.values();
-        let states = |place: usize| {
-            let group = &x[place / LANES * own..][..program.states];
-            group.iter().map(move |lanes| lanes[place % LANES])
-        };
-        for (place, run) in self.runs.iter_mut().enumerate() {
-            if run.is_over {
-                continue;
-            }
-            let row = (0..program.columns).map(|column| at(place, column));
-            let found = run.judge(program, time, row, states(place));
-            if let Err(error) = found {
+        let groups = rows.chunks_exact(program.columns.max(1));
+        let states = self.now.values().chunks_exact(own.max(1));
+        let runs = self.runs.chunks_mut(LANES);
+        for (k, ((row, x), runs)) in groups.zip(states).zip(runs).enumerate() {
+            let x = &x[..program.states];
+            let extent = Extent::new(program, row, x);
+            for (lane, run) in runs.iter_mut().enumerate().filter(|(_, run)| !run.is_over) {
+                let Err(error) = run.judge(program, time, extent.of(lane), (x, lane)) else {
+                    continue;
+                };
                 run.is_over = true;
-                let run = self.first + place;
+                let run = self.first + k * LANES + lane;
                 self.ended.push(Ended { run, error });
             }
         }
         for &column in columns {
-            let values = (0..self.runs.len()).map(|place| at(place, column));
+            let lanes = rows.iter().skip(column).step_by(program.columns);
+            let values = lanes.flatten().take(self.runs.len());
             self.recorded.extend(values);
         }
     }
 }
 
+/// How large the values of four runs are at a row.
+struct Extent {
+    /// zero where all are finite
+    oddity: Lane,
+    /// of what is no estimate
+    known: Lane,
+    /// of the observer's states
+    estimates: Lane,
+}
+
+/// [`Extent`] of one run.
+struct Size {
+    is_finite: bool,
+    known: f64,
+    estimates: f64,
+}
+
+impl Extent {
+    fn new(program: &Program, row: &[Lane], x: &[Lane]) -> Self {
+        let mut oddity = [0.0; LANES];
+        for value in row.iter().chain(x) {
+            for (odd, v) in oddity.iter_mut().zip(value) {
+                *odd += v * 0.0;
+            }
+        }
+        let largest = |values: &[Lane]| {
+            values.iter().fold([0.0; LANES], |largest: Lane, value| {
+                std::array::from_fn(|lane| largest[lane].max(value[lane].abs()))
+            })
+        };
+        Self {
+            oddity,
+            known: largest(&row[..program.known]),
+            estimates: largest(&x[program.plant_states..]),
+        }
+    }
+
+    fn of(&self, lane: usize) -> Size {
+        Size {
+            is_finite: self.oddity[lane] == 0.0,
+            known: self.known[lane],
+            estimates: self.estimates[lane],
+        }
+    }
+}
+
 impl Run {
-    /// Whether the run goes on.
+    /// Whether the run goes on; `states` are those of its group, with its lane.
     fn judge(
         &mut self,
         program: &Program,
         time: f64,
-        row: impl Iterator<Item = f64>,
-        states: impl Iterator<Item = f64> + Clone,
+        size: Size,
+        states: (&[Lane], usize),
     ) -> Result<(), Error> {
-        let mut is_finite = true;
-        for (column, value) in row.enumerate() {
-            is_finite &= value.is_finite();
-            if column < program.known {
-                self.bound.see(&[value]);
-            }
-        }
-        if !is_finite {
-            let x: Vec<f64> = states.collect();
+        let (x, lane) = states;
+        let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
+        self.bound.see(&[size.known]);
+        if !size.is_finite {
             return Err(Error::NotFinite {
                 time,
                 operation: "a value is not finite".to_owned(),
-                state: state_text(&program.names, &x),
+                state: state_text(&program.names, &x()),
             });
         }
-        let estimates = states.skip(program.plant_states);
-        for (name, value) in program.observer_names.iter().zip(estimates) {
-            let one = std::slice::from_ref(name);
-            self.bound.check(time, one, &[value], String::new)?;
-        }
-        Ok(())
+        let names = &program.observer_names;
+        self.bound
+            .check(time, &[], &[size.estimates], String::new)
+            .or_else(|_| {
+                let x = x();
+                self.bound
+                    .check(time, names, &x[program.plant_states..], String::new)
+            })
     }
 }

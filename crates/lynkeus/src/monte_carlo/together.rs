@@ -32,7 +32,6 @@ impl Together<'_> {
             return Ok(None);
         }
         let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
-        let mut watch = watch;
         let Some(first) = self.pass(seeds, &columns, &mut *watch)? else {
             return Ok(None);
         };
