@@ -82,13 +82,17 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
 
     fn new(program: &'p Program, shared: usize) -> Self {
         let count = program.values.len();
-        let mut uses = vec![vec![]; count];
-        for (i, &value) in program.values.iter().enumerate().rev() {
-            program.each_argument(value, |argument| uses[argument as usize].push(i as u32));
-        }
         let mut results = vec![vec![]; count];
         for (i, &output) in program.outputs.iter().enumerate() {
             results[output as usize].push(i as u32);
+        }
+        let mut uses: Vec<Vec<u32>> = vec![vec![]; count];
+        for (i, &value) in program.values.iter().enumerate().rev() {
+            let is_idle = uses[i].is_empty() && results[i].is_empty();
+            if is_idle && Program::is_pure(value) {
+                continue;
+            }
+            program.each_argument(value, |argument| uses[argument as usize].push(i as u32));
         }
         let width = if LANES == 1 {
             Width::Scalar
@@ -141,6 +145,10 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     fn step(&mut self, id: Id, value: Value) {
         for slot in self.leaving.drain(..) {
             self.frame.release(slot);
+        }
+        let is_idle = self.uses[id as usize].is_empty() && self.results[id as usize].is_empty();
+        if is_idle && Program::is_pure(value) {
+            return;
         }
         match value {
             Value::Input(_) | Value::Constant(_) => {}

@@ -12,13 +12,13 @@ use crate::noise::Sensors;
 use crate::rk4::instant;
 
 /// Bytes that the states of a block may take, twice: they should stay in the first cache.
-const CACHE: usize = 24 * 1024;
+const CACHE: usize = 16 * 1024;
 
 /// Most groups of lanes in a block.
 const GROUPS: usize = 64;
 
 /// Steps for which what is shared is computed ahead.
-const AHEAD: usize = 64;
+const AHEAD: usize = 16;
 
 /// Groups of lanes in a block.
 pub(crate) fn groups(program: &Program) -> usize {
