@@ -1,4 +1,5 @@
 //! Many runs at once give what each gives alone.
+#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 

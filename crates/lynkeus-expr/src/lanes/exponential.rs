@@ -10,7 +10,7 @@ pub(super) const MAGIC: f64 = 6_755_399_441_055_744.0;
 
 /// ln 2 in two parts, the first of 33 bits (W. J. Cody, W. Waite: Software Manual for the
 /// Elementary Functions, 1980).
-pub(super) const LN_2: [f64; 2] = [6.931_471_803_691_238_2e-1, 1.908_214_929_270_587_7e-10];
+pub(super) const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 
 /// Beyond, 2ᵏ may be no normal number.
 const LARGE: f64 = 708.0;

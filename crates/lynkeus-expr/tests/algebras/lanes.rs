@@ -58,7 +58,7 @@ fn subjects() -> Vec<Subject> {
     vec![
         one(
             Unary::Exp,
-            1.01,
+            1.1,
             &[
                 (-0.4, 0.4),
                 (-30.0, 30.0),
@@ -68,7 +68,7 @@ fn subjects() -> Vec<Subject> {
         ),
         one(
             Unary::Ln,
-            1.0,
+            0.8,
             &[
                 (0.5, 2.0),
                 (0.99, 1.01),
@@ -77,14 +77,14 @@ fn subjects() -> Vec<Subject> {
                 (1.0, 1e300),
             ],
         ),
-        one(Unary::Sin, 1.0, &circle),
-        one(Unary::Cos, 1.0, &circle),
-        one(Unary::Tan, 2.5, &circle),
-        one(Unary::Asin, 2.0, &unit),
-        one(Unary::Acos, 2.0, &unit),
+        one(Unary::Sin, 0.8, &circle),
+        one(Unary::Cos, 0.8, &circle),
+        one(Unary::Tan, 1.8, &circle),
+        one(Unary::Asin, 1.8, &unit),
+        one(Unary::Acos, 1.8, &unit),
         one(
             Unary::Atan,
-            2.0,
+            1.8,
             &[
                 (-1.0, 1.0),
                 (-10.0, 10.0),
@@ -93,16 +93,16 @@ fn subjects() -> Vec<Subject> {
                 (1e3, 1e10),
             ],
         ),
-        one(Unary::Sinh, 2.0, &hyperbola),
-        one(Unary::Cosh, 2.0, &hyperbola),
+        one(Unary::Sinh, 1.6, &hyperbola),
+        one(Unary::Cosh, 1.6, &hyperbola),
         one(
             Unary::Tanh,
-            2.0,
+            1.6,
             &[(-0.6, 0.6), (-3.0, 3.0), (-25.0, 25.0), (0.5, 0.6)],
         ),
         two(
             Binary::Pow,
-            1.5,
+            1.2,
             &[
                 [(0.5, 2.0), (-3.0, 3.0)],
                 [(0.5, 2.0), (-1000.0, 1000.0)],
@@ -113,7 +113,7 @@ fn subjects() -> Vec<Subject> {
         ),
         two(
             Binary::Atan2,
-            2.5,
+            1.8,
             &[
                 [(-1.0, 1.0), (-1.0, 1.0)],
                 [(-10.0, 10.0), (-0.1, 0.1)],
@@ -191,7 +191,7 @@ fn check(count: usize) {
                 }
             }
         }
-        println!("{op:?}: {worst:.3} ulp at {at:?}");
+        eprintln!("{op:?}: {worst:.3} ulp at {at:?}");
         assert!(worst <= ulp, "{op:?}: {worst} units at {at:?}");
     }
 }
@@ -202,9 +202,9 @@ fn errors_of_lanes_are_as_stated() {
 }
 
 #[test]
-#[ignore = "minutes"]
+#[ignore = "a minute"]
 fn errors_of_lanes_are_as_stated_at_very_many_points() {
-    check(100_000);
+    check(5_000);
 }
 
 fn same(x: f64, y: f64) -> bool {
@@ -278,5 +278,5 @@ fn next_to_zeros_every_digit_is_kept() {
             }
         }
     }
-    assert!(worst < 2.5, "{worst}");
+    assert!(worst < 1.8, "{worst}");
 }

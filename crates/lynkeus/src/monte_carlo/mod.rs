@@ -148,16 +148,21 @@ pub fn monte_carlo(
     let prepared = Prepared::new(study, &plant)?;
     let rig = Rig::new(&prepared)?;
     let followed = followed(&plant, &rig);
-    let seeds: Vec<u64> = (settings.seed..=last).collect();
+    let seeds = || (settings.seed..=last).collect::<Vec<u64>>();
     let together = Together {
         prepared: &prepared,
         rig: &rig,
         followed: &followed,
     };
-    if let Some(figures) = together.figures(&seeds, watch)? {
+    let figures = match together.can(runs)? {
+        true => together.figures(&seeds(), watch)?,
+        false => None,
+    };
+    if let Some(figures) = figures {
         return Ok(reported(&prepared, &rig, &followed, runs, figures));
     }
     room(study, &rig, runs, followed.len())?;
+    let seeds = seeds();
     // what the design made comes with every clone of the plant
     let shared = (plant.clone(), rig.clone());
     let job = Job {

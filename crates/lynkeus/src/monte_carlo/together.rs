@@ -1,7 +1,7 @@
 //! All runs at once, where their steps are fixed: row by row, so that no more than some rows of
 //! them are in memory.
 
-use lynkeus_run::{Batch, Column, Member, Role};
+use lynkeus_run::{Batch, Column, Member, Method, Role, Step};
 
 use super::statistics::{Found, Scatter};
 use super::{Failure, Figures, Followed};
@@ -21,16 +21,28 @@ pub(super) struct Together<'a> {
 }
 
 impl Together<'_> {
-    /// The figures of the runs of these seeds; none where each run has steps of its own, or a
-    /// program.
+    /// Whether so many runs can go on together: not where each has steps or a program of its own.
     ///
     /// # Errors
-    /// A study that cannot be run, runs that would not fit into the memory, no run that reached its
-    /// end, or a limit.
-    pub fn figures(&self, seeds: &[u64], watch: &mut Watch<'_>) -> Result<Option<Figures>, Error> {
-        if self.rig.design.observer.filter.is_some() || self.rig.has_own_programs() {
-            return Ok(None);
+    /// Runs that would not fit into the memory.
+    pub fn can(&self, runs: usize) -> Result<bool, Error> {
+        let has_steps = matches!(
+            self.rig.simulation.method,
+            Method::Rk4(Step::AtMost(_) | Step::Substeps(_))
+        );
+        let is_filter = self.rig.design.observer.filter.is_some();
+        if !has_steps || is_filter || self.rig.has_own_programs() {
+            return Ok(false);
         }
+        room(self.prepared.study(), self.rig, runs, self.followed.len())?;
+        Ok(true)
+    }
+
+    /// The figures of the runs of these seeds; none where a step is too large to be one function.
+    ///
+    /// # Errors
+    /// A study that cannot be run, no run that reached its end, or a limit.
+    pub fn figures(&self, seeds: &[u64], watch: &mut Watch<'_>) -> Result<Option<Figures>, Error> {
         let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
         let Some(first) = self.pass(seeds, &columns, &mut *watch)? else {
             return Ok(None);
@@ -83,7 +95,6 @@ impl Together<'_> {
         let Some(mut batch) = self.batch(seeds, columns)? else {
             return Ok(None);
         };
-        room(study, &batch, row, self.followed.len())?;
         let (rows, threads) = (batch.rows(), crew::threads());
         let mut pass = Pass {
             time: Vec::with_capacity(rows),
@@ -198,20 +209,28 @@ struct Pass {
     ended: Vec<lynkeus_run::Ended>,
 }
 
+/// Bytes that the noise of one signal takes, at most.
+const STREAM: usize = 512;
+
 /// Refuses what would not fit into the memory that the study may take.
-fn room(study: &Study, batch: &Batch, row: usize, quantities: usize) -> Result<(), Error> {
-    let figures = batch.rows() * quantities * size_of::<[f64; 8]>();
-    let runs = batch.len() * quantities * size_of::<[f64; 3]>();
-    let bytes = row.max(WINDOW) + figures + runs;
-    let room = study.budget.room().unwrap_or(usize::MAX);
+fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), Error> {
+    let run = &rig.simulation;
+    let observer = run.observer.as_ref().map_or(0, |o| o.states().len());
+    let values = run.plant.states().len() + observer + run.plant.outputs().len();
+    let streams = run.noise.levels.len() + run.noise.process.len();
+    // states before and after a step; starts and figures; a row of what is followed
+    let numbers = 3 * values + 6 * quantities + 16;
+    let of_run = (numbers * size_of::<f64>() + streams * STREAM) as f64;
+    let rows = ((run.until - run.start) / run.output_step).ceil() + 1.0;
+    let figures = rows * (quantities * size_of::<[f64; 8]>()) as f64;
+    let bytes = runs as f64 * of_run + figures + WINDOW as f64;
+    let room = study.budget.room().unwrap_or(usize::MAX) as f64;
     if bytes <= room {
         return Ok(());
     }
-    let mib = |bytes: usize| bytes.div_ceil(1 << 20);
+    let mib = |bytes: f64| (bytes / f64::from(1 << 20)).ceil();
     let message = format!(
-        "{} runs of {} rows take {} MiB, and {} MiB are left",
-        batch.len(),
-        batch.rows(),
+        "{runs} runs of {rows} rows take {} MiB, and {} MiB are left",
         mib(bytes),
         mib(room)
     );
