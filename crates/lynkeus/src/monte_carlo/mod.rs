@@ -24,6 +24,7 @@ use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
 pub use report::Settled;
+use report::headers_of;
 use statistics::{Found, of_runs};
 use together::Together;
 
@@ -385,22 +386,6 @@ fn reported(
 fn is_measured(prepared: &Prepared<'_>, variable: &Variable) -> bool {
     let outputs = &prepared.extended().outputs;
     outputs.iter().any(|o| o.variable.node == variable.node)
-}
-
-/// The headers of a quantity's columns.
-fn headers_of(name: &str, headers: &mut Headers) -> [String; 7] {
-    let columns = [
-        ("mean", "the mean"),
-        ("q05", "the 5 % quantile"),
-        ("q95", "the 95 % quantile"),
-        ("error_mean", "the mean error"),
-        ("error_q05", "the 5 % quantile of the error"),
-        ("error_q95", "the 95 % quantile of the error"),
-        ("error_worst", "the largest error"),
-    ];
-    columns.map(|(suffix, what)| {
-        headers.free(&format!("{name}_{suffix}"), &format!("{what} of {name}"))
-    })
 }
 
 #[cfg(test)]
