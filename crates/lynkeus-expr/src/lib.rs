@@ -34,6 +34,7 @@ mod implicit;
 pub mod interval;
 pub mod jacobian;
 mod jet;
+pub mod lanes;
 mod linear;
 mod op;
 mod partials;

@@ -13,6 +13,8 @@ pub(crate) enum Base {
     Outputs,
     /// r13
     Frame,
+    /// r15
+    Shared,
 }
 
 impl Base {
@@ -21,6 +23,7 @@ impl Base {
             Self::Inputs => 3,
             Self::Outputs => 14,
             Self::Frame => 13,
+            Self::Shared => 15,
         }
     }
 }
@@ -204,17 +207,37 @@ impl Assembler {
         self.bytes.push(9);
     }
 
-    /// Saves what the caller owns, and takes the three pointers.
+    /// Saves what the caller owns, and takes the four pointers and the number of groups.
     pub fn enter(&mut self) {
-        self.bytes.extend([0x53, 0x41, 0x55, 0x41, 0x56]); // push rbx, r13, r14: aligns the stack
+        // push rbx, r12, r13, r14, r15: aligns the stack
+        self.bytes
+            .extend([0x53, 0x41, 0x54, 0x41, 0x55, 0x41, 0x56, 0x41, 0x57]);
         self.bytes.extend([0x48, 0x89, 0xfb]); // mov rbx, rdi
         self.bytes.extend([0x49, 0x89, 0xf6]); // mov r14, rsi
         self.bytes.extend([0x49, 0x89, 0xd5]); // mov r13, rdx
+        self.bytes.extend([0x49, 0x89, 0xcf]); // mov r15, rcx
+        self.bytes.extend([0x4d, 0x89, 0xc4]); // mov r12, r8
+    }
+
+    /// Goes back to `first` with the next inputs and outputs, so many bytes further, until every
+    /// group is done.
+    pub fn repeat(&mut self, first: usize, inputs: i32, outputs: i32) {
+        self.bytes.extend([0x48, 0x81, 0xc3]); // add rbx, inputs
+        self.bytes.extend(inputs.to_le_bytes());
+        self.bytes.extend([0x49, 0x81, 0xc6]); // add r14, outputs
+        self.bytes.extend(outputs.to_le_bytes());
+        self.bytes.extend([0x49, 0xff, 0xcc]); // dec r12
+        self.bytes.extend([0x0f, 0x85]); // jnz first
+        let next = self.bytes.len() + 4;
+        self.bytes
+            .extend((first as i32 - next as i32).to_le_bytes());
     }
 
     pub fn leave(&mut self) {
         self.bytes.extend([0xc5, 0xf8, 0x77]); // vzeroupper
-        self.bytes.extend([0x41, 0x5e, 0x41, 0x5d, 0x5b, 0xc3]); // pop r14, r13, rbx; ret
+        // pop r15, r14, r13, r12, rbx; ret
+        self.bytes
+            .extend([0x41, 0x5f, 0x41, 0x5e, 0x41, 0x5d, 0x41, 0x5c, 0x5b, 0xc3]);
     }
 
     /// Calls what stands at an absolute address.

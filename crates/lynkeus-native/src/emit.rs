@@ -10,6 +10,16 @@ use crate::record::{Id, Program, Value};
 const REGISTERS: usize = 14;
 pub(crate) const TEMPORARY: [Register; 2] = [14, 15];
 
+/// What code takes, and how often.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Shape {
+    /// number of first inputs that stand apart
+    pub shared: usize,
+    /// distance of the outputs of one group of lanes from those of the next, in values; none for
+    /// code that does one group
+    pub spacing: Option<usize>,
+}
+
 /// What was compiled.
 #[derive(Debug)]
 pub(crate) struct Emitted {
@@ -47,11 +57,17 @@ pub(crate) struct Emitter<'p, const LANES: usize> {
 }
 
 /// Code for a program.
-pub(crate) fn emit<const LANES: usize>(program: &Program) -> Emitted {
-    let mut emitter = Emitter::<LANES>::new(program);
+pub(crate) fn emit<const LANES: usize>(program: &Program, shape: Shape) -> Emitted {
+    let mut emitter = Emitter::<LANES>::new(program, shape.shared);
     emitter.assembler.enter();
+    let first = emitter.assembler.bytes.len();
     for (i, &value) in program.values.iter().enumerate() {
         emitter.step(i as Id, value);
+    }
+    if let Some(spacing) = shape.spacing {
+        let own = program.inputs - shape.shared;
+        let [inputs, outputs] = [own, spacing].map(|values| (values * 8 * LANES) as i32);
+        emitter.assembler.repeat(first, inputs, outputs);
     }
     emitter.assembler.leave();
     Emitted {
@@ -64,15 +80,19 @@ pub(crate) fn emit<const LANES: usize>(program: &Program) -> Emitted {
 impl<'p, const LANES: usize> Emitter<'p, LANES> {
     const BYTES: usize = 8 * LANES;
 
-    fn new(program: &'p Program) -> Self {
+    fn new(program: &'p Program, shared: usize) -> Self {
         let count = program.values.len();
-        let mut uses = vec![vec![]; count];
-        for (i, &value) in program.values.iter().enumerate().rev() {
-            program.each_argument(value, |argument| uses[argument as usize].push(i as u32));
-        }
         let mut results = vec![vec![]; count];
         for (i, &output) in program.outputs.iter().enumerate() {
             results[output as usize].push(i as u32);
+        }
+        let mut uses: Vec<Vec<u32>> = vec![vec![]; count];
+        for (i, &value) in program.values.iter().enumerate().rev() {
+            let is_idle = uses[i].is_empty() && results[i].is_empty();
+            if is_idle && Program::is_pure(value) {
+                continue;
+            }
+            program.each_argument(value, |argument| uses[argument as usize].push(i as u32));
         }
         let width = if LANES == 1 {
             Width::Scalar
@@ -91,22 +111,29 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
             pinned: vec![],
             leaving: vec![],
         };
-        emitter.place_leaves();
+        emitter.place_leaves(shared);
         emitter
     }
 
     /// Constants, inputs and systems have their places before anything is computed.
-    fn place_leaves(&mut self) {
+    fn place_leaves(&mut self, shared: usize) {
         for constant in crate::operations::CONSTANTS {
             self.frame.constant(constant);
         }
         for (i, &value) in self.program.values.iter().enumerate() {
             self.homes[i].memory = match value {
                 Value::Constant(c) => Some(Frame::address(self.frame.add(c), Self::BYTES)),
-                Value::Input(k) => Some(Address {
-                    base: Base::Inputs,
-                    offset: (k as usize * Self::BYTES) as i32,
-                }),
+                Value::Input(k) => {
+                    let k = k as usize;
+                    let (base, place) = match k.checked_sub(shared) {
+                        Some(own) => (Base::Inputs, own),
+                        None => (Base::Shared, k),
+                    };
+                    Some(Address {
+                        base,
+                        offset: (place * Self::BYTES) as i32,
+                    })
+                }
                 _ => None,
             };
         }
@@ -118,6 +145,10 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
     fn step(&mut self, id: Id, value: Value) {
         for slot in self.leaving.drain(..) {
             self.frame.release(slot);
+        }
+        let is_idle = self.uses[id as usize].is_empty() && self.results[id as usize].is_empty();
+        if is_idle && Program::is_pure(value) {
+            return;
         }
         match value {
             Value::Input(_) | Value::Constant(_) => {}
@@ -308,16 +339,8 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         self.assembler.call(library::solver::<LANES>());
     }
 
-    /// A library function: numbers go by register, lanes by address.
+    /// A function: arguments and result go by register, one number or four in each.
     fn call(&mut self, id: Id, function: usize, arguments: &[Id]) {
-        if LANES == 1 {
-            self.call_scalar(id, function, arguments);
-        } else {
-            self.call_lanes(id, function, arguments);
-        }
-    }
-
-    fn call_scalar(&mut self, id: Id, function: usize, arguments: &[Id]) {
         // to the temporaries first: an argument may stand where another one goes
         for (&argument, temporary) in arguments.iter().zip(TEMPORARY) {
             match self.homes[argument as usize].register {
@@ -334,45 +357,5 @@ impl<'p, const LANES: usize> Emitter<'p, LANES> {
         }
         self.assembler.call(function);
         self.settle(id, 0);
-    }
-
-    fn call_lanes(&mut self, id: Id, function: usize, arguments: &[Id]) {
-        let mut addresses = vec![];
-        for &argument in arguments {
-            let home = self.homes[argument as usize];
-            let address = match (home.memory, home.register) {
-                (None, Some(register)) => self.spill(argument, register),
-                (memory, _) => memory.unwrap_or(Frame::address(0, Self::BYTES)),
-            };
-            addresses.push(address);
-        }
-        self.vacate_all_but(arguments, id);
-        let slot = self.frame.slot();
-        let to = Frame::address(slot, Self::BYTES);
-        let home = &mut self.homes[id as usize];
-        (home.memory, home.slot) = (Some(to), Some(slot));
-        for (i, address) in addresses.into_iter().chain([to]).enumerate() {
-            self.assembler.pass(i, address);
-        }
-        self.assembler.call(function);
-        self.consume(id, arguments);
-    }
-
-    /// Registers are lost; arguments keep their memory until the call is over.
-    fn vacate_all_but(&mut self, arguments: &[Id], at: Id) {
-        for register in 0..REGISTERS {
-            let Some(id) = self.holds[register] else {
-                continue;
-            };
-            let is_over =
-                arguments.contains(&id) && self.uses[id as usize].iter().all(|&use_| use_ <= at);
-            if is_over {
-                self.holds[register] = None;
-                self.homes[id as usize].register = None;
-            } else {
-                self.vacate(register as Register);
-            }
-        }
-        self.pinned.clear();
     }
 }

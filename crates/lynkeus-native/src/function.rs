@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use lynkeus_expr::Tape;
 
+use crate::Buffer;
 use crate::record::Program;
 
 #[cfg(target_arch = "x86_64")]
-use crate::memory::Executable;
+use crate::emit::Shape;
+#[cfg(target_arch = "x86_64")]
+use crate::memory::{Executable, Places};
 
 /// Most instructions of a tape that is compiled.
 const LARGEST: usize = 1_000_000;
@@ -22,10 +25,21 @@ pub struct Function<const LANES: usize> {
     compiled: Arc<Compiled>,
 }
 
+/// A tape as machine code that goes over many groups of lanes: the first inputs are common to all
+/// groups, and the outputs of the groups stand at a distance from each other. A clone shares the code.
+#[derive(Clone, Debug)]
+pub struct Sweep<const LANES: usize> {
+    compiled: Arc<Compiled>,
+}
+
 #[derive(Debug)]
 struct Compiled {
     inputs: usize,
     outputs: usize,
+    /// number of inputs that groups have in common, of a [`Sweep`]
+    shared: usize,
+    /// from the outputs of one group to those of the next
+    spacing: usize,
     constants: Vec<f64>,
     /// length of the frame, in values
     frame: usize,
@@ -35,35 +49,52 @@ struct Compiled {
 
 impl<const LANES: usize> Function<LANES> {
     /// Compiles a tape, for 1 lane or 4. None on machines that are not compiled for (other than
-    /// x86-64 with AVX2), where the system does not let programs make code, for tapes with
+    /// x86-64 with AVX2 and FMA), where the system does not let programs make code, for tapes with
     /// operations that are not compiled, and for other numbers of lanes.
     pub fn compile(tape: &Tape) -> Option<Self> {
-        if !(LANES == 1 || LANES == 4) || tape.len() > LARGEST || !is_supported() {
-            return None;
-        }
-        let compiled = Compiled::new::<LANES>(&Program::record(tape)?)?;
-        Some(Self {
-            compiled: Arc::new(compiled),
-        })
+        let program = recorded::<LANES>(tape)?;
+        let compiled = Arc::new(Compiled::new::<LANES>(&program, 0, None)?);
+        Some(Self { compiled })
     }
 
     /// An evaluator with its own working memory.
     pub fn evaluator(&self) -> Evaluator<LANES> {
-        let compiled = &self.compiled;
-        let mut frame = vec![[0.0; LANES]; compiled.frame + 1];
-        for (place, &constant) in frame.iter_mut().zip(&compiled.constants) {
-            *place = [constant; LANES];
-        }
         Evaluator {
-            compiled: compiled.clone(),
-            frame,
+            frame: self.compiled.frame(),
+            compiled: self.compiled.clone(),
         }
     }
 }
 
+impl<const LANES: usize> Sweep<LANES> {
+    /// Compiles a tape whose first `shared` inputs are common to all groups; from the outputs of one
+    /// group to those of the next there are `spacing` values. None as of [`Function::compile`].
+    pub fn compile(tape: &Tape, shared: usize, spacing: usize) -> Option<Self> {
+        if shared > tape.inputs() || spacing < tape.outputs() {
+            return None;
+        }
+        let program = recorded::<LANES>(tape)?;
+        let compiled = Arc::new(Compiled::new::<LANES>(&program, shared, Some(spacing))?);
+        Some(Self { compiled })
+    }
+
+    /// An evaluator with its own working memory.
+    pub fn evaluator(&self) -> Sweeper<LANES> {
+        Sweeper {
+            frame: self.compiled.frame(),
+            compiled: self.compiled.clone(),
+        }
+    }
+}
+
+fn recorded<const LANES: usize>(tape: &Tape) -> Option<Program> {
+    let is_compiled_for = (LANES == 1 || LANES == 4) && is_supported();
+    (is_compiled_for && tape.len() <= LARGEST).then(|| Program::record(tape))?
+}
+
 #[cfg(target_arch = "x86_64")]
 fn is_supported() -> bool {
-    std::arch::is_x86_feature_detected!("avx2")
+    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
 }
 
 #[cfg(not(target_arch = "x86_64"))]
@@ -73,9 +104,14 @@ fn is_supported() -> bool {
 
 impl Compiled {
     #[cfg(target_arch = "x86_64")]
-    fn new<const LANES: usize>(program: &Program) -> Option<Self> {
-        let emitted = crate::emit::emit::<LANES>(program);
-        let places = [program.inputs, program.outputs.len(), emitted.frame + 1];
+    fn new<const LANES: usize>(
+        program: &Program,
+        shared: usize,
+        spacing: Option<usize>,
+    ) -> Option<Self> {
+        let emitted = crate::emit::emit::<LANES>(program, Shape { shared, spacing });
+        let outputs = spacing.unwrap_or(program.outputs.len());
+        let places = [program.inputs, outputs, emitted.frame + 1];
         if places
             .iter()
             .any(|count| *count > LARGEST_PLACE / (8 * LANES))
@@ -85,6 +121,8 @@ impl Compiled {
         Some(Self {
             inputs: program.inputs,
             outputs: program.outputs.len(),
+            shared,
+            spacing: spacing.unwrap_or(program.outputs.len()),
             code: Executable::new(&emitted.code)?,
             constants: emitted.constants,
             frame: emitted.frame,
@@ -92,8 +130,18 @@ impl Compiled {
     }
 
     #[cfg(not(target_arch = "x86_64"))]
-    fn new<const LANES: usize>(_: &Program) -> Option<Self> {
+    fn new<const LANES: usize>(_: &Program, _: usize, _: Option<usize>) -> Option<Self> {
         None
+    }
+
+    /// Constants, then what registers do not hold; one place more than is used, since logic
+    /// reads beyond a single number.
+    fn frame<const LANES: usize>(&self) -> Buffer<LANES> {
+        let mut frame = Buffer::new(self.frame + 1);
+        for (place, &constant) in frame.values_mut().iter_mut().zip(&self.constants) {
+            *place = [constant; LANES];
+        }
+        frame
     }
 }
 
@@ -101,9 +149,7 @@ impl Compiled {
 #[derive(Clone, Debug)]
 pub struct Evaluator<const LANES: usize> {
     compiled: Arc<Compiled>,
-    /// constants, then what registers do not hold; one place more than is used, since logic
-    /// reads beyond a single number
-    frame: Vec<[f64; LANES]>,
+    frame: Buffer<LANES>,
 }
 
 impl<const LANES: usize> Evaluator<LANES> {
@@ -117,13 +163,60 @@ impl<const LANES: usize> Evaluator<LANES> {
         assert_eq!(outputs.len(), compiled.outputs, "one place per output");
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
-        // frame, of LANES numbers each, and the lengths were compared
+        // frame, of LANES numbers each, for one group and nothing shared, and the lengths were
+        // compared
         unsafe {
-            compiled.code.run(
-                inputs.as_ptr().cast(),
-                outputs.as_mut_ptr().cast(),
-                self.frame.as_mut_ptr().cast(),
-            );
+            compiled.code.run(Places {
+                inputs: inputs.as_ptr().cast(),
+                outputs: outputs.as_mut_ptr().cast(),
+                frame: self.frame.values_mut().as_mut_ptr().cast(),
+                shared: std::ptr::null(),
+                groups: 1,
+            });
+        }
+    }
+}
+
+/// Evaluates a [`Sweep`] again and again, without allocating.
+#[derive(Clone, Debug)]
+pub struct Sweeper<const LANES: usize> {
+    compiled: Arc<Compiled>,
+    frame: Buffer<LANES>,
+}
+
+impl<const LANES: usize> Sweeper<LANES> {
+    /// For each of `groups` groups: writes the outputs at the shared inputs and its own ones, which
+    /// stand one group after the other.
+    ///
+    /// # Panics
+    /// If the slices are too short for so many groups.
+    pub fn eval(
+        &mut self,
+        groups: usize,
+        shared: &[[f64; LANES]],
+        inputs: &[[f64; LANES]],
+        outputs: &mut [[f64; LANES]],
+    ) {
+        let compiled = &*self.compiled;
+        let own = compiled.inputs - compiled.shared;
+        let Some(before) = groups.checked_sub(1) else {
+            return;
+        };
+        assert_eq!(shared.len(), compiled.shared, "one value per shared input");
+        assert!(inputs.len() >= groups * own, "inputs of every group");
+        let needed = before * compiled.spacing + compiled.outputs;
+        assert!(outputs.len() >= needed, "outputs of every group");
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
+        // frame, of LANES numbers each, and there is room for so many groups
+        unsafe {
+            compiled.code.run(Places {
+                inputs: inputs.as_ptr().cast(),
+                outputs: outputs.as_mut_ptr().cast(),
+                frame: self.frame.values_mut().as_mut_ptr().cast(),
+                shared: shared.as_ptr().cast(),
+                groups,
+            });
         }
     }
 }

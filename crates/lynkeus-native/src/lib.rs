@@ -1,16 +1,19 @@
 //! Tapes of `lynkeus-expr` as machine code.
 //!
-//! A [`Function`] computes what a [`Tape`](lynkeus_expr::Tape) computes, to the last bit where both
-//! call the same library functions (a NaN is a NaN, whatever its payload): the interpreter is the
-//! oracle. There are two shapes, one value per number ([`Function<1>`]) and four values side by
-//! side in vector registers ([`Function<4>`]), made by one emitter.
+//! A [`Function`] computes what a [`Tape`](lynkeus_expr::Tape) computes, to the last bit (a NaN is
+//! a NaN, whatever its payload): the interpreter is the oracle. There are two shapes, made by one
+//! emitter: one number per value ([`Function<1>`]), which is the tape over
+//! [`Reals`](lynkeus_expr::Reals), and four numbers side by side in vector registers
+//! ([`Function<4>`]), the tape over [`Lanes`](lynkeus_expr::lanes::Lanes), whose elementary
+//! functions are written for lanes. A [`Sweep`] does many groups of four with one call.
 //!
 //! Compiling is one more evaluation of the tape, over the algebra of instructions (`record`);
 //! values are then placed in registers in one pass (`emit`), operation by operation
-//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 is compiled for: elsewhere
+//! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 and FMA is compiled for: elsewhere
 //! [`Function::compile`] gives none and the interpreter does the work.
 //!
-//! This is the only crate of the workspace with `unsafe`: to call the code that it wrote.
+//! This is the only crate of the workspace with `unsafe`: to call the code that it wrote, and for
+//! the instructions of the functions in lanes.
 //!
 //! ```
 //! use lynkeus_expr::{Graph, Tape};
@@ -27,11 +30,14 @@
 //! # Ok::<(), lynkeus_expr::MissingInput>(())
 //! ```
 
+mod buffer;
 mod function;
 mod record;
 
 #[cfg(target_arch = "x86_64")]
 mod assemble;
+#[cfg(target_arch = "x86_64")]
+mod avx;
 #[cfg(target_arch = "x86_64")]
 mod emit;
 #[cfg(target_arch = "x86_64")]
@@ -43,4 +49,5 @@ mod memory;
 #[cfg(target_arch = "x86_64")]
 mod operations;
 
-pub use function::{Evaluator, Function};
+pub use buffer::Buffer;
+pub use function::{Evaluator, Function, Sweep, Sweeper};

@@ -1,8 +1,14 @@
-//! What compiled code calls: the functions that the interpreter calls, too.
+//! What compiled code calls: the functions that the interpreter calls, too, over `Reals` for one
+//! lane and over `Lanes` for four.
 
+use std::arch::x86_64::__m256d;
+
+use lynkeus_expr::lanes;
 use lynkeus_expr::{Algebra, Binary, Reals, Unary};
 
-/// A function of one number, and of four side by side, which go by address.
+use crate::avx::Avx;
+
+/// A function of numbers, and of four of them side by side.
 struct Pair {
     scalar: usize,
     lanes: usize,
@@ -14,9 +20,10 @@ impl Pair {
     }
 }
 
-/// The library's functions, by a macro because each has to be a function of its own.
+/// The library's functions and those of lanes, by a macro because each has to be a function of
+/// its own. Arguments and result go by vector registers, one number or four in each.
 macro_rules! unary {
-    ($($op:ident),*) => {
+    ($($op:ident $function:ident),*) => {
         /// The address of a function of one value; none where code is emitted for it.
         pub(crate) fn unary<const LANES: usize>(op: Unary) -> Option<usize> {
             let pair = match op {
@@ -24,18 +31,15 @@ macro_rules! unary {
                     extern "sysv64" fn scalar(x: f64) -> f64 {
                         Reals.unary(Unary::$op, &x)
                     }
-                    /// # Safety
-                    /// Both must point at four numbers.
-                    unsafe extern "sysv64" fn lanes(x: *const [f64; 4], to: *mut [f64; 4]) {
-                        // SAFETY: by the caller's promise
-                        unsafe { *to = (*x).map(scalar_value) }
-                    }
-                    fn scalar_value(x: f64) -> f64 {
-                        Reals.unary(Unary::$op, &x)
+                    // with AVX the System V ABI passes it in a register
+                    #[allow(improper_ctypes_definitions)]
+                    #[target_feature(enable = "avx2,fma")]
+                    extern "sysv64" fn side_by_side(x: __m256d) -> __m256d {
+                        lanes::$function(Avx(x)).0
                     }
                     Pair {
                         scalar: scalar as extern "sysv64" fn(f64) -> f64 as usize,
-                        lanes: lanes as unsafe extern "sysv64" fn(*const [f64; 4], *mut [f64; 4])
+                        lanes: side_by_side as unsafe extern "sysv64" fn(__m256d) -> __m256d
                             as usize,
                     }
                 })*
@@ -47,7 +51,7 @@ macro_rules! unary {
 }
 
 macro_rules! binary {
-    ($($op:ident),*) => {
+    ($($op:ident $function:ident),*) => {
         /// The address of a function of two values; none where code is emitted for it.
         pub(crate) fn binary<const LANES: usize>(op: Binary) -> Option<usize> {
             let pair = match op {
@@ -55,28 +59,17 @@ macro_rules! binary {
                     extern "sysv64" fn scalar(x: f64, y: f64) -> f64 {
                         Reals.binary(Binary::$op, &x, &y)
                     }
-                    /// # Safety
-                    /// All must point at four numbers.
-                    unsafe extern "sysv64" fn lanes(
-                        x: *const [f64; 4],
-                        y: *const [f64; 4],
-                        to: *mut [f64; 4],
-                    ) {
-                        // SAFETY: by the caller's promise
-                        let (x, y) = unsafe { (*x, *y) };
-                        let values =
-                            std::array::from_fn(|i| Reals.binary(Binary::$op, &x[i], &y[i]));
-                        // SAFETY: by the caller's promise
-                        unsafe { *to = values }
+                    // with AVX the System V ABI passes it in a register
+                    #[allow(improper_ctypes_definitions)]
+                    #[target_feature(enable = "avx2,fma")]
+                    extern "sysv64" fn side_by_side(x: __m256d, y: __m256d) -> __m256d {
+                        lanes::$function(Avx(x), Avx(y)).0
                     }
                     Pair {
                         scalar: scalar as extern "sysv64" fn(f64, f64) -> f64 as usize,
-                        lanes: lanes
-                            as unsafe extern "sysv64" fn(
-                                *const [f64; 4],
-                                *const [f64; 4],
-                                *mut [f64; 4],
-                            ) as usize,
+                        lanes: side_by_side
+                            as unsafe extern "sysv64" fn(__m256d, __m256d) -> __m256d
+                            as usize,
                     }
                 })*
                 _ => return None,
@@ -86,8 +79,11 @@ macro_rules! binary {
     };
 }
 
-unary!(Exp, Ln, Sin, Cos, Tan, Asin, Acos, Atan, Sinh, Cosh, Tanh);
-binary!(Pow, Atan2);
+unary!(
+    Exp exp, Ln ln, Sin sin, Cos cos, Tan tan, Asin asin, Acos acos, Atan atan, Sinh sinh,
+    Cosh cosh, Tanh tanh
+);
+binary!(Pow pow, Atan2 atan2);
 
 /// Solves a system of `n` equations whose values have `LANES` lanes. At `system` stand A row by
 /// row and b, with one more place behind; b becomes x, the last place the condition.

@@ -46,6 +46,11 @@ impl Program {
         (!recorder.is_beyond.get()).then_some(program)
     }
 
+    /// Whether a value is only there for its users; a linear system is there for its entries.
+    pub fn is_pure(value: Value) -> bool {
+        !matches!(value, Value::Solve(_))
+    }
+
     /// Hands over the arguments of a value.
     pub fn each_argument(&self, value: Value, mut give: impl FnMut(Id)) {
         match value {
@@ -76,6 +81,14 @@ struct Recorder {
 const LARGEST_SYSTEM: usize = 64;
 
 impl Recorder {
+    /// What a value is the negative of.
+    fn negated(&self, id: Id) -> Option<Id> {
+        match self.program.borrow().values[id as usize] {
+            Value::Unary(Unary::Neg, x) => Some(x),
+            _ => None,
+        }
+    }
+
     fn push(&self, value: Value) -> Id {
         let values = &mut self.program.borrow_mut().values;
         values.push(value);
@@ -122,8 +135,15 @@ impl Algebra for Recorder {
         }
     }
 
+    /// −x + y is y − x, and x − (−y) is x + y, to the bit.
     fn binary(&self, op: Binary, x: &Id, y: &Id) -> Id {
-        self.push(Value::Binary(op, *x, *y))
+        let (op, x, y) = match (op, self.negated(*x), self.negated(*y)) {
+            (Binary::Add, _, Some(y)) => (Binary::Sub, *x, y),
+            (Binary::Add, Some(x), None) => (Binary::Sub, *y, x),
+            (Binary::Sub, _, Some(y)) => (Binary::Add, *x, y),
+            _ => (op, *x, *y),
+        };
+        self.push(Value::Binary(op, x, y))
     }
 
     fn select(&self, condition: &Id, x: &Id, y: &Id) -> Id {

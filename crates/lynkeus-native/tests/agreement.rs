@@ -1,7 +1,8 @@
 //! Compiled code gives what the interpreter gives, to the bit.
 
+use lynkeus_expr::lanes::Lanes;
 use lynkeus_expr::{Binary, Graph, Node, Tape, Unary};
-use lynkeus_native::Function;
+use lynkeus_native::{Function, Sweep};
 use proptest::prelude::*;
 
 /// One step of a random program: what to do with which earlier values.
@@ -87,15 +88,48 @@ fn agrees(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
     let columns: Vec<[f64; 4]> = (0..5).map(|i| rows.map(|row| row[i])).collect();
     let mut side_by_side = vec![[0.0; 4]; outputs.len()];
     lanes.eval(&columns, &mut side_by_side);
-    for (lane, row) in rows.iter().enumerate() {
+    let together = tape.eval_in(&Lanes::<4>, &columns);
+    for (i, (e, found)) in together.iter().zip(&side_by_side).enumerate() {
+        for lane in 0..4 {
+            let (e, found) = (e[lane], found[lane]);
+            prop_assert!(same(e, found), "output {i}, lane {lane}: {e} and {found}");
+        }
+    }
+    for row in rows {
         let (mut expected, mut found) = (vec![0.0; outputs.len()], vec![[0.0]; outputs.len()]);
         interpreter.eval(row, &mut expected);
         single.eval(&row.map(|x| [x]), &mut found);
         for (i, &e) in expected.iter().enumerate() {
             prop_assert!(same(e, found[i][0]), "output {i}: {e} and {}", found[i][0]);
-            let beside = side_by_side[i][lane];
-            prop_assert!(same(e, beside), "output {i}, lane {lane}: {e} and {beside}");
         }
+    }
+    Ok(())
+}
+
+/// Three groups with two inputs in common give what each gives alone.
+fn sweeps_agree(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseError> {
+    const SPARE: usize = 3;
+    let g = Graph::new();
+    let inputs: Vec<Node> = (0..5).map(|i| g.symbol(&format!("x{i}")).node()).collect();
+    let outputs = build(&g, &inputs, draws);
+    let tape = Tape::new(&g, &inputs, &outputs).expect("all inputs are there");
+    let spacing = outputs.len() + SPARE;
+    let Some(sweep) = Sweep::<4>::compile(&tape, 2, spacing) else {
+        return Ok(());
+    };
+    let [u, v, a, b, c] = std::array::from_fn(|i| rows.map(|row| row[i]));
+    let own = [[a, b, c], [b, c, a], [c, c, b]];
+    let mut found = vec![[7.0; 4]; 3 * spacing];
+    let mut sweeper = sweep.evaluator();
+    sweeper.eval(3, &[u, v], own.as_flattened(), &mut found);
+    for (group, [a, b, c]) in own.into_iter().enumerate() {
+        let expected = tape.eval_in(&Lanes::<4>, &[u, v, a, b, c]);
+        let (values, spare) = found[group * spacing..][..spacing].split_at(outputs.len());
+        let pairs = values.as_flattened().iter().zip(expected.as_flattened());
+        for (found, expected) in pairs {
+            prop_assert!(same(*found, *expected), "group {group}: {found} {expected}");
+        }
+        prop_assert_eq!(spare, &[[7.0; 4]; SPARE]);
     }
     Ok(())
 }
@@ -110,6 +144,7 @@ proptest! {
     #[test]
     fn random_programs_agree(draws in prop::collection::vec(draw(), 1..200), rows in rows()) {
         agrees(&draws, &rows)?;
+        sweeps_agree(&draws, &rows)?;
     }
 }
 

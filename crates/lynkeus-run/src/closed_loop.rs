@@ -1,5 +1,7 @@
 //! Inputs, plant, sensors and observer as one system.
 
+use lynkeus_expr::Tape;
+
 use crate::joint::Parts;
 use crate::noise::Sensors;
 use crate::routine::Runner;
@@ -171,6 +173,34 @@ impl Loop {
         (names, &x[self.plant.dimension()..])
     }
 
+    /// The joint derivatives, as functions of time, states, what disturbs them, and modes.
+    pub(crate) fn tape(&self) -> &Tape {
+        self.joint.tape()
+    }
+
+    /// The values of a row, as functions of the same.
+    pub(crate) fn row_tape(&self) -> Result<Tape, Error> {
+        let parts = Parts {
+            inputs: self.inputs.system(),
+            plant: self.plant.system(),
+            observer: self.observer.as_ref().map(Evaluation::system),
+            sensors: &self.sensors,
+            plant_wires: &self.plant_wires,
+            observer_wires: &self.observer_wires,
+        };
+        parts.row(self.record_outputs)
+    }
+
+    /// How many values disturb sensors and states.
+    pub(crate) fn disturbances(&self) -> usize {
+        self.sensors.disturbances().count()
+    }
+
+    /// The values of what jumps with time, since the last [`Dynamics::enter`].
+    pub(crate) fn modes(&self) -> &[f64] {
+        &self.arguments[1 + self.dimension() + self.disturbances()..]
+    }
+
     /// Draws the next noise sample.
     pub(crate) fn draw(&mut self) {
         self.sensors.draw();
@@ -208,11 +238,10 @@ impl Loop {
     /// the next.
     fn settle(&mut self) {
         let first = 1 + self.dimension();
-        let noise = (0..self.y.len()).map(|i| self.sensors.disturbance(i));
-        let drives = self.sensors.moved().map(|state| self.sensors.drive(state));
         let observer = self.observer.as_ref().map_or(&[][..], Evaluation::modes);
-        let of = [self.inputs.modes(), self.plant.modes(), observer];
-        let values = noise.chain(drives).chain(of.into_iter().flatten().copied());
+        let modes = [self.inputs.modes(), self.plant.modes(), observer];
+        let modes = modes.into_iter().flatten().copied();
+        let values = self.sensors.disturbances().chain(modes);
         for (argument, value) in self.arguments[first..].iter_mut().zip(values) {
             *argument = value;
         }

@@ -117,14 +117,7 @@ impl Integrator {
         to: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let shortest = 4.0 * resolution(to);
-        let length = to - from;
-        if !length.is_finite() || length <= shortest {
-            let what = format!("interval from t = {from} to {to}");
-            let expected =
-                format!("more than {shortest:e}, which time resolves (shift its origin)");
-            return Err(Error::setting(what, expected, length));
-        }
+        check_interval(from, to)?;
         let mut instants = std::mem::take(&mut self.instants);
         instants.clear();
         let result = f
@@ -161,18 +154,11 @@ impl Integrator {
         instants: &mut Vec<f64>,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        instants.sort_unstable_by(f64::total_cmp);
         if let Stepper::Adaptive(adaptive) = &mut self.stepper {
             adaptive.grant(instants.len());
         }
-        instants.push(to);
         let whole = to - from;
-        let mut start = from;
-        for &end in instants.iter() {
-            // two detectors may find one switch, a rounding error apart
-            if end - start <= 4.0 * f64::EPSILON * end.abs() && end < to {
-                continue;
-            }
+        for (start, end) in pieces(from, to, instants) {
             f.enter(start + 0.5 * (end - start));
             match &mut self.stepper {
                 Stepper::Adaptive(adaptive) => {
@@ -182,7 +168,6 @@ impl Integrator {
                 }
                 Stepper::Fixed(fixed) => fixed.advance(f, start, end, whole, x)?,
             }
-            start = end;
         }
         Ok(())
     }
@@ -241,19 +226,13 @@ impl Fixed {
         whole: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let used = match self.step {
-            Step::AtMost(h) => h.min(whole),
-            Step::Substeps(n) => whole / n as f64,
-            Step::Auto => return self.auto(f, from, to, x),
+        let Some(used) = self.step.length(whole) else {
+            return self.auto(f, from, to, x);
         };
         if self.advice.is_none() {
             self.look(f, from, x, used);
         }
-        let steps = count(from, to, used).ok_or_else(|| {
-            let least = (to - from) / MOST_STEPS as f64;
-            let expected = format!("at least {least:e} for the interval from {from} to {to}");
-            Error::setting("step", expected, used)
-        })?;
+        let steps = fixed_steps(from, to, used)?;
         self.begin.copy_from_slice(x);
         let result = self.rk4.advance(f, from, to, steps, x);
         if let Err(Error::NotFinite { .. }) = result {
@@ -317,6 +296,47 @@ impl Fixed {
             used,
         });
     }
+}
+
+/// # Errors
+/// [`Error::Setting`] for an interval that is empty or too short for the resolution of time.
+pub(crate) fn check_interval(from: f64, to: f64) -> Result<(), Error> {
+    let shortest = 4.0 * resolution(to);
+    let length = to - from;
+    if length.is_finite() && length > shortest {
+        return Ok(());
+    }
+    let what = format!("interval from t = {from} to {to}");
+    let expected = format!("more than {shortest:e}, which time resolves (shift its origin)");
+    Err(Error::setting(what, expected, length))
+}
+
+/// The pieces of an interval between switching instants, which are put in order.
+pub(crate) fn pieces(
+    from: f64,
+    to: f64,
+    instants: &mut Vec<f64>,
+) -> impl Iterator<Item = (f64, f64)> {
+    instants.sort_unstable_by(f64::total_cmp);
+    instants.push(to);
+    let mut start = from;
+    instants.iter().filter_map(move |&end| {
+        // two detectors may find one switch, a rounding error apart
+        let is_same = end - start <= 4.0 * f64::EPSILON * end.abs() && end < to;
+        (!is_same).then(|| (std::mem::replace(&mut start, end), end))
+    })
+}
+
+/// How many equal steps of at most `h` make the interval.
+///
+/// # Errors
+/// [`Error::Setting`] if too many.
+pub(crate) fn fixed_steps(from: f64, to: f64, h: f64) -> Result<usize, Error> {
+    count(from, to, h).ok_or_else(|| {
+        let least = (to - from) / MOST_STEPS as f64;
+        let expected = format!("at least {least:e} for the interval from {from} to {to}");
+        Error::setting("step", expected, h)
+    })
 }
 
 /// How many equal steps of at most `h` make the interval; none if too many.

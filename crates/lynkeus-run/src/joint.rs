@@ -25,46 +25,124 @@ impl Parts<'_> {
     /// states, what disturbs each sensor and each moved state, and the modes of inputs, plant and observer.
     pub fn joined(&self) -> Result<Arc<Routine>, Error> {
         let g = Graph::new();
-        let fresh = |count: usize| -> Vec<Expr<'_>> { (0..count).map(|_| g.fresh("x")).collect() };
-        let observer_states = self.observer.map_or(0, |o| o.states().len());
-        let time = g.fresh("time");
-        let plant_x = fresh(self.plant.states().len());
-        let observer_x = fresh(observer_states);
-        let noise = fresh(self.plant.outputs().len());
-        let drives = fresh(self.sensors.moved().count());
-        let input_modes = fresh(self.inputs.modes());
-        let plant_modes = fresh(self.plant.modes());
-        let observer_modes = fresh(self.observer.map_or(0, System::modes));
-        let eval = |tape: &Tape, arguments: [&[Expr<'_>]; 3]| -> Vec<Expr<'_>> {
-            let all = std::iter::once(&time).chain(arguments.into_iter().flatten());
-            let nodes: Vec<Node> = all.map(|e| e.node()).collect();
-            let values = tape.eval_in(&Nodes(&g), &nodes);
-            values.into_iter().map(|value| g.expr(value)).collect()
-        };
-        let u = eval(self.inputs.output_tape(), [&[], &[], &input_modes]);
-        let w: Vec<Expr<'_>> = self.plant_wires.iter().map(|&wire| u[wire]).collect();
-        let mut derivatives = eval(self.plant.derivative_tape(), [&plant_x, &w, &plant_modes]);
-        for (state, &drive) in self.sensors.moved().zip(&drives) {
+        let symbols = Symbols::new(&g, self);
+        let (u, w) = symbols.inputs(self);
+        let mut derivatives = symbols.plant(self.plant.derivative_tape(), &w);
+        for (state, &drive) in self.sensors.moved().zip(&symbols.drives) {
             derivatives[state] = derivatives[state] + drive;
         }
         if let Some(observer) = self.observer {
-            let y = eval(self.plant.output_tape(), [&plant_x, &w, &plant_modes]);
-            let signal = |wire: &Source| match *wire {
-                Source::Input(i) => u[i],
-                Source::Sensor(i) => match self.sensors.disturbed(i) {
-                    Disturbed::Not => y[i],
-                    Disturbed::Added => y[i] + noise[i],
-                    Disturbed::Multiplied => y[i] * noise[i],
-                },
-            };
-            let w: Vec<Expr<'_>> = self.observer_wires.iter().map(signal).collect();
-            let tape = observer.derivative_tape();
-            derivatives.extend(eval(tape, [&observer_x, &w, &observer_modes]));
+            let y = symbols.plant(self.plant.output_tape(), &w);
+            let w = symbols.signals(self, &u, &y);
+            derivatives.extend(symbols.observer(observer.derivative_tape(), &w));
         }
-        let modes = [input_modes, plant_modes, observer_modes].concat();
-        let symbols = [vec![time], plant_x, observer_x, noise, drives, modes].concat();
-        let [symbols, derivatives] =
-            [symbols, derivatives].map(|of| of.iter().map(|e| e.node()).collect::<Vec<_>>());
-        Ok(Routine::new(Tape::new(&g, &symbols, &derivatives)?))
+        Ok(Routine::new(symbols.tape(&derivatives)?))
+    }
+
+    /// The values of a row, in the order of the columns of a run, as functions of the same.
+    pub fn row(&self, with_outputs: bool) -> Result<Tape, Error> {
+        let g = Graph::new();
+        let symbols = Symbols::new(&g, self);
+        let (u, w) = symbols.inputs(self);
+        let y = symbols.plant(self.plant.output_tape(), &w);
+        let mut row = [&symbols.plant_x[..], &w].concat();
+        if with_outputs {
+            row.extend(&y);
+            row.extend((0..y.len()).map(|i| symbols.measured(self, &y, i)));
+        }
+        if let Some(observer) = self.observer {
+            let w = symbols.signals(self, &u, &y);
+            match observer.outputs().is_empty() {
+                true => row.extend(&symbols.observer_x),
+                false => row.extend(symbols.observer(observer.output_tape(), &w)),
+            }
+        }
+        symbols.tape(&row)
+    }
+}
+
+/// The arguments of what is made of the parts.
+struct Symbols<'g> {
+    graph: &'g Graph,
+    time: Expr<'g>,
+    plant_x: Vec<Expr<'g>>,
+    observer_x: Vec<Expr<'g>>,
+    noise: Vec<Expr<'g>>,
+    drives: Vec<Expr<'g>>,
+    input_modes: Vec<Expr<'g>>,
+    plant_modes: Vec<Expr<'g>>,
+    observer_modes: Vec<Expr<'g>>,
+}
+
+impl<'g> Symbols<'g> {
+    fn new(graph: &'g Graph, parts: &Parts<'_>) -> Self {
+        let fresh = |count: usize| (0..count).map(|_| graph.fresh("x")).collect();
+        Self {
+            graph,
+            time: graph.fresh("time"),
+            plant_x: fresh(parts.plant.states().len()),
+            observer_x: fresh(parts.observer.map_or(0, |o| o.states().len())),
+            noise: fresh(parts.plant.outputs().len()),
+            drives: fresh(parts.sensors.moved().count()),
+            input_modes: fresh(parts.inputs.modes()),
+            plant_modes: fresh(parts.plant.modes()),
+            observer_modes: fresh(parts.observer.map_or(0, System::modes)),
+        }
+    }
+
+    fn eval(&self, tape: &Tape, arguments: [&[Expr<'g>]; 3]) -> Vec<Expr<'g>> {
+        let all = std::iter::once(&self.time).chain(arguments.into_iter().flatten());
+        let nodes: Vec<Node> = all.map(|e| e.node()).collect();
+        let values = tape.eval_in(&Nodes(self.graph), &nodes);
+        values.into_iter().map(|v| self.graph.expr(v)).collect()
+    }
+
+    fn plant(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        self.eval(tape, [&self.plant_x, w, &self.plant_modes])
+    }
+
+    fn observer(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        self.eval(tape, [&self.observer_x, w, &self.observer_modes])
+    }
+
+    /// All inputs, then those that the plant reads.
+    fn inputs(&self, parts: &Parts<'_>) -> (Vec<Expr<'g>>, Vec<Expr<'g>>) {
+        let u = self.eval(parts.inputs.output_tape(), [&[], &[], &self.input_modes]);
+        let w = parts.plant_wires.iter().map(|&wire| u[wire]).collect();
+        (u, w)
+    }
+
+    /// What a sensor shows.
+    fn measured(&self, parts: &Parts<'_>, y: &[Expr<'g>], i: usize) -> Expr<'g> {
+        match parts.sensors.disturbed(i) {
+            Disturbed::Not => y[i],
+            Disturbed::Added => y[i] + self.noise[i],
+            Disturbed::Multiplied => y[i] * self.noise[i],
+        }
+    }
+
+    /// The signals of the observer.
+    fn signals(&self, parts: &Parts<'_>, u: &[Expr<'g>], y: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        let signal = |wire: &Source| match *wire {
+            Source::Input(i) => u[i],
+            Source::Sensor(i) => self.measured(parts, y, i),
+        };
+        parts.observer_wires.iter().map(signal).collect()
+    }
+
+    fn tape(&self, values: &[Expr<'g>]) -> Result<Tape, Error> {
+        let of = [
+            &self.plant_x,
+            &self.observer_x,
+            &self.noise,
+            &self.drives,
+            &self.input_modes,
+            &self.plant_modes,
+            &self.observer_modes,
+        ];
+        let symbols = std::iter::once(&self.time).chain(of.into_iter().flatten());
+        let symbols: Vec<Node> = symbols.map(|e| e.node()).collect();
+        let values: Vec<Node> = values.iter().map(|e| e.node()).collect();
+        Ok(Tape::new(self.graph, &symbols, &values)?)
     }
 }

@@ -88,6 +88,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod adaptive;
+mod batch;
 mod closed_loop;
 mod divergence;
 mod driven;
@@ -100,6 +101,7 @@ mod flow;
 mod grid;
 mod intake;
 mod integrator;
+mod itinerary;
 mod joint;
 mod method;
 mod noise;
@@ -117,6 +119,7 @@ mod switches;
 mod system;
 mod trajectory;
 
+pub use batch::{Batch, Ended, Member};
 pub use dynamics::{Dynamics, Function};
 pub use error::{Error, Interrupted};
 pub use estimate::{Estimates, Log, estimate, estimate_watched};

@@ -97,6 +97,16 @@ pub enum Step {
 }
 
 impl Step {
+    /// The greatest length of a step in an interval of this one; none where it follows from the
+    /// system.
+    pub(crate) fn length(self, interval: f64) -> Option<f64> {
+        match self {
+            Self::Auto => None,
+            Self::AtMost(h) => Some(h.min(interval)),
+            Self::Substeps(n) => Some(interval / n as f64),
+        }
+    }
+
     fn check(&self) -> Result<(), Error> {
         match *self {
             Self::AtMost(h) if !(h > 0.0 && h.is_finite()) => {

@@ -175,6 +175,12 @@ impl Sensors {
         wander.map_or(0.0, |wander| wander.deviation * wander.deviate)
     }
 
+    /// What noise does at every sensor, then to every moved state, at present.
+    pub(crate) fn disturbances(&self) -> impl Iterator<Item = f64> + '_ {
+        let sensors = (0..self.channels.len()).map(|i| self.disturbance(i));
+        sensors.chain(self.moved().map(|state| self.drive(state)))
+    }
+
     /// Draws the next sample of every channel.
     pub(crate) fn draw(&mut self) {
         for wander in self.process.iter_mut().flatten() {

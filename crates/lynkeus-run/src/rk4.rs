@@ -20,6 +20,11 @@ pub struct Rk4 {
     stage: Vec<f64>,
 }
 
+/// Where step `i` of `steps` equal ones begins.
+pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
+    from + (to - from) * (i as f64 / steps as f64)
+}
+
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -78,9 +83,8 @@ impl Rk4 {
         steps: usize,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        let at = |i: usize| from + (to - from) * (i as f64 / steps as f64);
         for i in 0..steps {
-            let (t, next) = (at(i), at(i + 1));
+            let [t, next] = [i, i + 1].map(|i| instant(from, to, steps, i));
             if f.is_over() {
                 return Err(Error::Cancelled { time: t });
             }

@@ -29,6 +29,11 @@ impl Backend {
         BACKEND.store(self as u8, Ordering::Relaxed);
     }
 
+    /// Whether what is evaluated very often is compiled before it is.
+    pub(crate) fn compiles_at_once() -> bool {
+        Self::patience(0).is_some()
+    }
+
     /// Evaluations after which machine code is made; none for never.
     fn patience(most: u32) -> Option<u32> {
         match BACKEND.load(Ordering::Relaxed) {
@@ -43,7 +48,7 @@ impl Backend {
 const PATIENCE: u32 = 200;
 
 /// Largest tape whose step is made one function: it has four times the instructions.
-const LARGEST_STEP: usize = 50_000;
+pub(crate) const LARGEST_STEP: usize = 50_000;
 
 /// A tape with the code that was made of it, shared by all that run it.
 #[derive(Debug)]
@@ -103,7 +108,7 @@ impl Routine {
 /// One step of the classical Runge–Kutta method for a tape (t, x, w) → dx: the tape
 /// (t, x, w, h) → x at t + h, operation by operation what [`Rk4`](crate::Rk4) does. What the
 /// stages have in common is computed once.
-fn classical_step(tape: &Tape) -> Option<Tape> {
+pub(crate) fn classical_step(tape: &Tape) -> Option<Tape> {
     let g = Graph::new();
     let symbols: Vec<Expr<'_>> = (0..tape.inputs()).map(|_| g.fresh("w")).collect();
     let h = g.fresh("h");
@@ -186,6 +191,11 @@ pub(crate) struct Runner {
 }
 
 impl Runner {
+    /// What is run.
+    pub fn tape(&self) -> &Tape {
+        self.routine.tape()
+    }
+
     /// Writes the outputs at `inputs`.
     #[inline]
     pub fn eval(&mut self, inputs: &[f64], outputs: &mut [f64]) {

@@ -4,12 +4,9 @@ use std::ops::ControlFlow;
 
 use crate::closed_loop::Loop;
 use crate::divergence::Bound;
-use crate::grid::Grid;
+use crate::itinerary::{Itinerary, Stop};
 use crate::noise::Sensors;
 use crate::{Dynamics, Error, Integrator, Interrupted, Method, Noise, System, Trajectory};
-
-/// Most cells of a trajectory (8 bytes each).
-const MOST_CELLS: f64 = 4e8;
 
 /// A plant under known inputs and, if wished, an observer of its measured
 /// outputs.
@@ -91,151 +88,61 @@ impl Simulation {
             })),
         }
     }
-
-    /// Number of intervals between rows.
-    fn intervals(&self) -> Result<usize, Error> {
-        let Self {
-            start,
-            until,
-            output_step,
-            ..
-        } = self;
-        if !start.is_finite() {
-            return Err(Error::setting("start", "a finite time", start));
-        }
-        if !(until.is_finite() && until > start) {
-            let expected = format!("a finite time after the start {start}");
-            return Err(Error::setting("until", expected, until));
-        }
-        if !(*output_step > 0.0 && output_step.is_finite()) {
-            return Err(Error::setting(
-                "output_step",
-                "a finite time above 0",
-                output_step,
-            ));
-        }
-        let intervals = ((until - start) / output_step * (1.0 - 1e-12))
-            .ceil()
-            .max(1.0);
-        let cells = intervals * (1 + self.plant.states().len()) as f64;
-        if cells > MOST_CELLS {
-            let expected = format!("a step that makes fewer than {MOST_CELLS:e} values");
-            let found = format!("{output_step}, which makes {cells:e}");
-            return Err(Error::setting("output_step", expected, found));
-        }
-        Ok(intervals as usize)
-    }
 }
 
 /// A simulation under way.
-struct Run<'a> {
-    simulation: &'a Simulation,
-    intervals: usize,
-    grid: Grid,
+struct Run {
+    itinerary: Itinerary,
     integrator: Integrator,
     system: Loop,
     x: Vec<f64>,
     table: Trajectory,
     row: Vec<f64>,
     bound: Bound,
-    sample_step: f64,
-    /// samples drawn so far
-    samples: usize,
 }
 
-impl<'a> Run<'a> {
-    fn new(simulation: &'a Simulation) -> Result<Self, Error> {
-        let intervals = simulation.intervals()?;
-        let sample_step = simulation
-            .noise
-            .sample_step
-            .unwrap_or(simulation.output_step);
-        if !(sample_step > 0.0 && sample_step.is_finite()) {
-            let expected = "a finite time above 0";
-            return Err(Error::setting("sample_step", expected, sample_step));
-        }
-        let samples = (simulation.until - simulation.start) / sample_step;
-        if samples > MOST_CELLS {
-            let expected = format!("a step that makes fewer than {MOST_CELLS:e} samples");
-            return Err(Error::setting("sample_step", expected, sample_step));
-        }
+impl Run {
+    fn new(simulation: &Simulation) -> Result<Self, Error> {
+        let itinerary = Itinerary::new(simulation)?;
         let plant = &simulation.plant;
         let sensors = Sensors::new(
             &simulation.noise,
             plant.outputs(),
             plant.states(),
-            sample_step,
+            itinerary.sample_step(),
         )?;
         let system = Loop::new(simulation, sensors)?;
         let x = system.start();
         Ok(Self {
-            intervals,
-            grid: Grid::new(simulation.start, simulation.output_step),
+            itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
             table: system.table(),
             row: vec![],
             bound: Bound::new(&x),
-            sample_step,
-            samples: 0,
-            simulation,
             system,
             x,
         })
     }
 
     fn rows(&mut self, watch: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Result<(), Error> {
-        self.sample();
-        self.record(self.simulation.start)?;
-        for k in 1..=self.intervals {
-            let (from, to) = (self.time(k - 1), self.time(k));
-            self.advance(from, to)?;
-            self.record(to)?;
-            if watch(k as f64 / self.intervals as f64).is_break() {
-                return Err(Error::Cancelled { time: to });
+        let all = self.itinerary.intervals() as f64;
+        while let Some(stop) = self.itinerary.next() {
+            match stop {
+                Stop::Draw => self.system.draw(),
+                Stop::Advance { from, to } => {
+                    self.integrator
+                        .advance(&mut self.system, from, to, &mut self.x)?;
+                }
+                Stop::Row(time) => {
+                    self.record(time)?;
+                    let done = self.table.len() - 1;
+                    if done > 0 && watch(done as f64 / all).is_break() {
+                        return Err(Error::Cancelled { time });
+                    }
+                }
             }
         }
         Ok(())
-    }
-
-    /// Time of row k.
-    fn time(&self, k: usize) -> f64 {
-        if k == self.intervals {
-            self.simulation.until
-        } else {
-            self.grid.time(k)
-        }
-    }
-
-    /// From one row to the next, over the noise samples between; a sample due at
-    /// the next row is drawn there.
-    fn advance(&mut self, from: f64, to: f64) -> Result<(), Error> {
-        // a sample and a row at the same time may differ by rounding
-        let same = 1e-9 * (to - from).min(self.sample_step);
-        let mut t = from;
-        while !self.system.is_exact() {
-            let due = self.simulation.start + self.samples as f64 * self.sample_step;
-            if due > to + same {
-                break;
-            }
-            let stop = if due > to - same { to } else { due };
-            self.integrate(t, stop)?;
-            t = stop;
-            self.sample();
-        }
-        self.integrate(t, to)
-    }
-
-    fn integrate(&mut self, from: f64, to: f64) -> Result<(), Error> {
-        if to <= from {
-            return Ok(());
-        }
-        self.integrator
-            .advance(&mut self.system, from, to, &mut self.x)
-    }
-
-    fn sample(&mut self) {
-        self.system.draw();
-        self.samples += 1;
     }
 
     fn record(&mut self, t: f64) -> Result<(), Error> {

@@ -113,6 +113,11 @@ impl Trajectory {
         (0..self.len()).filter_map(|index| self.row(index))
     }
 
+    /// The place of a column among the values of a row.
+    pub(crate) fn place(&self, column: Column) -> Option<usize> {
+        self.series.iter().position(|s| s.column == column)
+    }
+
     /// The values of one column; none where the run has no such column.
     pub fn column(&self, column: Column) -> Option<&[f64]> {
         let mut found = self.series.iter().filter(|s| s.column == column);

@@ -34,6 +34,14 @@ const LIMITS: [Limit; 3] = [
     },
 ];
 
+impl Limit {
+    /// The first of the rows that it looks at; none where there are no rows.
+    fn first(&self, rows: usize) -> Option<usize> {
+        let count = ((self.last * rows as f64).ceil() as usize).max(1);
+        rows.checked_sub(count)
+    }
+}
+
 /// A quantity without a declared range is doubted where it ends at so many times the largest
 /// number that is known; a thousand times more ends the run.
 const LARGER: f64 = 1e9;
@@ -71,6 +79,54 @@ pub(crate) fn doubts(plant: &Plant, quantities: &[Quantity]) -> Vec<Doubt> {
     quantities.iter().filter_map(doubt).collect()
 }
 
+/// The same of one quantity, row by row, without what is measured: an estimate that [`doubts`] would
+/// doubt is suspect, and few others are.
+#[cfg_attr(not(feature = "tune"), allow(dead_code))]
+#[derive(Clone, Debug)]
+pub(crate) struct Screen {
+    min: f64,
+    max: f64,
+    rows: u32,
+    /// by limit, how far the estimate was at least from the range
+    least: [f64; LIMITS.len()],
+    last: f64,
+}
+
+impl Screen {
+    /// For so many rows.
+    pub fn new(declared: &Variable, rows: usize) -> Self {
+        Self {
+            min: declared.min,
+            max: declared.max,
+            rows: u32::try_from(rows).unwrap_or(u32::MAX),
+            least: [f64::INFINITY; LIMITS.len()],
+            last: 0.0,
+        }
+    }
+
+    pub fn add(&mut self, row: usize, truth: f64, estimate: f64) {
+        self.last = estimate;
+        let rows = self.rows as usize;
+        for (limit, least) in LIMITS.iter().zip(&mut self.least) {
+            if limit.first(rows).is_some_and(|first| row >= first) {
+                let away = (self.min.min(truth) - estimate).max(estimate - self.max.max(truth));
+                *least = least.min(away);
+            }
+        }
+    }
+
+    pub fn is_suspect(&self) -> bool {
+        let width = self.max - self.min;
+        match width.is_finite() {
+            true => {
+                let far = |(limit, least): (&Limit, &f64)| *least > limit.widths * width;
+                width > 0.0 && LIMITS.iter().zip(&self.least).any(far)
+            }
+            false => self.last.abs() > LARGER,
+        }
+    }
+}
+
 /// The largest magnitude of what is known and of where the estimates start; at least 1.
 fn largest(quantities: &[Quantity]) -> f64 {
     let known = quantities.iter().flat_map(|q| [&q.truth, &q.measured]);
@@ -106,9 +162,9 @@ fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Doubt> {
         away.fold(f64::INFINITY, |least, away| least.min(away / width))
     };
     let exceeded = LIMITS.iter().find_map(|limit| {
-        let count = ((limit.last * rows as f64).ceil() as usize).max(1);
-        let widths = least(rows.checked_sub(count)?);
-        (widths > limit.widths).then_some((count, widths))
+        let first = limit.first(rows)?;
+        let widths = least(first);
+        (widths > limit.widths).then_some((rows - first, widths))
     });
     let (rows, widths) = exceeded?;
     Some(Doubt {

@@ -2,6 +2,7 @@
 
 use std::num::NonZero;
 use std::ops::ControlFlow;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread::{self, Builder};
@@ -80,7 +81,7 @@ pub(crate) fn every<S: Clone + Send, T: Send>(
 ) -> Result<Vec<T>, Error> {
     let board = Board::new(count);
     let (sender, receiver) = channel();
-    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    let threads = threads();
     let mut desk = Desk::new(&board, watch);
     thread::scope(|scope| {
         let mut hired = 0;
@@ -115,6 +116,34 @@ pub(crate) fn every<S: Clone + Send, T: Send>(
         true => results.and(Err(stopped())),
         false => results,
     }
+}
+
+/// How many threads work at a time.
+pub(crate) fn threads() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+/// Does the work on every item, with its place, on so many threads.
+pub(crate) fn each<T: Send>(
+    items: &mut [T],
+    threads: usize,
+    work: &(impl Fn(usize, &mut T) + Sync),
+) {
+    let count = items.len();
+    let queue = Mutex::new(items.iter_mut().enumerate());
+    let next = || queue.lock().unwrap_or_else(|e| e.into_inner()).next();
+    let hand = || {
+        while let Some((place, item)) = next() {
+            work(place, item);
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..threads.min(count) {
+            // where no thread can be had, the others do its work
+            let _ = Builder::new().spawn_scoped(scope, hand);
+        }
+        hand();
+    });
 }
 
 /// One thread: takes the next run as long as there is one.

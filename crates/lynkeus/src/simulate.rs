@@ -91,6 +91,16 @@ impl Rig {
         is_noisy || noise.process.values().any(|q| *q > 0.0) || self.spread.is_random()
     }
 
+    /// Whether the runs of different seeds differ in more than noise and start.
+    pub fn has_own_programs(&self) -> bool {
+        self.spread.has_parameters()
+    }
+
+    /// The start of the plant in the run of a seed.
+    pub fn start(&self, seed: u64) -> Vec<f64> {
+        self.spread.start(&self.simulation.plant, seed)
+    }
+
     /// The run of a seed: its noise, its start and its parameters. `prepared` is the study's.
     ///
     /// # Errors

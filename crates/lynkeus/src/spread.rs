@@ -66,6 +66,12 @@ impl Spread {
             true => nominal.clone(),
             false => self.with_parameters(study, seed)?,
         };
+        let start = self.start(&plant, seed);
+        plant.with_start(start).map_err(Error::from_source)
+    }
+
+    /// The start of the run of a seed.
+    pub fn start(&self, plant: &System, seed: u64) -> Vec<f64> {
         let mut start = plant.start().to_vec();
         for (name, deviation) in &self.starts {
             let place = plant.states().iter().position(|state| state == name);
@@ -73,7 +79,12 @@ impl Spread {
                 *x += deviation * deviate(seed, name);
             }
         }
-        plant.with_start(start).map_err(Error::from_source)
+        start
+    }
+
+    /// Whether runs have parameters of their own.
+    pub fn has_parameters(&self) -> bool {
+        !self.parameters.is_empty()
     }
 
     fn with_parameters(&self, study: &Study, seed: u64) -> Result<System, Error> {

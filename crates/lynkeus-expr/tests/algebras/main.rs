@@ -7,6 +7,7 @@ mod interval_operations;
 mod interval_systems;
 mod interval_tightness;
 mod jets;
+mod lanes;
 mod library;
 mod loops;
 mod operations;

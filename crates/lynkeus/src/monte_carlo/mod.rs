@@ -8,6 +8,7 @@
 mod picture;
 mod report;
 mod statistics;
+mod together;
 
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
@@ -23,7 +24,9 @@ use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
 pub use report::Settled;
-use statistics::of_runs;
+use report::headers_of;
+use statistics::{Found, of_runs};
+use together::{Screened, Together};
 
 /// What many runs of a study give.
 #[derive(Clone, Debug)]
@@ -157,26 +160,35 @@ pub fn monte_carlo(
     let prepared = Prepared::new(study, &plant)?;
     let rig = Rig::new(&prepared)?;
     let followed = followed(&plant, &rig);
-    room(study, &rig, runs, followed.len())?;
-    let seeds: Vec<u64> = (settings.seed..=last).collect();
-    // what the design made comes with every clone of the plant
-    let shared = (plant.clone(), rig.clone());
+    let seeds = || (settings.seed..=last).collect::<Vec<u64>>();
+    let together = Together {
+        prepared: &prepared,
+        rig: &rig,
+        followed: &followed,
+    };
     let job = Job {
         study,
         followed: &followed,
         time: OnceLock::new(),
     };
-    let singles = crew::every(
-        runs,
-        &shared,
-        &|(plant, rig), k, watch| {
-            let seed = seeds.get(k).copied().unwrap_or(settings.seed);
-            Ok(job.single(plant, rig, seed, watch))
-        },
-        watch,
-    )?;
+    let pass = match together.can(runs)? {
+        true => together.figures(&seeds(), watch)?,
+        false => None,
+    };
+    if let Some(Screened {
+        mut figures,
+        suspects,
+    }) = pass
+    {
+        let judged = job.singles(&plant, &rig, &suspects, watch)?;
+        figures.doubtful = judged.into_iter().filter_map(Single::doubt).collect();
+        return Ok(reported(&prepared, &rig, &followed, runs, figures));
+    }
+    room(study, &rig, runs, followed.len())?;
+    let singles = job.singles(&plant, &rig, &seeds(), watch)?;
     let time = job.time.into_inner().unwrap_or_default();
-    gathered(&prepared, &rig, &followed, singles, time)
+    let figures = gathered(study, &followed, singles, time)?;
+    Ok(reported(&prepared, &rig, &followed, runs, figures))
 }
 
 /// Estimates whose truth a run has.
@@ -225,7 +237,34 @@ struct Job<'a> {
     time: OnceLock<Vec<f64>>,
 }
 
+impl Single {
+    /// Why its estimate is not credible, where it is not.
+    fn doubt(self) -> Option<Failure> {
+        let reason = self.result.ok()??.doubt?;
+        let seed = self.seed;
+        Some(Failure { seed, reason })
+    }
+}
+
 impl Job<'_> {
+    /// The runs of these seeds, on all processors.
+    fn singles(
+        &self,
+        plant: &Plant,
+        rig: &Rig,
+        seeds: &[u64],
+        watch: &mut Watch<'_>,
+    ) -> Result<Vec<Single>, Error> {
+        // what the design made comes with every clone of the plant
+        let shared = (plant.clone(), rig.clone());
+        crew::every(
+            seeds.len(),
+            &shared,
+            &|(plant, rig), k, watch| Ok(self.single(plant, rig, seeds[k], watch)),
+            watch,
+        )
+    }
+
     fn single(&self, plant: &Plant, rig: &Rig, seed: u64, watch: &mut Watch<'_>) -> Single {
         let result = self.run(plant, rig, seed, watch);
         Single { seed, result }
@@ -267,16 +306,25 @@ impl Job<'_> {
     }
 }
 
-/// All runs together.
+/// What all runs together give.
+struct Figures {
+    /// of the runs that reached their end
+    seeds: Vec<u64>,
+    failures: Vec<Failure>,
+    /// in the figures, but not credible
+    doubtful: Vec<Failure>,
+    time: Vec<f64>,
+    /// by quantity
+    found: Vec<Found>,
+}
+
+/// The figures of runs that were done one by one.
 fn gathered(
-    prepared: &Prepared<'_>,
-    rig: &Rig,
+    study: &Study,
     followed: &[Followed],
     singles: Vec<Single>,
     time: Vec<f64>,
-) -> Result<MonteCarlo, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
-    let asked = singles.len();
+) -> Result<Figures, Error> {
     let (mut seeds, mut runs) = (vec![], vec![]);
     let (mut failures, mut doubtful) = (vec![], vec![]);
     let mut first = None;
@@ -303,13 +351,38 @@ fn gathered(
         (Some(spent), None) if seeds.is_empty() => return Err(Error::ended(spent)),
         _ => {}
     }
+    let found = (0..followed.len()).map(|place| of_runs(&runs, place));
+    Ok(Figures {
+        found: found.collect(),
+        seeds,
+        failures,
+        doubtful,
+        time,
+    })
+}
+
+/// The figures under their names.
+fn reported(
+    prepared: &Prepared<'_>,
+    rig: &Rig,
+    followed: &[Followed],
+    asked: usize,
+    figures: Figures,
+) -> MonteCarlo {
+    let (study, plant) = (prepared.study(), prepared.plant());
+    let Figures {
+        seeds,
+        failures,
+        doubtful,
+        time,
+        found,
+    } = figures;
     let mut headers = Headers::beside(plant);
     let time_header = headers.time();
     let estimates = &rig.design.observer.estimates;
-    let quantities = followed.iter().enumerate().map(|(place, f)| {
+    let quantities = followed.iter().zip(found).map(|(f, found)| {
         let estimate = &estimates[f.estimate];
         let variable = &estimate.variable;
-        let found = of_runs(&runs, place);
         Scattered {
             unknown_input: estimate.unknown_input,
             is_measured: is_measured(prepared, variable),
@@ -332,8 +405,13 @@ fn gathered(
         notes.push("nothing differs from run to run: `noise` of [sensors], [process_noise] and `spread` of [simulate] draw by the seed".to_owned());
     }
     let done = seeds.len() + failures.len();
-    notes.extend(ended.map(|spent| format!("{done} of {asked} runs: {spent}")));
-    Ok(MonteCarlo {
+    notes.extend(
+        study
+            .budget
+            .marked()
+            .map(|spent| format!("{done} of {asked} runs: {spent}")),
+    );
+    MonteCarlo {
         plant: plant.name.clone(),
         family: rig.design.observer.family,
         file: study.file.clone(),
@@ -345,28 +423,12 @@ fn gathered(
         time_header,
         quantities,
         notes,
-    })
+    }
 }
 
 fn is_measured(prepared: &Prepared<'_>, variable: &Variable) -> bool {
     let outputs = &prepared.extended().outputs;
     outputs.iter().any(|o| o.variable.node == variable.node)
-}
-
-/// The headers of a quantity's columns.
-fn headers_of(name: &str, headers: &mut Headers) -> [String; 7] {
-    let columns = [
-        ("mean", "the mean"),
-        ("q05", "the 5 % quantile"),
-        ("q95", "the 95 % quantile"),
-        ("error_mean", "the mean error"),
-        ("error_q05", "the 5 % quantile of the error"),
-        ("error_q95", "the 95 % quantile of the error"),
-        ("error_worst", "the largest error"),
-    ];
-    columns.map(|(suffix, what)| {
-        headers.free(&format!("{name}_{suffix}"), &format!("{what} of {name}"))
-    })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 use super::statistics::{HIGH, mean, quantile};
 use super::{Failure, MonteCarlo, Scattered};
 use crate::Error;
+use crate::headers::Headers;
 
 /// Seeds of runs that are told one by one.
 const TOLD: usize = 20;
@@ -170,4 +171,20 @@ fn told(runs: &[Failure]) -> String {
         0 => told,
         more => format!("{told}, … ({more} more)"),
     }
+}
+
+/// The headers of a quantity's columns.
+pub(super) fn headers_of(name: &str, headers: &mut Headers) -> [String; 7] {
+    let columns = [
+        ("mean", "the mean"),
+        ("q05", "the 5 % quantile"),
+        ("q95", "the 95 % quantile"),
+        ("error_mean", "the mean error"),
+        ("error_q05", "the 5 % quantile of the error"),
+        ("error_q95", "the 95 % quantile of the error"),
+        ("error_worst", "the largest error"),
+    ];
+    columns.map(|(suffix, what)| {
+        headers.free(&format!("{name}_{suffix}"), &format!("{what} of {name}"))
+    })
 }

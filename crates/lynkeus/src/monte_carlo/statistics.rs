@@ -1,7 +1,6 @@
 //! Means, quantiles and the worst of many runs.
 
 use super::{Bands, Series};
-use crate::quantity::settled_error;
 
 /// The quantiles that a band reaches over.
 const LOW: f64 = 0.05;
@@ -21,49 +20,81 @@ pub(super) struct Found {
 pub(super) fn of_runs(runs: &[Vec<Series>], place: usize) -> Found {
     let own: Vec<&Series> = runs.iter().filter_map(|run| run.get(place)).collect();
     let rows = own.first().map_or(0, |series| series.truth.len());
-    let (mut truth, mut error) = (Bands::default(), Bands::default());
-    let mut error_worst = Vec::with_capacity(rows);
-    let mut values = Vec::with_capacity(own.len());
+    let mut scatter = Scatter::new(own.len());
     for row in 0..rows {
-        gather(&mut values, own.iter().map(|s| s.truth[row]));
-        truth.add(&mut values);
-        gather(&mut values, own.iter().map(|s| s.error(row)));
-        let worst = values.iter().map(|e| e.abs()).reduce(f64::max);
-        error_worst.push(worst.unwrap_or(f64::NAN));
-        error.add(&mut values);
+        let pairs = own.iter().map(|s| (s.truth[row], s.estimate(row)));
+        scatter.add(pairs, row >= rows / 2);
     }
-    let rms: Vec<f64> = own
-        .iter()
-        .map(|s| {
-            let pairs = s.truth.iter().copied().zip(s.estimate.iter().copied());
-            settled_error(pairs).unwrap_or(f64::NAN)
-        })
-        .collect();
-    let worst_run = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
-    let worst_run = worst_run.unwrap_or(0);
-    let worst = own
-        .get(worst_run)
-        .map(|s| (0..rows).map(|row| s.error(row)));
-    Found {
-        truth,
-        error,
-        error_worst,
-        worst_run,
-        worst_course: worst.map_or(vec![], Iterator::collect),
-        rms,
+    let mut found = scatter.found(rows);
+    if let Some(worst) = own.get(found.worst_run) {
+        let errors = (0..rows).map(|row| worst.estimate(row) - worst.truth[row]);
+        found.worst_course.extend(errors);
     }
+    found
 }
 
-fn gather(values: &mut Vec<f64>, of: impl Iterator<Item = f64>) {
-    values.clear();
-    values.extend(of.filter(|x| x.is_finite()));
+/// A quantity over all runs, row after row.
+#[derive(Clone, Debug)]
+pub(super) struct Scatter {
+    truth: Bands,
+    error: Bands,
+    error_worst: Vec<f64>,
+    /// sums of the squared errors over the last half of the rows, by run
+    squares: Vec<f64>,
+    values: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl Scatter {
+    /// Of so many runs.
+    pub fn new(runs: usize) -> Self {
+        Self {
+            truth: Bands::default(),
+            error: Bands::default(),
+            error_worst: vec![],
+            squares: vec![0.0; runs],
+            values: Vec::with_capacity(runs),
+            errors: Vec::with_capacity(runs),
+        }
+    }
+
+    /// One more row: true value and estimate of every run.
+    pub fn add(&mut self, pairs: impl Iterator<Item = (f64, f64)>, is_late: bool) {
+        self.values.clear();
+        self.errors.clear();
+        for ((truth, estimate), square) in pairs.zip(&mut self.squares) {
+            let error = estimate - truth;
+            self.values.extend(Some(truth).filter(|x| x.is_finite()));
+            self.errors.extend(Some(error).filter(|x| x.is_finite()));
+            if is_late {
+                *square += error.powi(2);
+            }
+        }
+        let worst = self.errors.iter().map(|e| e.abs()).reduce(f64::max);
+        self.error_worst.push(worst.unwrap_or(f64::NAN));
+        self.truth.add(&mut self.values);
+        self.error.add(&mut self.errors);
+    }
+
+    /// What the rows say, but for the course of the worst run.
+    pub fn found(self, rows: usize) -> Found {
+        let late = (rows - rows / 2).max(1) as f64;
+        let rms: Vec<f64> = self.squares.iter().map(|s| (s / late).sqrt()).collect();
+        let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
+        Found {
+            truth: self.truth,
+            error: self.error,
+            error_worst: self.error_worst,
+            worst_run: worst.unwrap_or(0),
+            worst_course: vec![],
+            rms,
+        }
+    }
 }
 
 impl Series {
-    fn error(&self, row: usize) -> f64 {
-        self.estimate
-            .get(row)
-            .map_or(f64::NAN, |hat| hat - self.truth[row])
+    fn estimate(&self, row: usize) -> f64 {
+        self.estimate.get(row).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -71,9 +102,8 @@ impl Bands {
     /// One more row, of these values.
     fn add(&mut self, values: &mut [f64]) {
         self.mean.push(mean(values));
-        values.sort_unstable_by(f64::total_cmp);
-        self.low.push(quantile(values, LOW));
-        self.high.push(quantile(values, HIGH));
+        self.low.push(selected(values, LOW));
+        self.high.push(selected(values, HIGH));
     }
 }
 
@@ -94,6 +124,18 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[low] + (place - below) * (sorted[high] - sorted[low])
 }
 
+/// The [`quantile`] of values in any order, which change places.
+fn selected(values: &mut [f64], share: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else {
+        return f64::NAN;
+    };
+    let place = share * last as f64;
+    let below = place.floor();
+    let (_, low, above) = values.select_nth_unstable_by(below as usize, f64::total_cmp);
+    let next = above.iter().copied().min_by(f64::total_cmp);
+    *low + (place - below) * (next.unwrap_or(*low) - *low)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,6 +153,7 @@ mod tests {
         ] {
             let found = quantile(&sorted, share);
             assert!((found - expected).abs() < 1e-12, "{share}: {found}");
+            assert_eq!(selected(&mut [4.0, 1.0, 8.0, 2.0], share), found);
         }
         assert_eq!(quantile(&[3.0], 0.95), 3.0);
         assert!(quantile(&[], 0.5).is_nan());

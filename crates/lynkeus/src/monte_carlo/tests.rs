@@ -44,12 +44,72 @@ fn alone(study: &Study, seed: u64) -> crate::Outcome {
 fn a_run_alone_is_the_same_and_a_loop_gives_the_same_figures() {
     let folder = folder();
     let spread = "spread = { x = 0.3, p = 0.05 }";
-    let study = study(&folder, "noise = { y = 0.1 }", spread);
-    let found = runs(&study, 7).unwrap();
+    same_as_alone(&study(&folder, "noise = { y = 0.1 }", spread));
+}
+
+/// Runs with fixed steps go on together.
+#[test]
+fn runs_that_go_on_together_are_the_same_alone() {
+    let folder = folder();
+    for step in ["step = 0.03", "substeps = 3"] {
+        let simulate =
+            format!("spread = {{ x = 0.3 }}\nsample_step = 0.07\nmethod = \"rk4\"\n{step}");
+        same_as_alone(&study(&folder, "noise = { y = 0.1 }", &simulate));
+    }
+}
+
+#[test]
+fn runs_that_go_on_together_are_refused_before_they_fill_the_memory() {
+    let folder = folder();
+    let limited = Study {
+        budget: lynkeus_expr::Budget::new(
+            None,
+            Some(lynkeus_expr::Memory {
+                limit: 64 << 20,
+                used: || 0,
+            }),
+        ),
+        ..study(
+            &folder,
+            "noise = { y = 0.1 }",
+            "method = \"rk4\"\nstep = 0.05",
+        )
+    };
+    assert!(runs(&limited, 100).is_ok());
+    let text = runs(&limited, 1_000_000_000).unwrap_err().to_string();
+    assert!(text.contains("1000000000 runs of 41 rows take"), "{text}");
+}
+
+/// x' = x³/10 ends at 5/x₀², which is before the end of the run where x₀ is above 1.118.
+#[test]
+fn runs_that_go_on_together_and_do_not_reach_their_end_are_in_no_figure() {
+    let folder = folder();
+    let simulate = "spread = { x = 0.3 }\nmethod = \"rk4\"\nstep = 0.01";
+    let study = study(&folder, "noise = { y = 0.1 }", simulate);
+    let growing = PLANT.replace("-p*x", "x^3/10");
+    std::fs::write(folder.path().join("decay.mo"), growing).unwrap();
+    let found = runs(&study, 12).unwrap();
+    let failed: Vec<u64> = found.failures.iter().map(|f| f.seed).collect();
+    let escaping = (5..17).filter(|seed| 1.0 + 0.3 * deviate(*seed, "x") > 5_f64.sqrt() / 2.0);
+    let escaping: Vec<u64> = escaping.collect();
+    assert!(
+        !escaping.is_empty() && escaping.len() < 12,
+        "the seeds show nothing"
+    );
+    assert_eq!(failed, escaping);
+    for (seed, rms) in found.seeds.iter().zip(&found.quantities[0].rms) {
+        let outcome = alone(&study, *seed);
+        assert_eq!(outcome.quantities[0].settled_error(), Some(*rms));
+    }
+    assert!(found.refusal().is_some());
+}
+
+fn same_as_alone(study: &Study) {
+    let found = runs(study, 7).unwrap();
     assert_eq!(found.seeds, [5, 6, 7, 8, 9, 10, 11]);
     assert_eq!(found.quantities.len(), 1);
     let x = &found.quantities[0];
-    let outcomes: Vec<crate::Outcome> = found.seeds.iter().map(|s| alone(&study, *s)).collect();
+    let outcomes: Vec<crate::Outcome> = found.seeds.iter().map(|s| alone(study, *s)).collect();
     for (outcome, rms) in outcomes.iter().zip(&x.rms) {
         assert_eq!(outcome.time.to_vec(), found.time);
         assert_eq!(outcome.quantities[0].settled_error(), Some(*rms));
@@ -72,6 +132,13 @@ fn a_run_alone_is_the_same_and_a_loop_gives_the_same_figures() {
     let worst = x.rms.iter().copied().fold(0.0, f64::max);
     assert_eq!(x.rms[x.worst_run], worst);
     assert_eq!(x.settled().worst, worst);
+    let worst = &outcomes[x.worst_run];
+    let course = (0..found.time.len()).map(|row| {
+        let q = &worst.quantities[0];
+        let at = |values: &Option<crate::Series>| values.as_ref().unwrap().get(row).unwrap();
+        at(&q.estimate) - at(&q.truth)
+    });
+    assert_eq!(x.worst_course, course.collect::<Vec<f64>>());
 }
 
 /// Under noise that is held for Δ the error e' = −(p + θ) e + θ v is the recursion
@@ -231,4 +298,27 @@ fn estimates_that_are_not_credible_are_told() {
             .contains("in these figures, but not credible: seeds")
     );
     assert_eq!(found.to_json()["not_credible"]["count"], told.len());
+}
+
+/// The rate of a noisy position, in widths of a range that it is thousands of times too noisy for: with fixed
+/// steps all runs go on together, and each is judged as alone.
+#[test]
+fn runs_that_go_on_together_are_judged_one_by_one() {
+    let folder = folder();
+    let model = "model Cart Real x(start = 0, min = -99, max = 99); Real v(start = 0, min = -1e-3, max = 1e-3);
+      output Real y = x; equation der(x) = v; der(v) = 0; end Cart;";
+    std::fs::write(folder.path().join("decay.mo"), model).unwrap();
+    let mut study = study(
+        &folder,
+        "noise = { y = 0.1 }",
+        "method = \"rk4\"\nstep = 0.02",
+    );
+    study.observer.tuning.values.remove("S");
+    let found = runs(&study, 30).unwrap();
+    let told: Vec<u64> = found.doubtful.iter().map(|run| run.seed).collect();
+    let expected: Vec<u64> = (5..35)
+        .filter(|seed| !alone(&study, *seed).is_credible())
+        .collect();
+    assert!(!told.is_empty() && told.len() < 30, "{told:?}");
+    assert_eq!(told, expected);
 }

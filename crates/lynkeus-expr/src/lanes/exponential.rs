@@ -1,0 +1,171 @@
+//! eˣ and the hyperbolic functions.
+
+use std::f64::consts::LOG2_E;
+
+use super::Vector;
+use super::vector::polynomial;
+
+/// Adding 1.5·2⁵² leaves the nearest whole number in the lowest bits.
+pub(super) const MAGIC: f64 = 6_755_399_441_055_744.0;
+
+/// ln 2 in two parts, the first of 33 bits (W. J. Cody, W. Waite: Software Manual for the
+/// Elementary Functions, 1980).
+pub(super) const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+
+/// Beyond, 2ᵏ may be no normal number.
+const LARGE: f64 = 708.0;
+
+/// eˣ = p·2ᵏ with p from √½ to √2.
+pub(super) struct Parts<V> {
+    pub p: V,
+    /// k + [`MAGIC`]
+    pub shifted: V,
+}
+
+/// x − k ln 2, and k + [`MAGIC`], for |x| below 10⁶.
+#[inline(always)]
+pub(super) fn reduced<V: Vector>(x: V) -> [V; 2] {
+    let shifted = x.mul_add(V::splat(LOG2_E), V::splat(MAGIC));
+    let k = shifted - V::splat(MAGIC);
+    let r = k.mul_add(V::splat(-LN_2[1]), k.mul_add(V::splat(-LN_2[0]), x));
+    [r, shifted]
+}
+
+/// eʳ·2ᵏ, from r of at most ½ ln 2 and k + [`MAGIC`].
+#[inline(always)]
+pub(super) fn parts<V: Vector>([r, shifted]: [V; 2]) -> Parts<V> {
+    // (eʳ − 1 − r)/r² for |r| ≤ ½ ln 2, from Chebyshev's nodes
+    let rest = polynomial(
+        r,
+        [
+            0.5,
+            0.041_666_666_666_624_164,
+            0.001_388_888_891_719_720_9,
+            2.480_152_132_160_664_7e-5,
+            2.762_007_624_252_725_4e-7,
+        ],
+        [
+            0.166_666_666_666_666_69,
+            0.008_333_333_333_330_065,
+            0.000_198_412_698_630_409_22,
+            2.755_726_847_972_400_4e-6,
+            2.510_037_611_136_142e-8,
+        ],
+    );
+    Parts {
+        p: V::splat(1.0) + rest.mul_add(r * r, r),
+        shifted,
+    }
+}
+
+/// 2ᵏ·unit, from k + [`MAGIC`].
+#[inline(always)]
+fn power<V: Vector>(shifted: V, unit: f64) -> V {
+    shifted.up::<52>().plus_bits(V::splat(unit))
+}
+
+impl<V: Vector> Parts<V> {
+    /// p·2ᵏ·unit where that is normal.
+    #[inline(always)]
+    pub fn value(self, unit: f64) -> V {
+        self.p * power(self.shifted, unit)
+    }
+}
+
+/// eˣ·unit for a unit of 1 or ½.
+#[inline(always)]
+fn scaled<V: Vector>(x: V, unit: f64) -> V {
+    if x.abs().below(V::splat(LARGE)).all() {
+        return parts(reduced(x)).value(unit);
+    }
+    extreme(x, unit)
+}
+
+/// As [`scaled`] also where the result is subnormal, zero or infinite; the same elsewhere.
+#[inline(always)]
+fn extreme<V: Vector>(x: V, unit: f64) -> V {
+    let x = V::splat(760.0).smaller(x);
+    let x = V::choose(x.below(V::splat(-760.0)), V::splat(-760.0), x);
+    let Parts { p, shifted } = parts(reduced(x));
+    let k = shifted - V::splat(MAGIC);
+    let half = k.mul_add(V::splat(0.5), V::splat(MAGIC));
+    let rest = (k - (half - V::splat(MAGIC))) + V::splat(MAGIC);
+    p * power(half, 1.0) * power(rest, unit)
+}
+
+/// eˣ.
+#[inline(always)]
+pub fn exp<V: Vector>(x: V) -> V {
+    scaled(x, 1.0)
+}
+
+/// ½ e^|x| and ½ e^−|x|.
+#[inline(always)]
+fn halves<V: Vector>(x: V) -> [V; 2] {
+    let growing = scaled(x.abs(), 0.5);
+    [growing, V::splat(0.25) / growing]
+}
+
+/// The hyperbolic sine.
+#[inline(always)]
+pub fn sinh<V: Vector>(x: V) -> V {
+    let a = x.abs();
+    let [growing, fading] = halves(x);
+    let z = a * a;
+    // (sinh a / a − 1)/a² for a ≤ 1, from Chebyshev's nodes
+    let rest = polynomial(
+        z,
+        [
+            0.166_666_666_666_666_66,
+            0.000_198_412_698_412_697_73,
+            2.505_210_836_405_804e-8,
+            7.646_625_361_656_657e-13,
+        ],
+        [
+            0.008_333_333_333_333_333,
+            2.755_731_922_404_034e-6,
+            1.605_904_839_635_056_2e-10,
+            2.844_526_416_989_528_5e-15,
+        ],
+    );
+    let small = rest.mul_add(a * z, a);
+    let y = V::choose(a.below(V::splat(1.0)), small, growing - fading);
+    y.or(x.signs())
+}
+
+/// The hyperbolic cosine.
+#[inline(always)]
+pub fn cosh<V: Vector>(x: V) -> V {
+    let [growing, fading] = halves(x);
+    growing + fading
+}
+
+/// The hyperbolic tangent.
+#[inline(always)]
+pub fn tanh<V: Vector>(x: V) -> V {
+    let a = V::splat(22.0).smaller(x.abs());
+    let z = a * a;
+    // (tanh a / a − 1)/a² for a ≤ 0.55, from Chebyshev's nodes
+    let rest = polynomial(
+        z,
+        [
+            -0.333_333_333_333_333_3,
+            -0.053_968_253_967_434_016,
+            -0.008_863_234_397_814_355,
+            -0.001_455_661_830_100_716,
+            -0.000_234_634_741_088_723_7,
+            -2.060_276_537_636_634e-5,
+        ],
+        [
+            0.133_333_333_333_327_14,
+            0.021_869_488_493_666_944,
+            0.003_592_110_378_689_024,
+            0.000_588_936_052_007_405_7,
+            8.511_313_685_577_672e-5,
+        ],
+    );
+    let small = rest.mul_add(a * z, a);
+    let square = parts(reduced(a + a)).value(1.0);
+    let large = V::splat(1.0) - V::splat(2.0) / (square + V::splat(1.0));
+    V::choose(a.below(V::splat(0.55)), small, large).or(x.signs())
+}

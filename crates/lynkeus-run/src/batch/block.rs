@@ -1,0 +1,314 @@
+//! Some trajectories that go side by side, few enough to stay in the cache.
+
+use lynkeus_native::Buffer;
+
+use super::code::Runner;
+use super::plan::{Event, Program};
+use super::{Ended, LANES, Lane};
+use crate::Error;
+use crate::divergence::Bound;
+use crate::error::state_text;
+use crate::noise::Sensors;
+use crate::rk4::instant;
+
+/// Bytes that the states of a block may take, twice: they should stay in the first cache.
+const CACHE: usize = 16 * 1024;
+
+/// Most groups of lanes in a block.
+const GROUPS: usize = 64;
+
+/// Steps for which what is shared is computed ahead.
+const AHEAD: usize = 16;
+
+/// Groups of lanes in a block.
+pub(crate) fn groups(program: &Program) -> usize {
+    let group = (program.states + program.disturbances) * size_of::<Lane>();
+    (CACHE / (2 * group).max(1)).clamp(1, GROUPS)
+}
+
+/// The working memory of a thread.
+pub(crate) struct Desk<'p> {
+    program: &'p Program,
+    step: Runner,
+    row: Runner,
+    /// arguments of what is shared, at four instants
+    arguments: Vec<Lane>,
+    shared: Buffer<LANES>,
+    shared_row: Buffer<LANES>,
+    rows: Buffer<LANES>,
+}
+
+impl<'p> Desk<'p> {
+    pub fn new(program: &'p Program) -> Self {
+        Self {
+            step: program.step.runner(),
+            row: program.row.runner(),
+            arguments: vec![],
+            shared: Buffer::new(AHEAD * program.step.shared()),
+            shared_row: Buffer::new(LANES * program.row.shared()),
+            rows: Buffer::new(groups(program) * program.columns),
+            program,
+        }
+    }
+
+    /// What the steps from `first` on share; how many steps.
+    fn share(&mut self, leg: &Leg<'_>, first: usize) -> usize {
+        let count = AHEAD.min(leg.steps - first);
+        let size = self.program.step.shared();
+        for (k, table) in (0..count).step_by(LANES).zip(
+            self.shared
+                .values_mut()
+                .chunks_exact_mut(LANES * size.max(1)),
+        ) {
+            let times: [[f64; 2]; LANES] = std::array::from_fn(|lane| {
+                // lanes without a step of their own do the last one again
+                let step = (first + k + lane).min(leg.steps - 1);
+                [step, step + 1].map(|i| instant(leg.from, leg.to, leg.steps, i))
+            });
+            self.arguments.clear();
+            self.arguments.push(times.map(|[t, _]| t));
+            let modes = leg.modes.iter().map(|&mode| [mode; LANES]);
+            self.arguments.extend(modes);
+            self.arguments.push(times.map(|[t, next]| next - t));
+            self.step.share(&self.arguments, table);
+        }
+        count
+    }
+
+    /// The values of a row of every group.
+    fn read(&mut self, time: f64, modes: &[f64], groups: usize, x: &[Lane]) -> &[Lane] {
+        let size = self.program.row.shared();
+        self.arguments.clear();
+        self.arguments.push([time; LANES]);
+        self.arguments.extend(modes.iter().map(|&m| [m; LANES]));
+        let table = self.shared_row.values_mut();
+        self.row.share(&self.arguments, table);
+        let rows = self.rows.values_mut();
+        self.row.sweep(groups, &table[..size], x, rows);
+        &rows[..groups * self.program.columns]
+    }
+}
+
+/// Equal steps.
+struct Leg<'e> {
+    from: f64,
+    to: f64,
+    steps: usize,
+    modes: &'e [f64],
+}
+
+/// One trajectory.
+#[derive(Debug)]
+struct Run {
+    sensors: Sensors,
+    bound: Bound,
+    is_over: bool,
+}
+
+/// Trajectories side by side. The last group is filled up with copies.
+#[derive(Debug)]
+pub(crate) struct Block {
+    /// place of the first one among all
+    first: usize,
+    runs: Vec<Run>,
+    groups: usize,
+    /// states, then what disturbs them, of each group of lanes
+    now: Buffer<LANES>,
+    next: Buffer<LANES>,
+    /// rows of the portion at hand: row by row, column by column, run by run
+    pub recorded: Vec<f64>,
+    pub ended: Vec<Ended>,
+}
+
+impl Block {
+    /// With the sensors and the start of each.
+    pub fn new(program: &Program, first: usize, members: Vec<(Sensors, Vec<f64>)>) -> Self {
+        let groups = members.len().div_ceil(LANES);
+        let own = program.states + program.disturbances;
+        let mut now = Buffer::new(groups * own);
+        for place in 0..groups * LANES {
+            let (_, start) = &members[place.min(members.len() - 1)];
+            let group = &mut now.values_mut()[place / LANES * own..][..own];
+            for (x, start) in group.iter_mut().zip(start) {
+                x[place % LANES] = *start;
+            }
+        }
+        let run = |(sensors, start): (Sensors, Vec<f64>)| Run {
+            sensors,
+            bound: Bound::new(&start),
+            is_over: false,
+        };
+        Self {
+            first,
+            runs: members.into_iter().map(run).collect(),
+            groups,
+            next: now.clone(),
+            now,
+            recorded: vec![],
+            ended: vec![],
+        }
+    }
+
+    /// Number of trajectories.
+    pub fn len(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// Goes through a portion of the plan, and records these columns of its rows.
+    pub fn run(&mut self, desk: &mut Desk<'_>, events: &[Event], columns: &[usize]) {
+        self.recorded.clear();
+        for event in events {
+            match event {
+                Event::Draw => self.draw(desk.program),
+                Event::Leg {
+                    from,
+                    to,
+                    steps,
+                    modes,
+                } => {
+                    let leg = Leg {
+                        from: *from,
+                        to: *to,
+                        steps: *steps,
+                        modes,
+                    };
+                    self.advance(desk, &leg);
+                }
+                Event::Row { time, modes } => self.record(desk, *time, modes, columns),
+            }
+        }
+    }
+
+    fn draw(&mut self, program: &Program) {
+        let own = program.states + program.disturbances;
+        for run in &mut self.runs {
+            run.sensors.draw();
+        }
+        for place in 0..self.groups * LANES {
+            let run = &self.runs[place.min(self.runs.len() - 1)];
+            let first = place / LANES * own + program.states;
+            for (k, value) in run.sensors.disturbances().enumerate() {
+                for buffer in [&mut self.now, &mut self.next] {
+                    buffer.values_mut()[first + k][place % LANES] = value;
+                }
+            }
+        }
+    }
+
+    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg<'_>) {
+        let size = desk.program.step.shared();
+        let mut done = 0;
+        while done < leg.steps {
+            let count = desk.share(leg, done);
+            for k in 0..count {
+                let shared = &desk.shared.values()[k * size..][..size];
+                let to = self.next.values_mut();
+                desk.step.sweep(self.groups, shared, self.now.values(), to);
+                std::mem::swap(&mut self.now, &mut self.next);
+            }
+            done += count;
+        }
+    }
+
+    fn record(&mut self, desk: &mut Desk<'_>, time: f64, modes: &[f64], columns: &[usize]) {
+        let program = desk.program;
+        let rows = desk.read(time, modes, self.groups, self.now.values());
+        let own = program.states + program.disturbances;
+        let groups = rows.chunks_exact(program.columns.max(1));
+        let states = self.now.values().chunks_exact(own.max(1));
+        let runs = self.runs.chunks_mut(LANES);
+        for (k, ((row, x), runs)) in groups.zip(states).zip(runs).enumerate() {
+            let x = &x[..program.states];
+            let extent = Extent::new(program, row, x);
+            for (lane, run) in runs.iter_mut().enumerate().filter(|(_, run)| !run.is_over) {
+                let Err(error) = run.judge(program, time, extent.of(lane), (x, lane)) else {
+                    continue;
+                };
+                run.is_over = true;
+                let run = self.first + k * LANES + lane;
+                self.ended.push(Ended { run, error });
+            }
+        }
+        for &column in columns {
+            let lanes = rows.iter().skip(column).step_by(program.columns);
+            let values = lanes.flatten().take(self.runs.len());
+            self.recorded.extend(values);
+        }
+    }
+}
+
+/// How large the values of four runs are at a row.
+struct Extent {
+    /// zero where all are finite
+    oddity: Lane,
+    /// of what is no estimate
+    known: Lane,
+    /// of the observer's states
+    estimates: Lane,
+}
+
+/// [`Extent`] of one run.
+struct Size {
+    is_finite: bool,
+    known: f64,
+    estimates: f64,
+}
+
+impl Extent {
+    fn new(program: &Program, row: &[Lane], x: &[Lane]) -> Self {
+        let mut oddity = [0.0; LANES];
+        for value in row.iter().chain(x) {
+            for (odd, v) in oddity.iter_mut().zip(value) {
+                *odd += v * 0.0;
+            }
+        }
+        let largest = |values: &[Lane]| {
+            values.iter().fold([0.0; LANES], |largest: Lane, value| {
+                std::array::from_fn(|lane| largest[lane].max(value[lane].abs()))
+            })
+        };
+        Self {
+            oddity,
+            known: largest(&row[..program.known]),
+            estimates: largest(&x[program.plant_states..]),
+        }
+    }
+
+    fn of(&self, lane: usize) -> Size {
+        Size {
+            is_finite: self.oddity[lane] == 0.0,
+            known: self.known[lane],
+            estimates: self.estimates[lane],
+        }
+    }
+}
+
+impl Run {
+    /// Whether the run goes on; `states` are those of its group, with its lane.
+    fn judge(
+        &mut self,
+        program: &Program,
+        time: f64,
+        size: Size,
+        states: (&[Lane], usize),
+    ) -> Result<(), Error> {
+        let (x, lane) = states;
+        let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
+        self.bound.see(&[size.known]);
+        if !size.is_finite {
+            return Err(Error::NotFinite {
+                time,
+                operation: "a value is not finite".to_owned(),
+                state: state_text(&program.names, &x()),
+            });
+        }
+        let names = &program.observer_names;
+        self.bound
+            .check(time, &[], &[size.estimates], String::new)
+            .or_else(|_| {
+                let x = x();
+                self.bound
+                    .check(time, names, &x[program.plant_states..], String::new)
+            })
+    }
+}

@@ -1,0 +1,182 @@
+//! Many runs of one simulation at once.
+//!
+//! Four trajectories stand side by side in vector registers, some such groups in a block that
+//! stays in the cache, and threads take blocks. What all of them have in common, time and what
+//! follows from it, is computed once for a block. Elementary functions are those of
+//! [`lynkeus_expr::lanes`], in every trajectory, so that what a run gives depends on neither its
+//! neighbours nor the number of threads; where none is used a run in a batch is that of
+//! [`Simulation::run`] to the bit.
+
+mod block;
+mod code;
+mod plan;
+mod split;
+
+use std::sync::Mutex;
+use std::thread::Builder;
+
+use crate::{Column, Error, Simulation};
+use block::{Block, Desk, groups};
+use plan::{Event, Plan, Program};
+
+/// Trajectories in a register.
+const LANES: usize = 4;
+
+type Lane = [f64; LANES];
+
+/// What one run of a batch has of its own.
+#[derive(Clone, Debug)]
+pub struct Member {
+    /// seed of its noise
+    pub seed: u64,
+    /// start values of the plant's states
+    pub start: Vec<f64>,
+}
+
+/// A run that did not go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// its place among the members
+    pub run: usize,
+    /// why: at the row where it was seen
+    pub error: Error,
+}
+
+/// Many runs of one [`Simulation`] with [`Method::Rk4`](crate::Method::Rk4) and steps that do not
+/// depend on the state. They go on together, some rows at a time.
+pub struct Batch {
+    plan: Plan,
+    program: Program,
+    blocks: Vec<Block>,
+    /// places of the recorded columns in a row
+    columns: Vec<usize>,
+    times: Vec<f64>,
+    runs: usize,
+}
+
+impl Batch {
+    /// The runs of these members, of which `columns` are recorded; none where the steps of the
+    /// simulation depend on the state, or it is too large. Its own seed and start do not count.
+    ///
+    /// # Errors
+    /// A simulation that cannot be run, a start of the wrong size, a column that a run has not.
+    pub fn new(
+        simulation: &Simulation,
+        members: &[Member],
+        columns: &[Column],
+    ) -> Result<Option<Self>, Error> {
+        let Some((plan, program)) = Plan::new(simulation)? else {
+            return Ok(None);
+        };
+        let place = |column: &Column| {
+            plan.place(*column).ok_or_else(|| {
+                let found = format!("{:?} {}", column.role, column.index);
+                Error::setting("recorded column", "one of the run", found)
+            })
+        };
+        let columns = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let size = groups(&program) * LANES;
+        let mut blocks = vec![];
+        for (k, members) in members.chunks(size).enumerate() {
+            let member = |m: &Member| {
+                let plant = simulation.plant.clone().with_start(m.start.clone())?;
+                let observer = simulation.observer.iter().flat_map(|o| o.start());
+                let start = plant.start().iter().chain(observer).copied().collect();
+                Ok((plan.sensors(simulation, m.seed)?, start))
+            };
+            let members = members
+                .iter()
+                .map(member)
+                .collect::<Result<Vec<_>, Error>>()?;
+            blocks.push(Block::new(&program, k * size, members));
+        }
+        Ok(Some(Self {
+            runs: members.len(),
+            plan,
+            program,
+            blocks,
+            columns,
+            times: vec![],
+        }))
+    }
+
+    /// Number of rows of every run.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.plan.rows()
+    }
+
+    /// Takes all runs through the next rows, at most so many, on so many threads. The rows before
+    /// are forgotten. False where there are no more.
+    ///
+    /// # Errors
+    /// Times at which something jumps that cannot be found, or too many steps.
+    pub fn advance(&mut self, rows: usize, threads: usize) -> Result<bool, Error> {
+        self.times.clear();
+        loop {
+            let events = self.plan.next(rows.max(1))?;
+            let times = events.iter().filter_map(|event| match event {
+                Event::Row { time, .. } => Some(*time),
+                _ => None,
+            });
+            self.times.extend(times);
+            self.run(&events, threads);
+            if events.is_empty() || !self.times.is_empty() {
+                return Ok(!self.times.is_empty());
+            }
+        }
+    }
+
+    fn run(&mut self, events: &[Event], threads: usize) {
+        let (program, columns) = (&self.program, &self.columns[..]);
+        let threads = threads.min(self.blocks.len());
+        let queue = Mutex::new(self.blocks.iter_mut());
+        let next = || queue.lock().unwrap_or_else(|e| e.into_inner()).next();
+        let work = || {
+            let mut desk = Desk::new(program);
+            while let Some(block) = next() {
+                block.run(&mut desk, events, columns);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 1..threads {
+                // where no thread can be had, the others do its work
+                let _ = Builder::new().spawn_scoped(scope, work);
+            }
+            work();
+        });
+    }
+
+    /// Times of the rows at hand.
+    #[must_use]
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The values of a row at hand in all runs, in the order of the members, for a column by its
+    /// place among those that are recorded. Those of runs that ended mean nothing.
+    pub fn values(&self, row: usize, column: usize) -> impl Iterator<Item = f64> + '_ {
+        let place = row * self.columns.len() + column;
+        self.blocks.iter().flat_map(move |block| {
+            let runs = block.len();
+            block.recorded[place * runs..][..runs].iter().copied()
+        })
+    }
+
+    /// The runs that did not go on, so far.
+    pub fn ended(&self) -> impl Iterator<Item = &Ended> {
+        self.blocks.iter().flat_map(|block| &block.ended)
+    }
+
+    /// Number of runs.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.runs
+    }
+
+    /// True of no runs.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.runs == 0
+    }
+}
