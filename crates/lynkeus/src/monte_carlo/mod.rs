@@ -4,6 +4,7 @@
 //! alone. What a run draws follows from its seed, and the runs are put together in order: the
 //! result does not depend on the number of processors.
 
+mod apart;
 #[cfg(feature = "plot")]
 mod picture;
 mod report;
@@ -13,19 +14,18 @@ mod together;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
-use lynkeus_expr::Spent;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::Column;
 
-use crate::crew::{self, Watch};
 use crate::headers::Headers;
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
+use apart::{Job, Series, Single, gathered, room};
 pub use report::Settled;
 use report::headers_of;
-use statistics::{Found, of_runs};
+use statistics::Found;
 use together::{Screened, Together};
 
 /// What many runs of a study give.
@@ -104,30 +104,6 @@ pub struct Bands {
     pub high: Vec<f64>,
 }
 
-/// True course and estimate of one quantity in one run.
-#[derive(Clone, Debug)]
-struct Series {
-    truth: Vec<f64>,
-    estimate: Vec<f64>,
-}
-
-/// What one run gave.
-#[derive(Debug)]
-struct Single {
-    seed: u64,
-    /// none where a limit ended the run
-    result: Result<Option<Whole>, Error>,
-}
-
-/// A run that reached its end.
-#[derive(Debug)]
-struct Whole {
-    /// by quantity
-    series: Vec<Series>,
-    /// why its estimate is not credible, where it is not
-    doubt: Option<String>,
-}
-
 /// What is followed: an estimate by its place, beside the column of its true value.
 #[derive(Clone, Debug)]
 struct Followed {
@@ -201,111 +177,6 @@ fn followed(plant: &Plant, rig: &Rig) -> Vec<Followed> {
     known.collect()
 }
 
-/// Refuses what would not fit into the memory that the study may take.
-fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), Error> {
-    let run = &rig.simulation;
-    let rows = ((run.until - run.start) / run.output_step).ceil() + 1.0;
-    let of_run = rows * quantities as f64 * size_of::<[f64; 2]>() as f64;
-    // a run is counted, and watched, whatever it gives
-    let bytes = runs as f64 * (of_run + 2.0 * size_of::<Single>() as f64);
-    let room = study.budget.room().unwrap_or(usize::MAX);
-    if bytes <= room as f64 {
-        return Ok(());
-    }
-    let mib = |bytes: f64| (bytes / f64::from(1 << 20)).ceil();
-    let message = format!(
-        "{runs} runs × {rows} rows × {quantities} quantities take {} MiB, and {} MiB are left",
-        mib(bytes),
-        mib(room as f64)
-    );
-    // a filter's rows are its samples
-    let is_sampled = rig.design.observer.filter.is_some() && run.noise.sample_step.is_some();
-    let step = match is_sampled {
-        true => "sample_step",
-        false => "output_step",
-    };
-    Err(Error::input(message).at(&study.file).hint(format!(
-        "a longer `{step}` of [simulate], fewer runs, or a greater limit of memory"
-    )))
-}
-
-/// What all runs share.
-struct Job<'a> {
-    study: &'a Study,
-    followed: &'a [Followed],
-    /// the rows of every run that reaches its end
-    time: OnceLock<Vec<f64>>,
-}
-
-impl Single {
-    /// Why its estimate is not credible, where it is not.
-    fn doubt(self) -> Option<Failure> {
-        let reason = self.result.ok()??.doubt?;
-        let seed = self.seed;
-        Some(Failure { seed, reason })
-    }
-}
-
-impl Job<'_> {
-    /// The runs of these seeds, on all processors.
-    fn singles(
-        &self,
-        plant: &Plant,
-        rig: &Rig,
-        seeds: &[u64],
-        watch: &mut Watch<'_>,
-    ) -> Result<Vec<Single>, Error> {
-        // what the design made comes with every clone of the plant
-        let shared = (plant.clone(), rig.clone());
-        crew::every(
-            seeds.len(),
-            &shared,
-            &|(plant, rig), k, watch| Ok(self.single(plant, rig, seeds[k], watch)),
-            watch,
-        )
-    }
-
-    fn single(&self, plant: &Plant, rig: &Rig, seed: u64, watch: &mut Watch<'_>) -> Single {
-        let result = self.run(plant, rig, seed, watch);
-        Single { seed, result }
-    }
-
-    fn run(
-        &self,
-        plant: &Plant,
-        rig: &Rig,
-        seed: u64,
-        watch: &mut Watch<'_>,
-    ) -> Result<Option<Whole>, Error> {
-        let study = self.study;
-        if study.budget.spent().is_some() {
-            return Ok(None);
-        }
-        let own = Prepared::new(study, plant)?;
-        let ran = match rig.run(&own, seed, watch) {
-            // a run that was ended says nothing of the study
-            Err(_) if study.budget.marked().is_some() => return Ok(None),
-            ran => ran?,
-        };
-        if let Some(ended) = &ran.course.ended {
-            return Err(Error::refused(ended.to_string()).at(&study.file));
-        }
-        if ran.run.times().last() != Some(&rig.simulation.until) {
-            return Ok(None);
-        }
-        self.time.get_or_init(|| ran.run.times().to_vec());
-        let series = self.followed.iter().map(|f| Series {
-            truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
-            estimate: ran.course.estimates[f.estimate].to_vec(),
-        });
-        let series = series.collect();
-        // as `simulate` judges this run alone
-        let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
-        let doubt = alone.refusal().map(|refusal| refusal.to_string());
-        Ok(Some(Whole { series, doubt }))
-    }
-}
-
 /// What all runs together give.
 struct Figures {
     /// of the runs that reached their end
@@ -316,49 +187,6 @@ struct Figures {
     time: Vec<f64>,
     /// by quantity
     found: Vec<Found>,
-}
-
-/// The figures of runs that were done one by one.
-fn gathered(
-    study: &Study,
-    followed: &[Followed],
-    singles: Vec<Single>,
-    time: Vec<f64>,
-) -> Result<Figures, Error> {
-    let (mut seeds, mut runs) = (vec![], vec![]);
-    let (mut failures, mut doubtful) = (vec![], vec![]);
-    let mut first = None;
-    for single in singles {
-        let seed = single.seed;
-        match single.result {
-            Ok(None) => {}
-            Ok(Some(Whole { series, doubt })) => {
-                seeds.push(seed);
-                runs.push(series);
-                doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
-            }
-            Err(error) => {
-                let reason = error.to_string();
-                failures.push(Failure { seed, reason });
-                first = first.or(Some(error));
-            }
-        }
-    }
-    let ended = study.budget.marked();
-    match (ended, first) {
-        (Some(Spent::Cancelled), _) => return Err(Error::ended(Spent::Cancelled)),
-        (_, Some(first)) if seeds.is_empty() => return Err(first),
-        (Some(spent), None) if seeds.is_empty() => return Err(Error::ended(spent)),
-        _ => {}
-    }
-    let found = (0..followed.len()).map(|place| of_runs(&runs, place));
-    Ok(Figures {
-        found: found.collect(),
-        seeds,
-        failures,
-        doubtful,
-        time,
-    })
 }
 
 /// The figures under their names.

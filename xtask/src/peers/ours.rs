@@ -1,0 +1,110 @@
+//! Ours among the peers: what a user's study costs, whole runs of the library.
+
+use std::io::Write as _;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use lynkeus::Study;
+use lynkeus::run::Backend;
+use serde_json::json;
+
+use crate::process::root;
+
+const STUDY: &str = include_str!("../../peers/lee.toml");
+
+/// Time of a Runge–Kutta run, of an adaptive one.
+const STEPS: f64 = 2e6;
+const SPANS: f64 = 1000.0;
+/// The adaptive run that the others make, and where it ends: SciPy's DOP853 with `rtol = 3e-14`.
+const SPAN: f64 = 20.0;
+const END: [f64; 4] = [
+    -1.6760961891465884,
+    0.2759977606804534,
+    -1.8648705788937479,
+    -0.08462431160802764,
+];
+
+/// Prints what the other peers print.
+pub fn print(backend: &str) -> Result<(), String> {
+    match backend {
+        "interpreter" => Backend::Interpreter,
+        "native" => Backend::Native,
+        _ => return Err("expected interpreter or native".to_owned()),
+    }
+    .choose();
+    let fixed = "method = \"rk4\"\nstep = 1e-3";
+    let step = seconds(&study(STEPS * 1e-3, 20.0, fixed)?)? / STEPS;
+    let adaptive = "rtol = 1e-8\natol = 1e-8";
+    let span = seconds(&study(SPANS * SPAN, 0.1, adaptive)?)? / SPANS;
+    let error = error(&run(&study(SPAN, 0.1, adaptive)?)?)?;
+    let found = json!({ "step": step, "adaptive": span, "error": error });
+    writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
+}
+
+fn study(until: f64, output: f64, method: &str) -> Result<Study, String> {
+    let plant = root().join("examples").join("lee").join("lee.mo");
+    let text = STUDY
+        .replace("{plant}", &plant.display().to_string().replace('\\', "/"))
+        .replace("{until}", &until.to_string())
+        .replace("{output}", &output.to_string())
+        .replace("{method}", method);
+    Study::parse(&text, "lee.toml").map_err(|error| error.to_string())
+}
+
+fn run(study: &Study) -> Result<lynkeus::Outcome, String> {
+    lynkeus::simulate(study, &mut |_| ControlFlow::Continue(())).map_err(|e| e.to_string())
+}
+
+/// Of the second run: the first finds the pages of memory.
+fn seconds(study: &Study) -> Result<f64, String> {
+    run(study)?;
+    let clock = Clock::start();
+    run(study)?;
+    Ok(clock.seconds())
+}
+
+/// The largest error of a true state or an estimate at the end, where they are equal.
+fn error(outcome: &lynkeus::Outcome) -> Result<f64, String> {
+    let columns = outcome.columns(true);
+    let last = |name: &str| {
+        let column = columns.iter().find(|(header, _)| header == name);
+        let end = column.and_then(|(_, values)| values.last().copied());
+        end.ok_or(format!("no column {name}"))
+    };
+    let mut largest: f64 = 0.0;
+    for (name, end) in ["x1", "x2", "x3", "x4"].iter().zip(END) {
+        let estimate = format!("{name}_hat");
+        largest = largest
+            .max((last(name)? - end).abs())
+            .max((last(&estimate)? - end).abs());
+    }
+    Ok(largest)
+}
+
+/// Processor time of this thread where the system tells it, else the clock.
+struct Clock {
+    begun: Instant,
+    used: Option<u64>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self {
+            begun: Instant::now(),
+            used: used(),
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match (self.used, used()) {
+            (Some(before), Some(after)) => (after - before) as f64 * 1e-9,
+            _ => self.begun.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+/// Nanoseconds on a processor, as Linux counts them.
+fn used() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}
