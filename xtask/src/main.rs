@@ -8,6 +8,7 @@ mod gallery;
 mod gap;
 mod numbers;
 mod options;
+mod peers;
 mod process;
 mod python;
 
@@ -30,10 +31,12 @@ usage: cargo xtask <task>
             [--binary FILE]; build with --release
   exercise  random operations on estimators of every kind: no panic, always finite or an error, a
             restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]; build with
-            --release";
+            --release
+  bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi and SciPy: the table of
+            BENCHMARKS.md; [--rounds N]; needs gcc; build with --release";
 
 /// Tasks with options of their own.
-const WITH_OPTIONS: [&str; 3] = ["falsify", "attack", "exercise"];
+const WITH_OPTIONS: [&str; 5] = ["falsify", "attack", "exercise", "bench-peers", "bench-ours"];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -51,6 +54,9 @@ fn main() -> ExitCode {
         "attack" => attack::run(&arguments[1..]),
         "exercise" => exercise::run(&arguments[1..]),
         "falsify" => falsify::run(&arguments[1..]),
+        "bench-peers" => peers::bench(&arguments[1..]),
+        // one of the peers, as a process of its own
+        "bench-ours" => peers::ours::print(arguments.get(1).map_or("", String::as_str)),
         _ => {
             eprintln!("{USAGE}");
             return ExitCode::from(2);

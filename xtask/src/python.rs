@@ -1,5 +1,5 @@
-//! The virtual environment that the cross-checks use: `.venv` in the workspace root, holding
-//! exactly what `xtask/requirements.txt` pins.
+//! Virtual environments in the workspace root, holding exactly what a list pins: `.venv` of the
+//! cross-checks, `xtask/requirements.txt`, and another of the benchmarks' peers.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,21 +12,36 @@ pub const VARIABLE: &str = "LYNKEUS_PYTHON";
 
 const REQUIREMENTS: &str = include_str!("../requirements.txt");
 
-/// The environment's interpreter, the environment being made or brought up to date first.
-/// The error says what is missing and how to supply it.
+/// The interpreter of the cross-checks.
+///
+/// # Errors
+/// What is missing and how to supply it.
 pub fn interpreter() -> Result<PathBuf, String> {
-    let folder = root().join(".venv");
+    environment(".venv", REQUIREMENTS)
+}
+
+/// The interpreter of the environment of that name, which is made or brought up to date first.
+///
+/// # Errors
+/// What is missing and how to supply it.
+pub fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
+    let folder = root().join(name);
     let python = interpreter_in(&folder);
     // Written last: an interrupted installation leaves no stamp and starts again.
     let stamp = folder.join("installed-requirements.txt");
-    let installed = fs::read_to_string(&stamp).is_ok_and(|text| text == REQUIREMENTS);
+    let installed = fs::read_to_string(&stamp).is_ok_and(|text| text == requirements);
     if !(installed && answers(&python)) {
         create(&folder)?;
-        install(&python)?;
-        fs::write(&stamp, REQUIREMENTS)
-            .map_err(|error| format!("cannot write {}: {error}", stamp.display()))?;
+        let list = folder.join("requirements.txt");
+        write(&list, requirements)?;
+        install(&python, &list)?;
+        write(&stamp, requirements)?;
     }
     Ok(python)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()))
 }
 
 fn interpreter_in(environment: &Path) -> PathBuf {
@@ -49,12 +64,12 @@ fn create(folder: &Path) -> Result<(), String> {
     })
 }
 
-fn install(python: &Path) -> Result<(), String> {
+fn install(python: &Path, list: &Path) -> Result<(), String> {
     let mut command = Command::new(python);
     command
         .args(["-m", "pip", "install", "--disable-pip-version-check"])
         .args(["--quiet", "--retries", "1", "--requirement"])
-        .arg(root().join("xtask").join("requirements.txt"));
+        .arg(list);
     run(&mut command)
         .map_err(|error| format!("{error}; the packages come from the Python package index"))
 }

@@ -1,16 +1,14 @@
-//! How many Runge–Kutta steps a second a batch makes: Lee's example with its observer (8 states),
-//! beside `benches/lee_lanes.c`.
-//!
-//! `cargo run --release --package lynkeus-run --example batch (shared|own) [runs] [threads]`, with one
-//! input for all runs, or sin and exp in every run
+//! Ours in a batch: Lee's example with its observer (8 states), one input for all runs or sin and
+//! exp in every run.
 
-use std::time::Instant;
+use lynkeus::expr::{Expr, Graph, Node};
+use lynkeus::run::{Batch, Error, Member, Method, Role, Simulation, Step, System};
 
-use lynkeus_expr::{Expr, Graph, Node};
-use lynkeus_run::{Batch, Error, Member, Method, Role, Simulation, Step, System};
+use super::clock::Clock;
 
 const STEP: f64 = 1e-3;
 const UNTIL: f64 = 5.0;
+const RUNS: usize = 6144;
 
 /// Two coupled oscillators under u and their observer; `own` input: one of its own phase in every
 /// run, which is a state.
@@ -78,8 +76,8 @@ fn simulation(own: bool) -> Result<Simulation, Error> {
     })
 }
 
-/// Millions of steps a second.
-fn speed(own: bool, runs: usize, threads: usize) -> Result<f64, Error> {
+/// Seconds of a step of one run, on one thread.
+pub(super) fn seconds(own: bool) -> Result<f64, Error> {
     let simulation = simulation(own)?;
     let member = |k: usize| {
         let mut start = simulation.plant.start().to_vec();
@@ -89,26 +87,12 @@ fn speed(own: bool, runs: usize, threads: usize) -> Result<f64, Error> {
         }
         Member { seed: 0, start }
     };
-    let members: Vec<Member> = (0..runs).map(member).collect();
+    let members: Vec<Member> = (0..RUNS).map(member).collect();
     let columns = [Role::State.at(0), Role::State.at(4)];
     let Some(mut batch) = Batch::new(&simulation, &members, &columns)? else {
-        return Ok(0.0);
+        return Ok(f64::INFINITY);
     };
-    let begin = Instant::now();
-    while batch.advance(1, threads)? {}
-    let steps = runs as f64 * (UNTIL / STEP);
-    Ok(steps / begin.elapsed().as_secs_f64() / 1e6)
-}
-
-#[allow(clippy::print_stdout)]
-fn main() -> Result<(), Error> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let own = arguments.first().is_some_and(|what| what == "own");
-    let number = |k: usize, default: usize| {
-        let given = arguments.get(k).and_then(|text| text.parse().ok());
-        given.unwrap_or(default)
-    };
-    let speed = speed(own, number(1, 1024), number(2, 1))?;
-    println!("{speed:.1} million steps a second");
-    Ok(())
+    let clock = Clock::start();
+    while batch.advance(1, 1)? {}
+    Ok(clock.seconds() / (RUNS as f64 * (UNTIL / STEP)))
 }

@@ -5,16 +5,18 @@
 //! each figure the least over the rounds is taken, so that what else the machine does counts for
 //! nobody.
 
+mod clock;
+mod lanes;
 pub mod ours;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::Command;
 
 use crate::options;
-use crate::process::{cargo, root, run};
+use crate::process::{root, run};
 use crate::python;
 
 const BEGIN: &str = "<!-- table: cargo xtask bench-peers -->\n";
@@ -65,9 +67,6 @@ fn peers() -> Result<Vec<Peer>, String> {
     let library = |name: &str| vec![text(&python), text(&script), name.to_owned()];
     let this = std::env::current_exe().map_err(|error| error.to_string())?;
     let ours = |backend: &str| vec![text(&this), "bench-ours".to_owned(), backend.to_owned()];
-    let batch = batch()?;
-    let lanes = |input: &str| vec![text(&batch), input.to_owned()];
-    let compiled = |source: &str, name: &str, flags: &[&str]| compiled(source, name, flags);
     let lee = "xtask/peers/lee.c";
     let in_lanes = "xtask/peers/lanes.c";
     let plain = ["-O2", "-ffp-contract=off"];
@@ -77,8 +76,7 @@ fn peers() -> Result<Vec<Peer>, String> {
     let all = [
         ("Lynkeus, machine code", ours("native")),
         ("Lynkeus, interpreter", ours("interpreter")),
-        ("Lynkeus, lanes", lanes("shared")),
-        ("Lynkeus, lanes, own inputs", lanes("own")),
+        ("Lynkeus, lanes", ours("lanes")),
         ("C by hand", compiled(lee, "lee", &plain)?),
         ("C by hand, fused", compiled(lee, "lee-fused", &fused)?),
         ("C in lanes", compiled(in_lanes, "lanes", &avx)?),
@@ -100,13 +98,6 @@ fn peers() -> Result<Vec<Peer>, String> {
     Ok(all.into_iter().map(peer).collect())
 }
 
-/// Ours in lanes.
-fn batch() -> Result<PathBuf, String> {
-    let package = ["--package", "lynkeus-run", "--example", "batch"];
-    run(cargo(&["build", "--release"]).args(package))?;
-    Ok(root().join("target/release/examples/batch"))
-}
-
 /// The command of a program in C, compiled.
 fn compiled(source: &str, name: &str, flags: &[&str]) -> Result<Vec<String>, String> {
     let folder = root().join("target").join("peers");
@@ -123,7 +114,7 @@ fn compiled(source: &str, name: &str, flags: &[&str]) -> Result<Vec<String>, Str
     Ok(vec![text(&program)])
 }
 
-fn text(path: &std::path::Path) -> String {
+fn text(path: &Path) -> String {
     path.display().to_string()
 }
 

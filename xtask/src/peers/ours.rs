@@ -2,12 +2,13 @@
 
 use std::io::Write as _;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use lynkeus::Study;
 use lynkeus::run::Backend;
-use serde_json::json;
+use serde_json::{Value, json};
 
+use super::clock::Clock;
+use super::lanes;
 use crate::process::root;
 
 const STUDY: &str = include_str!("../../peers/lee.toml");
@@ -25,20 +26,27 @@ const END: [f64; 4] = [
 ];
 
 /// Prints what the other peers print.
-pub fn print(backend: &str) -> Result<(), String> {
-    match backend {
-        "interpreter" => Backend::Interpreter,
-        "native" => Backend::Native,
-        _ => return Err("expected interpreter or native".to_owned()),
-    }
-    .choose();
+pub fn print(what: &str) -> Result<(), String> {
+    let found = match what {
+        "interpreter" => study_alone(Backend::Interpreter)?,
+        "native" => study_alone(Backend::Native)?,
+        "lanes" => {
+            let seconds = |own: bool| lanes::seconds(own).map_err(|error| error.to_string());
+            json!({ "batch": seconds(false)?, "own": seconds(true)? })
+        }
+        _ => return Err("expected interpreter, native or lanes".to_owned()),
+    };
+    writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
+}
+
+fn study_alone(backend: Backend) -> Result<Value, String> {
+    backend.choose();
     let fixed = "method = \"rk4\"\nstep = 1e-3";
     let step = seconds(&study(STEPS * 1e-3, 20.0, fixed)?)? / STEPS;
     let adaptive = "rtol = 1e-8\natol = 1e-8";
     let span = seconds(&study(SPANS * SPAN, 0.1, adaptive)?)? / SPANS;
     let error = error(&run(&study(SPAN, 0.1, adaptive)?)?)?;
-    let found = json!({ "step": step, "adaptive": span, "error": error });
-    writeln!(std::io::stdout(), "{found}").map_err(|error| error.to_string())
+    Ok(json!({ "step": step, "adaptive": span, "error": error }))
 }
 
 fn study(until: f64, output: f64, method: &str) -> Result<Study, String> {
@@ -68,7 +76,7 @@ fn error(outcome: &lynkeus::Outcome) -> Result<f64, String> {
     let columns = outcome.columns(true);
     let last = |name: &str| {
         let column = columns.iter().find(|(header, _)| header == name);
-        let end = column.and_then(|(_, values)| values.last().copied());
+        let end = column.and_then(|(_, values)| values.last());
         end.ok_or(format!("no column {name}"))
     };
     let mut largest: f64 = 0.0;
@@ -79,32 +87,4 @@ fn error(outcome: &lynkeus::Outcome) -> Result<f64, String> {
             .max((last(&estimate)? - end).abs());
     }
     Ok(largest)
-}
-
-/// Processor time of this thread where the system tells it, else the clock.
-struct Clock {
-    begun: Instant,
-    used: Option<u64>,
-}
-
-impl Clock {
-    fn start() -> Self {
-        Self {
-            begun: Instant::now(),
-            used: used(),
-        }
-    }
-
-    fn seconds(&self) -> f64 {
-        match (self.used, used()) {
-            (Some(before), Some(after)) => (after - before) as f64 * 1e-9,
-            _ => self.begun.elapsed().as_secs_f64(),
-        }
-    }
-}
-
-/// Nanoseconds on a processor, as Linux counts them.
-fn used() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split_whitespace().next()?.parse().ok()
 }
