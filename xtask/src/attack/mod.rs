@@ -3,6 +3,7 @@
 
 mod base;
 mod commands;
+mod free;
 mod mutate;
 mod options;
 mod oracle;
@@ -82,7 +83,8 @@ impl Case {
     fn new(bases: &[Base], numbers: &mut Numbers) -> Self {
         let base = match numbers.chance(0.6) {
             true => numbers.of(bases).clone(),
-            false => base::random(numbers),
+            false if numbers.chance(0.5) => base::random(numbers),
+            false => free::free(numbers),
         };
         let commands = commands::choose(numbers, &base);
         let mut files = base.files;
