@@ -13,7 +13,7 @@ use lynkeus::{Study, interrupt};
 pub(super) const ENDED: u8 = 3;
 
 /// The time of `design` and `certify` where none is given.
-const PROOF: Duration = Duration::from_secs(120);
+const PROOF: Duration = Duration::from_secs(60);
 
 /// Counts what is in use, for the limit of memory.
 #[global_allocator]
@@ -22,7 +22,7 @@ static ALLOCATOR: Cap<std::alloc::System> = Cap::new(std::alloc::System, usize::
 /// When a command stops: what is done by then is told.
 #[derive(Debug, Args)]
 pub(super) struct Limits {
-    /// Stop after this time, with what is done by then (`design` and `certify`: after 120 s)
+    /// Stop after this time, with what is done by then (`design` and `certify`: after a minute)
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     time_limit: Option<Duration>,
     /// Stop where more memory would be used, with what is done by then
