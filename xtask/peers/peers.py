@@ -149,7 +149,7 @@ def with_diffrax():
         found = diffrax.diffeqsolve(
             diffrax.ODETerm(f), diffrax.Dopri8(), 0.0, UNTIL, 1e-3, x,
             stepsize_controller=control, max_steps=100_000,
-            saveat=diffrax.SaveAt(ts=jnp.linspace(0, UNTIL, 201)),
+            saveat=diffrax.SaveAt(ts=jnp.linspace(0, UNTIL, 21)),
         )
         return found.ys[-1]
 
@@ -165,7 +165,7 @@ def with_casadi():
     step = ca.Function("step", [x, t], [rk4(f, t, x, STEP)])
     many = step.mapaccum(10_000)
     times = STEP * np.arange(10_000)
-    grid = np.linspace(0, UNTIL, 201)[1:]
+    grid = np.linspace(0, UNTIL, 21)[1:]
     problem = {"x": x, "t": t, "ode": f(t, x)}
     cvodes = ca.integrator("c", "cvodes", problem, 0, list(grid), {"abstol": TOLERANCE, "reltol": TOLERANCE})
     return {
@@ -178,7 +178,7 @@ def with_scipy():
     from scipy.integrate import solve_ivp
 
     f = lambda t, x: field(t, x, np.sin, np.exp)
-    grid = np.linspace(0, UNTIL, 201)
+    grid = np.linspace(0, UNTIL, 21)
     run = lambda: solve_ivp(
         f, (0, UNTIL), START, method="DOP853", rtol=TOLERANCE, atol=TOLERANCE, t_eval=grid
     )

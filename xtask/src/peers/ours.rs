@@ -44,8 +44,8 @@ fn study_alone(backend: Backend) -> Result<Value, String> {
     let fixed = "method = \"rk4\"\nstep = 1e-3";
     let step = seconds(&study(STEPS * 1e-3, 20.0, fixed)?)? / STEPS;
     let adaptive = "rtol = 1e-8\natol = 1e-8";
-    let span = seconds(&study(SPANS * SPAN, 0.1, adaptive)?)? / SPANS;
-    let error = error(&run(&study(SPAN, 0.1, adaptive)?)?)?;
+    let span = seconds(&study(SPANS * SPAN, 1.0, adaptive)?)? / SPANS;
+    let error = error(&run(&study(SPAN, 1.0, adaptive)?)?)?;
     Ok(json!({ "step": step, "adaptive": span, "error": error }))
 }
 
