@@ -25,6 +25,11 @@ pub(crate) fn instant(from: f64, to: f64, steps: usize, i: usize) -> f64 {
     from + (to - from) * (i as f64 / steps as f64)
 }
 
+/// Without a branch for each value.
+fn are_finite(values: &[f64]) -> bool {
+    values.iter().fold(true, |all, v| all & v.is_finite())
+}
+
 /// (time of the stage as a fraction of the step, factor of the stage before)
 const STAGES: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.5), (0.5, 0.5), (1.0, 1.0)];
 
@@ -51,7 +56,7 @@ impl Rk4 {
         h: f64,
         x: &mut [f64],
     ) -> Result<(), Error> {
-        if f.step(t, h, x, &mut self.stage) && self.stage.iter().all(|v| v.is_finite()) {
+        if f.step(t, h, x, &mut self.stage) && are_finite(&self.stage) {
             x.copy_from_slice(&self.stage);
             return Ok(());
         }
@@ -63,7 +68,7 @@ impl Rk4 {
         for (i, &x) in x.iter().enumerate() {
             self.stage[i] = x + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         }
-        if self.stage.iter().all(|v| v.is_finite()) {
+        if are_finite(&self.stage) {
             x.copy_from_slice(&self.stage);
             return Ok(());
         }
@@ -83,12 +88,14 @@ impl Rk4 {
         steps: usize,
         x: &mut [f64],
     ) -> Result<(), Error> {
+        let mut t = from;
         for i in 0..steps {
-            let [t, next] = [i, i + 1].map(|i| instant(from, to, steps, i));
+            let next = instant(from, to, steps, i + 1);
             if f.is_over() {
                 return Err(Error::Cancelled { time: t });
             }
             self.step(f, t, next - t, x)?;
+            t = next;
         }
         Ok(())
     }
