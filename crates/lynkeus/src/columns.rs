@@ -1,11 +1,65 @@
 //! The columns of a log that a study reads.
 
+use std::borrow::Cow;
+
 use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
+use lynkeus_structure::Extended;
 
 use crate::course::Samples;
+use crate::headers::{refuse_seconds, time_of};
+use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
+use crate::table::Ordered;
 use crate::{Error, Series, Table};
+
+/// A log in the order of time, and what the observers of a study read of it.
+#[derive(Debug)]
+pub(crate) struct Log<'t> {
+    pub table: Cow<'t, Table>,
+    /// the header of time
+    pub time: String,
+    pub samples: Samples,
+    /// what it lacks and what was done for its order
+    pub notes: Vec<String>,
+}
+
+impl<'t> Log<'t> {
+    /// A table as a study takes it: rows put in order unless the study is strict.
+    ///
+    /// # Errors
+    /// Columns that the study names or its observers read and the log does not have, or not as
+    /// numbers; times that are no order.
+    pub fn read(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        let (study, plant) = (prepared.study(), prepared.plant());
+        let settings = &study.estimate;
+        let extended = prepared.extended();
+        refuse_stray_columns(plant, settings)?;
+        let time = time_of(table, plant, settings, read(extended))?;
+        refuse_seconds(study, table, &time)?;
+        let ordered = match settings.strict {
+            true => None,
+            false => table.in_order(&time, settings.late)?,
+        };
+        let (table, mut notes) = match ordered {
+            None => (Cow::Borrowed(table), vec![]),
+            Some(Ordered { table, notes }) => (Cow::Owned(table), notes),
+        };
+        let samples = samples(&table, &time, settings, extended)?;
+        notes.extend(gaps(&table, settings, &time, extended));
+        Ok(Self {
+            table,
+            time,
+            samples,
+            notes,
+        })
+    }
+}
+
+/// Names of the measured outputs, then of the known inputs.
+fn read<'e>(extended: &'e Extended<'_>) -> impl Iterator<Item = &'e str> {
+    let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
+    outputs.chain(extended.inputs.iter().map(|input| input.name.as_str()))
+}
 
 /// The header under which the log has a signal of the plant.
 pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
@@ -16,10 +70,7 @@ pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a s
     given.map_or(name, |(_, header)| header)
 }
 
-pub(crate) fn refuse_stray_columns(
-    plant: &Plant,
-    settings: &EstimateSettings,
-) -> Result<(), Error> {
+fn refuse_stray_columns(plant: &Plant, settings: &EstimateSettings) -> Result<(), Error> {
     let names = || {
         plant
             .outputs
@@ -43,36 +94,24 @@ pub(crate) fn refuse_stray_columns(
     }
 }
 
-/// What the observer reads under a plant's name: an input's last value stands where its cell is
-/// missing, unless the study is strict.
-pub(crate) fn signal(
-    table: &Table,
-    settings: &EstimateSettings,
-    observer: &Observer,
-    name: &str,
-) -> Result<Series, Error> {
-    let header = header(settings, name);
-    let is_input = observer.inputs.iter().any(|input| input.name == name);
-    match is_input && !settings.strict {
-        true => table.held(header),
-        false => table.column(header).cloned(),
-    }
-}
-
-/// The columns of a log that an observer reads.
-pub(crate) fn samples(
+/// The columns of a log that an observer reads: an input's last value stands where its cell is
+/// missing; a study that is strict has no cell missing.
+fn samples(
     table: &Table,
     time_header: &str,
     settings: &EstimateSettings,
-    observer: &Observer,
+    extended: &Extended<'_>,
 ) -> Result<Samples, Error> {
     let reading = |name: &str| match settings.strict {
         true => table.column(header(settings, name)).cloned(),
         false => table.readings(header(settings, name)).cloned(),
     };
-    let readings = observer.measured.iter().map(|s| reading(&s.name));
-    let inputs = observer.inputs.iter();
-    let inputs = inputs.map(|s| signal(table, settings, observer, &s.name));
+    let input = |name: &str| match settings.strict {
+        true => table.column(header(settings, name)).cloned(),
+        false => table.held(header(settings, name)),
+    };
+    let readings = extended.outputs.iter().map(|o| reading(&o.variable.name));
+    let inputs = extended.inputs.iter().map(|u| input(&u.name));
     Ok(Samples {
         time: table.time(time_header)?.clone(),
         readings: readings.collect::<Result<_, _>>()?,
@@ -81,19 +120,19 @@ pub(crate) fn samples(
 }
 
 /// What the log lacks in words, and where its times count from.
-pub(crate) fn gaps(
+fn gaps(
     table: &Table,
     settings: &EstimateSettings,
     time: &str,
-    design: &Design,
+    extended: &Extended<'_>,
 ) -> Vec<String> {
     let origin = table.origin(time);
     let mut notes: Vec<String> = origin
         .map(|origin| format!("times are seconds since {origin}"))
         .into_iter()
         .collect();
-    let observer = &design.observer;
-    for signal in observer.inputs.iter().chain(&observer.measured) {
+    let outputs = extended.outputs.iter().map(|o| &o.variable);
+    for signal in extended.inputs.iter().chain(outputs) {
         let header = header(settings, &signal.name);
         let places: Vec<String> = table
             .faults(header)

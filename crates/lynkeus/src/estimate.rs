@@ -6,10 +6,9 @@ use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::{Estimator, EstimatorSettings};
 
 use crate::checkpoint::Checkpoint;
-use crate::columns::{self, refuse_stray_columns};
+use crate::columns::{self, Log};
 use crate::course::{Course, Samples};
 use crate::frozen::{Channel, Frozen, frozen};
-use crate::headers::{refuse_seconds, time_of};
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
@@ -66,37 +65,24 @@ pub(crate) fn estimated(
 }
 
 fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<Outcome, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
+    let study = prepared.study();
     let settings = &study.estimate;
     let mut design = prepared.design()?;
     refuse_derivatives(study, &design)?;
-    refuse_stray_columns(plant, settings)?;
-    let read = design
-        .observer
-        .measured
-        .iter()
-        .chain(&design.observer.inputs);
-    let names = read.map(|signal| signal.name.as_str());
-    let time_header = time_of(table, plant, settings, names)?;
-    refuse_seconds(study, table, &time_header)?;
-    let ordered = match settings.strict {
-        true => None,
-        false => table.in_order(&time_header, settings.late)?,
-    };
-    let order_notes = ordered.as_ref().map_or(&[][..], |o| &o.notes).to_vec();
-    let table = ordered.as_ref().map_or(table, |o| &o.table);
-    let samples = columns::samples(table, &time_header, settings, &design.observer)?;
-    start_at_readings(prepared, &samples, &mut design);
+    let log = Log::read(prepared, table)?;
+    let samples = &log.samples;
+    start_at_readings(prepared, samples, &mut design);
     let watch = &mut Watch {
         watch: &mut within(&study.budget, watch.watch),
         checkpoint: watch.checkpoint,
     };
-    let mut course = course_of(prepared, &design, &samples, watch)?;
+    let run = run_settings(settings);
+    let mut course = course_of(prepared, &design, samples, run, watch)?;
     let rows = course.estimates.first().map_or(0, Series::len);
-    settle(&mut course, rows, study, table.file())?;
-    let intervals = interval::intervals(prepared, &design, &samples, &course);
+    settle(&mut course, rows, study, log.table.file())?;
+    let intervals = interval::intervals(prepared, &design, samples, &course);
     let logged = |name: &str| {
-        let values = columns::logged(table, settings, &time_header, name)?;
+        let values = columns::logged(&log.table, settings, &log.time, name)?;
         Some(values.shortened(rows))
     };
     let estimated = design.observer.estimates.iter().enumerate();
@@ -121,11 +107,10 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
         ..Quantity::default()
     });
     let mut notes = design.notes.clone();
-    notes.extend(order_notes);
-    notes.extend(columns::gaps(table, settings, &time_header, &design));
+    notes.extend_from_slice(&log.notes);
     let raw = Raw {
         intervals,
-        frozen: hanging(study, &design.observer, &samples),
+        frozen: hanging(study, &design.observer, samples),
         time: samples.time.shortened(rows),
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
@@ -156,7 +141,7 @@ fn hanging(study: &Study, observer: &Observer, samples: &Samples) -> Vec<Frozen>
 
 /// A measured state for which neither the study nor the model says where it starts begins at its
 /// sensor's first reading.
-fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
+pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
     let extended = prepared.extended();
     let initial = &prepared.study().observer.tuning.initial;
     let number = |node| extended.graph().constant_value(node);
@@ -199,18 +184,20 @@ pub(crate) fn course(
     samples: &Samples,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Course, Error> {
-    course_of(prepared, design, samples, &mut Watch::only(watch))
+    let run = run_settings(&prepared.study().estimate);
+    course_of(prepared, design, samples, run, &mut Watch::only(watch))
 }
 
-fn course_of(
+/// The same with other limits of the method.
+pub(crate) fn course_of(
     prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples,
+    run: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
-    let run = run_settings(settings);
     if design.observer.filter.is_some() {
         return filter::run(study, prepared.extended(), design, samples, run, watch);
     }

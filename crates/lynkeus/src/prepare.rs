@@ -116,6 +116,20 @@ impl<'a> Prepared<'a> {
         &self.extended
     }
 
+    /// The same plant with another study, which differs in nothing that was prepared.
+    #[cfg(feature = "tune")]
+    pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Prepared<'b>
+    where
+        'a: 'b,
+    {
+        Prepared {
+            study,
+            extended: self.extended.clone(),
+            examinations: OnceCell::new(),
+            choice: OnceCell::new(),
+        }
+    }
+
     /// What every family that the study allows finds in the plant.
     ///
     /// # Errors

@@ -7,21 +7,19 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Monitor, Observer, Signal};
 
 use super::speed::transparent;
+use crate::course::{Course, Samples};
 use crate::study::TuneSettings;
-use crate::systems::Reported;
-use crate::{Error, Study};
+use crate::{Error, Series, Study};
 
 /// The signal that is above zero where the measurements are held out; no name in a model's text
 /// has a blank, unless it is in quotes.
 pub(super) const HELD_OUT: &str = "held out";
 
-/// The course of a predicted measurement, by its place among the observer's measured outputs.
-pub(super) fn predicted<'r>(
-    observer: &Observer,
-    reported: Reported<'r>,
-    place: usize,
-) -> Option<&'r [f64]> {
-    reported.monitor(observer.states.len() + place)
+/// Of a course of a [`switchable`] observer: what it predicts of its measured outputs, in their
+/// order.
+pub(super) fn predicted<'c>(observer: &Observer, course: &'c Course) -> &'c [Series] {
+    let states = observer.states.len();
+    course.monitors.get(states..).unwrap_or_default()
 }
 
 /// The observer with a switch: where [`HELD_OUT`] is above zero, it reads its own prediction
@@ -79,6 +77,9 @@ fn predictions(plant: &Plant, observer: &Observer) -> Vec<Node> {
     graph.substitute(&outputs, &map)
 }
 
+/// What to do where a plan does not fit a log.
+pub(super) const FEWER: &str = "set fewer `blocks` or a smaller `held_out` in [tune]";
+
 /// Which rows of a log are held out, and which are scored.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Plan {
@@ -89,65 +90,118 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// Equal blocks of rows, each with its last share held out.
+    /// Blocks with equally many rows in which a sensor reports, the last share of these held out;
+    /// the rows between two of them belong to the first.
     ///
     /// # Errors
     /// A log too short for the blocks.
-    pub fn new(study: &Study, rows: usize) -> Result<Self, Error> {
+    pub fn new(study: &Study, samples: &Samples) -> Result<Self, Error> {
         let TuneSettings {
             held_out, blocks, ..
         } = study.tune;
+        let reporting = reporting(samples);
+        let rows = reporting.len();
         let edge = |block: usize| block * rows / blocks;
         let out = |length: usize| ((held_out * length as f64).round() as usize).max(1);
         let shortest = rows / blocks;
         if shortest < 2 || out(shortest) >= shortest {
             return Err(Error::input(format!(
-                "a log of {rows} rows is too short for {blocks} blocks of which {held_out} is held out: expected 2 rows or more in each"
+                "a log with readings in {rows} rows is too short for {blocks} blocks of which {held_out} is held out: expected 2 rows or more in each"
             ))
             .at(&study.file)
-            .hint("set fewer `blocks` or a smaller `held_out` in [tune]"));
+            .hint(FEWER));
         }
-        let mut plan = vec![0.0; rows];
+        let row = |place: usize| reporting.get(place).copied().unwrap_or(samples.time.len());
+        let mut plan = vec![0.0; samples.time.len()];
         for block in 0..blocks {
             let (from, to) = (edge(block), edge(block + 1));
-            let tail = plan.get_mut(to - out(to - from)..to);
+            let tail = plan.get_mut(row(to - out(to - from))..row(to));
             tail.into_iter().flatten().for_each(|row| *row = 1.0);
         }
         Ok(Self {
             held_out: plan,
-            first: edge(1),
+            first: row(edge(1)),
         })
     }
 
-    /// The rows that are scored.
-    pub fn scored(&self) -> impl Iterator<Item = usize> + '_ {
-        let rows = self.held_out.iter().enumerate().skip(self.first);
-        rows.filter(|(_, out)| **out > 0.0).map(|(row, _)| row)
+    /// Whether a row is scored, by row.
+    pub fn scored(&self) -> impl Iterator<Item = bool> + '_ {
+        let rows = self.held_out.iter().enumerate();
+        rows.map(|(row, out)| row >= self.first && *out > 0.0)
     }
+
+    /// By row, the number of its stretch: rows that are all held out, or all not.
+    pub fn stretches(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        let (mut before, mut stretch) = (0.0, 0);
+        self.held_out.iter().map(move |&out| {
+            stretch += usize::from(std::mem::replace(&mut before, out) != out);
+            stretch
+        })
+    }
+}
+
+/// The rows in which a sensor reports.
+fn reporting(samples: &Samples) -> Vec<usize> {
+    let mut readings: Vec<_> = samples.readings.iter().map(Series::iter).collect();
+    let mut reports = |_: &usize| {
+        let row = readings.iter_mut().filter_map(Iterator::next);
+        // every sensor goes on to the next row
+        row.fold(false, |any, y| any | y.is_finite())
+    };
+    (0..samples.time.len()).filter(|row| reports(row)).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn plan(text: &str, rows: usize) -> Result<Plan, Error> {
-        Plan::new(&Study::parse(text, "s.toml").unwrap(), rows)
+    /// Of two sensors, the first of which reports in every so many rows, the second never.
+    fn plan(text: &str, rows: usize, every: usize) -> Result<Plan, Error> {
+        let reading = |row: usize| match row.is_multiple_of(every) {
+            true => 1.0,
+            false => f64::NAN,
+        };
+        let samples = Samples {
+            time: (0..rows).map(|row| row as f64).collect::<Vec<_>>().into(),
+            readings: vec![
+                (0..rows).map(reading).collect::<Vec<_>>().into(),
+                vec![f64::NAN; rows].into(),
+            ],
+            inputs: vec![],
+        };
+        Plan::new(&Study::parse(text, "s.toml").unwrap(), &samples)
+    }
+
+    fn rows(plan: &Plan) -> Vec<usize> {
+        let rows = plan.scored().enumerate();
+        rows.filter(|(_, is)| *is).map(|(row, _)| row).collect()
     }
 
     #[test]
     fn the_end_of_every_block_is_held_out_and_the_first_block_not_scored() {
-        let plan = plan("tune = { blocks = 3, held_out = 0.4 }", 15).unwrap();
-        assert_eq!(plan.scored().collect::<Vec<_>>(), [8, 9, 13, 14]);
+        let plan = plan("tune = { blocks = 3, held_out = 0.4 }", 15, 1).unwrap();
+        assert_eq!(rows(&plan), [8, 9, 13, 14]);
         assert_eq!(plan.held_out.iter().sum::<f64>(), 6.0);
+        let stretches: Vec<usize> = plan.stretches().collect();
+        assert_eq!(stretches, [0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 4, 5, 5]);
+    }
+
+    #[test]
+    fn blocks_have_equally_many_rows_with_readings() {
+        // readings in rows 0, 3, …, 27; of each five the last two are held out
+        let plan = plan("tune = { blocks = 2, held_out = 0.4 }", 30, 3).unwrap();
+        assert_eq!(plan.first, 15);
+        assert_eq!(rows(&plan), [24, 25, 26, 27, 28, 29]);
+        assert!(plan.held_out[9..15].iter().all(|out| *out == 1.0));
     }
 
     #[test]
     fn a_short_log_is_refused() {
-        let error = plan("", 30).unwrap_err().to_string();
+        let error = plan("", 90, 3).unwrap_err().to_string();
         assert!(
-            error.contains("a log of 30 rows is too short for 20 blocks"),
+            error.contains("a log with readings in 30 rows is too short for 20 blocks"),
             "{error}"
         );
-        assert!(plan("", 40).is_ok());
+        assert!(plan("", 40, 1).is_ok());
     }
 }

@@ -11,6 +11,7 @@ mod measures;
 #[cfg(feature = "plot")]
 mod picture;
 mod pinned;
+mod record;
 mod reference;
 mod replay;
 mod report;
@@ -21,6 +22,8 @@ mod whiteness;
 
 use std::ops::ControlFlow;
 
+use lynkeus_observers::Design;
+
 pub use axis::Axis;
 pub use measures::Measure;
 pub use rewrite::Change;
@@ -30,6 +33,7 @@ use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
 use pinned::{Pinned, pinned};
+use record::Record;
 use reference::Reference;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.
@@ -174,13 +178,13 @@ pub fn tune(
 /// What a value is judged on.
 enum Bench<'a> {
     Simulation(Box<Reference>),
-    Log(&'a Table),
+    Log(Box<Record<'a>>),
 }
 
 impl<'a> Bench<'a> {
     fn new(prepared: &Prepared<'_>, log: Option<&'a Table>) -> Result<Self, Error> {
         Ok(match log {
-            Some(table) => Self::Log(table),
+            Some(table) => Self::Log(Box::new(Record::new(prepared, table)?)),
             None => Self::Simulation(Box::new(Reference::new(prepared)?)),
         })
     }
@@ -197,18 +201,19 @@ impl<'a> Bench<'a> {
             Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
             Err(error) => return Err(error),
         };
+        refuse_filter(prepared.study(), &design)?;
         match self {
             Self::Simulation(reference) => {
                 trial::simulated(prepared, &design, reference, row, watch)
             }
-            Self::Log(table) => replay::logged(prepared, &design, table, row, watch),
+            Self::Log(record) => replay::logged(prepared, design, record, row, watch),
         }
     }
 
     fn notes(&self) -> &[String] {
         match self {
             Self::Simulation(reference) => &reference.notes,
-            Self::Log(_) => &[],
+            Self::Log(record) => &record.notes,
         }
     }
 
@@ -217,6 +222,19 @@ impl<'a> Bench<'a> {
             Self::Simulation(_) => measures::SIMULATED,
             Self::Log(_) => measures::LOGGED,
         }
+    }
+}
+
+/// A filter's equations without its updates are the plant alone.
+fn refuse_filter(study: &Study, design: &Design) -> Result<(), Error> {
+    match design.observer.filter {
+        None => Ok(()),
+        Some(_) => Err(Error::input(format!(
+            "`tune` judges observers whose correction is in their equations: expected another family than the filter \"{}\"",
+            design.observer.family
+        ))
+        .at(&study.file)
+        .hint("name another `family` in [observer]; `lynkeus compare` judges filters as they are")),
     }
 }
 

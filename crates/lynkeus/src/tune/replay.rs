@@ -1,25 +1,22 @@
 //! One value on a log: how well held-out samples are predicted, and how white the innovation is.
 
-use std::ops::ControlFlow;
+use lynkeus_observers::Design;
+use lynkeus_run::EstimatorSettings;
 
-use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Observer};
-use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, System, Trajectory, estimate_watched};
-
-use super::errors::{Errors, rms};
-use super::holdout::{HELD_OUT, Plan, predicted, switchable};
+use super::errors::{rms, run_away};
+use super::holdout::{predicted, switchable};
+use super::record::{Record, Replayed};
 use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
-use crate::columns::{refuse_stray_columns, signal};
+use crate::course::Course;
 use crate::crew::{Watch, part};
-use crate::estimate::{refuse_derivatives, run_settings};
-use crate::headers::{refuse_seconds, time_of};
+use crate::estimate::{course_of, refuse_derivatives, run_settings, start_at_readings};
 use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
-use crate::systems::{self, Reported};
-use crate::{Error, Study, Table};
+use crate::series::steps;
+use crate::{Error, Series, replay, systems};
 
 /// Judges the tuning of a study on a log; an estimate that diverges is a row without figures.
 ///
@@ -27,12 +24,19 @@ use crate::{Error, Study, Table};
 /// A study or a log that cannot be used.
 pub(super) fn logged(
     prepared: &Prepared<'_>,
-    design: &Design,
-    table: &Table,
+    mut design: Design,
+    record: &Record<'_>,
     mut row: Row,
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
-    let replay = Replay::new(prepared.study(), prepared.plant(), design, table)?;
+    refuse_derivatives(prepared.study(), &design)?;
+    start_at_readings(prepared, &record.log.samples, &mut design);
+    design.observer = switchable(prepared.plant(), &design.observer);
+    let replay = Replay {
+        prepared,
+        design,
+        record,
+    };
     match replay.judge(&mut row, watch)? {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
@@ -41,83 +45,28 @@ pub(super) fn logged(
 
 /// One value on a log.
 struct Replay<'a> {
-    switchable: Observer,
-    /// the same, compiled
-    observer: System,
-    time: Vec<f64>,
-    names: Vec<String>,
-    columns: Vec<Vec<f64>>,
-    /// values of the measured outputs
-    measured: Vec<Vec<f64>>,
-    plan: Plan,
-    settings: EstimatorSettings,
-    file: &'a str,
-    /// the file of the study
-    study: &'a str,
+    prepared: &'a Prepared<'a>,
+    /// its observer is switchable
+    design: Design,
+    record: &'a Record<'a>,
 }
 
 /// A replay, or why its estimate is none.
-type Ran = Result<Trajectory, String>;
+type Ran = Result<Course, String>;
 
-impl<'a> Replay<'a> {
-    fn new(
-        study: &'a Study,
-        plant: &Plant,
-        design: &Design,
-        table: &'a Table,
-    ) -> Result<Self, Error> {
-        let settings = &study.estimate;
-        let run = run_settings(settings);
-        refuse_derivatives(study, design)?;
-        refuse_stray_columns(plant, settings)?;
-        let column = |name: &str| signal(table, settings, &design.observer, name)?.held();
-        let names = |signals: &[lynkeus_observers::Signal]| -> Vec<String> {
-            signals.iter().map(|s| s.name.clone()).collect()
-        };
-        let measured = names(&design.observer.measured);
-        let mut read = names(&design.observer.inputs);
-        read.extend(measured.iter().cloned());
-        let header_of_time = time_of(table, plant, settings, read.iter().map(String::as_str))?;
-        refuse_seconds(study, table, &header_of_time)?;
-        let time = table.time(&header_of_time)?.held()?;
-        let columns: Result<Vec<_>, Error> = read.iter().map(|n| column(n)).collect();
-        let measured: Result<Vec<_>, Error> = measured.iter().map(|n| column(n)).collect();
-        let switchable = switchable(plant, &design.observer);
-        Ok(Self {
-            observer: systems::observer(plant, &switchable)?,
-            switchable,
-            plan: Plan::new(study, time.len())?,
-            names: read,
-            columns: columns?,
-            measured: measured?,
-            settings: EstimatorSettings {
-                method: thrifty(run.method, time.len() as f64),
-                ..run
-            },
-            time,
-            file: table.file(),
-            study: &study.file,
-        })
-    }
-
+impl Replay<'_> {
     /// Fills the row in; the reason where a replay failed.
     fn judge(&self, row: &mut Row, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
-        let causal = EstimatorSettings {
-            between: BetweenSamples::Hold,
-            ..self.settings
-        };
-        let nothing = vec![0.0; self.time.len()];
-        match self.run(nothing, causal, &mut part(watch, 0, 2))? {
+        match self.run(&self.record.whole, &mut part(watch, 0, 2))? {
             Ok(run) => {
                 if let Some(reason) = self.judge_innovation(row, &run) {
                     return Ok(Some(reason));
                 }
-                row.set(measures::LOG_MARGIN, self.margin(&run));
+                row.set(measures::LOG_MARGIN, self.margin(&run)?);
             }
             Err(reason) => return Ok(Some(reason)),
         }
-        let held_out = self.plan.held_out.clone();
-        match self.run(held_out, self.settings, &mut part(watch, 1, 2))? {
+        match self.run(&self.record.parts, &mut part(watch, 1, 2))? {
             Ok(run) => {
                 row.set(measures::HELD_OUT_ERROR, self.held_out_error(&run));
                 Ok(None)
@@ -126,66 +75,64 @@ impl<'a> Replay<'a> {
         }
     }
 
-    fn run(
-        &self,
-        held_out: Vec<f64>,
-        settings: EstimatorSettings,
-        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> Result<Ran, Error> {
-        let mut names = self.names.clone();
-        names.push(HELD_OUT.to_owned());
-        let mut columns = self.columns.clone();
-        columns.push(held_out);
-        let log = Log::new(names, self.time.to_vec(), columns)
-            .map_err(|error| Error::from_source(error).at(self.file))?;
-        match estimate_watched(&self.observer, &log, settings, watch) {
-            Ok(estimates) => Ok(Ok(estimates.trajectory)),
-            Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
-            Err(error) => Err(interrupted_on(error.error, self.file, self.study)),
+    /// What `estimate` does, as far as a figure depends on it.
+    fn run(&self, replayed: &Replayed, watch: &mut Watch<'_>) -> Result<Ran, Error> {
+        let mut study = self.prepared.study().clone();
+        study.estimate.between_samples = replayed.between;
+        study.estimate.deviations = false;
+        study.estimate.smoothing = None;
+        let prepared = self.prepared.with_study(&study);
+        let run = run_settings(&study.estimate);
+        let rows = replayed.samples.time.len();
+        let run = EstimatorSettings {
+            method: thrifty(run.method, rows as f64),
+            ..run
+        };
+        let watch = &mut replay::Watch::only(watch);
+        let mut course = course_of(&prepared, &self.design, &replayed.samples, run, watch)?;
+        course.check()?;
+        match course.ended.take() {
+            None => Ok(Ok(course)),
+            Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
+            Some(error) => {
+                let log = self.record.log.table.file();
+                Err(interrupted_on(error, log, &study.file))
+            }
         }
-    }
-
-    /// What the observer predicts of a measured output.
-    fn predicted<'r>(&self, run: &'r Trajectory, place: usize) -> Option<&'r [f64]> {
-        let reported = Reported::new(&self.switchable, run);
-        predicted(&self.switchable, reported, place)
     }
 
     /// The root mean square over outputs of each one's error on the scored rows, over the span
-    /// of its values on the whole log.
-    fn held_out_error(&self, run: &Trajectory) -> Option<f64> {
-        let error = |(place, values): (usize, &Vec<f64>)| {
-            let prediction = self.predicted(run, place)?;
-            let rows = self.plan.scored();
-            let errors: Option<Vec<f64>> = rows
-                .map(|row| Some(values.get(row)? - prediction.get(row)?))
-                .collect();
-            Some(rms(&errors?) / span(values))
+    /// of its values on the whole log; outputs that do not report there are left out.
+    fn held_out_error(&self, run: &Course) -> Option<f64> {
+        let error = |(values, prediction): (&Series, &Series)| {
+            let rows = values.iter().zip(prediction).zip(self.record.plan.scored());
+            let scored = rows.filter(|((y, _), is_scored)| *is_scored && y.is_finite());
+            let errors: Vec<f64> = scored.map(|((y, hat), _)| y - hat).collect();
+            (!errors.is_empty()).then(|| rms(&errors) / span(values))
         };
-        let errors: Option<Vec<f64>> = self.measured.iter().enumerate().map(error).collect();
-        Some(rms(&errors?))
+        let predicted = predicted(&self.design.observer, run);
+        let pairs = self.record.readings().iter().zip(predicted);
+        let errors: Vec<f64> = pairs.filter_map(error).collect();
+        (!errors.is_empty()).then(|| rms(&errors))
     }
 
-    /// The innovation of a replay that looks at no later sample, past the first block; the
-    /// reason where it shows that the estimate runs away.
-    fn judge_innovation(&self, row: &mut Row, run: &Trajectory) -> Option<String> {
-        let innovation = |(place, values): (usize, &Vec<f64>)| -> Option<Vec<f64>> {
-            let prediction = self.predicted(run, place)?;
-            let pairs = values.iter().zip(prediction).skip(self.plan.first);
+    /// The innovation of a replay that looks at no later sample, past the first block, in the
+    /// rows with readings; the reason where it shows that the estimate runs away.
+    fn judge_innovation(&self, row: &mut Row, run: &Course) -> Option<String> {
+        let innovation = |(values, prediction): (&Series, &Series)| -> Vec<f64> {
+            let pairs = values.iter().zip(prediction).skip(self.record.plan.first);
             // over all rows: not within the loop over them
             let span = span(values);
-            Some(pairs.map(|(y, hat)| (y - hat) / span).collect())
+            let readings = pairs.filter(|(y, _)| y.is_finite());
+            readings.map(|(y, hat)| (y - hat) / span).collect()
         };
-        let measured = self.measured.iter().enumerate();
-        let innovations = Errors {
-            time: self.time.iter().copied().skip(self.plan.first).collect(),
-            scaled: measured.filter_map(innovation).collect(),
-        };
-        let reason = innovations.run_away();
+        let predicted = predicted(&self.design.observer, run);
+        let pairs = self.record.readings().iter().zip(predicted);
+        let all: Vec<Vec<f64>> = pairs.map(innovation).filter(|i| !i.is_empty()).collect();
+        let reason = run_away(&all);
         if reason.is_some() {
             return reason;
         }
-        let all = innovations.scaled;
         let sizes: Vec<f64> = all.iter().map(|series| rms(series)).collect();
         row.set(measures::INNOVATION, Some(rms(&sizes)));
         let white: Vec<Whiteness> = all.iter().filter_map(|series| whiteness(series)).collect();
@@ -198,38 +145,96 @@ impl<'a> Replay<'a> {
         None
     }
 
-    /// The longest stable step over the longest step of the log.
-    fn margin(&self, run: &Trajectory) -> Option<f64> {
-        let names = self.observer.signals().to_vec();
-        let place = |name: &String| self.names.iter().position(|n| n == name);
-        let places: Vec<Option<usize>> = names.iter().map(place).collect();
-        let reported = Reported::new(&self.switchable, run);
-        let step = longest_step(
-            &self.observer,
-            run.times(),
-            reported,
-            &mut |row, _, signals| {
-                for (signal, place) in signals.iter_mut().zip(&places) {
-                    let column = place.and_then(|place| self.columns.get(place));
-                    // the one signal that is no column is the switch, which is off
-                    *signal = column.and_then(|c| c.get(row).copied()).unwrap_or(0.0);
-                }
-                ControlFlow::Continue(())
-            },
-        )?;
-        let steps = self.time.windows(2).map(|pair| pair[1] - pair[0]);
-        let longest = steps.fold(0.0, f64::max);
-        (longest > 0.0).then(|| step / longest)
+    /// The longest stable step over the longest step of the log; a prediction stands in for a
+    /// reading that is missing.
+    fn margin(&self, run: &Course) -> Result<Option<f64>, Error> {
+        let observer = &self.design.observer;
+        let system = systems::observer(self.prepared.plant(), observer)?;
+        let samples = &self.record.whole.samples;
+        let predicted = predicted(observer, run);
+        let step = longest_step(&system, samples.time.len(), &mut |row, x, signals| {
+            for (x, column) in x.iter_mut().zip(&run.monitors) {
+                *x = column.get(row)?;
+            }
+            for (i, (signal, column)) in signals.iter_mut().zip(samples.columns()).enumerate() {
+                let value = column.get(row)?;
+                *signal = match value.is_finite() {
+                    true => value,
+                    false => predicted.get(i)?.get(row)?,
+                };
+            }
+            samples.time.get(row)
+        });
+        let longest = steps(samples.time.iter()).fold(0.0, f64::max);
+        Ok(step.filter(|_| longest > 0.0).map(|step| step / longest))
     }
 }
 
-/// From the least to the greatest, or the magnitude of a constant, or 1.
-fn span(values: &[f64]) -> f64 {
-    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+/// From the least to the greatest of the values that are there, or the magnitude of a constant,
+/// or 1.
+fn span(values: &Series) -> f64 {
+    let low = values.iter().fold(f64::INFINITY, f64::min);
+    let high = values.iter().fold(f64::NEG_INFINITY, f64::max);
     match high - low {
         span if span > 0.0 => span,
         _ if high.abs() > 0.0 => high.abs(),
         _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+    use std::path::Path;
+
+    use lynkeus_run::{BetweenSamples, Log, Role};
+
+    use super::*;
+    use crate::{Study, Table, prepare};
+
+    /// The runner's own replay of a log knows nothing of gaps, nor of files.
+    #[test]
+    fn a_log_without_gaps_is_replayed_to_the_bit() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-tanks");
+        let study = Study::load(folder.join("study.toml")).unwrap();
+        let table = Table::load(folder.join("log.csv")).unwrap();
+        let plant = prepare::plant(&study).unwrap();
+        let prepared = Prepared::new(&study, &plant).unwrap();
+        let record = Record::new(&prepared, &table).unwrap();
+        let mut design = prepared.design().unwrap();
+        design.observer = switchable(&plant, &design.observer);
+        let system = systems::observer(&plant, &design.observer).unwrap();
+        let replay = Replay {
+            prepared: &prepared,
+            design,
+            record: &record,
+        };
+        for (replayed, between) in [
+            (&record.whole, BetweenSamples::Hold),
+            (&record.parts, BetweenSamples::Linear),
+        ] {
+            let samples = &replayed.samples;
+            let columns = samples.columns().map(Series::to_vec).collect();
+            let log = Log::new(system.signals().to_vec(), samples.time.to_vec(), columns).unwrap();
+            let settings = EstimatorSettings {
+                between,
+                ..run_settings(&study.estimate)
+            };
+            let expected = lynkeus_run::estimate(&system, &log, settings).unwrap();
+            let watch = &mut |_| ControlFlow::Continue(());
+            let run = replay.run(replayed, watch).unwrap().unwrap();
+            for (i, column) in run.estimates.iter().chain(&run.monitors).enumerate() {
+                let expected = expected.trajectory.column(Role::Estimate.at(i)).unwrap();
+                assert_eq!(column.to_vec(), expected, "{between:?} {i}");
+            }
+        }
+        let out = record.parts.samples.inputs.last().unwrap().iter();
+        assert_eq!(out.sum::<f64>(), record.plan.held_out.iter().sum::<f64>());
+    }
+
+    #[test]
+    fn gaps_are_no_part_of_what_values_span() {
+        assert_eq!(span(&vec![f64::NAN, 2.0, -1.0, f64::NAN].into()), 3.0);
+        assert_eq!(span(&vec![f64::NAN, -2.0].into()), 2.0);
     }
 }

@@ -9,7 +9,7 @@ use lynkeus_run::{
     Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
 };
 
-use super::errors::{Errors, rms};
+use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use super::{Peak, Row, measures};
@@ -70,7 +70,7 @@ impl Trial<'_> {
             Err(reason) => return Ok(Some(reason)),
         };
         let exact = self.errors(&exact_run);
-        if let Some(reason) = exact.run_away() {
+        if let Some(reason) = run_away(&exact.scaled) {
             return Ok(Some(reason));
         }
         self.judge_exact(row, &exact, &exact_run);
@@ -250,20 +250,20 @@ impl Trial<'_> {
         let inputs_of_time = simulation.inputs.outputs();
         let input = |signal: usize| inputs_of_time.iter().position(|n| *n == names[signal]);
         let reported = Reported::new(&self.observer, run);
-        let step = longest_step(observer, run.times(), reported, &mut |row, t, signals| {
+        let step = longest_step(observer, run.len(), &mut |row, x, signals| {
+            let t = *run.times().get(row)?;
+            for (i, x) in x.iter_mut().enumerate() {
+                *x = *reported.monitor(i)?.get(row)?;
+            }
             inputs.enter(t);
             inputs.outputs(t, &[], &mut u);
             for (i, signal) in signals.iter_mut().enumerate() {
-                let value = match column(i) {
-                    Some(values) => values.get(row),
-                    None => input(i).and_then(|place| u.get(place)),
+                *signal = match column(i) {
+                    Some(values) => *values.get(row)?,
+                    None => *u.get(input(i)?)?,
                 };
-                match value {
-                    Some(value) => *signal = *value,
-                    None => return ControlFlow::Break(()),
-                }
             }
-            ControlFlow::Continue(())
+            Some(t)
         })?;
         Some(step / self.reference.sample_step)
     }

@@ -1,0 +1,109 @@
+//! A log as every value of a sweep is judged on it.
+
+use super::holdout::{FEWER, Plan};
+use crate::columns::Log;
+use crate::course::Samples;
+use crate::prepare::Prepared;
+use crate::study::BetweenSamples;
+use crate::{Error, Series, Table, lines};
+
+/// What is the same for all values.
+#[derive(Debug)]
+pub(super) struct Record<'t> {
+    pub log: Log<'t>,
+    pub plan: Plan,
+    /// every sample, the switch off
+    pub whole: Replayed,
+    /// with samples held out
+    pub parts: Replayed,
+    /// what the user should know
+    pub notes: Vec<String>,
+}
+
+/// Samples for a switchable observer: the switch is the last of the inputs.
+#[derive(Debug)]
+pub(super) struct Replayed {
+    pub samples: Samples,
+    pub between: BetweenSamples,
+}
+
+impl<'t> Record<'t> {
+    /// A table as `estimate` takes it.
+    ///
+    /// # Errors
+    /// As of [`Log::read`] and [`Plan::new`]; a sensor of which nothing is left.
+    pub fn new(prepared: &Prepared<'_>, table: &'t Table) -> Result<Self, Error> {
+        let log = Log::read(prepared, table)?;
+        let study = prepared.study();
+        let plan = Plan::new(study, &log.samples)?;
+        let between = study.estimate.between_samples;
+        let parts = match log.samples.have_gaps() {
+            // the switch alone decides, and no value stands in for another
+            false => log.samples.clone(),
+            true => held_out(&log.samples, &plan, between),
+        };
+        let mut notes = log.notes.clone();
+        for (i, output) in prepared.extended().outputs.iter().enumerate() {
+            let name = &output.variable.name;
+            let is_left = |readings: &Series| readings.iter().any(f64::is_finite);
+            if !parts.readings.get(i).is_some_and(is_left) {
+                return Err(Error::input(format!("every reading of {name} is held out"))
+                    .at(&study.file)
+                    .hint(FEWER));
+            }
+            let scored = log.samples.readings.get(i).into_iter().flatten();
+            let mut scored = scored.zip(plan.scored());
+            if !scored.any(|(y, is_scored)| is_scored && y.is_finite()) {
+                notes.push(format!(
+                    "no reading of {name} is held out after the first block: it is not among the held-out samples that are judged; fewer `blocks` of [tune] may change that"
+                ));
+            }
+        }
+        let causal = match between {
+            BetweenSamples::Linear => BetweenSamples::Hold,
+            causal => causal,
+        };
+        let off = vec![0.0; plan.held_out.len()];
+        Ok(Self {
+            whole: Replayed {
+                samples: switched(log.samples.clone(), off),
+                between: causal,
+            },
+            parts: Replayed {
+                samples: switched(parts, plan.held_out.clone()),
+                between,
+            },
+            log,
+            plan,
+            notes,
+        })
+    }
+
+    /// The readings of the measured outputs, by output.
+    pub fn readings(&self) -> &[Series] {
+        &self.log.samples.readings
+    }
+}
+
+fn switched(mut samples: Samples, switch: Vec<f64>) -> Samples {
+    samples.inputs.push(switch.into());
+    samples
+}
+
+/// Samples with gaps less those that are held out. Lines between samples end where samples are
+/// held out: across, they would tell what comes after.
+fn held_out(samples: &Samples, plan: &Plan, between: BetweenSamples) -> Samples {
+    let left = |readings: &Series| {
+        let rows = readings.iter().zip(&plan.held_out);
+        let left = rows.map(|(y, out)| if *out > 0.0 { f64::NAN } else { y });
+        let left = Series::gathered(readings.store(), left);
+        match between {
+            BetweenSamples::Linear => lines::within(&samples.time, &left, plan.stretches()),
+            BetweenSamples::Hold | BetweenSamples::Predict => left,
+        }
+    };
+    Samples {
+        readings: samples.readings.iter().map(left).collect(),
+        ..samples.clone()
+    }
+}
