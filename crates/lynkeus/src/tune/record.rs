@@ -107,3 +107,51 @@ fn held_out(samples: &Samples, plan: &Plan, between: BetweenSamples) -> Samples 
         ..samples.clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Study, prepare};
+    use std::path::Path;
+
+    /// A log of 60 rows, every third of them empty, whose readings that are held out say `lie`.
+    fn parts(between: BetweenSamples, lie: f64) -> Vec<f64> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-tanks");
+        let mut study = Study::load(folder.join("study.toml")).unwrap();
+        study.estimate.between_samples = between;
+        study.tune.blocks = 4;
+        let plant = prepare::plant(&study).unwrap();
+        let prepared = Prepared::new(&study, &plant).unwrap();
+        let log = |held_out: &dyn Fn(usize) -> bool| {
+            let level = |row: usize| match (row.is_multiple_of(3), held_out(row)) {
+                (true, _) => f64::NAN,
+                (_, true) => lie,
+                _ => 4.0 + (row as f64).sin(),
+            };
+            Table::from_columns(vec![
+                ("t".to_owned(), (0..60).map(f64::from).collect()),
+                ("level".to_owned(), (0..60).map(level).collect()),
+            ])
+            .unwrap()
+        };
+        let honest = log(&|_| false);
+        let plan = Record::new(&prepared, &honest).unwrap().plan;
+        let table = log(&|row| plan.held_out[row] > 0.0);
+        let record = Record::new(&prepared, &table).unwrap();
+        assert_eq!(record.plan, plan);
+        record.parts.samples.readings[0].to_vec()
+    }
+
+    /// Neither before, by a line towards it, nor after.
+    #[test]
+    fn what_is_held_out_is_read_nowhere() {
+        use BetweenSamples::{Hold, Linear, Predict};
+        for between in [Hold, Predict, Linear] {
+            let [a, b] = [-7.0, 9.0].map(|lie| parts(between, lie));
+            let same = a.iter().zip(&b).all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(same, "{between:?}: {a:?} {b:?}");
+            let is_whole = a.iter().all(|y| y.is_finite());
+            assert_eq!(is_whole, between == Linear);
+        }
+    }
+}
