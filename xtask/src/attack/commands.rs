@@ -43,6 +43,12 @@ impl Command {
         }
     }
 
+    /// Whether a limit of time may end it.
+    pub fn has_limit(&self) -> bool {
+        let given = |word: &String| ["--time-limit", "design", "certify"].contains(&word.as_str());
+        self.arguments.iter().any(given)
+    }
+
     fn flag(&mut self, numbers: &mut Numbers, chance: f64, words: &[&str]) -> bool {
         let chosen = numbers.chance(chance);
         if chosen {
@@ -177,7 +183,10 @@ fn run(numbers: &mut Numbers, base: &Base, words: &[&str]) -> Command {
         let seed = *numbers.of(&["0", "7", "18446744073709551615"]);
         command.flag(numbers, 0.2, &["--seed", seed]);
         let runs = *numbers.of(&["0", "1", "3", "70"]);
-        command.flag(numbers, 0.2, &["--runs", runs]);
+        // without a file for the table it is a summary that is printed
+        if command.flag(numbers, 0.2, &["--runs", runs]) && command.printed == Form::Csv {
+            command.printed = Form::Text;
+        }
     }
     let backend = *numbers.of(&["interpreter", "native"]);
     command.flag(numbers, 0.4, &["--backend", backend]);

@@ -51,7 +51,7 @@ pub fn judge(
     before: &Snapshot,
     after: &Snapshot,
 ) -> Option<Finding> {
-    let code = match exit(ended) {
+    let code = match exit(command, ended) {
         Ok(code) => code,
         Err(finding) => return Some(finding),
     };
@@ -60,7 +60,7 @@ pub fn judge(
         .or_else(|| contents(command, ended, before, after, code))
 }
 
-fn exit(ended: &Ended) -> Result<i32, Finding> {
+fn exit(command: &Command, ended: &Ended) -> Result<i32, Finding> {
     let err = String::from_utf8_lossy(&ended.err);
     let line = |word: &str| err.lines().find(|line| line.contains(word));
     let Some(status) = ended.status else {
@@ -71,6 +71,7 @@ fn exit(ended: &Ended) -> Result<i32, Finding> {
     }
     match status.code() {
         Some(code @ 0..=2) => Ok(code),
+        Some(code @ 3) if command.has_limit() => Ok(code),
         Some(code) => Err(Finding::new(Class::ExitCode, format!("exit code {code}"))),
         None => Err(match line("memory allocation") {
             Some(_) => Finding::new(Class::Memory, "memory allocation failed"),
