@@ -67,6 +67,13 @@ impl Error {
         }
     }
 
+    /// The same as an answer of no, where the rest of the work was done.
+    #[must_use]
+    pub fn as_refusal(mut self) -> Self {
+        self.kind = ErrorKind::Refused;
+        self
+    }
+
     /// Keeps the error that it comes from.
     #[must_use]
     pub fn caused_by(mut self, source: impl std::error::Error + Send + Sync + 'static) -> Self {

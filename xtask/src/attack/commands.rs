@@ -194,7 +194,8 @@ fn run(numbers: &mut Numbers, base: &Base, words: &[&str]) -> Command {
 }
 
 fn compare(numbers: &mut Numbers, base: &Base) -> Command {
-    let mut command = Command::new(&["compare", base.study()], base, Form::Text);
+    let words = ["compare", base.study(), "--time-limit", "20"];
+    let mut command = Command::new(&words, base, Form::Text);
     if let Some(log) = base.log()
         && command.flag(numbers, 0.5, &[log])
     {

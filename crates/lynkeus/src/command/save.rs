@@ -97,7 +97,7 @@ impl Results {
         match svg {
             Ok(svg) => self.put(path, svg),
             Err(error) => {
-                self.undrawn = Some(error);
+                self.undrawn = Some(error.as_refusal());
                 Ok(())
             }
         }

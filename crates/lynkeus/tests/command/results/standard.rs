@@ -136,6 +136,25 @@ fn a_picture_that_cannot_be_drawn_takes_no_table_with_it() {
     assert_eq!((ended.code, ended.out), (1, expected));
     let ended = folder.run(&[&estimate[..], &["--json"]].concat());
     assert_eq!((ended.code, ended.json()["rows"].as_u64()), (1, Some(1)));
+    // nor does a name that nothing has
+    folder.change("study.toml", "show = [", "show = [\"nobody\", ");
+    let whole = [
+        "estimate",
+        "study.toml",
+        "log.csv",
+        "-o",
+        "w.csv",
+        "--plot",
+        "p.svg",
+    ];
+    let ended = folder.run(&whole);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(
+        ended.err.contains("nothing is called \"nobody\""),
+        "{}",
+        ended.err
+    );
+    assert!(folder.read("w.csv").lines().count() > 2);
     assert!(!folder.path.path().join("p.svg").exists());
 }
 
