@@ -306,7 +306,7 @@ impl Dynamics for Loop {
             return false;
         }
         self.place(t, x);
-        self.joint.step(&self.arguments, h, next)
+        self.joint.step(&mut self.arguments, h, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {

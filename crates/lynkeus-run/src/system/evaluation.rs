@@ -194,7 +194,7 @@ impl Dynamics for Evaluation {
             return false;
         }
         self.place(t, x);
-        self.derivatives.step(&self.inputs, h, next)
+        self.derivatives.step(&mut self.inputs, h, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
