@@ -211,10 +211,26 @@ impl Plant {
                 offset,
             }
         })?;
-        let name = path.display().to_string();
-        Ok(match Language::of(&name) {
-            Language::Modelica => Self::from_modelica(source, &name, options)?,
-            Language::OdeModel => Self::from_ode_model(source, &name, options)?,
-        })
+        Ok(Self::from_text(
+            source,
+            &path.display().to_string(),
+            options,
+        )?)
+    }
+
+    /// Reads a text in the language that `file_name` tells: the notation of `@ODEmodel` where it
+    /// ends in `.jl`, else Modelica.
+    ///
+    /// # Errors
+    /// The first thing in the text that is wrong or not supported.
+    pub fn from_text(
+        source: &str,
+        file_name: &str,
+        options: &LoadOptions,
+    ) -> Result<Self, Diagnostic> {
+        match Language::of(file_name) {
+            Language::Modelica => Self::from_modelica(source, file_name, options),
+            Language::OdeModel => Self::from_ode_model(source, file_name, options),
+        }
     }
 }

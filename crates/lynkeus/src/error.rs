@@ -104,6 +104,16 @@ impl Error {
     pub fn place(&self) -> Option<&str> {
         self.place.as_deref()
     }
+
+    /// What is wrong, without place and hint.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// What to do about it, when something is known.
+    pub fn remedy(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
 }
 
 impl fmt::Display for Error {

@@ -1,5 +1,7 @@
 //! What a simulation or a replay gives.
 
+mod summary;
+
 use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Monitor, Signal};

@@ -41,7 +41,6 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
         let message = "the study names no plant: expected `plant = \"FILE.mo\"`";
         return Err(Error::input(message).at(&study.file));
     };
-    crate::files::must_exist(path, "plant", &study.file)?;
     let options = LoadOptions {
         model: study.model.clone(),
         parameters: study.parameters.clone(),
@@ -49,7 +48,16 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
         tables: study.tables,
         budget: study.budget.clone(),
     };
-    let plant = Plant::load(path, &options);
+    let plant = match &study.plant_text {
+        Some(text) => {
+            let name = path.display().to_string();
+            Plant::from_text(text, &name, &options).map_err(LoadError::from)
+        }
+        None => {
+            crate::files::must_exist(path, "plant", &study.file)?;
+            Plant::load(path, &options)
+        }
+    };
     if let Some(spent) = study.budget.marked() {
         return Err(Error::ended(spent).at(path.display()));
     }

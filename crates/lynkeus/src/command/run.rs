@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Series, Study};
-use serde_json::{Value, json};
+use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
+use serde_json::Value;
 
 use super::files::is_standard;
 use super::inputs::{self, Source};
@@ -191,7 +191,7 @@ fn finish(
         None => {}
     }
     if output.json {
-        results.print(&output::json(&summary(outcome, &columns)));
+        results.print(&output::json(&outcome.to_json(simulated)));
     }
     results.keep()?;
     match outcome.refusal() {
@@ -201,51 +201,4 @@ fn finish(
             Ok(ExitCode::from(1))
         }
     }
-}
-
-fn summary(outcome: &Outcome, columns: &[(String, &Series)]) -> Value {
-    let object = |pairs: Vec<(String, Value)>| Value::Object(pairs.into_iter().collect());
-    let estimated = || outcome.quantities.iter().filter(|q| q.estimate.is_some());
-    let last = |q: &lynkeus::Quantity| json!(q.estimate.as_ref().and_then(Series::last));
-    let settled = |q: &lynkeus::Quantity| Some((q.name.clone(), json!(q.settled_error()?)));
-    let gains = outcome.design.gains.iter().map(|gain| {
-        let entries = gain
-            .entries
-            .iter()
-            .map(|(state, k)| (state.clone(), json!(k)));
-        (gain.output.clone(), object(entries.collect()))
-    });
-    let watches = outcome.watches.iter().map(|w| {
-        let entry = json!({ "alarm_at": w.alarm, "column": w.header });
-        (w.monitor.name.clone(), entry)
-    });
-    let headers = estimated().map(|q| (q.name.clone(), json!(q.estimate_header)));
-    let doubts = outcome.doubts.iter().map(|d| {
-        let entry = json!({ "rows": d.rows, "widths": d.widths });
-        (d.name.clone(), entry)
-    });
-    let outside = |outside: &Option<lynkeus::Outside>| json!(outside.as_ref().map(|o| o.to_json()));
-    json!({
-        "plant": outcome.plant,
-        "family": outcome.design.observer.family,
-        "chains": outcome.design.examination.chains,
-        "gains": object(gains.collect()),
-        "rows": outcome.time.len(),
-        "columns": columns.iter().map(|(name, _)| name).collect::<Vec<_>>(),
-        "estimates": object(headers.collect()),
-        "final": object(estimated().map(|q| (q.name.clone(), last(q))).collect()),
-        "rms_error_last_half": object(estimated().filter_map(settled).collect()),
-        "errors": object(outcome.accuracies.iter().map(|a| (a.quantity.clone(), a.to_json())).collect()),
-        "sampling": outcome.intervals.as_ref().map(lynkeus::Intervals::to_json),
-        "frozen": outcome.frozen.iter().map(lynkeus::Frozen::to_json).collect::<Vec<_>>(),
-        "monitors": object(watches.collect()),
-        "outside_box": {
-            "plant": outside(&outcome.plant_outside),
-            "estimate": outside(&outcome.estimate_outside),
-        },
-        "innovations": object(outcome.innovations.iter().map(|i| (i.output.clone(), i.to_json())).collect()),
-        "credible": outcome.is_credible(),
-        "doubts": object(doubts.collect()),
-        "notes": outcome.notes,
-    })
 }

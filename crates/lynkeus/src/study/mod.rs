@@ -61,6 +61,9 @@ pub struct Study {
     pub file: String,
     /// The Modelica file, resolved against the study's folder.
     pub plant: Option<PathBuf>,
+    /// The plant's text where it is at hand; `plant` then only names it, in messages, and tells
+    /// its language. `None`: the file is read.
+    pub plant_text: Option<Arc<str>>,
     /// The model to take where the Modelica file holds several.
     pub model: Option<String>,
     /// Parameter values that replace those of the plant.
@@ -167,6 +170,7 @@ impl Study {
             plant: top
                 .optional("plant", section::Entry::name)?
                 .map(|name| PathBuf::from(name.text)),
+            plant_text: None,
             model: top
                 .optional("model", section::Entry::name)?
                 .map(|name| name.text),
