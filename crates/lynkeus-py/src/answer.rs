@@ -1,0 +1,320 @@
+//! What commands answer: a text, a JSON object, columns and a picture.
+
+use std::sync::Mutex;
+
+use lynkeus::study::Name;
+use lynkeus::{
+    CertifyReport, Comparison, DesignReport, Error, Outcome, Study, monte_carlo::MonteCarlo,
+    precision, tune::Sweep, visible,
+};
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::prelude::*;
+use serde_json::Value;
+
+use crate::errors::exception;
+
+/// What an answer tells.
+pub trait Told: Send {
+    /// In words, as the command prints it.
+    fn text(&self) -> String;
+    /// As the command's `--json`.
+    fn json(&self) -> Value;
+    /// Headers of its columns.
+    fn headers(&self) -> Vec<String> {
+        vec![]
+    }
+    /// The column of that place.
+    fn column(&self, _place: usize) -> Option<Vec<f64>> {
+        None
+    }
+    /// Its picture, where it has one.
+    fn svg(&self) -> Result<Option<String>, Error> {
+        Ok(None)
+    }
+    /// What speaks against it although it is there.
+    fn refusal(&self) -> Option<Error> {
+        None
+    }
+    /// What the user should know.
+    fn notes(&self) -> Vec<String> {
+        vec![]
+    }
+    /// What a logger would have seen.
+    fn log(&self) -> Result<Vec<(String, Vec<f64>)>, Error> {
+        Ok(vec![])
+    }
+}
+
+/// An answer of a command.
+#[pyclass(frozen, module = "lynkeus._lynkeus")]
+pub struct Answer {
+    /// a graph in it may be used by one thread at a time
+    told: Mutex<Box<dyn Told>>,
+}
+
+impl Answer {
+    pub fn of(told: impl Told + 'static) -> Self {
+        Self {
+            told: Mutex::new(Box::new(told)),
+        }
+    }
+
+    fn ask<T: Send>(&self, py: Python<'_>, question: impl FnOnce(&dyn Told) -> T + Send) -> T {
+        py.detach(|| {
+            let told = self.told.lock().unwrap_or_else(|e| e.into_inner());
+            question(told.as_ref())
+        })
+    }
+}
+
+/// A column under its header.
+type Named<'py> = (String, Bound<'py, PyArray1<f64>>);
+
+#[pymethods]
+impl Answer {
+    fn text(&self, py: Python<'_>) -> String {
+        self.ask(py, |told| visible::lines(&told.text()).into_owned())
+    }
+
+    fn json(&self, py: Python<'_>) -> String {
+        self.ask(py, |told| told.json().to_string())
+    }
+
+    fn headers(&self, py: Python<'_>) -> Vec<String> {
+        self.ask(py, |told| told.headers())
+    }
+
+    fn column<'py>(&self, py: Python<'py>, place: usize) -> Option<Bound<'py, PyArray1<f64>>> {
+        let values = self.ask(py, |told| told.column(place))?;
+        Some(values.into_pyarray(py))
+    }
+
+    fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.ask(py, |told| told.svg()).map_err(|e| exception(&e))
+    }
+
+    /// The exception that speaks against it, to be raised or told.
+    fn refusal(&self, py: Python<'_>) -> Option<PyErr> {
+        self.ask(py, |told| told.refusal()).map(|e| exception(&e))
+    }
+
+    fn notes(&self, py: Python<'_>) -> Vec<String> {
+        self.ask(py, |told| told.notes())
+    }
+
+    fn log<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
+        let columns = self.ask(py, |told| told.log()).map_err(|e| exception(&e))?;
+        let columns = columns.into_iter();
+        Ok(columns
+            .map(|(name, x)| (name, x.into_pyarray(py)))
+            .collect())
+    }
+}
+
+/// A run with what of its study tables and pictures need.
+pub struct Ran {
+    pub outcome: Outcome,
+    pub study: Study,
+    /// its true states are known
+    pub is_simulated: bool,
+}
+
+impl Told for Ran {
+    fn text(&self) -> String {
+        let rows = self.outcome.time.len();
+        let Outcome { plant, design, .. } = &self.outcome;
+        let credible = match self.outcome.refusal() {
+            None => "credible".to_owned(),
+            Some(refusal) => format!("not credible: {refusal}"),
+        };
+        let family = design.observer.family;
+        format!("{plant}: {family} observer, {rows} rows; {credible}")
+    }
+
+    fn json(&self) -> Value {
+        self.outcome.to_json(self.is_simulated)
+    }
+
+    fn headers(&self) -> Vec<String> {
+        let columns = self.outcome.columns(self.is_simulated);
+        columns.into_iter().map(|(name, _)| name).collect()
+    }
+
+    fn column(&self, place: usize) -> Option<Vec<f64>> {
+        let columns = self.outcome.columns(self.is_simulated);
+        columns.get(place).map(|(_, values)| values.to_vec())
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        let (unit, show) = drawn(&self.study);
+        lynkeus::figure(&self.outcome, unit, show)?
+            .to_svg()
+            .map(Some)
+    }
+
+    fn refusal(&self) -> Option<Error> {
+        self.outcome.refusal()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.outcome.notes.clone()
+    }
+
+    fn log(&self) -> Result<Vec<(String, Vec<f64>)>, Error> {
+        let columns = self.outcome.log(&self.study.estimate);
+        let columns = columns.map_err(|e| e.at(&self.study.file))?;
+        let columns = columns.into_iter();
+        Ok(columns.map(|(name, x)| (name, x.to_vec())).collect())
+    }
+}
+
+/// What a study says of pictures.
+fn drawn(study: &Study) -> (Option<&str>, Option<&[Name]>) {
+    (study.time_unit.as_deref(), study.show.as_deref())
+}
+
+/// Something of a study, whose pictures need it.
+pub struct Of<T> {
+    pub found: T,
+    pub study: Study,
+}
+
+impl Told for Of<MonteCarlo> {
+    fn text(&self) -> String {
+        self.found.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.found.to_json()
+    }
+
+    fn headers(&self) -> Vec<String> {
+        let columns = self.found.columns();
+        columns.into_iter().map(|(name, _)| name).collect()
+    }
+
+    fn column(&self, place: usize) -> Option<Vec<f64>> {
+        let columns = self.found.columns();
+        columns.get(place).map(|(_, values)| values.to_vec())
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        let (unit, show) = drawn(&self.study);
+        self.found.figure(unit, show)?.to_svg().map(Some)
+    }
+
+    fn refusal(&self) -> Option<Error> {
+        self.found.refusal()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.found.notes.clone()
+    }
+}
+
+impl Told for Of<Comparison> {
+    fn text(&self) -> String {
+        self.found.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.found.to_json()
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        let picture = self.found.picture(self.study.time_unit.as_deref());
+        picture.to_svg().map(Some)
+    }
+}
+
+impl Told for Sweep {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.to_json()
+    }
+
+    fn headers(&self) -> Vec<String> {
+        let keys = self.axes.iter().map(|a| a.key.clone());
+        let figures = self.measures.iter().map(|m| m.name.to_owned());
+        keys.chain(figures).collect()
+    }
+
+    fn column(&self, place: usize) -> Option<Vec<f64>> {
+        let cell = |row: &lynkeus::tune::Row| match place.checked_sub(self.axes.len()) {
+            None => row.values.get(place).copied(),
+            Some(figure) => row.figures.get(figure).copied().flatten(),
+        };
+        let rows = self.rows.iter();
+        Some(rows.map(|row| cell(row).unwrap_or(f64::NAN)).collect())
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.to_svg().map(Some)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.notes.clone()
+    }
+}
+
+impl Told for precision::Report {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.to_json()
+    }
+
+    fn headers(&self) -> Vec<String> {
+        self.columns().into_iter().map(|(name, _)| name).collect()
+    }
+
+    fn column(&self, place: usize) -> Option<Vec<f64>> {
+        Some(self.columns().into_iter().nth(place)?.1)
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        self.to_svg().map(Some)
+    }
+}
+
+impl Told for lynkeus::Report {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.to_json()
+    }
+
+    fn svg(&self) -> Result<Option<String>, Error> {
+        match &self.uniform {
+            Some(_) => self.picture()?.to_svg().map(Some),
+            None => Ok(None),
+        }
+    }
+}
+
+impl Told for DesignReport {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.to_json()
+    }
+}
+
+impl Told for CertifyReport {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn json(&self) -> Value {
+        self.to_json()
+    }
+}

@@ -1,0 +1,28 @@
+//! The compiled half of the Python package: studies, answers, estimators and logs as Python
+//! classes without comfort. What users see is `python/lynkeus`, built on these.
+//!
+//! Work is done without the interpreter's lock, on a thread of its own ([`away`]); errors become
+//! the exceptions of `lynkeus.errors` ([`errors`]).
+
+mod answer;
+mod away;
+mod errors;
+mod estimator;
+mod functions;
+mod log;
+mod study;
+
+/// The module `lynkeus._lynkeus`.
+#[pyo3::pymodule]
+mod _lynkeus {
+    #[pymodule_export]
+    use crate::answer::Answer;
+    #[pymodule_export]
+    use crate::estimator::Estimator;
+    #[pymodule_export]
+    use crate::functions::Functions;
+    #[pymodule_export]
+    use crate::log::Log;
+    #[pymodule_export]
+    use crate::study::{Study, schema};
+}

@@ -1,0 +1,141 @@
+"""The compiled half of the package."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import LynkeusError
+from .study import Study as _Study
+
+_Column = NDArray[np.float64]
+_Tell = Callable[[float], Any] | None
+
+class Answer:
+    def text(self) -> str: ...
+    def json(self) -> str: ...
+    def headers(self) -> list[str]: ...
+    def column(self, place: int) -> _Column | None: ...
+    def svg(self) -> str | None: ...
+    def refusal(self) -> LynkeusError | None: ...
+    def notes(self) -> list[str]: ...
+    def log(self) -> list[tuple[str, _Column]]: ...
+
+class Log:
+    """A table of named columns of equal length."""
+
+    @staticmethod
+    def load(path: str) -> Log:
+        """A CSV or Parquet file."""
+
+    @staticmethod
+    def from_columns(columns: Sequence[tuple[str, _Column]]) -> Log:
+        """Columns of numbers; what is not finite is missing."""
+
+    def headers(self) -> list[str]: ...
+    def column(self, name: str) -> _Column: ...
+    def __len__(self) -> int: ...
+
+class Study:
+    @staticmethod
+    def load(path: str, model: str | None = None) -> Study: ...
+    @staticmethod
+    def parse(
+        text: str, file: str, plant: tuple[str, str | None] | None = None, model: str | None = None
+    ) -> Study: ...
+    @property
+    def file(self) -> str: ...
+    @property
+    def text(self) -> str: ...
+    @property
+    def plant(self) -> tuple[str, str | None] | None: ...
+    @property
+    def model(self) -> str | None: ...
+    def check(self, parameters: bool, about: Sequence[str], time_limit: float | None) -> Answer: ...
+    def design(self, time_limit: float | None) -> Answer: ...
+    def certify(self, time_limit: float | None) -> Answer: ...
+    def how_well(self, horizon: float | None, sensors: str | None, time_limit: float | None) -> Answer: ...
+    def simulate(self, progress: _Tell, time_limit: float | None) -> Answer: ...
+    def monte_carlo(self, runs: int, progress: _Tell, time_limit: float | None) -> Answer: ...
+    def estimate(self, log: Log, progress: _Tell, time_limit: float | None) -> Answer: ...
+    def tune(self, log: Log | None, progress: _Tell, time_limit: float | None) -> Answer: ...
+    def compare(self, log: Log | None, progress: _Tell, time_limit: float | None) -> Answer: ...
+    def functions(self) -> Functions: ...
+    def estimator(self, study: _Study) -> Estimator: ...
+
+class Functions:
+    """A plant's equations: x' = f(t, x, u), y = h(t, x, u)."""
+
+    @property
+    def states(self) -> list[str]: ...
+    @property
+    def inputs(self) -> list[str]: ...
+    @property
+    def outputs(self) -> list[str]: ...
+    @property
+    def start(self) -> _Column:
+        """Start values of the states, NaN where the model gives none."""
+
+    def f(self, t: float, x: Sequence[float] | _Column, u: Sequence[float] | _Column = ()) -> _Column:
+        """The derivatives of the states."""
+
+    def h(self, t: float, x: Sequence[float] | _Column, u: Sequence[float] | _Column = ()) -> _Column:
+        """The outputs."""
+
+class Estimator:
+    """A study's estimator, for samples that come one by one. Its pickle is its snapshot."""
+
+    def predict(self, t: float) -> None:
+        """Goes to a time at which nothing is read."""
+
+    def update(self, t: float, readings: Mapping[str, float | None]) -> None:
+        """Goes to a time and takes what was read there. A sensor that is left out, ``None`` or NaN did
+        not report; of a known input the last value holds."""
+
+    def push(self, t: float, signals: Sequence[float]) -> None:
+        """The same with all signals, in their order."""
+
+    @property
+    def signals(self) -> list[str]:
+        """Measured outputs, then known inputs."""
+
+    @property
+    def sensors(self) -> int:
+        """How many of the signals are measured outputs."""
+
+    @property
+    def names(self) -> list[str]:
+        """What is estimated."""
+
+    @property
+    def time(self) -> float | None:
+        """The time of the last sample or prediction."""
+
+    @property
+    def estimate(self) -> dict[str, float]:
+        """What is estimated, by name."""
+
+    @property
+    def sd(self) -> dict[str, float] | None:
+        """Standard deviations by name, where the observer has them."""
+
+    def to_numpy(self) -> _Column:
+        """What is estimated, in the order of ``names``."""
+
+    @property
+    def innovations(self) -> dict[str, dict[str, Any]]:
+        """By sensor what the last reading said beside what the model expected; of a filter."""
+
+    @property
+    def health(self) -> dict[str, Any]:
+        """Counts by sensor, and of what was held or confined."""
+
+    def snapshot(self) -> bytes:
+        """Everything that the future depends on."""
+
+    def restore(self, snapshot: bytes) -> None:
+        """Goes to where another estimator of the same study was."""
+
+def schema() -> str:
+    """The JSON Schema of study files."""

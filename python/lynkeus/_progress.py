@@ -1,0 +1,33 @@
+"""Progress of long calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Progress = bool | Callable[[float], Any]
+
+
+@contextmanager
+def told(progress: Progress, what: str) -> Iterator[Callable[[float], Any] | None]:
+    """A function that is told the fraction done: the caller's own, or a bar of ``tqdm`` where that
+    is installed and ``progress`` is true."""
+    if not progress:
+        yield None
+        return
+    if callable(progress):
+        yield progress
+        return
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        yield None
+        return
+    with tqdm(total=1.0, desc=what, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+
+        def tell(fraction: float) -> None:
+            bar.update(fraction - bar.n)
+
+        yield tell
+        tell(1.0)

@@ -1,0 +1,45 @@
+"""What goes wrong: the command's messages as exceptions."""
+
+from __future__ import annotations
+
+
+class LynkeusError(Exception):
+    """The text is the command's: place, what is wrong, what was expected, what to do.
+
+    ``message``, ``place`` (file, line, column; ``None`` where there is none) and ``hint`` are its parts.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        message: str | None = None,
+        place: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(text)
+        self.message = text if message is None else message
+        self.place = place
+        self.hint = hint
+
+    def __reduce__(self) -> tuple[type[LynkeusError], tuple[str, str, str | None, str | None]]:
+        return type(self), (str(self), self.message, self.place, self.hint)
+
+
+class InputError(LynkeusError, ValueError):
+    """The input is at fault: a file, a key, a column, a name, a shape."""
+
+
+class RefusedError(LynkeusError):
+    """The question is well posed and the answer is no: a condition is refuted, an estimate diverges."""
+
+
+class LimitError(LynkeusError, TimeoutError):
+    """A limit of time or memory ended the work before there was an answer."""
+
+
+class NotCredible(UserWarning):
+    """There is a result, and something speaks against it."""
+
+
+class TraceError(InputError, TypeError):
+    """A Python function does what no equation can say, an ``if`` on a traced value, for example."""

@@ -1,0 +1,234 @@
+"""Studies: a plant, its sensors, an observer, and what is asked of them."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar, overload
+
+from . import _lynkeus
+from ._logs import log_of
+from ._progress import Progress, told
+from ._toml import document
+from .errors import InputError, NotCredible
+from .model import Model
+from .results import (
+    Certificate,
+    Check,
+    Comparison,
+    Design,
+    Estimation,
+    HowWell,
+    MonteCarlo,
+    Run,
+    Simulation,
+    Sweep,
+)
+
+_Run = TypeVar("_Run", bound=Run)
+Section = Mapping[str, Any]
+
+
+class Study:
+    """Everything that is asked of a plant. Keys and sections are those of study files (docs/study.md).
+
+    ``model`` is a :class:`Model`, or the path of one. ``measured``, ``unknown``, ``noise`` and the
+    like are keys of ``[sensors]``; ``observer`` may be the name of a family.
+
+    >>> import lynkeus
+    >>> model = lynkeus.Model.from_modelica('''
+    ...     model Tank
+    ...       input Real inflow(min = 0, max = 5);
+    ...       Real level(start = 4, min = 0.1, max = 10);
+    ...       output Real y = level;
+    ...     equation
+    ...       der(level) = inflow - 0.5*sqrt(level);
+    ...     end Tank;''')
+    >>> study = lynkeus.Study(model, unknown=["inflow"], observer={"theta": 1.0},
+    ...                       simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}})
+    >>> run = study.simulate()
+    >>> float(abs(run["inflow_hat"][-1] - 1.2)) < 1e-3
+    True
+    """
+
+    def __init__(
+        self,
+        model: Model | str | os.PathLike[str],
+        *,
+        measured: Sequence[str] | None = None,
+        unknown: Sequence[str] | None = None,
+        disturbances: Sequence[str] | None = None,
+        noise: Section | None = None,
+        limits: Section | None = None,
+        sensors: Section | None = None,
+        process_noise: Section | None = None,
+        parameters: Section | None = None,
+        observer: Section | str | None = None,
+        box: Section | None = None,
+        certify: Section | None = None,
+        simulate: Section | None = None,
+        estimate: Section | None = None,
+        tune: Section | None = None,
+        compare: Section | Sequence[str] | None = None,
+        plot: Section | None = None,
+        tables: str | None = None,
+    ) -> None:
+        named = {
+            "measured": measured,
+            "unknown": unknown,
+            "disturbances": disturbances,
+            "noise": noise,
+            "limits": limits,
+        }
+        given = {k: v for k, v in named.items() if v is not None}
+        text = document(
+            {
+                "tables": tables,
+                "sensors": {**(sensors or {}), **given} or None,
+                "process_noise": process_noise,
+                "parameters": parameters,
+                "observer": {"family": observer} if isinstance(observer, str) else observer,
+                "box": box,
+                "certify": certify,
+                "simulate": simulate,
+                "estimate": estimate,
+                "tune": tune,
+                "compare": compare if compare is None or isinstance(compare, Mapping) else {"families": compare},
+                "plot": plot,
+            }
+        )
+        plant = model if isinstance(model, Model) else Model.load(model)
+        self._core = _lynkeus.Study.parse(text, "study", (plant.name, plant.text), plant.choose)
+
+    @classmethod
+    def _of(cls, core: _lynkeus.Study) -> Study:
+        study = cls.__new__(cls)
+        study._core = core
+        return study
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], model: str | None = None) -> Study:
+        """A study file, or a model, which stands for the study in which every output is measured and
+        every input known; ``model`` chooses among several in its file. The plant's text is read as
+        well: the study goes without files from here on."""
+        return cls._of(_lynkeus.Study.load(os.fspath(path), model))
+
+    @classmethod
+    def parse(cls, text: str, model: Model, file: str = "study") -> Study:
+        """A study's text in TOML with its model; ``file`` is what messages call it."""
+        return cls._of(_lynkeus.Study.parse(text, file, (model.name, model.text), model.choose))
+
+    @property
+    def text(self) -> str:
+        """The study in TOML."""
+        return self._core.text
+
+    @property
+    def model(self) -> Model:
+        """The plant's equations."""
+        plant = self._core.plant
+        if plant is None:
+            raise InputError('the study names no plant: expected `plant = "FILE.mo"`')
+        name, text = plant
+        return Model.load(name, self._core.model) if text is None else Model(text, name, self._core.model)
+
+    def replace(self, **changes: Any) -> Study:
+        """The same study with other keys; those of a section are added to it:
+        ``study.replace(observer={"theta": 2.0}, parameters={"k": 0.1})``. A key that is ``None`` is
+        left out."""
+        study = tomllib.loads(self.text)
+        for name, change in changes.items():
+            old = study.get(name)
+            if isinstance(old, dict) and isinstance(change, Mapping):
+                study[name] = {**old, **change}
+            else:
+                study[name] = change
+        return Study.parse(document(study), self.model, self._core.file)
+
+    def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
+        core = self._core
+        return _restored, (core.text, core.file, core.plant, core.model)
+
+    def __repr__(self) -> str:
+        return f"<Study of {self.model.name}\n{self.text.rstrip()}>"
+
+    def check(
+        self, *, parameters: bool = False, about: Sequence[str] = (), time_limit: float | None = None
+    ) -> Check:
+        """Which states, unknown inputs and (with ``parameters``) parameters can be known, and which
+        observers fit; ``about``: expressions to decide on. ``time_limit`` in seconds, as everywhere."""
+        return Check(self._core.check(parameters, list(about), time_limit))
+
+    def design(self, *, time_limit: float | None = None) -> Design:
+        """The observer, with its gains and certificate."""
+        return Design(self._core.design(time_limit))
+
+    def certify(self, *, time_limit: float | None = None) -> Certificate:
+        """What can be proved of the observer."""
+        return Certificate(self._core.certify(time_limit))
+
+    def how_well(
+        self, *, horizon: float | None = None, sensors: str | None = None, time_limit: float | None = None
+    ) -> HowWell:
+        """Standard errors for the declared noise; ``sensors``: try every ``"outputs"`` of the model, or
+        ``"all"`` with its states."""
+        return HowWell(self._core.how_well(horizon, sensors, time_limit))
+
+    @overload
+    def simulate(self, *, progress: Progress = ..., time_limit: float | None = ...) -> Simulation: ...
+    @overload
+    def simulate(self, *, runs: int, progress: Progress = ..., time_limit: float | None = ...) -> MonteCarlo: ...
+    def simulate(
+        self, *, runs: int | None = None, progress: Progress = False, time_limit: float | None = None
+    ) -> Simulation | MonteCarlo:
+        """The plant with its observer; ``runs``: so many of them with other noise and starts."""
+        with told(progress, "simulating") as tell:
+            if runs is None:
+                return _judged(Simulation(self._core.simulate(tell, time_limit)))
+            return _judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit)))
+
+    def estimate(self, log: Any, *, progress: Progress = False, time_limit: float | None = None) -> Estimation:
+        """A log through the observer: a path, a mapping of columns, a data frame, an Arrow table or a
+        simulation."""
+        with told(progress, "estimating") as tell:
+            return _judged(Estimation(self._core.estimate(log_of(log), tell, time_limit)))
+
+    def tune(
+        self, log: Any = None, *, progress: Progress = False, time_limit: float | None = None
+    ) -> Sweep:
+        """The tuning of ``[tune]`` over its values, judged by simulation or by a log."""
+        with told(progress, "tuning") as tell:
+            return Sweep(self._core.tune(_some(log), tell, time_limit))
+
+    def compare(
+        self, log: Any = None, *, progress: Progress = False, time_limit: float | None = None
+    ) -> Comparison:
+        """Families side by side, on a simulation or on a log."""
+        with told(progress, "comparing") as tell:
+            return Comparison(self._core.compare(_some(log), tell, time_limit))
+
+    def estimator(self) -> _lynkeus.Estimator:
+        """An estimator for samples that come one by one."""
+        return self._core.estimator(self)
+
+
+def _some(log: Any) -> _lynkeus.Log | None:
+    return None if log is None else log_of(log)
+
+
+def _restored(text: str, file: str, plant: tuple[str, str] | None, model: str | None) -> Study:
+    return Study._of(_lynkeus.Study.parse(text, file, plant, model))
+
+
+def _resumed(study: Study, snapshot: bytes) -> _lynkeus.Estimator:
+    estimator = study.estimator()
+    estimator.restore(snapshot)
+    return estimator
+
+
+def _judged(run: _Run) -> _Run:
+    if run.refusal is not None:
+        warnings.warn(str(run.refusal), NotCredible, stacklevel=3)
+    return run
