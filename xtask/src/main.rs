@@ -8,10 +8,12 @@ mod gallery;
 mod gap;
 mod numbers;
 mod options;
+mod package;
 mod peers;
 mod process;
 mod python;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use process::{cargo, run};
@@ -19,7 +21,8 @@ use process::{cargo, run};
 const USAGE: &str = "\
 usage: cargo xtask <task>
 
-  test      every test of the workspace, with the Python cross-checks
+  test      every test of the workspace and of the Python package, with the Python cross-checks
+  package   build the Python package, install it into .venv-package and run its tests
   ci        format check, lints, documentation, then `test`
   gallery   draw the pictures of docs/pictures again from the shipped studies
   gap       compute the table of docs/gap.md again from the shipped studies;
@@ -49,6 +52,7 @@ fn main() -> ExitCode {
     let outcome = match task {
         "test" => test(),
         "ci" => ci(),
+        "package" => package::interpreter().and_then(|python| package::test(&python)),
         "gallery" => gallery::draw(),
         "gap" => gap::tabulate(name),
         "attack" => attack::run(&arguments[1..]),
@@ -74,19 +78,26 @@ fn main() -> ExitCode {
 /// Runs every test. `cargo test` comes last, so its summary closes the output.
 fn test() -> Result<(), String> {
     let mut tests = cargo(&["test", "--workspace"]);
-    match python::interpreter() {
-        Ok(path) => {
-            tests.env(python::VARIABLE, path);
-        }
-        Err(reason) if is_ci() => {
-            return Err(format!("the Python cross-checks cannot run: {reason}"));
-        }
-        Err(reason) => {
-            tests.env_remove(python::VARIABLE);
-            eprintln!("skipped: the Python cross-checks: {reason}");
-        }
+    match found(python::interpreter(), "the Python cross-checks")? {
+        Some(path) => tests.env(python::VARIABLE, path),
+        None => tests.env_remove(python::VARIABLE),
+    };
+    if let Some(python) = found(package::interpreter(), "the tests of the Python package")? {
+        package::test(&python)?;
     }
     run(&mut tests)
+}
+
+/// An interpreter for something; none where that is skipped, with a word.
+fn found(interpreter: Result<PathBuf, String>, what: &str) -> Result<Option<PathBuf>, String> {
+    match interpreter {
+        Ok(path) => Ok(Some(path)),
+        Err(reason) if is_ci() => Err(format!("{what} cannot run: {reason}")),
+        Err(reason) => {
+            eprintln!("skipped: {what}: {reason}");
+            Ok(None)
+        }
+    }
 }
 
 fn ci() -> Result<(), String> {

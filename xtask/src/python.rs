@@ -56,7 +56,7 @@ fn create(folder: &Path) -> Result<(), String> {
     let system = ["python3", "python"]
         .into_iter()
         .find(|name| answers(Path::new(name)))
-        .ok_or("no Python 3.10 or newer on the PATH; install one and run this again")?;
+        .ok_or("no Python 3.11 or newer on the PATH; install one and run this again")?;
     let mut command = Command::new(system);
     command.args(["-m", "venv", "--clear"]).arg(folder);
     run(&mut command).map_err(|error| {
@@ -77,7 +77,7 @@ fn install(python: &Path, list: &Path) -> Result<(), String> {
 /// True when this interpreter starts and is new enough for the pinned packages.
 fn answers(python: &Path) -> bool {
     Command::new(python)
-        .args(["-c", "import sys; sys.exit(sys.version_info < (3, 10))"])
+        .args(["-c", "import sys; sys.exit(sys.version_info < (3, 11))"])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .status()

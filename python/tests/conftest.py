@@ -1,0 +1,25 @@
+"""What several tests share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="session")
+def examples() -> Path:
+    """The shipped studies."""
+    return ROOT / "examples"
+
+
+@pytest.fixture(scope="session")
+def command() -> Path:
+    """The ``lynkeus`` command of the same sources."""
+    named = os.environ.get("LYNKEUS_COMMAND")
+    if not named:
+        pytest.skip("LYNKEUS_COMMAND names no command: `cargo xtask package` does")
+    return Path(named)

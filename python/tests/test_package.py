@@ -1,0 +1,149 @@
+"""The package as a user meets it."""
+
+from __future__ import annotations
+
+import copy
+import doctest
+import importlib
+import pickle
+import pkgutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lynkeus
+
+TANK = """
+model Tank
+  input Real inflow(min = 0, max = 5);
+  Real level(start = 4, min = 0.1, max = 10);
+  output Real y = level;
+equation
+  der(level) = inflow - 0.5*sqrt(level);
+end Tank;
+"""
+
+
+@pytest.fixture
+def study() -> lynkeus.Study:
+    return lynkeus.Study(
+        lynkeus.Model.from_modelica(TANK),
+        unknown=["inflow"],
+        observer={"theta": 1.0},
+        simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}},
+    )
+
+
+def test_documentation_runs() -> None:
+    for module in pkgutil.iter_modules(lynkeus.__path__):
+        loaded = importlib.import_module(f"lynkeus.{module.name}")
+        assert doctest.testmod(loaded).failed == 0, module.name
+
+
+def test_a_study_without_files(study: lynkeus.Study) -> None:
+    assert study.check().recommended == "triangular"
+    run = study.simulate()
+    assert run.columns == ["t", "level", "inflow", "level_hat", "inflow_hat"]
+    assert abs(run["inflow_hat"][-1] - 1.2) < 1e-4
+    assert run.t[1] == 0.5 and len(run) == 41
+    # what was simulated is a log
+    replayed = study.estimate(run)
+    assert abs(replayed["inflow_hat"][-1] - 1.2) < 1e-2
+
+
+def test_a_study_changes_and_travels(study: lynkeus.Study) -> None:
+    faster = study.replace(observer={"theta": 2.0})
+    assert faster.simulate().summary != study.simulate().summary
+    assert "theta = 1.0" in study.text and "theta = 2.0" in faster.text
+    twin = pickle.loads(pickle.dumps(faster))
+    np.testing.assert_array_equal(twin.simulate()["inflow_hat"], faster.simulate()["inflow_hat"])
+
+
+def test_a_study_from_a_file_goes_without_it(tmp_path: Path) -> None:
+    (tmp_path / "tank.mo").write_text(TANK)
+    (tmp_path / "s.toml").write_text('plant = "tank.mo"\n[sensors]\nunknown = ["inflow"]\n')
+    study = lynkeus.Study.load(tmp_path / "s.toml")
+    before, data = study.check().summary, pickle.dumps(study)
+    for file in tmp_path.iterdir():
+        file.unlink()
+    assert pickle.loads(data).check().summary == before
+
+
+def test_an_estimator_goes_on_where_its_pickle_was(study: lynkeus.Study) -> None:
+    estimator = study.estimator()
+    assert estimator.signals == ["y"] and estimator.names == ["level", "inflow"]
+    for k in range(20):
+        estimator.update(0.5 * k, {"y": None if k % 5 == 3 else 4.0})
+    twins = [pickle.loads(pickle.dumps(estimator)), copy.copy(estimator)]
+    for twin in [estimator, *twins]:
+        twin.update(10.0, {"y": 4.1})
+        twin.predict(10.5)
+    assert all(twin.estimate == estimator.estimate for twin in twins)
+    assert estimator.time == 10.5
+    assert estimator.health["sensors"]["y"]["missing"] == 4
+    np.testing.assert_array_equal(estimator.to_numpy(), list(estimator.estimate.values()))
+
+
+def test_errors_say_where(study: lynkeus.Study, tmp_path: Path) -> None:
+    with pytest.raises(lynkeus.InputError, match="no output named 'nix'") as caught:
+        lynkeus.Study(lynkeus.Model.from_modelica(TANK), measured=["nix"]).check()
+    assert caught.value.place is not None and caught.value.place.startswith("study:")
+    copied = pickle.loads(pickle.dumps(caught.value))
+    assert (str(copied), copied.place) == (str(caught.value), caught.value.place)
+    with pytest.raises(lynkeus.InputError, match="no signal is called") as caught:
+        study.estimator().update(0.0, {"nix": 1.0})
+    with pytest.raises(TypeError, match="expected a number"):
+        study.estimator().update(0.0, {"y": "four"})  # type: ignore[dict-item]
+    with pytest.raises(lynkeus.InputError, match="no study file"):
+        lynkeus.Study.load(tmp_path / "none.toml")
+    with pytest.raises(KeyError, match="expected one of t, level"):
+        study.simulate()["nix"]
+    with pytest.raises(AttributeError, match="its summary has"):
+        study.check().nix
+    with pytest.raises(lynkeus.InputError, match="observer.theta: expected a number"):
+        study.replace(observer={"theta": object()})
+
+
+def test_what_is_not_credible_warns() -> None:
+    filtered = lynkeus.Study(
+        lynkeus.Model.from_modelica(TANK),
+        unknown=["inflow"],
+        noise={"y": 1e-3},
+        process_noise={"inflow": 1e-6, "level": 1e-9},
+        observer="ekf",
+    )
+    noisy = 4.0 + np.random.default_rng(1).normal(size=200)
+    with pytest.warns(lynkeus.NotCredible):
+        run = filtered.estimate({"t": np.arange(200.0), "y": noisy})
+    assert not run.is_credible and isinstance(run.refusal, lynkeus.RefusedError)
+
+
+def test_a_limit_is_an_exception(examples: Path) -> None:
+    with pytest.raises(lynkeus.LimitError):
+        lynkeus.design(examples / "column" / "study-certified.toml", time_limit=1e-3)
+
+
+def test_progress_is_told_and_may_raise(study: lynkeus.Study) -> None:
+    long = study.replace(simulate={"until": 1e5, "output_step": 1.0})
+    told: list[float] = []
+    long.simulate(progress=told.append)
+    assert told == sorted(told)
+
+    class Stopped(Exception):
+        pass
+
+    def stop(_: float) -> None:
+        raise Stopped
+
+    with pytest.raises(Stopped):
+        long.replace(simulate={"until": 1e7}).simulate(progress=stop)
+
+
+def test_functions_are_those_of_the_model() -> None:
+    functions = lynkeus.Model.from_modelica(TANK).functions()
+    assert functions.states == ["level"] and functions.inputs == ["inflow"]
+    assert functions.f(0.0, [4.0], [1.2]).tolist() == [1.2 - 0.5 * 2.0]
+    assert functions.h(0.0, [4.0], [1.2]).tolist() == [4.0]
+    with pytest.raises(lynkeus.InputError, match=r"x: expected 1 values \(level\), found 2"):
+        functions.f(0.0, [4.0, 1.0], [1.2])

@@ -1,0 +1,89 @@
+"""Every number of the command is that of Python: one engine, on all examples."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lynkeus
+
+from conftest import ROOT
+
+parquet = pytest.importorskip("pyarrow.parquet")
+
+STUDIES = sorted(p.relative_to(ROOT).as_posix() for p in (ROOT / "examples").glob("*/*.toml"))
+
+#: of reports that are told the study's path, or take time
+UNLIKE = {"next", "seconds_per_sample"}
+
+
+def run(command: Path, *arguments: str) -> tuple[int, str]:
+    """The exit code, and what is printed: the error where there is no result."""
+    done = subprocess.run([command, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout or done.stderr
+
+
+def without(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: without(v) for k, v in value.items() if k not in UNLIKE}
+    return [without(v) for v in value] if isinstance(value, list) else value
+
+
+@pytest.fixture(autouse=True)
+def in_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    warnings.simplefilter("ignore", lynkeus.NotCredible)
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_reports(command: Path, study: str) -> None:
+    loaded = lynkeus.Study.load(study)
+    for name in ("check", "design"):
+        code, text = run(command, name, "--json", study)
+        try:
+            answer = getattr(loaded, name)()
+        except lynkeus.LynkeusError as error:
+            assert (code, text) == (exit_code(error), f"error: {error}\n")
+            continue
+        assert without(answer.summary) == without(json.loads(text))
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_runs(command: Path, study: str, tmp_path: Path) -> None:
+    loaded = lynkeus.Study.load(study)
+    if "[simulate]" not in loaded.text:
+        pytest.skip("it simulates nothing")
+    # with all digits
+    file, log = tmp_path / "run.parquet", tmp_path / "log.parquet"
+    code, text = run(command, "simulate", study, "--json", "-q", "-o", str(file), "--log", str(log))
+    same(loaded.simulate(), code, text, file)
+    # a log by its path, and as columns: both are what the command reads
+    code, text = run(command, "estimate", study, str(log), "--json", "-q", "-o", str(file))
+    try:
+        replayed = loaded.estimate(log)
+    except lynkeus.LynkeusError as error:
+        assert (code, text) == (exit_code(error), f"error: {error}\n")
+        return
+    same(replayed, code, text, file)
+    columns = parquet.read_table(log).to_pydict()
+    assert list(columns) == lynkeus.Log.load(str(log)).headers()
+    assert loaded.estimate(columns).summary["final"] == json.loads(text)["final"]
+
+
+def exit_code(error: lynkeus.LynkeusError) -> int:
+    return 2 if isinstance(error, lynkeus.InputError) else 1
+
+
+def same(run: lynkeus.Run, code: int, text: str, file: Path) -> None:
+    assert run.is_credible == (code == 0)
+    assert without(run.summary) == without(json.loads(text))
+    written = parquet.read_table(file)
+    assert written.column_names == run.columns
+    for name in run.columns:
+        np.testing.assert_array_equal(written[name].to_numpy(), run[name], err_msg=name)

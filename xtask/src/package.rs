@@ -1,0 +1,66 @@
+//! The Python package: built as a wheel, installed into an environment of its own, and tested there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::process::{cargo, root, run};
+use crate::python;
+
+/// What its tests need, pinned.
+const REQUIREMENTS: &str = include_str!("../../python/requirements.txt");
+
+/// The tests compare with the command that this names.
+const COMMAND: &str = "LYNKEUS_COMMAND";
+
+/// Builds, installs and tests it.
+///
+/// # Errors
+/// What is missing, or what failed.
+pub fn test(python: &Path) -> Result<(), String> {
+    let wheel = wheel(python)?;
+    let mut install = Command::new(python);
+    install
+        .args(["-m", "pip", "install", "--disable-pip-version-check"])
+        .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
+        .arg(wheel);
+    run(&mut install)?;
+    run(&mut cargo(&["build", "--package", "lynkeus"]))?;
+    let command = root().join("target").join("debug").join("lynkeus");
+    let command = command.with_extension(std::env::consts::EXE_EXTENSION);
+    let mut tests = Command::new(python);
+    tests
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+        .env(COMMAND, command)
+        .current_dir(root());
+    run(&mut tests)?;
+    let mut types = Command::new(python);
+    types.args(["-m", "mypy"]).current_dir(root());
+    run(&mut types)
+}
+
+/// The interpreter of its environment.
+///
+/// # Errors
+/// What is missing and how to supply it.
+pub fn interpreter() -> Result<PathBuf, String> {
+    python::environment(".venv-package", REQUIREMENTS)
+}
+
+/// The only wheel in a folder that is made anew.
+fn wheel(python: &Path) -> Result<PathBuf, String> {
+    let folder = root().join("target").join("package");
+    // there is none at first
+    let _ = fs::remove_dir_all(&folder);
+    let mut build = Command::new(python);
+    build
+        .args(["-m", "maturin", "build", "--quiet", "--profile", "dev"])
+        .args(["--auditwheel", "skip", "--out"])
+        .arg(&folder)
+        .current_dir(root());
+    run(&mut build)?;
+    let entries = fs::read_dir(&folder).map_err(|e| format!("cannot read the wheels: {e}"))?;
+    let mut wheels = entries.flatten().map(|entry| entry.path());
+    let wheel = wheels.find(|path| path.extension().is_some_and(|kind| kind == "whl"));
+    wheel.ok_or_else(|| format!("no wheel in {}", folder.display()))
+}
