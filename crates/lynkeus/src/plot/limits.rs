@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Band, Kind, Panel};
+use super::{Band, Extent, Kind, Panel};
 use crate::Series;
 use crate::series::{Sorted, Store};
 
@@ -22,7 +22,7 @@ impl Panel {
     /// The limits of the value axis: everything, unless the estimate peaks.
     ///
     /// The core of a panel is the span of its true and measured values together with the middle
-    /// 90 % of the estimate and of the ends of its bands; a band that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
+    /// 90 % of the estimate and of the ends of its bands; a band of deviations that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
     /// core's height beyond it on either side. `None` when nothing is finite.
     pub fn limits(&self) -> Option<Limits> {
         let curves = extremes(self.values(|_| true))?;
@@ -40,10 +40,18 @@ impl Panel {
                 beyond: Some(beyond),
             });
         }
+        let whole = self.quantiles().fold(all.clone(), |all, b| union(&all, &b));
+        let is_too_tall = whole.end - whole.start > TOO_TALL * height;
         Some(Limits {
-            shown: padded(all),
+            shown: padded(if is_too_tall { all } else { whole }),
             beyond: None,
         })
+    }
+
+    /// What bands of quantiles span: errors that there were, not only what is thought possible.
+    fn quantiles(&self) -> impl Iterator<Item = Range<f64>> {
+        let own = self.bands.iter().filter(|b| b.extent == Extent::Quantiles);
+        own.filter_map(|b| extremes(b.low.iter().chain(&b.high)))
     }
 
     fn core(&self) -> Option<Range<f64>> {
@@ -148,6 +156,28 @@ mod tests {
             .unwrap();
         assert_eq!(limits.beyond, None);
         assert!(limits.shown.end > 3.0);
+    }
+
+    #[test]
+    fn quantiles_are_shown_whole_and_deviations_are_not() {
+        let limits = |extent: Extent| {
+            let mut high = vec![1.0; 100];
+            high[3] = 1.5;
+            let band = Band {
+                extent,
+                time: (0..100).map(f64::from).collect::<Vec<_>>().into(),
+                low: vec![-1.0; 100].into(),
+                high: high.into(),
+            };
+            let mean = curve(Kind::Mean, vec![0.0; 100]);
+            let panel = Panel {
+                bands: vec![band],
+                ..panel(vec![mean])
+            };
+            panel.limits().unwrap().shown.end
+        };
+        assert!(limits(Extent::Quantiles) > 1.5);
+        assert!(limits(Extent::TwoDeviations) < 1.2);
     }
 
     #[test]
