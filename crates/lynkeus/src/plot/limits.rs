@@ -26,8 +26,10 @@ impl Panel {
     /// core's height beyond it on either side. `None` when nothing is finite.
     pub fn limits(&self) -> Option<Limits> {
         let curves = extremes(self.values(|_| true))?;
-        let all = self.bands().fold(curves, |all, b| union(&all, &b));
-        let core = self.core().unwrap_or_else(|| all.clone());
+        // sorted once: they may be long
+        let bands: Vec<Range<f64>> = self.bands().collect();
+        let all = bands.iter().fold(curves, |all, b| union(&all, b));
+        let core = self.core(bands).unwrap_or_else(|| all.clone());
         let height = core.end - core.start;
         if height > 0.0 && all.end - all.start > TOO_TALL * height {
             let shown = (core.start - height).max(all.start)..(core.end + height).min(all.end);
@@ -54,12 +56,12 @@ impl Panel {
         own.filter_map(|b| extremes(b.low.iter().chain(&b.high)))
     }
 
-    fn core(&self) -> Option<Range<f64>> {
+    fn core(&self, bands: Vec<Range<f64>>) -> Option<Range<f64>> {
         let peaks = |kind| matches!(kind, Kind::Estimated | Kind::Worst | Kind::Mean);
         let known = extremes(self.values(|kind| !peaks(kind)));
         let store = self.curves.first().map(|c| c.values.store());
         let middle = store.and_then(|store| middle(store, self.values(peaks)));
-        let spans = known.into_iter().chain(middle).chain(self.bands());
+        let spans = known.into_iter().chain(middle).chain(bands);
         spans.reduce(|a, b| union(&a, &b))
     }
 

@@ -108,6 +108,13 @@ impl Column {
         self.values.push(value);
     }
 
+    /// Takes a row that has no value.
+    #[cfg(feature = "parquet")]
+    pub(super) fn put_nothing(&mut self) {
+        self.miss(self.values.len() as u64 + 1, "");
+        self.values.push(f64::NAN);
+    }
+
     /// Takes the next row's point in time.
     #[cfg(feature = "parquet")]
     pub(super) fn put_instant(&mut self, instant: Instant) {

@@ -58,12 +58,12 @@ impl Table {
         };
         let columns: Result<Vec<Column>, Error> = self.columns.iter().map(merged).collect();
         let notes = [
-            (count, "came late and were put in their place"),
+            (count, "that came late and were put in their place"),
             (
                 repeated,
-                "repeat a time: the last value of each column counts",
+                "that repeat a time, of which the last value of each column counts",
             ),
-            (timeless, "have no time and are left out"),
+            (timeless, "that have no time and are left out"),
         ];
         Ok(Some(Ordered {
             table: Table {
@@ -75,7 +75,7 @@ impl Table {
             notes: notes
                 .into_iter()
                 .filter(|(count, _)| *count > 0)
-                .map(|(count, what)| format!("rows of the log: {count} {what}"))
+                .map(|(count, what)| format!("rows of the log {what}: {count}"))
                 .collect(),
         }))
     }
