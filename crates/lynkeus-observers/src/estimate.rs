@@ -94,10 +94,8 @@ impl<'e, 'p> Copy<'e, 'p> {
             return Err(TuningError::new("initial", expected, format!("\"{name}\"")));
         }
         let start = |variable: &Variable| {
-            let array = variable.name.split('[').next().unwrap_or_default();
-            let exact = initial.values.get(&variable.name);
-            let named = exact.or_else(|| initial.values.get(array)).copied();
-            named
+            initial
+                .of(&variable.name)
                 .or(initial.default)
                 .or(variable.start)
                 .unwrap_or_else(|| middle(variable))

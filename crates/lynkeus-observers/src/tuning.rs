@@ -79,6 +79,16 @@ pub struct Initial {
     pub values: BTreeMap<String, f64>,
 }
 
+impl Initial {
+    /// What is given for a state by its name, else by its array's; not the default.
+    #[must_use]
+    pub fn of(&self, state: &str) -> Option<f64> {
+        let array = state.split('[').next().unwrap_or_default();
+        let own = self.values.get(state);
+        own.or_else(|| self.values.get(array)).copied()
+    }
+}
+
 /// The tuning of an observer: keys that belong to every family, and those of one. A family
 /// reads it once into settings of its own.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -3,7 +3,7 @@
 use lynkeus_structure::{Side, figures};
 use serde_json::{Value, json};
 
-use crate::words::number;
+use crate::words::instant;
 use crate::{Quantity, Series};
 
 /// Settled is an error below this share of the declared range.
@@ -100,7 +100,7 @@ impl Accuracy {
 
     fn words(&self) -> String {
         let settled = match self.settling {
-            Settling::From(t) => format!("; within 5 % of its range from t = {} on", number(t)),
+            Settling::From(t) => format!("; within 5 % of its range from t = {} on", instant(t)),
             Settling::Never => "; not within 5 % of its range at the end".to_owned(),
             Settling::NoRange => String::new(),
         };
@@ -112,7 +112,7 @@ impl Accuracy {
             "error of {}: {late}, at most {} (t = {}){settled}",
             self.quantity,
             figures(self.peak, 3),
-            number(self.peak_at),
+            instant(self.peak_at),
         )
     }
 }

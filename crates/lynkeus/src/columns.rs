@@ -134,19 +134,21 @@ fn gaps(
     let outputs = extended.outputs.iter().map(|o| &o.variable);
     for signal in extended.inputs.iter().chain(outputs) {
         let header = header(settings, &signal.name);
-        let places: Vec<String> = table
-            .faults(header)
-            .iter()
-            .map(|fault| format!("{fault} in line {}", fault.line))
-            .collect();
-        if !places.is_empty() {
-            notes.push(format!(
-                "column \"{header}\": {} of {} cells are missing, first {}",
-                table.missing(header),
-                table.rows(),
-                places.join(", ")
-            ));
+        let missing = table.missing(header);
+        if missing == 0 {
+            continue;
         }
+        let places = table.faults(header).iter();
+        let places = places.map(|fault| format!("{fault} in line {}", fault.line));
+        let places: Vec<String> = places.collect();
+        let first = match places.is_empty() {
+            true => String::new(),
+            false => format!(", first {}", places.join(", ")),
+        };
+        let rows = table.rows();
+        notes.push(format!(
+            "column \"{header}\": {missing} of {rows} cells are missing{first}"
+        ));
     }
     notes
 }

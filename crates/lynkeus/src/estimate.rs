@@ -79,7 +79,7 @@ fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<O
     let run = run_settings(settings);
     let mut course = course_of(prepared, &design, samples, run, watch)?;
     let rows = course.estimates.first().map_or(0, Series::len);
-    settle(&mut course, rows, study, log.table.file())?;
+    settle(&mut course, rows, study, &log.table.place())?;
     let intervals = interval::intervals(prepared, &design, samples, &course);
     let logged = |name: &str| {
         let values = columns::logged(&log.table, settings, &log.time, name)?;
@@ -150,12 +150,8 @@ pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, desi
             continue;
         };
         let state = &extended.states[i];
-        let array = state.name.split('[').next().unwrap_or_default();
-        let is_given = state.start.is_some()
-            || initial.default.is_some()
-            || [state.name.as_str(), array]
-                .iter()
-                .any(|name| initial.values.contains_key(*name));
+        let given = initial.of(&state.name).or(initial.default);
+        let is_given = given.or(state.start).is_some();
         let first = readings.iter().find(|y| y.is_finite());
         let (Some(slope), Some(offset), Some(y)) = (number(slope), number(offset), first) else {
             continue;

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::Series;
 use crate::series::points;
 use crate::study::Noise;
-use crate::words::number;
+use crate::words::instant;
 
 /// Fewer equal readings in a row are none of our business.
 const FEWEST: usize = 5;
@@ -248,8 +248,8 @@ impl Frozen {
             "the sensor {} hangs at {} from t = {} to {} ({} rows), which its noise would not let it: {cause}; a family without `gate` believes it",
             self.output,
             figures(self.value, 6),
-            number(self.from),
-            number(self.to),
+            instant(self.from),
+            instant(self.to),
             self.rows
         )
     }

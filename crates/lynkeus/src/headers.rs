@@ -94,7 +94,7 @@ pub(crate) fn time_of<'s>(
         return Err(Error::input(format!(
             "the column \"{time}\" cannot be both time and \"{name}\""
         ))
-        .at(table.file())
+        .at(table.place())
         .hint("say which columns they are: `time` and `columns` of [estimate]"));
     }
     let is_there = table.names().any(|name| name == time);
@@ -103,7 +103,7 @@ pub(crate) fn time_of<'s>(
             "no time column \"{time}\" (the model has a variable called t); the columns found are: {}",
             crate::near::list(table.names())
         ))
-        .at(table.file())
+        .at(table.place())
         .hint("if it has another name, set `time` in [estimate] of the study"));
     }
     Ok(time)
@@ -119,7 +119,7 @@ pub(crate) fn refuse_seconds(study: &Study, table: &Table, time: &str) -> Result
         (Some(unit), Some(date)) => Err(Error::input(format!(
             "the times of the log are dates such as {date}, which count in seconds, but `time_unit` of [plot] says that the plant's are in {unit}"
         ))
-        .at(table.file())
+        .at(table.place())
         .hint(format!("write them as numbers in {unit}, or the model in seconds"))),
         _ => Ok(()),
     }

@@ -6,8 +6,11 @@ pub(crate) fn nearest<'a>(
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
     let folded = name.to_lowercase();
+    // one letter is like any word that begins with it
+    let (least, most) = (name.len().div_ceil(2), 2 * name.len());
     candidates
         .into_iter()
+        .filter(|c| (least..=most).contains(&c.len()))
         .map(|c| (strsim::jaro_winkler(&folded, &c.to_lowercase()), c))
         .filter(|(likeness, _)| *likeness >= 0.75)
         .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -55,5 +58,6 @@ mod tests {
         );
         assert_eq!(suggest("zzz", ["theta", "r"]), "choose from: theta, r");
         assert_eq!(suggest("q", []), "choose from: (none)");
+        assert_eq!(suggest("therm", ["t", "probe"]), "choose from: t, probe");
     }
 }

@@ -6,7 +6,7 @@ use lynkeus_structure::{Extended, Side, figures};
 use serde_json::{Map, Value, json};
 
 use crate::series::Iter;
-use crate::words::number;
+use crate::words::{instant, number};
 use crate::{Quantity, Series};
 
 /// What is beyond an end by no more than this share of the side's width is on it: integration
@@ -208,7 +208,7 @@ impl Outside {
         format!(
             "at {} of the rows, first at t = {} ({})",
             percent(self.share),
-            number(self.first),
+            instant(self.first),
             self.listed(each)
         )
     }

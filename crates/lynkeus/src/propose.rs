@@ -158,8 +158,9 @@ fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
             true => start - off,
             false => start + off,
         };
-        if initial.default.is_none() && off.is_finite() {
-            initial.values.entry(state.name.clone()).or_insert(moved);
+        let is_given = initial.of(&state.name).or(initial.default).is_some();
+        if !is_given && off.is_finite() {
+            initial.values.insert(state.name.clone(), moved);
         }
     }
 }
@@ -195,4 +196,31 @@ fn time_scales(prepared: &Prepared<'_>, speed: Speed) -> Option<Proposal> {
 /// Two significant digits.
 fn rounded(x: f64) -> f64 {
     format!("{x:.1e}").parse().unwrap_or(x)
+}
+
+#[cfg(all(test, feature = "tune"))]
+mod tests {
+    use lynkeus_model::{LoadOptions, Plant};
+
+    use super::*;
+
+    #[test]
+    fn only_a_start_that_is_not_given_is_moved() {
+        let text = "model M Real x[2](each max = 1, each min = 0); Real z(min = 0, max = 2); output Real y = x[1]; equation der(x[1]) = x[2]; der(x[2]) = z; der(z) = 0; end M;";
+        let plant = Plant::from_modelica(text, "m.mo", &LoadOptions::default()).unwrap();
+        let started = |initial: &str| {
+            let text = format!("plant = \"m.mo\"\n[observer]\ninitial = {{ {initial} }}\n");
+            let study = crate::Study::parse(&text, "s.toml").unwrap();
+            let mut own = study.clone();
+            start_off(&mut own, &Prepared::new(&study, &plant).unwrap());
+            let initial = own.observer.tuning.initial;
+            ["x[1]", "x[2]", "z"].map(|name| initial.of(name))
+        };
+        let [one, two, z] = started("x = 0.25");
+        assert_eq!((one, two), (Some(0.25), Some(0.25)));
+        assert!(z.is_some());
+        let [one, two, _] = started("\"x[2]\" = 0.75");
+        assert!(one.is_some_and(|x| x != 0.75) && two == Some(0.75));
+        assert_eq!(started("default = 0.5"), [None; 3]);
+    }
 }

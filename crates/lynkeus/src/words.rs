@@ -10,6 +10,15 @@ pub(crate) fn number(value: f64) -> String {
     figures(value, 4)
 }
 
+/// Ten significant digits of a time, all written out: rows of a log that counts seconds since 1970 differ.
+pub(crate) fn instant(time: f64) -> String {
+    let rounded: f64 = format!("{time:.9e}").parse().unwrap_or(time);
+    match rounded.abs() {
+        0.0 | 1e-4..1e15 => rounded.to_string(),
+        _ => figures(rounded, 10),
+    }
+}
+
 /// `x in [0, 1]`, or `x = 4.69` for a point.
 pub(crate) fn side(name: &str, low: f64, high: f64) -> String {
     match low == high {
@@ -42,4 +51,23 @@ pub(crate) fn conditions<'a>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_two_rows_differ() {
+        for (time, words) in [
+            (1_700_002_280.0, "1700002280"),
+            (1_405_380.0, "1405380"),
+            (-0.1 - 0.2, "-0.3"),
+            (0.0, "0"),
+            (2e-9, "2e-9"),
+            (1e300, "1e300"),
+        ] {
+            assert_eq!(instant(time), words);
+        }
+    }
 }

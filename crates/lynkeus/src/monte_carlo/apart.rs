@@ -14,7 +14,7 @@ use crate::{Error, Study};
 
 /// True course and estimate of one quantity in one run.
 #[derive(Clone, Debug)]
-pub(super) struct Series {
+pub(super) struct Track {
     pub truth: Vec<f64>,
     pub estimate: Vec<f64>,
 }
@@ -31,7 +31,7 @@ pub(super) struct Single {
 #[derive(Debug)]
 struct Whole {
     /// by quantity
-    series: Vec<Series>,
+    tracks: Vec<Track>,
     /// why its estimate is not credible, where it is not
     doubt: Option<String>,
 }
@@ -101,15 +101,15 @@ impl Job<'_> {
             return Ok(None);
         }
         self.time.get_or_init(|| ran.run.times().to_vec());
-        let series = self.followed.iter().map(|f| Series {
+        let tracks = self.followed.iter().map(|f| Track {
             truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
             estimate: ran.course.estimates[f.estimate].to_vec(),
         });
-        let series = series.collect();
+        let tracks = tracks.collect();
         // as `simulate` judges this run alone
         let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
         let doubt = alone.refusal().map(|refusal| refusal.to_string());
-        Ok(Some(Whole { series, doubt }))
+        Ok(Some(Whole { tracks, doubt }))
     }
 }
 
@@ -155,9 +155,9 @@ pub(super) fn gathered(
         let seed = single.seed;
         match single.result {
             Ok(None) => {}
-            Ok(Some(Whole { series, doubt })) => {
+            Ok(Some(Whole { tracks, doubt })) => {
                 seeds.push(seed);
-                runs.push(series);
+                runs.push(tracks);
                 doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
             }
             Err(error) => {

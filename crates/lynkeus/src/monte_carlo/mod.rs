@@ -22,7 +22,7 @@ use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
-use apart::{Job, Series, Single, gathered, room};
+use apart::{Job, Single, Track, gathered, room};
 pub use report::Settled;
 use report::headers_of;
 use statistics::Found;

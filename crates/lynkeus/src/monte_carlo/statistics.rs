@@ -1,6 +1,6 @@
 //! Means, quantiles and the worst of many runs.
 
-use super::{Bands, Series};
+use super::{Bands, Track};
 
 /// The quantiles that a band reaches over.
 const LOW: f64 = 0.05;
@@ -17,9 +17,9 @@ pub(super) struct Found {
 }
 
 /// Of the quantity at a place of every run.
-pub(super) fn of_runs(runs: &[Vec<Series>], place: usize) -> Found {
-    let own: Vec<&Series> = runs.iter().filter_map(|run| run.get(place)).collect();
-    let rows = own.first().map_or(0, |series| series.truth.len());
+pub(super) fn of_runs(runs: &[Vec<Track>], place: usize) -> Found {
+    let own: Vec<&Track> = runs.iter().filter_map(|run| run.get(place)).collect();
+    let rows = own.first().map_or(0, |track| track.truth.len());
     let mut scatter = Scatter::new(own.len());
     for row in 0..rows {
         let pairs = own.iter().map(|s| (s.truth[row], s.estimate(row)));
@@ -92,7 +92,7 @@ impl Scatter {
     }
 }
 
-impl Series {
+impl Track {
     fn estimate(&self, row: usize) -> f64 {
         self.estimate.get(row).copied().unwrap_or(f64::NAN)
     }
@@ -161,16 +161,16 @@ mod tests {
 
     #[test]
     fn the_worst_error_has_no_sign_and_a_gap_counts_nowhere() {
-        let series = |estimate: [f64; 2]| {
-            vec![Series {
+        let track = |estimate: [f64; 2]| {
+            vec![Track {
                 truth: vec![1.0, 1.0],
                 estimate: estimate.to_vec(),
             }]
         };
         let runs = [
-            series([-4.0, 2.0]),
-            series([3.0, f64::NAN]),
-            series([1.0, 0.5]),
+            track([-4.0, 2.0]),
+            track([3.0, f64::NAN]),
+            track([1.0, 0.5]),
         ];
         let found = of_runs(&runs, 0);
         assert_eq!(found.error_worst, [5.0, 1.0]);

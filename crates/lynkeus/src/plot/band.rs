@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::decimate::decimated;
+use super::decimate::{decimated, stretches};
 use super::render::{BLUE, Chart, Drawn, VERMILION};
 use super::{Band, Span};
 use crate::Series;
@@ -30,8 +30,7 @@ pub(super) fn draw_band(
 ) -> Drawn {
     let edge = |values: &Series| decimated(&band.time, values, columns);
     let (low, high) = (edge(&band.low), edge(&band.high));
-    let pieces = finite_pieces(&low).into_iter().zip(finite_pieces(&high));
-    for (low, high) in pieces {
+    for (low, high) in stretches(&low).zip(stretches(&high)) {
         let outline = high.iter().chain(low.iter().rev());
         let outline: Vec<(f64, f64)> = outline
             .map(|p| (p.0, p.1.clamp(shown.start, shown.end)))
@@ -39,11 +38,6 @@ pub(super) fn draw_band(
         chart.draw_series([Polygon::new(outline, band_style())])?;
     }
     Ok(())
-}
-
-fn finite_pieces(points: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
-    let pieces = points.split(|p| !p.1.is_finite());
-    pieces.filter(|piece| piece.len() > 1).collect()
 }
 
 /// Marks spans of time at the foot of a panel; those closer than a column of the picture are one.
@@ -87,18 +81,5 @@ mod tests {
         let found = joined(&spans, 0.1);
         let found: Vec<(f64, f64)> = found.iter().map(|s| (s.from, s.to)).collect();
         assert_eq!(found, [(0.0, 2.0), (3.0, 3.05)]);
-    }
-
-    #[test]
-    fn a_band_has_a_piece_between_gaps() {
-        let points = [
-            (0.0, 1.0),
-            (1.0, 1.0),
-            (2.0, f64::NAN),
-            (3.0, 1.0),
-            (4.0, 2.0),
-        ];
-        let lengths: Vec<usize> = finite_pieces(&points).iter().map(|p| p.len()).collect();
-        assert_eq!(lengths, [2, 2]);
     }
 }

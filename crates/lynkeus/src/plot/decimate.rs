@@ -9,8 +9,10 @@ type Point = (f64, f64);
 
 /// Points of a curve, at most four for each of `columns` equal spans of time: the first, the
 /// lowest, the highest and the last, in their order. A curve with few points stays as it is.
-/// Non-finite values are kept, one for each gap: they break the line.
-pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<(f64, f64)> {
+/// A value that is not finite breaks the line: one is kept for each column without values, and
+/// between columns where a gap reaches from one to the next. A gap within a column is too narrow
+/// to be seen.
+pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<Point> {
     let points = || time.iter().zip(values);
     let count = time.len().min(values.len());
     let (first, last) = (time.get(0), count.checked_sub(1).and_then(|i| time.get(i)));
@@ -22,34 +24,86 @@ pub(super) fn decimated(time: &Series, values: &Series, columns: usize) -> Vec<(
         return points().collect();
     }
     let column = |p: Point| ((p.0 - first) / width).floor();
-    let are_together =
-        |a: Point, b: Point| column(a) == column(b) && a.1.is_finite() == b.1.is_finite();
-    let mut kept = vec![];
+    let mut kept = Kept::default();
     let mut few: Option<Few> = None;
     for point in points().enumerate() {
         match &mut few {
-            Some(few) if are_together(few.last.1, point.1) => few.take(point),
+            Some(few) if column(few.last) == column(point.1) => few.take(point),
             _ => {
-                kept.extend(few.replace(Few::new(point)).iter().flat_map(Few::corners));
+                let done = few.replace(Few::new(point));
+                done.iter().for_each(|done| kept.add(done));
             }
         }
     }
-    kept.extend(few.iter().flat_map(Few::corners));
-    kept
+    few.iter().for_each(|done| kept.add(done));
+    kept.points
 }
 
 /// A point of a curve with its row.
 type Numbered = (usize, Point);
 
-/// What is drawn of points that are close together.
+fn is_gap(point: Point) -> bool {
+    !point.0.is_finite() || !point.1.is_finite()
+}
+
+/// What is drawn of the columns so far.
+#[derive(Default)]
+struct Kept {
+    points: Vec<Point>,
+    ends_in_gap: bool,
+}
+
+impl Kept {
+    /// Adds the next column.
+    fn add(&mut self, few: &Few) {
+        let is_across = self.ends_in_gap && is_gap(few.first);
+        if is_across || few.corners.is_none() {
+            self.points.push((few.first.0, f64::NAN));
+        }
+        self.points
+            .extend(few.corners.iter().flat_map(Corners::points));
+        self.ends_in_gap = is_gap(few.last);
+    }
+}
+
+/// The points of a column.
 struct Few {
+    first: Point,
+    last: Point,
+    /// none where all are gaps
+    corners: Option<Corners>,
+}
+
+impl Few {
+    fn new(point: Numbered) -> Self {
+        let mut few = Self {
+            first: point.1,
+            last: point.1,
+            corners: None,
+        };
+        few.take(point);
+        few
+    }
+
+    fn take(&mut self, point: Numbered) {
+        self.last = point.1;
+        if !is_gap(point.1) {
+            self.corners
+                .get_or_insert_with(|| Corners::new(point))
+                .take(point);
+        }
+    }
+}
+
+/// What is drawn of finite points that are close together.
+struct Corners {
     first: Numbered,
     low: Numbered,
     high: Numbered,
     last: Numbered,
 }
 
-impl Few {
+impl Corners {
     fn new(point: Numbered) -> Self {
         Self {
             first: point,
@@ -61,17 +115,17 @@ impl Few {
 
     fn take(&mut self, point: Numbered) {
         let y = |p: Numbered| p.1.1;
-        if y(point).total_cmp(&y(self.low)).is_lt() {
+        if y(point) < y(self.low) {
             self.low = point;
         }
-        if y(point).total_cmp(&y(self.high)).is_ge() {
+        if y(point) >= y(self.high) {
             self.high = point;
         }
         self.last = point;
     }
 
     /// The first, lowest, highest and last point, in their order, each once.
-    fn corners(&self) -> Vec<Point> {
+    fn points(&self) -> Vec<Point> {
         let mut kept = vec![self.first, self.low, self.high, self.last];
         kept.sort_by_key(|p| p.0);
         kept.dedup_by_key(|p| p.0);
@@ -79,9 +133,27 @@ impl Few {
     }
 }
 
-/// The pieces of a line inside a band of values: a line that leaves the band ends at its edge.
-pub(super) fn clipped(points: &[(f64, f64)], band: &Range<f64>) -> Vec<Vec<(f64, f64)>> {
-    let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
+/// The stretches of a curve between gaps.
+pub(super) fn stretches(points: &[Point]) -> impl Iterator<Item = &[Point]> {
+    let all = points.split(|p| is_gap(*p));
+    all.filter(|stretch| !stretch.is_empty())
+}
+
+/// The pieces of a line inside a band of values: a line that leaves the band ends at its edge. A
+/// point without neighbours is a piece of its own.
+pub(super) fn clipped(points: &[Point], band: &Range<f64>) -> Vec<Vec<Point>> {
+    let mut pieces: Vec<Vec<Point>> = Vec::new();
+    for stretch in stretches(points) {
+        match stretch {
+            [alone] => pieces.extend(band.contains(&alone.1).then(|| vec![*alone])),
+            _ => cut(stretch, band, &mut pieces),
+        }
+    }
+    pieces
+}
+
+/// Adds the pieces of a line without gaps.
+fn cut(points: &[Point], band: &Range<f64>, pieces: &mut Vec<Vec<Point>>) {
     let mut joined = false;
     for pair in points.windows(2) {
         let &[a, b] = pair else { continue };
@@ -95,14 +167,12 @@ pub(super) fn clipped(points: &[(f64, f64)], band: &Range<f64>) -> Vec<Vec<(f64,
         }
         joined = to == b;
     }
-    pieces
 }
 
 /// The part of a segment inside the band.
 fn segment(a: Point, b: Point, band: &Range<f64>) -> Option<(Point, Point)> {
-    let finite = [a.0, a.1, b.0, b.1].iter().all(|v| v.is_finite());
     let outside = |edge: fn(f64, f64) -> bool, at: f64| edge(a.1, at) && edge(b.1, at);
-    if !finite || outside(|v, e| v < e, band.start) || outside(|v, e| v > e, band.end) {
+    if outside(|v, e| v < e, band.start) || outside(|v, e| v > e, band.end) {
         return None;
     }
     let moved = |p: Point, q: Point| {
@@ -152,6 +222,47 @@ mod tests {
                 vec![(4.0, 0.0), (5.0, 1.0)]
             ]
         );
+    }
+
+    /// A sensor that reports in every other row of a long log.
+    #[test]
+    fn gaps_do_not_make_a_picture_large() {
+        let n = 100_000;
+        let time = Series::from((0..n).map(f64::from).collect::<Vec<_>>());
+        let reported = |is: &dyn Fn(i32) -> bool| {
+            let value = |row: i32| {
+                if is(row) {
+                    f64::from(row % 7)
+                } else {
+                    f64::NAN
+                }
+            };
+            decimated(&time, &(0..n).map(value).collect::<Vec<_>>().into(), 500)
+        };
+        let every_other = reported(&|row| row % 2 == 0);
+        assert!(every_other.len() <= 2000, "{}", every_other.len());
+        assert_eq!(stretches(&every_other).count(), 1);
+        // a column has 200 rows; the second gap reaches from the middle of one to that of the next
+        let twice = reported(&|row| !(5000..6000).contains(&row) && !(9900..10_100).contains(&row));
+        let found = stretches(&twice).map(|s| (s[0].0, s[s.len() - 1].0));
+        let expected = [(0.0, 4999.0), (6000.0, 9899.0), (10_100.0, 99_999.0)];
+        assert!(found.eq(expected));
+        // what is far apart stays where it was
+        let sparse = reported(&|row| row % 2500 == 1300);
+        let alone: Vec<f64> = stretches(&sparse).map(|s| s[0].0).collect();
+        assert!(
+            alone
+                .iter()
+                .copied()
+                .eq((0..40).map(|k| f64::from(k * 2500 + 1300)))
+        );
+    }
+
+    #[test]
+    fn a_point_without_neighbours_is_a_piece() {
+        let nan = f64::NAN;
+        let points = [(0.0, nan), (1.0, 0.5), (2.0, nan), (3.0, 5.0), (4.0, nan)];
+        assert_eq!(clipped(&points, &(-1.0..1.0)), [vec![(1.0, 0.5)]]);
     }
 
     #[test]

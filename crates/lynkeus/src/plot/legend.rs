@@ -15,8 +15,19 @@ const SAMPLE: i32 = 28;
 const GAP: i32 = 20;
 
 /// Pixels that a text takes at most in the fonts that viewers have for sans-serif.
-fn width(text: &str, size: u32) -> i32 {
+pub(super) fn width(text: &str, size: u32) -> i32 {
     text.chars().count() as i32 * size as i32 / 2
+}
+
+/// The text, or as much of it as has room in so many pixels.
+pub(super) fn fitted(text: &str, size: u32, room: i32) -> String {
+    if width(text, size) <= room {
+        return text.to_owned();
+    }
+    // a letter takes half of its size, and the dots one or two
+    let letters = 2 * (room - size as i32).max(0) / size as i32;
+    let kept: String = text.chars().take(letters as usize).collect();
+    format!("{}…", kept.trim_end())
 }
 
 /// An entry of the legend.
@@ -69,19 +80,18 @@ pub(super) fn head(root: &Area<'_>, figure: &Figure) -> Drawn {
         false => (8, 38),
     };
     let title = (FONT, TITLE).into_font().style(FontStyle::Bold).color(&INK);
-    root.draw(&Text::new(
-        figure.title.clone(),
-        (LEFT as i32, title_at),
-        title,
-    ))?;
+    let words = fitted(&figure.title, TITLE, (WIDTH - LEFT - RIGHT) as i32);
+    root.draw(&Text::new(words, (LEFT as i32, title_at), title))?;
     let mut right = (WIDTH - RIGHT) as i32;
     for entry in entries.into_iter().rev() {
+        // beside its sample, however broad its letters are
         let words = (FONT, WORDS)
             .into_font()
             .color(&INK)
-            .pos(Pos::new(HPos::Right, VPos::Center));
+            .pos(Pos::new(HPos::Left, VPos::Center));
+        right -= width(entry.label(), WORDS);
         root.draw(&Text::new(entry.label(), (right, legend_at), words))?;
-        right -= width(entry.label(), WORDS) + 4;
+        right -= 4;
         sample(root, entry, right - SAMPLE, legend_at)?;
         right -= SAMPLE + GAP;
     }
@@ -107,6 +117,13 @@ fn sample(root: &Area<'_>, entry: Entry, from: i32, y: i32) -> Drawn {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_has_no_room_is_cut_short() {
+        assert_eq!(fitted("level of the tank", 14, 119), "level of the tank");
+        assert_eq!(fitted("level of the tank", 14, 118), "level of the t…");
+        assert_eq!(fitted("level", 14, 7), "…");
+    }
 
     /// "GermaniManes: drift-observable observer" is some 330 pixels, four entries are 470, of 812.
     #[test]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Band, Kind, Panel};
+use super::{Band, Extent, Kind, Panel};
 use crate::Series;
 use crate::series::{Sorted, Store};
 
@@ -22,12 +22,14 @@ impl Panel {
     /// The limits of the value axis: everything, unless the estimate peaks.
     ///
     /// The core of a panel is the span of its true and measured values together with the middle
-    /// 90 % of the estimate and of the ends of its bands; a band that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
+    /// 90 % of the estimate and of the ends of its bands; a band of deviations that is wider elsewhere is cut. Where all values span more than 4 times the core, the axis ends one
     /// core's height beyond it on either side. `None` when nothing is finite.
     pub fn limits(&self) -> Option<Limits> {
         let curves = extremes(self.values(|_| true))?;
-        let all = self.bands().fold(curves, |all, b| union(&all, &b));
-        let core = self.core().unwrap_or_else(|| all.clone());
+        // sorted once: they may be long
+        let bands: Vec<Range<f64>> = self.bands().collect();
+        let all = bands.iter().fold(curves, |all, b| union(&all, b));
+        let core = self.core(bands).unwrap_or_else(|| all.clone());
         let height = core.end - core.start;
         if height > 0.0 && all.end - all.start > TOO_TALL * height {
             let shown = (core.start - height).max(all.start)..(core.end + height).min(all.end);
@@ -40,18 +42,26 @@ impl Panel {
                 beyond: Some(beyond),
             });
         }
+        let whole = self.quantiles().fold(all.clone(), |all, b| union(&all, &b));
+        let is_too_tall = whole.end - whole.start > TOO_TALL * height;
         Some(Limits {
-            shown: padded(all),
+            shown: padded(if is_too_tall { all } else { whole }),
             beyond: None,
         })
     }
 
-    fn core(&self) -> Option<Range<f64>> {
+    /// What bands of quantiles span: errors that there were, not only what is thought possible.
+    fn quantiles(&self) -> impl Iterator<Item = Range<f64>> {
+        let own = self.bands.iter().filter(|b| b.extent == Extent::Quantiles);
+        own.filter_map(|b| extremes(b.low.iter().chain(&b.high)))
+    }
+
+    fn core(&self, bands: Vec<Range<f64>>) -> Option<Range<f64>> {
         let peaks = |kind| matches!(kind, Kind::Estimated | Kind::Worst | Kind::Mean);
         let known = extremes(self.values(|kind| !peaks(kind)));
         let store = self.curves.first().map(|c| c.values.store());
         let middle = store.and_then(|store| middle(store, self.values(peaks)));
-        let spans = known.into_iter().chain(middle).chain(self.bands());
+        let spans = known.into_iter().chain(middle).chain(bands);
         spans.reduce(|a, b| union(&a, &b))
     }
 
@@ -148,6 +158,28 @@ mod tests {
             .unwrap();
         assert_eq!(limits.beyond, None);
         assert!(limits.shown.end > 3.0);
+    }
+
+    #[test]
+    fn quantiles_are_shown_whole_and_deviations_are_not() {
+        let limits = |extent: Extent| {
+            let mut high = vec![1.0; 100];
+            high[3] = 1.5;
+            let band = Band {
+                extent,
+                time: (0..100).map(f64::from).collect::<Vec<_>>().into(),
+                low: vec![-1.0; 100].into(),
+                high: high.into(),
+            };
+            let mean = curve(Kind::Mean, vec![0.0; 100]);
+            let panel = Panel {
+                bands: vec![band],
+                ..panel(vec![mean])
+            };
+            panel.limits().unwrap().shown.end
+        };
+        assert!(limits(Extent::Quantiles) > 1.5);
+        assert!(limits(Extent::TwoDeviations) < 1.2);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod axis;
 mod band;
 mod bars;
 mod chart;
+mod curve;
 mod decimate;
 mod grid;
 mod legend;

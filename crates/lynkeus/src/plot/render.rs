@@ -10,8 +10,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::band::{draw_band, draw_marks};
-use super::decimate::{clipped, decimated};
-use super::legend::head;
+use super::curve::draw_curve;
+use super::legend::{fitted, head, width};
 use super::limits::Limits;
 use super::{Curve, Figure, Kind, Panel};
 use crate::{Error, visible};
@@ -119,35 +119,36 @@ fn draw_panel(
     let mut curves: Vec<&Curve> = panel.curves.iter().collect();
     curves.sort_by_key(|c| c.kind);
     for curve in curves {
-        draw_curve(&mut chart, curve, &limits.shown)?;
+        draw_curve(&mut chart, curve, time, &limits.shown)?;
     }
     Ok(())
 }
 
 fn caption(area: &Area<'_>, panel: &Panel, limits: &Limits) -> Drawn {
     let baseline = CAPTION as i32 - 5;
-    let style = (FONT, 14)
-        .into_font()
-        .color(&INK)
-        .pos(Pos::new(HPos::Left, VPos::Bottom));
-    area.draw(&Text::new(
-        panel.caption.clone(),
-        (LEFT as i32, baseline),
-        style,
-    ))?;
-    let Some(beyond) = limits.beyond else {
-        return Ok(());
+    let at = |side, size: u32, colour: &RGBColor| {
+        let font = (FONT, size).into_font();
+        font.color(colour).pos(Pos::new(side, VPos::Bottom))
     };
     let is_worst = panel.curves.iter().any(|c| c.kind == Kind::Worst);
     let who = if is_worst { "worst run" } else { "estimate" };
-    let note = (FONT, 13)
-        .into_font()
-        .color(&VERMILION)
-        .pos(Pos::new(HPos::Right, VPos::Bottom));
+    let note = limits.beyond.map_or(String::new(), |beyond| {
+        format!("{who} peaks at {} (axis cut)", tick(&rounded(beyond, 3)))
+    });
+    let (left, right) = (LEFT as i32, (WIDTH - RIGHT) as i32);
+    let words = fitted(&panel.caption, 14, right - left - width(&note, 14));
     area.draw(&Text::new(
-        format!("{who} peaks at {} (axis cut)", tick(&rounded(beyond, 3))),
-        ((WIDTH - RIGHT) as i32, baseline),
+        words,
+        (left, baseline),
+        at(HPos::Left, 14, &INK),
+    ))?;
+    if note.is_empty() {
+        return Ok(());
+    }
+    area.draw(&Text::new(
         note,
+        (right, baseline),
+        at(HPos::Right, 13, &VERMILION),
     ))
 }
 
@@ -169,21 +170,6 @@ fn axes(chart: &mut Chart<'_>, time_label: Option<&String>, shown: &Range<f64>) 
         mesh.x_desc(label);
     }
     mesh.draw()
-}
-
-fn draw_curve(chart: &mut Chart<'_>, curve: &Curve, shown: &Range<f64>) -> Drawn {
-    let columns = (WIDTH - LEFT - RIGHT) as usize;
-    let points = decimated(&curve.time, &curve.values, columns);
-    if curve.kind == Kind::Measured {
-        let dots = points.into_iter().filter(|p| shown.contains(&p.1));
-        let style = ORANGE.mix(0.75).filled();
-        chart.draw_series(dots.map(|p| Circle::new(p, 2, style)))?;
-        return Ok(());
-    }
-    for piece in clipped(&points, shown) {
-        chart.draw_series([PathElement::new(piece, stroke(curve.kind))])?;
-    }
-    Ok(())
 }
 
 /// A tick's number without the dust of binary fractions.
@@ -332,6 +318,35 @@ mod tests {
             .to_svg()
             .unwrap();
         assert!(svg.len() < 150_000, "{} bytes", svg.len());
+    }
+
+    #[test]
+    fn a_long_caption_leaves_room_for_the_note() {
+        let mut peak = wave(Kind::Estimated, 300);
+        let values = peak.values.iter().enumerate();
+        let values = values.map(|(i, x)| if i == 3 { 1e3 } else { x });
+        peak.values = values.collect::<Vec<_>>().into();
+        let mut picture = figure(vec![peak, wave(Kind::True, 300)]);
+        picture.panels[0].caption = "level ".repeat(30);
+        let svg = picture.to_svg().unwrap();
+        assert!(svg.contains("peaks at 1000 (axis cut)") && svg.contains('…'));
+        let longest = svg
+            .lines()
+            .filter(|line| line.starts_with("level"))
+            .map(str::len);
+        assert!(longest.max().unwrap() < 100);
+    }
+
+    /// The laboratory's values of a state: few, and far apart.
+    #[test]
+    fn values_without_neighbours_are_dots() {
+        let mut sparse = wave(Kind::True, 300);
+        let values = sparse.values.iter().enumerate();
+        let values = values.map(|(i, x)| if i % 50 == 7 { x } else { f64::NAN });
+        sparse.values = values.collect::<Vec<_>>().into();
+        let svg = figure(vec![sparse, wave(Kind::Estimated, 300)]);
+        let svg = svg.to_svg().unwrap();
+        assert_eq!(svg.matches("<circle").count(), 6);
     }
 
     #[test]

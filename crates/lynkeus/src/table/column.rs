@@ -84,16 +84,12 @@ impl Column {
         column
     }
 
-    /// The same with other values.
-    pub(super) fn with(&self, values: Series) -> Self {
-        let missing = values.iter().filter(|x| !x.is_finite()).count();
+    /// The same with other values, and the first of those that are missing.
+    pub(super) fn with(&self, values: Series, faults: Vec<Fault>) -> Self {
         Self {
+            missing: values.iter().filter(|x| !x.is_finite()).count(),
             values,
-            missing,
-            faults: match missing {
-                0 => vec![],
-                _ => self.faults.clone(),
-            },
+            faults,
             ..self.clone()
         }
     }
@@ -110,6 +106,13 @@ impl Column {
             }
         };
         self.values.push(value);
+    }
+
+    /// Takes a row that has no value.
+    #[cfg(feature = "parquet")]
+    pub(super) fn put_nothing(&mut self) {
+        self.miss(self.values.len() as u64 + 1, "");
+        self.values.push(f64::NAN);
     }
 
     /// Takes the next row's point in time.

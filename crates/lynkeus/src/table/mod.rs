@@ -89,6 +89,22 @@ impl Table {
         &self.file
     }
 
+    /// The table in messages about all of it.
+    pub(crate) fn place(&self) -> String {
+        match self.file.is_empty() {
+            true => "the table".to_owned(),
+            false => self.file.clone(),
+        }
+    }
+
+    /// A line of it in messages; a table made in Rust has rows, from 1.
+    fn place_of(&self, line: u64) -> String {
+        match self.file.is_empty() {
+            true => format!("row {line} of the table"),
+            false => format!("{}:{line}", self.file),
+        }
+    }
+
     /// A column if there is one of that name whose cells can be told; missing ones are NaN.
     pub fn get(&self, name: &str) -> Option<&Series> {
         let column = self.columns.iter().find(|c| c.name == name)?;
@@ -125,18 +141,25 @@ impl Table {
         if let Some(refusal) = &column.refusal {
             return Err(
                 Error::input(format!("column \"{name}\": {}", refusal.message))
-                    .at(format!("{}:{}", self.file, refusal.line))
+                    .at(self.place_of(refusal.line))
                     .hint(refusal.hint),
             );
         }
-        match column.faults.first() {
-            Some(fault) if column.missing == column.values.len() => Err(Error::input(format!(
-                "column \"{name}\" has no number, found {fault}"
-            ))
-            .at(format!("{}:{}", self.file, fault.line))
-            .hint("name another column under [estimate] columns, or mend this one")),
-            _ => Ok(&column.values),
+        match column.missing == column.values.len() {
+            true => Err(self.without_number(column)),
+            false => Ok(&column.values),
         }
+    }
+
+    fn without_number(&self, column: &Column) -> Error {
+        let message = format!("column \"{}\" has no number", column.name);
+        let refusal = match column.faults.first() {
+            Some(fault) => {
+                Error::input(format!("{message}, found {fault}")).at(self.place_of(fault.line))
+            }
+            None => Error::input(message).at(self.place()),
+        };
+        refusal.hint("name another column under [estimate] columns, or mend this one")
     }
 
     /// A column in which the last value stands where a cell is missing, and the first one before it.
@@ -171,7 +194,7 @@ impl Table {
                     more => format!(" and {} more such cells", more - 1),
                 }
             ))
-            .at(format!("{}:{}", self.file, fault.line))
+            .at(self.place_of(fault.line))
             .hint("remove the row or fill the cell"));
         }
         values
@@ -195,7 +218,7 @@ impl Table {
             "time must increase from row to row, found \"{name}\" = {at} after {before} in line {}",
             line(i)
         ))
-        .at(format!("{}:{}", self.file, line(i + 1)))
+        .at(self.place_of(line(i + 1)))
         .hint("sort the rows by time and remove doubles"))
     }
 
@@ -209,7 +232,7 @@ impl Table {
             Some(_) => Err(Error::input(format!(
                 "two columns are called \"{name}\", expected one"
             ))
-            .at(&self.file)),
+            .at(self.place())),
         }
     }
 
@@ -220,7 +243,7 @@ impl Table {
             list(self.names())
         );
         let near = nearest(name, self.names()).unwrap_or("…");
-        Error::input(found).at(&self.file).hint(format!(
+        Error::input(found).at(self.place()).hint(format!(
             "if it has another name, set time = \"{near}\" in [estimate] of the study"
         ))
     }
@@ -231,7 +254,7 @@ impl Table {
             list(self.names())
         );
         let near = nearest(name, self.names());
-        Error::input(found).at(&self.file).hint(match near {
+        Error::input(found).at(self.place()).hint(match near {
             Some(near) => format!(
                 "if \"{near}\" is meant, add [estimate] columns = {{ \"{name}\" = \"{near}\" }} to the study"
             ),

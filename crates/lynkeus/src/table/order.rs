@@ -1,7 +1,7 @@
 //! Rows that are late, repeated, or have no time.
 
 use super::Table;
-use super::column::Column;
+use super::column::{Column, Fault};
 use super::lines::Lines;
 use crate::series::{Sorted, steps};
 use crate::{Error, Series};
@@ -51,15 +51,19 @@ impl Table {
         let groups = Groups::of(times)?;
         let timeless = times.len() - groups.rows.len();
         let repeated = groups.rows.len() - groups.count;
-        let merged = |column: &Column| Ok(column.with(groups.merged(&column.values)?));
+        let merged = |column: &Column| {
+            let values = groups.merged(&column.values)?;
+            let faults = groups.faults_left(&column.faults, &values, &self.lines);
+            Ok(column.with(values, faults))
+        };
         let columns: Result<Vec<Column>, Error> = self.columns.iter().map(merged).collect();
         let notes = [
-            (count, "came late and were put in their place"),
+            (count, "that came late and were put in their place"),
             (
                 repeated,
-                "repeat a time: the last value of each column counts",
+                "that repeat a time, of which the last value of each column counts",
             ),
-            (timeless, "have no time and are left out"),
+            (timeless, "that have no time and are left out"),
         ];
         Ok(Some(Ordered {
             table: Table {
@@ -71,7 +75,7 @@ impl Table {
             notes: notes
                 .into_iter()
                 .filter(|(count, _)| *count > 0)
-                .map(|(count, what)| format!("rows of the log: {count} {what}"))
+                .map(|(count, what)| format!("rows of the log {what}: {count}"))
                 .collect(),
         }))
     }
@@ -80,7 +84,7 @@ impl Table {
         Error::input(format!(
             "the clock jumps back: \"{time}\" = {t} after {latest}, more than a late row may be"
         ))
-        .at(format!("{}:{}", self.file, self.lines.of(row)))
+        .at(self.place_of(self.lines.of(row)))
         .hint("split the log there, or allow later rows: `late` of [estimate], in units of time")
     }
 }
@@ -132,6 +136,24 @@ impl Groups {
         }
         Ok(merged)
     }
+
+    /// The faults that no other row of the same time mends.
+    fn faults_left(&self, faults: &[Fault], merged: &Series, lines: &Lines) -> Vec<Fault> {
+        let (mut group, mut left) = (vec![], vec![]);
+        if faults.is_empty() {
+            return left;
+        }
+        let mut values = merged.iter();
+        for (&row, &is_end) in self.rows.iter().zip(&self.ends) {
+            let line = lines.of(row);
+            group.extend(faults.iter().filter(|fault| fault.line == line));
+            if is_end {
+                let is_mended = values.next().is_none_or(f64::is_finite);
+                left.extend(group.drain(..).filter(|_| !is_mended).cloned());
+            }
+        }
+        left
+    }
 }
 
 #[cfg(test)]
@@ -151,6 +173,29 @@ mod tests {
         assert_eq!(table.readings("u").unwrap().to_vec(), [5.0, 6.0, 7.0, 8.0]);
         assert_eq!(notes.len(), 3, "{notes:?}");
         assert!(read("t,y\n0,1\n1,2\n", None).unwrap().is_none());
+    }
+
+    /// A logger with a row for each sensor.
+    #[test]
+    fn a_cell_that_another_row_fills_is_no_fault() {
+        let text = "t,y,u\n0,1,\n0,,5\n1,2,\n1,,6\n2,3,\n2,,7\n3,4,\n4,5,8\n,,\n";
+        let Ordered { table, .. } = read(text, None).unwrap().unwrap();
+        let faults = |name: &str| -> Vec<u64> {
+            let faults = table.faults(name).iter();
+            faults.map(|fault| fault.line).collect()
+        };
+        assert_eq!((table.missing("y"), faults("y")), (0, vec![]));
+        assert_eq!((table.missing("u"), faults("u")), (1, vec![8]));
+    }
+
+    /// The first cells without a number are all mended, and the only one that is not is not known.
+    #[test]
+    fn a_column_without_numbers_is_refused_whatever_is_left_out() {
+        let text = "t,y\n,\n,\n,\n,\n,\n0,\n1,\n";
+        let Ordered { table, .. } = read(text, None).unwrap().unwrap();
+        assert!(table.faults("y").is_empty());
+        let error = table.readings("y").unwrap_err().to_string();
+        assert!(error.contains("column \"y\" has no number"), "{error}");
     }
 
     #[test]

@@ -137,7 +137,7 @@ fn each<T: DataType>(
             let value = if is_null { None } else { present.next() };
             match value {
                 Some(value) => take(column, value),
-                None => column.put(f64::NAN),
+                None => column.put_nothing(),
             }
         }
     }

@@ -273,3 +273,23 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_table_made_in_rust_has_rows_and_no_file() {
+    let column = |name: &str, values: &[f64]| (name.to_owned(), values.to_vec());
+    let columns = vec![
+        column("t", &[0.0, 2.0, 1.0]),
+        column("y", &[1.0, f64::NAN, 1.0]),
+    ];
+    let table = Table::from_columns(columns).unwrap();
+    let told = |error: Error| error.to_string();
+    let time = told(table.time("t").unwrap_err());
+    assert!(
+        time.starts_with("row 3 of the table: time must increase"),
+        "{time}"
+    );
+    let cell = told(table.column("y").unwrap_err());
+    assert!(cell.starts_with("row 2 of the table: "), "{cell}");
+    let absent = told(table.readings("level").unwrap_err());
+    assert!(absent.starts_with("the table: no column"), "{absent}");
+}

@@ -32,6 +32,8 @@ pub struct Axis {
     pub values: Vec<f64>,
     /// The value that the study has now (1 for a factor), if it has the key.
     pub present: Option<f64>,
+    /// The value that is proposed, where the study does not have the key.
+    pub proposed: Option<f64>,
     /// The key without indices.
     base: String,
     /// Its indices, from 0.
@@ -193,6 +195,7 @@ fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
         is_factor,
         values,
         present,
+        proposed: None,
         base: base.to_owned(),
         path,
         place: name.place.clone(),

@@ -22,8 +22,6 @@ mod whiteness;
 
 use std::ops::ControlFlow;
 
-use lynkeus_observers::Design;
-
 pub use axis::Axis;
 pub use measures::Measure;
 pub use rewrite::Change;
@@ -32,7 +30,7 @@ use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::{Error, ErrorKind, Study, Table, prepare};
-use pinned::{Pinned, pinned};
+use pinned::pinned;
 use record::Record;
 use reference::Reference;
 
@@ -122,14 +120,20 @@ pub fn tune(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Sweep, Error> {
     // what the study says wrongly is told before anything is computed
+    refuse_named_filter(study)?;
     let given = axis::axes(study);
     if !study.tune.keys.is_empty() {
         given?;
     }
     let plant = prepare::plant(study)?;
-    let Pinned { study, notes: told } = pinned(&Prepared::new(study, &plant)?)?;
-    let study = &study;
-    let axes = axis::axes(study)?;
+    let pinned = pinned(&Prepared::new(study, &plant)?)?;
+    let study = &pinned.study;
+    refuse_named_filter(study)?;
+    let mut axes = axis::axes(study)?;
+    let is_proposed = |axis: &&mut Axis| pinned.proposed == Some(axis.path().0);
+    for axis in axes.iter_mut().filter(is_proposed) {
+        axis.proposed = axis.present.take();
+    }
     let grid = axis::grid(study, &axes)?;
     let prepared = Prepared::new(study, &plant)?;
     let bench = Bench::new(&prepared, log)?;
@@ -157,7 +161,7 @@ pub fn tune(
         },
         watch,
     )?;
-    let mut notes = told;
+    let mut notes = pinned.notes.clone();
     notes.extend_from_slice(bench.notes());
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));
@@ -201,7 +205,9 @@ impl<'a> Bench<'a> {
             Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
             Err(error) => return Err(error),
         };
-        refuse_filter(prepared.study(), &design)?;
+        if design.observer.filter.is_some() {
+            return Err(filter_refused(prepared.study(), design.observer.family));
+        }
         match self {
             Self::Simulation(reference) => {
                 trial::simulated(prepared, &design, reference, row, watch)
@@ -225,17 +231,23 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// A filter's equations without its updates are the plant alone.
-fn refuse_filter(study: &Study, design: &Design) -> Result<(), Error> {
-    match design.observer.filter {
+/// A filter that the study names has nothing to sweep, whatever its keys.
+fn refuse_named_filter(study: &Study) -> Result<(), Error> {
+    let named = study.observer.family.as_ref();
+    let family = named.and_then(|name| lynkeus_observers::find(&name.text));
+    match family.filter(|family| family.is_filter()) {
+        Some(filter) => Err(filter_refused(study, filter.name())),
         None => Ok(()),
-        Some(_) => Err(Error::input(format!(
-            "`tune` judges observers whose correction is in their equations: expected another family than the filter \"{}\"",
-            design.observer.family
-        ))
-        .at(&study.file)
-        .hint("name another `family` in [observer]; `lynkeus compare` judges filters as they are")),
     }
+}
+
+/// A filter's equations without its updates are the plant alone.
+fn filter_refused(study: &Study, family: &str) -> Error {
+    Error::input(format!(
+        "`tune` judges observers whose correction is in their equations: expected another family than the filter \"{family}\""
+    ))
+    .at(&study.file)
+    .hint("name another `family` in [observer], if `lynkeus check` finds one that fits; `lynkeus compare` judges filters as they are")
 }
 
 fn least(rows: &[Row]) -> Option<usize> {
@@ -268,20 +280,39 @@ impl Sweep {
         self.rows.get(self.knee?)
     }
 
-    /// The range of the first key's values that are nearly as good as the knee, the other keys
-    /// being those of the knee: the first figure is within 10 % of the least.
+    /// The range of the first key's values around the knee that are all nearly as good, the other
+    /// keys being those of the knee: the first figure is within 10 % of the least.
     pub fn good(&self) -> Option<std::ops::RangeInclusive<f64>> {
         let knee = self.chosen()?;
+        let at = *knee.values.first()?;
         let limit = NEARLY * knee.figure(measures::OBJECTIVE)?;
-        let beside = self.rows.iter().filter(|row| self.beside_knee(row));
-        let beside =
-            beside.filter(|row| row.figure(measures::OBJECTIVE).is_some_and(|x| x <= limit));
-        let values: Vec<f64> = beside
-            .filter_map(|row| row.values.first().copied())
-            .collect();
-        let low = values.iter().copied().min_by(f64::total_cmp)?;
-        let high = values.iter().copied().max_by(f64::total_cmp)?;
-        Some(low..=high)
+        let beside = self.points(measures::OBJECTIVE, |row| self.beside_knee(row));
+        let (up_to, beyond) = beside.split_at(beside.partition_point(|(x, _)| *x <= at));
+        let is_good = |(_, y): &&(f64, f64)| *y <= limit;
+        let low = up_to.iter().rev().take_while(is_good).last();
+        let high = beyond.iter().take_while(is_good).last();
+        let end = |found: Option<&(f64, f64)>| found.map_or(at, |(x, _)| *x);
+        Some(end(low)..=end(high))
+    }
+
+    /// True for rows that differ from the knee in the first key at most.
+    fn beside_knee(&self, row: &Row) -> bool {
+        let others = |row: &Row| row.values.get(1..).map(<[f64]>::to_vec);
+        self.chosen().is_none_or(|knee| others(knee) == others(row))
+    }
+
+    /// (first key's value, figure) of some rows, in the order of the values.
+    fn points(&self, measure: usize, of: impl Fn(&Row) -> bool) -> Vec<(f64, f64)> {
+        let rows = self.rows.iter().filter(|row| of(row));
+        let point = |row: &Row| {
+            Some((
+                *row.values.first()?,
+                row.figure(measure).unwrap_or(f64::NAN),
+            ))
+        };
+        let mut points: Vec<(f64, f64)> = rows.filter_map(point).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
     }
 
     /// True where no value gave an estimate; the command's exit code is then 1.
@@ -301,5 +332,49 @@ impl Sweep {
                 .join(", "),
             reason.unwrap_or_else(|| "there is no error to judge by".to_owned())
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sweep of one key with these first figures.
+    fn swept(figures: &[(f64, Option<f64>)]) -> Sweep {
+        let row = |&(value, figure): &(f64, Option<f64>)| {
+            let mut row = Row::empty(&[value], 1);
+            row.set(measures::OBJECTIVE, figure);
+            row
+        };
+        let rows: Vec<Row> = figures.iter().map(row).collect();
+        Sweep {
+            plant: String::new(),
+            log: None,
+            axes: vec![],
+            measures: measures::LOGGED,
+            knee: least(&rows),
+            rows,
+            time_unit: None,
+            notes: vec![],
+        }
+    }
+
+    #[test]
+    fn nothing_within_the_good_range_is_worse() {
+        let good = |figures: &[f64]| {
+            let rows = figures.iter().enumerate();
+            let rows: Vec<_> = rows
+                .map(|(i, x)| (i as f64, Some(*x).filter(|x| !x.is_nan())))
+                .collect();
+            swept(&rows).good()
+        };
+        assert_eq!(good(&[9.0, 1.09, 1.0, 1.05, 1.2]), Some(1.0..=3.0));
+        // another valley, or a failed run, lies apart
+        assert_eq!(good(&[1.05, 2.0, 1.0, 1.05, 1.2]), Some(2.0..=3.0));
+        assert_eq!(good(&[1.05, 1.0, f64::NAN, 1.05]), Some(0.0..=1.0));
+        assert_eq!(good(&[f64::NAN]), None);
+        // values in any order
+        let rows = [(4.0, Some(1.0)), (1.0, Some(9.0)), (3.0, Some(1.01))];
+        assert_eq!(swept(&rows).good(), Some(3.0..=4.0));
     }
 }

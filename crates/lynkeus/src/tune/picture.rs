@@ -1,7 +1,7 @@
 //! The trade-off drawn.
 
 use super::axis::shown;
-use super::{Row, Sweep, measures};
+use super::{Sweep, measures};
 use crate::Error;
 use crate::plot::{Chart, Line, Look, Plot, Upright};
 
@@ -19,18 +19,21 @@ impl Sweep {
     pub fn chart(&self) -> Chart {
         let first = self.axes.first();
         let knee = self.chosen().and_then(|row| row.values.first().copied());
-        let present = first.and_then(|a| a.present).filter(|x| Some(*x) != knee);
         let word = |word: &str, x: f64| Some((x, format!("{word} {}", shown(x))));
+        let (present, whose) = match first.and_then(|a| a.proposed) {
+            Some(proposed) => (Some(proposed), "proposed"),
+            None => (first.and_then(|a| a.present), "study"),
+        };
         Chart {
             title: format!("{}: {}", self.plant, self.subject()),
             label: first.map_or(String::new(), |a| a.label()),
-            mark: knee.and_then(|x| match first.and_then(|a| a.present) == Some(x) {
-                true => word("knee, and the study:", x),
-                false => word("knee", x),
+            mark: knee.and_then(|x| match present == Some(x) {
+                true if whose == "study" => word("knee, and the study:", x),
+                _ => word("knee", x),
             }),
             present: present
-                .filter(|x| self.covers(*x))
-                .and_then(|x| word("study", x)),
+                .filter(|x| knee != Some(*x) && self.covers(*x))
+                .and_then(|x| word(whose, x)),
             band: self.good(),
             crosses: self.failures(),
             plots: self.plots(),
@@ -56,12 +59,6 @@ impl Sweep {
             .filter(|row| row.figure(measures::OBJECTIVE).is_none())
             .filter_map(|row| row.values.first().copied())
             .collect()
-    }
-
-    /// True for rows that differ from the knee in the first key at most.
-    pub(super) fn beside_knee(&self, row: &Row) -> bool {
-        let others = |row: &Row| row.values.get(1..).map(<[f64]>::to_vec);
-        self.chosen().is_none_or(|knee| others(knee) == others(row))
     }
 
     fn plots(&self) -> Vec<Plot> {
@@ -134,19 +131,5 @@ impl Sweep {
             },
             lines: combinations.iter().map(line).collect(),
         }
-    }
-
-    /// (first key's value, figure) of some rows, in the order of the values.
-    fn points(&self, measure: usize, of: impl Fn(&Row) -> bool) -> Vec<(f64, f64)> {
-        let rows = self.rows.iter().filter(|row| of(row));
-        let point = |row: &Row| {
-            Some((
-                *row.values.first()?,
-                row.figure(measure).unwrap_or(f64::NAN),
-            ))
-        };
-        let mut points: Vec<(f64, f64)> = rows.filter_map(point).collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        points
     }
 }

@@ -11,6 +11,8 @@ use crate::{Error, Study};
 /// A study that names its family.
 pub(super) struct Pinned {
     pub study: Study,
+    /// the key for which a value is proposed, as the study lacks it
+    pub proposed: Option<&'static str>,
     /// which family that is, and which speed, where the study leaves them open
     pub notes: Vec<String>,
 }
@@ -22,14 +24,18 @@ pub(super) struct Pinned {
 /// # Errors
 /// Keys of `[observer]` that cannot be used.
 pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
-    let mut study = prepared.study().clone();
-    let mut notes = vec![];
-    let swept = axis::swept(&study);
+    let study = prepared.study();
+    let as_it_is = || Pinned {
+        study: study.clone(),
+        proposed: None,
+        notes: vec![],
+    };
+    let swept = axis::swept(study);
     if study.observer.family.is_some() && !swept.is_empty() {
-        return Ok(Pinned { study, notes });
+        return Ok(as_it_is());
     }
     let Some(choice) = prepared.choice()? else {
-        return Ok(Pinned { study, notes });
+        return Ok(as_it_is());
     };
     let owns = |name: &str| {
         let family = lynkeus_observers::find(name);
@@ -45,17 +51,20 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
             .map(|e| e.family),
     };
     let Some(family) = family else {
-        return Ok(Pinned { study, notes });
+        return Ok(as_it_is());
     };
-    if family == choice.family {
-        study.observer.tuning = choice.completed(&study.observer.tuning);
-        notes.extend(choice.proposal.as_ref().map(ToString::to_string));
+    let mut pinned = as_it_is();
+    let proposal = choice.proposal.as_ref();
+    if let Some(proposal) = proposal.filter(|_| family == choice.family) {
+        pinned.study.observer.tuning = choice.completed(&study.observer.tuning);
+        pinned.proposed = Some(proposal.speed.key());
+        pinned.notes.push(proposal.to_string());
     }
     if study.observer.family.is_none() {
-        notes.push(format!(
+        pinned.notes.push(format!(
             "every value is one of the family {family}; `family` of [observer] names another"
         ));
     }
-    study.observer.family = Some(Name::from(family));
-    Ok(Pinned { study, notes })
+    pinned.study.observer.family = Some(Name::from(family));
+    Ok(pinned)
 }

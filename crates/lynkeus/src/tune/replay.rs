@@ -95,8 +95,8 @@ impl Replay<'_> {
             None => Ok(Ok(course)),
             Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
             Some(error) => {
-                let log = self.record.log.table.file();
-                Err(interrupted_on(error, log, &study.file))
+                let log = self.record.log.table.place();
+                Err(interrupted_on(error, &log, &study.file))
             }
         }
     }

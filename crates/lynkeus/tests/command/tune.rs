@@ -218,20 +218,62 @@ fn a_sensor_that_is_not_scored_is_told_of() {
     );
 }
 
+/// Whatever else the study lacks: what to sweep, or the filter's name.
 #[test]
 fn a_filter_is_refused() {
     let folder = Folder::empty();
+    let study = "plant = \"m.mo\"\nprocess_noise = { x = 0.1 }\nsensors = { noise = { y = 0.1 } }\nsimulate = { until = 9, output_step = 0.1 }\n";
+    let model = |y: &str| {
+        format!(
+            "model M Real x(start = 1, min = -9, max = 9); output Real y = {y}; equation der(x) = -x; end M;"
+        )
+    };
+    let named = "observer = { family = \"ekf\" }\n";
+    for (y, rest) in [
+        (
+            "x",
+            format!("{named}tune = {{ keys = {{ gate = [3, 5] }} }}\n"),
+        ),
+        ("x", named.to_owned()),
+        // nothing but a filter fits
+        ("x^2", String::new()),
+        ("x^2", "tune = { keys = { gate = [3, 5] } }\n".to_owned()),
+    ] {
+        folder.write("m.mo", &model(y));
+        folder.write("s.toml", &format!("{study}{rest}"));
+        let ended = folder.run(&["tune", "s.toml"]);
+        assert_eq!(ended.code, 2, "{}", ended.out);
+        assert!(ended.err.contains("the filter \"ekf\""), "{}", ended.err);
+    }
+}
+
+/// The study has no θ: the picture must not say that it has.
+#[test]
+fn a_value_that_is_proposed_is_not_the_studys() {
+    let folder = Folder::empty();
     folder.write(
         "m.mo",
-        "model M Real x(start = 1, min = -9, max = 9); output Real y = x; equation der(x) = -x; end M;",
+        "model M input Real u(min = 0, max = 2, start = 1); Real x(start = 1, min = -9, max = 9); Real z(start = 1, min = -9, max = 9); output Real y = x; equation der(x) = z - x; der(z) = u - z; end M;",
     );
     folder.write(
         "s.toml",
-        "plant = \"m.mo\"\nobserver = { family = \"ekf\" }\nprocess_noise = { x = 0.1 }\nsensors = { noise = { y = 0.1 } }\nsimulate = { until = 9, output_step = 0.1 }\ntune = { keys = { gate = [3, 5] } }\n",
+        "plant = \"m.mo\"\nsensors = { noise = { y = 0.1 } }\nsimulate = { until = 9, output_step = 0.1 }\n",
     );
-    let ended = folder.run(&["tune", "s.toml"]);
-    assert_eq!(ended.code, 2, "{}", ended.out);
-    assert!(ended.err.contains("the filter \"ekf\""), "{}", ended.err);
+    let ended = folder.run(&["tune", "s.toml", "--json", "--plot", "t.svg"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(ended.json()["present"]["theta"].is_null(), "{}", ended.out);
+    assert!(!folder.read("t.svg").contains("study"));
+    let proposed = ended.json()["notes"][0].as_str().unwrap().to_owned();
+    assert!(proposed.starts_with("theta = "), "{proposed}");
+    let value = proposed.split_whitespace().nth(2).unwrap();
+    folder.change(
+        "s.toml",
+        "sensors",
+        &format!("observer = {{ theta = {value} }}\nsensors"),
+    );
+    let ended = folder.run(&["tune", "s.toml", "--json", "--plot", "t.svg"]);
+    assert_eq!(ended.json()["present"]["theta"].to_string(), value);
+    assert!(folder.read("t.svg").contains("study"));
 }
 
 #[test]

@@ -54,7 +54,10 @@ fn what_is_written_is_read_back_to_the_bit() {
             .zip(&values)
             .all(|(a, b)| a == *b || (a.is_nan() && b.is_nan()))
     );
-    assert_eq!((table.missing("x y"), table.faults("x y")[0].line), (1, 8));
+    let fault = &table.faults("x y")[0];
+    assert_eq!((table.missing("x y"), fault.line), (1, 8));
+    // a null is no NaN that somebody wrote
+    assert_eq!(fault.to_string(), "an empty cell");
 }
 
 #[test]

@@ -73,6 +73,7 @@ fn a_grid_is_counted_without_overflow() {
             is_factor: false,
             values: vec![1.0; points],
             present: None,
+            proposed: None,
             base: (*key).to_owned(),
             path: vec![],
             place: None,
