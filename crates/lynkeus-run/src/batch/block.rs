@@ -29,10 +29,20 @@ const PATIENCE: usize = 1024;
 /// Whether somebody wants the work to end.
 pub(crate) type IsOver<'a> = dyn Fn() -> bool + Sync + 'a;
 
-/// Groups of lanes in a block.
-pub(crate) fn groups(program: &Program) -> usize {
+/// Least groups of lanes that are worth what a block computes for all of them, where there are so many.
+const FEW: usize = 4;
+
+/// Most groups of lanes in a block.
+fn most_groups(program: &Program) -> usize {
     let group = (program.states + program.disturbances) * size_of::<Lane>();
     (CACHE / (2 * group).max(1)).clamp(1, GROUPS)
+}
+
+/// Groups of lanes in each block of so many runs: few enough that every thread has a block.
+pub(crate) fn groups(program: &Program, runs: usize, threads: usize) -> usize {
+    let most = most_groups(program);
+    let own = runs.div_ceil(LANES).div_ceil(threads.max(1));
+    own.clamp(FEW.min(most), most)
 }
 
 /// The working memory of a thread.
@@ -58,7 +68,7 @@ impl<'p> Desk<'p> {
             arguments: vec![],
             shared: Buffer::new(AHEAD * program.step.shared()),
             shared_row: Buffer::new(LANES * program.row.shared()),
-            rows: Buffer::new(groups(program) * program.columns),
+            rows: Buffer::new(most_groups(program) * program.columns),
             program,
             is_over,
             // what was ended between two portions does not begin the next
@@ -345,5 +355,42 @@ impl Run {
                 self.bound
                     .check(time, names, &x[program.plant_states..], String::new)
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Method, Simulation, Step, System};
+    use lynkeus_expr::Graph;
+
+    /// Two states: 64 groups of 64 bytes, twice, are 8 KiB.
+    #[test]
+    fn every_thread_has_a_block_where_there_are_enough_runs() {
+        let g = Graph::new();
+        let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
+        let states = [("x", x, 1.0), ("v", v, 0.0)];
+        let states = states.map(|(name, e, start)| (name.to_owned(), e.node(), start));
+        let dx = [v.node(), (-x).node()];
+        let plant = System::new(&g, time.node(), &states, &[], &dx, &[]).unwrap();
+        let inputs = System::new(&g, time.node(), &[], &[], &[], &[]).unwrap();
+        let mut simulation = Simulation::new(plant, inputs, 1.0, 0.5);
+        simulation.method = Method::Rk4(Step::AtMost(0.1));
+        let (_, program) = super::super::Plan::new(&simulation).unwrap().unwrap();
+        for (runs, threads, expected) in [
+            (0, 1, 4),
+            (1, 8, 4),
+            (100, 1, 25),
+            (100, 2, 13),
+            (1_000, 8, 32),
+            (100_000, 8, 64),
+            (1_000, 0, 64),
+        ] {
+            assert_eq!(
+                groups(&program, runs, threads),
+                expected,
+                "{runs} {threads}"
+            );
+        }
     }
 }

@@ -5,17 +5,18 @@
 //! follows from it, is computed once for a block. Elementary functions are those of
 //! [`lynkeus_expr::lanes`], in every trajectory, so that what a run gives depends on neither its
 //! neighbours nor the number of threads; where none is used a run in a batch is that of
-//! [`Simulation::run`] to the bit.
+//! [`Simulation::run`] to the bit ([`Batch::is_exact`]).
 
 mod block;
 mod code;
 mod plan;
 mod split;
 
+use std::num::NonZero;
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::Builder;
+use std::thread::{Builder, available_parallelism};
 
 use crate::{Column, Error, Simulation};
 use block::{Block, Desk, IsOver, groups};
@@ -80,7 +81,9 @@ impl Batch {
             })
         };
         let columns = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let size = groups(&program) * LANES;
+        // what a run gives does not depend on the block that it is in
+        let threads = available_parallelism().map_or(1, NonZero::get);
+        let size = groups(&program, members.len(), threads) * LANES;
         let mut blocks = vec![];
         for (k, members) in members.chunks(size).enumerate() {
             let member = |m: &Member| {
@@ -105,6 +108,13 @@ impl Batch {
             reached: simulation.start,
             is_cancelled: false,
         }))
+    }
+
+    /// Whether each run is that of [`Simulation::run`] to the bit: no function is used that lanes round
+    /// in their own way.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        !self.program.step.has_functions() && !self.program.row.has_functions()
     }
 
     /// Number of rows of every run.
