@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, SupportsFloat
 
 from .errors import InputError
 
@@ -22,7 +22,7 @@ def text(value: str) -> str:
     return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04X}" for c in quoted) + '"'
 
 
-def number(value: Real) -> str:
+def number(value: SupportsFloat) -> str:
     exact = float(value)
     if math.isnan(exact):
         return "nan"
