@@ -57,8 +57,6 @@ _MEANING: dict[str, _Scalar] = {
     **dict.fromkeys(("logical_not", "invert"), neither),
 }
 _PRODUCTS = frozenset({"matmul", "vecdot", "matvec", "vecmat"})
-#: Which arguments of the other products are factors.
-_FACTORS = {**dict.fromkeys(("dot", "inner", "vdot", "tensordot", "kron"), range(2)), "einsum": range(1, 9)}
 
 
 def _least(a: Any, b: Any) -> Any:
@@ -137,23 +135,13 @@ def _elementwise(
     ufunc: np.ufunc, method: str, plain: list[np.ndarray[Any, Any]], options: dict[str, Any]
 ) -> Any:
     if ufunc.__name__ in _PRODUCTS:
-        return getattr(ufunc, method)(*map(_without_zeros, plain), **options)
+        return getattr(ufunc, method)(*plain, **options)
     function = np.frompyfunc(_scalar(ufunc), ufunc.nin, 1, identity=None)
     if method == "__call__":
         return function(*plain, **options)
     if method == "reduce" and plain[0].size == 0:
         return ufunc.reduce(plain[0].astype(float), **options)
     return getattr(function, method)(*plain, **options)
-
-
-def _without_zeros(array: Any) -> np.ndarray[Any, Any]:
-    """An array for products: a zero of a matrix is a term that is not there, not 0·x."""
-    objects = np.array(array, dtype=object)
-    for place in np.ndindex(objects.shape):
-        element = objects[place]
-        if not isinstance(element, Value) and element == 0:
-            objects[place] = 0
-    return objects
 
 
 def called(function: Any, given: Any, options: Any) -> Any:
@@ -163,9 +151,6 @@ def called(function: Any, given: Any, options: Any) -> Any:
         return own(*given, **options)
     given = tuple(_opened(x) for x in given)
     options = {name: _opened(x) for name, x in options.items()}
-    factors = _FACTORS.get(function.__name__)
-    if factors is not None:
-        given = tuple(_without_zeros(x) if place in factors else x for place, x in enumerate(given))
     plainly = getattr(function, "_implementation", function)
     return _wrapped(plainly(*given, **options))
 

@@ -20,7 +20,8 @@ _CONDITIONS = RELATIONS | {"and", "or", "not"}
 
 _NO_IF = (
     "write `lynkeus.where(condition, a, b)` in place of `if`, `lynkeus.maximum` and `lynkeus.minimum` in"
-    " place of `max` and `min`, `&`, `|` and `~` in place of `and`, `or` and `not`"
+    " place of `max` and `min`, `&`, `|` and `~` in place of `and`, `or` and `not`; an array that is compared"
+    " is made by `np.stack`, not by `np.array`"
 )
 _NO_NUMBER = (
     "write `lynkeus.sin` in place of `math.sin`, and so on; what has traced values in it is a list, or an"
@@ -99,19 +100,21 @@ def _is(given: Any, number: float) -> bool:
 
 
 def _nothing(given: Any) -> bool:
-    """An integer zero has no sign: it is a term that is not there, as at the start of ``sum``."""
+    """An integer zero has no sign: it is a term that is not there, as at the start of ``sum``, or a
+    product with 0."""
     return isinstance(given, Integral) and given == 0
 
 
 def arithmetic(op: str, a: Any, b: Any) -> Any:
-    """``+ - * / ^`` of two scalars, one of them traced, without operations that change no value."""
+    """``+ - * / ^`` of two scalars, one of them traced, without operations that change no value. A
+    product with the number 0 is 0: zeros of a matrix are terms that are not there."""
     if op == "+":
         if _nothing(a) or _is(a, -0.0):
             return b
         if _nothing(b) or _is(b, -0.0):
             return a
     elif op == "*":
-        if _nothing(a) or _nothing(b):
+        if any(_is(x, zero) for x in (a, b) for zero in (0.0, -0.0)):
             return 0
         if _is(a, 1.0):
             return b

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import lynkeus as ly
@@ -266,7 +266,6 @@ def two_tanks() -> Plant:
         "inputs": {"pump": {**volts, "min": 0, "start": 2}},
         "outputs": {"level": {"unit": "V"}},
         "params": {"k1": 0.03951, "k2": 0.07283, "k3": 0.06651, "k4": 0.03037},
-        "name": "TwoTanks",
     }
 
 
@@ -306,3 +305,9 @@ PLANTS: Mapping[str, Plant] = {
     "two-tanks/two_tanks": two_tanks(),
     "van-der-pol-pair/van_der_pol_pair": van_der_pol_pair(),
 }
+
+
+def traced(f: Callable[..., Any], states: Any = ("x",), **given: Any) -> ly.Model:
+    """A model of one function, for tests."""
+    h = given.pop("h", None)
+    return ly.Model.from_function(f, h, states=states, **given)
