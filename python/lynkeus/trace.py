@@ -315,10 +315,10 @@ class Condition(Value):
 
 
 def both(a: Any, b: Any) -> Any:
-    """True where two conditions hold."""
+    """True where two conditions hold. A known result is a truth of NumPy's: ``~True`` is -2."""
     for x, other in ((a, b), (b, a)):
         if _is_number(x):
-            return other if x else False
+            return other if x else np.False_
     return apply("and", a, b)
 
 
@@ -326,7 +326,7 @@ def either(a: Any, b: Any) -> Any:
     """True where one of two conditions holds."""
     for x, other in ((a, b), (b, a)):
         if _is_number(x):
-            return True if x else other
+            return np.True_ if x else other
     return apply("or", a, b)
 
 

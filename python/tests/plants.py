@@ -311,3 +311,8 @@ def traced(f: Callable[..., Any], states: Any = ("x",), **given: Any) -> ly.Mode
     """A model of one function, for tests."""
     h = given.pop("h", None)
     return ly.Model.from_function(f, h, states=states, **given)
+
+
+def derivatives(model: ly.Model, x: Any, t: float = 0.0, u: Any = ()) -> np.ndarray[Any, Any]:
+    """x' of a model at a point."""
+    return model.functions().f(t, x, u)
