@@ -194,9 +194,10 @@ def interp(x: Any, xp: Any, fp: Any) -> Any:
         raise refusal("`interp`: expected points that increase", here())
 
     def scalar(at: Any) -> Any:
+        if not _any_traced(at, *points, *values):
+            return np.interp(at, points, values)
         inside = _least(_most(at, points[0]), points[-1])
-        graph = next(v.graph for v in (inside, *points, *values) if isinstance(v, Value))
-        return graph.node("interpolate", inside, *points, *values)
+        return apply("interpolate", inside, *points, *values)
 
     return _wrapped(np.frompyfunc(scalar, 1, 1)(_plain(x)))
 

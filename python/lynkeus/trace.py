@@ -130,7 +130,7 @@ def arithmetic(op: str, a: Any, b: Any) -> Any:
 
 
 class Value:
-    """What expressions and conditions have in common. Compared by identity, which is equality."""
+    """What expressions and conditions have in common. Equal ones are the same object."""
 
     __slots__ = ("arguments", "data", "graph", "op", "place")
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
 import math
+import re
 import time
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -232,3 +234,15 @@ def test_a_traced_study_travels_as_bytes() -> None:
     study = ly.Study(model, simulate={"until": 1, "output_step": 0.5})
     again = pickle.loads(pickle.dumps(study))
     np.testing.assert_array_equal(again.simulate()["x_hat"], study.simulate()["x_hat"])
+
+
+# documentation
+
+
+def test_the_examples_of_the_documentation() -> None:
+    assert doctest.testmod(importlib.import_module("lynkeus.model")).failed == 0
+    section = (EXAMPLES.parent / "docs" / "python.md").read_text().split("## Models from functions")[1]
+    blocks = dict(reversed(re.findall(r"```(\w+)\n(.*?)```", section, re.DOTALL)))
+    names: dict[str, Any] = {}
+    exec(blocks["python"], names)
+    assert names["tanks"].text == blocks["modelica"]

@@ -131,7 +131,11 @@ ARRAYS: dict[str, Callable[[Any], Any]] = {
         np.where(x > 1, x, -x) + ly.where(x < [1, 2, 3], np.sqrt(x), 0) + np.select([x > 2, x > 1], [x, 1.0])
     ),
     "lists": lambda x: ly.sin([x[0], 1.0, x[2]]) + ly.maximum([0, 1, 2], [x[0], x[1], 0.5]) + np.array([*x]),
-    "tables": lambda x: np.interp(x, [0, 1, 2.5], [0, 3, 1]) + ly.interp(x, np.array([0.0, 2]), x[:2]),
+    "tables": lambda x: (
+        np.interp(x, [0, 1, 2.5], [0, 3, 1])
+        + ly.interp(x, np.array([0.0, 2]), x[:2])
+        + ly.interp([x[0], 1, 9], [0, 2], [5, 3])
+    ),
     "norms": lambda x: x / np.linalg.norm(x) + np.sqrt(x @ x) + np.diff(x).sum() + np.exp(-np.array([*x])),
     "comparisons": lambda x: ly.where(np.stack([x[2], x[0], 1]) > 1, x, np.stack([x[0], 2, 3]) * 2),
     "masks": lambda x: x * (x > 1) + np.any(x > 2) + np.all(x > 0) + np.logical_or.reduce(x > 2),
