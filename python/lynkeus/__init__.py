@@ -10,6 +10,8 @@
 
 from ._lynkeus import Estimator, Log
 from .errors import InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
+from .functions import abs, acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
+from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .model import Model
 from .results import (
     Answer,
@@ -53,12 +55,34 @@ __all__ = [
     "Sweep",
     "Table",
     "TraceError",
+    "abs",
+    "acos",
+    "asin",
+    "atan",
+    "atan2",
+    "ceil",
     "certify",
     "check",
     "compare",
+    "cos",
+    "cosh",
     "design",
     "estimate",
+    "exp",
+    "floor",
     "how_well",
+    "interp",
+    "log",
+    "log10",
+    "maximum",
+    "minimum",
+    "sign",
     "simulate",
+    "sin",
+    "sinh",
+    "sqrt",
+    "tan",
+    "tanh",
     "tune",
+    "where",
 ]
