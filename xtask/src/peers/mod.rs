@@ -8,6 +8,7 @@
 mod clock;
 mod lanes;
 pub mod ours;
+pub mod runs;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,7 +20,6 @@ use crate::options;
 use crate::process::{root, run};
 use crate::python;
 
-const BEGIN: &str = "<!-- table: cargo xtask bench-peers -->\n";
 const END: &str = "<!-- end of table -->";
 const REQUIREMENTS: &str = include_str!("../../peers/requirements.txt");
 
@@ -62,7 +62,7 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
         }
     }
     agree(peers.iter().filter_map(Peer::end))?;
-    write(&table(&peers))
+    write("bench-peers", &table(&peers))
 }
 
 /// # Errors
@@ -220,15 +220,17 @@ fn machine() -> String {
     format!("{model}; {}", compiler.lines().next().unwrap_or("gcc"))
 }
 
-fn write(table: &str) -> Result<(), String> {
+/// Writes the table of a task.
+fn write(task: &str, table: &str) -> Result<(), String> {
     eprint!("{table}");
+    let begin = format!("<!-- table: cargo xtask {task} -->\n");
     let page = root().join("BENCHMARKS.md");
     let text = fs::read_to_string(&page).map_err(|e| format!("{}: {e}", page.display()))?;
     let marks = text
-        .split_once(BEGIN)
+        .split_once(&begin)
         .and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
-    let (before, after) = marks.ok_or("BENCHMARKS.md has no table mark")?;
-    let text = format!("{before}{BEGIN}{table}{END}{after}");
+    let (before, after) = marks.ok_or_else(|| format!("BENCHMARKS.md has no mark {begin}"))?;
+    let text = format!("{before}{begin}{table}{END}{after}");
     fs::write(&page, text).map_err(|e| format!("{}: {e}", page.display()))
 }
 

@@ -54,6 +54,7 @@ impl<'g> Walk<'g> {
             .collect();
         // refuses symbols outside the region
         Tape::new(graph, &region.symbols(), roots)?;
+        let moving: HashSet<Node> = moving.iter().copied().collect();
         let mut moves: Vec<bool> = vec![];
         for &node in &nodes {
             let arguments = graph.arguments(node);

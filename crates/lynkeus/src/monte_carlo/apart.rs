@@ -98,12 +98,12 @@ impl Job<'_> {
         if let Some(ended) = &ran.course.ended {
             return Err(Error::refused(ended.to_string()).at(&study.file));
         }
-        if ran.run.times().last() != Some(&rig.simulation.until) {
+        if ran.run.time.last() != Some(rig.simulation.until) {
             return Ok(None);
         }
-        self.time.get_or_init(|| ran.run.times().to_vec());
+        self.time.get_or_init(|| ran.run.time.to_vec());
         let tracks = self.followed.iter().map(|f| Track {
-            truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
+            truth: ran.run.column(f.truth).map_or(vec![], |x| x.to_vec()),
             estimate: ran.course.estimates[f.estimate].to_vec(),
         });
         let tracks = tracks.collect();
