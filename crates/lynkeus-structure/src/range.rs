@@ -65,24 +65,52 @@ pub fn enclosure_within(
     region: &Region,
     budget: usize,
 ) -> Result<Interval, MissingInput> {
-    let own = region.restricted(&graph.symbols_of(&[node]));
-    let question = Glance(Question::new(node, &own, 0));
-    let regular = match graph.noted(&question) {
-        Some(known) => known,
-        None => {
-            let mut whole = [Interval::ENTIRE];
-            let tape = Tape::new(graph, &own.symbols(), &[node])?;
-            tape.evaluator_in(Intervals).eval(&own.cell(), &mut whole);
-            let regular =
-                whole[0].is_defined() || Regularity::of(graph, &[node], &[], &own)?.holds();
-            graph.note(question, regular);
-            regular
-        }
-    };
-    match regular {
+    match has_values(graph, node, region)? {
         true => Ok(range_within(graph, node, region, budget)?.enclosure),
         false => Ok(Interval::UNKNOWN),
     }
+}
+
+/// The magnitude of the [`enclosure_within`], at up to half its cost: the end of the range that
+/// is nearer to zero is not sought. Infinite where the expression may lack a value.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn magnitude_within(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    budget: usize,
+) -> Result<f64, MissingInput> {
+    if !has_values(graph, node, region)? {
+        return Ok(f64::INFINITY);
+    }
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let question = Question::new(node, &region, budget);
+    if let Some(known) = graph.noted::<_, Range>(&question) {
+        return Ok(known.enclosure.magnitude());
+    }
+    if let Some(known) = graph.noted(&question) {
+        return Ok(known);
+    }
+    let size = Search::new(graph, node, &region, budget)?.magnitude();
+    graph.note(question, size);
+    Ok(size)
+}
+
+/// Whether an expression is seen to have a value everywhere on the box.
+fn has_values(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
+    let own = region.restricted(&graph.symbols_of(&[node]));
+    let question = Glance(Question::new(node, &own, 0));
+    if let Some(known) = graph.noted(&question) {
+        return Ok(known);
+    }
+    let mut whole = [Interval::ENTIRE];
+    let tape = Tape::new(graph, &own.symbols(), &[node])?;
+    tape.evaluator_in(Intervals).eval(&own.cell(), &mut whole);
+    let regular = whole[0].is_defined() || Regularity::of(graph, &[node], &[], &own)?.holds();
+    graph.note(question, regular);
+    Ok(regular)
 }
 
 /// Whether an expression has values on the whole box.
@@ -167,11 +195,22 @@ mod tests {
                 range_within(&g, node, &region, 600).unwrap().enclosure,
             )
         };
-        for node in [x * (1.0 - x), (x * (x - 1.0) + 0.3).sqrt()] {
+        let size = |node: Node| magnitude_within(&g, node, &region, 600).unwrap();
+        let root = (x * (x - 1.0) + 0.3).sqrt();
+        for node in [
+            x * (1.0 - x),
+            x * (x - 1.0),
+            (x - 0.4).sin() * x - 0.1,
+            root,
+        ] {
+            let size = size(node.node());
             let (quick, searched) = both(node.node());
             assert!(quick == searched && quick.is_defined());
             assert!(quick.magnitude() < 0.6);
+            // found before the range was, and the same
+            assert_eq!(size, quick.magnitude());
         }
+        assert_eq!(size((1.0 / (x - 0.5)).node()), f64::INFINITY);
         let (quick, searched) = both((1.0 / (x - 0.5)).node());
         assert!(!quick.is_defined() && !searched.is_defined());
         assert_eq!(quick.magnitude(), f64::INFINITY);

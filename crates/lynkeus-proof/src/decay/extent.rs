@@ -103,11 +103,10 @@ mod tests {
         }];
         let models = [ErrorModel { constant, sectors }];
         let found = distances(&coupled(&models, n));
-        for i in 0..n - 1 {
-            for j in 0..n - 1 {
-                assert_eq!(found[i][j], i.abs_diff(j));
-            }
-            assert_eq!(found[i][n - 1], i.abs_diff(2) + 1);
+        for (i, row) in found.iter().enumerate().take(n - 1) {
+            let along: Vec<usize> = (0..n - 1).map(|j| i.abs_diff(j)).collect();
+            assert_eq!(row[..n - 1], along);
+            assert_eq!(row[n - 1], i.abs_diff(2) + 1);
         }
         let mut corrected = models.clone();
         for row in 0..n {

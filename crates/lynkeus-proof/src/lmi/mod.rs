@@ -123,12 +123,11 @@ impl Problem {
     /// An unknown symmetric n×n matrix with zeros where `kept` says no; it is asked for rows
     /// i ≤ j only.
     pub fn symmetric_where(&mut self, n: usize, kept: impl Fn(usize, usize) -> bool) -> Affine {
-        let mut places = vec![vec![None; n]; n];
-        for j in 0..n {
-            for i in (0..=j).filter(|&i| kept(i, j)) {
-                places[j][i] = Some(self.fresh(1).start);
-            }
-        }
+        let mut column = |j: usize| {
+            let place = |i: usize| kept(i, j).then(|| self.fresh(1).start);
+            (0..=j).map(place).collect::<Vec<_>>()
+        };
+        let places: Vec<Vec<Option<usize>>> = (0..n).map(&mut column).collect();
         Affine::unknown(n, n, |i, j| places[i.max(j)][i.min(j)])
     }
 

@@ -58,6 +58,8 @@ struct Branch {
     /// the first of its two halves, the second behind it
     halves: Option<usize>,
     sampled: bool,
+    /// its extreme corner that is one of the cell that it is a half of
+    shared: Option<End>,
 }
 
 /// A value attained.
@@ -123,7 +125,7 @@ impl<'a> Search<'a> {
             lowest: None,
             highest: None,
         };
-        search.add(region.cell());
+        search.add(region.cell(), None);
         search.sample(0, true);
         Ok(search)
     }
@@ -135,6 +137,23 @@ impl<'a> Search<'a> {
 
     /// The end of the range, as well as the budget allows.
     pub fn end(&mut self, end: End) -> Found {
+        self.end_beyond(end, f64::INFINITY)
+    }
+
+    /// A bound of the absolute values, as well as the budget allows. The end that values were
+    /// seen further out at is sought first; the other only as far as it is not nearer to zero.
+    pub fn magnitude(&mut self) -> f64 {
+        let size = |end: End| self.attained(end).map_or(0.0, f64::abs);
+        let (first, second) = match size(End::Lower) > size(End::Upper) {
+            true => (End::Lower, End::Upper),
+            false => (End::Upper, End::Lower),
+        };
+        let size = -self.end(first).bound;
+        size.max(-self.end_beyond(second, -size).bound)
+    }
+
+    /// The same where a bound of `enough` is as good as a better one.
+    fn end_beyond(&mut self, end: End, enough: f64) -> Found {
         let mut open = BinaryHeap::from([Open {
             bound: end.bound(self.tree[0].values),
             place: 0,
@@ -142,7 +161,8 @@ impl<'a> Search<'a> {
         for step in 0..self.budget {
             let Some(weakest) = open.peek() else { break };
             let looks = step % OFTEN == 0;
-            if self.is_close(weakest.bound, end) || looks && self.graph.spent().is_some() {
+            let done = weakest.bound >= enough || self.is_close(weakest.bound, end);
+            if done || looks && self.graph.spent().is_some() {
                 break;
             }
             let Some(first) = self.halved(weakest.place) else {
@@ -183,7 +203,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn add(&mut self, cell: Cell) {
+    fn add(&mut self, cell: Cell, shared: Option<End>) {
         let mut values = [Interval::ENTIRE];
         self.bounds.eval(&cell, &mut values);
         self.tree.push(Branch {
@@ -191,6 +211,7 @@ impl<'a> Search<'a> {
             values: values[0],
             halves: None,
             sampled: false,
+            shared,
         });
     }
 
@@ -201,8 +222,8 @@ impl<'a> Search<'a> {
         }
         let (one, other) = self.region.split(&self.tree[place].cell)?;
         let first = self.tree.len();
-        self.add(one);
-        self.add(other);
+        self.add(one, Some(End::Lower));
+        self.add(other, Some(End::Upper));
         self.tree[place].halves = Some(first);
         Some(first)
     }
@@ -224,23 +245,30 @@ impl<'a> Search<'a> {
     }
 
     /// Looks at the middle of a cell and its two extreme corners, and at the middles of its
-    /// faces where `faces` asks for them: these cost more than the cell's bound.
+    /// faces where `faces` asks for them: these cost more than the cell's bound. Whoever halves
+    /// a cell has looked at its corners.
     fn sample(&mut self, place: usize, faces: bool) {
         if std::mem::replace(&mut self.tree[place].sampled, true) {
             return;
         }
-        let cell = &self.tree[place].cell;
-        let points = match faces {
-            true => self.region.samples(cell),
-            false => self.region.corners(cell),
-        };
+        let Branch { cell, shared, .. } = &self.tree[place];
+        let mut points = vec![self.region.middle_point(cell)];
+        if *shared != Some(End::Lower) {
+            points.push(cell.iter().map(|side| side.lo()).collect());
+        }
+        if *shared != Some(End::Upper) {
+            points.push(cell.iter().map(|side| side.hi()).collect());
+        }
+        if faces {
+            points.extend(self.region.faces(cell));
+        }
         for point in points {
             self.look(point);
         }
     }
 
     fn look(&mut self, at: Vec<f64>) {
-        if !self.region.reaches(&at) {
+        if !(at.iter().all(|x| x.is_finite()) && self.region.reaches(&at)) {
             return;
         }
         let mut out = [0.0];
@@ -258,6 +286,47 @@ impl<'a> Search<'a> {
         }
         if self.highest.as_ref().is_none_or(|best| value > best.value) {
             self.highest = Some(attained());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Dimension;
+
+    /// The second end costs fewer cells than it does alone, and is the same.
+    #[test]
+    fn the_ends_share_their_cells() {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let f = (x * y - x * x + (x - y).sin() * y).node();
+        let side = |name: &str, symbol: Node| Dimension {
+            name: name.into(),
+            symbol,
+            min: -1.0,
+            max: 2.0,
+            integer: false,
+        };
+        let region = Region {
+            dimensions: vec![side("x", x.node()), side("y", y.node())],
+        };
+        let of = |ends: &[End]| {
+            let mut search = Search::new(&g, f, &region, 400).unwrap();
+            let found: Vec<f64> = ends.iter().map(|&end| search.end(end).bound).collect();
+            (found, search.tree.len())
+        };
+        let (both, cells) = of(&[End::Lower, End::Upper]);
+        let ((lower, first), (upper, second)) = (of(&[End::Lower]), of(&[End::Upper]));
+        assert!(cells < first + second - 1, "{cells} {first} {second}");
+        assert_eq!(both[0], lower[0]);
+        assert!((both[1] - upper[0]).abs() <= 2.0 * TOLERANCE * upper[0].abs());
+        for i in 0..=60 {
+            for j in 0..=60 {
+                let (x, y) = (-1.0 + 0.05 * f64::from(i), -1.0 + 0.05 * f64::from(j));
+                let value = x * y - x * x + (x - y).sin() * y;
+                assert!(both[0] <= value && value <= -both[1]);
+            }
         }
     }
 }
