@@ -10,6 +10,7 @@
 
 from ._lynkeus import Estimator, Log
 from .errors import InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
+from .functions import Driven, Functions, Observer
 from .model import Model
 from .results import (
     Answer,
@@ -35,8 +36,10 @@ __all__ = [
     "Check",
     "Comparison",
     "Design",
+    "Driven",
     "Estimation",
     "Estimator",
+    "Functions",
     "HowWell",
     "InputError",
     "LimitError",
@@ -45,6 +48,7 @@ __all__ = [
     "Model",
     "MonteCarlo",
     "NotCredible",
+    "Observer",
     "Record",
     "RefusedError",
     "Run",
