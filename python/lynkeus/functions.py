@@ -97,10 +97,10 @@ class Functions:
             raise _absent("to_nlsys", "control") from None
 
         def update(t: float, x: Column, u: Column, _: Mapping[str, Any]) -> Column:
-            return self._core.f(t, x, u)
+            return self.f(t, x, u)
 
         def output(t: float, x: Column, u: Column, _: Mapping[str, Any]) -> Column:
-            return self._core.h(t, x, u)
+            return self.h(t, x, u)
 
         return control.nlsys(
             update,
@@ -121,7 +121,7 @@ class Functions:
         text, has_systems = self._core.source("casadi")
         module = _executed(text)
         # the symbolic solution of a matrix of scalars has no pivots
-        symbols = casadi.MX if has_systems else casadi.SX
+        symbols: Any = casadi.MX if has_systems else casadi.SX
         vectors = _arguments(self)
         t = symbols.sym("t")
         x, u = symbols.sym(vectors[0], len(self.states)), symbols.sym(vectors[1], len(self.inputs))

@@ -74,6 +74,19 @@ def test_the_text_evaluates_the_same_over_numpy(name: str) -> None:
                 assert deviation(module["h"](np, t, x, u), system.h(t, x, u)) < 1e-13
 
 
+@pytest.mark.parametrize("z", [(0, 0, 0), (1, 0, 0), (0, 1.2, 0), (0, np.pi / 3, 0.5)])
+def test_a_singular_gain_is_passed_within_bounds_as_the_tool_does(z: tuple[float, ...]) -> None:
+    observer = systems("germani-manes/theoretical.toml")[1]
+    module: dict[str, Any] = {}
+    exec(observer.source("python"), module)
+    w = np.array([1.0, 1.0, 0.0])
+    ours = observer.f(0.0, z, w)
+    assert np.isfinite(ours).all()
+    assert deviation(module["f"](np, 0.0, z, w), ours) < 1e-13
+    pytest.importorskip("casadi")
+    assert deviation(observer.to_casadi().f(0.0, z, w), ours) < 1e-13
+
+
 @pytest.mark.parametrize("name", STUDIES)
 def test_jax_evaluates_and_differentiates_the_same(name: str) -> None:
     jax = pytest.importorskip("jax")
@@ -257,3 +270,44 @@ def test_a_text_that_no_one_reads_stays_as_it_is(tmp_path: Path) -> None:
     path.write_text("model Wrong\n  Real x;\nequation\n  der(x) = y;\nend Wrong;\n")
     with pytest.raises(InputError, match="wrong.mo:4"):
         Model.load(path).functions()
+
+
+TANK = """
+    model Tank
+      input Real inflow(min = 0, max = 5);
+      input Real leak(min = 0, max = 1);
+      Real level(start = 3, min = 0.1, max = 10);
+      output Real y = level;
+    equation
+      der(level) = inflow - 0.5*sqrt(level) - leak;
+    end Tank;"""
+
+
+def test_a_loop_of_do_mpc_takes_the_estimates() -> None:
+    do_mpc = pytest.importorskip("do_mpc")
+    casadi = pytest.importorskip("casadi")
+    from lynkeus.mpc import Estimator
+
+    model = do_mpc.model.Model("continuous")
+    height = model.set_variable("_x", "height")
+    leak = model.set_variable("_x", "leak")
+    inflow = model.set_variable("_u", "inflow")
+    model.set_rhs("height", inflow - 0.5 * casadi.sqrt(height) - leak)
+    model.set_rhs("leak", casadi.SX(0))
+    model.set_meas("y", height)
+    model.setup()
+    plant = do_mpc.simulator.Simulator(model)
+    plant.set_param(t_step=0.05)
+    plant.setup()
+    plant.x0 = np.array([4.0, 0.3])
+    study = Study(Model.from_modelica(TANK), unknown=["leak"], observer={"theta": 3.0})
+    with pytest.raises(InputError, match="the state 'height' has no counterpart"):
+        Estimator(study, model, 0.05)
+    estimator = Estimator(study, model, 0.05, names={"height": "level"})
+    level = 4.0
+    for _ in range(200):
+        x = estimator.make_step(level, [1.4])
+        level = plant.make_step(np.array([[1.4]])).item()
+    assert x.shape == (2, 1)
+    # the last step of a level at rest changes it by less
+    assert deviation(x, [level, 0.3]) < 1e-3

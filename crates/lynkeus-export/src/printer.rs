@@ -67,6 +67,11 @@ fn uses(code: &Code, operations: &[Node]) -> HashMap<Node, usize> {
     uses
 }
 
+/// An operation in words.
+fn called(op: impl std::fmt::Debug) -> String {
+    format!("{op:?}").to_lowercase()
+}
+
 struct Printer<'a> {
     code: &'a Code,
     dialect: &'a dyn Dialect,
@@ -97,31 +102,34 @@ impl Printer<'_> {
 
     fn operation(&self, op: Op) -> Result<Text, Refusal> {
         let dialect = self.dialect;
-        let form = match op {
-            Op::Powi(x, n) => return Ok(dialect.power(&self.value(x), n)),
-            Op::Select(c, x, y) => {
-                let (x, y) = (self.value(x), self.value(y));
-                return Ok(dialect.select(&self.condition(c), &x, &y));
-            }
-            Op::Unary(op, _) => dialect.unary(op).ok_or_else(|| self.lacks(&op)),
-            Op::Binary(op, ..) => dialect.binary(op).ok_or_else(|| self.lacks(&op)),
-            other => Err(self.lacks(&other)),
-        }?;
         Ok(match op {
-            Op::Unary(Unary::Not, x) => form.of(&[&self.condition(x)]),
-            Op::Unary(_, x) => form.of(&[&self.value(x)]),
-            Op::Binary(Binary::And | Binary::Or, x, y) => {
-                form.of(&[&self.condition(x), &self.condition(y)])
+            Op::Powi(x, n) => dialect.power(&self.value(x), n),
+            Op::Select(c, x, y) => {
+                dialect.select(&self.condition(c), &self.value(x), &self.value(y))
             }
-            Op::Binary(_, x, y) => form.of(&[&self.value(x), &self.value(y)]),
-            _ => return Err(self.lacks(&op)),
+            Op::Unary(op, x) => {
+                let form = dialect.unary(op).ok_or_else(|| self.lacks(called(op)))?;
+                match op {
+                    Unary::Not => form.of(&[&self.condition(x)]),
+                    _ => form.of(&[&self.value(x)]),
+                }
+            }
+            Op::Binary(op, x, y) => {
+                let form = dialect.binary(op).ok_or_else(|| self.lacks(called(op)))?;
+                match op {
+                    Binary::And | Binary::Or => form.of(&[&self.condition(x), &self.condition(y)]),
+                    _ => form.of(&[&self.value(x), &self.value(y)]),
+                }
+            }
+            // leaves and systems are written elsewhere
+            other => return Err(self.lacks(called(other))),
         })
     }
 
-    fn lacks(&self, operation: &dyn std::fmt::Debug) -> Refusal {
+    fn lacks(&self, operation: impl Into<String>) -> Refusal {
         Refusal::Lacks {
             language: self.dialect.name(),
-            operation: format!("{operation:?}").to_lowercase(),
+            operation: operation.into(),
         }
     }
 
@@ -139,13 +147,13 @@ impl Printer<'_> {
     fn solution(&mut self, node: Node) -> Result<Text, Refusal> {
         let graph = self.code.graph();
         let Some(system) = graph.system(node) else {
-            return Err(self.lacks(&"an implicit function"));
+            return Err(self.lacks("an implicit function"));
         };
         let texts = |nodes: &[Node]| nodes.iter().map(|&n| self.value(n)).collect::<Vec<_>>();
         let (a, b) = (texts(system.matrix()), texts(system.right()));
         let name = self.names.numbered('s');
         let lines = self.dialect.solution(&name, &a, &b);
-        let lines = lines.ok_or_else(|| self.lacks(&"a linear system"))?;
+        let lines = lines.ok_or_else(|| self.lacks("a linear system"))?;
         self.lines.extend(lines);
         Ok(Text::atom(name))
     }
@@ -179,5 +187,126 @@ impl Printer<'_> {
             text: format!("{} != {zero}", text.tighter(Binding::Relation)),
             binding: Binding::Relation,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Form;
+    use crate::python::Namespace;
+    use lynkeus_expr::{Expr, Graph, Tape};
+
+    fn printed<const N: usize>(
+        dialect: &dyn Dialect,
+        make: impl for<'g> Fn([Expr<'g>; 3]) -> [Expr<'g>; N],
+    ) -> Result<Body, Refusal> {
+        let g = Graph::new();
+        let symbols = ["a", "b", "c"].map(|name| g.symbol(name));
+        let outputs = make(symbols).map(|e| e.node());
+        let tape = Tape::new(&g, &symbols.map(|e| e.node()), &outputs).unwrap();
+        let inputs = ["a", "b", "c"].map(Text::atom);
+        Body::of(&Code::of(&tape)?, dialect, &inputs, &mut Names::default())
+    }
+
+    fn text(make: impl for<'g> Fn([Expr<'g>; 3]) -> Expr<'g>) -> String {
+        let body = printed(&Namespace::Numpy, |symbols| [make(symbols)]).unwrap();
+        assert_eq!(body.lines, [""; 0]);
+        body.outputs[0].text.clone()
+    }
+
+    #[test]
+    fn parentheses_keep_the_order_of_operations() {
+        assert_eq!(text(|[a, b, c]| a - (b - c)), "a - (b - c)");
+        assert_eq!(text(|[a, b, c]| a - b - c), "a - b - c");
+        assert_eq!(text(|[a, b, c]| a + (b + c)), "a + (b + c)");
+        assert_eq!(text(|[a, b, c]| a / (b / c)), "a/(b/c)");
+        assert_eq!(text(|[a, b, c]| (a + b) / -c), "(a + b)/-c");
+        assert_eq!(text(|[a, b, _]| -(a + b)), "-(a + b)");
+        assert_eq!(text(|[a, _, _]| (-a).powi(2)), "(-a)**2");
+        assert_eq!(text(|[a, _, _]| -a.powi(2)), "-a**2");
+        assert_eq!(text(|[a, _, _]| a.powi(2).powi(-3)), "(a**2)**-3");
+        assert_eq!(text(|[a, b, _]| (a * -0.1) - b * -1e22), "a*-0.1 - b*-1e22");
+    }
+
+    #[test]
+    fn truth_values_and_numbers_stand_where_the_other_is_needed() {
+        assert_eq!(
+            text(|[a, b, c]| a.less(b).select(a, c)),
+            "xp.where(a < b, a, c)"
+        );
+        assert_eq!(
+            text(|[a, b, c]| a.less(b).equal(c)),
+            "xp.where(c == xp.where(a < b, 1.0, 0.0), 1.0, 0.0)"
+        );
+        assert_eq!(
+            text(|[a, b, _]| a.and(!b)),
+            "xp.where(xp.logical_and(a != 0.0, xp.logical_not(b != 0.0)), 1.0, 0.0)"
+        );
+        // nobody knows what a condition says that is no number
+        assert_eq!(
+            text(|[a, b, c]| a.select(b, c)),
+            "xp.where(a == a, xp.where(a != 0.0, b, c), float(\"nan\"))"
+        );
+    }
+
+    #[test]
+    fn what_is_used_twice_has_a_name_and_what_no_one_needs_is_gone() {
+        let body = printed(&Namespace::Numpy, |[a, b, c]| {
+            let _ = c.exp();
+            [a.sin() * b, a.sin() / b]
+        })
+        .unwrap();
+        assert_eq!(body.lines, ["v1 = xp.sin(a)"]);
+        let outputs: Vec<&str> = body.outputs.iter().map(|o| o.text.as_str()).collect();
+        assert_eq!(outputs, ["b*v1", "v1/b"]);
+    }
+
+    /// Without inverse tangents of two arguments and without a solver.
+    struct Poor;
+
+    impl Dialect for Poor {
+        fn name(&self) -> &'static str {
+            "Poor"
+        }
+        fn is_reserved(&self, _: &str) -> bool {
+            false
+        }
+        fn number(&self, value: f64) -> Text {
+            Namespace::Numpy.number(value)
+        }
+        fn unary(&self, op: Unary) -> Option<Form> {
+            Namespace::Numpy.unary(op)
+        }
+        fn binary(&self, op: Binary) -> Option<Form> {
+            (op != Binary::Atan2).then(|| Namespace::Numpy.binary(op))?
+        }
+        fn power(&self, base: &Text, exponent: i32) -> Text {
+            Namespace::Numpy.power(base, exponent)
+        }
+        fn select(&self, condition: &Text, x: &Text, y: &Text) -> Text {
+            Namespace::Numpy.select(condition, x, y)
+        }
+        fn assignment(&self, name: &str, value: &Text) -> String {
+            Namespace::Numpy.assignment(name, value)
+        }
+        fn solution(&self, _: &str, _: &[Text], _: &[Text]) -> Option<Vec<String>> {
+            None
+        }
+        fn entry(&self, solution: &str, place: usize) -> Text {
+            Namespace::Numpy.entry(solution, place)
+        }
+    }
+
+    #[test]
+    fn an_operation_that_a_language_lacks_is_refused_by_name() {
+        let refusal = printed(&Poor, |[a, b, _]| [a.atan2(b)]).unwrap_err();
+        assert_eq!(refusal.to_string(), "Poor has no way to write atan2");
+        let refusal = printed(&Poor, |[a, b, c]| {
+            let solution = a.graph().solve(&[a.node()], &[b.node()]);
+            [a.graph().expr(solution.x[0]) + c]
+        });
+        let told = refusal.unwrap_err().to_string();
+        assert_eq!(told, "Poor has no way to write a linear system");
     }
 }

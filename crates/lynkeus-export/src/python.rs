@@ -90,6 +90,9 @@ fn comment(words: &str) -> String {
     format!("# {}\n", words.trim_end())
 }
 
+/// Longest list on one line, in characters.
+const LONGEST: usize = 80;
+
 const RESERVED: [&str; 39] = [
     "False", "None", "True", "and", "as", "assert", "async", "await", "break", "case", "class",
     "continue", "def", "del", "elif", "else", "except", "finally", "float", "for", "from",
@@ -125,7 +128,7 @@ impl Namespace {
         }
         let body = Body::of(code, &self, &inputs, &mut names)?;
         lines.extend(body.lines);
-        lines.push(self.result(&body.outputs));
+        lines.extend(self.result(&body.outputs));
         let parameters = ["xp", "t"].iter().chain(&arguments).copied();
         let head = parameters.collect::<Vec<_>>().join(", ");
         let lines = lines.into_iter().map(|line| format!("    {line}\n"));
@@ -153,11 +156,21 @@ impl Namespace {
         }
     }
 
-    fn result(self, outputs: &[Text]) -> String {
-        match (self, outputs) {
-            (Self::Casadi, []) => "return xp.SX(0, 1)".to_owned(),
-            _ => format!("return {}", self.vector(outputs)),
+    fn result(self, outputs: &[Text]) -> Vec<String> {
+        let short = match (self, outputs) {
+            (Self::Casadi, []) => "xp.SX(0, 1)".to_owned(),
+            _ => self.vector(outputs),
+        };
+        if short.len() <= LONGEST {
+            return vec![format!("return {short}")];
         }
+        let (open, close) = match self {
+            Self::Numpy => ("return xp.array([", "])"),
+            Self::Casadi => ("return xp.vertcat(", ")"),
+        };
+        let entries = outputs.iter().map(|output| format!("    {},", output.text));
+        let lines = std::iter::once(open.to_owned()).chain(entries);
+        lines.chain([close.to_owned()]).collect()
     }
 
     fn matrix(self, a: &[Text], n: usize) -> Vec<String> {

@@ -10,11 +10,13 @@ use lynkeus::observers::{self, Observer};
 use lynkeus::study::SimulateSettings;
 use lynkeus_export::python::{Function, Namespace, Vector, module};
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors::{exception, from_source};
+
+type Values<'py> = PyReadonlyArray1<'py, f64>;
 
 /// x' = f(t, x, u), y = h(t, x, u).
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
@@ -181,18 +183,21 @@ impl Functions {
         })
     }
 
-    fn arguments(&self, t: f64, x: &[f64], u: &[f64]) -> PyResult<Vec<f64>> {
-        let expect = |Vector { name, entries }: &Vector, values: &[f64]| match values.len() {
-            found if found == entries.len() => Ok(()),
-            found => Err(exception(&Error::input(format!(
-                "{name}: expected {} values ({}), found {found}",
-                entries.len(),
-                entries.join(", ")
-            )))),
-        };
-        expect(&self.states, x)?;
-        expect(&self.inputs, u)?;
-        Ok([&[t], x, u].concat())
+    fn arguments(&self, t: f64, x: &Values<'_>, u: &Values<'_>) -> PyResult<Vec<f64>> {
+        let mut arguments = vec![t];
+        for (Vector { name, entries }, values) in [(&self.states, x), (&self.inputs, u)] {
+            let values = values.as_array();
+            if values.len() != entries.len() {
+                return Err(exception(&Error::input(format!(
+                    "{name}: expected {} values ({}), found {}",
+                    entries.len(),
+                    entries.join(", "),
+                    values.len()
+                ))));
+            }
+            arguments.extend(values);
+        }
+        Ok(arguments)
     }
 
     /// Made when first asked for.
@@ -250,43 +255,40 @@ impl Functions {
     }
 
     /// x'
-    #[pyo3(signature = (t, x, u=vec![]))]
     fn f<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: Vec<f64>,
-        u: Vec<f64>,
+        x: Values<'_>,
+        u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
         Ok(self.f.at(&arguments).into_pyarray(py))
     }
 
     /// y
-    #[pyo3(signature = (t, x, u=vec![]))]
     fn h<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: Vec<f64>,
-        u: Vec<f64>,
+        x: Values<'_>,
+        u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
         Ok(self.h.at(&arguments).into_pyarray(py))
     }
 
     /// ∂f/∂x, row by row of x'
-    #[pyo3(signature = (t, x, u=vec![]))]
     fn jacobian_x<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: Vec<f64>,
-        u: Vec<f64>,
+        x: Values<'_>,
+        u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
         let slopes = self.slopes()?;
-        let mut found = Array2::zeros((x.len(), x.len()));
+        let mut found = Array2::zeros((self.start.len(), self.start.len()));
         for (&place, value) in slopes.places.iter().zip(slopes.entries.at(&arguments)) {
             found[place] = value;
         }
