@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 from . import _lynkeus
 from .errors import LynkeusError
 
@@ -19,7 +21,7 @@ def is_read(text: str, name: str, choose: str | None) -> bool:
 
 def flattened(path: str, choose: str | None) -> tuple[str, str] | None:
     """The text of a file without connectors and libraries, with the name that messages call it by;
-    None where rumoca is absent or refuses it, or where that text is not read either."""
+    None where rumoca is absent or refuses it (a warning says why), or where that text is not read either."""
     try:
         import rumoca
     except ImportError:
@@ -28,6 +30,7 @@ def flattened(path: str, choose: str | None) -> tuple[str, str] | None:
     try:
         model = rumoca.Session().load(path, model=choose)
         texts = [model.render(rendering) for rendering in RENDERINGS]
-    except rumoca.RumocaError:
+    except rumoca.RumocaError as error:
+        warnings.warn(f"{path}: rumoca does not flatten it: {error}", stacklevel=3)
         return None
     return next(((text, name) for text in texts if is_read(text, name, None)), None)
