@@ -29,6 +29,7 @@ from .results import (
     Table,
 )
 from .study import Study
+from .systems import Driven, Functions, Observer
 from .verbs import certify, check, compare, design, estimate, how_well, simulate, tune
 
 __all__ = [
@@ -37,8 +38,10 @@ __all__ = [
     "Check",
     "Comparison",
     "Design",
+    "Driven",
     "Estimation",
     "Estimator",
+    "Functions",
     "HowWell",
     "InputError",
     "LimitError",
@@ -47,6 +50,7 @@ __all__ = [
     "Model",
     "MonteCarlo",
     "NotCredible",
+    "Observer",
     "Record",
     "RefusedError",
     "Run",

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from . import _from_function, _lynkeus
+from ._flatten import flattened, is_read
 from ._toml import key, number
+from .systems import Functions
 
 
 class Model:
@@ -25,8 +27,15 @@ class Model:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], choose: str | None = None) -> Model:
-        """A file: ``.mo`` or ``.jl``."""
-        return cls(Path(path).read_text(encoding="utf-8-sig"), os.fspath(path), choose)
+        """A file: ``.mo`` or ``.jl``. Where connectors or libraries keep it from being read and the
+        compiler ``rumoca`` is installed (``pip install lynkeus[modelica]``), what that makes of it:
+        names come out dotted, ``r1.p.v``."""
+        name = os.fspath(path)
+        text = Path(path).read_text(encoding="utf-8-sig")
+        if not name.endswith(".mo") or is_read(text, name, choose):
+            return cls(text, name, choose)
+        flat = flattened(name, choose)
+        return cls(text, name, choose) if flat is None else cls(*flat)
 
     @classmethod
     def from_modelica(cls, text: str, choose: str | None = None) -> Model:
@@ -86,12 +95,13 @@ class Model:
         )
         return cls(text, f"{called}.mo")
 
-    def functions(self, parameters: Mapping[str, float] | None = None) -> _lynkeus.Functions:
+    def functions(self, parameters: Mapping[str, float] | None = None) -> Functions:
         """The equations as functions of numbers, x' = f(t, x, u) and y = h(t, x, u); ``parameters``
         replace those of the model."""
         given = "".join(f"{key(k)} = {number(v)}\n" for k, v in (parameters or {}).items())
         text = f"[parameters]\n{given}"
-        return _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose).functions()
+        core = _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose)
+        return Functions(core.functions())
 
     def __repr__(self) -> str:
         return f"Model({self.name!r})"
