@@ -1,8 +1,8 @@
 //! The compiled half of the Python package: studies, answers, estimators and logs as Python
 //! classes without comfort. What users see is `python/lynkeus`, built on these.
 //!
-//! Work is done without the interpreter's lock, on a thread of its own ([`away`]); errors become
-//! the exceptions of `lynkeus.errors` ([`errors`]).
+//! Work is done without the interpreter's lock, on a thread of its own (`away`); errors become
+//! the exceptions of `lynkeus.errors` (`errors`).
 
 mod answer;
 mod away;

@@ -114,6 +114,10 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
 
 /// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
 fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
+    if !found.eigenvalue.is_finite() {
+        let detail = "the entries of S are so large that AᵀS + SA has no value in floating point";
+        return (undecided(title, detail), false);
+    }
     let value = quotient(S, found);
     let direction: Vec<String> = names
         .iter()
@@ -149,4 +153,27 @@ fn quotient(S: &Tridiagonal, found: &Breaking) -> Interval {
         Interval::point(2.0) * v(i) * SA * v(j)
     });
     sum(terms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Verdict;
+
+    #[test]
+    fn a_matrix_that_overflows_is_no_refutation() {
+        let S = Tridiagonal::new(vec![1e308, 1e308], vec![-1.0]).unwrap();
+        let found = Breaking {
+            a: vec![1.0],
+            eigenvalue: f64::NAN,
+            direction: vec![0.0, 1.0],
+        };
+        let title = Hammouri::Lemma1 {
+            states: vec!["x".into(), "z".into()],
+            ρ: 2.0,
+        };
+        let (check, is_refuted) = breaks(title, &S, &found, &["x".into(), "z".into()]);
+        assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
+        assert!(!check.detail.contains("NaN"), "{}", check.detail);
+    }
 }

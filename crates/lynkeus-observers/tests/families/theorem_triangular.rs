@@ -164,7 +164,7 @@ fn a_missing_box_is_named() {
          equation der(a) = b + b^3; der(b) = c; der(c) = -a*b; end Free;",
     );
     let found = study(&free, Tuning::from([("theta", 1.0)])).certificate();
-    assert_eq!(found.verdict(), Standing::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided, "{found:?}");
     let lemma = hypothesis(&found, "Lemma 1");
     assert!(
         lemma.detail.contains("declare min and max of b"),
@@ -196,7 +196,7 @@ fn a_varying_gain_is_not_covered_a_scaled_one_is() {
     tuning.values.insert("partials".into(), Value::Flag(true));
     let varying = plant(&text("b + b^2"));
     let found = study(&varying, tuning.clone()).certificate();
-    assert_eq!(found.verdict(), Standing::Undecided);
+    assert_eq!(found.verdict(), Standing::Undecided, "{found:?}");
     assert!(
         hypothesis(&found, "gain is constant")
             .detail
