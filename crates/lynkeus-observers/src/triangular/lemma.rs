@@ -158,7 +158,7 @@ fn quotient(S: &Tridiagonal, found: &Breaking) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Verdict;
+    use lynkeus_structure::Verdict;
 
     #[test]
     fn a_matrix_that_overflows_is_no_refutation() {
