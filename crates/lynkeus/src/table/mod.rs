@@ -7,6 +7,7 @@
 
 mod cell;
 mod column;
+mod gathering;
 mod instant;
 mod lines;
 mod marks;
@@ -27,6 +28,8 @@ use lines::Lines;
 #[cfg(feature = "parquet")]
 pub use self::parquet::write_parquet;
 pub use column::Fault;
+pub use gathering::{Cell, Gathered, Gathering};
+pub use instant::Instant;
 pub use number::{exact, significant};
 pub use order::Ordered;
 pub use write::write_csv;
@@ -56,22 +59,11 @@ impl Table {
     /// # Errors
     /// The columns differ in length.
     pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Error> {
-        let rows = columns.first().map_or(0, |(_, values)| values.len());
-        if let Some((name, values)) = columns.iter().find(|(_, values)| values.len() != rows) {
-            return Err(Error::input(format!(
-                "the columns of a table must be equally long: expected {rows} rows, found {} in \"{name}\"",
-                values.len()
-            )));
-        }
+        let table = Gathering::new("");
         let columns = columns.into_iter();
-        Ok(Self {
-            file: String::new(),
-            columns: columns
-                .map(|(name, values)| Column::computed(name, values))
-                .collect(),
-            lines: Lines::counted(rows),
-            store: Store::default(),
-        })
+        let columns = columns.map(|(name, values)| table.owned(&name, values));
+        let columns = columns.collect();
+        table.ragged(columns)
     }
 
     /// The number of rows.
@@ -125,7 +117,7 @@ impl Table {
         if let Some(refusal) = &column.refusal {
             return Err(
                 Error::input(format!("column \"{name}\": {}", refusal.message))
-                    .at(format!("{}:{}", self.file, refusal.line))
+                    .at(self.place(refusal.line))
                     .hint(refusal.hint),
             );
         }
@@ -197,6 +189,14 @@ impl Table {
         ))
         .at(format!("{}:{}", self.file, line(i + 1)))
         .hint("sort the rows by time and remove doubles"))
+    }
+
+    /// A line of the file; the file where that is 0.
+    fn place(&self, line: u64) -> String {
+        match line {
+            0 => self.file.clone(),
+            line => format!("{}:{line}", self.file),
+        }
     }
 
     fn find(&self, name: &str) -> Result<&Column, Error> {
