@@ -8,14 +8,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tank_study import MODEL, estimated, log, same, tank
+from tank_study import estimated, log, same, tank
 
 import lynkeus
 from lynkeus._logs import log_of
@@ -225,6 +225,13 @@ def test_an_exception_in_a_callback_ends_the_call(verb: str) -> None:
     assert time.monotonic() - began < 20
 
 
+def test_a_time_limit_ends_the_run_that_a_sweep_is_judged_by() -> None:
+    began = time.monotonic()
+    with pytest.raises(lynkeus.LimitError):
+        slow().tune(time_limit=0.5)
+    assert time.monotonic() - began < 20
+
+
 _INTERRUPTED = """
 import _thread, threading
 from test_bad_input import VERBS, slow
@@ -315,7 +322,11 @@ def test_a_reading_may_use_the_estimator_that_reads_it() -> None:
 def test_bad_readings_change_nothing() -> None:
     estimator = tank().estimator()
     estimator.update(0.0, {"y": 4.0})
-    before = estimator.snapshot()
+
+    def state() -> Any:  # a snapshot counts what was refused as well
+        return estimator.time, estimator.estimate, estimator.sd, estimator.health
+
+    before = state()
 
     class Broken:
         def __float__(self) -> float:
@@ -337,15 +348,16 @@ def test_bad_readings_change_nothing() -> None:
     ]:
         with pytest.raises(error):
             estimator.update(t, readings)
-        assert estimator.snapshot() == before, (t, readings)
+        assert state() == before, (t, readings)
     for signals in ([], [1.0, 2.0], ["a"], None, np.zeros((1, 1, 1))):
         with pytest.raises((TypeError, ValueError)):
             estimator.push(0.1, signals)
-    for snapshot in (b"", b"nonsense", before[:-1], before + b"x"):
+    kept = estimator.snapshot()
+    for snapshot in (b"", b"nonsense", kept[:-1], kept + b"x"):
         with pytest.raises(lynkeus.InputError):
             estimator.restore(snapshot)
-    assert estimator.snapshot() == before
-    assert pickle.loads(pickle.dumps(estimator)).snapshot() == before
+    assert (estimator.snapshot(), state()) == (kept, before)
+    assert pickle.loads(pickle.dumps(estimator)).snapshot() == kept
 
 
 def _in_child(run: lynkeus.Estimation, file: lynkeus.Log, pipe: Any) -> None:

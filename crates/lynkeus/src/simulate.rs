@@ -135,6 +135,20 @@ fn rows(run: Result<Trajectory, Box<Interrupted>>) -> (Trajectory, Option<lynkeu
     }
 }
 
+/// A run from its start to its end.
+///
+/// # Errors
+/// Why it ended early: a limit, or what the model does.
+pub(crate) fn whole(
+    run: Result<Trajectory, Box<Interrupted>>,
+    study: &Study,
+) -> Result<Trajectory, Error> {
+    run.map_err(|error| match study.budget.marked() {
+        Some(spent) => Error::ended(spent).at(&study.file),
+        None => interrupted(error.error, &study.file),
+    })
+}
+
 /// The plant alone, then a filter on what its sensors show: every row is a sample.
 fn sampled(
     prepared: &Prepared<'_>,
@@ -145,10 +159,7 @@ fn sampled(
     let (study, plant) = (prepared.study(), prepared.plant());
     let watch = &mut within(&study.budget, watch);
     let plant_alone = simulation.run_watched(&mut |done| watch(0.5 * done));
-    let mut run = plant_alone.map_err(|error| match study.budget.marked() {
-        Some(spent) => Error::ended(spent).at(&study.file),
-        None => interrupted(error.error, &study.file),
-    })?;
+    let mut run = whole(plant_alone, study)?;
     let observer = &design.observer;
     let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
     let column = |role: Role, at: Option<usize>| {
@@ -196,11 +207,9 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let settings = settings(study)?;
     let mut simulation = open_loop(study, settings, plant)?;
     simulation.output_step = step;
-    let run = simulation
-        .run_watched(&mut within(&study.budget, &mut |_| {
-            ControlFlow::Continue(())
-        }))
-        .map_err(|error| interrupted(error.error, &study.file))?;
+    let watch = &mut |_| ControlFlow::Continue(());
+    let run = simulation.run_watched(&mut within(&study.budget, watch));
+    let run = whole(run, study)?;
     let groups = [
         (&plant.outputs, Role::Measured),
         (&plant.inputs, Role::Input),
