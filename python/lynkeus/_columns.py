@@ -120,12 +120,13 @@ def _is_missing(value: Any) -> bool:
 
 def _nanoseconds(value: Any) -> int:
     """From 1970 to a date or a time."""
-    if isinstance(value, datetime.datetime) and not hasattr(value, "to_datetime64"):
+    exactly = getattr(value, "to_datetime64", None)  # of pandas: to the nanosecond
+    if isinstance(value, datetime.datetime) and exactly is None:
         if value.tzinfo is not None:
             value = value.astimezone(_UTC).replace(tzinfo=None)
         microseconds = (value - datetime.datetime(1970, 1, 1)) // datetime.timedelta(microseconds=1)
         return int(microseconds) * 1000
-    exact = value.to_datetime64() if hasattr(value, "to_datetime64") else np.datetime64(value)
+    exact = np.datetime64(value) if exactly is None else exactly()
     unit, count = np.datetime_data(exact.dtype)
     if unit not in _UNITS:
         exact, unit, count = exact.astype("datetime64[ns]"), "ns", 1

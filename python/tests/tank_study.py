@@ -23,7 +23,7 @@ def tank(**sections: Any) -> lynkeus.Study:
     return lynkeus.Study(MODEL, unknown=["inflow"], observer={"theta": 2.0}, **sections)
 
 
-def log(rows: int = 50, step: float = 0.25) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+def log(rows: int = 50, step: float = 0.25) -> dict[str, Any]:
     """Times in seconds and levels."""
     t = np.arange(rows) * step
     return {"t": t, "y": 4.0 + 0.5 * np.sin(0.3 * t)}

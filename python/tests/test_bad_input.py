@@ -308,7 +308,7 @@ def test_threads_take_turns_at_an_estimator() -> None:
 
 
 def test_a_reading_may_use_the_estimator_that_reads_it() -> None:
-    estimator = tank().estimator()
+    estimator: Any = tank().estimator()
 
     class Sly:
         def __float__(self) -> float:
@@ -320,7 +320,7 @@ def test_a_reading_may_use_the_estimator_that_reads_it() -> None:
 
 
 def test_bad_readings_change_nothing() -> None:
-    estimator = tank().estimator()
+    estimator: Any = tank().estimator()
     estimator.update(0.0, {"y": 4.0})
 
     def state() -> Any:  # a snapshot counts what was refused as well
