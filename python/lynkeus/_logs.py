@@ -3,64 +3,103 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from . import _lynkeus
+from ._columns import Given, column, why
 from .errors import InputError
+
+_Named = Iterable[tuple[Any, Any]]
 
 
 def log_of(data: Any) -> _lynkeus.Log:
     """The log in a file (CSV, Parquet), a mapping of columns, a data frame of pandas or polars, a
-    table of Arrow, a structured array, or the result of a simulation."""
+    table of Arrow or whatever else has ``__arrow_c_stream__``, a structured array, or the result of
+    a simulation. A column that cannot be read is refused where the study asks for it, not before."""
     if isinstance(data, _lynkeus.Log):
         return data
     if isinstance(data, (str, os.PathLike)):
         return _lynkeus.Log.load(os.fspath(data))
-    recorded = getattr(data, "log", None)
-    if isinstance(recorded, Mapping):
-        return log_of(recorded)
     if isinstance(data, Mapping):
-        return _gathered((str(name), values) for name, values in data.items())
-    if isinstance(data, np.ndarray) and data.dtype.names is not None:
-        return _gathered((name, data[name]) for name in data.dtype.names)
-    if hasattr(data, "columns") and hasattr(data, "__getitem__"):
-        return _gathered((str(name), data[name]) for name in data.columns)
-    if hasattr(data, "column_names"):  # Arrow
-        return _gathered((name, data.column(name)) for name in data.column_names)
+        return _gathered(_items(data))
+    if isinstance(data, np.ndarray):
+        return _gathered(_fields(data))
+    pandas = sys.modules.get("pandas")
+    if pandas is not None and isinstance(data, pandas.DataFrame):
+        return _gathered(_frame(data))
+    recorded = getattr(type(data), "log", None)
+    if recorded is not None and isinstance(data.log, Mapping):  # what a simulation's logger saw
+        return log_of(data.log)
+    has_names = hasattr(type(data), "__getitem__") and _names(data) is not None
+    if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
+        try:
+            return _lynkeus.Log.from_arrow(data)
+        except (InputError, KeyboardInterrupt, SystemExit, GeneratorExit):
+            raise
+        except BaseException as error:  # polars panics at columns of objects
+            if not has_names:
+                raise InputError(f"the log: {why(error)}") from error
+    if has_names:
+        return _gathered((name, lambda name=name: _taken(data, name)) for name in _names(data) or ())
     raise InputError(
-        f"the log: expected a path, a mapping of columns or a data frame, found {type(data).__name__}"
+        "the log: expected a path, a mapping of columns, a data frame or an Arrow table, found "
+        + type(data).__name__
     )
 
 
-def _gathered(columns: Iterable[tuple[str, Any]]) -> _lynkeus.Log:
-    return _lynkeus.Log.from_columns([(name, numbers(name, values)) for name, values in columns])
+def _gathered(columns: _Named) -> _lynkeus.Log:
+    """Of headers, and functions that give their columns."""
+    return _lynkeus.Log.from_columns([(str(name), _read(values)) for name, values in columns])
 
 
-def numbers(name: str, values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """A column as numbers: instants become seconds since the first of them, ``None`` a gap."""
-    if hasattr(values, "to_numpy"):
-        values = values.to_numpy()
-    array = np.asarray(values)
-    if array.ndim != 1:
+def _read(values: Any) -> Given:
+    try:
+        return column(values())
+    except Exception as error:
+        return f"it cannot be read: {why(error)}"
+
+
+def _items(data: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:
+    for name in data:
+        yield name, lambda name=name: data[name]
+
+
+def _fields(data: np.ndarray[Any, Any]) -> Iterator[tuple[Any, Any]]:
+    if data.dtype.names is None or data.ndim != 1:
         raise InputError(
-            f'column "{name}": expected one value per row, found '
-            + (f"an array of shape {array.shape}" if array.ndim else type(values).__name__)
+            "the log: expected named columns, found an array "
+            f"of {data.dtype} of shape {data.shape}; give a mapping: {{'t': a[:, 0], 'y': a[:, 1]}}"
         )
-    if array.dtype.kind == "M":
-        first = array[~np.isnat(array)][:1]
-        array = array - first[0] if len(first) else array.astype("timedelta64[s]")
-    if array.dtype.kind == "m":
-        gaps = np.isnat(array)
-        seconds = array.astype("timedelta64[ns]").astype(np.int64) * 1e-9
-        return np.where(gaps, np.nan, seconds)
-    if array.dtype.kind in "fiub":
-        return np.ascontiguousarray(array, dtype=np.float64)
-    if array.dtype.kind == "O":
-        try:
-            return np.array([np.nan if v is None else float(v) for v in array], dtype=np.float64)
-        except (TypeError, ValueError):
-            pass
-    raise InputError(f'column "{name}": expected numbers or instants, found {array.dtype}')
+    for name in data.dtype.names:
+        yield name, lambda name=name: data[name]
+
+
+def _frame(data: Any) -> Iterator[tuple[Any, Any]]:
+    """Columns of a frame of pandas, and what its index is called by name."""
+    if data.columns.nlevels > 1:
+        raise InputError(
+            f"the log: expected one header for each column, found {data.columns.nlevels} levels of them; "
+            "join them: frame.columns = ['_'.join(levels) for levels in frame.columns]"
+        )
+    for level, name in enumerate(data.index.names):
+        if name is not None and name not in data.columns:
+            yield name, lambda level=level: data.index.get_level_values(level).to_series()
+    for place, name in enumerate(data.columns):
+        yield name, lambda place=place: data.iloc[:, place]
+
+
+def _names(data: Any) -> list[str] | None:
+    """Headers of a frame of another library."""
+    try:
+        names = getattr(data, "column_names", None) or getattr(data, "columns", None)
+        return None if names is None or isinstance(names, str) else [name for name in names]
+    except Exception:
+        return None
+
+
+def _taken(data: Any, name: str) -> Any:
+    return data.column(name) if hasattr(data, "column") else data[name]

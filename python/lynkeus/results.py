@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 from collections.abc import Iterator
 from functools import cached_property
@@ -17,6 +18,7 @@ from .errors import LynkeusError
 if TYPE_CHECKING:
     import pandas
     import polars
+    import pyarrow
     from matplotlib.axes import Axes
 
 Column = NDArray[np.float64]
@@ -144,8 +146,15 @@ class Table(Answer):
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
 
+    @cached_property
+    def _rows(self) -> int:
+        return self._core.rows()
+
     def __len__(self) -> int:
-        return len(self[self.columns[0]]) if self.columns else 0
+        return self._rows
+
+    def __bool__(self) -> bool:
+        return True
 
     def keys(self) -> list[str]:
         """Headers of the columns: ``dict(result)`` has them all."""
@@ -155,17 +164,48 @@ class Table(Answer):
         """All columns by their headers."""
         return {name: self[name] for name in self.columns}
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """The numbers of a data frame: a row for each time, a column for each header."""
+        if copy is False:
+            raise ValueError("the columns lie apart: an array of them is a copy")
+        found = np.empty((len(self), len(self.columns)), dtype or np.float64)
+        for place in range(len(self.columns)):
+            found[:, place] = self._core.column(place)
+        return found
+
+    def __arrow_c_schema__(self) -> object:
+        """Headers and kinds of the columns, for Arrow."""
+        return self._core.arrow_schema()
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """The columns for Arrow, in batches that are made as they are asked for: whoever reads
+        one after the other takes little memory however long the result is. A NaN is a null;
+        ``requested_schema`` is not followed, numbers are of 64 bits."""
+        return self._core.arrow_stream()
+
     def to_pandas(self) -> pandas.DataFrame:
         """As a data frame of pandas."""
-        import pandas
-
-        return pandas.DataFrame(self.to_dict())
+        columns = {name: self._core.column(place) for place, name in enumerate(self.columns)}
+        frame: pandas.DataFrame = _needed("pandas").DataFrame(columns, copy=False)
+        return frame
 
     def to_polars(self) -> polars.DataFrame:
-        """As a data frame of polars."""
-        import polars
+        """As a data frame of polars; a NaN is a null."""
+        frame: polars.DataFrame = _needed("polars").DataFrame(self)
+        return frame
 
-        return polars.DataFrame(self.to_dict())
+    def to_arrow(self) -> pyarrow.Table:
+        """As a table of pyarrow; a NaN is a null. Without the whole in memory:
+        ``pyarrow.RecordBatchReader.from_stream(result)``."""
+        table: pyarrow.Table = _needed("pyarrow").table(self)
+        return table
+
+
+def _needed(package: str) -> Any:
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise ImportError(f"expected the package {package}, found none: pip install {package}") from error
 
 
 class Run(Table):

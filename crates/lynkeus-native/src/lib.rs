@@ -12,8 +12,8 @@
 //! (`operations`), and encoded (`assemble`). Only x86-64 with AVX2 and FMA is compiled for: elsewhere
 //! [`Function::compile`] gives none and the interpreter does the work.
 //!
-//! This is the only crate of the workspace with `unsafe`: to call the code that it wrote, and for
-//! the instructions of the functions in lanes.
+//! The engine's only crate with `unsafe`: to call the code that it wrote, and for the instructions
+//! of the functions in lanes.
 //!
 //! ```
 //! use lynkeus_expr::{Graph, Tape};

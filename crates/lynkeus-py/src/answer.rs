@@ -4,13 +4,15 @@ use std::sync::Mutex;
 
 use lynkeus::study::Name;
 use lynkeus::{
-    CertifyReport, Comparison, DesignReport, Error, Outcome, Study, monte_carlo::MonteCarlo,
-    precision, tune::Sweep, visible,
+    CertifyReport, Comparison, DesignReport, Error, Outcome, Series, Study,
+    monte_carlo::MonteCarlo, precision, tune::Sweep, visible,
 };
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyCapsule;
 use serde_json::Value;
 
+use crate::arrow::export;
 use crate::errors::exception;
 
 /// What an answer tells.
@@ -24,7 +26,7 @@ pub trait Told: Send {
         vec![]
     }
     /// The column of that place.
-    fn column(&self, _place: usize) -> Option<Vec<f64>> {
+    fn column(&self, _place: usize) -> Option<Series> {
         None
     }
     /// Its picture, where it has one.
@@ -84,9 +86,41 @@ impl Answer {
         self.ask(py, |told| told.headers())
     }
 
-    fn column<'py>(&self, py: Python<'py>, place: usize) -> Option<Bound<'py, PyArray1<f64>>> {
-        let values = self.ask(py, |told| told.column(place))?;
-        Some(values.into_pyarray(py))
+    /// The number of rows.
+    fn rows(&self, py: Python<'_>) -> usize {
+        self.ask(py, |told| told.column(0).map_or(0, |column| column.len()))
+    }
+
+    fn column<'py>(
+        &self,
+        py: Python<'py>,
+        place: usize,
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let Some(column) = self.ask(py, |told| told.column(place)) else {
+            return Ok(None);
+        };
+        let values = py.detach(|| {
+            let values = column.to_vec();
+            column.check().map(|()| values)
+        });
+        let values = values.map_err(|e| exception(&e))?;
+        Ok(Some(values.into_pyarray(py)))
+    }
+
+    /// The headers for Arrow.
+    fn arrow_schema<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        export::schema(py, &self.headers(py))
+    }
+
+    /// The columns for Arrow, read as they are asked for.
+    fn arrow_stream<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        let columns = self.ask(py, |told| {
+            let headers = told.headers().into_iter().enumerate();
+            headers
+                .filter_map(|(place, header)| Some((header, told.column(place)?)))
+                .collect()
+        });
+        export::stream(py, columns)
     }
 
     fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {
@@ -140,9 +174,9 @@ impl Told for Ran {
         columns.into_iter().map(|(name, _)| name).collect()
     }
 
-    fn column(&self, place: usize) -> Option<Vec<f64>> {
+    fn column(&self, place: usize) -> Option<Series> {
         let columns = self.outcome.columns(self.is_simulated);
-        columns.get(place).map(|(_, values)| values.to_vec())
+        columns.get(place).map(|(_, values)| (*values).clone())
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -193,9 +227,9 @@ impl Told for Of<MonteCarlo> {
         columns.into_iter().map(|(name, _)| name).collect()
     }
 
-    fn column(&self, place: usize) -> Option<Vec<f64>> {
+    fn column(&self, place: usize) -> Option<Series> {
         let columns = self.found.columns();
-        columns.get(place).map(|(_, values)| values.to_vec())
+        columns.get(place).map(|(_, values)| values.to_vec().into())
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -242,13 +276,14 @@ impl Told for Sweep {
         keys.chain(figures).collect()
     }
 
-    fn column(&self, place: usize) -> Option<Vec<f64>> {
+    fn column(&self, place: usize) -> Option<Series> {
         let cell = |row: &lynkeus::tune::Row| match place.checked_sub(self.axes.len()) {
             None => row.values.get(place).copied(),
             Some(figure) => row.figures.get(figure).copied().flatten(),
         };
         let rows = self.rows.iter();
-        Some(rows.map(|row| cell(row).unwrap_or(f64::NAN)).collect())
+        let values = rows.map(|row| cell(row).unwrap_or(f64::NAN));
+        Some(values.collect::<Vec<f64>>().into())
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -273,8 +308,8 @@ impl Told for precision::Report {
         self.columns().into_iter().map(|(name, _)| name).collect()
     }
 
-    fn column(&self, place: usize) -> Option<Vec<f64>> {
-        Some(self.columns().into_iter().nth(place)?.1)
+    fn column(&self, place: usize) -> Option<Series> {
+        Some(self.columns().into_iter().nth(place)?.1.into())
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {

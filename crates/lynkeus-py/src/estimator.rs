@@ -1,26 +1,32 @@
 //! Live estimation, sample by sample.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use lynkeus::run::{self, filter::Reading};
 use numpy::{IntoPyArray, PyArray1};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
 
 use crate::errors::{exception, from_source};
 
 /// A study's estimator; a call is short, so that it keeps the interpreter's lock.
-#[pyclass(module = "lynkeus._lynkeus")]
+#[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Estimator {
-    estimator: run::Estimator,
+    /// threads take turns; nothing of Python is called while it is locked
+    estimator: Mutex<run::Estimator>,
     /// the Python study that it is of
     study: Py<PyAny>,
     /// names of the signals, interned
     signals: Vec<Py<PyString>>,
     /// names of what is estimated, interned
     names: Vec<Py<PyString>>,
-    /// the signals of a call
-    sample: Vec<f64>,
+    /// how many of the signals are measured
+    sensors: usize,
 }
+
+/// Signals of a call that need no room of their own.
+const FEW: usize = 32;
 
 impl Estimator {
     pub fn of(py: Python<'_>, estimator: run::Estimator, study: Py<PyAny>) -> Self {
@@ -33,30 +39,43 @@ impl Estimator {
         Self {
             signals: interned(estimator.signals()),
             names: interned(estimator.names()),
-            sample: vec![f64::NAN; estimator.signals().len()],
-            estimator,
+            sensors: estimator.sensors(),
+            estimator: Mutex::new(estimator),
             study,
         }
     }
 
+    fn lock(&self) -> MutexGuard<'_, run::Estimator> {
+        self.estimator
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Puts readings by name in their order; what is left out or None did not report.
-    fn read(&mut self, readings: &Bound<'_, PyDict>) -> PyResult<()> {
+    fn read(&self, readings: &Bound<'_, PyDict>, sample: &mut [f64]) -> PyResult<()> {
         let py = readings.py();
         let mut taken = 0;
-        for (place, name) in self.signals.iter().enumerate() {
-            let found = readings.get_item(name.bind(py))?;
-            taken += usize::from(found.is_some());
-            self.sample[place] = match found {
-                Some(value) if !value.is_none() => value
-                    .extract()
-                    .map_err(|_| wrong_reading(name.bind(py), &value))?,
-                _ => f64::NAN,
+        for (name, x) in self.signals.iter().zip(sample) {
+            let Some(value) = readings.get_item(name.bind(py))? else {
+                continue;
             };
+            taken += 1;
+            if !value.is_none() {
+                *x = value
+                    .extract()
+                    .map_err(|error| wrong_reading(name.bind(py), &value, error))?;
+            }
         }
         match taken == readings.len() {
             true => Ok(()),
             false => Err(self.stranger(readings)),
         }
+    }
+
+    fn taken(&self, t: f64, readings: &Bound<'_, PyDict>, sample: &mut [f64]) -> PyResult<()> {
+        self.read(readings, sample)?;
+        let pushed = self.lock().push(t, sample).map(drop);
+        pushed.map_err(from_source)
     }
 
     fn by_name<'py>(&self, py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyDict>> {
@@ -69,7 +88,7 @@ impl Estimator {
 
     /// A name that is no signal.
     fn stranger(&self, readings: &Bound<'_, PyDict>) -> PyErr {
-        let known = self.estimator.signals();
+        let known = self.signals();
         let names = readings.keys().into_iter();
         let mut names = names.map(|name| name.to_string());
         let name = names.find(|name| !known.contains(name)).unwrap_or_default();
@@ -81,77 +100,87 @@ impl Estimator {
     }
 }
 
-fn wrong_reading(name: &Bound<'_, PyString>, value: &Bound<'_, PyAny>) -> PyErr {
+/// A value that is no number; what its own conversion raises is passed on.
+fn wrong_reading(name: &Bound<'_, PyString>, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
+    let py = value.py();
+    if !error.is_instance_of::<PyTypeError>(py) && !error.is_instance_of::<PyValueError>(py) {
+        return error;
+    }
     let kind = value.get_type();
-    PyTypeError::new_err(format!("{name}: expected a number or None, found {kind}"))
+    let wrong = PyTypeError::new_err(format!("{name}: expected a number or None, found {kind}"));
+    wrong.set_cause(py, Some(error));
+    wrong
 }
 
 #[pymethods]
 impl Estimator {
     /// Goes to a time at which nothing is read.
-    fn predict(&mut self, t: f64) -> PyResult<()> {
-        self.estimator.predict(t).map_err(from_source)?;
-        Ok(())
+    fn predict(&self, t: f64) -> PyResult<()> {
+        let predicted = self.lock().predict(t).map(drop);
+        predicted.map_err(from_source)
     }
 
     /// Goes to a time and takes what was read there, by name.
-    fn update(&mut self, t: f64, readings: &Bound<'_, PyDict>) -> PyResult<()> {
-        self.read(readings)?;
-        self.estimator.push(t, &self.sample).map_err(from_source)?;
-        Ok(())
+    fn update(&self, t: f64, readings: &Bound<'_, PyDict>) -> PyResult<()> {
+        match [f64::NAN; FEW].get_mut(..self.signals.len()) {
+            Some(sample) => self.taken(t, readings, sample),
+            None => self.taken(t, readings, &mut vec![f64::NAN; self.signals.len()]),
+        }
     }
 
     /// The same with all signals in their order.
-    fn push(&mut self, t: f64, signals: Vec<f64>) -> PyResult<()> {
-        self.estimator.push(t, &signals).map_err(from_source)?;
-        Ok(())
+    fn push(&self, t: f64, signals: Vec<f64>) -> PyResult<()> {
+        let pushed = self.lock().push(t, &signals).map(drop);
+        pushed.map_err(from_source)
     }
 
     #[getter]
     fn signals(&self) -> Vec<String> {
-        self.estimator.signals().to_vec()
+        self.lock().signals().to_vec()
     }
 
     /// How many of the signals are sensors; known inputs follow.
     #[getter]
     fn sensors(&self) -> usize {
-        self.estimator.sensors()
+        self.sensors
     }
 
     #[getter]
     fn names(&self) -> Vec<String> {
-        self.estimator.names().to_vec()
+        self.lock().names().to_vec()
     }
 
     #[getter]
     fn time(&self) -> Option<f64> {
-        self.estimator.time()
+        self.lock().time()
     }
 
     /// What is estimated, by name.
     #[getter]
     fn estimate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.by_name(py, self.estimator.estimate())
+        let estimate = self.lock().estimate().to_vec();
+        self.by_name(py, &estimate)
     }
 
     /// Standard deviations by name, where the observer has them.
     #[getter]
     fn sd<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let deviations = self.estimator.deviations();
-        deviations.map(|sd| self.by_name(py, sd)).transpose()
+        let deviations = self.lock().deviations().map(<[f64]>::to_vec);
+        deviations.map(|sd| self.by_name(py, &sd)).transpose()
     }
 
     /// What is estimated, in the order of `names`.
     fn to_numpy<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.estimator.estimate().to_vec().into_pyarray(py)
+        let estimate = self.lock().estimate().to_vec();
+        estimate.into_pyarray(py)
     }
 
     /// By sensor what the last reading said beside what the model expected; of a filter.
     #[getter]
     fn innovations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let sensors = PyDict::new(py);
-        let names = self.signals.iter();
-        for (name, innovation) in names.zip(self.estimator.innovations()) {
+        let innovations = self.lock().innovations().to_vec();
+        for (name, innovation) in self.signals.iter().zip(innovations) {
             let entry = PyDict::new(py);
             entry.set_item("innovation", innovation.value)?;
             entry.set_item("sd", innovation.deviation)?;
@@ -165,7 +194,7 @@ impl Estimator {
     /// Counts by sensor, and of what was held or confined.
     #[getter]
     fn health<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let health = self.estimator.health();
+        let health = self.lock().health().clone();
         let sensors = PyDict::new(py);
         for (name, counts) in self.signals.iter().zip(&health.sensors) {
             let entry = PyDict::new(py);
@@ -184,11 +213,12 @@ impl Estimator {
     }
 
     fn snapshot<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.estimator.snapshot())
+        PyBytes::new(py, &self.lock().snapshot())
     }
 
-    fn restore(&mut self, snapshot: &[u8]) -> PyResult<()> {
-        self.estimator.restore(snapshot).map_err(from_source)
+    fn restore(&self, snapshot: &[u8]) -> PyResult<()> {
+        let restored = self.lock().restore(snapshot);
+        restored.map_err(from_source)
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {

@@ -5,6 +5,7 @@
 //! the exceptions of `lynkeus.errors` (`errors`).
 
 mod answer;
+mod arrow;
 mod away;
 mod errors;
 mod estimator;

@@ -3,15 +3,91 @@
 use std::path::PathBuf;
 
 use lynkeus::Table;
+use lynkeus::table::{Cell, Gathered, Gathering, Instant};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
+use crate::arrow::import;
 use crate::errors::exception;
+
+/// What messages call a log that is no file.
+const NAME: &str = "log";
+
+/// What to do about a column that cannot be read.
+const HINT: &str = "convert it before, or name another column under [estimate] columns";
 
 /// A table of named columns of equal length.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Log {
     pub table: Table,
+}
+
+/// A column that Python holds.
+#[derive(FromPyObject)]
+enum Column<'py> {
+    Numbers(PyReadonlyArray1<'py, f64>),
+    /// counts of so many nanoseconds since 1970, the least of all where one is missing; in UTC,
+    /// or in no zone
+    Instants(PyReadonlyArray1<'py, i64>, i64, bool),
+    /// what each row holds (see [`cell`]), its number and its nanoseconds since 1970
+    Cells(
+        PyReadonlyArray1<'py, u8>,
+        PyReadonlyArray1<'py, f64>,
+        PyReadonlyArray1<'py, i64>,
+    ),
+    /// why it can be no column
+    Refused(String),
+    /// has `__arrow_c_stream__` or `__arrow_c_array__`
+    Arrow(Bound<'py, PyAny>),
+}
+
+impl Column<'_> {
+    fn gathered(&self, name: &str, log: &Gathering) -> PyResult<Gathered> {
+        match self {
+            Self::Numbers(values) => {
+                let values = match values.as_slice() {
+                    Ok(values) => values.to_vec(),
+                    Err(_) => values.as_array().to_vec(),
+                };
+                Ok(log.owned(name, values))
+            }
+            Self::Instants(counts, unit, zoned) => {
+                let mut column = log.column(name);
+                let counts = counts.as_array();
+                column.instants(counts.iter().map(|&count| {
+                    let nanoseconds = i128::from(count) * i128::from(*unit);
+                    (count != i64::MIN).then(|| Instant::at(nanoseconds, *zoned))
+                }));
+                Ok(column)
+            }
+            Self::Cells(kinds, numbers, instants) => {
+                let mut column = log.column(name);
+                let (kinds, numbers) = (kinds.as_array(), numbers.as_array());
+                let parts = kinds.iter().zip(numbers).zip(instants.as_array());
+                parts.for_each(|((kind, x), at)| column.cell(cell(*kind, *x, *at)));
+                Ok(column)
+            }
+            Self::Refused(why) => Ok(log.refused(name, why, HINT)),
+            Self::Arrow(object) => import::column(object, name, log),
+        }
+    }
+}
+
+/// What a row holds: 1 a number, 2 an instant in no zone, 3 one in UTC, else nothing.
+fn cell(kind: u8, number: f64, nanoseconds: i64) -> Cell {
+    match kind {
+        1 => Cell::Number(number),
+        2 | 3 => Cell::Instant(Instant::at(nanoseconds.into(), kind == 3)),
+        _ => Cell::Missing,
+    }
+}
+
+impl Log {
+    fn of(py: Python<'_>, log: &Gathering, columns: Vec<Gathered>) -> PyResult<Self> {
+        let table = py.detach(|| log.table(columns));
+        let table = table.map_err(|e| exception(&e))?;
+        Ok(Self { table })
+    }
 }
 
 #[pymethods]
@@ -24,19 +100,22 @@ impl Log {
         Ok(Self { table })
     }
 
-    /// Columns of numbers; what is not finite is missing.
+    /// Columns in the forms that `_logs.py` gives them.
     #[staticmethod]
-    fn from_columns(
-        py: Python<'_>,
-        columns: Vec<(String, PyReadonlyArray1<'_, f64>)>,
-    ) -> PyResult<Self> {
-        let columns = columns.into_iter();
-        let columns: Vec<_> = columns
-            .map(|(name, values)| (name, values.as_array().iter().copied().collect()))
-            .collect();
-        let table = py.detach(|| Table::from_columns(columns));
-        let table = table.map_err(|e| exception(&e))?;
-        Ok(Self { table })
+    fn from_columns(py: Python<'_>, columns: Vec<(String, Column<'_>)>) -> PyResult<Self> {
+        let log = Gathering::new(NAME);
+        let columns = columns.iter();
+        let gathered = columns.map(|(name, column)| column.gathered(name, &log));
+        let gathered = gathered.collect::<PyResult<_>>()?;
+        Self::of(py, &log, gathered)
+    }
+
+    /// Anything with `__arrow_c_stream__` or `__arrow_c_array__` that is a table.
+    #[staticmethod]
+    fn from_arrow(py: Python<'_>, table: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let log = Gathering::new(NAME);
+        let columns = import::table(table, &log)?;
+        Self::of(py, &log, columns)
     }
 
     fn headers(&self) -> Vec<String> {
@@ -46,6 +125,11 @@ impl Log {
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let values = py.detach(|| self.table.readings(name).map(lynkeus::Series::to_vec));
         Ok(values.map_err(|e| exception(&e))?.into_pyarray(py))
+    }
+
+    /// What stands for zero in a column of dates and times.
+    fn origin(&self, name: &str) -> Option<&str> {
+        self.table.origin(name)
     }
 
     fn __len__(&self) -> usize {

@@ -129,6 +129,14 @@ impl Rig {
     }
 }
 
+/// Why a run ended before its end: a limit, or what the model does.
+pub(crate) fn ended_early(error: lynkeus_run::Error, study: &Study) -> Error {
+    match study.budget.marked() {
+        Some(spent) => Error::ended(spent).at(&study.file),
+        None => interrupted(error, &study.file),
+    }
+}
+
 /// The plant alone, then a filter on what its sensors show: every row is a sample.
 fn sampled(
     prepared: &Prepared<'_>,
@@ -142,10 +150,7 @@ fn sampled(
     let plant_alone = simulation.run_into(&mut |time, row| run.push(time, row), &mut |done| {
         watch(0.5 * done)
     });
-    plant_alone.map_err(|error| match study.budget.marked() {
-        Some(spent) => Error::ended(spent).at(&study.file),
-        None => interrupted(error, &study.file),
-    })?;
+    plant_alone.map_err(|error| ended_early(error, study))?;
     let observer = &design.observer;
     let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
     let column = |role: Role, at: Option<usize>| {
@@ -193,11 +198,9 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let settings = settings(study)?;
     let mut simulation = open_loop(study, settings, plant)?;
     simulation.output_step = step;
-    let run = simulation
-        .run_watched(&mut within(&study.budget, &mut |_| {
-            ControlFlow::Continue(())
-        }))
-        .map_err(|error| interrupted(error.error, &study.file))?;
+    let watch = &mut |_| ControlFlow::Continue(());
+    let run = simulation.run_watched(&mut within(&study.budget, watch));
+    let run = run.map_err(|interrupted| ended_early(interrupted.error, study))?;
     let groups = [
         (&plant.outputs, Role::Measured),
         (&plant.inputs, Role::Input),

@@ -2,12 +2,15 @@
 
 mod sorted;
 mod store;
+mod tail;
 
 pub(crate) use sorted::Sorted;
 pub(crate) use store::Store;
 pub use store::folder;
+pub use tail::Lent;
 
 use crate::Error;
+use tail::Tail;
 
 /// Numbers that go to the disk together; what is read of a long series at a time.
 const BLOCK: usize = 1 << 15;
@@ -23,7 +26,7 @@ pub struct Series {
     /// where its blocks are in the store
     blocks: Vec<u64>,
     /// the numbers after them
-    tail: Vec<f64>,
+    tail: Tail,
 }
 
 impl Series {
@@ -42,6 +45,15 @@ impl Series {
         series
     }
 
+    /// Of numbers that stay where they are.
+    #[must_use]
+    pub fn lent(values: Lent) -> Self {
+        Self {
+            tail: Tail::lent(values),
+            ..Self::default()
+        }
+    }
+
     /// The number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -56,14 +68,15 @@ impl Series {
 
     /// Adds a row.
     pub(crate) fn push(&mut self, x: f64) {
-        if self.tail.len() >= BLOCK {
-            let (blocks, rest) = self.tail.as_chunks::<BLOCK>();
+        let tail = self.tail.own();
+        if tail.len() >= BLOCK {
+            let (blocks, rest) = tail.as_chunks::<BLOCK>();
             self.blocks
                 .extend(blocks.iter().map(|b| self.store.keep(b)));
-            self.tail = rest.to_vec();
-            self.tail.reserve_exact(BLOCK - self.tail.len());
+            *tail = rest.to_vec();
+            tail.reserve_exact(BLOCK - tail.len());
         }
-        self.tail.push(x);
+        tail.push(x);
     }
 
     /// The number in a row; a long series is better [read on](Self::iter_from).
@@ -101,6 +114,7 @@ impl Series {
         let next = (row / BLOCK).min(self.blocks.len());
         let mut iter = Iter {
             series: self,
+            tail: &self.tail,
             next,
             block: vec![],
             at: row - next * BLOCK,
@@ -116,7 +130,26 @@ impl Series {
     /// All numbers at once, however many.
     #[must_use]
     pub fn to_vec(&self) -> Vec<f64> {
-        self.iter().collect()
+        self.part(0, self.len())
+    }
+
+    /// At most so many numbers from a row on.
+    #[must_use]
+    pub fn part(&self, from: usize, count: usize) -> Vec<f64> {
+        let to = self.len().min(from.saturating_add(count));
+        let in_blocks = to.min(self.blocks.len() * BLOCK);
+        let mut values = Vec::with_capacity(to.saturating_sub(from));
+        let mut row = from;
+        while row < in_blocks {
+            let (block, at) = (row / BLOCK, row % BLOCK);
+            let rows = (BLOCK - at).min(in_blocks - row);
+            self.store.append(self.blocks[block], at, rows, &mut values);
+            row += rows;
+        }
+        let before = self.blocks.len() * BLOCK;
+        let tail = row.max(before) - before..to.max(before) - before;
+        values.extend_from_slice(self.tail.get(tail).unwrap_or_default());
+        values
     }
 
     /// All numbers at once, where they are needed in any order.
@@ -141,7 +174,7 @@ impl Series {
             return Self {
                 store: self.store.clone(),
                 blocks: self.blocks[..whole].to_vec(),
-                tail: self.iter_from(from).take(rows - from).collect(),
+                tail: self.part(from, rows - from).into(),
             };
         }
         let mut series = self.clone();
@@ -167,7 +200,7 @@ impl Series {
 impl From<Vec<f64>> for Series {
     fn from(values: Vec<f64>) -> Self {
         Self {
-            tail: values,
+            tail: values.into(),
             ..Self::default()
         }
     }
@@ -192,6 +225,8 @@ impl<'s> IntoIterator for &'s Series {
 #[derive(Clone, Debug)]
 pub struct Iter<'s> {
     series: &'s Series,
+    /// the numbers after all blocks
+    tail: &'s [f64],
     /// the block that is read next
     next: usize,
     /// the block that is being read; empty in the tail
@@ -227,7 +262,7 @@ impl Iterator for Iter<'_> {
             self.at += 1;
             return x;
         }
-        let x = self.series.tail.get(self.at).copied()?;
+        let x = self.tail.get(self.at).copied()?;
         self.at += 1;
         Some(x)
     }
@@ -235,8 +270,8 @@ impl Iterator for Iter<'_> {
     fn size_hint(&self) -> (usize, Option<usize>) {
         let blocks = (self.series.blocks.len() - self.next) * BLOCK;
         let left = match self.block.is_empty() {
-            true => self.series.tail.len().saturating_sub(self.at),
-            false => BLOCK - self.at + blocks + self.series.tail.len(),
+            true => self.tail.len().saturating_sub(self.at),
+            false => BLOCK - self.at + blocks + self.tail.len(),
         };
         (left, Some(left))
     }
@@ -269,7 +304,7 @@ mod tests {
             let series = Series::gathered(&Store::default(), numbers(count));
             assert_eq!(series.len(), count);
             assert!(series.iter().eq(numbers(count)), "{count}");
-            assert!(series.tail.capacity() <= 2 * BLOCK);
+            assert!(series.clone().tail.own().capacity() <= 2 * BLOCK);
             for from in [
                 0,
                 1,
@@ -290,6 +325,8 @@ mod tests {
                 assert_eq!(series.get(from), numbers(count).nth(from));
                 let short = series.shortened(from.min(count));
                 assert!(short.iter().eq(numbers(count).take(from)));
+                let part = numbers(count).skip(from).take(BLOCK + 3);
+                assert!(series.part(from, BLOCK + 3).into_iter().eq(part));
             }
             assert_eq!(series.last(), numbers(count).last());
             assert_eq!(Series::from(series.to_vec()), series);
@@ -310,6 +347,23 @@ mod tests {
         held.push(4.0);
         assert_eq!((held.len(), held.last()), (2 * BLOCK + 2, Some(4.0)));
         assert_eq!(held.iter().sum::<f64>(), 3.0 * (2 * BLOCK + 1) as f64 + 4.0);
+    }
+
+    #[test]
+    fn lent_numbers_stay_where_they_are_until_they_are_changed() {
+        let owner: Lent = std::sync::Arc::new(vec![1.0, 2.0, 3.0]);
+        let mut series = Series::lent(owner.clone());
+        let twin = series.clone();
+        let place = (*owner).as_ref().as_ptr();
+        assert_eq!(twin.tail.as_ptr(), place);
+        assert_eq!(series.shortened(3).tail.as_ptr(), place);
+        assert_eq!(series.shortened(2).to_vec(), [1.0, 2.0]);
+        series.push(4.0);
+        assert_eq!(series.to_vec(), [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(
+            (twin.to_vec(), (*owner).as_ref().len()),
+            (vec![1.0, 2.0, 3.0], 3)
+        );
     }
 
     #[test]

@@ -68,22 +68,6 @@ impl Column {
         }
     }
 
-    /// Of values that are not read from a file.
-    pub(super) fn computed(name: String, mut values: Vec<f64>) -> Self {
-        let mut column = Self {
-            name,
-            ..Self::default()
-        };
-        for (row, value) in values.iter_mut().enumerate() {
-            if !value.is_finite() {
-                column.miss(row as u64 + 1, &value.to_string());
-                *value = f64::NAN;
-            }
-        }
-        column.values = values.into();
-        column
-    }
-
     /// The same with other values, and the first of those that are missing.
     pub(super) fn with(&self, values: Series, faults: Vec<Fault>) -> Self {
         Self {
@@ -100,8 +84,7 @@ impl Column {
         let value = match value.is_finite() {
             true => value,
             false => {
-                let line = self.values.len() as u64 + 1;
-                self.miss(line, &value.to_string());
+                self.miss_number(self.values.len() as u64 + 1, value);
                 f64::NAN
             }
         };
@@ -118,12 +101,18 @@ impl Column {
     /// Takes the next row's point in time.
     #[cfg(feature = "parquet")]
     pub(super) fn put_instant(&mut self, instant: Instant) {
-        let line = self.values.len() as u64 + 1;
-        let seconds = match &self.origin {
-            Some(origin) => instant.seconds_since(origin.instant),
-            None => self.instant(instant, line, &instant.to_string()),
-        };
+        let seconds = self.since_origin(instant).unwrap_or_else(|| {
+            let line = self.values.len() as u64 + 1;
+            self.instant(instant, line, &instant.to_string())
+        });
         self.values.push(seconds);
+    }
+
+    /// Seconds from the first date to this one, where nothing speaks against it.
+    pub(super) fn since_origin(&self, instant: Instant) -> Option<f64> {
+        let origin = self.origin.as_ref()?.instant;
+        let is_alike = origin.zoned == instant.zoned && !self.has_number;
+        is_alike.then(|| instant.seconds_since(origin))
     }
 
     /// Takes the next row's cell.
@@ -154,7 +143,8 @@ impl Column {
         self.values.push(value);
     }
 
-    fn number(&mut self, value: f64, line: u64, text: &str) -> f64 {
+    /// A number in its row; the value.
+    pub(super) fn number(&mut self, value: f64, line: u64, text: &str) -> f64 {
         self.has_number = true;
         if let Some(origin) = &self.origin {
             let message = format!("expected a date like \"{}\", found \"{text}\"", origin.text);
@@ -189,7 +179,8 @@ impl Column {
         self.values = Series::gathered(self.values.store(), settled);
     }
 
-    fn instant(&mut self, instant: Instant, line: u64, text: &str) -> f64 {
+    /// A date in its row; the value.
+    pub(super) fn instant(&mut self, instant: Instant, line: u64, text: &str) -> f64 {
         if self.has_number {
             let message = format!("expected a number, found the date \"{text}\"");
             self.refuse(line, message, ALIKE);
@@ -209,7 +200,16 @@ impl Column {
         seconds
     }
 
-    fn miss(&mut self, line: u64, text: &str) {
+    /// A number that is not finite.
+    pub(super) fn miss_number(&mut self, line: u64, value: f64) {
+        match self.faults.len() < KEPT {
+            true => self.miss(line, &value.to_string()),
+            false => self.missing += 1,
+        }
+    }
+
+    /// A cell that says nothing.
+    pub(super) fn miss(&mut self, line: u64, text: &str) {
         self.missing += 1;
         if self.faults.len() < KEPT {
             self.faults.push(Fault {

@@ -2,28 +2,29 @@
 
 /// A point in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Instant {
+pub struct Instant {
     /// since 1970-01-01T00:00:00, UTC or local
     nanoseconds: i128,
     /// it says how far its clock is from UTC
-    pub zoned: bool,
+    pub(super) zoned: bool,
 }
 
 /// Nanoseconds in a second.
 const SECOND: i128 = 1_000_000_000;
 
 impl Instant {
-    /// So many nanoseconds after 1970-01-01T00:00:00.
-    #[cfg(feature = "parquet")]
-    pub(super) fn at(nanoseconds: i128, zoned: bool) -> Self {
+    /// So many nanoseconds after 1970-01-01T00:00:00, in UTC where it is `zoned`.
+    #[must_use]
+    pub fn at(nanoseconds: i128, zoned: bool) -> Self {
         Self { nanoseconds, zoned }
     }
 
     /// From `origin` to here, rounded once where that is less than 104 days.
     pub(super) fn seconds_since(self, origin: Self) -> f64 {
         let nanoseconds = self.nanoseconds - origin.nanoseconds;
-        if nanoseconds.unsigned_abs() < 1 << 53 {
-            return nanoseconds as f64 / SECOND as f64;
+        match i64::try_from(nanoseconds) {
+            Ok(short) if short.unsigned_abs() < 1 << 53 => return short as f64 / SECOND as f64,
+            _ => {}
         }
         let part = nanoseconds.rem_euclid(SECOND) as f64 / SECOND as f64;
         nanoseconds.div_euclid(SECOND) as f64 + part
@@ -31,7 +32,6 @@ impl Instant {
 }
 
 /// As RFC 3339 has it.
-#[cfg(feature = "parquet")]
 impl std::fmt::Display for Instant {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let seconds = self.nanoseconds.div_euclid(SECOND);
@@ -219,7 +219,6 @@ mod tests {
         assert!(a.zoned && !at("2026-11-22").zoned);
     }
 
-    #[cfg(feature = "parquet")]
     #[test]
     fn what_is_shown_is_read() {
         let nanoseconds = (-1000..1000).map(|i: i128| i * 86_399_999_999_999 * 37 + 5);

@@ -7,6 +7,7 @@
 
 mod cell;
 mod column;
+mod gathering;
 mod instant;
 mod lines;
 mod marks;
@@ -27,6 +28,8 @@ use lines::Lines;
 #[cfg(feature = "parquet")]
 pub use self::parquet::write_parquet;
 pub use column::Fault;
+pub use gathering::{Cell, Gathered, Gathering};
+pub use instant::Instant;
 pub use number::{exact, significant};
 pub use order::Ordered;
 pub use write::write_csv;
@@ -56,22 +59,11 @@ impl Table {
     /// # Errors
     /// The columns differ in length.
     pub fn from_columns(columns: Vec<(String, Vec<f64>)>) -> Result<Self, Error> {
-        let rows = columns.first().map_or(0, |(_, values)| values.len());
-        if let Some((name, values)) = columns.iter().find(|(_, values)| values.len() != rows) {
-            return Err(Error::input(format!(
-                "the columns of a table must be equally long: expected {rows} rows, found {} in \"{name}\"",
-                values.len()
-            )));
-        }
+        let table = Gathering::new("");
         let columns = columns.into_iter();
-        Ok(Self {
-            file: String::new(),
-            columns: columns
-                .map(|(name, values)| Column::computed(name, values))
-                .collect(),
-            lines: Lines::counted(rows),
-            store: Store::default(),
-        })
+        let columns = columns.map(|(name, values)| table.owned(&name, values));
+        let columns = columns.collect();
+        table.ragged(columns)
     }
 
     /// The number of rows.
@@ -97,11 +89,12 @@ impl Table {
         }
     }
 
-    /// A line of it in messages; a table made in Rust has rows, from 1.
+    /// A line of it in messages, 0 for none; a table made in Rust has rows, from 1.
     fn place_of(&self, line: u64) -> String {
-        match self.file.is_empty() {
-            true => format!("row {line} of the table"),
-            false => format!("{}:{line}", self.file),
+        match (line, self.file.is_empty()) {
+            (0, _) => self.place(),
+            (line, true) => format!("row {line} of the table"),
+            (line, false) => format!("{}:{line}", self.file),
         }
     }
 

@@ -8,7 +8,7 @@ use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Column, Dynamics, Level, Noise, Role, Trajectory};
 
 use crate::prepare::Prepared;
-use crate::simulate::{open_loop, settings};
+use crate::simulate::{ended_early, open_loop, settings, within};
 use crate::systems;
 use crate::{Error, Study};
 
@@ -49,9 +49,10 @@ impl Reference {
         let settings = settings(study)?;
         let mut alone = open_loop(study, settings, plant)?;
         let stated = std::mem::take(&mut alone.noise);
+        let watch = &mut |_| ControlFlow::Continue(());
         let truth = alone
-            .run_watched(&mut |_| ControlFlow::Continue(()))
-            .map_err(|error| crate::outcome::interrupted(error.error, &study.file))?;
+            .run_watched(&mut within(&study.budget, watch))
+            .map_err(|interrupted| ended_early(interrupted.error, study))?;
         let scales = scales(plant, &truth);
         let starts = starts(study, plant)?;
         let last = starts.last().copied().unwrap_or(settings.start);
