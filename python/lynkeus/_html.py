@@ -120,7 +120,8 @@ def _certificate(found: Report, _: Report) -> str:
 
 
 def _proof(part: Report) -> str:
-    checks = [(c["verdict"], c["name"], c["detail"]) for c in part.get("hypotheses", [])]
+    # inequality and theorem share some of them
+    checks = dict.fromkeys((c["verdict"], c["name"], c["detail"]) for c in part.get("hypotheses", []))
     constants = [(c["name"], c["value"], c["meaning"]) for c in part.get("constants", [])]
     return (
         f"<p>{escape(part['basis'])}: {verdict(part['verdict'])}</p>"

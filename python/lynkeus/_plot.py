@@ -48,6 +48,7 @@ class Panel:
     band: str = ""
     low: Column | None = None
     high: Column | None = None
+    is_monitor: bool = False
 
 
 @dataclass
@@ -97,6 +98,7 @@ def _panel(run: Run, name: str, estimates: Mapping[str, str], caption: str, trut
     panel = Panel(name, caption)
     if name not in estimates:
         panel.curves.append(Curve(name, run[name], {"color": PLAIN, "linewidth": 1.4}))
+        panel.is_monitor = name in run.summary.get("monitors", {})
         return panel
     true = run[name] if name in run.columns else truth.get(name)
     estimate = run[estimates[name]]
@@ -161,7 +163,7 @@ def draw(panels: Sequence[Panel], t: Column, time: str, ax: Axes | Sequence[Axes
             _draw(place, panel, t)
             place.set_title(panel.caption + _cut(place, panel), loc="left", fontsize="medium")
     axes[-1].set_xlabel(time)
-    _legends(axes)
+    _legends(axes, {panel.name for panel in panels} if len(axes) > 1 else set())
     return axes
 
 
@@ -199,7 +201,12 @@ def _draw(ax: Axes, panel: Panel, t: Column, prefix: str = "") -> None:
 
 def _cut(ax: Axes, panel: Panel) -> str:
     """Cuts the axis where an estimate peaks far beyond the rest, by the rule of the command's pictures;
-    what to add to the caption then."""
+    what to add to the caption then. Monitors, which may fall by decades, are seen by their logarithm."""
+    if panel.is_monitor:
+        low, high = _ends(panel.curves[0].values) if len(panel.curves[0].values) else (0.0, 0.0)
+        if high > 1000 * low > 0:
+            ax.set_yscale("log")
+        return ""
     core = [_ends(curve.values, 0.0 if curve.label == "true" else 0.05) for curve in panel.curves]
     core += [_ends(values, 0.05) for values in (panel.low, panel.high) if values is not None]
     worth, whole = np.concatenate(core), np.concatenate([_ends(curve.values) for curve in panel.curves])
@@ -227,10 +234,12 @@ def _ends(values: Column, share: float = 0.0) -> Column:
     return finite[[cut, len(finite) - 1 - cut]] if len(finite) else finite
 
 
-def _legends(axes: Sequence[Axes]) -> None:
-    """One legend above everything where all panels speak of the same, else one for each."""
+def _legends(axes: Sequence[Axes], alone: set[str]) -> None:
+    """One legend above everything where all panels speak of the same, else one for each; but for what
+    stands ``alone`` in a panel that has its name."""
     told = [ax.get_legend_handles_labels() for ax in axes]
-    every = dict(zip(chain(*(labels for _, labels in told)), chain(*(lines for lines, _ in told)), strict=True))
+    pairs = zip(chain(*(lines for lines, _ in told)), chain(*(labels for _, labels in told)), strict=True)
+    every = {label: line for line, label in pairs if label not in alone}
     figure = axes[0].figure
     if len(axes) > 1 and len(every) <= 5 and figure is not None:
         figure.legend(
