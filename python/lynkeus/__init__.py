@@ -10,6 +10,8 @@
 
 from ._lynkeus import Estimator, Log
 from .errors import InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
+from .functions import abs, acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
+from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .model import Model
 from .results import (
     Answer,
@@ -27,6 +29,7 @@ from .results import (
     Table,
 )
 from .study import Study
+from .systems import Driven, Functions, Observer
 from .verbs import certify, check, compare, design, estimate, how_well, simulate, tune
 
 __all__ = [
@@ -35,8 +38,10 @@ __all__ = [
     "Check",
     "Comparison",
     "Design",
+    "Driven",
     "Estimation",
     "Estimator",
+    "Functions",
     "HowWell",
     "InputError",
     "LimitError",
@@ -45,6 +50,7 @@ __all__ = [
     "Model",
     "MonteCarlo",
     "NotCredible",
+    "Observer",
     "Record",
     "RefusedError",
     "Run",
@@ -53,12 +59,34 @@ __all__ = [
     "Sweep",
     "Table",
     "TraceError",
+    "abs",
+    "acos",
+    "asin",
+    "atan",
+    "atan2",
+    "ceil",
     "certify",
     "check",
     "compare",
+    "cos",
+    "cosh",
     "design",
     "estimate",
+    "exp",
+    "floor",
     "how_well",
+    "interp",
+    "log",
+    "log10",
+    "maximum",
+    "minimum",
+    "sign",
     "simulate",
+    "sin",
+    "sinh",
+    "sqrt",
+    "tan",
+    "tanh",
     "tune",
+    "where",
 ]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
-from . import _lynkeus
+from . import _from_function, _lynkeus
+from ._flatten import flattened, is_read
 from ._toml import key, number
+from .systems import Functions
 
 
 class Model:
@@ -24,20 +27,81 @@ class Model:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], choose: str | None = None) -> Model:
-        """A file: ``.mo`` or ``.jl``."""
-        return cls(Path(path).read_text(encoding="utf-8-sig"), os.fspath(path), choose)
+        """A file: ``.mo`` or ``.jl``. Where connectors or libraries keep it from being read and the
+        compiler ``rumoca`` is installed (``pip install lynkeus[modelica]``), what that makes of it:
+        names come out dotted, ``r1.p.v``."""
+        name = os.fspath(path)
+        text = Path(path).read_text(encoding="utf-8-sig")
+        if not name.endswith(".mo") or is_read(text, name, choose):
+            return cls(text, name, choose)
+        flat = flattened(name, choose)
+        return cls(text, name, choose) if flat is None else cls(*flat)
 
     @classmethod
     def from_modelica(cls, text: str, choose: str | None = None) -> Model:
         """A text in Modelica."""
         return cls(text, choose=choose)
 
-    def functions(self, parameters: Mapping[str, float] | None = None) -> _lynkeus.Functions:
+    @classmethod
+    def from_function(
+        cls,
+        f: Callable[..., Any],
+        h: Callable[..., Any] | None = None,
+        *,
+        states: Any,
+        inputs: Any = (),
+        outputs: Any = None,
+        params: Any = (),
+        name: str | None = None,
+        description: str | None = None,
+    ) -> Model:
+        """Python functions: ``f(t, x, u, p)`` returns the derivatives of the states, ``h(t, x, u, p)`` the
+        outputs, as lists, tuples, arrays or dictionaries by name. Each is called once, with values that
+        record what is done with them: operators, the functions of this package (``lynkeus.sin``…),
+        NumPy's functions and ``@``; ``lynkeus.where`` in place of ``if``. Both may leave out ``p``, or
+        ``u`` and ``p``. Without ``h`` the outputs are states.
+
+        ``states``, ``inputs``, ``outputs`` and ``params`` are lists of names, or dictionaries: name to a
+        number (start or value), an array, or a dictionary of ``start``, ``fixed``, ``min``, ``max``,
+        ``unit``, ``description``, ``size`` (of a parameter: ``value``). In ``f``, states are ``x[0]``,
+        ``x["T"]``, ``x.T`` or ``a, b = x``; inputs and parameters alike.
+
+        >>> import lynkeus
+        >>> def tank(t, x, u, p):
+        ...     return [u.inflow - p.k * lynkeus.sqrt(x.level)]
+        >>> model = lynkeus.Model.from_function(
+        ...     tank, states={"level": {"start": 4, "min": 0.1, "max": 10}},
+        ...     inputs={"inflow": {"min": 0, "max": 5}}, params={"k": 0.5})
+        >>> print(model.text)
+        model tank
+          parameter Real k = 0.5;
+          input Real inflow(min = 0, max = 5);
+          output Real level(start = 4, min = 0.1, max = 10);
+        equation
+          der(level) = inflow - k*sqrt(level);
+        end tank;
+        <BLANKLINE>
+        """
+        called = _from_function.model_name(f, name)
+        text = _from_function.text(
+            f,
+            h,
+            states=states,
+            inputs=inputs,
+            outputs=outputs,
+            params=params,
+            name=called,
+            description=description,
+        )
+        return cls(text, f"{called}.mo")
+
+    def functions(self, parameters: Mapping[str, float] | None = None) -> Functions:
         """The equations as functions of numbers, x' = f(t, x, u) and y = h(t, x, u); ``parameters``
         replace those of the model."""
         given = "".join(f"{key(k)} = {number(v)}\n" for k, v in (parameters or {}).items())
         text = f"[parameters]\n{given}"
-        return _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose).functions()
+        core = _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose)
+        return Functions(core.functions())
 
     def __repr__(self) -> str:
         return f"Model({self.name!r})"

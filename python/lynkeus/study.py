@@ -13,6 +13,7 @@ from ._logs import log_of
 from ._progress import Progress, told
 from ._toml import document
 from .errors import InputError, NotCredible
+from .systems import Functions, Observer
 from .model import Model
 from .results import (
     Certificate,
@@ -209,6 +210,14 @@ class Study:
         """Families side by side, on a simulation or on a log."""
         with told(progress, "comparing") as tell:
             return Comparison(self._core.compare(_some(log), tell, time_limit))
+
+    def plant(self) -> Functions:
+        """The plant as functions, with the study's parameters and start."""
+        return Functions(self._core.functions())
+
+    def observer(self, *, time_limit: float | None = None) -> Observer:
+        """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
+        return Observer(self._core.observer(time_limit))
 
     def estimator(self) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one."""

@@ -36,10 +36,19 @@ usage: cargo xtask <task>
             restored snapshot equal to the bit; [--seed N] [--count N] [--seconds N]; build with
             --release
   bench-peers  ours beside C by hand, numba, JAX, diffrax, CasADi and SciPy: the table of
-            BENCHMARKS.md; [--rounds N]; needs gcc; build with --release";
+            BENCHMARKS.md; [--rounds N]; needs gcc; build with --release
+  bench-runs   10,000 runs of the column with noise beside JAX: clock, processor time and memory;
+            [--runs N] [--rounds N]; needs `cargo build --release`; build with --release";
 
 /// Tasks with options of their own.
-const WITH_OPTIONS: [&str; 5] = ["falsify", "attack", "exercise", "bench-peers", "bench-ours"];
+const WITH_OPTIONS: [&str; 6] = [
+    "falsify",
+    "attack",
+    "exercise",
+    "bench-peers",
+    "bench-runs",
+    "bench-ours",
+];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -59,6 +68,7 @@ fn main() -> ExitCode {
         "exercise" => exercise::run(&arguments[1..]),
         "falsify" => falsify::run(&arguments[1..]),
         "bench-peers" => peers::bench(&arguments[1..]),
+        "bench-runs" => peers::runs::bench(&arguments[1..]),
         // one of the peers, as a process of its own
         "bench-ours" => peers::ours::print(arguments.get(1).map_or("", String::as_str)),
         _ => {

@@ -134,6 +134,48 @@ fn sweeps_agree(draws: &[Draw], rows: &[[f64; 5]; 4]) -> Result<(), TestCaseErro
     Ok(())
 }
 
+/// Linear systems of every size up to one that the stack has no room for, twice in a program; the largest is
+/// beyond what is compiled.
+#[test]
+fn linear_systems_of_every_size_agree() {
+    for n in [1, 2, 5, 6, 9, 64, 65] {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let entry = |k: usize| (1.7 * (k * k) as f64).sin() + x * (k % 5) as f64 - y;
+        let a: Vec<Node> = (0..n * n).map(|k| entry(k).node()).collect();
+        let b: Vec<Node> = (0..n).map(|k| entry(k + 3).node()).collect();
+        let first = g.solve(&a, &b);
+        let second = g.solve(&a, &first.x);
+        let outputs = [&first.x[..], &second.x, &[first.rcond, second.rcond]].concat();
+        let tape = Tape::new(&g, &[x.node(), y.node()], &outputs).expect("all inputs are there");
+        let Some(lanes) = Function::<4>::compile(&tape) else {
+            assert!(
+                n == 65 || Function::<4>::compile(&smallest()).is_none(),
+                "{n}"
+            );
+            continue;
+        };
+        assert!(n < 65);
+        let inputs = [[0.3, -1.5, f64::NAN, 0.0], [2.0, 0.25, 1.0, 0.0]];
+        let mut found = vec![[0.0; 4]; outputs.len()];
+        let mut evaluator = lanes.evaluator();
+        for _ in 0..2 {
+            evaluator.eval(&inputs, &mut found);
+            let expected = tape.eval_in(&Lanes::<4>, &inputs);
+            let pairs = found.as_flattened().iter().zip(expected.as_flattened());
+            assert!(pairs.clone().all(|(f, e)| same(*f, *e)), "{n}");
+            assert!(found[0][0].is_finite() && found[0][0] != 0.0);
+        }
+    }
+}
+
+/// What every machine compiles that compiles at all.
+fn smallest() -> Tape {
+    let g = Graph::new();
+    let x = g.symbol("x").node();
+    Tape::new(&g, &[x], &[x]).expect("its input is there")
+}
+
 fn rows() -> impl Strategy<Value = [[f64; 5]; 4]> {
     prop::array::uniform4(prop::array::uniform5(number()))
 }

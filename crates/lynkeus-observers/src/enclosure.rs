@@ -8,7 +8,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 use lynkeus_proof::inverse::Inverse;
 use lynkeus_proof::magnitude::{norm, plus, product, size, times};
 use lynkeus_proof::matrix::IntervalMatrix;
-use lynkeus_structure::{Dimension, Matrix, Region, enclosure_within};
+use lynkeus_structure::{Dimension, Matrix, Region, enclosure_within, magnitude_within};
 
 /// Cells examined per end of the range of an entry.
 const CELLS: usize = 600;
@@ -87,8 +87,11 @@ impl<'g> Enclosure<'g> {
 
     /// Largest absolute value.
     pub fn magnitude(&self, node: Node) -> Result<f64, MissingInput> {
-        let (low, high) = self.range(node)?;
-        Ok(low.abs().max(high.abs()))
+        let size = self.magnitude_of(node)?;
+        if !size.is_finite() {
+            self.note(node);
+        }
+        Ok(size)
     }
 
     /// Where the whole is too hard, its factors and terms one by one.
@@ -118,8 +121,8 @@ impl<'g> Enclosure<'g> {
             let size = match entry {
                 // it is such an entry itself
                 Some(entry) if entry != node => {
-                    let found = enclosure_within(self.graph, entry, &self.region, CELLS)?;
-                    times(found.magnitude(), self.magnitude_of(b)?)
+                    let inverse = magnitude_within(self.graph, entry, &self.region, CELLS)?;
+                    times(inverse, self.magnitude_of(b)?)
                 }
                 _ => f64::INFINITY,
             };
@@ -133,8 +136,7 @@ impl<'g> Enclosure<'g> {
         if let Some(known) = self.sizes.borrow().get(&node) {
             return Ok(*known);
         }
-        let found = enclosure_within(self.graph, node, &self.region, CELLS)?;
-        let whole = found.magnitude();
+        let whole = magnitude_within(self.graph, node, &self.region, CELLS)?;
         let size = match whole.is_finite() {
             true => whole,
             false => self.of_parts(node)?,

@@ -1,83 +1,231 @@
-//! A plant's equations as functions that are called with numbers.
+//! Plants and observers as functions that are called with numbers, and as texts in languages
+//! that have such functions.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use lynkeus::Error;
-use lynkeus::expr::{Evaluator, Node, Tape};
+use lynkeus::expr::{Evaluator, Graph, MissingInput, Node, Tape, jacobian};
 use lynkeus::model::{Plant, Variable};
-use numpy::{IntoPyArray, PyArray1};
+use lynkeus::observers::{self, Observer};
+use lynkeus::study::SimulateSettings;
+use lynkeus_export::python::{Function, Namespace, Vector, module};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::errors::{exception, from_source};
 
+type Values<'py> = PyReadonlyArray1<'py, f64>;
+
 /// x' = f(t, x, u), y = h(t, x, u).
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Functions {
-    states: Vec<String>,
-    inputs: Vec<String>,
+    /// what it is, for people
+    title: String,
+    states: Vector,
+    inputs: Vector,
     outputs: Vec<String>,
-    start: Vec<Option<f64>>,
-    f: Mutex<Evaluator>,
-    h: Mutex<Evaluator>,
+    start: Vec<f64>,
+    /// of an observer
+    family: Option<&'static str>,
+    /// whether there are updates besides the flow
+    is_filter: bool,
+    /// how many of the inputs are sensors
+    sensors: usize,
+    equations: Mutex<Equations>,
+    f: Compiled,
+    h: Compiled,
+    jacobian: OnceLock<Jacobian>,
+}
+
+/// Expressions over one graph.
+struct Equations {
+    graph: Graph,
+    time: Node,
+    states: Vec<Node>,
+    inputs: Vec<Node>,
+    derivatives: Vec<Node>,
+    outputs: Vec<Node>,
+}
+
+impl Equations {
+    fn compiled(&self, values: &[Node]) -> Result<Compiled, MissingInput> {
+        let arguments = [&[self.time][..], &self.states, &self.inputs].concat();
+        let tape = Tape::new(&self.graph, &arguments, values)?;
+        let evaluator = Mutex::new(tape.evaluator());
+        Ok(Compiled { tape, evaluator })
+    }
+
+    fn jacobian(&self) -> Result<Jacobian, MissingInput> {
+        let found = jacobian::forward(&self.graph, &self.derivatives, &self.states);
+        let entries: Vec<Node> = found.entries.iter().map(|&(.., node)| node).collect();
+        let places = found.entries.iter().map(|&(row, column, _)| [row, column]);
+        Ok(Jacobian {
+            places: places.collect(),
+            entries: self.compiled(&entries)?,
+        })
+    }
+}
+
+struct Compiled {
+    tape: Tape,
+    evaluator: Mutex<Evaluator>,
+}
+
+impl Compiled {
+    fn at(&self, arguments: &[f64]) -> Vec<f64> {
+        let mut found = vec![0.0; self.tape.outputs()];
+        let mut evaluator = self.evaluator.lock().unwrap_or_else(|e| e.into_inner());
+        evaluator.eval(arguments, &mut found);
+        found
+    }
+}
+
+/// The entries that are not zero everywhere.
+struct Jacobian {
+    /// row and column of each
+    places: Vec<[usize; 2]>,
+    entries: Compiled,
 }
 
 fn names(variables: &[Variable]) -> Vec<String> {
     variables.iter().map(|v| v.name.clone()).collect()
 }
 
-impl Functions {
-    /// # Errors
-    /// An equation reads what has no value.
-    pub fn of(plant: &Plant) -> PyResult<Self> {
-        let nodes = |variables: &[Variable]| variables.iter().map(|v| v.node).collect::<Vec<_>>();
-        let (states, inputs) = (nodes(&plant.states), nodes(&plant.inputs));
-        let arguments = [&[plant.time][..], &states, &inputs].concat();
-        let compiled = |values: &[Node]| {
-            let tape = Tape::new(&plant.graph, &arguments, values).map_err(from_source)?;
-            Ok::<_, PyErr>(Mutex::new(tape.evaluator()))
-        };
-        Ok(Self {
-            states: names(&plant.states),
-            inputs: names(&plant.inputs),
-            outputs: names(&plant.outputs),
-            start: plant.states.iter().map(|s| s.start).collect(),
-            f: compiled(&plant.derivatives)?,
-            h: compiled(&nodes(&plant.outputs))?,
-        })
-    }
+fn nodes(variables: &[Variable]) -> Vec<Node> {
+    variables.iter().map(|v| v.node).collect()
+}
 
-    fn arguments(&self, t: f64, x: &[f64], u: &[f64]) -> PyResult<Vec<f64>> {
-        let expect = |what: &str, names: &[String], values: &[f64]| match values.len() {
-            found if found == names.len() => Ok(()),
-            found => Err(exception(&Error::input(format!(
-                "{what}: expected {} values ({}), found {found}",
-                names.len(),
-                names.join(", ")
-            )))),
-        };
-        expect("x", &self.states, x)?;
-        expect("u", &self.inputs, u)?;
-        Ok([&[t], x, u].concat())
+fn vector(name: &str, entries: Vec<String>) -> Vector {
+    Vector {
+        name: name.to_owned(),
+        entries,
     }
 }
 
-fn evaluated(function: &Mutex<Evaluator>, arguments: &[f64], values: usize) -> Vec<f64> {
-    let mut found = vec![0.0; values];
-    let mut function = function.lock().unwrap_or_else(|e| e.into_inner());
-    function.eval(arguments, &mut found);
-    found
+impl Functions {
+    /// The plant; its start is that of `[simulate]` where the study has one.
+    ///
+    /// # Errors
+    /// An equation reads what has no value.
+    pub fn of_plant(plant: &Plant, settings: Option<&SimulateSettings>) -> PyResult<Self> {
+        let initial = settings.map_or(&[][..], |settings| &settings.initial);
+        let start = |state: &Variable| {
+            let given = initial.iter().find(|(name, _)| name.text == state.name);
+            given.map(|(_, x)| *x).or(state.start).unwrap_or(f64::NAN)
+        };
+        let equations = Equations {
+            graph: plant.graph.clone(),
+            time: plant.time,
+            states: nodes(&plant.states),
+            inputs: nodes(&plant.inputs),
+            derivatives: plant.derivatives.clone(),
+            outputs: nodes(&plant.outputs),
+        };
+        Ok(Self {
+            title: format!("{}: x' = f(t, x, u), y = h(t, x, u)", plant.name),
+            states: vector("x", names(&plant.states)),
+            inputs: vector("u", names(&plant.inputs)),
+            outputs: names(&plant.outputs),
+            start: plant.states.iter().map(start).collect(),
+            family: None,
+            is_filter: false,
+            sensors: 0,
+            f: equations
+                .compiled(&equations.derivatives)
+                .map_err(from_source)?,
+            h: equations
+                .compiled(&equations.outputs)
+                .map_err(from_source)?,
+            equations: Mutex::new(equations),
+            jacobian: OnceLock::new(),
+        })
+    }
+
+    /// The observer: its inputs are the sensors, the known inputs and the derivatives of these
+    /// that it reads; its outputs the estimates.
+    ///
+    /// # Errors
+    /// An equation reads what has no value.
+    pub fn of_observer(plant: &Plant, observer: &Observer) -> PyResult<Self> {
+        let system = lynkeus::observer_system(plant, observer).map_err(|e| exception(&e))?;
+        let read = observer.measured.iter().chain(&observer.inputs);
+        let signals = read.chain(observer.input_derivatives.iter().map(|d| &d.signal));
+        let estimates = observer.estimates.iter();
+        let equations = Equations {
+            graph: plant.graph.clone(),
+            time: observer.time,
+            states: observer.states.iter().map(|(s, _)| s.symbol).collect(),
+            inputs: signals.map(|signal| signal.symbol).collect(),
+            derivatives: observer.derivatives.clone(),
+            outputs: estimates.map(|estimate| estimate.node).collect(),
+        };
+        let outputs = system.outputs().iter().take(equations.outputs.len());
+        let (family, name) = (observer.family, &plant.name);
+        Ok(Self {
+            title: format!("{family} observer of {name}: z' = f(t, z, w), estimates h(t, z, w)"),
+            states: vector("z", system.states().to_vec()),
+            inputs: vector("w", system.signals().to_vec()),
+            outputs: outputs.cloned().collect(),
+            start: system.start().to_vec(),
+            family: Some(family),
+            is_filter: observer.filter.is_some(),
+            sensors: observer.measured.len(),
+            f: equations
+                .compiled(&equations.derivatives)
+                .map_err(from_source)?,
+            h: equations
+                .compiled(&equations.outputs)
+                .map_err(from_source)?,
+            equations: Mutex::new(equations),
+            jacobian: OnceLock::new(),
+        })
+    }
+
+    fn arguments(&self, t: f64, x: &Values<'_>, u: &Values<'_>) -> PyResult<Vec<f64>> {
+        let mut arguments = vec![t];
+        for (Vector { name, entries }, values) in [(&self.states, x), (&self.inputs, u)] {
+            let values = values.as_array();
+            if values.len() != entries.len() {
+                return Err(exception(&Error::input(format!(
+                    "{name}: expected {} values ({}), found {}",
+                    entries.len(),
+                    entries.join(", "),
+                    values.len()
+                ))));
+            }
+            arguments.extend(values);
+        }
+        Ok(arguments)
+    }
+
+    /// Made when first asked for.
+    fn slopes(&self) -> PyResult<&Jacobian> {
+        if let Some(known) = self.jacobian.get() {
+            return Ok(known);
+        }
+        let equations = self.equations.lock().unwrap_or_else(|e| e.into_inner());
+        let made = equations.jacobian().map_err(from_source)?;
+        Ok(self.jacobian.get_or_init(|| made))
+    }
 }
 
 #[pymethods]
 impl Functions {
     #[getter]
+    fn title(&self) -> &str {
+        &self.title
+    }
+
+    #[getter]
     fn states(&self) -> Vec<String> {
-        self.states.clone()
+        self.states.entries.clone()
     }
 
     #[getter]
     fn inputs(&self) -> Vec<String> {
-        self.inputs.clone()
+        self.inputs.entries.clone()
     }
 
     #[getter]
@@ -88,33 +236,91 @@ impl Functions {
     /// Start values, NaN where the model gives none.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let start = self.start.iter().map(|s| s.unwrap_or(f64::NAN));
-        start.collect::<Vec<f64>>().into_pyarray(py)
+        self.start.clone().into_pyarray(py)
+    }
+
+    #[getter]
+    fn family(&self) -> Option<&'static str> {
+        self.family
+    }
+
+    #[getter]
+    fn is_filter(&self) -> bool {
+        self.is_filter
+    }
+
+    #[getter]
+    fn sensors(&self) -> usize {
+        self.sensors
     }
 
     /// x'
-    #[pyo3(signature = (t, x, u=vec![]))]
     fn f<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: Vec<f64>,
-        u: Vec<f64>,
+        x: Values<'_>,
+        u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
-        Ok(evaluated(&self.f, &arguments, self.states.len()).into_pyarray(py))
+        Ok(self.f.at(&arguments).into_pyarray(py))
     }
 
     /// y
-    #[pyo3(signature = (t, x, u=vec![]))]
     fn h<'py>(
         &self,
         py: Python<'py>,
         t: f64,
-        x: Vec<f64>,
-        u: Vec<f64>,
+        x: Values<'_>,
+        u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
-        Ok(evaluated(&self.h, &arguments, self.outputs.len()).into_pyarray(py))
+        Ok(self.h.at(&arguments).into_pyarray(py))
     }
+
+    /// ∂f/∂x, row by row of x'
+    fn jacobian_x<'py>(
+        &self,
+        py: Python<'py>,
+        t: f64,
+        x: Values<'_>,
+        u: Values<'_>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let arguments = self.arguments(t, &x, &u)?;
+        let slopes = self.slopes()?;
+        let mut found = Array2::zeros((self.start.len(), self.start.len()));
+        for (&place, value) in slopes.places.iter().zip(slopes.entries.at(&arguments)) {
+            found[place] = value;
+        }
+        Ok(found.into_pyarray(py))
+    }
+
+    /// A module with f and h, and whether it leaves linear systems to its namespace.
+    fn source(&self, language: &str) -> PyResult<(String, bool)> {
+        let namespace = match language {
+            "python" => Namespace::Numpy,
+            "casadi" => Namespace::Casadi,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "language: expected \"python\" (over NumPy or JAX) or \"casadi\", found \"{other}\""
+                )));
+            }
+        };
+        let functions = [("f", &self.f), ("h", &self.h)];
+        let functions = functions.map(|(name, compiled)| Function {
+            name,
+            tape: &compiled.tape,
+        });
+        let vectors = [self.states.clone(), self.inputs.clone()];
+        let printed = module(&self.title, &functions, &vectors, namespace);
+        let printed = printed.map_err(|e| exception(&Error::refused(e.to_string())))?;
+        Ok((printed.text, printed.has_systems))
+    }
+}
+
+/// The families of observers, and which of them are filters.
+#[pyfunction]
+pub fn families() -> Vec<(&'static str, bool)> {
+    let families = observers::FAMILIES.iter();
+    families.map(|f| (f.name(), f.is_filter())).collect()
 }

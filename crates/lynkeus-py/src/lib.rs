@@ -20,7 +20,7 @@ mod _lynkeus {
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
-    use crate::functions::Functions;
+    use crate::functions::{Functions, families};
     #[pymodule_export]
     use crate::log::Log;
     #[pymodule_export]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lynkeus::precision::{self, Candidates};
+use lynkeus::prepare::Prepared;
 use lynkeus::{CheckOptions, Error};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -259,7 +260,19 @@ impl Study {
         let plant = away(py, &self.study, &Terms::default(), |study, _| {
             lynkeus::prepare::plant(study)
         });
-        Functions::of(&plant?)
+        Functions::of_plant(&plant?, self.study.simulate.as_ref())
+    }
+
+    /// The observer as functions.
+    #[pyo3(signature = (time_limit=None))]
+    fn observer(&self, py: Python<'_>, time_limit: Option<f64>) -> PyResult<Functions> {
+        let made = away(py, &self.study, &timed(time_limit), |study, _| {
+            let plant = lynkeus::prepare::plant(study)?;
+            let design = Prepared::new(study, &plant)?.design()?;
+            Ok((plant, design.observer))
+        });
+        let (plant, observer) = made?;
+        Functions::of_observer(&plant, &observer)
     }
 
     /// `study` is what a copy or an unpickled estimator is made of again.

@@ -5,7 +5,7 @@ use lynkeus_expr::Tape;
 use crate::joint::Parts;
 use crate::noise::Sensors;
 use crate::routine::Runner;
-use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, Trajectory};
+use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
 
 /// Where a signal of the observer comes from.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +56,22 @@ impl Sources<'_> {
 fn places<'a>(names: &'a [String], name: &'a str) -> impl Iterator<Item = usize> + 'a {
     let named = names.iter().enumerate().filter(move |(_, n)| *n == name);
     named.map(|(place, _)| place)
+}
+
+/// A table with the columns that a run records.
+pub(crate) fn table(plant: &System, observer: Option<&System>, record_outputs: bool) -> Trajectory {
+    let mut table = Trajectory::default()
+        .with(Role::State, plant.states())
+        .with(Role::Input, plant.signals());
+    if record_outputs {
+        table = table
+            .with(Role::Output, plant.outputs())
+            .with(Role::Measured, plant.outputs());
+    }
+    match observer {
+        Some(observer) => table.with(Role::Estimate, observer.estimates()),
+        None => table,
+    }
 }
 
 /// The joint system; its state is the plant's, then the observer's.
@@ -138,19 +154,8 @@ impl Loop {
 
     /// A table with the recorded columns.
     pub(crate) fn table(&self) -> Trajectory {
-        let plant = self.plant.system();
-        let mut table = Trajectory::default()
-            .with(Role::State, plant.states())
-            .with(Role::Input, plant.signals());
-        if self.record_outputs {
-            table = table
-                .with(Role::Output, plant.outputs())
-                .with(Role::Measured, plant.outputs());
-        }
-        match &self.observer {
-            Some(observer) => table.with(Role::Estimate, observer.system().estimates()),
-            None => table,
-        }
+        let observer = self.observer.as_ref().map(Evaluation::system);
+        table(self.plant.system(), observer, self.record_outputs)
     }
 
     /// Columns that are not estimates.

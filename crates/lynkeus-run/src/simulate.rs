@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::closed_loop::Loop;
+use crate::closed_loop::{Loop, table};
 use crate::divergence::Bound;
 use crate::itinerary::{Itinerary, Stop};
 use crate::noise::Sensors;
@@ -79,14 +79,29 @@ impl Simulation {
         &self,
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Trajectory, Box<Interrupted>> {
-        let mut run = Run::new(self)?;
-        match run.rows(watch) {
-            Ok(()) => Ok(run.table),
-            Err(error) => Err(Box::new(Interrupted {
-                error,
-                partial: run.table,
-            })),
+        let mut partial = self.table();
+        match self.run_into(&mut |time, row| partial.push(time, row), watch) {
+            Ok(()) => Ok(partial),
+            Err(error) => Err(Box::new(Interrupted { error, partial })),
         }
+    }
+
+    /// As [`Simulation::run_watched`], but every row, its time and its values, is handed on as
+    /// soon as it is made: nothing is kept, however many there are.
+    ///
+    /// # Errors
+    /// As [`Simulation::run_watched`].
+    pub fn run_into(
+        &self,
+        take: &mut dyn FnMut(f64, &[f64]),
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        Run::new(self)?.rows(take, watch)
+    }
+
+    /// The table of a run before its first row.
+    pub fn table(&self) -> Trajectory {
+        table(&self.plant, self.observer.as_ref(), self.record_outputs)
     }
 }
 
@@ -96,7 +111,6 @@ struct Run {
     integrator: Integrator,
     system: Loop,
     x: Vec<f64>,
-    table: Trajectory,
     row: Vec<f64>,
     bound: Bound,
 }
@@ -116,7 +130,6 @@ impl Run {
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,
-            table: system.table(),
             row: vec![],
             bound: Bound::new(&x),
             system,
@@ -124,8 +137,13 @@ impl Run {
         })
     }
 
-    fn rows(&mut self, watch: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Result<(), Error> {
+    fn rows(
+        &mut self,
+        take: &mut dyn FnMut(f64, &[f64]),
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
         let all = self.itinerary.intervals() as f64;
+        let mut made = 0_usize;
         while let Some(stop) = self.itinerary.next() {
             match stop {
                 Stop::Draw => self.system.draw(),
@@ -134,18 +152,18 @@ impl Run {
                         .advance(&mut self.system, from, to, &mut self.x)?;
                 }
                 Stop::Row(time) => {
-                    self.record(time)?;
-                    let done = self.table.len() - 1;
-                    if done > 0 && watch(done as f64 / all).is_break() {
+                    take(time, self.record(time)?);
+                    if made > 0 && watch(made as f64 / all).is_break() {
                         return Err(Error::Cancelled { time });
                     }
+                    made += 1;
                 }
             }
         }
         Ok(())
     }
 
-    fn record(&mut self, t: f64) -> Result<(), Error> {
+    fn record(&mut self, t: f64) -> Result<&[f64], Error> {
         self.row.clear();
         self.system.enter(t);
         self.system.row(t, &self.x, &mut self.row)?;
@@ -153,7 +171,6 @@ impl Run {
         self.bound.see(&self.row[..self.system.known_columns()]);
         self.bound
             .check(t, names, estimate, || self.integrator.hint())?;
-        self.table.push(t, &self.row);
-        Ok(())
+        Ok(&self.row)
     }
 }

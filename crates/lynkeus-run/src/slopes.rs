@@ -94,7 +94,7 @@ impl Slopes {
         }
     }
 
-    /// One-sided differences, every entry.
+    /// One-sided differences, every entry: forward, or backward where f has no value ahead.
     fn differences(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
         let n = x.len();
         // as many places as there are in all are all of them
@@ -110,12 +110,18 @@ impl Slopes {
         let mut image = vec![0.0; n];
         let mut columns = DMatrix::zeros(n, n);
         for (k, mut column) in columns.column_iter_mut().enumerate() {
-            moved[k] = x[k] + f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
-            // the difference that the rounded sum really makes
-            let step = moved[k] - x[k];
-            f.derivatives(t, &moved, &mut image);
-            for (entry, (moved, base)) in column.iter_mut().zip(image.iter().zip(&base)) {
-                *entry = (moved - base) / step;
+            let size = f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
+            for ahead in [size, -size] {
+                moved[k] = x[k] + ahead;
+                // the difference that the rounded sum really makes
+                let step = moved[k] - x[k];
+                f.derivatives(t, &moved, &mut image);
+                for (entry, (moved, base)) in column.iter_mut().zip(image.iter().zip(&base)) {
+                    *entry = (moved - base) / step;
+                }
+                if column.iter().all(|entry| entry.is_finite()) {
+                    break;
+                }
             }
             moved[k] = x[k];
         }
@@ -186,6 +192,25 @@ mod tests {
         slopes.look(&mut f, 0.0, &[0.2, 0.7, 0.0]);
         assert_eq!(slopes.values().len(), 9);
         assert!(slopes.are_finite() && slopes.dense(3)[(1, 2)] > 1e3);
+    }
+
+    /// √(1 − x₁) has no value ahead of x₁ = 1, where its slope is −∞; the column of x₂ is as ever.
+    #[test]
+    fn where_nothing_is_ahead_differences_look_back() {
+        let mut f = Function::new(2, |_, x: &[f64], dx: &mut [f64]| {
+            dx[0] = (1.0 - x[0]).sqrt() + 3.0 * x[1];
+            dx[1] = -x[0];
+        });
+        let mut slopes = Slopes::default();
+        slopes.look(&mut f, 0.0, &[1.0, 0.5]);
+        let found = slopes.dense(2);
+        // √h/h for the step h = √ε
+        assert!(
+            (found[(0, 0)] / -f64::EPSILON.powf(-0.25) - 1.0).abs() < 1e-6,
+            "{found}"
+        );
+        assert!((found[(1, 0)] + 1.0).abs() < 1e-7);
+        assert!((found[(0, 1)] - 3.0).abs() < 1e-6);
     }
 
     #[test]

@@ -86,6 +86,11 @@ impl Trajectory {
         named.map(|s| s.name.as_str())
     }
 
+    /// The columns, in the order of a row's values.
+    pub fn columns(&self) -> impl Iterator<Item = Column> + '_ {
+        self.series.iter().map(|s| s.column)
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.times.len()
@@ -115,7 +120,7 @@ impl Trajectory {
 
     /// The place of a column among the values of a row.
     pub(crate) fn place(&self, column: Column) -> Option<usize> {
-        self.series.iter().position(|s| s.column == column)
+        self.columns().position(|own| own == column)
     }
 
     /// The values of one column; none where the run has no such column.

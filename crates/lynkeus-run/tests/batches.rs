@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lynkeus_expr::{Expr, Graph};
 use lynkeus_run::{
@@ -118,6 +119,8 @@ fn alone(simulation: &Simulation, member: &Member) -> Vec<f64> {
 fn without_elementary_functions_a_run_is_that_of_a_simulation_to_the_bit() {
     let simulation = simulation(rational);
     let members = members(3..80);
+    let batch = Batch::new(&simulation, &members, &[]).unwrap().unwrap();
+    assert!(batch.is_exact());
     let found = run(&simulation, &members, 3, 2);
     for (member, found) in members.iter().zip(&found) {
         assert_eq!(*found, alone(&simulation, member), "seed {}", member.seed);
@@ -128,6 +131,8 @@ fn without_elementary_functions_a_run_is_that_of_a_simulation_to_the_bit() {
 fn with_elementary_functions_it_is_near_and_the_same_however_runs_are_grouped() {
     let simulation = simulation(transcendental);
     let members = members(0..150);
+    let batch = Batch::new(&simulation, &members, &[]).unwrap().unwrap();
+    assert!(!batch.is_exact());
     let found = run(&simulation, &members, 1, 1);
     for (member, found) in members.iter().zip(&found).take(5) {
         let expected = alone(&simulation, member);
@@ -203,4 +208,65 @@ fn steps_of_their_own_and_columns_that_are_not_there() {
             .unwrap()
             .is_none()
     );
+}
+
+/// Asked on the way to the second row, half a million steps away: the batch ends at once, and for good.
+#[test]
+fn a_batch_that_is_told_to_end_ends_between_two_rows() {
+    let mut simulation = simulation(rational);
+    simulation.noise.sample_step = Some(2.0);
+    simulation.output_step = 2.0;
+    simulation.method = Method::Rk4(Step::AtMost(4e-6));
+    for count in [1, 300] {
+        let mut batch = Batch::new(&simulation, &members(0..count), &COLUMNS)
+            .unwrap()
+            .unwrap();
+        assert!(batch.advance(1, 2).unwrap());
+        let asked = AtomicUsize::new(0);
+        let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 3;
+        let ended = batch.advance_watched(1, 2, &is_over);
+        assert_eq!(ended, Err(Error::Cancelled { time: 0.0 }), "{count}");
+        assert!(asked.into_inner() <= 5);
+        assert_eq!(batch.times(), []);
+        let again = batch.advance(1, 2);
+        assert_eq!(again, Err(Error::Cancelled { time: 0.0 }));
+    }
+}
+
+/// y = 1/(1 − t) of a system without states has no value at t = 1.
+#[test]
+fn runs_without_states_are_judged_as_well() {
+    let g = Graph::new();
+    let [time, u] = ["time", "u"].map(|name| g.symbol(name));
+    let plant = System::new(
+        &g,
+        time.node(),
+        &[],
+        &[named("u", u)],
+        &[],
+        &[named("y", 1.0 / (1.0 - u))],
+    );
+    let inputs = System::new(&g, time.node(), &[], &[], &[], &[named("u", time)]);
+    let simulation = Simulation {
+        method: Method::Rk4(Step::AtMost(0.5)),
+        record_outputs: true,
+        ..Simulation::new(plant.unwrap(), inputs.unwrap(), 2.0, 0.5)
+    };
+    let alone = simulation.run().unwrap_err().error;
+    let Error::NotFinite { time: expected, .. } = alone else {
+        panic!("{alone}");
+    };
+    let member = Member {
+        seed: 0,
+        start: vec![],
+    };
+    let members = vec![member; 5];
+    let mut batch = Batch::new(&simulation, &members, &[]).unwrap().unwrap();
+    while batch.advance(1, 1).unwrap() {}
+    let ended: Vec<usize> = batch.ended().map(|ended| ended.run).collect();
+    assert_eq!(ended, [0, 1, 2, 3, 4]);
+    for ended in batch.ended() {
+        let is_there = matches!(ended.error, Error::NotFinite { time, .. } if time == expected);
+        assert!(is_there, "{}", ended.error);
+    }
 }

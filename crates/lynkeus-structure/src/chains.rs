@@ -255,10 +255,11 @@ fn pairs(extended: &Extended<'_>, heads: [usize; 2]) -> Result<Vec<Assignment>, 
 fn follower(extended: &Extended<'_>, lead: &[usize], path: &[usize]) -> Option<Vec<usize>> {
     let n = extended.states.len();
     let n2 = n - lead.len();
+    // rows 1 … n₂−2 are strict: the first n₂−1 states are those of the strict path; most cuts
+    // of a long plant end here
+    let strict = path.get(..n2 - 1)?;
     let mut taken = vec![false; n];
     lead.iter().for_each(|&i| taken[i] = true);
-    // rows 1 … n₂−2 are strict: the first n₂−1 states are those of the strict path
-    let strict = path.get(..n2 - 1)?;
     if strict
         .iter()
         .any(|&i| std::mem::replace(&mut taken[i], true))

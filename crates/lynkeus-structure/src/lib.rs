@@ -39,7 +39,7 @@ pub use determined::determined;
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
-pub use range::{Range, enclosure_within, range, range_within};
+pub use range::{Range, enclosure_within, magnitude_within, range, range_within};
 pub use region::{Dimension, Region};
 pub use regularity::{Regularity, Trouble, has_value_at, steps};
 pub use slopes::{Innovation, Slopes};

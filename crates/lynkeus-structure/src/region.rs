@@ -190,26 +190,26 @@ impl Region {
     /// A few points of a cell: the middle, its ends one side at a time and the
     /// two extreme corners; only finite ones.
     pub(crate) fn samples(&self, cell: &Cell) -> Vec<Vec<f64>> {
-        let middle = self.middle_point(cell);
-        let mut points = self.corners(cell);
-        for (i, side) in cell.iter().enumerate() {
-            for end in [side.lo(), side.hi()] {
-                let mut point = middle.clone();
-                point[i] = end;
-                points.push(point);
-            }
-        }
+        let mut points = vec![self.middle_point(cell)];
+        points.push(cell.iter().map(|side| side.lo()).collect());
+        points.push(cell.iter().map(|side| side.hi()).collect());
+        points.extend(self.faces(cell));
         points.retain(|p| p.iter().all(|x| x.is_finite()));
         points
     }
 
-    /// The middle and the two extreme corners; only finite ones.
-    pub(crate) fn corners(&self, cell: &Cell) -> Vec<Vec<f64>> {
-        let mut points = vec![self.middle_point(cell)];
-        points.push(cell.iter().map(|side| side.lo()).collect());
-        points.push(cell.iter().map(|side| side.hi()).collect());
-        points.retain(|p| p.iter().all(|x| x.is_finite()));
-        points
+    /// The middles of the faces of a cell: its middle with one side at its ends.
+    pub(crate) fn faces(&self, cell: &Cell) -> Vec<Vec<f64>> {
+        let middle = self.middle_point(cell);
+        let face = |i: usize, end: f64| {
+            let mut point = middle.clone();
+            point[i] = end;
+            point
+        };
+        let sides = cell.iter().enumerate();
+        sides
+            .flat_map(|(i, side)| [face(i, side.lo()), face(i, side.hi())])
+            .collect()
     }
 
     /// Whether one can move straight between two points inside the region.

@@ -280,6 +280,43 @@ mod tests {
         assert_eq!(blind.alike, Some([at(0.0, -0.25), at(0.0, 1.25)]));
     }
 
+    /// At u = 0 the sign of b still shows, and which side of a threshold it is on.
+    #[test]
+    fn what_a_jump_shows_is_not_hidden() {
+        let blind = |jump: &str| {
+            let equations = format!("der(a) = u*b + {jump}; der(b) = -b;");
+            examined(&equations).unwrap().blind
+        };
+        for jump in ["sign(b)", "(if b > 0.5 then a else 0)", "floor(b)"] {
+            let [blind] = &blind(jump)[..] else {
+                panic!("{jump}")
+            };
+            assert!(blind.hidden.is_empty() && blind.alike.is_none(), "{jump}");
+        }
+        assert_eq!(blind("sign(a)")[0].hidden, ["b"]);
+    }
+
+    /// Nothing but the jump of it is in the second output.
+    #[test]
+    fn what_another_output_shows_by_a_jump_is_not_hidden() {
+        let hidden = |output: &str| {
+            let text = format!(
+                "model P input Real u(min = -1, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2);
+                   output Real y = a; output Real z = {output}; equation der(a) = u*b; der(b) = -b; end P;"
+            );
+            let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
+            let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+            let found = uniformity(&extended).unwrap().unwrap();
+            found
+                .blind
+                .into_iter()
+                .map(|blind| blind.hidden)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(hidden("sign(b)"), [Vec::<String>::new()]);
+        assert_eq!(hidden("2*a"), [["b"]]);
+    }
+
     /// d/db b² = 2b: zero at b = 0, a third up the side from −1 to 2.
     #[test]
     fn the_singular_set_is_enclosed() {

@@ -145,7 +145,11 @@ fn chosen(
 /// The family that the study names; what its keys lack is proposed where that can be done.
 fn asked_for(prepared: &Prepared<'_>, examination: &Examination) -> Result<Choice, Error> {
     let tuning = &prepared.study().observer.tuning;
-    let lacked = lacked_speed(prepared, examination).filter(|_| !is_certified_gain(tuning));
+    // a certified gain has no speed to be proposed, and making it takes long
+    let lacked = match is_certified_gain(tuning) {
+        true => None,
+        false => lacked_speed(prepared, examination),
+    };
     let proposal = lacked.and_then(|speed| propose(prepared, examination, speed));
     Ok(Choice {
         family: examination.family,

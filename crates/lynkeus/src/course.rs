@@ -1,11 +1,12 @@
 //! What an observer makes of samples, whatever kind of observer it is.
 
 use lynkeus_observers::Observer;
-use lynkeus_run::Error as RunError;
 use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::{Error as RunError, Role};
 
+use crate::recorded::Recorded;
 use crate::series::{Iter, Store};
-use crate::systems::Reported;
+use crate::systems::monitor_column;
 use crate::{Error, Quantity, Series};
 
 /// Samples for an observer: what each sensor and each known input reads, NaN where it does not.
@@ -92,18 +93,14 @@ pub(crate) struct Course {
 
 impl Course {
     /// Of a run of the observer's own system.
-    pub fn of_run(observer: &Observer, reported: &Reported<'_>) -> Self {
-        let store = Store::default();
-        let column = |values: Option<&[f64]>| {
-            let values = values.unwrap_or_default();
-            Series::gathered(&store, values.iter().copied())
-        };
-        let estimates = (0..observer.estimates.len()).map(|i| column(reported.estimate(i)));
-        let monitors = (0..observer.monitors.len()).map(|i| column(reported.monitor(i)));
+    pub fn of_run(observer: &Observer, run: &Recorded) -> Self {
+        let column = |column| run.column(column).cloned().unwrap_or_default();
+        let estimates = (0..observer.estimates.len()).map(|i| column(Role::Estimate.at(i)));
+        let monitors = (0..observer.monitors.len()).map(|i| column(monitor_column(observer, i)));
         Self {
             estimates: estimates.collect(),
             monitors: monitors.collect(),
-            store: store.clone(),
+            store: run.store.clone(),
             ..Self::default()
         }
     }

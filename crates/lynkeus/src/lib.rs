@@ -94,6 +94,7 @@ pub mod precision;
 pub mod prepare;
 mod propose;
 mod quantity;
+mod recorded;
 mod replay;
 mod sampled;
 pub mod series;

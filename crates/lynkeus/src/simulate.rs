@@ -6,15 +6,16 @@ use std::ops::ControlFlow;
 use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
-use lynkeus_run::{Interrupted, Level, Role, Simulation, Trajectory};
+use lynkeus_run::{Level, Role, Simulation};
 
 use crate::course::{Course, Samples};
 use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
+use crate::recorded::Recorded;
 use crate::spread::Spread;
 use crate::study::{Noise, SimulateSettings};
-use crate::systems::{self, Reported, method};
+use crate::systems::{self, method};
 use crate::{Error, Outcome, Quantity, Series, Study, Table, columns, estimate, prepare};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
@@ -55,7 +56,7 @@ pub(crate) struct Rig {
 #[derive(Debug)]
 pub(crate) struct Ran {
     /// the plant
-    pub run: Trajectory,
+    pub run: Recorded,
     /// the estimates, row by row of the run
     pub course: Course,
 }
@@ -118,20 +119,13 @@ impl Rig {
         if self.design.observer.filter.is_some() {
             return sampled(prepared, &self.design, &simulation, watch);
         }
-        let (run, ended) = rows(simulation.run_watched(&mut within(&study.budget, watch)));
-        let observer = &self.design.observer;
-        let mut course = Course::of_run(observer, &Reported::new(observer, &run));
-        course.ended = ended;
-        settle(&mut course, run.times().len(), study, &study.file)?;
+        let mut run = Recorded::new(&simulation);
+        let watch = &mut within(&study.budget, watch);
+        let done = simulation.run_into(&mut |time, row| run.push(time, row), watch);
+        let mut course = Course::of_run(&self.design.observer, &run);
+        course.ended = done.err();
+        settle(&mut course, run.time.len(), study, &study.file)?;
         Ok(Ran { run, course })
-    }
-}
-
-/// The rows of a run, and why it ended early.
-fn rows(run: Result<Trajectory, Box<Interrupted>>) -> (Trajectory, Option<lynkeus_run::Error>) {
-    match run {
-        Ok(run) => (run, None),
-        Err(interrupted) => (interrupted.partial, Some(interrupted.error)),
     }
 }
 
@@ -144,21 +138,24 @@ fn sampled(
 ) -> Result<Ran, Error> {
     let (study, plant) = (prepared.study(), prepared.plant());
     let watch = &mut within(&study.budget, watch);
-    let plant_alone = simulation.run_watched(&mut |done| watch(0.5 * done));
-    let mut run = plant_alone.map_err(|error| match study.budget.marked() {
+    let mut run = Recorded::new(simulation);
+    let plant_alone = simulation.run_into(&mut |time, row| run.push(time, row), &mut |done| {
+        watch(0.5 * done)
+    });
+    plant_alone.map_err(|error| match study.budget.marked() {
         Some(spent) => Error::ended(spent).at(&study.file),
-        None => interrupted(error.error, &study.file),
+        None => interrupted(error, &study.file),
     })?;
     let observer = &design.observer;
     let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
     let column = |role: Role, at: Option<usize>| {
         let values = at.and_then(|i| run.column(role.at(i)));
-        Series::from(values.unwrap_or_default().to_vec())
+        values.cloned().unwrap_or_default()
     };
     let readings = observer.measured.iter();
     let inputs = observer.inputs.iter();
     let samples = Samples {
-        time: run.times().to_vec().into(),
+        time: run.time.clone(),
         readings: readings
             .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
             .collect(),
@@ -292,12 +289,10 @@ fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
 pub(crate) fn outcome(
     prepared: &Prepared<'_>,
     design: Design,
-    run: &Trajectory,
+    run: &Recorded,
     mut course: Course,
 ) -> Result<Outcome, Error> {
     let plant = prepared.plant();
-    let store = course.store.clone();
-    let kept = |values: &[f64]| Series::gathered(&store, values.iter().copied());
     let deviations = prepared.study().estimate.deviations;
     let mut quantity = |variable: &Variable, role: Role, place: usize| {
         let estimates = &design.observer.estimates;
@@ -307,7 +302,7 @@ pub(crate) fn outcome(
             name: variable.name.clone(),
             unit: variable.unit.clone(),
             description: variable.description.clone(),
-            truth: run.column(role.at(place)).map(kept),
+            truth: run.column(role.at(place)).cloned(),
             unknown_input: estimated.is_some_and(|i| estimates[i].unknown_input),
             is_input: role == Role::Input,
             ..Quantity::default()
@@ -323,11 +318,10 @@ pub(crate) fn outcome(
     quantities.extend(inputs.map(|(i, v)| quantity(v, Role::Input, i)));
     let measured = |signal: &lynkeus_observers::Signal| {
         let output = systems::output_of(plant, signal)?;
-        let values = run.column(Role::Measured.at(output))?;
-        Some(kept(values))
+        run.column(Role::Measured.at(output)).cloned()
     };
     Raw {
-        time: kept(run.times()),
+        time: run.time.clone(),
         quantities,
         measurements: measurements(&design, measured),
         frozen: vec![],

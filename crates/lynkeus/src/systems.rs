@@ -3,7 +3,7 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 use lynkeus_observers::{Observer, Signal};
-use lynkeus_run::{Column, Method, Role, Step, System, Tolerances, Trajectory};
+use lynkeus_run::{Column, Method, Role, Step, System, Tolerances};
 
 use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
@@ -29,31 +29,10 @@ pub(crate) fn output_of(plant: &Plant, signal: &Signal) -> Option<usize> {
     plant.outputs.iter().position(|o| o.name == signal.name)
 }
 
-/// What an observer, made by [`observer`], reported in a run.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Reported<'r> {
-    run: &'r Trajectory,
-    estimates: usize,
-}
-
-impl<'r> Reported<'r> {
-    pub fn new(observer: &Observer, run: &'r Trajectory) -> Self {
-        Self {
-            run,
-            estimates: observer.estimates.len(),
-        }
-    }
-
-    /// The course of an estimate, by its place among the observer's.
-    pub fn estimate(&self, place: usize) -> Option<&'r [f64]> {
-        let is_one = place < self.estimates;
-        is_one.then(|| self.run.column(Role::Estimate.at(place)))?
-    }
-
-    /// The course of a monitor, by its place among the observer's.
-    pub fn monitor(&self, place: usize) -> Option<&'r [f64]> {
-        self.run.column(Role::Estimate.at(self.estimates + place))
-    }
+/// The column of a run that holds a monitor of an observer, by its place among them: they are
+/// reported after the estimates.
+pub(crate) fn monitor_column(observer: &Observer, place: usize) -> Column {
+    Role::Estimate.at(observer.estimates.len() + place)
 }
 
 /// An observer as a system that can be run: its signals are the measured outputs,

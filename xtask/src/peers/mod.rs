@@ -8,6 +8,7 @@
 mod clock;
 mod lanes;
 pub mod ours;
+pub mod runs;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,7 +20,6 @@ use crate::options;
 use crate::process::{root, run};
 use crate::python;
 
-const BEGIN: &str = "<!-- table: cargo xtask bench-peers -->\n";
 const END: &str = "<!-- end of table -->";
 const REQUIREMENTS: &str = include_str!("../../peers/requirements.txt");
 
@@ -33,6 +33,9 @@ const FIGURES: [(&str, &str, f64); 4] = [
 
 /// The last column: the largest error of a state at the end of the adaptive run.
 const ERROR: &str = "error";
+
+/// Where the steps of some peers end: they do the same work.
+const END_OF_STEPS: &str = "end";
 
 struct Peer {
     name: &'static str,
@@ -58,7 +61,23 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
             peer.measure()?;
         }
     }
-    write(&table(&peers))
+    agree(peers.iter().filter_map(Peer::end))?;
+    write("bench-peers", &table(&peers))
+}
+
+/// # Errors
+/// Two peers that end in different places, beyond what rounding makes.
+fn agree<'p>(mut ends: impl Iterator<Item = (&'p str, f64)>) -> Result<(), String> {
+    let Some((first, expected)) = ends.next() else {
+        return Ok(());
+    };
+    let is_near = |end: f64| (end - expected).abs() <= 1e-9 * expected.abs();
+    match ends.find(|(_, end)| !is_near(*end)) {
+        None => Ok(()),
+        Some((other, end)) => Err(format!(
+            "expected the same end of all steps, found {expected} of {first} and {end} of {other}"
+        )),
+    }
 }
 
 fn peers() -> Result<Vec<Peer>, String> {
@@ -142,6 +161,10 @@ impl Peer {
         Ok(())
     }
 
+    fn end(&self) -> Option<(&'static str, f64)> {
+        Some((self.name, *self.found.get(END_OF_STEPS)?))
+    }
+
     fn line(&self) -> String {
         let mut line = format!("| {} |", self.name);
         for (key, _, per_second) in FIGURES {
@@ -197,14 +220,39 @@ fn machine() -> String {
     format!("{model}; {}", compiler.lines().next().unwrap_or("gcc"))
 }
 
-fn write(table: &str) -> Result<(), String> {
+/// Writes the table of a task.
+fn write(task: &str, table: &str) -> Result<(), String> {
     eprint!("{table}");
+    let begin = format!("<!-- table: cargo xtask {task} -->\n");
     let page = root().join("BENCHMARKS.md");
     let text = fs::read_to_string(&page).map_err(|e| format!("{}: {e}", page.display()))?;
     let marks = text
-        .split_once(BEGIN)
+        .split_once(&begin)
         .and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
-    let (before, after) = marks.ok_or("BENCHMARKS.md has no table mark")?;
-    let text = format!("{before}{BEGIN}{table}{END}{after}");
+    let (before, after) = marks.ok_or_else(|| format!("BENCHMARKS.md has no mark {begin}"))?;
+    let text = format!("{before}{begin}{table}{END}{after}");
     fs::write(&page, text).map_err(|e| format!("{}: {e}", page.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn peers_that_do_other_work_are_found() {
+        let near = [("a", -2.528), ("b", -2.528 * (1.0 + 1e-12))];
+        assert_eq!(agree(near.into_iter()), Ok(()));
+        for end in [-2.529, 2.528, f64::NAN] {
+            let found = agree([("a", -2.528), ("b", end)].into_iter());
+            assert!(found.is_err_and(|text| text.contains("of b")), "{end}");
+        }
+    }
+
+    #[test]
+    fn figures_have_three_digits() {
+        assert_eq!(
+            [0.1404, 8.981, 106.9, 1234.4].map(short),
+            ["0.140", "8.98", "107", "1234"]
+        );
+    }
 }

@@ -180,11 +180,13 @@ fn check(count: usize) {
                     random.between(range)
                 };
                 let y = random.between(second);
-                let found = op.lane(x, y);
+                let (found, library) = (op.lane(x, y), op.over(&Reals, x, y));
                 // what is no number has no units
-                if !found.is_finite() || found == 0.0 {
+                if !library.is_finite() || library == 0.0 {
+                    assert!(same(found, library), "{op:?} of {x}, {y} is {found}");
                     continue;
                 }
+                assert!(found.is_finite(), "{op:?} of {x}, {y} is {found}");
                 let error = units(found, &op.over(&space, x, y));
                 if error > worst {
                     (worst, at) = (error, [x, y]);
@@ -218,12 +220,73 @@ fn special_arguments_in_lanes_give_what_the_library_gives() {
         for x in SPECIAL {
             for y in SPECIAL {
                 let (found, expected) = (op.lane(x, y), op.over(&Reals, x, y));
-                let is_special = expected == 0.0 || !expected.is_finite();
-                let distance = (found - expected).abs();
-                let is_near = distance <= 4.0 * f64::EPSILON * expected.abs() || distance < 1e-323;
-                let holds = same(found, expected) || (!is_special && is_near);
+                let holds = is_near(found, expected);
                 assert!(holds, "{op:?} of {x}, {y} is {found} and not {expected}");
             }
+        }
+    }
+}
+
+/// A few units from the library's; the same where that is zero or no number.
+fn is_near(found: f64, expected: f64) -> bool {
+    let is_special = expected == 0.0 || !expected.is_finite();
+    let distance = (found - expected).abs();
+    let is_near = distance <= 4.0 * f64::EPSILON * expected.abs() || distance < 1e-323;
+    same(found, expected) || (!is_special && is_near)
+}
+
+/// Where the functions go over from one formula to another, or to the library's.
+const SEAMS: [f64; 22] = [
+    f64::MIN_POSITIVE,
+    1e-150,
+    1e-8,
+    0.414_213_562_373_095_03,
+    0.5,
+    0.55,
+    std::f64::consts::FRAC_1_SQRT_2,
+    std::f64::consts::FRAC_PI_4,
+    1.0,
+    std::f64::consts::SQRT_2,
+    std::f64::consts::FRAC_PI_2,
+    2.414_213_562_373_095,
+    22.0,
+    354.5,
+    708.0,
+    709.782_712_893_384,
+    710.475_860_073_943_9,
+    745.133_219_101_941_1,
+    1.6e6,
+    1e150,
+    1e300,
+    f64::MAX,
+];
+
+/// On both sides of every seam, and as powers of what is nearly 1.
+#[test]
+fn no_seam_shows() {
+    let beside = |x: f64| [x, x.next_up(), x.next_down()].map(|x| [x, -x]);
+    let arguments = SEAMS.map(beside);
+    let arguments: Vec<f64> = arguments.as_flattened().as_flattened().to_vec();
+    for Subject { op, .. } in subjects() {
+        for &x in &arguments {
+            for &y in &arguments {
+                let (found, expected) = (op.lane(x, y), op.over(&Reals, x, y));
+                let holds = is_near(found, expected);
+                assert!(
+                    holds,
+                    "{op:?} of {x:e}, {y:e} is {found:e} and not {expected:e}"
+                );
+            }
+        }
+    }
+    let power = Op::Two(Binary::Pow);
+    for base in [1.0_f64.next_up(), 1.0_f64.next_down(), 1.0 + 1e-12] {
+        for exponent in [1e12, -3.7e15, 1.5e17, 3e18, -1e19, 1e300, 5e-324] {
+            let (found, expected) = (power.lane(base, exponent), base.powf(exponent));
+            assert!(
+                is_near(found, expected),
+                "{base:e}^{exponent:e}: {found:e} {expected:e}"
+            );
         }
     }
 }
@@ -238,8 +301,9 @@ fn bound(op: Op) -> f64 {
     }
 }
 
+/// Of random numbers, half of them of any size.
 #[test]
-fn lanes_do_not_see_each_other() {
+fn lanes_do_not_see_each_other_and_are_near_the_library() {
     let mut random = Random(42);
     for Subject { op, .. } in subjects() {
         for _ in 0..5_000 {
@@ -254,6 +318,13 @@ fn lanes_do_not_see_each_other() {
                 assert!(
                     same(alone, found),
                     "{op:?} of {x:?}, {y:?}: {alone} {found}"
+                );
+                let library = op.over(&Reals, x[lane], y[lane]);
+                assert!(
+                    is_near(alone, library),
+                    "{op:?} of {:e}, {:e} is {alone:e} and not {library:e}",
+                    x[lane],
+                    y[lane]
                 );
                 let is_inside = alone.is_nan() || alone.abs() <= bound(op);
                 assert!(is_inside, "{op:?} of {} is {alone}", x[lane]);

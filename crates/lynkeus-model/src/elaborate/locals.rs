@@ -3,6 +3,7 @@
 use super::evaluate::Evaluator;
 use super::frame::Local;
 use super::inline::Outcome;
+use super::records::Record;
 use super::value::{Value, describe_dims};
 use crate::syntax::ast::{Causality, Class, ClassKind, Declaration, Kind, TypeName};
 use crate::syntax::{Problem, Result, Span, plain};
@@ -27,7 +28,13 @@ impl<'a> Evaluator<'a> {
     ) -> Result<()> {
         let name = declaration.label.clone();
         if let Some(record) = self.record_type(declaration, &class.path) {
-            return self.introduce_record(record, &name, given);
+            return match self.record_given(class, declaration, given, span)? {
+                Some(value) => {
+                    self.know_record(&name, value);
+                    Ok(())
+                }
+                None => self.open_record(record, &name),
+            };
         }
         if let TypeName::Named(type_name) = declaration.prefix.type_name {
             self.check_number(class, type_name)?;
@@ -39,11 +46,10 @@ impl<'a> Evaluator<'a> {
                 return Err(Problem::new(span, message));
             }
             (None, Some(id)) => Some(self.value(id)?),
-            (None, None) if declaration.prefix.causality == Causality::Input => {
-                let message = format!("input `{name}` of function `{}` is not given", class.path);
-                return Err(Problem::new(span, message));
+            (None, None) => {
+                check_given(class, declaration, span)?;
+                None
             }
-            (None, None) => None,
         };
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
         let mut local = Local::without_value(dims, declaration.prefix.is_integer());
@@ -82,37 +88,58 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    fn introduce_record(
+    /// The value of a variable that is a record: its argument, or what it is declared with; none
+    /// of one that its function assigns.
+    fn record_given(
         &mut self,
-        record: usize,
-        name: &str,
+        class: &'a Class,
+        declaration: &'a Declaration,
         given: Option<Outcome>,
-    ) -> Result<()> {
-        let mut names = vec![];
-        match given {
-            Some(Outcome::Record(given)) => {
-                for (member, value) in given.members {
-                    let full = format!("{name}.{member}");
-                    names.push((member, full, Local::of(&value)));
-                }
+        span: Span,
+    ) -> Result<Option<Record>> {
+        let number = |span: Span| {
+            let name = &declaration.label;
+            Problem::new(span, format!("`{name}` takes a record, found a number"))
+        };
+        match (given, declaration.binding) {
+            (Some(Outcome::Record(record)), _) => Ok(Some(record)),
+            (Some(Outcome::Value(_)), _) => Err(number(span)),
+            (None, Some(id)) => {
+                let record = self.record(id)?;
+                record.map(Some).ok_or_else(|| number(self.span(id)))
             }
-            _ => {
-                for declaration in self.declarations_of(record)? {
-                    let full = format!("{name}.{}", declaration.label);
-                    let dims = self.dims_declared(declaration, None, declaration.name)?;
-                    let local = Local::without_value(dims, declaration.prefix.is_integer());
-                    names.push((declaration.label.clone(), full, local));
-                }
+            (None, None) => {
+                check_given(class, declaration, span)?;
+                Ok(None)
             }
         }
-        if let Some(frame) = self.frame.as_mut() {
-            let members = names.iter().map(|(member, ..)| member.clone()).collect();
-            frame.records.insert(name.to_owned(), members);
-            frame
-                .locals
-                .extend(names.into_iter().map(|(_, full, local)| (full, local)));
+    }
+
+    fn know_record(&mut self, name: &str, value: Record) {
+        let members = value.members.into_iter();
+        let known = members.map(|(member, value)| (member, Local::of(&value)));
+        self.insert_record(name, known.collect());
+    }
+
+    /// A record of which no member has a value yet.
+    fn open_record(&mut self, record: usize, name: &str) -> Result<()> {
+        let mut members = vec![];
+        for declaration in self.declarations_of(record)? {
+            let dims = self.dims_declared(declaration, None, declaration.name)?;
+            let local = Local::without_value(dims, declaration.prefix.is_integer());
+            members.push((declaration.label.clone(), local));
         }
+        self.insert_record(name, members);
         Ok(())
+    }
+
+    fn insert_record(&mut self, name: &str, members: Vec<(String, Local)>) {
+        if let Some(frame) = self.frame.as_mut() {
+            let names = members.iter().map(|(member, _)| member.clone()).collect();
+            frame.records.insert(name.to_owned(), names);
+            let full = |(member, local)| (format!("{name}.{member}"), local);
+            frame.locals.extend(members.into_iter().map(full));
+        }
     }
 
     /// The size of a variable of a function; `:` is taken from its value.
@@ -142,4 +169,14 @@ impl<'a> Evaluator<'a> {
         self.budget.charge(count, span)?;
         Ok(dims)
     }
+}
+
+/// Refuses an input that has no value; other variables are given theirs by statements.
+fn check_given(class: &Class, declaration: &Declaration, span: Span) -> Result<()> {
+    if declaration.prefix.causality != Causality::Input {
+        return Ok(());
+    }
+    let (name, function) = (&declaration.label, &class.path);
+    let message = format!("input `{name}` of function `{function}` is not given");
+    Err(Problem::new(span, message))
 }

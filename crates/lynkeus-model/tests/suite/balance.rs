@@ -229,6 +229,32 @@ fn whether_a_loop_is_singular_is_asked_where_its_variables_may_be() {
     assert!(found.message.contains("do not determine `T`"), "{found}");
 }
 
+/// Beyond its threshold each of these determines T; sin(T)² + cos(T)² does nowhere, whatever else
+/// jumps.
+#[test]
+fn what_a_threshold_hides_is_not_called_singular_everywhere() {
+    for (equation, place) in [
+        ("max(T - 300, 0)^2 = x;", "where these start"),
+        ("min(T, -3)^2 = x;", "where these start"),
+        ("(if T > 1e5 then T else 0) = x;", "where these start"),
+        (
+            "sin(T)^2 + cos(T)^2 = x + (if x > 3 then 1 else 0);",
+            "everywhere",
+        ),
+        (
+            "sin(T)^2 + cos(T)^2 = x + (if T > 3 then 1 else 0);",
+            "everywhere",
+        ),
+    ] {
+        let found = refused(&model(
+            "Real x; Real T;",
+            &format!("der(x) = T; {equation}"),
+        ));
+        let expected = format!("do not determine `T`: they are singular {place}");
+        assert!(found.message.contains(&expected), "{equation} {found}");
+    }
+}
+
 #[test]
 fn long_loops_are_torn() {
     let text = "model M parameter Integer n = 20000; Real a[n]; Real x; equation der(x) = a[1]; \

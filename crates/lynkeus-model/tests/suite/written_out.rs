@@ -190,6 +190,34 @@ fn records_are_their_members() {
     assert_eq!(plant.parameters[0].variable.name, "p.x");
 }
 
+/// A record of a function is what it is declared with, unless something else is given to it.
+#[test]
+fn records_of_functions_have_the_values_they_are_declared_with() {
+    let text = |call: &str| {
+        format!(
+            "package P
+               record R Real a; Real b; end R;
+               function f input Real u; input R r = R(u, 2*u); output Real v;
+                 protected R s = R(r.b, 10); R t;
+                 algorithm t := r; t.a := 100; v := s.a + s.b*r.a + t.a; end f;
+               function g input R r; output Real v = r.a; algorithm end g;
+               model M Real z; equation der(z) = {call}; end M;
+             end P;"
+        )
+    };
+    // 2u + 10u + 100, and 4 + 10·3 + 100
+    let by_default = plant(&text("f(z)"));
+    assert_eq!(slopes(&by_default, &[("z", 3.0)]), [136.0]);
+    let given = plant(&text("f(z, R(3, 4))"));
+    assert_eq!(slopes(&given, &[("z", 3.0)]), [134.0]);
+    for (call, message) in [
+        ("g()", "input `r` of function `P.g` is not given"),
+        ("g(3)", "`r` takes a record, found a number"),
+    ] {
+        assert_eq!(refused(&text(call)).message, message);
+    }
+}
+
 #[test]
 fn names_in_quotes_and_with_dots_are_one() {
     let plant = plant(

@@ -11,6 +11,8 @@ use super::expanded;
 
 /// Bisections of the share of the ranges.
 const HALVINGS: usize = 6;
+/// The smallest share tried.
+const LEAST: f64 = 0.01;
 /// Slopes up to which each is tried alone.
 const SINGLES: usize = 12;
 /// What an explanation may take.
@@ -26,7 +28,7 @@ fn cut(slopes: &Slopes, factor: impl Fn(usize) -> f64 + Copy) -> Vec<ErrorModel>
 /// not even a hundredth works.
 fn share(slopes: &Slopes, works: impl Fn(&[ErrorModel]) -> bool) -> Option<f64> {
     let at = |share: f64| works(&cut(slopes, |_| share));
-    let (mut low, mut high) = (0.01, 1.0);
+    let (mut low, mut high) = (LEAST, 1.0);
     if !at(low) {
         return None;
     }
@@ -57,8 +59,10 @@ pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
         budget: request.budget.within(EXPLAINING),
         ..request.clone()
     };
-    let works = |models: &[ErrorModel]| decay::is_reachable(models, request);
-    let share = share(slopes, works);
+    let works = |models: &[ErrorModel]| decay::is_reachable(models, request, true);
+    // that there is none at all is said of a thorough look only
+    let least = || decay::is_reachable(&cut(slopes, |_| LEAST), request, false);
+    let share = share(slopes, works).or_else(|| least().then_some(LEAST));
     if request.budget.marked().is_some() {
         return "which range stands in the way takes longer to find out: narrow the box or lower the rate".into();
     }

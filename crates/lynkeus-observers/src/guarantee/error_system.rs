@@ -59,8 +59,8 @@ impl ErrorSystem {
         }
         let symbols: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
         let region = seen_by(extended, observer, assumptions)?;
-        let mut system = Self::of(extended, &observer.derivatives, &symbols, region)?;
-        system.around_innovations(extended, observer, &symbols)?;
+        let slopes = around_innovations(extended, observer, &symbols, &region)?;
+        let mut system = Self::of(extended, &observer.derivatives, &symbols, region, slopes)?;
         system.injection = injection(extended, observer, &system.region)?;
         right(extended, observer, &mut system)?;
         Ok(Ok(system))
@@ -68,8 +68,9 @@ impl ErrorSystem {
 
     /// The error system of a copy of the plant without correction.
     pub fn open_loop(extended: &Extended<'_>, region: &Region) -> Result<Self, MissingInput> {
-        let symbols = extended.symbols();
-        Self::of(extended, &extended.derivatives, &symbols, region.clone())
+        let (symbols, derivatives) = (extended.symbols(), &extended.derivatives);
+        let slopes = Slopes::new(extended.graph(), derivatives, &symbols, region)?;
+        Self::of(extended, derivatives, &symbols, region.clone(), slopes)
     }
 
     fn of(
@@ -77,9 +78,9 @@ impl ErrorSystem {
         derivatives: &[Node],
         symbols: &[Node],
         region: Region,
+        slopes: Slopes,
     ) -> Result<Self, MissingInput> {
         let graph = extended.graph();
-        let slopes = Slopes::new(graph, derivatives, symbols, &region)?;
         let jacobian = jacobian::forward(graph, derivatives, symbols);
         let zero = graph.constant(0.0).node();
         let n = symbols.len();
@@ -96,28 +97,6 @@ impl ErrorSystem {
             slopes,
             region,
         })
-    }
-
-    /// The slopes again, with the innovations apart: an observer is right where they
-    /// vanish, whatever its gain is there.
-    fn around_innovations(
-        &mut self,
-        extended: &Extended<'_>,
-        observer: &Observer,
-        symbols: &[Node],
-    ) -> Result<(), MissingInput> {
-        let found = innovation::of(extended, observer, &self.region)?;
-        let graph = extended.graph();
-        let derivatives = graph.substitute(&observer.derivatives, &found.images);
-        self.slopes = Slopes::around(
-            graph,
-            &derivatives,
-            symbols,
-            &found.innovations,
-            &found.region,
-        )?;
-        self.models = expanded(&self.slopes.models);
-        Ok(())
     }
 
     pub fn is_bounded(&self) -> bool {
@@ -182,6 +161,21 @@ impl ErrorSystem {
         let rows = entries.chunks(self.scale.len());
         rows.map(<[Interval]>::to_vec).collect()
     }
+}
+
+/// The slopes with the innovations apart: an observer is right where they vanish, whatever
+/// its gain is there.
+fn around_innovations(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    symbols: &[Node],
+    region: &Region,
+) -> Result<Slopes, MissingInput> {
+    let found = innovation::of(extended, observer, region)?;
+    let graph = extended.graph();
+    let derivatives = graph.substitute(&observer.derivatives, &found.images);
+    let innovations = &found.innovations;
+    Slopes::around(graph, &derivatives, symbols, innovations, &found.region)
 }
 
 /// What the system is where the estimate is right: what is measured is then h at the

@@ -327,6 +327,40 @@ fn an_s_that_rests_on_damping_is_told() {
     );
 }
 
+/// The eigenvalues of a long chain are not computed: what Routh's table leaves open is undecided.
+/// With S the identity K = (1, 0, …), so that 0 is a zero of the polynomial.
+#[test]
+fn a_long_chain_is_not_called_damped() {
+    let told = |n: usize| {
+        let text = format!(
+            "model L Real x[{n}]; output Real y = x[1]; equation
+             for i in 1:{n}-1 loop der(x[i]) = x[i+1]; end for; der(x[{n}]) = -x[{n}]; end L;"
+        );
+        let pairs = [
+            ("diag", numbers(&vec![1.0; n])),
+            ("off", numbers(&vec![0.0; n - 1])),
+        ];
+        let pairs = pairs.map(|(key, value)| (key.to_owned(), value));
+        let tuning = with(
+            &[1.0],
+            &[("S", Value::List(vec![Value::Table(pairs.into())]))],
+        );
+        let examination = design_with(&Triangular, &plant(&text), &[], &tuning)
+            .unwrap()
+            .examination;
+        assert_eq!(examination.fit(), Standing::Undecided);
+        examination.checks.last().unwrap().detail.clone()
+    };
+    let short = told(20);
+    assert!(short.contains("→ x[20]), eigenvalues 0"), "{short}");
+    let long = told(201);
+    assert!(
+        long.contains("is not stable for (x[1] → … → x[201]); only")
+            && long.contains("201 states, more than 200"),
+        "{long}"
+    );
+}
+
 /// Either chain can lead. The exponents decide where they are given: δ₂/δ₁ = 2 lies in
 /// (1, 3) for z first, not in (3, 5) for y first.
 #[test]

@@ -3,6 +3,7 @@
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
+use super::extent::{Extent, is_large};
 use super::frame::{Frame, Seen};
 use super::{ErrorModel, Proof, check::holds};
 use crate::lmi::{Affine, Problem};
@@ -21,16 +22,34 @@ pub fn prove(models: &[ErrorModel], scale: &[f64], rate: f64, budget: &Budget) -
     if !models.iter().all(|m| m.size() == n && m.is_bounded()) {
         return None;
     }
-    let frames = Frame::natural(models, scale).into_iter();
-    let mut frames = frames.chain([Frame::plain(models, scale)]);
-    frames.find_map(|frame| prove_in(&frame, models, rate, budget))
+    let frames: Vec<Frame> = Frame::natural(models, scale)
+        .into_iter()
+        .chain([Frame::plain(models, scale)])
+        .collect();
+    let extents = match is_large(n) {
+        true => &[Extent::Near, Extent::Full][..],
+        false => &[Extent::Full],
+    };
+    let mut trials = extents
+        .iter()
+        .flat_map(|&extent| frames.iter().map(move |frame| (frame, extent)));
+    trials.find_map(|(frame, extent)| prove_in(frame, extent, models, rate, budget))
 }
 
-fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64, budget: &Budget) -> Option<Proof> {
+fn prove_in(
+    frame: &Frame,
+    extent: Extent,
+    models: &[ErrorModel],
+    rate: f64,
+    budget: &Budget,
+) -> Option<Proof> {
     let scale = &frame.scale;
     let scaled: Vec<ErrorModel> = models.iter().map(|m| scale.model(m)).collect();
     let seen: Vec<Seen> = scaled.iter().map(|m| frame.seen(m)).collect();
-    let mut proof = candidate(&seen, rate * scale.unit, budget)?;
+    let mut problem = Problem::new();
+    problem.set_budget(budget);
+    let P = extent.lyapunov(&mut problem, &scaled);
+    let mut proof = candidate(problem, &P, &seen, rate * scale.unit)?;
     proof.P = symmetric(&frame.restored(&proof.P));
     let proof = scale.restored(models, &proof);
     let proof = Proof { rate, ..proof };
@@ -39,26 +58,16 @@ fn prove_in(frame: &Frame, models: &[ErrorModel], rate: f64, budget: &Budget) ->
 
 /// What the solver says, unchecked: P in the frame's axes, the multipliers in the
 /// models' units.
-fn candidate(models: &[Seen], rate: f64, budget: &Budget) -> Option<Proof> {
-    let n = models.first()?.A.nrows();
-    let mut problem = Problem::new();
-    problem.set_budget(budget);
-    let P = problem.symmetric(n);
+fn candidate(mut problem: Problem, P: &Affine, models: &[Seen], rate: f64) -> Option<Proof> {
     problem.positive(P.clone());
-    problem.positive(Affine::identity(n).minus(&P));
+    problem.positive(Affine::identity(P.rows()).minus(P));
     let mut multipliers = vec![];
     for model in models {
-        if budget.spent().is_some() {
+        if problem.is_spent() {
             return None;
         }
         let PA = P.times(&model.A);
-        multipliers.push(inequality(
-            &mut problem,
-            &P,
-            &PA,
-            (&model.B, &model.C),
-            rate,
-        ));
+        multipliers.push(inequality(&mut problem, P, &PA, (&model.B, &model.C), rate));
     }
     let solution = problem.inside().ok()?;
     let restored = |(T, model): (&Affine, &Seen)| {
@@ -67,7 +76,7 @@ fn candidate(models: &[Seen], rate: f64, budget: &Budget) -> Option<Proof> {
     };
     Some(Proof {
         rate,
-        P: symmetric(&solution.value(&P)),
+        P: symmetric(&solution.value(P)),
         multipliers: multipliers.iter().zip(models).map(restored).collect(),
     })
 }

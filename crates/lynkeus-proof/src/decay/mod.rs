@@ -16,8 +16,10 @@
 
 mod analysis;
 mod check;
+mod extent;
 mod frame;
 mod growth;
+mod inequalities;
 mod model;
 mod scale;
 mod synthesis;

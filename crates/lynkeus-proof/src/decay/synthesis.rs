@@ -4,6 +4,8 @@ use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
 use super::analysis::{inequality, prove};
+use super::extent::{Extent, is_large};
+use super::inequalities::{Inequalities, WIDEST, roomy};
 use super::{ErrorModel, Proof, scale::Scale};
 use crate::lmi::{Affine, Failure, Problem, Solution};
 use crate::lyapunov::symmetric;
@@ -14,9 +16,6 @@ const ROUNDS: usize = 6;
 const SHARE: f64 = 0.1;
 /// Bound of P relative to the first point's.
 const CEILING: f64 = 10.0;
-/// Bounds of Y in the first phase, where P ≤ I: the larger is tried where the smaller
-/// leaves no gain.
-const LARGE: [f64; 2] = [30.0, 3e3];
 /// A gain is sought for a rate larger by this share, so that its proof has room.
 const RESERVE: f64 = 0.01;
 /// A round has to lower the largest entry by this share to be worth another.
@@ -112,15 +111,22 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
     Ok(Gain { K, proof })
 }
 
-/// Whether some gain is proved to reach the rate, whatever its size: cheaper than the
-/// gain itself.
-pub fn is_reachable(models: &[ErrorModel], request: &Request) -> bool {
+/// Whether some gain is seen to reach the rate, whatever its size: cheaper than the gain
+/// itself. A `quick` look at a large system tries Lyapunov matrices without entries between
+/// states that are far from each other, and no others.
+pub fn is_reachable(models: &[ErrorModel], request: &Request, quick: bool) -> bool {
     if models.is_empty() || !models.iter().all(ErrorModel::is_bounded) {
         return false;
     }
     let scaled = Scaled::new(models, request);
-    let (problem, P, Y) = scaled.inequalities();
-    normalised(&problem, &P, &Y).is_ok()
+    let exists = |extent| {
+        let all = scaled.inequalities(extent).bounded(WIDEST);
+        all.has_inside().is_ok()
+    };
+    match is_large(scaled.size()) {
+        true => exists(Extent::Near) || !quick && exists(Extent::Full),
+        false => exists(Extent::Full),
+    }
 }
 
 struct Scaled<'a> {
@@ -170,30 +176,54 @@ impl<'a> Scaled<'a> {
         problem
     }
 
-    /// The inequality of every model, where its middle matrix makes PA.
-    fn constrain(&self, problem: &mut Problem, P: &Affine, PA: impl Fn(&DMatrix<f64>) -> Affine) {
-        for model in &self.models {
+    /// The inequality of every model, where its middle matrix makes PA; its multipliers.
+    fn constrain(
+        &self,
+        problem: &mut Problem,
+        P: &Affine,
+        PA: impl Fn(&DMatrix<f64>) -> Affine,
+    ) -> Vec<Affine> {
+        let one = |model: &ErrorModel| {
             let uncertain = (&model.spread(), &model.reads());
-            inequality(problem, P, &PA(&model.nominal()), uncertain, self.rate);
-        }
+            inequality(problem, P, &PA(&model.nominal()), uncertain, self.rate)
+        };
+        self.models.iter().map(one).collect()
     }
 
     /// P > 0 and the inequality of every model in P and Y = PK.
-    fn inequalities(&self) -> (Problem, Affine, Affine) {
+    fn inequalities(&self, extent: Extent) -> Inequalities {
         let mut problem = self.problem();
-        let P = problem.symmetric(self.size());
+        let P = extent.lyapunov(&mut problem, &self.models);
         let Y = problem.matrix(self.size(), self.request.measured.len());
         problem.positive(P.clone());
         let YC = Y.times(&self.selector());
-        self.constrain(&mut problem, &P, |A| P.times(A).minus(&YC));
-        (problem, P, Y)
+        let T = self.constrain(&mut problem, &P, |A| P.times(A).minus(&YC));
+        Inequalities { problem, P, Y, T }
+    }
+
+    /// A point inside `all`, P being of full extent. In large systems one with few unknowns
+    /// is looked for first, and then whether there is one at all.
+    fn first(&self, all: &Inequalities) -> Result<Solution, Failure> {
+        if is_large(self.size()) {
+            let near = self.inequalities(Extent::Near);
+            if near.bounded(WIDEST).has_inside().is_ok()
+                && let Ok(found) = near.normalised()
+            {
+                return Ok(all.like(&near, &found));
+            }
+            all.bounded(WIDEST).has_inside()?;
+        }
+        all.normalised()
     }
 
     /// The convex problem in P and Y = PK.
     fn direct(&self) -> Result<DMatrix<f64>, Failure> {
         let (n, p) = (self.size(), self.request.measured.len());
-        let (mut problem, P, Y) = self.inequalities();
-        let first = normalised(&problem, &P, &Y)?;
+        let all = self.inequalities(Extent::Full);
+        let first = self.first(&all)?;
+        let Inequalities {
+            mut problem, P, Y, ..
+        } = all;
         // Z ≥ YᵀP⁻¹Y = KᵀPK and β ≥ |P|
         let (Z, β) = (problem.symmetric(p), problem.matrix(1, 1));
         problem.positive(Affine::symmetric_blocks(&Z, &Y.transposed(), &P));
@@ -285,38 +315,85 @@ impl<'a> Scaled<'a> {
     }
 }
 
-/// A point inside, from the same problem with P and Y bounded above, scaled so that
-/// P > I: the inequalities are homogeneous.
-fn normalised(problem: &Problem, P: &Affine, Y: &Affine) -> Result<Solution, Failure> {
-    let bounded = |large: f64| {
-        let mut bounded = problem.clone();
-        bounded.positive(Affine::identity(P.rows()).minus(P));
-        let wide = |n: usize| Affine::identity(n).scaled(large);
-        let Y = Affine::symmetric_blocks(&wide(Y.rows()), Y, &wide(Y.columns()));
-        bounded.positive(Y);
-        bounded.inside()
-    };
-    let inside = bounded(LARGE[0]).or_else(|_| bounded(LARGE[1]))?;
-    let smallest = symmetric(&inside.value(P)).symmetric_eigenvalues().min();
-    if smallest <= 0.0 {
-        return Err(Failure::Numerical);
-    }
-    Ok(inside.scaled(1.1 / smallest))
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::decay::Sector;
+    use lynkeus_expr::Interval;
 
-/// Values for Z and β with room to spare, and |P|.
-fn roomy(first: &Solution, P: &Affine, Y: &Affine) -> Result<(Solution, f64), Failure> {
-    let (P, Y) = (symmetric(&first.value(P)), first.value(Y));
-    let largest = P.symmetric_eigenvalues().max();
-    let factor = P.cholesky().ok_or(Failure::Numerical)?;
-    let Z = symmetric(&(Y.transpose() * factor.solve(&Y))) * 2.0;
-    let room = 1.0 + Z.trace() * 1e-3;
-    let mut newer = vec![];
-    for j in 0..Z.ncols() {
-        for i in 0..=j {
-            newer.push(Z[(i, j)] + if i == j { room } else { 0.0 });
+    /// x_i' = x_{i+1} − 2x_i + θ_i x_i, the last state without a next one.
+    fn chain(n: usize) -> ErrorModel {
+        let mut constant = vec![vec![Interval::ZERO; n]; n];
+        for (i, row) in constant.iter_mut().enumerate() {
+            row[i] = Interval::point(-2.0);
+            if i + 1 < n {
+                row[i + 1] = Interval::ONE;
+            }
+        }
+        let sector = |column: usize| {
+            let mut direction = vec![Interval::ZERO; n];
+            direction[column] = Interval::ONE;
+            Sector {
+                column,
+                direction,
+                range: Interval::new(-0.2, 0.2).unwrap(),
+            }
+        };
+        ErrorModel {
+            constant,
+            sectors: (0..n).map(sector).collect(),
         }
     }
-    newer.push(2.0 * largest);
-    Ok((first.with(&newer), largest))
+
+    /// What is found with few unknowns is a point of the problem with all of them.
+    #[test]
+    fn a_near_point_is_one_of_the_full_problem() {
+        let n = 12;
+        let models = [chain(n)];
+        let request = Request {
+            rate: 0.3,
+            measured: vec![0],
+            noise: vec![1.0],
+            scale: vec![1.0; n],
+            aim: Aim::Noise,
+            limit: None,
+            budget: Budget::default(),
+        };
+        let scaled = Scaled::new(&models, &request);
+        let near = scaled.inequalities(Extent::Near);
+        let full = scaled.inequalities(Extent::Full);
+        let found = near.normalised().unwrap();
+        let same = full.like(&near, &found);
+        assert_eq!(found.value(&near.P), same.value(&full.P));
+        assert_eq!(same.value(&full.P)[(0, n - 1)], 0.0);
+        assert_eq!(found.value(&near.Y), same.value(&full.Y));
+        let mut problem = full.problem.clone();
+        problem.minimise(&full.P.trace());
+        assert!(problem.solve_from(&same).is_ok());
+        assert!(near.bounded(WIDEST).has_inside().is_ok());
+    }
+
+    /// No gain on state 0 moves what it does not see.
+    #[test]
+    fn what_is_out_of_reach_is_seen_without_a_point() {
+        let mut model = chain(12);
+        model.constant[5][6] = Interval::ZERO;
+        model.constant[11][11] = Interval::point(1.0);
+        let mut request = Request {
+            rate: 0.3,
+            measured: vec![0],
+            noise: vec![1.0],
+            scale: vec![1.0; 12],
+            aim: Aim::Noise,
+            limit: None,
+            budget: Budget::default(),
+        };
+        assert!(!is_reachable(std::slice::from_ref(&model), &request, false));
+        let scaled = Scaled::new(std::slice::from_ref(&model), &request);
+        let full = scaled.inequalities(Extent::Full).bounded(WIDEST);
+        assert_eq!(full.has_inside(), Err(Failure::Infeasible));
+        model.constant[11][11] = Interval::point(-1.0);
+        request.rate = 0.1;
+        assert!(is_reachable(&[model], &request, true));
+    }
 }

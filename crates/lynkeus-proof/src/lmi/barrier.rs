@@ -3,7 +3,7 @@
 use lynkeus_expr::Budget;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::Affine;
+use super::block::Block;
 
 /// t grows by this factor between centrings.
 const GROWTH: f64 = 12.0;
@@ -16,152 +16,6 @@ const NEAR: f64 = 1.0;
 const PANEL: usize = 64;
 /// Newton steps altogether.
 const STEPS: usize = 400;
-
-/// One inequality F(x) = F₀ + Σ x_k F_k > 0 with sparse symmetric F_k.
-pub(super) struct Block {
-    size: usize,
-    constant: DMatrix<f64>,
-    terms: Vec<Term>,
-}
-
-/// F_k of one unknown that occurs.
-struct Term {
-    unknown: usize,
-    /// entries (i, j, value) with i ≤ j
-    entries: Vec<(usize, usize, f64)>,
-    /// F_k = Σ e_i vᵀ + v e_iᵀ over few rows i
-    rows: Vec<Row>,
-}
-
-/// A row of a symmetric matrix, and the column that mirrors it.
-struct Row {
-    place: usize,
-    /// the entries of v that are not zero
-    entries: Vec<(usize, f64)>,
-}
-
-impl Term {
-    fn new(unknown: usize, entries: Vec<(usize, usize, f64)>, n: usize) -> Self {
-        let mut rows = vec![];
-        let mut left = entries.clone();
-        while !left.is_empty() {
-            let mut counts = vec![0; n];
-            for &(i, j, _) in &left {
-                counts[i] += 1;
-                counts[j] += 1;
-            }
-            let fullest = (0..n).max_by_key(|&i| counts[i]).unwrap_or(0);
-            let mut row = vec![];
-            left.retain(|&(i, j, value)| {
-                match (i == fullest, j == fullest) {
-                    (true, true) => row.push((i, 0.5 * value)),
-                    (true, false) => row.push((j, value)),
-                    (false, true) => row.push((i, value)),
-                    (false, false) => return true,
-                }
-                false
-            });
-            rows.push(Row {
-                place: fullest,
-                entries: row,
-            });
-        }
-        Self {
-            unknown,
-            entries,
-            rows,
-        }
-    }
-
-    /// tr(F G) for symmetric G.
-    fn inner(&self, G: &DMatrix<f64>) -> f64 {
-        let entry = |&(i, j, value): &(usize, usize, f64)| {
-            value * G[(i, j)] * if i == j { 1.0 } else { 2.0 }
-        };
-        self.entries.iter().map(entry).sum()
-    }
-
-    /// The upper triangle of W F W.
-    fn sandwiched(&self, W: &DMatrix<f64>) -> DMatrix<f64> {
-        let n = W.ncols();
-        let mut G = DMatrix::zeros(n, n);
-        for row in &self.rows {
-            let a = W.column(row.place);
-            let mut b = DVector::zeros(n);
-            for &(j, value) in &row.entries {
-                b.axpy(value, &W.column(j), 1.0);
-            }
-            for (column, mut into) in G.column_iter_mut().enumerate() {
-                let mut upper = into.rows_range_mut(..column + 1);
-                upper.axpy(b[column], &a.rows_range(..column + 1), 1.0);
-                upper.axpy(a[column], &b.rows_range(..column + 1), 1.0);
-            }
-        }
-        G
-    }
-}
-
-impl Block {
-    pub(super) fn new(F: &Affine) -> Self {
-        let n = F.rows();
-        let mut terms: std::collections::BTreeMap<usize, Vec<(usize, usize, f64)>> =
-            std::collections::BTreeMap::new();
-        for i in 0..n {
-            for j in i..n {
-                for (unknown, value) in F.terms(i, j).filter(|(_, value)| *value != 0.0) {
-                    terms.entry(unknown).or_default().push((i, j, value));
-                }
-            }
-        }
-        let terms = terms.into_iter();
-        Self {
-            size: n,
-            constant: DMatrix::from_fn(n, n, |i, j| F.constant_at(i.min(j), i.max(j))),
-            terms: terms.map(|(k, entries)| Term::new(k, entries, n)).collect(),
-        }
-    }
-
-    fn value(&self, x: &DVector<f64>) -> DMatrix<f64> {
-        let mut F = self.constant.clone();
-        for term in &self.terms {
-            for &(i, j, value) in &term.entries {
-                F[(i, j)] += x[term.unknown] * value;
-                if i != j {
-                    F[(j, i)] += x[term.unknown] * value;
-                }
-            }
-        }
-        F
-    }
-
-    /// Adds −∇ log det and its Hessian: with W = F⁻¹, g_k = −tr(W F_k) and
-    /// H_kl = tr(W F_k W F_l). Where the budget ends they are not whole, and nobody
-    /// reads them: [`newton`] asks for the budget first.
-    fn derivatives(
-        &self,
-        W: &DMatrix<f64>,
-        g: &mut DVector<f64>,
-        H: &mut DMatrix<f64>,
-        budget: &Budget,
-    ) {
-        for (a, term) in self.terms.iter().enumerate() {
-            if budget.spent().is_some() {
-                return;
-            }
-            let k = term.unknown;
-            g[k] -= term.inner(W);
-            let G = term.sandwiched(W);
-            for other in &self.terms[a..] {
-                let l = other.unknown;
-                let h = other.inner(&G);
-                H[(k, l)] += h;
-                if k != l {
-                    H[(l, k)] += h;
-                }
-            }
-        }
-    }
-}
 
 /// A barrier problem.
 pub(super) struct Barrier<'a> {
@@ -183,7 +37,15 @@ impl Barrier<'_> {
     ) -> Option<DVector<f64>> {
         let order = 1.0 + self.blocks.iter().map(|b| b.size as f64).sum::<f64>();
         let mut t = self.first(&x, order)?;
-        for _ in 0..STEPS {
+        for dbg in 0..STEPS {
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "  step {dbg} m {} t {t:.2e} gap {:.2e} last {:.6e}",
+                    x.len(),
+                    order / t,
+                    x[x.len() - 1]
+                );
+            }
             let factors = self.factors(&x)?;
             let (g, H) = self.derivatives(&x, &factors, t);
             let Some(step) = newton(H, &g, self.budget) else {
@@ -285,15 +147,17 @@ impl Barrier<'_> {
 }
 
 /// −H⁻¹g, with unknowns scaled so that H has a unit diagonal; none where the budget is spent.
+/// Of H the lower triangle is read.
 fn newton(mut H: DMatrix<f64>, g: &DVector<f64>, budget: &Budget) -> Option<DVector<f64>> {
     if budget.spent().is_some() {
         return None;
     }
     let scale = H.diagonal().map(|h| 1.0 / h.sqrt());
-    for j in 0..H.ncols() {
-        for i in 0..H.nrows() {
-            H[(i, j)] *= scale[i] * scale[j];
-        }
+    for (j, mut column) in H.column_iter_mut().enumerate() {
+        let below = column.as_mut_slice().iter_mut().zip(scale.as_slice());
+        below
+            .skip(j)
+            .for_each(|(h, factor)| *h *= factor * scale[j]);
     }
     let right = -g.component_mul(&scale);
     let mut ridge = 1e-14;
@@ -367,27 +231,5 @@ mod tests {
             indefinite[(n - 1, n - 1)] = -1.0;
             assert!(cholesky(indefinite, &Budget::default()).is_none());
         }
-    }
-
-    /// tr(F W) and W F W of a term with several rows against the whole matrices.
-    #[test]
-    fn a_term_is_what_its_entries_say() {
-        let n = 5;
-        let entries = vec![(0, 3, 2.0), (1, 1, -1.0), (1, 4, 0.5), (2, 3, 1.5)];
-        let mut F = DMatrix::zeros(n, n);
-        for &(i, j, value) in &entries {
-            F[(i, j)] = value;
-            F[(j, i)] = value;
-        }
-        let term = Term::new(0, entries, n);
-        let W = DMatrix::from_fn(n, n, |i, j| ((i * j) as f64).cos());
-        let expected = &W * &F * &W;
-        let found = term.sandwiched(&W);
-        for j in 0..n {
-            for i in 0..=j {
-                assert!((found[(i, j)] - expected[(i, j)]).abs() < 1e-13);
-            }
-        }
-        assert!((term.inner(&W) - (&F * &W).trace()).abs() < 1e-13);
     }
 }

@@ -28,10 +28,12 @@
 
 mod affine;
 mod barrier;
+mod block;
 
 pub use affine::Affine;
 
-use barrier::{Barrier, Block};
+use barrier::Barrier;
+use block::Block;
 use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 
@@ -85,6 +87,11 @@ impl Problem {
         self.budget = budget.clone();
     }
 
+    /// Whether its budget has ended.
+    pub fn is_spent(&self) -> bool {
+        self.budget.spent().is_some()
+    }
+
     /// Newton's matrix, and its factor, for one unknown more than there are.
     fn affords(&self) -> Result<(), Failure> {
         let m = self.unknowns + 1;
@@ -110,12 +117,18 @@ impl Problem {
 
     /// An unknown symmetric n×n matrix.
     pub fn symmetric(&mut self, n: usize) -> Affine {
-        let first = self.fresh(n * (n + 1) / 2).start;
-        let place = |i: usize, j: usize| {
-            let (i, j) = (i.min(j), i.max(j));
-            first + j * (j + 1) / 2 + i
+        self.symmetric_where(n, |_, _| true)
+    }
+
+    /// An unknown symmetric n×n matrix with zeros where `kept` says no; it is asked for rows
+    /// i ≤ j only.
+    pub fn symmetric_where(&mut self, n: usize, kept: impl Fn(usize, usize) -> bool) -> Affine {
+        let mut column = |j: usize| {
+            let place = |i: usize| kept(i, j).then(|| self.fresh(1).start);
+            (0..=j).map(place).collect::<Vec<_>>()
         };
-        Affine::unknown(n, n, |i, j| Some(place(i, j)))
+        let places: Vec<Vec<Option<usize>>> = (0..n).map(&mut column).collect();
+        Affine::unknown(n, n, |i, j| places[i.max(j)][i.min(j)])
     }
 
     /// An unknown matrix.
@@ -157,6 +170,21 @@ impl Problem {
         self.solve_from(&self.inside()?)
     }
 
+    /// The point at which unknown matrices of this problem have these values.
+    pub fn point(&self, parts: &[(&Affine, DMatrix<f64>)]) -> Solution {
+        let mut values = DVector::zeros(self.unknowns);
+        for (matrix, value) in parts {
+            for j in 0..matrix.columns() {
+                for i in 0..matrix.rows() {
+                    for (unknown, _) in matrix.terms(i, j) {
+                        values[unknown] = value[(i, j)];
+                    }
+                }
+            }
+        }
+        Solution { values }
+    }
+
     /// The same from a known point inside.
     ///
     /// # Errors
@@ -186,6 +214,21 @@ impl Problem {
     /// # Errors
     /// [`Failure`].
     pub fn inside(&self) -> Result<Solution, Failure> {
+        self.relaxed(|s, gap| gap < INSIDE * s.abs() || gap < 1e-2 * MARGIN)
+    }
+
+    /// Whether there is a point inside at all: cheaper than one that is well inside.
+    ///
+    /// # Errors
+    /// [`Failure`], [`Failure::Infeasible`] where there is none.
+    pub fn has_inside(&self) -> Result<(), Failure> {
+        let found = self.relaxed(|s, gap| s < -MARGIN || gap < 1e-2 * MARGIN);
+        found.map(|_| ())
+    }
+
+    /// Minimises the s by which inequalities are relaxed until it is known to stay above the
+    /// margin, or is `enough` for its value and the gap to its minimum.
+    fn relaxed(&self, enough: impl Fn(f64, f64) -> bool) -> Result<Solution, Failure> {
         self.affords()?;
         let s = self.unknowns;
         let relaxed = |f: &Affine| {
@@ -210,9 +253,7 @@ impl Problem {
             radius: RADIUS,
             budget: &self.budget,
         };
-        let decided = |x: &DVector<f64>, gap: f64| {
-            gap < INSIDE * x[s].abs() || x[s] > 0.0 && gap < MARGIN || gap < 1e-2 * MARGIN
-        };
+        let decided = |x: &DVector<f64>, gap: f64| x[s] - gap > -MARGIN || enough(x[s], gap);
         let x = barrier.minimise(start, decided);
         let x = x.ok_or_else(|| self.failure())?;
         match x[s] < -MARGIN {

@@ -1,5 +1,7 @@
 //! Some trajectories that go side by side, few enough to stay in the cache.
 
+use std::ops::ControlFlow;
+
 use lynkeus_native::Buffer;
 
 use super::code::Runner;
@@ -20,10 +22,27 @@ const GROUPS: usize = 64;
 /// Steps for which what is shared is computed ahead.
 const AHEAD: usize = 16;
 
-/// Groups of lanes in a block.
-pub(crate) fn groups(program: &Program) -> usize {
+/// Steps of a group after which a thread asks whether it is to go on: some ten microseconds of a
+/// small system, a tenth of a second of the largest.
+const PATIENCE: usize = 1024;
+
+/// Whether somebody wants the work to end.
+pub(crate) type IsOver<'a> = dyn Fn() -> bool + Sync + 'a;
+
+/// Least groups of lanes that are worth what a block computes for all of them, where there are so many.
+const FEW: usize = 4;
+
+/// Most groups of lanes in a block.
+fn most_groups(program: &Program) -> usize {
     let group = (program.states + program.disturbances) * size_of::<Lane>();
     (CACHE / (2 * group).max(1)).clamp(1, GROUPS)
+}
+
+/// Groups of lanes in each block of so many runs: few enough that every thread has a block.
+pub(crate) fn groups(program: &Program, runs: usize, threads: usize) -> usize {
+    let most = most_groups(program);
+    let own = runs.div_ceil(LANES).div_ceil(threads.max(1));
+    own.clamp(FEW.min(most), most)
 }
 
 /// The working memory of a thread.
@@ -36,18 +55,37 @@ pub(crate) struct Desk<'p> {
     shared: Buffer<LANES>,
     shared_row: Buffer<LANES>,
     rows: Buffer<LANES>,
+    is_over: &'p IsOver<'p>,
+    /// steps of a group since it was asked
+    since_asked: usize,
 }
 
 impl<'p> Desk<'p> {
-    pub fn new(program: &'p Program) -> Self {
+    pub fn new(program: &'p Program, is_over: &'p IsOver<'p>) -> Self {
         Self {
             step: program.step.runner(),
             row: program.row.runner(),
             arguments: vec![],
             shared: Buffer::new(AHEAD * program.step.shared()),
             shared_row: Buffer::new(LANES * program.row.shared()),
-            rows: Buffer::new(groups(program) * program.columns),
+            rows: Buffer::new(most_groups(program) * program.columns),
             program,
+            is_over,
+            // what was ended between two portions does not begin the next
+            since_asked: PATIENCE,
+        }
+    }
+
+    /// Whether the work goes on with so many more steps of a group.
+    fn goes_on(&mut self, steps: usize) -> ControlFlow<()> {
+        self.since_asked += steps;
+        if self.since_asked < PATIENCE {
+            return ControlFlow::Continue(());
+        }
+        self.since_asked = 0;
+        match (self.is_over)() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
         }
     }
 
@@ -154,8 +192,14 @@ impl Block {
         self.runs.len()
     }
 
-    /// Goes through a portion of the plan, and records these columns of its rows.
-    pub fn run(&mut self, desk: &mut Desk<'_>, events: &[Event], columns: &[usize]) {
+    /// Goes through a portion of the plan, and records these columns of its rows; breaks where the
+    /// work is over before its end.
+    pub fn run(
+        &mut self,
+        desk: &mut Desk<'_>,
+        events: &[Event],
+        columns: &[usize],
+    ) -> ControlFlow<()> {
         self.recorded.clear();
         for event in events {
             match event {
@@ -172,11 +216,12 @@ impl Block {
                         steps: *steps,
                         modes,
                     };
-                    self.advance(desk, &leg);
+                    self.advance(desk, &leg)?;
                 }
                 Event::Row { time, modes } => self.record(desk, *time, modes, columns),
             }
         }
+        ControlFlow::Continue(())
     }
 
     fn draw(&mut self, program: &Program) {
@@ -195,11 +240,12 @@ impl Block {
         }
     }
 
-    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg<'_>) {
+    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg<'_>) -> ControlFlow<()> {
         let size = desk.program.step.shared();
         let mut done = 0;
         while done < leg.steps {
             let count = desk.share(leg, done);
+            desk.goes_on(count * self.groups)?;
             for k in 0..count {
                 let shared = &desk.shared.values()[k * size..][..size];
                 let to = self.next.values_mut();
@@ -208,17 +254,16 @@ impl Block {
             }
             done += count;
         }
+        ControlFlow::Continue(())
     }
 
     fn record(&mut self, desk: &mut Desk<'_>, time: f64, modes: &[f64], columns: &[usize]) {
         let program = desk.program;
         let rows = desk.read(time, modes, self.groups, self.now.values());
         let own = program.states + program.disturbances;
-        let groups = rows.chunks_exact(program.columns.max(1));
-        let states = self.now.values().chunks_exact(own.max(1));
-        let runs = self.runs.chunks_mut(LANES);
-        for (k, ((row, x), runs)) in groups.zip(states).zip(runs).enumerate() {
-            let x = &x[..program.states];
+        for (k, runs) in self.runs.chunks_mut(LANES).enumerate() {
+            let row = &rows[k * program.columns..][..program.columns];
+            let x = &self.now.values()[k * own..][..program.states];
             let extent = Extent::new(program, row, x);
             for (lane, run) in runs.iter_mut().enumerate().filter(|(_, run)| !run.is_over) {
                 let Err(error) = run.judge(program, time, extent.of(lane), (x, lane)) else {
@@ -310,5 +355,42 @@ impl Run {
                 self.bound
                     .check(time, names, &x[program.plant_states..], String::new)
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Method, Simulation, Step, System};
+    use lynkeus_expr::Graph;
+
+    /// Two states: 64 groups of 64 bytes, twice, are 8 KiB.
+    #[test]
+    fn every_thread_has_a_block_where_there_are_enough_runs() {
+        let g = Graph::new();
+        let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
+        let states = [("x", x, 1.0), ("v", v, 0.0)];
+        let states = states.map(|(name, e, start)| (name.to_owned(), e.node(), start));
+        let dx = [v.node(), (-x).node()];
+        let plant = System::new(&g, time.node(), &states, &[], &dx, &[]).unwrap();
+        let inputs = System::new(&g, time.node(), &[], &[], &[], &[]).unwrap();
+        let mut simulation = Simulation::new(plant, inputs, 1.0, 0.5);
+        simulation.method = Method::Rk4(Step::AtMost(0.1));
+        let (_, program) = super::super::Plan::new(&simulation).unwrap().unwrap();
+        for (runs, threads, expected) in [
+            (0, 1, 4),
+            (1, 8, 4),
+            (100, 1, 25),
+            (100, 2, 13),
+            (1_000, 8, 32),
+            (100_000, 8, 64),
+            (1_000, 0, 64),
+        ] {
+            assert_eq!(
+                groups(&program, runs, threads),
+                expected,
+                "{runs} {threads}"
+            );
+        }
     }
 }

@@ -41,6 +41,11 @@ impl Code {
         self.tapes.common.outputs()
     }
 
+    /// Whether there is a function that lanes round in their own way.
+    pub fn has_functions(&self) -> bool {
+        self.tapes.has_functions
+    }
+
     pub fn runner(&self) -> Runner {
         let engine = |tape: &Tape| Box::new(tape.evaluator_in(Lanes));
         Runner {

@@ -5,18 +5,21 @@
 //! follows from it, is computed once for a block. Elementary functions are those of
 //! [`lynkeus_expr::lanes`], in every trajectory, so that what a run gives depends on neither its
 //! neighbours nor the number of threads; where none is used a run in a batch is that of
-//! [`Simulation::run`] to the bit.
+//! [`Simulation::run`] to the bit ([`Batch::is_exact`]).
 
 mod block;
 mod code;
 mod plan;
 mod split;
 
+use std::num::NonZero;
+use std::ops::ControlFlow;
 use std::sync::Mutex;
-use std::thread::Builder;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{Builder, available_parallelism};
 
 use crate::{Column, Error, Simulation};
-use block::{Block, Desk, groups};
+use block::{Block, Desk, IsOver, groups};
 use plan::{Event, Plan, Program};
 
 /// Trajectories in a register.
@@ -52,6 +55,9 @@ pub struct Batch {
     columns: Vec<usize>,
     times: Vec<f64>,
     runs: usize,
+    /// the time that all runs have reached
+    reached: f64,
+    is_cancelled: bool,
 }
 
 impl Batch {
@@ -75,7 +81,9 @@ impl Batch {
             })
         };
         let columns = columns.iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        let size = groups(&program) * LANES;
+        // what a run gives does not depend on the block that it is in
+        let threads = available_parallelism().map_or(1, NonZero::get);
+        let size = groups(&program, members.len(), threads) * LANES;
         let mut blocks = vec![];
         for (k, members) in members.chunks(size).enumerate() {
             let member = |m: &Member| {
@@ -97,7 +105,16 @@ impl Batch {
             blocks,
             columns,
             times: vec![],
+            reached: simulation.start,
+            is_cancelled: false,
         }))
+    }
+
+    /// Whether each run is that of [`Simulation::run`] to the bit: no function is used that lanes round
+    /// in their own way.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        !self.program.step.has_functions() && !self.program.row.has_functions()
     }
 
     /// Number of rows of every run.
@@ -112,30 +129,55 @@ impl Batch {
     /// # Errors
     /// Times at which something jumps that cannot be found, or too many steps.
     pub fn advance(&mut self, rows: usize, threads: usize) -> Result<bool, Error> {
+        self.advance_watched(rows, threads, &|| false)
+    }
+
+    /// As [`Batch::advance`]; every thread asks now and then, also between two rows, whether the
+    /// work is over.
+    ///
+    /// # Errors
+    /// As [`Batch::advance`], and [`Error::Cancelled`] where it is: such a batch does not go on.
+    pub fn advance_watched(
+        &mut self,
+        rows: usize,
+        threads: usize,
+        is_over: &(dyn Fn() -> bool + Sync),
+    ) -> Result<bool, Error> {
         self.times.clear();
-        loop {
+        while !self.is_cancelled {
             let events = self.plan.next(rows.max(1))?;
             let times = events.iter().filter_map(|event| match event {
                 Event::Row { time, .. } => Some(*time),
                 _ => None,
             });
             self.times.extend(times);
-            self.run(&events, threads);
-            if events.is_empty() || !self.times.is_empty() {
-                return Ok(!self.times.is_empty());
+            if self.run(&events, threads, is_over).is_break() {
+                self.times.clear();
+                self.is_cancelled = true;
+            } else if let Some(time) = self.times.last() {
+                self.reached = *time;
+                return Ok(true);
+            } else if events.is_empty() {
+                return Ok(false);
             }
         }
+        let time = self.reached;
+        Err(Error::Cancelled { time })
     }
 
-    fn run(&mut self, events: &[Event], threads: usize) {
+    fn run(&mut self, events: &[Event], threads: usize, is_over: &IsOver<'_>) -> ControlFlow<()> {
         let (program, columns) = (&self.program, &self.columns[..]);
         let threads = threads.min(self.blocks.len());
+        let is_cut = AtomicBool::new(false);
         let queue = Mutex::new(self.blocks.iter_mut());
         let next = || queue.lock().unwrap_or_else(|e| e.into_inner()).next();
         let work = || {
-            let mut desk = Desk::new(program);
+            let mut desk = Desk::new(program, is_over);
             while let Some(block) = next() {
-                block.run(&mut desk, events, columns);
+                if block.run(&mut desk, events, columns).is_break() {
+                    is_cut.store(true, Ordering::Relaxed);
+                    return;
+                }
             }
         };
         std::thread::scope(|scope| {
@@ -145,6 +187,10 @@ impl Batch {
             }
             work();
         });
+        match is_cut.into_inner() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     }
 
     /// Times of the rows at hand.

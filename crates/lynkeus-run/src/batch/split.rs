@@ -1,8 +1,9 @@
 //! What all trajectories of a batch have in common, computed once.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 
+use lynkeus_expr::lanes::{self, Portable};
 use lynkeus_expr::{Algebra, Binary, Graph, Implicit, MissingInput, Node, Nodes, Tape, Unary};
 
 /// A tape in two: what follows from the shared inputs alone, and the rest.
@@ -12,6 +13,8 @@ pub(crate) struct Divided {
     pub common: Tape,
     /// these values, then all other inputs → the outputs
     pub own: Tape,
+    /// whether there is a function that lanes round in their own way
+    pub has_functions: bool,
 }
 
 impl Divided {
@@ -31,10 +34,11 @@ impl Divided {
             graph: &g,
             frontier: RefCell::default(),
             known: RefCell::default(),
+            has_functions: Cell::default(),
         };
         let outputs = tape.eval_in(&division, &inputs);
         let outputs: Vec<Node> = outputs.iter().map(|v| division.own(v)).collect();
-        let frontier = division.frontier.into_inner();
+        let frontier = division.frontier.take();
         let of = |shared: bool| inputs.iter().filter(move |v| v.is_shared == shared);
         let shared: Vec<Node> = of(true).map(|v| v.node).collect();
         let (values, symbols): (Vec<Node>, Vec<Node>) = frontier.into_iter().unzip();
@@ -45,6 +49,7 @@ impl Divided {
         Ok(Self {
             common: Tape::new(&g, &shared, &values)?,
             own: Tape::new(&g, &rest, &outputs)?,
+            has_functions: division.has_functions.get(),
         })
     }
 }
@@ -62,6 +67,7 @@ struct Division<'g> {
     /// shared values that others read, each with its symbol
     frontier: RefCell<Vec<(Node, Node)>>,
     known: RefCell<HashMap<Node, Node>>,
+    has_functions: Cell<bool>,
 }
 
 impl Division<'_> {
@@ -88,6 +94,13 @@ impl Division<'_> {
         (make(&nodes), is_shared)
     }
 
+    /// Takes note of a function of lanes.
+    fn see<F>(&self, function: Option<F>) {
+        if function.is_some() {
+            self.has_functions.set(true);
+        }
+    }
+
     fn one(&self, arguments: &[Value], make: impl FnOnce(&[Node]) -> Node) -> Value {
         let (node, is_shared) = self.made(arguments, make);
         Value { node, is_shared }
@@ -105,6 +118,7 @@ impl Algebra for Division<'_> {
     }
 
     fn unary(&self, op: Unary, x: &Value) -> Value {
+        self.see(lanes::unary::<Portable<1>>(op));
         self.one(&[*x], |a| self.graph.unary(op, a[0]))
     }
 
@@ -113,6 +127,7 @@ impl Algebra for Division<'_> {
     }
 
     fn binary(&self, op: Binary, x: &Value, y: &Value) -> Value {
+        self.see(lanes::binary::<Portable<1>>(op));
         self.one(&[*x, *y], |a| self.graph.binary(op, a[0], a[1]))
     }
 

@@ -1,9 +1,10 @@
 //! The extended Kalman filter, continuous-discrete.
 
 use super::Belief;
+use super::factor::Factor;
 use super::flow::Joint;
 use super::health::Reading;
-use super::root::{Factor, Gain, dot};
+use super::root::{Gain, dot};
 use super::sensing::Sensing;
 use super::smooth::Correction;
 use super::spanned::Rows;

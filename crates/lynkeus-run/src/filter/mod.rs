@@ -40,6 +40,7 @@
 mod curvature;
 mod doubling;
 pub(crate) mod extended;
+mod factor;
 mod flow;
 mod health;
 mod hindsight;

@@ -9,6 +9,13 @@ pub(super) const FINE: [f64; 5] = [
     1.0,
 ];
 
+/// How much of what is left out counts where it is odd about the middle: over the piece it comes
+/// to nothing, and an estimate from every other coefficient is too large.
+pub(super) const ODD: f64 = 0.1;
+
+/// What rounding makes of a value of a polynomial, as a share of it.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
 /// Interpolation of a vector that is known at the nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Lobatto {
@@ -27,35 +34,47 @@ impl Lobatto {
 
     /// Coefficients of 1, s, s² through three nodes; none where more nodes are needed for an
     /// error of `tolerance`. Legendre's coefficients tell, which of a smooth function fall
-    /// geometrically.
+    /// geometrically; of one that is odd about the middle there is none of s² to tell by, so that
+    /// what is found has to [meet](meets) the function elsewhere, too.
     pub fn coarse(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
         let fit = combined(&self.coarse, values);
         let last = largest(fit[2].iter().map(|c| c / 6.0));
         let before = largest(fit[1].iter().zip(&fit[2]).map(|(b, c)| 0.5 * (b + c)));
-        accepted(fit, before, last, tolerance)
+        accepted(fit, &[beyond(before, last)], tolerance)
     }
 
-    /// … of 1 … s⁴ through five nodes.
+    /// … of 1 … s⁴ through five nodes. Of an odd function every other coefficient falls.
     pub fn fine(&self, values: &[Vec<f64>], tolerance: f64) -> Option<Vec<Vec<f64>>> {
         let fit = combined(&self.fine, values);
         let last = largest(fit[4].iter().map(|c| c / 70.0));
         let before = largest(fit[3].iter().zip(&fit[4]).map(|(b, c)| b / 20.0 + c / 10.0));
-        accepted(fit, before, last, tolerance)
+        let pairs = (fit[1].iter().zip(&fit[2])).zip(fit[3].iter().zip(&fit[4]));
+        let first = largest(pairs.map(|((a, b), (c, d))| 0.5 * (a + b) + 0.45 * c + 0.4 * d));
+        let next = [beyond(before, last), ODD * beyond(first, before)];
+        accepted(fit, &next, tolerance)
     }
 }
 
-fn accepted(
-    mut fit: Vec<Vec<f64>>,
-    before: f64,
-    last: f64,
-    tolerance: f64,
-) -> Option<Vec<Vec<f64>>> {
-    let next = if last < before {
-        last * last / before
-    } else {
-        last
-    };
-    if next.is_nan() || next > tolerance {
+/// Whether a polynomial of s is this close to the values at s.
+pub(super) fn meets(fit: &[Vec<f64>], s: f64, values: &[f64], tolerance: f64) -> bool {
+    values.iter().enumerate().all(|(i, value)| {
+        let found = fit.iter().rev().fold(0.0, |sum, c| sum * s + c[i]);
+        (found - value).abs() <= tolerance.max(ROUNDING * value.abs())
+    })
+}
+
+/// The next one of coefficients that fall geometrically.
+fn beyond(before: f64, last: f64) -> f64 {
+    match last < before {
+        true => last * last / before,
+        false => last,
+    }
+}
+
+/// The polynomial, where what is left out of it is within the tolerance.
+fn accepted(mut fit: Vec<Vec<f64>>, next: &[f64], tolerance: f64) -> Option<Vec<Vec<f64>>> {
+    // false of what is not a number
+    if !next.iter().all(|next| *next <= tolerance) {
         return None;
     }
     // what is far below the tolerance is rounding, and would make sparse products dense
@@ -142,5 +161,26 @@ mod tests {
                 .is_none()
         );
         assert!(lobatto.fine(&at(&FINE, |_| f64::NAN), 1e-3).is_none());
+    }
+
+    /// What is odd about the middle has no even coefficients to fall: its own tell, and what three
+    /// nodes take for a line does not meet it elsewhere.
+    #[test]
+    fn a_wave_that_is_odd_about_the_middle_is_no_line() {
+        let lobatto = Lobatto::new();
+        let three = [FINE[0], FINE[2], FINE[4]];
+        for rate in [1.0, std::f64::consts::TAU] {
+            let wave = |s: f64| (rate * (s - 0.5)).sin();
+            let line = lobatto.coarse(&at(&three, wave), 1e-9).unwrap();
+            assert!(line.len() <= 2);
+            assert!(!meets(&line, FINE[1], &[wave(FINE[1])], 1e-4));
+            assert!(lobatto.fine(&at(&FINE, wave), 1e-6).is_none());
+        }
+        let slow = |s: f64| (0.02 * (s - 0.5)).sin();
+        let line = lobatto.coarse(&at(&three, slow), 1e-6).unwrap();
+        assert!(meets(&line, FINE[1], &[slow(FINE[1])], 1e-6));
+        let fit = lobatto.fine(&at(&FINE, slow), 1e-9).unwrap();
+        assert!(meets(&fit, 0.3, &[slow(0.3)], 1e-9));
+        assert!(!meets(&fit, 0.3, &[f64::NAN], 1e-9));
     }
 }

@@ -233,10 +233,8 @@ fn the_moving_horizon_keeps_to_the_bounds() {
     );
 }
 
-/// A place and its velocity, both within bounds, the whole log in the window: the last row of the
-/// bounded least squares over all rows so far (SciPy's `lsq_linear`, method `bvls`).
-#[test]
-fn the_moving_horizon_solves_the_bounded_problem() {
+/// A place, which is measured, and its velocity, both within bounds; a window of 20 samples.
+fn bounded_cart(bounds: [(f64, f64); 2]) -> Estimator {
     let g = Graph::new();
     let [time, x, v] = ["time", "x", "v"].map(|name| g.symbol(name));
     let model = FilterModel::new(&FilterPlant {
@@ -255,9 +253,16 @@ fn the_moving_horizon_solves_the_bounded_problem() {
         initial_variance: vec![1.0, 0.5],
         confined: None,
     });
-    let bounds = [(-0.3, 1.5), (0.0, 0.6)].map(|(low, high)| Bounds { low, high });
+    let bounds = bounds.map(|(low, high)| Bounds { low, high });
     let settings = FilterSettings::of(FilterKind::MovingHorizon(20, bounds.to_vec()));
-    let mut horizon = Estimator::filter(&model.unwrap(), settings, exact()).unwrap();
+    Estimator::filter(&model.unwrap(), settings, exact()).unwrap()
+}
+
+/// The whole log in the window: the last row of the
+/// bounded least squares over all rows so far (SciPy's `lsq_linear`, method `bvls`).
+#[test]
+fn the_moving_horizon_solves_the_bounded_problem() {
+    let mut horizon = bounded_cart([(-0.3, 1.5), (0.0, 0.6)]);
     let rows = [
         (0.1, [0.0961538462, 0.2]),
         (0.9, [0.6671166495, 0.6]),
@@ -277,6 +282,28 @@ fn the_moving_horizon_solves_the_bounded_problem() {
         for (found, expected) in found.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-8, "{k}: {found} {expected}");
         }
+    }
+}
+
+/// The velocity has one value alone, which holds it from either side: the last row of the least
+/// squares over the places that are left (NumPy's `lstsq`).
+#[test]
+fn a_range_of_one_value_is_met_from_either_side() {
+    let mut horizon = bounded_cart([(-9.0, 9.0), (0.2, 0.2)]);
+    let rows = [
+        (0.1, 0.096153846154),
+        (0.9, 0.574797123327),
+        (1.4, 0.983423799648),
+        (1.2, 1.128372032979),
+        (2.2, 1.58849741932),
+    ];
+    for (k, (y, expected)) in rows.into_iter().enumerate() {
+        let found = horizon.push(0.5 * k as f64, &[y]).unwrap();
+        assert!(
+            (found[0] - expected).abs() < 1e-8,
+            "{k}: {found:?} {expected}"
+        );
+        assert_eq!(found[1], 0.2);
     }
 }
 

@@ -1,9 +1,10 @@
 //! The unscented Kalman filter.
 
 use super::Belief;
+use super::factor::factor;
 use super::health::Reading;
 use super::model::FilterModel;
-use super::root::{Root, dot, factor};
+use super::root::{Root, dot};
 use super::sensing::Sensing;
 use super::smooth::Correction;
 use super::spanned::{Rows, Spanned};

@@ -9,7 +9,7 @@
 mod stiff;
 
 use super::Belief;
-use super::nodes::{FINE, Lobatto};
+use super::nodes::{FINE, Lobatto, ODD, meets};
 use super::spanned::Entry;
 use super::taylor::{Moments, Series};
 use crate::adaptive::resolution;
@@ -287,23 +287,23 @@ impl Variation {
                 polynomial,
             });
         }
+        let node = piece.at(FINE[1]);
         self.integrator
-            .advance(driven, piece.from, half, &mut middle)?;
+            .advance(driven, piece.from, node, &mut middle)?;
+        let inside = self.scaled(driven, node, &middle, h)?;
+        self.integrator.advance(driven, node, half, &mut middle)?;
         values.push(self.scaled(driven, half, &middle, h)?);
         end.extend_from_slice(&middle);
         self.integrator.advance(driven, half, piece.to, &mut end)?;
         values.push(self.scaled(driven, piece.to, &end, h)?);
-        let mut fit = self.lobatto.coarse(&values, self.tolerance);
+        let coarse = self.lobatto.coarse(&values, self.tolerance);
+        let within = self.tolerance / ODD;
+        let mut fit = coarse.filter(|fit| meets(fit, FINE[1], &inside, within));
         if fit.is_none() {
-            let mut inside = x.to_vec();
-            let node = piece.at(FINE[1]);
-            self.integrator
-                .advance(driven, piece.from, node, &mut inside)?;
-            values.insert(1, self.scaled(driven, node, &inside, h)?);
-            inside.copy_from_slice(&middle);
+            values.insert(1, inside);
             let node = piece.at(FINE[3]);
-            self.integrator.advance(driven, half, node, &mut inside)?;
-            values.insert(3, self.scaled(driven, node, &inside, h)?);
+            self.integrator.advance(driven, half, node, &mut middle)?;
+            values.insert(3, self.scaled(driven, node, &middle, h)?);
             fit = self.lobatto.fine(&values, self.tolerance);
         }
         let polynomial = fit.map(|fit| fit.iter().map(|c| self.sparse(c)).collect());

@@ -3,7 +3,8 @@
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Interval, Jets, Reals, Tape};
 
-use super::isolate::{Effort, Isolation};
+use super::effort::Effort;
+use super::isolate::Isolation;
 use super::timeline::{Timeline, apart};
 use crate::Error;
 

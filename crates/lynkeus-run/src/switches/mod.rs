@@ -15,6 +15,7 @@
 //! pulse is too short to be seen. What rounding errors hide, and what switches
 //! too often, is refused by name.
 
+mod effort;
 mod extract;
 mod indicator;
 mod isolate;
@@ -24,8 +25,8 @@ use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Tape};
 
 use crate::Error;
 use crate::snapshot::{Damaged, Persist, Walk};
+use effort::Allowance;
 use indicator::Indicator;
-use isolate::Allowance;
 use timeline::Timeline;
 
 /// Modes, kinks and how they are found.

@@ -13,6 +13,7 @@ mod walk;
 
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Unary};
 
+use crate::range::Question;
 use crate::region::Cell;
 use crate::words::short;
 use crate::{Finding, Place, Region, Side, Verdict, Witness};
@@ -115,6 +116,10 @@ impl Trouble {
             Trouble::Undefined { place, .. } | Trouble::Jumps { place, .. } => place,
         }
     }
+
+    fn is_undefined(&self) -> bool {
+        matches!(self, Trouble::Undefined { .. })
+    }
 }
 
 impl std::fmt::Display for Trouble {
@@ -174,7 +179,7 @@ pub fn has_value_at(
         let cell: Cell = sides
             .map(|(d, &middle)| Interval::point(told(&d.name).map_or(middle, |c| c.value)))
             .collect();
-        if walk.trouble(&[node], &cell).is_some() {
+        if walk.trouble(&cell).is_some() {
             return Ok(false);
         }
     }
@@ -190,7 +195,7 @@ pub(crate) fn is_regular(
     cell: &Cell,
 ) -> Result<bool, MissingInput> {
     let mut walk = Walk::new(graph, &[node], &region.symbols(), region)?;
-    Ok(walk.trouble(&[node], cell).is_none())
+    Ok(walk.trouble(cell).is_none())
 }
 
 /// Whether the whole box decides all of them, without halving it: so it is with most plants,
@@ -202,11 +207,15 @@ fn is_regular_at_once(
     region: &Region,
 ) -> Result<bool, MissingInput> {
     let mut walk = Walk::new(graph, nodes, moving, region)?;
-    Ok(walk.trouble(nodes, &region.cell()).is_none())
+    Ok(walk.trouble(&region.cell()).is_none())
 }
 
 /// The first place where it is not decided, depth first: a true jump is found after a few
 /// dozen cells, an overestimated range goes on until every cell is decided.
+///
+/// Where a part has no value the whole has none, if nothing in it is chosen: such a part is
+/// searched alone, once for all that are made of it, as derivatives of one expression are.
+/// A jump is not: what is constant all the same does not jump with its parts.
 fn search(
     graph: &Graph,
     node: Node,
@@ -215,13 +224,22 @@ fn search(
 ) -> Result<Option<Trouble>, MissingInput> {
     let region = region.restricted(&graph.symbols_of(&[node]));
     let mut walk = Walk::new(graph, &[node], moving, &region)?;
+    let mut asked = vec![node];
     let mut open: Vec<Cell> = vec![region.cell()];
     let mut seen = 0;
     while let Some(cell) = open.pop() {
         seen += 1;
-        let Some((culprit, known)) = walk.trouble(&[node], &cell) else {
+        let Some((culprit, known)) = walk.trouble(&cell) else {
             continue;
         };
+        let spoils = walk.needs_all() && !known.values.is_defined();
+        if spoils && !asked.contains(&culprit) {
+            let found = part(graph, culprit, moving, &region)?;
+            if found.as_ref().is_some_and(Trouble::is_undefined) {
+                return Ok(found);
+            }
+            asked.push(culprit);
+        }
         let used = graph.symbols_of(&[culprit]);
         let lasts = seen < BUDGET && graph.spent().is_none();
         let decidable = lasts && !known.values.is_empty();
@@ -234,6 +252,35 @@ fn search(
         }
     }
     Ok(None)
+}
+
+/// A part of expressions, with what its trouble depends on.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct PartOf {
+    question: Question,
+    moving: Vec<Node>,
+}
+
+/// [`search`] of a part, which the graph remembers.
+fn part(
+    graph: &Graph,
+    node: Node,
+    moving: &[Node],
+    region: &Region,
+) -> Result<Option<Trouble>, MissingInput> {
+    let symbols = graph.symbols_of(&[node]);
+    let region = region.restricted(&symbols);
+    let moving = moving.iter().copied().filter(|m| symbols.contains(m));
+    let part = PartOf {
+        moving: moving.collect(),
+        question: Question::new(node, &region, BUDGET),
+    };
+    if let Some(known) = graph.noted(&part) {
+        return Ok(known);
+    }
+    let found = search(graph, node, &part.moving, &region)?;
+    graph.note(part, found.clone());
+    Ok(found)
 }
 
 fn told(graph: &Graph, region: &Region, cell: &Cell, culprit: Node, values: Interval) -> Trouble {

@@ -210,3 +210,31 @@ fn loops_are_regular_where_they_have_one_root() {
     let inside = |z: Expr<'_>, x: Expr<'_>| (z + (z - 3.0).sign() - x).node();
     assert!(undefined(&root((1.0, 5.0), inside)) && root((5.0, 8.0), inside).holds());
 }
+
+/// A part without a value spoils what is made of it, wherever it stands, and is searched once;
+/// one that is regular on its own, or that is not needed there, spoils nothing.
+#[test]
+fn a_part_without_a_value_is_searched_once() {
+    let g = Graph::new();
+    let (x, y) = (g.symbol("x"), g.symbol("y"));
+    let region = Region {
+        dimensions: vec![side(x, -1.0, 2.0), side(y, 0.5, 3.0)],
+    };
+    let moving = [x.node(), y.node()];
+    let of = |f: Expr<'_>| Regularity::of(&g, &[f.node()], &moving, &region).unwrap();
+    let pole = 1.0 / (x - 0.5);
+    let place = |found: &Regularity| found.trouble().unwrap().clone();
+    let alone = place(&of(pole));
+    assert!(undefined(&of(pole)));
+    for made in [pole * y.sin(), (pole * pole + y).exp(), pole - y * pole] {
+        assert_eq!(place(&of(made)), alone);
+    }
+    // overestimated on the whole box, and regular on its parts
+    let root = (x - x.powi(2) / 4.0 + 1.25 + 1e-3).sqrt();
+    assert!(of(root).holds() && of(root * y + root.sin()).holds());
+    assert!(undefined(&of(root * y + pole)));
+    let near = x.less(g.constant(0.6));
+    let chosen = near.select(y, pole);
+    let found = Regularity::of(&g, &[chosen.node()], &[], &region).unwrap();
+    assert!(found.holds(), "{:?}", found.trouble());
+}

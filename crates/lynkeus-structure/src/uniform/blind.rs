@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{MissingInput, Node};
+use lynkeus_expr::{Graph, MissingInput, Node};
 
 use crate::output_map::jacobian_rows;
 use crate::points::inside;
@@ -96,12 +96,17 @@ fn hidden(
     let mut seen = vec![false; symbols.len()];
     let mut open: Vec<usize> = (0..first).collect();
     while let Some(row) = open.pop() {
+        let function = graph.substitute(&[functions[row]], fixed)[0];
         for (state, partial) in partials[row].iter().enumerate() {
-            let Some(partial) = partial.filter(|_| !seen[state]) else {
+            if seen[state] {
                 continue;
-            };
-            let there = graph.substitute(&[partial], fixed)[0];
-            if vanishes(graph, there, region)? != Verdict::Proved {
+            }
+            let there = partial.map(|partial| graph.substitute(&[partial], fixed)[0]);
+            let is_still = there.map(|there| vanishes(graph, there, region));
+            let moves = is_still
+                .transpose()?
+                .is_some_and(|verdict| verdict != Verdict::Proved);
+            if moves || jumps_with(graph, function, symbols[state]) {
                 seen[state] = true;
                 open.push(first + state);
             }
@@ -112,4 +117,11 @@ fn hidden(
         .filter(|(_, seen)| !**seen)
         .map(|(s, _)| s.name.clone())
         .collect())
+}
+
+/// Whether a function may jump with a variable, which its derivative does not show.
+fn jumps_with(graph: &Graph, function: Node, symbol: Node) -> bool {
+    let nodes = graph.reachable(&graph.with_residuals(&[function]));
+    let mut jumps = nodes.into_iter().filter(|&node| graph.jumps(node));
+    jumps.any(|node| graph.symbols_of(&[node]).contains(&symbol))
 }

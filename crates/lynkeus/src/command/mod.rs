@@ -139,7 +139,7 @@ enum Command {
         /// Also write what a logger would have seen (t, measured outputs, inputs), ready for `estimate`
         #[arg(long, value_name = "FILE.csv")]
         log: Option<PathBuf>,
-        /// Run it N times with the seeds S, S+1, … (S: the study's, or --seed), on all processors: means, quantiles and the worst. Run k is what --seed S+k gives alone; `spread` of [simulate] moves starts and parameters
+        /// Run it N times with the seeds S, S+1, … (S: the study's, or --seed), on all processors: means, quantiles and the worst. Run k is what --seed S+k gives alone (fixed steps: but for the rounding of exp, sin and the like); `spread` of [simulate] moves starts and parameters
         #[arg(long, value_name = "N", conflicts_with = "log", value_parser = runs)]
         runs: Option<usize>,
         #[command(flatten)]

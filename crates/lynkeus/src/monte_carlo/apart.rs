@@ -6,14 +6,15 @@ use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 
 use super::statistics::of_runs;
-use super::{Failure, Figures, Followed};
+use super::together::Screened;
+use super::{Again, Failure, Figures, Followed};
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::{Error, Study};
 
 /// True course and estimate of one quantity in one run.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Track {
     pub truth: Vec<f64>,
     pub estimate: Vec<f64>,
@@ -22,18 +23,18 @@ pub(super) struct Track {
 /// What one run gave.
 #[derive(Debug)]
 pub(super) struct Single {
-    seed: u64,
+    pub seed: u64,
     /// none where a limit ended the run
-    result: Result<Option<Whole>, Error>,
+    pub result: Result<Option<Whole>, Error>,
 }
 
 /// A run that reached its end.
 #[derive(Debug)]
-struct Whole {
+pub(super) struct Whole {
     /// by quantity
-    tracks: Vec<Track>,
+    pub tracks: Vec<Track>,
     /// why its estimate is not credible, where it is not
-    doubt: Option<String>,
+    pub doubt: Option<String>,
 }
 
 /// What all runs share.
@@ -97,12 +98,12 @@ impl Job<'_> {
         if let Some(ended) = &ran.course.ended {
             return Err(Error::refused(ended.to_string()).at(&study.file));
         }
-        if ran.run.times().last() != Some(&rig.simulation.until) {
+        if ran.run.time.last() != Some(rig.simulation.until) {
             return Ok(None);
         }
-        self.time.get_or_init(|| ran.run.times().to_vec());
+        self.time.get_or_init(|| ran.run.time.to_vec());
         let tracks = self.followed.iter().map(|f| Track {
-            truth: ran.run.column(f.truth).unwrap_or_default().to_vec(),
+            truth: ran.run.column(f.truth).map_or(vec![], |x| x.to_vec()),
             estimate: ran.course.estimates[f.estimate].to_vec(),
         });
         let tracks = tracks.collect();
@@ -110,6 +111,61 @@ impl Job<'_> {
         let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
         let doubt = alone.refusal().map(|refusal| refusal.to_string());
         Ok(Some(Whole { tracks, doubt }))
+    }
+
+    /// The figures of runs that went on together, with those that are not credible alone.
+    pub fn screened(
+        &self,
+        plant: &Plant,
+        rig: &Rig,
+        done: Screened,
+        watch: &mut Watch<'_>,
+    ) -> Result<Figures, Error> {
+        let judged = self.singles(plant, rig, &done.suspects, watch)?;
+        let doubtful = judged.into_iter().filter_map(Single::doubt).collect();
+        Ok(Figures {
+            doubtful,
+            ..done.figures
+        })
+    }
+
+    /// The figures of runs of which everything is kept.
+    pub fn gathered(self, singles: Vec<Single>, again: Again) -> Result<Figures, Error> {
+        let (mut seeds, mut runs) = (vec![], vec![]);
+        let (mut failures, mut doubtful) = (vec![], vec![]);
+        let mut first = None;
+        for single in singles {
+            let seed = single.seed;
+            match single.result {
+                Ok(None) => {}
+                Ok(Some(Whole { tracks, doubt })) => {
+                    seeds.push(seed);
+                    runs.push(tracks);
+                    doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
+                }
+                Err(error) => {
+                    let reason = error.to_string();
+                    failures.push(Failure { seed, reason });
+                    first = first.or(Some(error));
+                }
+            }
+        }
+        let ended = |spent| Err(Error::ended(spent).at(&self.study.file));
+        match (self.study.budget.marked(), first) {
+            (Some(Spent::Cancelled), _) => return ended(Spent::Cancelled),
+            (_, Some(first)) if seeds.is_empty() => return Err(first),
+            (Some(spent), None) if seeds.is_empty() => return ended(spent),
+            _ => {}
+        }
+        let found = (0..self.followed.len()).map(|place| of_runs(&runs, place));
+        Ok(Figures {
+            found: found.collect(),
+            seeds,
+            failures,
+            doubtful,
+            time: self.time.into_inner().unwrap_or_default(),
+            again,
+        })
     }
 }
 
@@ -139,47 +195,4 @@ pub(super) fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> 
     Err(Error::input(message).at(&study.file).hint(format!(
         "a longer `{step}` of [simulate], fewer runs, or a greater limit of memory"
     )))
-}
-
-/// The figures of runs that were done one by one.
-pub(super) fn gathered(
-    study: &Study,
-    followed: &[Followed],
-    singles: Vec<Single>,
-    time: Vec<f64>,
-) -> Result<Figures, Error> {
-    let (mut seeds, mut runs) = (vec![], vec![]);
-    let (mut failures, mut doubtful) = (vec![], vec![]);
-    let mut first = None;
-    for single in singles {
-        let seed = single.seed;
-        match single.result {
-            Ok(None) => {}
-            Ok(Some(Whole { tracks, doubt })) => {
-                seeds.push(seed);
-                runs.push(tracks);
-                doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
-            }
-            Err(error) => {
-                let reason = error.to_string();
-                failures.push(Failure { seed, reason });
-                first = first.or(Some(error));
-            }
-        }
-    }
-    let ended = study.budget.marked();
-    match (ended, first) {
-        (Some(Spent::Cancelled), _) => return Err(Error::ended(Spent::Cancelled)),
-        (_, Some(first)) if seeds.is_empty() => return Err(first),
-        (Some(spent), None) if seeds.is_empty() => return Err(Error::ended(spent)),
-        _ => {}
-    }
-    let found = (0..followed.len()).map(|place| of_runs(&runs, place));
-    Ok(Figures {
-        found: found.collect(),
-        seeds,
-        failures,
-        doubtful,
-        time,
-    })
 }

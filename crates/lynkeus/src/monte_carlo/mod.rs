@@ -1,12 +1,13 @@
 //! Many runs of a study: plant and observer with noise, starts and parameters of their own.
 //!
 //! Run k has the study's seed + k, so that [`simulate`](crate::simulate()) with that seed repeats it
-//! alone. What a run draws follows from its seed, and the runs are put together in order: the
+//! alone; up to how functions such as exp are rounded where runs go on together ([`Again`]). What a run draws follows from its seed, and the runs are put together in order: the
 //! result does not depend on the number of processors.
 
 mod apart;
 #[cfg(feature = "plot")]
 mod picture;
+mod portions;
 mod report;
 mod statistics;
 mod together;
@@ -22,11 +23,11 @@ use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
-use apart::{Job, Single, Track, gathered, room};
+use apart::{Job, Track, room};
 pub use report::Settled;
 use report::headers_of;
 use statistics::Found;
-use together::{Screened, Together};
+use together::Together;
 
 /// What many runs of a study give.
 #[derive(Clone, Debug)]
@@ -45,6 +46,8 @@ pub struct MonteCarlo {
     pub failures: Vec<Failure>,
     /// Those among `seeds` whose estimates are not credible.
     pub doubtful: Vec<Failure>,
+    /// What repeats one of the runs.
+    pub again: Again,
     /// Times of the rows.
     pub time: Vec<f64>,
     /// Header of their column.
@@ -53,6 +56,16 @@ pub struct MonteCarlo {
     pub quantities: Vec<Scattered>,
     /// What the user should know.
     pub notes: Vec<String>,
+}
+
+/// What repeats one of many runs to the last digit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Again {
+    /// [`simulate`](crate::simulate()) with its seed.
+    Alone,
+    /// [`monte_carlo`] of this seed alone: exp, sin and the like are those of
+    /// [`lanes`](lynkeus_expr::lanes), which [`simulate`](crate::simulate()) rounds otherwise.
+    InABatch,
 }
 
 /// A run that did not reach its end, or whose estimate is not credible.
@@ -87,7 +100,7 @@ pub struct Scattered {
     pub rms: Vec<f64>,
     /// The run with the greatest of these, by its place among the seeds.
     pub worst_run: usize,
-    /// The error of that run.
+    /// The error of that run; NaN from where a limit ended its repetition.
     pub worst_course: Vec<f64>,
     /// Headers of its columns: mean and quantiles of truth and error, then the largest |error|.
     pub headers: [String; 7],
@@ -147,24 +160,21 @@ pub fn monte_carlo(
         followed: &followed,
         time: OnceLock::new(),
     };
-    let pass = match together.can(runs)? {
-        true => together.figures(&seeds(), watch)?,
-        false => None,
-    };
-    if let Some(Screened {
-        mut figures,
-        suspects,
-    }) = pass
-    {
-        let judged = job.singles(&plant, &rig, &suspects, watch)?;
-        figures.doubtful = judged.into_iter().filter_map(Single::doubt).collect();
-        return Ok(reported(&prepared, &rig, &followed, runs, figures));
+    let told = |figures| reported(&prepared, &rig, &followed, runs, figures);
+    let fits = || room(study, &rig, runs, followed.len());
+    if together.can(runs)? {
+        // what a limit of time leaves has to be kept
+        if study.budget.left().is_some() && fits().is_ok() {
+            if let Some(done) = together.portions(&job, &plant, &seeds(), watch)? {
+                return job.gathered(done.singles, done.again).map(told);
+            }
+        } else if let Some(done) = together.figures(&seeds(), watch)? {
+            return job.screened(&plant, &rig, done, watch).map(told);
+        }
     }
-    room(study, &rig, runs, followed.len())?;
+    fits()?;
     let singles = job.singles(&plant, &rig, &seeds(), watch)?;
-    let time = job.time.into_inner().unwrap_or_default();
-    let figures = gathered(study, &followed, singles, time)?;
-    Ok(reported(&prepared, &rig, &followed, runs, figures))
+    job.gathered(singles, Again::Alone).map(told)
 }
 
 /// Estimates whose truth a run has.
@@ -187,6 +197,7 @@ struct Figures {
     time: Vec<f64>,
     /// by quantity
     found: Vec<Found>,
+    again: Again,
 }
 
 /// The figures under their names.
@@ -204,6 +215,7 @@ fn reported(
         doubtful,
         time,
         found,
+        again,
     } = figures;
     let mut headers = Headers::beside(plant);
     let time_header = headers.time();
@@ -247,6 +259,7 @@ fn reported(
         seeds,
         failures,
         doubtful,
+        again,
         time,
         time_header,
         quantities,

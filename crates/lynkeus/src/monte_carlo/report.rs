@@ -6,7 +6,7 @@ use lynkeus_structure::figures;
 use serde_json::{Map, Value, json};
 
 use super::statistics::{HIGH, mean, quantile};
-use super::{Failure, MonteCarlo, Scattered};
+use super::{Again, Failure, MonteCarlo, Scattered};
 use crate::Error;
 use crate::headers::Headers;
 
@@ -35,6 +35,29 @@ impl Scattered {
             q95: quantile(&sorted, HIGH),
             worst: sorted.last().copied().unwrap_or(f64::NAN),
         }
+    }
+}
+
+impl Again {
+    /// How to repeat the run of a seed.
+    fn in_words(self, seed: u64) -> String {
+        match self {
+            Self::Alone => format!("`lynkeus simulate --seed {seed}` repeats it alone"),
+            Self::InABatch => format!(
+                "`lynkeus simulate --runs 1 --seed {seed}` repeats it; without `--runs` exp, sin and the like are rounded otherwise"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Again {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Alone => "--seed repeats one alone",
+            Self::InABatch => {
+                "--runs 1 --seed repeats one, --seed alone up to the rounding of exp, sin and the like"
+            }
+        })
     }
 }
 
@@ -76,8 +99,12 @@ impl MonteCarlo {
             first.seed,
             first.reason
         );
-        let again = format!("`lynkeus simulate --seed {}` repeats it alone", first.seed);
-        Some(Error::refused(message).hint(again))
+        // whether an estimate is credible was asked of the run alone
+        let again = match self.failures.is_empty() {
+            true => Again::Alone,
+            false => self.again,
+        };
+        Some(Error::refused(message).hint(again.in_words(first.seed)))
     }
 
     fn worst_seed(&self, quantity: &Scattered) -> Option<u64> {
@@ -131,7 +158,7 @@ impl fmt::Display for MonteCarlo {
             "{plant}: {family} observer, {done} of {asked} runs to the end"
         )?;
         if let (Some(first), Some(last)) = (self.seeds.first(), self.seeds.last()) {
-            writeln!(f, "seeds {first} to {last}; --seed repeats one alone")?;
+            writeln!(f, "seeds {first} to {last}; {}", self.again)?;
         }
         writeln!(f, "RMS errors over the last half of the rows:")?;
         let width = self.quantities.iter().map(|q| q.name.chars().count());

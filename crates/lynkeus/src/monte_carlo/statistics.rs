@@ -16,6 +16,22 @@ pub(super) struct Found {
     pub worst_course: Vec<f64>,
 }
 
+/// What is made of one quantity, row after row.
+pub(super) trait Keep: Send {
+    /// One more row: true value and estimate of every run.
+    fn add(&mut self, pairs: impl Iterator<Item = (f64, f64)>, is_late: bool);
+}
+
+/// All rows of every run.
+impl Keep for Vec<Track> {
+    fn add(&mut self, pairs: impl Iterator<Item = (f64, f64)>, _: bool) {
+        for (tracks, (truth, estimate)) in self.iter_mut().zip(pairs) {
+            tracks.truth.push(truth);
+            tracks.estimate.push(estimate);
+        }
+    }
+}
+
 /// Of the quantity at a place of every run.
 pub(super) fn of_runs(runs: &[Vec<Track>], place: usize) -> Found {
     let own: Vec<&Track> = runs.iter().filter_map(|run| run.get(place)).collect();
@@ -58,8 +74,24 @@ impl Scatter {
         }
     }
 
-    /// One more row: true value and estimate of every run.
-    pub fn add(&mut self, pairs: impl Iterator<Item = (f64, f64)>, is_late: bool) {
+    /// What the rows say, but for the course of the worst run.
+    pub fn found(self, rows: usize) -> Found {
+        let late = (rows - rows / 2).max(1) as f64;
+        let rms: Vec<f64> = self.squares.iter().map(|s| (s / late).sqrt()).collect();
+        let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
+        Found {
+            truth: self.truth,
+            error: self.error,
+            error_worst: self.error_worst,
+            worst_run: worst.unwrap_or(0),
+            worst_course: vec![],
+            rms,
+        }
+    }
+}
+
+impl Keep for Scatter {
+    fn add(&mut self, pairs: impl Iterator<Item = (f64, f64)>, is_late: bool) {
         self.values.clear();
         self.errors.clear();
         for ((truth, estimate), square) in pairs.zip(&mut self.squares) {
@@ -74,21 +106,6 @@ impl Scatter {
         self.error_worst.push(worst.unwrap_or(f64::NAN));
         self.truth.add(&mut self.values);
         self.error.add(&mut self.errors);
-    }
-
-    /// What the rows say, but for the course of the worst run.
-    pub fn found(self, rows: usize) -> Found {
-        let late = (rows - rows / 2).max(1) as f64;
-        let rms: Vec<f64> = self.squares.iter().map(|s| (s / late).sqrt()).collect();
-        let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]).then(b.cmp(a)));
-        Found {
-            truth: self.truth,
-            error: self.error,
-            error_worst: self.error_worst,
-            worst_run: worst.unwrap_or(0),
-            worst_course: vec![],
-            rms,
-        }
     }
 }
 

@@ -5,6 +5,8 @@ use lynkeus_run::deviate;
 use super::*;
 use crate::simulate;
 
+mod limits;
+
 /// x' = −p x with x measured: the triangular observer of one state is z' = −p z + θ (y − z).
 const PLANT: &str = "model Decay
   parameter Real p = 0.5;
@@ -102,6 +104,31 @@ fn runs_that_go_on_together_and_do_not_reach_their_end_are_in_no_figure() {
         assert_eq!(outcome.quantities[0].settled_error(), Some(*rms));
     }
     assert!(found.refusal().is_some());
+}
+
+/// Lanes have a sine of their own: what is said to repeat a run does so.
+#[test]
+fn what_is_said_to_repeat_a_run_does() {
+    let folder = folder();
+    let simulate = "spread = { x = 0.3 }\nmethod = \"rk4\"\nstep = 0.03";
+    let study = study(&folder, "noise = { y = 0.1 }", simulate);
+    let rational = runs(&study, 9).unwrap();
+    assert_eq!(rational.again, Again::Alone);
+    assert!(rational.to_string().contains("; --seed repeats one alone"));
+    let sine = PLANT.replace("-p*x", "-p*sin(x)");
+    std::fs::write(folder.path().join("decay.mo"), sine).unwrap();
+    let found = runs(&study, 9).unwrap();
+    assert_eq!(found.again, Again::InABatch);
+    assert!(found.to_string().contains("; --runs 1 --seed repeats one"));
+    for (seed, rms) in found.seeds.iter().zip(&found.quantities[0].rms) {
+        let mut study = study.clone();
+        study.simulate.as_mut().unwrap().seed = *seed;
+        assert_eq!(runs(&study, 1).unwrap().quantities[0].rms, [*rms]);
+        let alone = alone(&study, *seed).quantities[0].settled_error().unwrap();
+        assert!((alone - rms).abs() < 1e-12 * rms, "{alone} {rms}");
+    }
+    let adaptive = self::study(&folder, "noise = { y = 0.1 }", "");
+    assert_eq!(runs(&adaptive, 2).unwrap().again, Again::Alone);
 }
 
 fn same_as_alone(study: &Study) {

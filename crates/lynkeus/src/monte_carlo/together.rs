@@ -1,10 +1,14 @@
 //! All runs at once, where their steps are fixed: row by row, so that no more than some rows of
 //! them are in memory.
 
-use lynkeus_run::{Batch, Column, Member, Method, Role, Step};
+use std::collections::HashSet;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
 
-use super::statistics::{Found, Scatter};
-use super::{Failure, Figures, Followed};
+use lynkeus_run::{Batch, Column, Ended, Member, Method, Role, Step};
+
+use super::statistics::{Found, Keep, Scatter};
+use super::{Again, Failure, Figures, Followed};
 use crate::credible::Screen;
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
@@ -13,6 +17,9 @@ use crate::{Error, Study};
 
 /// Bytes of the rows that are in memory at a time.
 const WINDOW: usize = 32 << 20;
+
+/// Time after which the rows that were made are handed over.
+const TOLD: Duration = Duration::from_millis(50);
 
 /// The runs of many seeds.
 pub(super) struct Together<'a> {
@@ -44,157 +51,173 @@ impl Together<'_> {
     /// # Errors
     /// A study that cannot be run, no run that reached its end, or a limit.
     pub fn figures(&self, seeds: &[u64], watch: &mut Watch<'_>) -> Result<Option<Screened>, Error> {
-        let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
-        let Some(first) = self.pass(seeds, &columns, &mut *watch)? else {
+        let Some(first) = self.pass(seeds, &|runs, _| Scatter::new(runs), &mut *watch)? else {
             return Ok(None);
         };
-        let failures = self.failures(seeds, &first, watch)?;
-        let seeds: Vec<u64> = seeds
-            .iter()
-            .copied()
-            .filter(|seed| failures.iter().all(|f| f.seed != *seed))
-            .collect();
+        let failures = self.failures(seeds, &first.ended, watch)?;
+        let failed: HashSet<u64> = failures.iter().map(|f| f.seed).collect();
+        let mut seeds = seeds.to_vec();
+        seeds.retain(|seed| !failed.contains(seed));
         // the rows of runs that ended are in these figures: once more without them
         let pass = match failures.is_empty() {
             true => first,
-            false => match self.pass(&seeds, &columns, &mut *watch)? {
+            false => match self.pass(&seeds, &|runs, _| Scatter::new(runs), &mut *watch)? {
                 Some(pass) => pass,
                 None => return Ok(None),
             },
         };
+        let suspects = pass.suspects().map(|k| seeds[k]).collect();
         let rows = pass.time.len();
-        let is_suspect = |k: usize| pass.quantities.iter().any(|q| q.screens[k].is_suspect());
-        let suspects = (0..seeds.len()).filter(|k| is_suspect(*k));
-        let suspects = suspects.map(|k| seeds[k]).collect();
-        let scatters = pass.quantities.into_iter().map(|q| q.scatter);
+        let scatters = pass.quantities.into_iter().map(|q| q.kept);
         let mut found: Vec<Found> = scatters.map(|s| s.found(rows)).collect();
-        self.worst_courses(&seeds, &columns, &mut found)?;
+        self.worst_courses(&seeds, &mut found)?;
         let figures = Figures {
             seeds,
             failures,
             doubtful: vec![],
             time: pass.time,
             found,
+            again: pass.again,
         };
         Ok(Some(Screened { figures, suspects }))
     }
 
-    fn batch(&self, seeds: &[u64], columns: &[Column]) -> Result<Option<Batch>, Error> {
+    fn batch(&self, seeds: &[u64]) -> Result<Option<Batch>, Error> {
         let simulation = &self.rig.simulation;
+        let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
         let members = seeds.iter().map(|&seed| Member {
             seed,
             start: self.rig.start(seed),
         });
         let members: Vec<Member> = members.collect();
-        Batch::new(simulation, &members, columns).map_err(Error::from_source)
+        Batch::new(simulation, &members, &columns).map_err(|error| self.told(error))
     }
 
-    /// All runs from start to end.
-    fn pass(
+    /// All runs from start to end, with what is made of their rows; `kept` for so many runs and rows.
+    ///
+    /// # Errors
+    /// As [`Together::figures`].
+    pub fn pass<K: Keep>(
         &self,
         seeds: &[u64],
-        columns: &[Column],
+        kept: &dyn Fn(usize, usize) -> K,
         watch: &mut Watch<'_>,
-    ) -> Result<Option<Pass>, Error> {
-        let study = self.prepared.study();
-        let row = seeds.len() * columns.len() * size_of::<f64>();
-        let Some(mut batch) = self.batch(seeds, columns)? else {
+    ) -> Result<Option<Pass<K>>, Error> {
+        let Some(mut batch) = self.batch(seeds)? else {
             return Ok(None);
         };
-        let (rows, threads) = (batch.rows(), crew::threads());
+        let rows = batch.rows();
+        let quantity = |followed: &Followed| {
+            let estimate = &self.rig.design.observer.estimates[followed.estimate];
+            Quantity {
+                kept: kept(seeds.len(), rows),
+                screens: vec![Screen::new(&estimate.variable, rows); seeds.len()],
+            }
+        };
         let mut pass = Pass {
             time: Vec::with_capacity(rows),
-            quantities: self
-                .followed
-                .iter()
-                .map(|f| self.quantity(f, seeds.len(), rows))
-                .collect(),
+            quantities: self.followed.iter().map(quantity).collect(),
             ended: vec![],
+            again: Again::of(&batch),
         };
-        let window = (WINDOW / row.max(1)).max(1);
-        while batch.advance(window, threads).map_err(Error::from_source)? {
-            let first = pass.time.len();
-            pass.time.extend(batch.times());
-            crew::each(&mut pass.quantities, threads, &|place, quantity| {
-                for k in 0..batch.times().len() {
-                    let pairs = || {
-                        let truth = batch.values(k, 2 * place);
-                        truth.zip(batch.values(k, 2 * place + 1))
-                    };
-                    let row = first + k;
-                    quantity.scatter.add(pairs(), row >= rows / 2);
-                    for (screen, (truth, estimate)) in quantity.screens.iter_mut().zip(pairs()) {
-                        screen.add(row, truth, estimate);
-                    }
-                }
-            });
-            if let Some(spent) = study.budget.spent() {
-                return Err(Error::ended(spent));
-            }
-            if watch(pass.time.len() as f64 / rows as f64).is_break() {
-                return Err(Error::input("the runs were stopped"));
-            }
-        }
+        self.drive(&mut batch, &mut |batch| {
+            pass.add(batch);
+            watch(pass.time.len() as f64 / rows as f64)
+        })?;
         pass.ended = batch.ended().cloned().collect();
         Ok(Some(pass))
     }
 
-    fn quantity(&self, followed: &Followed, runs: usize, rows: usize) -> Quantity {
-        let estimate = &self.rig.design.observer.estimates[followed.estimate];
-        Quantity {
-            scatter: Scatter::new(runs),
-            screens: vec![Screen::new(&estimate.variable, rows); runs],
+    /// Takes a batch to its end and hands it over every so many rows.
+    fn drive(
+        &self,
+        batch: &mut Batch,
+        take: &mut dyn FnMut(&Batch) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        let study = self.prepared.study();
+        let is_over = || study.budget.spent().is_some();
+        let row = 2 * batch.len() * self.followed.len() * size_of::<f64>();
+        let most = WINDOW / row.max(1);
+        let mut rows = 1;
+        loop {
+            let begun = Instant::now();
+            let goes_on = batch.advance_watched(rows, crew::threads(), &is_over);
+            if !goes_on.map_err(|error| self.told(error))? {
+                return Ok(());
+            }
+            if take(batch).is_break() {
+                return Err(Error::input("the runs were stopped"));
+            }
+            if begun.elapsed() < TOLD {
+                rows = (2 * rows).clamp(1, most.max(1));
+            }
         }
     }
 
-    /// The runs that did not reach their end. The first one is done alone, which says more.
+    /// An error of the batch as a whole.
+    fn told(&self, error: lynkeus_run::Error) -> Error {
+        let study = self.prepared.study();
+        let told = match study.budget.marked() {
+            Some(spent) => Error::ended(spent),
+            None => Error::from_source(error),
+        };
+        told.at(&study.file)
+    }
+
+    /// The runs that did not reach their end.
     fn failures(
         &self,
         seeds: &[u64],
-        pass: &Pass,
+        ended: &[Ended],
         watch: &mut Watch<'_>,
     ) -> Result<Vec<Failure>, Error> {
-        let file = &self.prepared.study().file;
-        let mut failures: Vec<Failure> = pass
-            .ended
-            .iter()
-            .filter_map(|ended| {
-                let error = Error::refused(ended.error.to_string()).at(file);
-                Some(Failure {
-                    seed: *seeds.get(ended.run)?,
-                    reason: error.to_string(),
-                })
-            })
-            .collect();
-        failures.sort_by_key(|f| f.seed);
-        let Some(first) = failures.first_mut() else {
-            return Ok(failures);
+        let mut errors = self.errors(seeds, ended);
+        if let Some((seed, error)) = errors.first_mut() {
+            self.ask_alone(*seed, error, watch);
+        }
+        if errors.len() == seeds.len()
+            && let Some((_, first)) = errors.drain(..).next()
+        {
+            return Err(first);
+        }
+        let failure = |(seed, error): (u64, Error)| Failure {
+            seed,
+            reason: error.to_string(),
         };
-        let alone = self.rig.run(self.prepared, first.seed, watch);
-        let error = match alone {
+        Ok(errors.into_iter().map(failure).collect())
+    }
+
+    /// Why runs did not reach their end, by seed.
+    pub fn errors(&self, seeds: &[u64], ended: &[Ended]) -> Vec<(u64, Error)> {
+        let file = &self.prepared.study().file;
+        let told = |ended: &Ended| {
+            let error = Error::refused(ended.error.to_string()).at(file);
+            Some((*seeds.get(ended.run)?, error))
+        };
+        let mut errors: Vec<(u64, Error)> = ended.iter().filter_map(told).collect();
+        errors.sort_by_key(|(seed, _)| *seed);
+        errors
+    }
+
+    /// Why a run did not reach its end as it is told alone, which says more.
+    pub fn ask_alone(&self, seed: u64, error: &mut Error, watch: &mut Watch<'_>) {
+        let study = self.prepared.study();
+        let alone = match self.rig.run(self.prepared, seed, watch) {
             Ok(ran) => ran
                 .course
                 .ended
-                .map(|e| Error::refused(e.to_string()).at(file)),
-            Err(error) => Some(error),
+                .map(|e| Error::refused(e.to_string()).at(&study.file)),
+            Err(alone) => Some(alone),
         };
-        if let Some(error) = &error {
-            first.reason = error.to_string();
+        // what a limit ended says nothing of the study
+        if let (Some(alone), None) = (alone, study.budget.marked()) {
+            *error = alone;
         }
-        if failures.len() < seeds.len() {
-            return Ok(failures);
-        }
-        let told = || Error::refused(failures[0].reason.clone()).at(file);
-        Err(error.unwrap_or_else(told))
     }
 
-    /// The courses of the worst runs, which are done once more.
-    fn worst_courses(
-        &self,
-        seeds: &[u64],
-        columns: &[Column],
-        found: &mut [Found],
-    ) -> Result<(), Error> {
+    /// The courses of the worst runs, which are done once more; without a value from where a limit
+    /// ended that.
+    fn worst_courses(&self, seeds: &[u64], found: &mut [Found]) -> Result<(), Error> {
         let mut worst: Vec<usize> = found.iter().map(|f| f.worst_run).collect();
         worst.sort_unstable();
         worst.dedup();
@@ -202,10 +225,10 @@ impl Together<'_> {
             .iter()
             .filter_map(|k| seeds.get(*k).copied())
             .collect();
-        let Some(mut batch) = self.batch(&own, columns)? else {
+        let Some(mut batch) = self.batch(&own)? else {
             return Ok(());
         };
-        while batch.advance(batch.rows(), 1).map_err(Error::from_source)? {
+        let driven = self.drive(&mut batch, &mut |batch| {
             for (place, found) in found.iter_mut().enumerate() {
                 let run = worst.iter().position(|k| *k == found.worst_run);
                 for k in 0..batch.times().len() {
@@ -214,6 +237,13 @@ impl Together<'_> {
                     found.worst_course.extend(pair.map(|(hat, x)| hat - x));
                 }
             }
+            ControlFlow::Continue(())
+        });
+        if self.prepared.study().budget.marked().is_none() {
+            driven?;
+        }
+        for found in found {
+            found.worst_course.resize(batch.rows(), f64::NAN);
         }
         Ok(())
     }
@@ -233,17 +263,55 @@ pub(super) struct Screened {
 }
 
 /// One quantity over all runs.
-struct Quantity {
-    scatter: Scatter,
+pub(super) struct Quantity<K> {
+    pub kept: K,
     /// by run
     screens: Vec<Screen>,
 }
 
 /// What the rows of all runs gave.
-struct Pass {
-    time: Vec<f64>,
-    quantities: Vec<Quantity>,
-    ended: Vec<lynkeus_run::Ended>,
+pub(super) struct Pass<K> {
+    pub time: Vec<f64>,
+    pub quantities: Vec<Quantity<K>>,
+    pub ended: Vec<Ended>,
+    pub again: Again,
+}
+
+impl<K: Keep> Pass<K> {
+    /// The rows at hand.
+    fn add(&mut self, batch: &Batch) {
+        let (first, rows) = (self.time.len(), batch.rows());
+        self.time.extend(batch.times());
+        crew::each(&mut self.quantities, crew::threads(), &|place, quantity| {
+            for k in 0..batch.times().len() {
+                let pairs = || {
+                    let truth = batch.values(k, 2 * place);
+                    truth.zip(batch.values(k, 2 * place + 1))
+                };
+                let row = first + k;
+                quantity.kept.add(pairs(), row >= rows / 2);
+                for (screen, (truth, estimate)) in quantity.screens.iter_mut().zip(pairs()) {
+                    screen.add(row, truth, estimate);
+                }
+            }
+        });
+    }
+
+    /// The runs whose estimates may not be credible, by their places.
+    pub fn suspects(&self) -> impl Iterator<Item = usize> + '_ {
+        let runs = self.quantities.first().map_or(0, |q| q.screens.len());
+        let is_suspect = |k: &usize| self.quantities.iter().any(|q| q.screens[*k].is_suspect());
+        (0..runs).filter(is_suspect)
+    }
+}
+
+impl Again {
+    fn of(batch: &Batch) -> Self {
+        match batch.is_exact() {
+            true => Self::Alone,
+            false => Self::InABatch,
+        }
+    }
 }
 
 /// Bytes that the noise of one signal takes, at most.

@@ -17,7 +17,7 @@ use crate::crew::{Watch, part};
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
-use crate::systems::{self, Reported, named};
+use crate::systems::{self, monitor_column, named};
 use crate::{Error, Study};
 
 /// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
@@ -163,10 +163,9 @@ impl Trial<'_> {
     /// Scaled errors of the estimates, in the observer's order; an input is what the plant has
     /// of it, disturbance included.
     fn errors(&self, run: &Trajectory) -> Errors {
-        let reported = Reported::new(&self.observer, run);
         let error = |(place, estimate): (usize, &Estimate)| {
             let column = systems::column_of(self.plant, &estimate.variable)?;
-            let (estimate, truth) = (reported.estimate(place)?, run.column(column)?);
+            let (estimate, truth) = (run.column(Role::Estimate.at(place))?, run.column(column)?);
             let scale = self.reference.scale(column);
             let pairs = estimate.iter().zip(truth);
             Some(pairs.map(|(hat, x)| (hat - x) / scale).collect())
@@ -189,7 +188,7 @@ impl Trial<'_> {
         };
         row.set(measures::PEAK_ERROR, Some(size));
         let estimate = self.observer.estimates.get(quantity);
-        let course = Reported::new(&self.observer, run).estimate(quantity);
+        let course = run.column(Role::Estimate.at(quantity));
         row.peak = estimate.and_then(|estimate| {
             Some(Peak {
                 name: estimate.variable.name.clone(),
@@ -249,11 +248,10 @@ impl Trial<'_> {
         let column = |signal: usize| outputs.get(signal).copied().flatten();
         let inputs_of_time = simulation.inputs.outputs();
         let input = |signal: usize| inputs_of_time.iter().position(|n| *n == names[signal]);
-        let reported = Reported::new(&self.observer, run);
         let step = longest_step(observer, run.len(), &mut |row, x, signals| {
             let t = *run.times().get(row)?;
             for (i, x) in x.iter_mut().enumerate() {
-                *x = *reported.monitor(i)?.get(row)?;
+                *x = *run.column(monitor_column(&self.observer, i))?.get(row)?;
             }
             inputs.enter(t);
             inputs.outputs(t, &[], &mut u);

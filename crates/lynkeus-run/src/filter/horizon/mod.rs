@@ -258,12 +258,10 @@ impl Horizon {
                 let force = forces.iter().find(|f| f.place == place);
                 let force = force.map_or(0.0, |f| f.push);
                 place += 1;
-                let outward = if bound == bounds[state].low {
-                    -force
-                } else {
-                    force
-                };
-                outward <= 0.0
+                let Bounds { low, high } = bounds[state];
+                let outward = if bound == low { -force } else { force };
+                // a single value pushes either way
+                low == high || outward <= 0.0
             });
             changed |= row.met.len() != before;
             for (i, (x, bounds)) in x.iter().zip(bounds).enumerate() {

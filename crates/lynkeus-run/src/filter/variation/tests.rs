@@ -113,6 +113,25 @@ fn series_agree_with_one_integration() {
     }
 }
 
+/// Rates that are odd about the middle of every sample look constant, or a line, from its ends and
+/// its middle: a whole wave, and a part of one.
+#[test]
+fn a_wave_in_step_with_the_samples_is_seen() {
+    let whole = chain(12, |[left, own, _, u], i| {
+        let wave = ((u - 0.5) * (std::f64::consts::TAU / 0.3)).sin();
+        left - own * (1.5 + wave * (0.2 * i as f64))
+    });
+    let part = chain(12, |[left, own, _, u], i| {
+        let wave = ((u - 0.65) * 4.0).sin() + ((u - 0.95) * 4.0).sin();
+        left - own * (1.5 + wave * (0.2 * i as f64))
+    });
+    for chain in [whole, part] {
+        let ours = Method::Explicit(tight(1e-9));
+        let off = differ(&chain, 1.0, ours, Method::Explicit(tight(1e-12)));
+        assert!(off < 1e-8, "{off}");
+    }
+}
+
 /// A derivative with a kink that the estimate crosses within a sample.
 #[test]
 fn a_kink_is_found() {

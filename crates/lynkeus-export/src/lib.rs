@@ -1,0 +1,54 @@
+//! Expression graphs as source text in other languages.
+//!
+//! [`Code`] is what a tape computes as a list of operations that any language has: each once,
+//! arguments first, nothing that no output needs. A [`Dialect`] says how one language writes an
+//! operation; [`Body`] is the list in its words, one assignment after the other. A frame around
+//! bodies, a module with functions for example, is the language's own ([`python`]).
+//!
+//! An operation that a dialect lacks is refused by name ([`Refusal`]); nothing is approximated.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod code;
+mod dialect;
+mod factorise;
+mod names;
+mod printer;
+pub mod python;
+
+pub use code::Code;
+pub use dialect::{Binding, Dialect, Form, Text};
+pub use names::Names;
+pub use printer::Body;
+
+/// What cannot be printed, and what to do about it.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// The root of equations that have to be searched.
+    #[error(
+        "the algebraic loop for {} cannot be printed: expected equations that are solved for their \
+         unknowns or linear in them; solve them in the model, or run what the tool itself runs",
+        .unknowns.join(", ")
+    )]
+    Loop {
+        /// what the unknowns are called
+        unknowns: Vec<String>,
+    },
+    /// The condition of a linear system that would be spelled out at too great a length.
+    #[error(
+        "the condition of a linear system of {size} unknowns cannot be printed: expected {most} at most"
+    )]
+    LargeSystem {
+        /// number of unknowns
+        size: usize,
+        /// what can be printed
+        most: usize,
+    },
+    /// An operation that the language has not.
+    #[error("{language} has no way to write {operation}")]
+    Lacks {
+        /// the language
+        language: &'static str,
+        /// the operation
+        operation: String,
+    },
+}

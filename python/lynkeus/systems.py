@@ -1,0 +1,257 @@
+"""Plants and observers as functions, here and in other packages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _lynkeus
+from .errors import InputError, RefusedError
+
+if TYPE_CHECKING:
+    import casadi
+    import control
+
+Column = NDArray[np.float64]
+Input = float | Callable[[float], float]
+
+
+class Pair(NamedTuple):
+    """The two functions of a system, called alike: ``f(t, x, u)`` and ``h(t, x, u)``."""
+
+    f: Any
+    h: Any
+
+
+class Functions:
+    """x' = f(t, x, u), y = h(t, x, u): a plant, or an observer (:class:`Observer`).
+
+    ``states``, ``inputs`` and ``outputs`` are names, in the order of the entries of x, u and y;
+    ``start`` are the states at the start, NaN where the model gives none.
+
+    >>> import lynkeus
+    >>> tank = lynkeus.Model.from_modelica('''
+    ...     model Tank
+    ...       input Real inflow;
+    ...       Real level(start = 4);
+    ...       output Real y = level;
+    ...     equation
+    ...       der(level) = inflow - 0.5*sqrt(level);
+    ...     end Tank;''').functions()
+    >>> tank.f(0.0, [4.0], [1.5])
+    array([0.5])
+    >>> tank.jacobian_x(0.0, [4.0], [1.5])
+    array([[-0.125]])
+    """
+
+    def __init__(self, core: _lynkeus.Functions) -> None:
+        self._core = core
+        self.states = core.states
+        self.inputs = core.inputs
+        self.outputs = core.outputs
+
+    @property
+    def start(self) -> Column:
+        """States at the start, shape (n,)."""
+        return self._core.start
+
+    def f(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
+        """x', shape (n,)."""
+        return self._core.f(t, _vector(x), _vector(u))
+
+    def h(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
+        """y, shape (p,)."""
+        return self._core.h(t, _vector(x), _vector(u))
+
+    def jacobian_x(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> NDArray[np.float64]:
+        """∂f/∂x, shape (n, n), from the derivatives of the equations."""
+        return self._core.jacobian_x(t, _vector(x), _vector(u))
+
+    def source(self, language: str = "python") -> str:
+        """A module with ``f(xp, t, x, u)`` and ``h(xp, t, x, u)``: in ``"python"`` ``xp`` is ``numpy``
+        or ``jax.numpy``; in ``"casadi"`` it is ``casadi``."""
+        return self._core.source(language)[0]
+
+    def driven(self, inputs: Mapping[str, Input] | None = None) -> Driven:
+        """The system with every input given as a number or as a function of time, for SciPy's
+        ``solve_ivp``: ``d = system.driven({"u": math.sin}); solve_ivp(d.rhs, (0, 9), d.start, jac=d.jac)``."""
+        self._refuse_updates("driven")
+        given = dict(inputs or {})
+        if strangers := [name for name in given if name not in self.inputs]:
+            raise InputError(f"no input is called {strangers[0]!r}: expected {', '.join(self.inputs)}")
+        if missing := [name for name in self.inputs if name not in given]:
+            raise InputError(f"the input {missing[0]!r} is missing: expected a number or a function of time")
+        return Driven(self, tuple(_course(given[name]) for name in self.inputs))
+
+    def to_nlsys(self, name: str | None = None) -> control.NonlinearIOSystem:
+        """A system of python-control with named signals. Names hold no dot there: ``r1.v`` becomes
+        ``r1_v``."""
+        self._refuse_updates("to_nlsys")
+        try:
+            import control
+        except ImportError:
+            raise _absent("to_nlsys", "control") from None
+
+        def update(t: float, x: Column, u: Column, _: Mapping[str, Any]) -> Column:
+            return self.f(t, x, u)
+
+        def output(t: float, x: Column, u: Column, _: Mapping[str, Any]) -> Column:
+            return self.h(t, x, u)
+
+        return control.nlsys(
+            update,
+            output,
+            states=_undotted(self.states),
+            inputs=_undotted(self.inputs),
+            outputs=_undotted(self.outputs),
+            name=name,
+        )
+
+    def to_casadi(self) -> Pair:
+        """``casadi.Function``s f and h of (t, x, u), of scalar operations unless linear systems are
+        solved in them."""
+        try:
+            import casadi
+        except ImportError:
+            raise _absent("to_casadi", "casadi") from None
+        text, has_systems = self._core.source("casadi")
+        module = _executed(text)
+        # the symbolic solution of a matrix of scalars has no pivots
+        symbols: Any = casadi.MX if has_systems else casadi.SX
+        vectors = _arguments(self)
+        t = symbols.sym("t")
+        x, u = symbols.sym(vectors[0], len(self.states)), symbols.sym(vectors[1], len(self.inputs))
+        names = ["t", *vectors]
+
+        def function(name: str, result: str) -> casadi.Function:
+            return casadi.Function(name, [t, x, u], [module[name](casadi, t, x, u)], names, [result])
+
+        return Pair(function("f", "der"), function("h", "y"))
+
+    def to_jax(self) -> Pair:
+        """Functions f and h of (t, x, u) over ``jax.numpy``, to be given to ``jit``, ``vmap`` and
+        ``grad``; in double precision where ``jax_enable_x64`` is set."""
+        try:
+            import jax.numpy as jnp
+        except ImportError:
+            raise _absent("to_jax", "jax") from None
+        module = _executed(self._core.source("python")[0])
+
+        def f(t: Any, x: Any, u: Any = ()) -> Any:
+            """The derivatives of the states."""
+            return module["f"](jnp, t, x, u)
+
+        def h(t: Any, x: Any, u: Any = ()) -> Any:
+            """The outputs."""
+            return module["h"](jnp, t, x, u)
+
+        return Pair(f, h)
+
+    def _refuse_updates(self, what: str) -> None:
+        if self._core.is_filter:
+            flows = ", ".join(name for name, is_filter in _lynkeus.families() if not is_filter)
+            raise RefusedError(
+                f"{what}: the family {self._core.family!r} corrects its estimate in updates when sensors "
+                f"report, and a flow alone is no observer: expected one of {flows}; "
+                "study.estimator() runs every family"
+            )
+
+    def __repr__(self) -> str:
+        return f"<{self._core.title}>"
+
+
+class Observer(Functions):
+    """z' = f(t, z, w), estimates h(t, z, w): what ``study.observer()`` gives.
+
+    ``signals`` (the entries of w) are the sensors, the known inputs, and the derivatives of known
+    inputs that the family reads (``u'``); ``outputs`` are the estimates, ``<name>_hat``. Of a filter
+    f is what happens between samples; its updates are those of ``study.estimator()``.
+    """
+
+    @property
+    def family(self) -> str:
+        """The family of the observer."""
+        return str(self._core.family)
+
+    @property
+    def is_filter(self) -> bool:
+        """Whether its correction is in updates, not in f."""
+        return self._core.is_filter
+
+    @property
+    def signals(self) -> list[str]:
+        """Names of the entries of w."""
+        return self.inputs
+
+    @property
+    def sensors(self) -> list[str]:
+        """Those of them that are measured outputs."""
+        return self.inputs[: self._core.sensors]
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A system under inputs that are functions of time."""
+
+    system: Functions
+    inputs: tuple[Callable[[float], float], ...]
+
+    @property
+    def start(self) -> Column:
+        """States at the start."""
+        return self.system.start
+
+    def u(self, t: float) -> Column:
+        """The inputs at a time."""
+        return np.array([float(value(t)) for value in self.inputs])
+
+    def rhs(self, t: float, x: ArrayLike) -> Column:
+        """x' = f(t, x, u(t)), shape (n,)."""
+        return self.system.f(t, x, self.u(t))
+
+    def jac(self, t: float, x: ArrayLike) -> NDArray[np.float64]:
+        """∂x'/∂x, shape (n, n)."""
+        return self.system.jacobian_x(t, x, self.u(t))
+
+    def outputs(self, t: float, x: ArrayLike) -> Column:
+        """y = h(t, x, u(t)), shape (p,)."""
+        return self.system.h(t, x, self.u(t))
+
+
+def _vector(values: ArrayLike) -> Column:
+    return np.asarray(values, dtype=float).reshape(-1)
+
+
+def _course(value: Input) -> Callable[[float], float]:
+    if callable(value):
+        return value
+    number = float(value)
+    return lambda _: number
+
+
+def _arguments(system: Functions) -> list[str]:
+    return ["z", "w"] if isinstance(system, Observer) else ["x", "u"]
+
+
+def _undotted(names: list[str]) -> list[str]:
+    found: dict[str, None] = {}
+    for name in names:
+        name = name.replace(".", "_")
+        while name in found:
+            name += "_"
+        found[name] = None
+    return list(found)
+
+
+def _executed(text: str) -> dict[str, Any]:
+    module: dict[str, Any] = {}
+    exec(compile(text, "<printed by lynkeus>", "exec"), module)
+    return module
+
+
+def _absent(what: str, package: str) -> ImportError:
+    return ImportError(f"{what} needs the package {package}: pip install {package}", name=package)
