@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import html
 import importlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _lynkeus
-from .errors import LynkeusError
+from . import _html, _lynkeus, _plot
+from ._logs import log_of
+from .errors import InputError, LynkeusError
 
 if TYPE_CHECKING:
     import pandas
@@ -89,12 +89,7 @@ class Answer:
         return self._core.svg()
 
     def _repr_html_(self) -> str:
-        text = f"<pre>{html.escape(str(self))}</pre>"
-        try:
-            picture = self.to_svg()
-        except LynkeusError:
-            picture = None
-        return text + (picture or "")
+        return _html.page(self)
 
 
 class Check(Answer):
@@ -221,29 +216,28 @@ class Run(Table):
         """Whether nothing speaks against the estimates; else :attr:`refusal` tells what does."""
         return self.refusal is None
 
-    def plot(self, ax: Axes | None = None, names: list[str] | None = None) -> Axes:
-        """Draws columns over time with matplotlib: those of ``names``, or every estimate with its
-        true value where there is one."""
-        if ax is None:
-            from matplotlib import pyplot
+    def plot(
+        self,
+        ax: Axes | Sequence[Axes] | None = None,
+        names: Sequence[str] | None = None,
+        truth: Any = None,
+    ) -> list[Axes]:
+        """Draws the run with matplotlib, a panel for each quantity that the study's ``[plot] show``
+        names, or for each of ``names`` (quantities, or columns): true values dashed, estimates solid with
+        a band of two standard deviations where the run has them. Into ``ax``, one for all or one for
+        each, or into a new figure; these axes are returned. ``truth`` is a log with true values in
+        columns by the quantities' names, one for each row of the run."""
+        panels, time = self._panels(names, {} if truth is None else self._truth(truth))
+        return _plot.draw(panels, self.t, time, ax)
 
-            ax = pyplot.figure().add_subplot()
-        shown = names if names is not None else self._shown()
-        for name in shown:
-            is_estimate = name not in shown or name in self._estimates().values()
-            ax.plot(self.t, self[name], label=name, linestyle="-" if is_estimate else "--")
-        ax.set_xlabel(self.columns[0])
-        ax.legend()
-        return ax
+    def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
+        return _plot.of_run(self, names, truth)
 
-    def _estimates(self) -> dict[str, str]:
-        return dict(self.summary.get("estimates", {}))
-
-    def _shown(self) -> list[str]:
-        shown: list[str] = []
-        for name, header in self._estimates().items():
-            shown += [name, header] if name in self.columns else [header]
-        return shown or self.columns[1:]
+    def _truth(self, data: Any) -> dict[str, Column]:
+        log = log_of(data)
+        if len(log) != len(self):
+            raise InputError(f"truth: expected {len(self)} rows, as the run has, found {len(log)}")
+        return {name: log.column(name) for name in log.headers()}
 
 
 class Simulation(Run):
@@ -262,6 +256,9 @@ class Estimation(Run):
 class MonteCarlo(Run):
     """Many runs: mean, quantile bands and the worst."""
 
+    def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
+        return _plot.of_many(self, names)
+
 
 class Sweep(Table):
     """A tuning over its values."""
@@ -269,6 +266,22 @@ class Sweep(Table):
 
 class HowWell(Run):
     """Standard errors over the horizon."""
+
+    def plot(
+        self,
+        ax: Axes | Sequence[Axes] | None = None,
+        names: Sequence[str] | None = None,
+        truth: Any = None,
+    ) -> list[Axes]:
+        """The standard errors over the horizon, both axes logarithmic."""
+        axes = super().plot(ax, names, truth)
+        for each in axes:
+            each.set_xscale("log")
+            each.set_yscale("log")
+        return axes
+
+    def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
+        return _plot.of_precision(self, names)
 
 
 class Comparison(Answer):

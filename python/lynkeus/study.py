@@ -38,20 +38,21 @@ class Study:
     ``model`` is a :class:`Model`, or the path of one. ``measured``, ``unknown``, ``noise`` and the
     like are keys of ``[sensors]``; ``observer`` may be the name of a family.
 
-    >>> import lynkeus
-    >>> model = lynkeus.Model.from_modelica('''
-    ...     model Tank
-    ...       input Real inflow(min = 0, max = 5);
-    ...       Real level(start = 4, min = 0.1, max = 10);
-    ...       output Real y = level;
-    ...     equation
-    ...       der(level) = inflow - 0.5*sqrt(level);
-    ...     end Tank;''')
-    >>> study = lynkeus.Study(model, unknown=["inflow"], observer={"theta": 1.0},
-    ...                       simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}})
-    >>> run = study.simulate()
-    >>> float(abs(run["inflow_hat"][-1] - 1.2)) < 1e-3
-    True
+    Examples:
+        >>> import lynkeus
+        >>> model = lynkeus.Model.from_modelica('''
+        ...     model Tank
+        ...       input Real inflow(min = 0, max = 5);
+        ...       Real level(start = 4, min = 0.1, max = 10);
+        ...       output Real y = level;
+        ...     equation
+        ...       der(level) = inflow - 0.5*sqrt(level);
+        ...     end Tank;''')
+        >>> study = lynkeus.Study(model, unknown=["inflow"], observer={"theta": 1.0},
+        ...                       simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}})
+        >>> run = study.simulate()
+        >>> float(abs(run["inflow_hat"][-1] - 1.2)) < 1e-3
+        True
     """
 
     def __init__(

@@ -1,0 +1,70 @@
+"""Answers in notebooks: well-formed, whatever they say, and with what they found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import lynkeus
+from lynkeus import _html
+
+STUDIES = ["two-tanks/study.toml", "two-tanks/smoothed.toml", "germani-manes/practical.toml"]
+
+
+def cells(answer: lynkeus.Answer) -> list[list[str]]:
+    """The rows of all tables, as texts; the page is XML as well."""
+    page = ElementTree.fromstring(answer._repr_html_())
+    return [["".join(td.itertext()) for td in row.iter("td")] for row in page.iter("tr")]
+
+
+@pytest.mark.filterwarnings("ignore::lynkeus.NotCredible")
+@pytest.mark.parametrize("name", STUDIES)
+def test_answers_are_well_formed(examples: Path, name: str) -> None:
+    study = lynkeus.Study.load(examples / name)
+    for answer in (study.check(), study.design(), study.certify(), study.simulate(), study.how_well()):
+        assert any(any(row) for row in cells(answer)), type(answer).__name__
+
+
+def test_what_a_page_says_is_what_was_found(examples: Path) -> None:
+    study = lynkeus.Study.load(examples / "two-tanks" / "study.toml")
+    check = cells(study.check())
+    assert ["pump", "everywhere"] in check
+    assert sum(row[:1] == ["proved"] for row in check) == len(study.check().families[0].checks)
+    run = study.simulate()
+    row = next(row for row in cells(run) if row[:1] == ["pump"])
+    assert row[1] == f"{run.final.pump:.4g}" and row[2] == f"{run.errors.pump.rms_last_half:.4g}"
+    sweep = study.tune()
+    knee = [row for row in cells(sweep) if row[-1:] == ["knee"]]
+    assert [row[0] for row in knee] == [f"{sweep.knee['keys'].theta:.4g}"]
+    compared = cells(study.replace(compare={"families": ["triangular", "ekf"]}).compare())
+    assert [row[0] for row in compared if row] == ["triangular", "ekf"]
+    many = cells(study.simulate(runs=3))
+    assert [row[:2] for row in many if row] == [[name, "V"] for name in ("upper", "lower", "pump")]
+
+
+def test_verdicts_have_their_colours() -> None:
+    assert _html.GOOD in _html.verdict("proved") and _html.BAD in _html.verdict("refuted")
+    assert "style" not in _html.verdict("pump")
+
+
+def test_nothing_of_a_model_becomes_markup() -> None:
+    tank = """
+    model Tank "<script>alert(1)</script> & \\"more\\""
+      input Real inflow(min = 0, max = 5, unit = "<b>&");
+      Real level(start = 4, min = 0.1, max = 10, unit = "<i>") "<img src=x>";
+      output Real y = level;
+    equation
+      der(level) = inflow - 0.5*sqrt(level);
+    end Tank;"""
+    study = lynkeus.Study(
+        lynkeus.Model.from_modelica(tank),
+        unknown=["inflow"],
+        observer={"theta": 1.0},
+        simulate={"until": 20, "inputs": {"inflow": 1.2}},
+    )
+    for answer in (study.check(), study.design(), study.simulate(), study.simulate(runs=2)):
+        tags = {element.tag for element in ElementTree.fromstring(answer._repr_html_()).iter()}
+        assert not tags & {"script", "img", "i"}
+    assert _html.table("<", ["&"], [["<td>"]]).count("&lt;") == 2
