@@ -64,3 +64,8 @@ def numbers(name: str, values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         except (TypeError, ValueError):
             pass
     raise InputError(f'column "{name}": expected numbers or instants, found {array.dtype}')
+
+
+def columns_of(log: _lynkeus.Log) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """A log's columns by name: what of it travels to other processes."""
+    return {name: log.column(name) for name in log.headers()}
