@@ -10,7 +10,7 @@ from ._each import Errors, Tell, each
 from ._fleet import split
 from ._logs import log_of
 from ._progress import Progress
-from .errors import InputError, LynkeusError, NotCredible
+from .errors import InputError, NotCredible
 from .results import Estimation, Run, Simulation
 
 if TYPE_CHECKING:
@@ -117,13 +117,3 @@ def _warn(doubted: dict[int, str], names: Sequence[str]) -> None:
     first = min(doubted)
     text = f"{len(doubted)} of {len(names)} results are not credible, first {names[first]}: {doubted[first]}"
     warnings.warn(text, NotCredible, stacklevel=4)
-
-
-def figures(run: Run) -> dict[str, Any]:
-    """What is kept of a run where nothing else is asked for: whether it is ``credible``, what speaks
-    against it (``refusal``, else ``None``), and of a simulation the root mean square error over the
-    last half of its rows by estimated quantity, ``rms_NAME``."""
-    refusal: LynkeusError | None = run.refusal
-    errors = run.summary["rms_error_last_half"] or {}
-    rms = {f"rms_{name}": error for name, error in errors.items()}
-    return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

@@ -15,12 +15,11 @@ import pickle
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ._batches import figures
 from ._each import Errors, chosen
 from ._logs import columns_of, log_of
 from ._optional import needed
 from .errors import InputError, LynkeusError
-from .results import Estimation, Run, Simulation
+from .results import Estimation, Run, Simulation, figures
 from .study import Study
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def campaign(
     """One row per seed: the study simulated with that seed of noise and starts.
 
     Columns are ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by
-    default :func:`lynkeus._batches.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
+    default :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
     the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. With
     ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, Ray's
     choice where it is left out; ``options`` are those of ``Dataset.map_batches``
