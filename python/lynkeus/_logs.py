@@ -103,3 +103,8 @@ def _names(data: Any) -> list[str] | None:
 
 def _taken(data: Any, name: str) -> Any:
     return data.column(name) if hasattr(data, "column") else data[name]
+
+
+def columns_of(log: _lynkeus.Log) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
+    """A log's columns by name: what of it travels to other processes."""
+    return {name: log.column(name) for name in log.headers()}

@@ -294,3 +294,13 @@ class Comparison(Answer):
                 return found
         names = ", ".join(row["family"] for row in self.summary["families"])
         raise KeyError(f"{family!r}: expected one of {names}")
+
+
+def figures(run: Run) -> dict[str, Any]:
+    """What is kept of a run where nothing else is asked for: whether it is ``credible``, what speaks
+    against it (``refusal``, else ``None``), and of a simulation the root mean square error over the
+    last half of its rows by estimated quantity, ``rms_NAME``."""
+    refusal: LynkeusError | None = run.refusal
+    errors = run.summary["rms_error_last_half"] or {}
+    rms = {f"rms_{name}": error for name, error in errors.items()}
+    return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

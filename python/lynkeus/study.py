@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import tomllib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
-from . import _lynkeus
+from . import _batches, _lynkeus
+from ._each import Errors
 from ._logs import log_of
 from ._progress import Progress, told
 from ._toml import document
@@ -196,6 +197,97 @@ class Study:
         simulation."""
         with told(progress, "estimating") as tell:
             return _judged(Estimation(self._core.estimate(log_of(log), tell, time_limit)))
+
+    @overload
+    def estimate_each(
+        self,
+        logs: Any,
+        *,
+        by: str,
+        keep: Callable[[Estimation], Any] | None = ...,
+        workers: int | None = ...,
+        errors: Errors = ...,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+    ) -> dict[Hashable, Any]: ...
+    @overload
+    def estimate_each(  # type: ignore[overload-overlap]  # a mapping is no list, but for types
+        self,
+        logs: Mapping[Any, Any],
+        *,
+        keep: Callable[[Estimation], Any] | None = ...,
+        workers: int | None = ...,
+        errors: Errors = ...,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+    ) -> dict[Hashable, Any]: ...
+    @overload
+    def estimate_each(
+        self,
+        logs: Iterable[Any],
+        *,
+        keep: Callable[[Estimation], Any] | None = ...,
+        workers: int | None = ...,
+        errors: Errors = ...,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+    ) -> list[Any]: ...
+    def estimate_each(
+        self,
+        logs: Any,
+        *,
+        by: str | None = None,
+        keep: Callable[[Estimation], Any] | None = None,
+        workers: int | None = None,
+        errors: Errors = "raise",
+        progress: Progress = False,
+        time_limit: float | None = None,
+    ) -> list[Any] | dict[Hashable, Any]:
+        """Many logs through the observer, on all cores: what :meth:`estimate` gives for each, in their
+        order.
+
+        ``logs`` is a list of what :meth:`estimate` takes, or a mapping of them by name; with ``by`` one
+        table of all, in which that column names the asset of each row. Mappings and tables give a
+        dictionary by name. ``keep`` makes of each result what is kept of it: so thousands of them need
+        no memory. With ``errors="return"`` the exception of a log that fails stands in its place,
+        instead of ending the rest. ``workers`` are threads, as many as there are cores; ``time_limit``
+        is that of one log, in seconds."""
+        return _batches.estimate_each(
+            self,
+            logs,
+            by=by,
+            keep=keep,
+            workers=workers,
+            errors=errors,
+            progress=progress,
+            time_limit=time_limit,
+        )
+
+    def sweep(
+        self,
+        changes: Iterable[Section],
+        log: Any = None,
+        *,
+        keep: Callable[[Any], Any] | None = None,
+        workers: int | None = None,
+        errors: Errors = "raise",
+        progress: Progress = False,
+        time_limit: float | None = None,
+    ) -> list[Any]:
+        """The study with each of the changes, simulated, or estimating from ``log``, on all cores.
+
+        A change is what :meth:`replace` takes: ``{"observer": {"theta": 2.0}, "simulate": {"seed": 7}}``.
+        The other options are those of :meth:`estimate_each`."""
+        return _batches.sweep(
+            self,
+            changes,
+            log,
+            keep=keep,
+            workers=workers,
+            errors=errors,
+            progress=progress,
+            time_limit=time_limit,
+        )
 
     def tune(
         self, log: Any = None, *, progress: Progress = False, time_limit: float | None = None

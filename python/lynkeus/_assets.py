@@ -1,0 +1,141 @@
+"""What a worker does with one asset of a fleet."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import _lynkeus
+from ._logs import log_of
+from ._optional import needed
+from .errors import LynkeusError
+from .results import Estimation
+from .study import Study
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Columns of a fleet: of its assets and time, what the observer reads, and what it gives."""
+
+    by: str
+    time: str
+    read: tuple[str, ...]
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, study: Study, by: str, time: str | None) -> Signals:
+        estimator = study.estimator()
+        read = tuple(estimator.signals)
+        named = tomllib.loads(study.text).get("estimate", {}).get("time")
+        time = time or named or ("time" if "t" in read else "t")
+        return cls(by, time, read, tuple(estimator.names))
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        return (self.by, self.time, *self.read)
+
+    @property
+    def headers(self) -> tuple[str, ...]:
+        return tuple(f"{name}_hat" for name in self.names)
+
+
+class Replay:
+    """An asset's rows through the observer."""
+
+    def __init__(self, study: Study, signals: Signals) -> None:
+        self.study = study.replace(estimate={"time": signals.time})
+        self.signals = signals
+
+    def asset(self, table: Any) -> Any:
+        """The estimates of one asset, from a table of Arrow that holds its rows."""
+        signals = self.signals
+        ordered = table.sort_by(signals.time)
+        asset = table.column(signals.by)[0].as_py()
+        log = {name: ordered.column(name) for name in (signals.time, *signals.read)}
+        try:
+            run = Estimation(self.study._core.estimate(log_of(log), None, None))
+        except LynkeusError as error:
+            nothing = [np.array([np.nan])] * (1 + len(signals.names))
+            return self._table(table, asset, nothing, None, str(error))
+        estimates = run.summary["estimates"]
+        columns = [run.t, *(run[estimates[name]] for name in signals.names)]
+        return self._table(table, asset, columns, run.is_credible, None)
+
+    def _table(
+        self, table: Any, asset: Any, columns: list[Any], credible: bool | None, error: str | None
+    ) -> Any:
+        arrow = needed("pyarrow", "spark")
+        rows, signals = len(columns[0]), self.signals
+        numbers = [arrow.array(column, from_pandas=error is not None) for column in columns]
+        made = {signals.by: arrow.array([asset] * rows, table.schema.field(signals.by).type)}
+        made |= dict(zip((signals.time, *signals.headers), numbers, strict=True))
+        made["credible"] = arrow.array([credible] * rows, arrow.bool_())
+        made["error"] = arrow.array([error] * rows, arrow.string())
+        return arrow.table(made)
+
+    def partition(self, batches: Iterable[Any]) -> Iterator[Any]:
+        """The estimates of all assets of a partition, in the order in which they come first."""
+        arrow = needed("pyarrow", "spark")
+        gathered = list(batches)
+        if not gathered:
+            return
+        table = arrow.Table.from_batches(gathered)
+        column = table.column(self.signals.by)
+        places: dict[Any, list[int]] = {}
+        for row, asset in enumerate(column.to_pylist()):
+            places.setdefault(asset, []).append(row)
+        for rows in places.values():
+            yield from self.asset(table.take(rows)).to_batches()
+
+
+class Follower:
+    """An asset's rows as they come; its state between them is a snapshot."""
+
+    def __init__(self, study: Study, signals: Signals) -> None:
+        self.study = study
+        self.signals = signals
+
+    def init(self, handle: Any) -> None:
+        self.state = handle.getValueState("snapshot", "snapshot BINARY")
+
+    @cached_property
+    def _estimator(self) -> tuple[_lynkeus.Estimator, bytes]:
+        """One for all assets of a worker, and where each of them begins."""
+        estimator = self.study.estimator()
+        return estimator, estimator.snapshot()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"study": self.study, "signals": self.signals}
+
+    def handleInputRows(self, key: Any, rows: Iterator[Any], timerValues: Any) -> Iterator[Any]:
+        estimator, start = self._estimator
+        known = self.state.get() if self.state.exists() else None
+        estimator.restore(start if known is None else bytes(known[0]))
+        pandas = needed("pandas", "spark")
+        table = pandas.concat(list(rows), ignore_index=True)
+        yield self._followed(estimator, key[0], table.sort_values(self.signals.time, kind="stable"))
+        self.state.update((estimator.snapshot(),))
+
+    def _followed(self, estimator: _lynkeus.Estimator, asset: Any, table: Any) -> Any:
+        signals = self.signals
+        times = table[signals.time].to_numpy(np.float64)
+        readings = table[list(signals.read)].to_numpy(np.float64)
+        estimates = np.full((len(times), len(signals.names)), np.nan)
+        errors: list[str | None] = [None] * len(times)
+        for row, time in enumerate(times):
+            try:
+                estimator.push(time, readings[row])
+                estimates[row] = estimator.to_numpy()
+            except LynkeusError as error:
+                errors[row] = str(error)
+        made = {signals.by: [asset] * len(times), signals.time: times}
+        made |= {header: estimates[:, place] for place, header in enumerate(signals.headers)}
+        return needed("pandas", "spark").DataFrame({**made, "error": errors})
+
+    def close(self) -> None:
+        pass

@@ -1,0 +1,110 @@
+"""Many calls on all cores, by threads: the engine works away from the interpreter's lock."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Literal, TypeVar
+
+from ._progress import Progress, told
+from .errors import InputError, LynkeusError
+
+Item = TypeVar("Item")
+Kept = TypeVar("Kept")
+Errors = Literal["raise", "return"]
+Tell = Callable[[float], None]
+
+#: in seconds, between two looks at what was told and at Ctrl-C
+LOOK = 0.1
+
+
+class _Ended(Exception):
+    """Raised where a call tells its progress, to end it."""
+
+
+class _Fractions:
+    """What of each call is done; how a call is told that its answer is no longer wanted."""
+
+    def __init__(self, count: int) -> None:
+        self.done = [0.0] * count
+        self.is_over = threading.Event()
+
+    def tell(self, place: int) -> Tell:
+        def tell(fraction: float) -> None:
+            if self.is_over.is_set():
+                raise _Ended
+            self.done[place] = fraction
+
+        return tell
+
+
+def each(
+    work: Callable[[Item, Tell], Kept],
+    items: Sequence[Item],
+    names: Sequence[str],
+    *,
+    workers: int | None,
+    errors: Errors,
+    progress: Progress,
+    what: str,
+) -> list[Kept | LynkeusError]:
+    """What ``work`` makes of each item, in their order. An error of ours stands in its place, or is
+    raised with the item's name as a note and ends the rest."""
+    chosen(errors)
+    count = _workers(workers, len(items))
+    fractions = _Fractions(len(items))
+
+    def call(place: int) -> Kept | LynkeusError:
+        tell = fractions.tell(place)
+        try:
+            tell(0.0)  # ended while it waited
+            return work(items[place], tell)
+        except LynkeusError as error:
+            error.add_note(f"in {names[place]}")
+            if errors == "raise":
+                raise
+            return error
+        finally:
+            fractions.done[place] = 1.0
+
+    with told(progress, what) as shown, ThreadPoolExecutor(count, "lynkeus") as pool:
+        futures = [pool.submit(call, place) for place in range(len(items))]
+        try:
+            _watch(futures, fractions, shown)
+            return [future.result() for future in futures]
+        finally:
+            fractions.is_over.set()
+            for future in futures:
+                future.cancel()
+
+
+def chosen(errors: str) -> None:
+    """Refuses another word than those of :data:`Errors`."""
+    if errors not in ("raise", "return"):
+        raise InputError(f'errors: expected "raise" or "return", found {errors!r}')
+
+
+def _workers(asked: int | None, items: int) -> int:
+    if asked is None:
+        usable = getattr(os, "sched_getaffinity", None)
+        asked = len(usable(0)) if usable else os.cpu_count() or 1
+    if asked < 1:
+        raise InputError(f"workers: expected at least 1, found {asked}")
+    return max(1, min(asked, items))
+
+
+def _watch(
+    futures: list[Future[Kept | LynkeusError]],
+    fractions: _Fractions,
+    shown: Callable[[float], object] | None,
+) -> None:
+    """Until all are done; what one of them raises is raised at once."""
+    waiting = set(futures)
+    while waiting:
+        done, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+        for future in done:
+            future.result()
+        if shown is not None:
+            shown(sum(fractions.done) / len(fractions.done))

@@ -1,0 +1,92 @@
+"""Fleets on Spark: one study, many assets.
+
+At rest, a table of all assets' rows:
+
+    lynkeus.spark.estimate(study, frame, by="asset")
+
+In motion, a stream of them; the state of each asset is its estimator's snapshot:
+
+    lynkeus.spark.follow(study, stream, by="asset")
+
+Spark brings the rows of an asset together, schedules and repeats; here stands only what a worker does
+with one asset. So an asset's estimates do not depend on how the rows are partitioned. A study
+travels with its texts and is prepared where it runs.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ._assets import Follower, Replay, Signals
+from ._optional import needed
+from .errors import InputError
+from .study import Study
+
+if TYPE_CHECKING:
+    from pyspark.sql import DataFrame
+
+
+def estimate(
+    study: Study, frame: DataFrame, *, by: str, time: str | None = None, is_partitioned: bool = False
+) -> DataFrame:
+    """The estimates of each asset that column ``by`` names, over its rows in the order of ``time``
+    (the header of the log's time column, ``[estimate] time`` of the study where it is left out).
+
+    Columns are ``by``, ``time`` in seconds, ``NAME_hat`` for each estimate, ``credible``, ``error``. An
+    asset that fails has one row, with the reason under ``error``. Rows are brought together by asset
+    (``applyInArrow``); where each partition holds all rows of its assets already, as after
+    ``repartition(by)``, ``is_partitioned=True`` goes without (``mapInArrow``)."""
+    needed("pyarrow", "spark")
+    signals = Signals.of(study, by, time)
+    taken = _taken(frame, signals)
+    schema = _schema(frame, signals, [("credible", "boolean"), ("error", "string")])
+    replay = Replay(study, signals)
+    if is_partitioned:
+        return taken.mapInArrow(replay.partition, schema)
+    return taken.groupBy(by).applyInArrow(lambda table: replay.asset(table), schema)  # one argument: a method has two
+
+
+def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None) -> DataFrame:
+    """The estimates after each row of a stream, asset by asset, from where the last batch ended.
+
+    Columns are ``by``, ``time``, ``NAME_hat`` for each estimate, and ``error``: a row that is refused, for
+    example because it comes late, changes nothing and tells why. The rows of a batch are taken in the
+    order of ``time``, which is to be numbers. The state of an asset is the snapshot of its estimator
+    (``transformWithStateInPandas``; Spark wants its RocksDB state store for it, and a checkpoint of the
+    query survives a restart)."""
+    processor = needed("pyspark.sql.streaming", "spark").StatefulProcessor
+    signals = Signals.of(study, by, time)
+    taken = _taken(stream, signals)
+    kind = dict(taken.dtypes)[signals.time]
+    if kind not in ("double", "float", "bigint", "int", "smallint", "tinyint") and not kind.startswith("decimal"):
+        raise InputError(
+            f'column "{signals.time}": expected numbers, found {kind}; a stream has no first instant to '
+            f'count from: stream.withColumn("{signals.time}", col("{signals.time}").cast("double"))'
+        )
+    follower = type("Follower", (Follower, processor), {})(study, signals)
+    return taken.groupBy(by).transformWithStateInPandas(
+        statefulProcessor=follower,
+        outputStructType=_schema(stream, signals, [("error", "string")]),
+        outputMode="append",
+        timeMode="none",
+    )
+
+
+def _taken(frame: DataFrame, signals: Signals) -> DataFrame:
+    """The columns that are needed: the others do not travel."""
+    missing = [name for name in signals.needed if name not in frame.columns]
+    if missing:
+        raise InputError(
+            f"the fleet: no column {', '.join(missing)}: there are {', '.join(frame.columns)}"
+        )
+    return frame.select(*(f"`{name}`" for name in signals.needed))
+
+
+def _schema(frame: DataFrame, signals: Signals, further: list[tuple[str, str]]) -> Any:
+    types = needed("pyspark.sql.types", "spark")
+    number = types.DoubleType()
+    kinds = {"boolean": types.BooleanType(), "string": types.StringType()}
+    fields = [types.StructField(signals.by, frame.schema[signals.by].dataType)]
+    fields += [types.StructField(name, number) for name in (signals.time, *signals.headers)]
+    fields += [types.StructField(name, kinds[kind]) for name, kind in further]
+    return types.StructType(fields)

@@ -1,0 +1,187 @@
+"""Many logs and many changes on all cores: what each gives by itself, in order."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lynkeus
+
+TANK = """
+model Tank
+  input Real inflow(min = 0, max = 5);
+  Real level(start = 4, min = 0.1, max = 10);
+  output Real y = level;
+equation
+  der(level) = inflow - 0.5*sqrt(level);
+end Tank;
+"""
+
+
+@pytest.fixture
+def study() -> lynkeus.Study:
+    return lynkeus.Study(
+        lynkeus.Model.from_modelica(TANK),
+        unknown=["inflow"],
+        noise={"y": 0.01},
+        observer={"theta": 1.0},
+        simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}},
+    )
+
+
+@pytest.fixture
+def logs(study: lynkeus.Study) -> list[dict[str, Any]]:
+    return study.sweep(seeds(7), keep=lambda run: run.log)
+
+
+def seeds(count: int) -> list[dict[str, Any]]:
+    return [{"simulate": {"seed": seed}} for seed in range(1, count + 1)]
+
+
+def same(run: lynkeus.Run, other: lynkeus.Run) -> None:
+    assert run.columns == other.columns and run.summary == other.summary
+    for name in run:
+        np.testing.assert_array_equal(run[name], other[name])
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5, None])
+def test_each_log_gives_what_it_gives_alone(
+    study: lynkeus.Study, logs: list[dict[str, Any]], workers: int | None
+) -> None:
+    runs = study.estimate_each(logs, workers=workers)
+    assert len(runs) == len(logs)
+    for run, log in zip(runs, logs, strict=True):
+        same(run, study.estimate(log))
+    # and they differ: a list of one run seven times would not pass
+    assert len({run["inflow_hat"][-1] for run in runs}) == len(logs)
+
+
+def test_names_stay_with_their_logs(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    named = study.estimate_each({f"tank {k}": log for k, log in enumerate(logs)})
+    assert list(named) == [f"tank {k}" for k in range(len(logs))]
+    same(named["tank 4"], study.estimate(logs[4]))
+
+
+@pytest.mark.parametrize("kind", ["mapping", "pandas", "polars", "arrow"])
+def test_a_table_with_a_column_of_assets(
+    study: lynkeus.Study, logs: list[dict[str, Any]], kind: str
+) -> None:
+    # interleaved: row by row, asset by asset
+    table: dict[str, Any] = {
+        name: np.stack([log[name] for log in logs]).T.ravel() for name in logs[0]
+    }
+    table["asset"] = [f"a{k}" for _ in logs[0]["t"] for k in range(len(logs))]
+    if kind == "pandas":
+        table = pytest.importorskip("pandas").DataFrame(table)
+    elif kind == "polars":
+        table = pytest.importorskip("polars").DataFrame(table)
+    elif kind == "arrow":
+        table = pytest.importorskip("pyarrow").table(table)
+    runs = study.estimate_each(table, by="asset")
+    assert list(runs) == [f"a{k}" for k in range(len(logs))]
+    for run, log in zip(runs.values(), logs, strict=True):
+        same(run, study.estimate(log))
+
+
+def test_a_log_that_fails_has_its_exception_in_its_place(
+    study: lynkeus.Study, logs: list[dict[str, Any]]
+) -> None:
+    logs[3] = {"t": [0.0, 1.0], "z": [4.0, 4.0]}
+    runs = study.estimate_each(logs, errors="return")
+    assert [isinstance(run, lynkeus.InputError) for run in runs] == [k == 3 for k in range(7)]
+    with pytest.raises(lynkeus.InputError) as alone:
+        study.estimate(logs[3])
+    assert str(runs[3]) == str(alone.value) and runs[3].place == alone.value.place
+    with pytest.raises(lynkeus.InputError) as raised:
+        study.estimate_each(dict(zip("abcdefg", logs, strict=True)))
+    assert str(raised.value) == str(alone.value) and raised.value.__notes__ == ["in the log of 'd'"]
+
+
+def test_a_sweep_is_a_loop_over_changes(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    changes = [{"observer": {"theta": theta}} for theta in (0.5, 1.0, 2.0)]
+    for change, run in zip(changes, study.sweep(changes), strict=True):
+        same(run, study.replace(**change).simulate())
+    for change, run in zip(changes, study.sweep(changes, logs[0]), strict=True):
+        same(run, study.replace(**change).estimate(logs[0]))
+    kept = study.sweep(seeds(3), keep=lambda run: run["inflow_hat"][-1])
+    assert kept == [study.replace(**change).simulate()["inflow_hat"][-1] for change in seeds(3)]
+    with pytest.raises(lynkeus.InputError, match="nix"):
+        study.sweep([{"observer": {"nix": 1}}])
+
+
+def test_what_is_asked_for_wrongly(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    for wrong in ("log.csv", 3, None):
+        with pytest.raises(lynkeus.InputError, match="expected a list or a mapping of logs"):
+            study.estimate_each(wrong)  # type: ignore[call-overload]
+    with pytest.raises(lynkeus.InputError, match='no column "asset": there are t, y'):
+        study.estimate_each(logs[0], by="asset")
+    with pytest.raises(lynkeus.InputError, match="row 1 names no asset"):
+        study.estimate_each({"asset": ["a", None], "t": [0.0, 1.0], "y": [4.0, 4.0]}, by="asset")
+    with pytest.raises(lynkeus.InputError, match='column "y": expected as many rows'):
+        study.estimate_each({"asset": ["a", "a"], "t": [0.0, 1.0], "y": [4.0]}, by="asset")
+    with pytest.raises(lynkeus.InputError, match='expected "raise" or "return"'):
+        study.estimate_each(logs, errors="ignore")  # type: ignore[call-overload]
+    with pytest.raises(lynkeus.InputError, match="workers: expected at least 1"):
+        study.estimate_each(logs, workers=0)
+    assert study.estimate_each([]) == [] and study.estimate_each({}) == {}
+
+
+def test_doubts_are_told_once() -> None:
+    filtered = lynkeus.Study(
+        lynkeus.Model.from_modelica(TANK),
+        unknown=["inflow"],
+        noise={"y": 1e-3},
+        process_noise={"inflow": 1e-6, "level": 1e-9},
+        observer="ekf",
+    )
+    noisy = 4.0 + np.random.default_rng(1).normal(size=200)
+    good = np.full(200, 4.0)
+    logs = [{"t": np.arange(200.0), "y": y} for y in (good, noisy, noisy)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        doubts = [not filtered.estimate(log).is_credible for log in logs]
+    with pytest.warns(lynkeus.NotCredible) as caught:
+        runs = filtered.estimate_each(logs)
+    assert len(caught) == 1 and caught[0].filename == __file__
+    assert str(caught[0].message).startswith(f"{sum(doubts)} of 3 results are not credible")
+    assert [not run.is_credible for run in runs] == doubts
+
+
+def test_progress_rises_to_the_end(study: lynkeus.Study) -> None:
+    seen: list[float] = []
+    study.sweep(seeds(30), progress=seen.append)
+    assert seen == sorted(seen) and seen[-1] == 1.0
+
+
+def test_what_progress_raises_ends_it(study: lynkeus.Study) -> None:
+    class Stopped(Exception):
+        pass
+
+    def stop(_: float) -> None:
+        raise Stopped
+
+    before = time.monotonic()
+    with pytest.raises(Stopped):
+        study.replace(simulate={"until": 1e7}).sweep(seeds(4), progress=stop)
+    assert time.monotonic() - before < 60 and no_threads_left()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_control_c_ends_it(study: lynkeus.Study) -> None:
+    timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        study.replace(simulate={"until": 1e8}).sweep(seeds(4))
+    timer.join()
+    assert no_threads_left()
+
+
+def no_threads_left() -> bool:
+    return not any(thread.name.startswith("lynkeus") for thread in threading.enumerate())

@@ -1,0 +1,101 @@
+"""Campaigns on a local cluster of Ray give what each run gives alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lynkeus
+import lynkeus.ray
+from lynkeus.results import figures
+
+ray = pytest.importorskip("ray", reason="skipped: ray is not installed")
+data = pytest.importorskip("ray.data")
+
+TANK = """
+model Tank
+  input Real inflow(min = 0, max = 5);
+  Real level(start = 4, min = 0.1, max = 10);
+  output Real y = level;
+equation
+  der(level) = inflow - 0.5*sqrt(level);
+end Tank;
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def cluster() -> Iterator[None]:
+    ray.init(num_cpus=2, include_dashboard=False, logging_level="error", _node_ip_address="127.0.0.1")
+    data.DataContext.get_current().enable_progress_bars = False
+    yield
+    ray.shutdown()
+
+
+@pytest.fixture
+def study() -> lynkeus.Study:
+    return lynkeus.Study(
+        lynkeus.Model.from_modelica(TANK),
+        unknown=["inflow"],
+        noise={"y": 0.01},
+        observer={"theta": 1.0},
+        simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}},
+    )
+
+
+def ordered(dataset: Any, key: str = "seed") -> list[dict[str, Any]]:
+    return sorted(dataset.take_all(), key=lambda row: int(row[key]))
+
+
+@pytest.mark.parametrize("blocks", [1, 3, 6])
+def test_seeds_whatever_the_blocks(study: lynkeus.Study, blocks: int) -> None:
+    changes = [{"simulate": {"seed": seed}} for seed in range(1, 7)]
+    alone = study.sweep(changes, keep=figures)
+    found = ordered(lynkeus.ray.campaign(study, range(1, 7), blocks=blocks))
+    assert found == [{"seed": place + 1, "error": None, **row} for place, row in enumerate(alone)]
+    assert len({row["rms_inflow"] for row in found}) == 6
+
+
+def test_columns_and_failures(study: lynkeus.Study) -> None:
+    changes: list[dict[str, Any]] = [{"observer": {"theta": 2.0}}, {"observer": {"nix": 1}}]
+    found = ordered(
+        lynkeus.ray.sweep(study, changes, keep=lambda run: {"inflow_hat": run["inflow_hat"]}, blocks=1),
+        "place",
+    )
+    run = study.replace(**changes[0]).simulate()
+    np.testing.assert_array_equal(found[0]["inflow_hat"], run["inflow_hat"])
+    assert found[0]["error"] is None and "nix" in found[1]["error"]
+    log = run.log
+    replayed = ordered(lynkeus.ray.sweep(study, changes[:1], log, keep=last), "place")
+    assert replayed[0]["last"] == study.replace(**changes[0]).estimate(log)["inflow_hat"][-1]
+
+
+def last(run: lynkeus.Run) -> dict[str, float]:
+    return {"last": float(run["inflow_hat"][-1])}
+
+
+def test_a_killed_worker_loses_nothing(study: lynkeus.Study, tmp_path: Path) -> None:
+    marker = tmp_path / "killed"
+
+    def killed_once(run: lynkeus.Run) -> dict[str, Any]:
+        if not marker.exists():
+            marker.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return {"last": float(run["inflow_hat"][-1])}
+
+    found = ordered(lynkeus.ray.campaign(study, range(8), keep=killed_once, blocks=4))
+    assert marker.exists()
+    changes = [{"simulate": {"seed": seed}} for seed in range(8)]
+    assert [row["last"] for row in found] == [row["last"] for row in study.sweep(changes, keep=last)]
+
+
+def test_what_is_asked_for_wrongly(study: lynkeus.Study) -> None:
+    with pytest.raises(lynkeus.InputError, match="seeds: expected whole numbers, found 1.5"):
+        lynkeus.ray.campaign(study, [1.5])  # type: ignore[list-item]
+    with pytest.raises(lynkeus.InputError, match="nothing to run"):
+        lynkeus.ray.campaign(study, [])
