@@ -155,7 +155,7 @@ def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
 def test_times_that_are_none_or_run_back_are_told() -> None:
     data = log()
     data["t"][3] = np.nan
-    assert any("1 have no time and are left out" in note for note in estimated(data).notes)
+    assert any("that have no time and are left out: 1" in note for note in estimated(data).notes)
     refused({**data, "t": np.full(ROWS, np.nan)}, 'column "t" has no number')
     refused({**data, "t": np.concatenate([data["t"][:25] + 100.0, data["t"][25:]])}, "the clock jumps back")
     refused({"y": data["y"]}, 'no time column "t"')

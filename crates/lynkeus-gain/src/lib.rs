@@ -16,7 +16,6 @@ pub mod integrators;
 pub mod lemma1;
 pub mod low_power;
 pub mod sampling;
-pub mod spectrum;
 mod tridiagonal;
 mod unit_factor;
 pub mod vandermonde;

@@ -20,7 +20,8 @@ use lynkeus_proof::matrix::points;
 use lynkeus_proof::{lyapunov, vertices};
 use nalgebra::{DMatrix, DVector};
 
-use crate::{spectrum, vandermonde};
+use crate::vandermonde;
+use lynkeus_proof::spectrum;
 
 /// (k_i1, k_i2) of each block, from the first.
 pub type Coefficients = Vec<[f64; 2]>;

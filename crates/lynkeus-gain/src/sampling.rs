@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::spectrum::eigenvalues;
+use lynkeus_proof::spectrum::eigenvalues;
 
 /// Factor between two intervals that are looked at.
 const FINER: f64 = 1.1;

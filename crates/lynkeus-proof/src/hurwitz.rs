@@ -1,6 +1,7 @@
 //! Whether every zero of a polynomial has a negative real part, by Routh's table in
 //! interval arithmetic: rounding fakes neither a yes nor a no.
 
+use crate::spectrum;
 use lynkeus_expr::Interval;
 use nalgebra::DMatrix;
 
@@ -74,7 +75,9 @@ pub fn zeros(coefficients: &[f64]) -> Vec<(f64, f64)> {
         (_, 0) => -coefficients[i],
         _ => f64::from(u8::from(j == i + 1)),
     });
-    let eigenvalues = companion.complex_eigenvalues();
+    let Some(eigenvalues) = spectrum::eigenvalues(companion) else {
+        return vec![];
+    };
     let mut found: Vec<(f64, f64)> = eigenvalues.iter().map(|λ| (λ.re, λ.im)).collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
     found

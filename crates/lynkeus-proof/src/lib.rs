@@ -15,6 +15,7 @@
 //! | does a filter bear a Lipschitz remainder? | Newton's method | [`riccati`] |
 //! | how large are the inverses of an interval matrix? | floating point | [`inverse`] |
 //! | are all zeros of a polynomial stable? | | [`hurwitz`]: Routh's table |
+//! | which eigenvalues and singular values? | bounded sweeps, floating point | [`spectrum`] |
 //!
 //! [`search`] only repeats such decisions along one number; [`vertices`] lists where convex
 //! ones have to be taken.
@@ -52,6 +53,7 @@ pub mod matrix;
 pub mod metzler;
 pub mod riccati;
 pub mod search;
+pub mod spectrum;
 mod vertices;
 
 pub use vertices::{Bounds, varying, vertices};

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_observers::Design;
+use lynkeus_proof::spectrum;
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
@@ -56,14 +57,7 @@ pub(crate) fn decay(extended: &Extended<'_>, design: &Design) -> Option<f64> {
 
 /// −max Re λ; none where an entry has no value.
 fn slowest(J: &DMatrix<f64>) -> Option<f64> {
-    let is_finite = J.iter().all(|x| x.is_finite());
-    let modes = || {
-        J.complex_eigenvalues()
-            .iter()
-            .map(|λ| λ.re)
-            .fold(f64::NEG_INFINITY, f64::max)
-    };
-    is_finite.then(|| -modes())
+    spectrum::abscissa(J.clone()).map(|largest| -largest)
 }
 
 /// Values at the start of the model.

@@ -1,5 +1,6 @@
 //! How fast an observer is to be, where the study leaves it out.
 
+use lynkeus_proof::spectrum;
 use std::fmt;
 
 use lynkeus_observers::Examination;
@@ -167,9 +168,7 @@ fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
 
 fn time_scales(prepared: &Prepared<'_>, speed: Speed) -> Option<Proposal> {
     let extended = prepared.extended();
-    let modes = Start::of(extended)
-        .jacobian(extended)?
-        .complex_eigenvalues();
+    let modes = spectrum::eigenvalues(Start::of(extended).jacobian(extended)?)?;
     let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let moving: Vec<f64> = sizes.into_iter().filter(|x| *x > 1e-9 * largest).collect();

@@ -86,6 +86,9 @@ impl Laid<'_, '_> {
             };
             let column = DVector::from_iterator(n, self.form.rows.iter().map(K));
             let gain = Q.solve(&column)?;
+            if !gain.iter().all(|k| k.is_finite()) {
+                return None;
+            }
             let states = self.extended.states.iter().map(|s| s.name.clone());
             Some(ChainGain {
                 output: output.variable.name.clone(),

@@ -14,8 +14,8 @@ use std::cmp::Ordering;
 
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Interval, MissingInput, Node, Tape, jacobian};
-use lynkeus_gain::spectrum;
 use lynkeus_proof::decay::is_unstable;
+use lynkeus_proof::spectrum;
 use lynkeus_structure::{Extended, Point};
 use nalgebra::{DMatrix, DVector};
 

@@ -13,8 +13,8 @@ use crate::Observer;
 use crate::statement::refuted;
 use crate::{Check, Inequality};
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
-use lynkeus_gain::spectrum;
 use lynkeus_proof::decay::is_unstable;
+use lynkeus_proof::spectrum;
 use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
 
 /// Points tried before the search climbs from the best of them.

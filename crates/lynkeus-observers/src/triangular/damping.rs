@@ -4,6 +4,7 @@ use crate::Hammouri;
 use crate::statement::undecided;
 use lynkeus_expr::{MissingInput, Tape, jacobian};
 use lynkeus_proof::hurwitz::Stability;
+use lynkeus_proof::spectrum;
 use lynkeus_structure::{Extended, Region};
 use nalgebra::DMatrix;
 
@@ -136,10 +137,6 @@ impl Form {
                 A[(state, chain.states[0])] -= product * k;
             }
         }
-        if !A.iter().all(|x| x.is_finite()) {
-            return Ok(false);
-        }
-        let schur = nalgebra::linalg::Schur::try_new(A, f64::EPSILON, 10_000);
-        Ok(schur.is_some_and(|s| s.complex_eigenvalues().iter().all(|λ| λ.re < 0.0)))
+        Ok(spectrum::abscissa(A).is_some_and(|largest| largest < 0.0))
     }
 }

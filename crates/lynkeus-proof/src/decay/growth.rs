@@ -7,6 +7,7 @@
 //! are wrong by the n-th root of the rounding. So they only propose H, which is checked
 //! in interval arithmetic.
 
+use crate::spectrum;
 use lynkeus_expr::Interval;
 use nalgebra::{DMatrix, DVector};
 
@@ -22,9 +23,6 @@ const SHIFTS: usize = 6;
 /// Where in a gap the axis is put: not in the middle, where the eigenvalues at its ends
 /// cancel in the equation of H.
 const SHARES: [f64; 2] = [0.1, 0.35];
-/// Sweeps of the eigenvalue iteration.
-const SWEEPS: usize = 10_000;
-
 /// Whether every matrix with entries in these intervals is proved to have an eigenvalue
 /// with a positive real part.
 ///
@@ -65,10 +63,10 @@ pub fn is_unstable(A: &IntervalMatrix) -> bool {
 /// Where to put the axis, σ ≥ 0: between real parts of eigenvalues that are far apart,
 /// the widest gap first.
 fn shifts(A: &DMatrix<f64>) -> Vec<f64> {
-    let Some(schur) = nalgebra::linalg::Schur::try_new(A.clone(), f64::EPSILON, SWEEPS) else {
+    let Some(eigenvalues) = spectrum::eigenvalues(A.clone()) else {
         return vec![];
     };
-    let mut parts: Vec<f64> = schur.complex_eigenvalues().iter().map(|λ| λ.re).collect();
+    let mut parts: Vec<f64> = eigenvalues.iter().map(|λ| λ.re).collect();
     parts.sort_by(|a, b| b.total_cmp(a));
     parts.push(f64::NEG_INFINITY);
     let growing = parts.windows(2).filter(|pair| pair[0] > 0.0);

@@ -6,6 +6,7 @@
 //! what moves along R can do anything.
 
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
+use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
 use super::{Fate, Ground, Hidden, Told};
@@ -144,7 +145,8 @@ impl Linear {
         }
     }
 
-    fn traceless(&self) -> Traceless {
+    /// None where no decomposition is found.
+    fn traceless(&self) -> Option<Traceless> {
         let (n, m) = (self.F.nrows(), self.G.ncols());
         let flow = DMatrix::from_fn(n, n + m, |i, j| match j < n {
             true => self.F[(i, j)],
@@ -154,15 +156,15 @@ impl Linear {
         let mut V = DMatrix::identity(n, n);
         loop {
             // (Fx + Gv) has no part across V
-            let across = null_space(&V.transpose());
+            let across = null_space(&V.transpose())?;
             let stays = equilibrated(&(across.transpose() * &flow), ZERO * flow.amax());
-            let pairs = null_space(&stacked(&stays, &seen));
+            let pairs = null_space(&stacked(&stays, &seen))?;
             // of columns of length one: where no state moves, rounding moves none
             let pairs = pairs.map(|x| if x.abs() > ZERO { x } else { 0.0 });
-            let next = image(&pairs.rows(0, n).into_owned());
+            let next = image(&pairs.rows(0, n).into_owned())?;
             // it never grows, but by rounding
             if next.ncols() >= V.ncols() {
-                return Traceless { pairs, V };
+                return Some(Traceless { pairs, V });
             }
             V = next;
         }
@@ -170,7 +172,7 @@ impl Linear {
 
     /// The fates, where the linearisation hides what is hidden and nothing else.
     fn fates(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<Fate>> {
-        let Traceless { pairs, V } = self.traceless();
+        let Traceless { pairs, V } = self.traceless()?;
         let n = self.F.nrows();
         if pairs.ncols() == 0 {
             // frozen at the point, everything is seen
@@ -180,12 +182,12 @@ impl Linear {
             pairs.rows(0, n).into_owned(),
             pairs.rows(n, pairs.nrows() - n).into_owned(),
         );
-        let solver = x.clone().svd(true, true);
+        let solver = spectrum::singular(x.clone(), true, true)?;
         let K = &v * solver.solve(&V, ZERO).ok()?;
-        let free = &v * null_space(&x);
+        let free = &v * null_space(&x)?;
         let A = V.transpose() * (&self.F * &V + &self.G * &K);
-        let R = reached(&A, &(V.transpose() * &self.G * &free));
-        let S = null_space(&R.transpose());
+        let R = reached(&A, &(V.transpose() * &self.G * &free))?;
+        let S = null_space(&R.transpose())?;
         let quotient = S.transpose() * &A * &S;
         let gross = self.F.amax() + (&self.G * &K).amax();
         let scale = A.amax().max(ROUNDING * gross);
@@ -195,18 +197,16 @@ impl Linear {
                 false => (K.row(i - n).into_owned(), free.row(i - n).amax()),
             };
             if alone > ZERO || (&row * &R).amax() > ZERO {
-                return Some(Fate::Moved);
+                return Some(Some(Fate::Moved));
             }
             let row = &row * &S;
-            (row.norm() > ZERO).then(|| {
-                fate(
-                    &quotient,
-                    DMatrix::from_fn(1, row.ncols(), |_, j| row[j]),
-                    scale,
-                )
-            })
+            if row.norm() <= ZERO {
+                return Some(None);
+            }
+            let row = DMatrix::from_fn(1, row.ncols(), |_, j| row[j]);
+            fate(&quotient, row, scale).map(Some)
         });
-        let of: Vec<Option<Fate>> = of.collect();
+        let of: Vec<Option<Fate>> = of.collect::<Option<_>>()?;
         let agrees = of.iter().zip(&hidden.told).all(|(fate, told)| match told {
             Told::Determined => fate.is_none(),
             Told::Hidden => fate.is_some(),
@@ -222,19 +222,18 @@ impl Linear {
     }
 }
 
-/// The slowest mode of x' = Ax that shows in a row.
-fn fate(A: &DMatrix<f64>, row: DMatrix<f64>, scale: f64) -> Fate {
-    let shown = reached(&A.transpose(), &row.transpose());
-    let modes = (shown.transpose() * A * &shown).complex_eigenvalues();
-    let slowest = modes.iter().map(|λ| λ.re).fold(f64::NEG_INFINITY, f64::max);
-    match slowest {
+/// The slowest mode of x' = Ax that shows in a row; none where its eigenvalues are not found.
+fn fate(A: &DMatrix<f64>, row: DMatrix<f64>, scale: f64) -> Option<Fate> {
+    let shown = reached(&A.transpose(), &row.transpose())?;
+    let slowest = spectrum::abscissa(shown.transpose() * A * &shown)?;
+    Some(match slowest {
         x if x < -AXIS * scale => Fate::Decays {
             rate: -x,
             ground: Ground::Point,
         },
         x if x > AXIS * scale => Fate::Grows { rate: x },
         _ => Fate::Stays,
-    }
+    })
 }
 
 /// Rows of length one, those up to `least` left out.
@@ -256,36 +255,37 @@ fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// An orthonormal basis of the null space; a matrix without rows has all of it.
-fn null_space(a: &DMatrix<f64>) -> DMatrix<f64> {
+/// An orthonormal basis of the null space; a matrix without rows has all of it. None where no
+/// decomposition is found, as here below.
+fn null_space(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = a.ncols();
     if n == 0 {
-        return DMatrix::zeros(0, 0);
+        return Some(DMatrix::zeros(0, 0));
     }
     // rows of zeros, so that every direction is listed
     let square = DMatrix::from_fn(a.nrows().max(n), n, |i, j| {
         if i < a.nrows() { a[(i, j)] } else { 0.0 }
     });
-    let svd = square.svd(false, true);
-    let Some(right) = svd.v_t else {
-        return DMatrix::zeros(n, 0);
-    };
+    let svd = spectrum::singular(square, false, true)?;
+    let right = svd.v_t.as_ref()?;
     let unseen: Vec<usize> = (0..n)
         .filter(|&k| {
             svd.singular_values[k] <= ZERO * svd.singular_values.max().max(f64::MIN_POSITIVE)
         })
         .collect();
-    DMatrix::from_fn(n, unseen.len(), |i, k| right[(unseen[k], i)])
+    Some(DMatrix::from_fn(n, unseen.len(), |i, k| {
+        right[(unseen[k], i)]
+    }))
 }
 
 /// An orthonormal basis of the space that the columns span.
-fn image(a: &DMatrix<f64>) -> DMatrix<f64> {
-    let across = null_space(&a.transpose());
+fn image(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let across = null_space(&a.transpose())?;
     null_space(&across.transpose())
 }
 
 /// An orthonormal basis of the smallest A-invariant space that holds the columns of B.
-fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
+fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = A.nrows();
     let scale = A.amax().max(f64::MIN_POSITIVE);
     let columns: Vec<_> = B
@@ -293,7 +293,7 @@ fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
         .filter(|c| c.norm() > ZERO)
         .map(|c| c.normalize())
         .collect();
-    let mut space = image(&DMatrix::from_fn(n, columns.len(), |i, k| columns[k][i]));
+    let mut space = image(&DMatrix::from_fn(n, columns.len(), |i, k| columns[k][i]))?;
     loop {
         let moved = A * &space / scale;
         let both = DMatrix::from_fn(n, 2 * space.ncols(), |i, k| {
@@ -302,10 +302,10 @@ fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
                 Some(k) => moved[(i, k)],
             }
         });
-        let next = image(&both);
+        let next = image(&both)?;
         // it never shrinks, but by rounding
         if next.ncols() <= space.ncols() {
-            return space;
+            return Some(space);
         }
         space = next;
     }

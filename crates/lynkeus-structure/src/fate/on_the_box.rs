@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Budget, Interval, MissingInput};
 use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
+use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
 use super::constraints::{Row, System, is_zero};
@@ -155,11 +156,7 @@ impl Cascade {
             return (rate > 0.0).then_some(rate);
         }
         let middle = DMatrix::from_fn(n, n, |i, j| entry(i, j).midpoint());
-        let slowest = middle
-            .complex_eigenvalues()
-            .iter()
-            .map(|λ| λ.re)
-            .fold(f64::MIN, f64::max);
+        let slowest = spectrum::abscissa(middle)?;
         let model = model(n, &entry);
         let width = |&s: &usize| {
             Some(self.scales[s])

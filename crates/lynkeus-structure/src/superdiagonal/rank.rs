@@ -1,6 +1,7 @@
 //! What the rank of F_k says before any input is known.
 
 use lynkeus_expr::{Graph, MissingInput, Node};
+use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
 use super::Factor;
@@ -69,7 +70,7 @@ impl Factor {
         for &(i, j, node) in &self.entries {
             matrix[(i, j)] = extended.graph().constant_value(node)?;
         }
-        let svd = matrix.svd(false, true);
+        let svd = spectrum::singular(matrix, false, true)?;
         let (smallest, value) = svd.singular_values.argmin();
         if value > 1e-13 * svd.singular_values.max() {
             return None;

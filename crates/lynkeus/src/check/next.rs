@@ -1,5 +1,6 @@
 //! What to type next, with what to paste into the study.
 
+use lynkeus_proof::spectrum;
 use std::fmt;
 use std::path::Path;
 
@@ -294,10 +295,11 @@ fn skeleton(prepared: &Prepared<'_>, observer: &str) -> String {
 /// Ten times the slowest time scale of the plant at its start, else 10.
 fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
     let extended = prepared.extended();
-    let Some(J) = crate::modes::Start::of(extended).jacobian(extended) else {
+    let J = crate::modes::Start::of(extended).jacobian(extended);
+    let Some(modes) = J.and_then(spectrum::eigenvalues) else {
         return 10.0;
     };
-    let sizes: Vec<f64> = J.complex_eigenvalues().iter().map(|λ| λ.norm()).collect();
+    let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
     let slowest = sizes
         .into_iter()

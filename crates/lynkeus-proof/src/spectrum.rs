@@ -1,7 +1,7 @@
-//! Eigenvalues in a bounded number of sweeps.
+//! Eigenvalues and singular values in a bounded number of sweeps.
 
-use nalgebra::linalg::Schur;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::linalg::{SVD, Schur};
+use nalgebra::{Complex, DMatrix, DVector, Dyn};
 
 /// Sweeps of the QR iteration: two or three per eigenvalue are usual, and a matrix whose entries
 /// lie hundreds of powers of ten apart may not converge at all.
@@ -15,6 +15,15 @@ pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<DVector<Complex<f64>>> {
     }
     let schur = Schur::try_new(matrix, f64::EPSILON, SWEEPS)?;
     Some(schur.complex_eigenvalues())
+}
+
+/// The singular values of a matrix, with the left and the right vectors asked for; none as for
+/// [`eigenvalues`].
+pub fn singular(matrix: DMatrix<f64>, left: bool, right: bool) -> Option<SVD<f64, Dyn, Dyn>> {
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    SVD::try_new(matrix, left, right, f64::EPSILON, SWEEPS)
 }
 
 /// The largest real part of an eigenvalue of a square matrix; none as for [`eigenvalues`].
