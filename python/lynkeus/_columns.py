@@ -61,7 +61,7 @@ def _array(values: Any) -> Given:
     if kind in "fiub":
         with np.errstate(over="ignore"):  # what is beyond all numbers is missing
             array = array.astype(np.float64, copy=False)
-        return np.ascontiguousarray(array.filled(np.nan) if masked else array)
+        return np.require(array.filled(np.nan) if masked else array, requirements=["C", "A"])
     if kind == "M":
         return _instants(array.filled(np.datetime64("NaT")) if masked else array, False)
     if kind == "O":
