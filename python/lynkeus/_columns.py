@@ -60,8 +60,8 @@ def _array(values: Any) -> Given:
         array, kind = array / np.timedelta64(1, "s"), "f"
     if kind in "fiub":
         with np.errstate(over="ignore"):  # what is beyond all numbers is missing
-            array = array.astype(np.float64)
-        return np.ascontiguousarray(array.filled(np.nan) if masked else array)
+            array = array.astype(np.float64, copy=False)
+        return np.require(array.filled(np.nan) if masked else array, requirements=["C", "A"])
     if kind == "M":
         return _instants(array.filled(np.datetime64("NaT")) if masked else array, False)
     if kind == "O":
