@@ -31,6 +31,7 @@ end Tank;
 
 @pytest.fixture(scope="module", autouse=True)
 def cluster() -> Iterator[None]:
+    os.environ["RAY_worker_niceness"] = "0"  # at Ray's 15 a busy machine takes minutes
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error", _node_ip_address="127.0.0.1")
     data.DataContext.get_current().enable_progress_bars = False
     yield
