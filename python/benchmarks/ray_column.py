@@ -26,6 +26,8 @@ Rows = list[dict[str, Any]]
 
 
 def main(runs: int, workers: int) -> None:
+    # Ray runs its workers at niceness 15: on a machine with other work they would starve beside threads
+    os.environ["RAY_worker_niceness"] = "0"
     ray.init(
         num_cpus=workers, include_dashboard=False, logging_level="warning", _node_ip_address="127.0.0.1"
     )

@@ -87,7 +87,7 @@ def rows(logs: dict[str, Any]) -> Any:
 def test_at_rest_whatever_the_partitioning(
     spark: Any, study: lynkeus.Study, logs: dict[str, Any], partitions: int, is_partitioned: bool
 ) -> None:
-    broken = {**logs, "broken": {"t": np.array([0.0, 0.0]), "y": np.array([4.0, 4.0])}}
+    broken = {**logs, "broken": {"t": np.array([0.0, 1.0]), "y": np.array([np.nan, np.nan])}}
     frame = spark.createDataFrame(rows(broken)).repartition(partitions, "asset")
     found = lynkeus.spark.estimate(study, frame, by="asset", is_partitioned=is_partitioned).toPandas()
     alone = study.estimate_each(broken, errors="return")
