@@ -24,6 +24,7 @@ usage: cargo xtask <task>
   test      every test of the workspace and of the Python package, with the Python cross-checks
   package   build the Python package, install it into .venv-package and run its tests
   ci        format check, lints, documentation, then `test`
+  site      build the documentation site into target/site, every link checked
   gallery   draw the pictures of docs/pictures again from the shipped studies
   gap       compute the table of docs/gap.md again from the shipped studies;
             `gap NAME` only the rows of that example
@@ -62,6 +63,7 @@ fn main() -> ExitCode {
         "test" => test(),
         "ci" => ci(),
         "package" => package::interpreter().and_then(|python| package::test(&python)),
+        "site" => package::site(),
         "gallery" => gallery::draw(),
         "gap" => gap::tabulate(name),
         "attack" => attack::run(&arguments[1..]),

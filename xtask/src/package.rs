@@ -1,4 +1,5 @@
-//! The Python package: built as a wheel, installed into an environment of its own, and tested there.
+//! The Python package, built as a wheel, installed into an environment of its own and tested there; and the
+//! documentation site, which shows it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -45,6 +46,20 @@ pub fn test(python: &Path) -> Result<(), String> {
 /// What is missing and how to supply it.
 pub fn interpreter() -> Result<PathBuf, String> {
     python::environment(".venv-package", REQUIREMENTS)
+}
+
+/// Builds the documentation site; a link that leads nowhere is an error.
+///
+/// # Errors
+/// What is missing, or what the page is whose link is broken.
+pub fn site() -> Result<(), String> {
+    let python = python::environment(".venv-docs", include_str!("../../docs/requirements.txt"))?;
+    let mut build = Command::new(python);
+    build
+        .args(["-m", "mkdocs", "build", "--quiet", "--strict"])
+        .env("NO_MKDOCS_2_WARNING", "1")
+        .current_dir(root());
+    run(&mut build)
 }
 
 /// The only wheel in a folder that is made anew.
