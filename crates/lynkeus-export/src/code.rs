@@ -1,6 +1,7 @@
 //! A tape as a list of operations that languages have.
 
 use std::cell::RefCell;
+use std::ops::Range;
 
 use lynkeus_expr::{Algebra, Binary, Graph, Implicit, Node, Nodes, Op, Tape, Unary};
 
@@ -18,34 +19,78 @@ pub struct Code {
     outputs: Vec<Node>,
 }
 
+/// Some outputs of a tape.
+#[derive(Clone, Debug)]
+pub struct Part<'t> {
+    /// its inputs are those of the code
+    pub tape: &'t Tape,
+    /// which outputs
+    pub outputs: Range<usize>,
+}
+
+impl<'t> Part<'t> {
+    /// All outputs.
+    pub fn all(tape: &'t Tape) -> Self {
+        Self {
+            tape,
+            outputs: 0..tape.outputs(),
+        }
+    }
+}
+
+/// What a language's solver of linear systems tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// the solution alone
+    Plain,
+    /// the reciprocal condition as well, and bounded answers near singularity
+    Conditioned,
+}
+
 impl Code {
-    /// What a tape computes.
+    /// What a tape computes, for a language whose solver tells the solution alone.
     ///
     /// # Errors
     /// [`Refusal::Loop`] and [`Refusal::LargeSystem`].
     pub fn of(tape: &Tape) -> Result<Self, Refusal> {
-        let (first, conditions) = Self::lowered(tape, &[])?;
+        Self::of_parts(&[Part::all(tape)], Solver::Plain)
+    }
+
+    /// What tapes with the same inputs compute, one after the other.
+    ///
+    /// # Errors
+    /// [`Refusal::Loop`] and [`Refusal::LargeSystem`].
+    pub fn of_parts(parts: &[Part<'_>], solver: Solver) -> Result<Self, Refusal> {
+        let (first, conditions) = Self::lowered(parts, &[])?;
+        if solver == Solver::Conditioned {
+            return Ok(first);
+        }
         let needed = first.operations();
         let is_read = |rcond: &Node| needed.binary_search(rcond).is_ok();
         let read: Vec<bool> = conditions.iter().map(is_read).collect();
         match read.contains(&true) {
-            true => Ok(Self::lowered(tape, &read)?.0),
+            true => Ok(Self::lowered(parts, &read)?.0),
             false => Ok(first),
         }
     }
 
-    /// The code and the conditions of its linear systems, in the order of the tape; those marked
+    /// The code and the conditions of its linear systems, in the order of the tapes; those marked
     /// are spelled out.
-    fn lowered(tape: &Tape, spelled: &[bool]) -> Result<(Self, Vec<Node>), Refusal> {
+    fn lowered(parts: &[Part<'_>], spelled: &[bool]) -> Result<(Self, Vec<Node>), Refusal> {
         let graph = Graph::new();
         let symbol = |i| graph.fresh(format!("input {i}")).node();
-        let inputs: Vec<Node> = (0..tape.inputs()).map(symbol).collect();
+        let count = parts.first().map_or(0, |part| part.tape.inputs());
+        let inputs: Vec<Node> = (0..count).map(symbol).collect();
         let lowering = Lowering {
             nodes: Nodes(&graph),
             spelled,
             found: RefCell::default(),
         };
-        let outputs = tape.eval_in(&lowering, &inputs);
+        let outputs = parts.iter().flat_map(|part| {
+            let all = part.tape.eval_in(&lowering, &inputs).into_iter();
+            all.skip(part.outputs.start).take(part.outputs.len())
+        });
+        let outputs = outputs.collect();
         let Found {
             conditions,
             refusal,

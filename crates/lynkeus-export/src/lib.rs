@@ -3,19 +3,20 @@
 //! [`Code`] is what a tape computes as a list of operations that any language has: each once,
 //! arguments first, nothing that no output needs. A [`Dialect`] says how one language writes an
 //! operation; [`Body`] is the list in its words, one assignment after the other. A frame around
-//! bodies, a module with functions for example, is the language's own ([`python`]).
+//! bodies, a module with functions for example, is the language's own ([`python`], [`curly`]).
 //!
 //! An operation that a dialect lacks is refused by name ([`Refusal`]); nothing is approximated.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod code;
+pub mod curly;
 mod dialect;
 mod factorise;
 mod names;
 mod printer;
 pub mod python;
 
-pub use code::Code;
+pub use code::{Code, Part, Solver};
 pub use dialect::{Binding, Dialect, Form, Text};
 pub use names::Names;
 pub use printer::Body;
@@ -42,6 +43,32 @@ pub enum Refusal {
         size: usize,
         /// what can be printed
         most: usize,
+    },
+    /// A window of samples, over which a problem of optimisation is solved.
+    #[error(
+        "a moving horizon solves a problem of optimisation at every sample, which is not exported: \
+         take family = \"ekf\" or \"ukf\""
+    )]
+    Window,
+    /// Between samples the next one is needed.
+    #[error(
+        "lines between samples look ahead by one: take between_samples = \"hold\" or \"predict\""
+    )]
+    LooksAhead,
+    /// A method without fixed steps.
+    #[error("expected fixed steps: method = \"rk4\" with `step` or `substeps` in [estimate]")]
+    NoFixedStep,
+    /// What jumps with time alone.
+    #[error(
+        "the model jumps with time, at instants that are searched for in every interval: give what \
+         jumps as a known input"
+    )]
+    JumpsWithTime,
+    /// A number that the filter refuses.
+    #[error("{error}")]
+    Setting {
+        /// what was expected
+        error: String,
     },
     /// An operation that the language has not.
     #[error("{language} has no way to write {operation}")]

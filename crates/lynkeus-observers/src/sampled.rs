@@ -47,7 +47,10 @@ impl Observer {
         observer.measured.clear();
         for (signal, rate) in self.measured.iter().zip(rates) {
             let switch = Signal::fresh(graph, "predict", &signal.name);
-            let rate = graph.expr(switch.symbol) * graph.expr(rate);
+            // where the measurement is held the model need not have a value
+            let rate = graph
+                .expr(switch.symbol)
+                .select(graph.expr(rate), graph.constant(0.0));
             observer.states.push((signal.clone(), 0.0));
             observer.derivatives.push(rate.node());
             observer.inputs.push(switch);

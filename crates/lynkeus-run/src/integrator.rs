@@ -9,7 +9,7 @@ use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
 const MOST_STEPS: usize = 1_000_000;
 
 /// |λ|·h of automatic fixed steps; the method is stable up to about 2.7.
-const AUTO_PRODUCT: f64 = 0.5;
+pub(crate) const AUTO_PRODUCT: f64 = 0.5;
 
 /// Intervals after which the automatic fixed step looks at the Jacobian again.
 const LOOK_EVERY: usize = 32;

@@ -89,6 +89,7 @@
 
 mod adaptive;
 mod batch;
+mod blueprint;
 mod closed_loop;
 mod divergence;
 mod driven;
@@ -120,6 +121,7 @@ mod system;
 mod trajectory;
 
 pub use batch::{Batch, Ended, Member};
+pub use blueprint::{Blueprint, needed_step};
 pub use dynamics::{Dynamics, Function};
 pub use error::{Error, Interrupted};
 pub use estimate::{Estimates, Log, estimate, estimate_watched};

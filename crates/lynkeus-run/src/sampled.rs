@@ -146,6 +146,7 @@ impl Runner for Sampled {
             }
         }
         self.bound.see(&self.x[first..]);
+        self.bound.see(sample.inputs);
         Ok(())
     }
 

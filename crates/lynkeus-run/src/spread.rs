@@ -79,9 +79,33 @@ impl ErrorModel {
 }
 
 impl ErrorModel {
-    /// The compiled linearisation.
-    pub(crate) fn flow(&self) -> &System {
+    /// The observer; its outputs are the entries of ∂F/∂z, then those of ∂g/∂z.
+    pub fn flow(&self) -> &System {
         &self.flow
+    }
+
+    /// Places (row, column) of the entries of ∂F/∂z.
+    pub fn flow_entries(&self) -> &[(usize, usize)] {
+        &self.flow_entries
+    }
+
+    /// Places of the entries of ∂g/∂z.
+    pub fn estimate_entries(&self) -> &[(usize, usize)] {
+        &self.estimate_entries
+    }
+
+    /// Number of estimates, the rows of ∂g/∂z.
+    pub fn estimates(&self) -> usize {
+        self.estimates
+    }
+
+    /// What acts on the error.
+    pub fn noise(&self) -> ErrorNoise {
+        ErrorNoise {
+            process: self.process_noise.clone(),
+            initial: self.initial_variance.clone(),
+            sensors: self.noise.clone(),
+        }
     }
 
     /// What acts on the error, as text.

@@ -200,19 +200,19 @@ impl System {
         digest.numbers(&self.start);
     }
 
-    /// (t, x, w, modes) → dx.
-    pub(crate) fn derivative_tape(&self) -> &Tape {
+    /// (t, x, w, [modes](System::modes)) → x'.
+    pub fn derivative_tape(&self) -> &Tape {
         self.code.derivatives_at.tape()
     }
 
-    /// (t, x, w, modes) → y.
-    pub(crate) fn output_tape(&self) -> &Tape {
+    /// (t, x, w, [modes](System::modes)) → y.
+    pub fn output_tape(&self) -> &Tape {
         self.code.outputs_at.tape()
     }
 
     /// How many values the switches in time have: what jumps with time alone is an input of the
     /// tapes.
-    pub(crate) fn modes(&self) -> usize {
+    pub fn modes(&self) -> usize {
         self.code.modes
     }
 

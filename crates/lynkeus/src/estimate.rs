@@ -139,33 +139,51 @@ fn hanging(study: &Study, observer: &Observer, samples: &Samples) -> Vec<Frozen>
     sensors.flat_map(of).collect()
 }
 
-/// A measured state for which neither the study nor the model says where it starts begins at its
-/// sensor's first reading.
-pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
+/// A measured state for which neither the study nor the model says where it starts: it begins at
+/// its sensor's first reading, (reading − offset)/slope.
+pub(crate) struct AtReading {
+    /// place among the states
+    pub state: usize,
+    /// place among the measured outputs
+    pub sensor: usize,
+    pub slope: f64,
+    pub offset: f64,
+}
+
+/// The states that start at a reading.
+pub(crate) fn at_readings(prepared: &Prepared<'_>) -> Vec<AtReading> {
     let extended = prepared.extended();
     let initial = &prepared.study().observer.tuning.initial;
     let number = |node| extended.graph().constant_value(node);
-    for (output, readings) in extended.outputs.iter().zip(&samples.readings) {
-        let Some((i, slope, offset)) = output.state else {
-            continue;
-        };
+    let of = |(sensor, output): (usize, &lynkeus_structure::Measurement)| {
+        let (i, slope, offset) = output.state?;
         let state = &extended.states[i];
         let given = initial.of(&state.name).or(initial.default);
-        let is_given = given.or(state.start).is_some();
-        let first = readings.iter().find(|y| y.is_finite());
-        let (Some(slope), Some(offset), Some(y)) = (number(slope), number(offset), first) else {
+        let (slope, offset) = (number(slope)?, number(offset)?);
+        given.or(state.start).is_none().then_some(AtReading {
+            state: i,
+            sensor,
+            slope,
+            offset,
+        })
+    };
+    extended.outputs.iter().enumerate().filter_map(of).collect()
+}
+
+/// Lets them start at the first readings of a log.
+pub(crate) fn start_at_readings(prepared: &Prepared<'_>, samples: &Samples, design: &mut Design) {
+    for at in at_readings(prepared) {
+        let readings = samples.readings.get(at.sensor);
+        let Some(y) = readings.and_then(|r| r.iter().find(|y| y.is_finite())) else {
             continue;
         };
-        let start = (y - offset) / slope;
-        if let (false, true, Some(own)) = (
-            is_given,
-            start.is_finite(),
-            design.observer.states.get_mut(i),
-        ) {
+        let start = (y - at.offset) / at.slope;
+        let own = design.observer.states.get_mut(at.state);
+        if let (true, Some(own)) = (start.is_finite(), own) {
             own.1 = start;
             design.notes.push(format!(
                 "{} starts at its first reading, {}: neither `initial` nor the model's `start` says where",
-                state.name,
+                prepared.extended().states[at.state].name,
                 lynkeus_structure::short(start)
             ));
         }

@@ -6,7 +6,7 @@ use lynkeus_run::filter::{
     Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor,
     Smoothed,
 };
-use lynkeus_run::{Estimator, EstimatorSettings};
+use lynkeus_run::{Blueprint, EstimatorSettings};
 use lynkeus_structure::{Extended, short};
 
 use crate::course::{Course, Samples};
@@ -31,7 +31,8 @@ pub(crate) fn run(
 ) -> Result<Course, Error> {
     let mut course = Course::default();
     let notes = &mut course.notes;
-    let mut filter = estimator(study, extended, design, samples, settings, notes)?;
+    let filter = blueprint(study, extended, design, samples, settings, notes)?;
+    let mut filter = filter.estimator().map_err(Error::from_source)?;
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
     let health = filter.health();
@@ -59,29 +60,32 @@ pub(crate) fn run(
     Ok(course)
 }
 
-/// The design's filter before its first sample.
+/// What the design's filter is made of.
 ///
 /// # Errors
 /// Noises of the study that do not fit.
-pub(crate) fn estimator(
+pub(crate) fn blueprint(
     study: &Study,
     extended: &Extended<'_>,
     design: &Design,
     samples: &Samples,
     settings: EstimatorSettings,
     notes: &mut Vec<String>,
-) -> Result<Estimator, Error> {
+) -> Result<Blueprint, Error> {
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
     refuse_longer_lag(study, &tuning.kind)?;
     let model = model(study, extended, design, tuning, samples, notes)?;
-    let settings_of_filter = FilterSettings {
-        kind: tuning.kind.clone(),
-        gate: tuning.gate,
-        keep_history: study.estimate.smoothing.is_some(),
-    };
-    Estimator::filter(&model, settings_of_filter, settings).map_err(Error::from_source)
+    Ok(Blueprint::Filter {
+        model: Box::new(model),
+        settings: FilterSettings {
+            kind: tuning.kind.clone(),
+            gate: tuning.gate,
+            keep_history: study.estimate.smoothing.is_some(),
+        },
+        run: settings,
+    })
 }
 
 fn is_window(design: &Design) -> bool {

@@ -72,6 +72,7 @@ mod design;
 mod error;
 mod estimate;
 mod expected;
+mod export;
 #[cfg(feature = "plot")]
 mod figure;
 mod files;
@@ -120,6 +121,7 @@ pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
+pub use export::{Export, ExportOptions, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;
@@ -139,6 +141,8 @@ pub use systems::observer as observer_system;
 pub use table::Table;
 #[cfg(feature = "tune")]
 pub use tune::tune;
+
+pub use lynkeus_export::curly::c::{File, Precision};
 
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;

@@ -1,6 +1,7 @@
 //! A study's estimator for samples that come one by one.
 
-use lynkeus_run::Estimator;
+use lynkeus_observers::Design;
+use lynkeus_run::{Blueprint, Estimator};
 
 use crate::course::Samples;
 use crate::estimate::{refuse_derivatives, run_settings};
@@ -45,21 +46,33 @@ pub fn estimator(study: &Study) -> Result<Estimator, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let design = prepared.design()?;
-    refuse_derivatives(study, &design)?;
+    let blueprint = blueprint(&prepared, &design)?;
+    blueprint.estimator().map_err(Error::from_source)
+}
+
+/// What the estimator of a study is made of.
+///
+/// # Errors
+/// As [`estimator`].
+pub(crate) fn blueprint(prepared: &Prepared<'_>, design: &Design) -> Result<Blueprint, Error> {
+    let study = prepared.study();
+    refuse_derivatives(study, design)?;
     refuse_looking_ahead(study, &study.estimate)?;
     let run = run_settings(&study.estimate);
     let none = Samples::default();
     // what is told of a log has no place here
     let notes = &mut vec![];
     if design.observer.filter.is_some() {
-        need_noises(&prepared, true)?;
-        return filter::estimator(study, prepared.extended(), &design, &none, run, notes);
+        need_noises(prepared, true)?;
+        return filter::blueprint(study, prepared.extended(), design, &none, run, notes);
     }
     if study.estimate.deviations {
-        need_noises(&prepared, false)?;
+        need_noises(prepared, false)?;
     }
-    let observer = sampled::observer(&prepared, &design, &none, notes)?;
-    Estimator::sampled(&observer, run.method).map_err(Error::from_source)
+    Ok(Blueprint::Sampled {
+        observer: Box::new(sampled::observer(prepared, design, &none, notes)?),
+        method: run.method,
+    })
 }
 
 fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<(), Error> {

@@ -12,9 +12,10 @@ use super::taylor::Moments;
 use super::variation::Variation;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, System};
+use crate::{Error, EstimatorSettings, Method, Step, System};
 
-/// Up to so many states x̂, Φ and W are integrated together.
+/// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
+/// then the steps of all three.
 const FEW: usize = 8;
 
 #[derive(Clone, Debug)]
@@ -48,7 +49,8 @@ impl Extended {
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
         let n = flow.states().len();
-        let way = match n <= FEW {
+        let is_given = matches!(run.method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
+        let way = match n <= FEW || is_given {
             true => Way::Joint(Box::new(Joint::new(
                 n,
                 flow.outputs().len(),

@@ -57,9 +57,9 @@ mod unscented;
 mod variation;
 
 pub use health::{Health, Innovation, Reading, SensorHealth};
-pub use model::{Confined, FilterModel, FilterPlant, Limits, Sensor};
+pub use model::{Confined, ConfinedFlow, FilterModel, FilterPlant, Limits, Sensor};
 pub use smooth::Smoothed;
-pub use unscented::SigmaPoints;
+pub use unscented::{SigmaPoints, Weights};
 
 use crate::divergence::{Bound, deviation_diverged};
 use crate::driven::Driven;
@@ -68,7 +68,6 @@ use crate::runner::Runner;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
-use model::ConfinedFlow;
 use root::Root;
 use sensing::Sensing;
 use smooth::History;

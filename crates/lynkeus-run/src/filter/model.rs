@@ -79,9 +79,12 @@ pub struct FilterModel {
 
 /// [`Confined`], compiled.
 #[derive(Clone, Debug)]
-pub(super) struct ConfinedFlow {
+pub struct ConfinedFlow {
+    /// x' = f of the states limited to their ranges; its outputs are the entries of its Jacobian
     pub flow: System,
+    /// places (row, column) of these entries
     pub entries: Vec<(usize, usize)>,
+    /// one pair per state
     pub bounds: Vec<Bounds>,
 }
 
@@ -160,6 +163,48 @@ impl FilterModel {
     #[must_use]
     pub fn inputs(&self) -> &[String] {
         self.flow.signals()
+    }
+
+    /// x' = f; its outputs are the entries of F = ∂f/∂x.
+    #[must_use]
+    pub fn flow(&self) -> &System {
+        &self.flow
+    }
+
+    /// Places (row, column) of the entries of F.
+    #[must_use]
+    pub fn flow_entries(&self) -> &[(usize, usize)] {
+        &self.flow_entries
+    }
+
+    /// No states; signals x, u; outputs h, then the entries of C = ∂h/∂x.
+    #[must_use]
+    pub fn output_map(&self) -> &System {
+        &self.output_map
+    }
+
+    /// Places of the entries of C.
+    #[must_use]
+    pub fn output_entries(&self) -> &[(usize, usize)] {
+        &self.output_entries
+    }
+
+    /// Spectral density of the noise on each derivative.
+    #[must_use]
+    pub fn process_noise(&self) -> &[f64] {
+        &self.process_noise
+    }
+
+    /// Variance of the first estimate.
+    #[must_use]
+    pub fn initial_variance(&self) -> &[f64] {
+        &self.initial_variance
+    }
+
+    /// The plant inside its declared ranges, for where it has no value outside.
+    #[must_use]
+    pub fn confined(&self) -> Option<&ConfinedFlow> {
+        self.confined.as_ref()
     }
 
     /// What is compiled.

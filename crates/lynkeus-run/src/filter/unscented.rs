@@ -36,15 +36,23 @@ impl Default for SigmaPoints {
 
 /// Weights of 2n + 1 points x̂, x̂ ± columns of √(n+λ) L.
 #[derive(Clone, Copy, Debug)]
-struct Weights {
-    spread: f64,
-    mean_of_centre: f64,
-    centre: f64,
-    other: f64,
+pub struct Weights {
+    /// √(n+λ): how far the points lie from x̂, in columns of L
+    pub spread: f64,
+    /// of x̂ in means
+    pub mean_of_centre: f64,
+    /// of x̂ in covariances
+    pub centre: f64,
+    /// of each other point
+    pub other: f64,
 }
 
 impl SigmaPoints {
-    fn weights(&self, n: usize) -> Result<Weights, Error> {
+    /// The weights for n states.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] where α²(n + κ) is not above 0.
+    pub fn weights(&self, n: usize) -> Result<Weights, Error> {
         let n = n as f64;
         let both = self.alpha.powi(2) * (n + self.kappa);
         if !(both > 0.0 && both.is_finite() && self.beta.is_finite()) {

@@ -1,5 +1,6 @@
 //! The `lynkeus` command.
 
+mod export;
 mod files;
 mod how_well;
 mod inputs;
@@ -69,6 +70,7 @@ Examples:
   lynkeus simulate study.toml --runs 1000 --plot spread.svg
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
+  lynkeus export study.toml --to c -o device
 
 A file called - is standard input or output.
 
@@ -183,6 +185,15 @@ enum Command {
         /// No progress bar
         #[arg(short, long)]
         quiet: bool,
+        #[command(flatten)]
+        limits: Limits,
+    },
+    /// The estimator as source code for other machines: the observer or filter with its fixed steps
+    Export {
+        /// The study (TOML; "-": standard input)
+        study: PathBuf,
+        #[command(flatten)]
+        options: export::Options,
         #[command(flatten)]
         limits: Limits,
     },
@@ -321,6 +332,14 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
                 quiet,
             };
             run::compare(&source, log.as_deref(), &output)
+        }
+        Command::Export {
+            study,
+            options,
+            limits,
+        } => {
+            let source = Source::load(&study)?.within(limits.for_a_proof());
+            export::export(&source, &options)
         }
         Command::Schema => {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;

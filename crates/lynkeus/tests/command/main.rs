@@ -4,6 +4,7 @@
 mod backends;
 mod certify;
 mod compare;
+mod export;
 mod families;
 mod faulty;
 mod filters;
@@ -124,12 +125,13 @@ fn shared(file: &str) -> Option<PathBuf> {
     if path.is_file() {
         return Some(path);
     }
-    // past the capture of passing tests, so that a skip is seen
-    let _ = std::io::Write::write_fmt(
-        &mut std::io::stderr(),
-        format_args!("skipped: ../shared/{file} is not there\n"),
-    );
+    skipped(&format!("../shared/{file} is not there"));
     None
+}
+
+/// Says so past the capture of passing tests.
+fn skipped(why: &str) {
+    let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("skipped: {why}\n"));
 }
 
 /// Header and rows of a CSV text.

@@ -4,7 +4,7 @@ use crate::Folder;
 use crate::normal::Normal;
 
 /// Which of `choices` comes next.
-fn pick<'c, T>(random: &mut Normal, choices: &'c [T]) -> &'c T {
+pub fn pick<'c, T>(random: &mut Normal, choices: &'c [T]) -> &'c T {
     let place = random.uniform() * choices.len() as f64;
     &choices[place as usize]
 }
@@ -28,7 +28,7 @@ fn sum(random: &mut Normal, names: &[String]) -> String {
 }
 
 /// A model with its unknown inputs.
-fn plant(random: &mut Normal) -> (String, Vec<String>) {
+pub fn plant(random: &mut Normal) -> (String, Vec<String>) {
     let names = |letter: &str, count: usize| -> Vec<String> {
         (0..count).map(|i| format!("{letter}{i}")).collect()
     };

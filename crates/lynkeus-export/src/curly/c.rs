@@ -1,0 +1,322 @@
+//! C99: a header, a source, a bench that replays a log, and how they are built.
+
+use super::device::Device;
+use super::function::comment;
+use super::language::Language;
+use super::machine::{Field, Kind, Machine};
+use super::tables::number;
+use super::template::exchanged;
+use crate::Refusal;
+
+const REPLAY: &str = include_str!("runtime/replay.c");
+const CMAKE: &str = include_str!("runtime/CMakeLists.txt");
+
+/// The type of numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// `double`
+    #[default]
+    F64,
+    /// `float`
+    F32,
+}
+
+/// A file of an export.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct File {
+    /// its name in the folder
+    pub name: String,
+    /// its text
+    pub text: String,
+}
+
+/// What [`push`](files) can say, from 1 on.
+const CODES: [(&str, &str); 5] = [
+    (
+        "TIME",
+        "the time is no number, or before that of the last sample",
+    ),
+    ("INPUT", "the first value of an input is no number"),
+    (
+        "INTERVAL",
+        "the interval is too short, or takes more than a million steps",
+    ),
+    ("DIVERGED", "an estimate has run away"),
+    ("NOT_FINITE", "the equations have no value there"),
+];
+
+/// What can become of a reading of a filter.
+const READINGS: [(&str, &str); 4] = [
+    ("MISSING", "the sensor did not report"),
+    ("TAKEN", "it corrected the estimate"),
+    ("REJECTED", "the gate kept it out"),
+    (
+        "AT_LIMIT",
+        "at an end of the sensor's range, beyond which the estimate is anyway",
+    ),
+];
+
+/// The words of the draft that have the device's name before them in C.
+const PREFIXED: [&str; 9] = [
+    "TIME",
+    "INPUT",
+    "INTERVAL",
+    "DIVERGED",
+    "NOT_FINITE",
+    "MISSING",
+    "TAKEN",
+    "REJECTED",
+    "AT_LIMIT",
+];
+
+/// The files of a device: `NAME.h`, `NAME.c`, `replay.c` and `CMakeLists.txt`.
+///
+/// # Errors
+/// What cannot run there, or cannot be written.
+pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+    let machine = Machine::of(device)?;
+    let frame = Frame {
+        device,
+        machine: &machine,
+        language: match precision {
+            Precision::F64 => Language::C,
+            Precision::F32 => Language::SingleC,
+        },
+        prefix: prefix(device.name),
+    };
+    let named = |text: &str| {
+        text.replace("@NAME@", &frame.prefix)
+            .replace("@CAPITALS@", &frame.capitals())
+            .replace("@REAL@", frame.real())
+    };
+    let file = |name: String, text: String| File { name, text };
+    Ok(vec![
+        file(format!("{}.h", frame.prefix), frame.header()),
+        file(format!("{}.c", frame.prefix), frame.source()),
+        file("replay.c".into(), named(REPLAY)),
+        file("CMakeLists.txt".into(), named(CMAKE)),
+    ])
+}
+
+/// A model's name in lower case, what C forbids replaced by `_`.
+pub fn prefix(name: &str) -> String {
+    let letters = name.chars().map(|c| match c.to_ascii_lowercase() {
+        c if c.is_ascii_alphanumeric() => c,
+        _ => '_',
+    });
+    let mut prefix: String = letters.collect();
+    if !prefix.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        prefix.insert(0, '_');
+    }
+    prefix
+}
+
+struct Frame<'a> {
+    device: &'a Device<'a>,
+    machine: &'a Machine,
+    language: Language,
+    prefix: String,
+}
+
+impl Frame<'_> {
+    fn capitals(&self) -> String {
+        self.prefix.to_ascii_uppercase()
+    }
+
+    fn real(&self) -> &'static str {
+        match self.language {
+            Language::SingleC => "float",
+            _ => "double",
+        }
+    }
+
+    /// What is said at the head of a file.
+    fn title(&self, what: &str) -> String {
+        let lines = self.device.about.iter().map(|line| comment(line));
+        let lines = lines.map(|line| format!(" * {line}").trim_end().to_owned() + "\n");
+        format!("/* {what}\n{} */\n", lines.collect::<String>())
+    }
+
+    fn header(&self) -> String {
+        let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
+        let Device {
+            signals, estimates, ..
+        } = self.device;
+        let listed = |entries: &[super::Entry]| -> String {
+            let line = |(place, entry): (usize, &super::Entry)| {
+                let about = comment(&format!("{} {}", entry.name, entry.about));
+                format!(" *   {place}  {}\n", about.trim())
+            };
+            entries.iter().enumerate().map(line).collect()
+        };
+        let codes = CODES.iter().enumerate().map(|(k, (code, about))| {
+            format!("#define {capitals}_{code} {} /* {about} */\n", k + 1)
+        });
+        let codes: String = codes.collect();
+        let fields: String = self
+            .machine
+            .fields
+            .iter()
+            .map(|f| self.declared(f))
+            .collect();
+        let has_readings = self
+            .machine
+            .fields
+            .iter()
+            .any(|field| field.name == "became");
+        let readings: String = match has_readings {
+            false => String::new(),
+            true => {
+                let each = READINGS.iter().enumerate();
+                let each = each.map(|(k, (word, about))| {
+                    format!("#define {capitals}_{word} {k} /* {about} */\n")
+                });
+                format!(
+                    "/* What became of a reading. */\n{}\n",
+                    each.collect::<String>()
+                )
+            }
+        };
+        format!(
+            "{title}#ifndef {capitals}_H\n#define {capitals}_H\n\n\
+             #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+             /* Signals, as they are given (NaN: a sensor did not report, an input stays):\n{signal_list} */\n\
+             #define {capitals}_SIGNALS {signal_count}\n\
+             extern const char *const {name}_signal_names[{capitals}_SIGNALS];\n\n\
+             /* Estimates, as they are returned:\n{estimate_list} */\n\
+             #define {capitals}_ESTIMATES {estimate_count}\n\
+             extern const char *const {name}_estimate_names[{capitals}_ESTIMATES];\n\n\
+             /* Why a sample was refused; nothing has changed then. */\n{codes}\n{readings}\
+             /* All there is to an estimator under way: a copy is a snapshot. */\n\
+             typedef struct {{\n{fields}}} {name}_state;\n\n\
+             /* Before the first sample. */\n\
+             void {name}_init({name}_state *s);\n\n\
+             /* Goes to time t and takes the signals there; 0, or one of the codes above, and then the\n\
+             \x20  state and the estimates are what they were. The first sample only updates the start. */\n\
+             int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates);\n\n\
+             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+            title = self.title(&format!("{name}.h")),
+            signal_list = listed(signals),
+            signal_count = signals.len(),
+            estimate_list = listed(estimates),
+            estimate_count = estimates.len(),
+        )
+    }
+
+    fn declared(&self, field: &Field) -> String {
+        let kind = match field.kind {
+            Kind::Real => self.real(),
+            Kind::Double => "double",
+            Kind::Int => "int",
+        };
+        let size = field
+            .count
+            .map_or(String::new(), |count| format!("[{count}]"));
+        let about = match comment(&field.about) {
+            words if words.is_empty() => words,
+            words => format!(" /* {words} */"),
+        };
+        format!("    {kind} {}{size};{about}\n", field.name)
+    }
+
+    fn source(&self) -> String {
+        let (name, capitals, machine) = (&self.prefix, self.capitals(), self.machine);
+        let sizes = machine
+            .sizes
+            .iter()
+            .map(|(name, size)| format!("    {name} = {size}"));
+        let sizes = sizes.collect::<Vec<_>>().join(",\n");
+        let library = machine.library();
+        let library: String = library
+            .iter()
+            .map(|(_, text)| format!("{text}\n\n"))
+            .collect();
+        let tables = match machine.tables.is_empty() {
+            true => String::new(),
+            false => format!("{}\n", machine.tables),
+        };
+        let draft = format!(
+            "enum {{\n{sizes}\n}};\n\n{tables}{library}{}{}",
+            machine.source,
+            self.init()
+        );
+        let draft = exchanged(&draft, |word| {
+            if word == "STATE" {
+                return Some(format!("{name}_state"));
+            }
+            PREFIXED
+                .contains(&word)
+                .then(|| format!("{capitals}_{word}"))
+        });
+        let names = |entries: &[super::Entry]| -> String {
+            let texts = entries
+                .iter()
+                .map(|e| format!("    \"{}\",\n", escaped(&e.name)));
+            texts.collect()
+        };
+        let real = self.real();
+        format!(
+            "{title}#include \"{name}.h\"\n\n#include <math.h>\n\n\
+             const char *const {name}_signal_names[{capitals}_SIGNALS] = {{\n{signals}}};\n\n\
+             const char *const {name}_estimate_names[{capitals}_ESTIMATES] = {{\n{estimates}}};\n\n\
+             {body}\n\
+             int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
+             \x20   const {name}_state before = *s;\n\
+             \x20   const int code = take(s, t, signals, estimates);\n\
+             \x20   if (code != 0) {{\n        *s = before;\n    }}\n    return code;\n}}\n",
+            title = self.title(&format!("{name}.c")),
+            signals = names(self.device.signals),
+            estimates = names(self.device.estimates),
+            body = self.language.render(&draft),
+        )
+    }
+
+    /// The start, in the draft.
+    fn init(&self) -> String {
+        let name = &self.prefix;
+        let lines: String = self.machine.fields.iter().map(start).collect();
+        format!("void {name}_init({name}_state *s)\n{{\n{lines}}}\n")
+    }
+}
+
+/// A field at the start, entry by entry where they differ.
+fn start(field: &Field) -> String {
+    let Field {
+        name,
+        kind,
+        count,
+        start,
+        ..
+    } = field;
+    let value = |value: f64| match kind {
+        Kind::Real => number(value),
+        Kind::Double => format!("{value:?}"),
+        Kind::Int => format!("{}", value as i64),
+    };
+    match count {
+        None => format!(
+            "    s->{name} = {};\n",
+            value(start.first().copied().unwrap_or(0.0))
+        ),
+        Some(count) => {
+            let zeros = format!(
+                "    for (int i = 0; i < {count}; i++) {{\n        s->{name}[i] = {};\n    }}\n",
+                value(0.0)
+            );
+            let others = start.iter().enumerate().filter(|(_, v)| **v != 0.0);
+            let others = others.map(|(i, v)| format!("    s->{name}[{i}] = {};\n", value(*v)));
+            zeros + &others.collect::<String>()
+        }
+    }
+}
+
+/// In a string of C.
+fn escaped(name: &str) -> String {
+    let plain = |c: char| match c {
+        '"' | '\\' => format!("\\{c}"),
+        '?' => "\\?".to_owned(),
+        c if c.is_control() => "?".to_owned(),
+        c => c.to_string(),
+    };
+    name.chars().map(plain).collect()
+}

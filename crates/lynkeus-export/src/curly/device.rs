@@ -1,0 +1,52 @@
+//! What an estimator for another machine is.
+
+use lynkeus_run::Blueprint;
+
+use super::function::Entry;
+
+/// An estimator and what its text says of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Device<'a> {
+    /// its name in files and functions
+    pub name: &'a str,
+    /// the estimator
+    pub blueprint: &'a Blueprint,
+    /// states that start at the first reading of a sensor, where it reports at the first sample
+    pub first_readings: &'a [FirstReading],
+    /// measured outputs, then known inputs, in the order in which they are given
+    pub signals: &'a [Entry],
+    /// what is reported: estimates, with [`deviations`](Self::deviations) their standard
+    /// deviations, monitors
+    pub estimates: &'a [Entry],
+    /// how many of them are monitors
+    pub monitors: usize,
+    /// whether a filter's standard deviations are reported
+    pub deviations: bool,
+    /// units and meanings of the model's names, where there are any
+    pub words: &'a [Entry],
+    /// lines for people: the study, the design, the certificate
+    pub about: &'a [String],
+}
+
+/// A state that starts where a sensor's first reading says: (reading − offset)/slope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstReading {
+    /// place of the sensor among the measured outputs
+    pub sensor: usize,
+    /// place of the state
+    pub state: usize,
+    /// how the output depends on the state
+    pub slope: f64,
+    /// the output where the state is 0
+    pub offset: f64,
+}
+
+impl Device<'_> {
+    /// Number of measured outputs.
+    pub(super) fn sensors(&self) -> usize {
+        match self.blueprint {
+            Blueprint::Sampled { observer, .. } => observer.sensors.len(),
+            Blueprint::Filter { model, .. } => model.sensors().len(),
+        }
+    }
+}

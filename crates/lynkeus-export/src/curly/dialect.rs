@@ -1,0 +1,268 @@
+//! How operations are written in the text that all languages with braces are rendered from.
+
+use lynkeus_expr::{Binary, Unary};
+
+use crate::{Binding, Dialect, Form, Text};
+
+/// C in which the type of numbers is `real` and their literals are `R(…)`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Draft;
+
+/// Words of C99 and JavaScript, of their headers, and of the runtime.
+const RESERVED: &[&str] = &[
+    "abs",
+    "acos",
+    "arguments",
+    "as",
+    "asin",
+    "async",
+    "atan",
+    "atan2",
+    "auto",
+    "await",
+    "began",
+    "bool",
+    "break",
+    "c",
+    "case",
+    "catch",
+    "ceil",
+    "char",
+    "class",
+    "complex",
+    "const",
+    "continue",
+    "cos",
+    "cosh",
+    "count",
+    "debugger",
+    "default",
+    "delete",
+    "do",
+    "dot",
+    "double",
+    "dx",
+    "else",
+    "enum",
+    "eval",
+    "exp",
+    "export",
+    "extends",
+    "extern",
+    "fabs",
+    "false",
+    "field",
+    "finally",
+    "float",
+    "floor",
+    "for",
+    "frexp",
+    "function",
+    "goto",
+    "h",
+    "if",
+    "implements",
+    "import",
+    "in",
+    "inline",
+    "instanceof",
+    "int",
+    "integer_power",
+    "interface",
+    "isfinite",
+    "isnan",
+    "larger",
+    "ldexp",
+    "let",
+    "log",
+    "long",
+    "math",
+    "memcpy",
+    "new",
+    "null",
+    "package",
+    "pow",
+    "private",
+    "protected",
+    "public",
+    "real",
+    "register",
+    "restrict",
+    "return",
+    "short",
+    "sign",
+    "signbit",
+    "signed",
+    "sin",
+    "sinh",
+    "sizeof",
+    "slopes",
+    "smaller",
+    "solve",
+    "sqrt",
+    "square",
+    "static",
+    "struct",
+    "super",
+    "switch",
+    "t",
+    "tan",
+    "tanh",
+    "this",
+    "throw",
+    "true",
+    "try",
+    "typedef",
+    "typeof",
+    "undefined",
+    "union",
+    "unsigned",
+    "var",
+    "void",
+    "volatile",
+    "w",
+    "while",
+    "with",
+    "x",
+    "y",
+    "yield",
+];
+
+/// Words in capitals that the runtime has a meaning for.
+const SIZES: &[&str] = &[
+    "AT_LIMIT",
+    "CARRIED",
+    "CARRIED_INSIDE",
+    "DIMENSION",
+    "DIMENSION_INSIDE",
+    "DIVERGED",
+    "ENTRIES",
+    "ENTRIES_INSIDE",
+    "ENTRIES_ROOM",
+    "ENTRIES_ROOM_INSIDE",
+    "EPSILON",
+    "ESTIMATED",
+    "INFINITY",
+    "INPUT",
+    "INPUTS",
+    "INTERVAL",
+    "LARGER",
+    "MISSING",
+    "NAN",
+    "NOT_FINITE",
+    "OUTPUTS",
+    "OWN",
+    "POINTS",
+    "R",
+    "RANK",
+    "REJECTED",
+    "REPORTED",
+    "SENSORS",
+    "SIGNALS",
+    "SMALLEST",
+    "STATE",
+    "STATES",
+    "TAKEN",
+    "TIME",
+    "TOLD",
+    "WIDTH",
+    "WIDTH_INSIDE",
+];
+
+impl Dialect for Draft {
+    fn name(&self) -> &'static str {
+        "C"
+    }
+
+    fn is_reserved(&self, word: &str) -> bool {
+        RESERVED.contains(&word) || SIZES.contains(&word) || word.ends_with("_matrix")
+    }
+
+    fn number(&self, value: f64) -> Text {
+        let (text, is_negative) = match value {
+            v if v.is_nan() => ("NAN".to_owned(), false),
+            v if v.is_infinite() => ("INFINITY".to_owned(), v < 0.0),
+            v => (format!("R({:?})", v.abs()), v.is_sign_negative()),
+        };
+        match is_negative {
+            true => Text {
+                text: format!("-{text}"),
+                binding: Binding::Sign,
+            },
+            false => Text::atom(text),
+        }
+    }
+
+    fn unary(&self, op: Unary) -> Option<Form> {
+        Some(Form::Call(match op {
+            Unary::Neg => return Some(Form::Prefix("-", Binding::Sign)),
+            Unary::Not => return Some(Form::Prefix("!", Binding::Sign)),
+            Unary::Abs => "fabs",
+            Unary::Sign => "sign",
+            Unary::Floor => "floor",
+            Unary::Sqrt => "sqrt",
+            Unary::Exp => "exp",
+            Unary::Ln => "log",
+            Unary::Sin => "sin",
+            Unary::Cos => "cos",
+            Unary::Tan => "tan",
+            Unary::Asin => "asin",
+            Unary::Acos => "acos",
+            Unary::Atan => "atan",
+            Unary::Sinh => "sinh",
+            Unary::Cosh => "cosh",
+            Unary::Tanh => "tanh",
+        }))
+    }
+
+    fn binary(&self, op: Binary) -> Option<Form> {
+        Some(match op {
+            Binary::Add => Form::Infix(" + ", Binding::Sum),
+            Binary::Sub => Form::Infix(" - ", Binding::Sum),
+            Binary::Mul => Form::Infix(" * ", Binding::Product),
+            Binary::Div => Form::Infix(" / ", Binding::Product),
+            Binary::Pow => Form::Call("pow"),
+            Binary::Atan2 => Form::Call("atan2"),
+            Binary::Min => Form::Call("smaller"),
+            Binary::Max => Form::Call("larger"),
+            Binary::Less => Form::Infix(" < ", Binding::Relation),
+            Binary::LessEq => Form::Infix(" <= ", Binding::Relation),
+            Binary::Equal => Form::Infix(" == ", Binding::Relation),
+            Binary::And => Form::Infix(" && ", Binding::Relation),
+            Binary::Or => Form::Infix(" || ", Binding::Relation),
+        })
+    }
+
+    fn power(&self, base: &Text, exponent: i32) -> Text {
+        match exponent {
+            2 => Text::call("square", &[base]),
+            n => Text::atom(format!("integer_power({}, {n})", base.text)),
+        }
+    }
+
+    fn select(&self, condition: &Text, x: &Text, y: &Text) -> Text {
+        Text::atom(format!("({} ? {} : {})", condition.text, x.text, y.text))
+    }
+
+    fn assignment(&self, name: &str, value: &Text) -> String {
+        format!("const real {name} = {};", value.text)
+    }
+
+    /// The solution, then the reciprocal condition.
+    fn solution(&self, name: &str, a: &[Text], b: &[Text]) -> Option<Vec<String>> {
+        let n = b.len();
+        let list = |texts: &[Text]| {
+            let texts: Vec<&str> = texts.iter().map(|text| text.text.as_str()).collect();
+            texts.join(", ")
+        };
+        Some(vec![
+            format!("real {name}_matrix[{}] = {{{}}};", n * n, list(a)),
+            format!("real {name}[{}] = {{{}, R(0.0)}};", n + 1, list(b)),
+            format!("solve({n}, {name}_matrix, {name});"),
+        ])
+    }
+
+    fn entry(&self, solution: &str, place: usize) -> Text {
+        Text::atom(format!("{solution}[{place}]"))
+    }
+}

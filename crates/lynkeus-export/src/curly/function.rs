@@ -1,0 +1,136 @@
+//! Functions of time, states and signals, drafted from code.
+
+use crate::curly::dialect::Draft;
+use crate::{Body, Code, Dialect, Names, Refusal, Text};
+
+/// A vector argument: its name, and what its entries are called.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Argument<'a> {
+    pub name: &'a str,
+    pub entries: &'a [Entry],
+}
+
+/// An entry of a vector.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Entry {
+    /// what the model calls it
+    pub name: String,
+    /// its unit and what it is, in words
+    pub about: String,
+}
+
+impl Entry {
+    /// Without words.
+    pub fn named(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            about: String::new(),
+        }
+    }
+}
+
+/// Where the outputs of a function go.
+#[derive(Clone, Debug)]
+pub(super) struct Target {
+    /// the vector
+    pub name: &'static str,
+    /// the place in it of each output
+    pub places: Vec<usize>,
+}
+
+impl Target {
+    /// Every place of a vector.
+    pub fn all(name: &'static str, count: usize) -> Self {
+        Self {
+            name,
+            places: (0..count).collect(),
+        }
+    }
+}
+
+/// Words in a comment, whatever they hold.
+pub(super) fn comment(words: &str) -> String {
+    let words: String = words
+        .chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    let words = words.replace("*/", "* /").replace("/*", "/ *");
+    // no trigraphs, and no line that goes on
+    words
+        .replace("??", "? ?")
+        .trim_end()
+        .trim_end_matches('\\')
+        .to_owned()
+}
+
+/// A function `static void name(real t, const real *x, …, real *target, …)` in the draft.
+///
+/// # Errors
+/// As [`Body::of`].
+pub(super) fn draft(
+    about: &str,
+    name: &str,
+    code: &Code,
+    arguments: &[Argument<'_>],
+    targets: &[Target],
+) -> Result<String, Refusal> {
+    let mut names = Names::default();
+    let needed = code.operations();
+    let is_needed = |place: usize| {
+        let input = code.inputs().get(place);
+        input.is_some_and(|input| needed.binary_search(input).is_ok())
+    };
+    let mut lines = vec![];
+    if !is_needed(0) {
+        lines.push("(void)t;".to_owned());
+    }
+    let mut inputs = vec![Text::atom("t")];
+    for argument in arguments {
+        let before = lines.len();
+        for (place, entry) in argument.entries.iter().enumerate() {
+            if !is_needed(inputs.len()) {
+                inputs.push(Text::atom("R(0.0)"));
+                continue;
+            }
+            let identifier = Draft.identifier(&mut names, &entry.name);
+            let about = match identifier == entry.name {
+                true => entry.about.clone(),
+                false => format!("{} {}", entry.name, entry.about),
+            };
+            let about = match comment(about.trim()) {
+                words if words.is_empty() => words,
+                words => format!(" /* {words} */"),
+            };
+            lines.push(format!(
+                "const real {identifier} = {}[{place}];{about}",
+                argument.name
+            ));
+            inputs.push(Text::atom(identifier));
+        }
+        if lines.len() == before {
+            lines.push(format!("(void){};", argument.name));
+        }
+    }
+    let body = Body::of(code, &Draft, &inputs, &mut names)?;
+    lines.extend(body.lines);
+    let places = targets
+        .iter()
+        .flat_map(|target| target.places.iter().map(|place| (target.name, *place)));
+    for ((target, place), output) in places.zip(&body.outputs) {
+        lines.push(format!("{target}[{place}] = {};", output.text));
+    }
+    for target in targets.iter().filter(|target| target.places.is_empty()) {
+        lines.push(format!("(void){};", target.name));
+    }
+    let parameters = arguments.iter().map(|a| format!("const real *{}", a.name));
+    let results = targets
+        .iter()
+        .map(|target| format!("real *{}", target.name));
+    let parameters: Vec<String> = parameters.chain(results).collect();
+    let lines: String = lines.iter().map(|line| format!("    {line}\n")).collect();
+    Ok(format!(
+        "/* {} */\nstatic void {name}(real t, {})\n{{\n{lines}}}\n",
+        comment(about),
+        parameters.join(", ")
+    ))
+}

@@ -1,0 +1,210 @@
+//! Kalman filters.
+
+use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, SigmaPoints};
+use lynkeus_run::{BetweenSamples, Blueprint};
+
+use super::device::Device;
+use super::function::{Argument, Target, draft};
+use super::linear::{Linear, Which};
+use super::machine::{FIELD, Kind, Machine, code, entries, refuse_jumps};
+use super::tables::{number, table};
+use super::template::{chosen, exchanged};
+use crate::Refusal;
+use crate::code::Part;
+
+const INTEGRATE: &str = include_str!("runtime/integrate.c");
+const JUDGE: &str = include_str!("runtime/judge.c");
+const EXTENDED: &str = include_str!("runtime/extended.c");
+const UNSCENTED: &str = include_str!("runtime/unscented.c");
+const FILTER: &str = include_str!("runtime/filter.c");
+
+impl Machine {
+    /// Nothing for an observer that is no filter.
+    pub fn filter(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
+        let Blueprint::Filter {
+            model,
+            settings,
+            run,
+        } = device.blueprint
+        else {
+            return Ok(());
+        };
+        if run.between == BetweenSamples::Linear {
+            return Err(Refusal::LooksAhead);
+        }
+        let (states, inputs) = (model.states(), model.inputs());
+        let (x, w) = (entries(states, device), entries(inputs, device));
+        let arguments = [
+            Argument {
+                name: "x",
+                entries: &x,
+            },
+            Argument {
+                name: "w",
+                entries: &w,
+            },
+        ];
+        let room = vec![0.0; inputs.len().max(1)];
+        self.size("STATES", states.len());
+        self.field(
+            "x",
+            Kind::Real,
+            &states.join(", "),
+            model.flow().start().to_vec(),
+        );
+        self.field("inputs", Kind::Real, &inputs.join(", "), room);
+        self.root(model.initial_variance());
+        // also a polynomial has no value once it has run away
+        let confined = model.confined().filter(|confined| {
+            let mut bounds = confined.bounds.iter();
+            bounds.any(|b| b.low.is_finite() || b.high.is_finite())
+        });
+        let has_limits = model.sensors().iter().any(|sensor| sensor.limits.is_some());
+        let facts = [
+            (confined.is_some(), "confined"),
+            (device.deviations, "deviations"),
+            (settings.gate.is_some(), "gate"),
+            (has_limits, "limits"),
+        ];
+        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        self.measure(model, &arguments, &settings.kind)?;
+        self.judge(model, settings, &holds);
+        let free = Linear {
+            flow: model.flow(),
+            entries: model.flow_entries(),
+            noise: model.process_noise(),
+        };
+        let field = self.engine(&settings.kind, &free, &arguments)?;
+        if let Some(confined) = confined {
+            let inside = Linear {
+                flow: &confined.flow,
+                entries: &confined.entries,
+                noise: model.process_noise(),
+            };
+            self.linear(Which::Inside, &inside, &arguments)?;
+            let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
+                confined.bounds.iter().map(end).collect()
+            };
+            self.tables += &table("range_from", &ends(|b| b.low));
+            self.tables += &table("range_to", &ends(|b| b.high));
+        }
+        let text = chosen(FILTER, &holds).replace("FIELD_INSIDE", "linearised_inside");
+        self.add(&text.replace("FIELD", field));
+        Ok(())
+    }
+
+    /// The way from sample to sample, and the correction; the name of the flow.
+    fn engine(
+        &mut self,
+        kind: &FilterKind,
+        free: &Linear<'_>,
+        arguments: &[Argument<'_>],
+    ) -> Result<&'static str, Refusal> {
+        let n = free.flow.states().len();
+        match kind {
+            FilterKind::MovingHorizon(..) => Err(Refusal::Window),
+            FilterKind::Extended => {
+                self.size("LARGER", n);
+                self.linear(Which::Free, free, arguments)?;
+                self.add(EXTENDED);
+                Ok("linearised")
+            }
+            FilterKind::Unscented(points) => {
+                self.unscented(points, free, arguments)?;
+                Ok("flow")
+            }
+        }
+    }
+
+    /// h, and for the extended filter the entries of C.
+    fn measure(
+        &mut self,
+        model: &FilterModel,
+        arguments: &[Argument<'_>],
+        kind: &FilterKind,
+    ) -> Result<(), Refusal> {
+        let (n, m) = (model.dimension(), model.sensors().len());
+        refuse_jumps(model.output_map())?;
+        let tape = model.output_map().output_tape();
+        let mut targets = vec![Target::all("h", m)];
+        let mut outputs = 0..m;
+        if *kind == FilterKind::Extended {
+            let places = model.output_entries().iter().map(|(i, j)| i * n + j);
+            targets.push(Target {
+                name: "c",
+                places: places.collect(),
+            });
+            outputs = 0..tape.outputs();
+        }
+        let text = draft(
+            "What the sensors show (c: the derivatives by x, row by row).",
+            "measure",
+            &code(&[Part { tape, outputs }])?,
+            arguments,
+            &targets,
+        )?;
+        self.add(&text);
+        Ok(())
+    }
+
+    fn judge(&mut self, model: &FilterModel, settings: &FilterSettings, holds: &[&str]) {
+        let m = model.sensors().len();
+        let mut kept = |name, kind, about: &str| self.field(name, kind, about, vec![0.0; m]);
+        kept("readings", Kind::Real, "of the last sample");
+        kept("became", Kind::Int, "what became of each reading");
+        kept("rejected", Kind::Int, "readings rejected in a row");
+        kept(
+            "moved",
+            Kind::Int,
+            "of these, how many differ from the one before",
+        );
+        kept("last", Kind::Real, "the reading before");
+        self.noises(model.sensors().iter().map(|s| s.noise));
+        if holds.contains(&"limits") {
+            let ends = |end: f64, pick: fn(Limits) -> f64| -> Vec<f64> {
+                let sensors = model.sensors().iter();
+                sensors.map(|s| s.limits.map_or(end, pick)).collect()
+            };
+            self.tables += &table("lowest", &ends(f64::NEG_INFINITY, |l| l.low));
+            self.tables += &table("highest", &ends(f64::INFINITY, |l| l.high));
+        }
+        let gate = number(settings.gate.unwrap_or_default());
+        self.add(&chosen(JUDGE, holds).replace("GATE", &gate));
+    }
+
+    fn unscented(
+        &mut self,
+        points: &SigmaPoints,
+        free: &Linear<'_>,
+        arguments: &[Argument<'_>],
+    ) -> Result<(), Refusal> {
+        let n = free.flow.states().len();
+        let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");
+        self.size("LARGER", sensors.map_or(n, |size| size.1.max(n)));
+        let weights = points.weights(n).map_err(|error| Refusal::Setting {
+            error: error.to_string(),
+        })?;
+        self.size("POINTS", 2 * n + 1);
+        self.size("DIMENSION", n);
+        self.flow(free.flow, arguments)?;
+        self.add(FIELD);
+        self.add(INTEGRATE);
+        self.tables += &table("process_noise", free.noise);
+        let holds: &[&str] = if weights.centre >= 0.0 {
+            &["definite"]
+        } else {
+            &[]
+        };
+        let text = exchanged(&chosen(UNSCENTED, holds), |word| {
+            Some(number(match word {
+                "SPREAD" => weights.spread,
+                "WEIGHT_OF_CENTRE" => weights.centre,
+                "WEIGHT_OF_OTHERS" => weights.other,
+                "WEIGHT_OF_MEAN" => weights.mean_of_centre,
+                _ => return None,
+            }))
+        });
+        self.add(&text);
+        Ok(())
+    }
+}

@@ -1,0 +1,139 @@
+//! A flow with its Jacobian: the covariance along an estimate.
+
+use lynkeus_run::{Level, System};
+
+use super::function::{Argument, Target, draft};
+use super::machine::{FIELD, Kind, Machine, code, refuse_jumps};
+use super::tables::{places, table};
+use super::template::{chosen, exchanged};
+use crate::Refusal;
+use crate::code::Part;
+
+const INTEGRATE: &str = include_str!("runtime/integrate.c");
+const LINEARISED: &str = include_str!("runtime/linearised.c");
+const PREDICT: &str = include_str!("runtime/predict.c");
+
+/// A flow with its Jacobian and the densities of the noise on its states.
+pub(super) struct Linear<'a> {
+    pub flow: &'a System,
+    pub entries: &'a [(usize, usize)],
+    pub noise: &'a [f64],
+}
+
+/// Which of two flows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Which {
+    Free,
+    /// inside the declared ranges
+    Inside,
+}
+
+/// Names and sizes of which there is one for each flow.
+const OWN: [&str; 12] = [
+    "linear_flow",
+    "linearised",
+    "integrate",
+    "predict",
+    "entry_rows",
+    "entry_columns",
+    "process_noise",
+    "WIDTH",
+    "ENTRIES",
+    "ENTRIES_ROOM",
+    "CARRIED",
+    "DIMENSION",
+];
+
+impl Which {
+    fn renamed(self, text: &str) -> String {
+        exchanged(text, |word| {
+            let is_own = self == Self::Inside && OWN.contains(&word);
+            is_own.then(|| match word.chars().all(|c| !c.is_lowercase()) {
+                true => format!("{word}_INSIDE"),
+                false => format!("{word}_inside"),
+            })
+        })
+    }
+}
+
+impl Machine {
+    /// The root of a covariance that starts diagonal.
+    pub fn root(&mut self, variances: &[f64]) {
+        let n = variances.len();
+        let mut start = vec![0.0; n * n];
+        for (i, variance) in variances.iter().enumerate() {
+            start[i * n + i] = variance.sqrt();
+        }
+        self.field(
+            "root",
+            Kind::Real,
+            "lower root of the covariance, row by row",
+            start,
+        );
+    }
+
+    /// The variances of the noises of the sensors.
+    pub fn noises(&mut self, levels: impl Iterator<Item = Level>) {
+        let parts = levels.map(|level| match level {
+            Level::Relative(share) => (0.0, share),
+            other => (other.variance(0.0), 0.0),
+        });
+        let (variances, shares): (Vec<f64>, Vec<f64>) = parts.unzip();
+        self.tables += &table("noise_variances", &variances);
+        self.tables += &table("noise_shares", &shares);
+    }
+
+    /// x, Φ and W along a flow, together.
+    pub fn linear(
+        &mut self,
+        which: Which,
+        linear: &Linear<'_>,
+        arguments: &[Argument<'_>],
+    ) -> Result<(), Refusal> {
+        let Linear {
+            flow,
+            entries,
+            noise,
+        } = linear;
+        refuse_jumps(flow)?;
+        let n = flow.states().len();
+        let scale = noise.iter().fold(0.0_f64, |m, q| m.max(*q));
+        let (width, holds): (usize, &[&str]) = match scale > 0.0 {
+            true => (2 * n, &["noisy"]),
+            false => (n, &[]),
+        };
+        for (name, size) in [
+            ("WIDTH", width),
+            ("ENTRIES", entries.len()),
+            ("ENTRIES_ROOM", entries.len().max(1)),
+            ("CARRIED", width),
+            ("DIMENSION", n + n * width),
+        ] {
+            self.size(which.renamed(name), size);
+        }
+        let mut tables = places("entry_rows", entries.iter().map(|e| e.0));
+        tables += &places("entry_columns", entries.iter().map(|e| e.1));
+        if scale > 0.0 {
+            let shares: Vec<f64> = noise.iter().map(|q| q / scale).collect();
+            tables += &table("process_noise", &shares);
+        }
+        self.tables += &which.renamed(&tables);
+        let jacobian = Part {
+            tape: flow.output_tape(),
+            outputs: 0..entries.len(),
+        };
+        let flow = draft(
+            "The derivatives, and the entries of their Jacobian that are not zero.",
+            "linear_flow",
+            &code(&[Part::all(flow.derivative_tape()), jacobian])?,
+            arguments,
+            &[Target::all("dx", n), Target::all("slopes", entries.len())],
+        )?;
+        let predict = chosen(PREDICT, holds).replace("NOISE_SCALE", &format!("R({scale:?})"));
+        let linearised = chosen(LINEARISED, holds);
+        let kind = if which == Which::Free { FIELD } else { "" };
+        let own = [kind, &flow, &linearised, INTEGRATE, &predict].join("\n");
+        self.add(&which.renamed(&own));
+        Ok(())
+    }
+}

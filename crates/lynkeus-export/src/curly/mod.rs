@@ -1,0 +1,21 @@
+//! Estimators as source text in languages with braces: C and JavaScript.
+//!
+//! Everything is drafted once, in C whose type of numbers is called `real`: the functions of the
+//! graph by [`function`](self::function), what is done with them from `runtime/*.c`, of which only
+//! what is called is taken. A [`Language`] renders the draft; a frame ([`c`]) makes files of it.
+
+pub mod c;
+mod device;
+mod dialect;
+mod function;
+mod kalman;
+mod language;
+mod linear;
+mod machine;
+mod observer;
+mod tables;
+mod template;
+
+pub use device::{Device, FirstReading};
+pub use function::Entry;
+pub use language::Language;

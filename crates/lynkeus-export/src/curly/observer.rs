@@ -1,0 +1,117 @@
+//! Observers whose sensors report when they do.
+
+use lynkeus_run::{ErrorModel, SampledObserver};
+
+use super::device::Device;
+use super::function::{Argument, Target, draft};
+use super::linear::{Linear, Which};
+use super::machine::{FIELD, Kind, Machine, code, entries, refuse_jumps};
+use super::template::chosen;
+use crate::Refusal;
+use crate::code::Part;
+
+const INTEGRATE: &str = include_str!("runtime/integrate.c");
+const SPREAD: &str = include_str!("runtime/spread.c");
+const SAMPLED: &str = include_str!("runtime/sampled.c");
+
+impl Machine {
+    pub fn sampled(
+        &mut self,
+        device: &Device<'_>,
+        observer: &SampledObserver,
+    ) -> Result<(), Refusal> {
+        let system = &observer.system;
+        refuse_jumps(system)?;
+        let (n, m) = (system.states().len(), observer.sensors.len());
+        let told = system.outputs().len().saturating_sub(m);
+        self.size("STATES", n);
+        self.size("OWN", n - m);
+        self.size("OUTPUTS", system.outputs().len());
+        self.size("TOLD", told);
+        self.size("ESTIMATED", told.saturating_sub(device.monitors));
+        let about = system.states().join(", ");
+        self.field("x", Kind::Real, &about, system.start().to_vec());
+        let about = format!(
+            "{}; the last {m} say whether a measurement follows the model",
+            system.signals().join(", ")
+        );
+        self.field(
+            "inputs",
+            Kind::Real,
+            &about,
+            vec![0.0; system.signals().len()],
+        );
+        let x = entries(system.states(), device);
+        let w = entries(system.signals(), device);
+        let arguments = [
+            Argument {
+                name: "x",
+                entries: &x,
+            },
+            Argument {
+                name: "w",
+                entries: &w,
+            },
+        ];
+        let outputs = draft(
+            "What the observer reports, then what it expects of each sensor.",
+            "outputs",
+            &code(&[Part::all(system.output_tape())])?,
+            &arguments,
+            &[Target::all("y", system.outputs().len())],
+        )?;
+        self.add(&outputs);
+        let (field, holds): (&str, &[&str]) = match &observer.errors {
+            None => {
+                self.flow(system, &arguments)?;
+                self.size("DIMENSION", n);
+                self.add(FIELD);
+                self.add(INTEGRATE);
+                ("flow", &[])
+            }
+            Some(errors) => {
+                self.spread(errors, &arguments)?;
+                ("linearised", &["deviations"])
+            }
+        };
+        let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
+        let text = chosen(SAMPLED, holds).replace("FIELD", field);
+        self.add(&text.replace("FOLLOWS", follows));
+        Ok(())
+    }
+
+    /// The covariance of an observer's error.
+    fn spread(&mut self, errors: &ErrorModel, arguments: &[Argument<'_>]) -> Result<(), Refusal> {
+        let noise = errors.noise();
+        let flow = errors.flow();
+        let n = flow.states().len();
+        self.root(&noise.initial);
+        self.noises(noise.sensors.iter().copied());
+        self.size("LARGER", n);
+        let linear = Linear {
+            flow,
+            entries: errors.flow_entries(),
+            noise: &noise.process,
+        };
+        self.linear(Which::Free, &linear, arguments)?;
+        let tape = flow.output_tape();
+        let slopes = Part {
+            tape,
+            outputs: errors.flow_entries().len()..tape.outputs(),
+        };
+        let places = errors.estimate_entries().iter().map(|(i, j)| i * n + j);
+        let text = draft(
+            "The derivatives of the estimates by x, row by row.",
+            "estimate_slopes",
+            &code(&[slopes])?,
+            arguments,
+            &[Target {
+                name: "c",
+                places: places.collect(),
+            }],
+        )?;
+        self.add(&text);
+        self.add(SPREAD);
+        Ok(())
+    }
+}

@@ -1,0 +1,83 @@
+//? confined
+/* Puts the estimate back into its declared ranges. */
+static void confine(real *x)
+{
+    for (int i = 0; i < STATES; i++) {
+        if (x[i] < range_from[i]) {
+            x[i] = range_from[i];
+        }
+        if (x[i] > range_to[i]) {
+            x[i] = range_to[i];
+        }
+    }
+}
+
+//?
+/* From the sample before to t, under its inputs. */
+static int advance(STATE *s, double t)
+{
+    const int steps = steps_between(s->time, t);
+    for (int i = 0; i < INPUTS; i++) {
+        widen(s, s->inputs[i]);
+    }
+    if (steps == 0) {
+        return INTERVAL;
+    }
+    if (predict(FIELD, s->time, t, steps, s->inputs, s->x, s->root)) {
+        return 0;
+    }
+//? confined
+    /* the model has no value on the way: once more, inside the declared ranges */
+    confine(s->x);
+    if (predict_inside(FIELD_INSIDE, s->time, t, steps, s->inputs, s->x, s->root)) {
+        return 0;
+    }
+//?
+    return NOT_FINITE;
+}
+
+/* Takes the readings and inputs of a sample. */
+static int update(STATE *s, double t, const real *signals)
+{
+    for (int i = 0; i < SENSORS; i++) {
+        s->readings[i] = signals[i];
+    }
+    for (int i = 0; i < INPUTS; i++) {
+        if (isfinite(signals[SENSORS + i])) {
+            s->inputs[i] = signals[SENSORS + i];
+        }
+    }
+    if (correct(s, t)) {
+        return 0;
+    }
+//? confined
+    confine(s->x);
+    if (correct(s, t)) {
+        return 0;
+    }
+//?
+    return NOT_FINITE;
+}
+
+/* The estimates, where all of them are numbers and none has run away. */
+static int report(STATE *s, double t, real *estimates)
+{
+    real deviations[STATES];
+    (void)t;
+    for (int i = 0; i < STATES; i++) {
+        if (!isfinite(s->x[i]) || !(fabs(s->x[i]) <= R(1e12) * s->scale)) {
+            return DIVERGED;
+        }
+        deviations[i] = deviation(s->root, i);
+        if (!isfinite(deviations[i])) {
+            return DIVERGED;
+        }
+    }
+    for (int i = 0; i < STATES; i++) {
+        estimates[i] = s->x[i];
+//? deviations
+        estimates[STATES + i] = deviations[i];
+//?
+    }
+    return 0;
+}

@@ -1,0 +1,352 @@
+//= square
+static real square(real a)
+{
+    return a * a;
+}
+
+//= sign
+static real sign(real a)
+{
+    return a > R(0.0) ? R(1.0) : (a < R(0.0) ? R(-1.0) : a);
+}
+
+//= integer_power
+static real integer_power(real a, int exponent)
+{
+    real power = R(1.0);
+    real factor = a;
+    int rest = exponent < 0 ? -exponent : exponent;
+    while (rest > 0) {
+        const int half = rest >> 1;
+        if (rest - half - half == 1) {
+            power *= factor;
+        }
+        factor *= factor;
+        rest = half;
+    }
+    return exponent < 0 ? R(1.0) / power : power;
+}
+
+//= smaller
+static real smaller(real a, real b)
+{
+    if (isnan(a) || isnan(b)) {
+        return NAN;
+    }
+    return a < b || (a == b && signbit(a)) ? a : b;
+}
+
+//= larger
+static real larger(real a, real b)
+{
+    if (isnan(a) || isnan(b)) {
+        return NAN;
+    }
+    return b < a || (a == b && !signbit(a)) ? a : b;
+}
+
+//= solve
+/* A x = b by Householder's reflections with a choice of columns; b becomes x, and after it comes
+   an estimate of 1/cond(A). Directions that a is singular along are left out, so that x stays
+   bounded. */
+static void solve(int n, real *a, real *b)
+{
+    for (int k = 0; k < n; k++) {
+        int pivot = k;
+        real best = R(-1.0);
+        for (int j = k; j < n; j++) {
+            real norm = R(0.0);
+            for (int i = k; i < n; i++) {
+                norm += a[i * n + j] * a[i * n + j];
+            }
+            if (norm > best || j == k) {
+                best = norm;
+                pivot = j;
+            }
+        }
+        for (int i = 0; i < n && pivot != k; i++) {
+            const real entry = a[i * n + k];
+            a[i * n + k] = a[i * n + pivot];
+            a[i * n + pivot] = entry;
+        }
+        real scale = R(0.0);
+        for (int i = k; i < n; i++) {
+            const real size = fabs(a[i * n + k]);
+            scale = size > scale ? size : scale;
+        }
+        if (scale != R(0.0)) {
+            real norm = R(0.0);
+            for (int i = k; i < n; i++) {
+                const real entry = a[i * n + k] / scale;
+                norm += entry * entry;
+            }
+            norm = scale * sqrt(norm);
+            const real corner = a[k * n + k];
+            const real alpha = corner > R(0.0) ? -norm : norm;
+            const real first = corner / scale - alpha / scale;
+            real own = first * corner;
+            real vv = first * first;
+            for (int i = k + 1; i < n; i++) {
+                const real entry = a[i * n + k];
+                own += entry / scale * entry;
+                a[i * n + k] = entry / scale;
+                vv += a[i * n + k] * a[i * n + k];
+            }
+            if (vv != R(0.0)) {
+                a[k * n + k] -= R(2.0) * own / vv * first;
+                for (int j = k + 1; j < n; j++) {
+                    real sum = first * a[k * n + j];
+                    for (int i = k + 1; i < n; i++) {
+                        sum += a[i * n + k] * a[i * n + j];
+                    }
+                    a[k * n + j] -= R(2.0) * sum / vv * first;
+                    for (int i = k + 1; i < n; i++) {
+                        a[i * n + j] -= R(2.0) * sum / vv * a[i * n + k];
+                    }
+                }
+                real sum = first * b[k];
+                for (int i = k + 1; i < n; i++) {
+                    sum += a[i * n + k] * b[i];
+                }
+                b[k] -= R(2.0) * sum / vv * first;
+                for (int i = k + 1; i < n; i++) {
+                    b[i] -= R(2.0) * sum / vv * a[i * n + k];
+                }
+            }
+        }
+        if (k + 1 < n) {
+            a[(k + 1) * n + k] = (real)pivot;
+        }
+    }
+    const real largest = fabs(a[0]);
+    int rank = 0;
+    while (rank < n && fabs(a[rank * n + rank]) > RANK * largest) {
+        rank++;
+    }
+    for (int k = n - 1; k >= rank; k--) {
+        b[k] = isnan(b[k]) || isnan(a[k * n + k]) ? NAN : R(0.0);
+    }
+    for (int k = rank - 1; k >= 0; k--) {
+        real tail = R(0.0);
+        for (int j = k + 1; j < n; j++) {
+            tail += a[k * n + j] * b[j];
+        }
+        b[k] = (b[k] - tail) / a[k * n + k];
+    }
+    for (int k = n - 1; k >= 1; k--) {
+        const int other = (int)a[k * n + k - 1];
+        const real entry = b[k - 1];
+        b[k - 1] = b[other];
+        b[other] = entry;
+    }
+    const real ratio = largest > R(0.0) ? fabs(a[n * n - 1]) / largest : R(0.0);
+    b[n] = ratio > R(1.0) ? R(1.0) : ratio;
+}
+
+//= power_of_two
+/* The power of two of a number. */
+static real power_of_two(real a)
+{
+    int exponent = 0;
+    (void)frexp(a, &exponent);
+    return ldexp(R(1.0), exponent - 1);
+}
+
+//= dot
+/* Sum of a[i + k] b[j + k] over k. */
+static real dot(const real *a, int i, const real *b, int j, int count)
+{
+    real sums[4];
+    real tail = R(0.0);
+    int k = 0;
+    for (int lane = 0; lane < 4; lane++) {
+        sums[lane] = R(0.0);
+    }
+    for (; k + 4 <= count; k += 4) {
+        for (int lane = 0; lane < 4; lane++) {
+            sums[lane] += a[i + k + lane] * b[j + k + lane];
+        }
+    }
+    for (; k < count; k++) {
+        tail += a[i + k] * b[j + k];
+    }
+    return sums[0] + sums[1] + sums[2] + sums[3] + tail;
+}
+
+//= deviation
+/* The standard deviation of a state, for the lower root of its covariance. */
+static real deviation(const real *root, int i)
+{
+    real sum = R(0.0);
+    for (int k = 0; k < STATES; k++) {
+        sum += root[i * STATES + k] * root[i * STATES + k];
+    }
+    return sqrt(sum);
+}
+
+//= triangularise
+/* Reflections (Householder) that make some rows upper triangular, in units in which squares
+   neither vanish nor overflow. */
+static void triangularise(real *rows, int count)
+{
+    real sums[STATES];
+    for (int k = 0; k < STATES && k < count; k++) {
+        real largest = R(0.0);
+        for (int i = k; i < count; i++) {
+            const real size = fabs(rows[i * STATES + k]);
+            if (!(size <= largest)) {
+                largest = size;
+            }
+        }
+        if (!(largest >= SMALLEST)) {
+            continue;
+        }
+        const real unit = power_of_two(largest);
+        real norm = R(0.0);
+        for (int i = k; i < count; i++) {
+            rows[i * STATES + k] /= unit;
+            norm += rows[i * STATES + k] * rows[i * STATES + k];
+        }
+        norm = sqrt(norm);
+        const real pivot = rows[k * STATES + k];
+        const real head = pivot > R(0.0) ? -norm : norm;
+        const real beta = -head * (pivot - head);
+        rows[k * STATES + k] = pivot - head;
+        for (int j = 0; j < STATES; j++) {
+            sums[j] = R(0.0);
+        }
+        for (int i = k; i < count; i++) {
+            const real v = rows[i * STATES + k];
+            for (int j = k + 1; j < STATES; j++) {
+                sums[j] += v * rows[i * STATES + j];
+            }
+        }
+        for (int i = k; i < count; i++) {
+            const real factor = rows[i * STATES + k] / beta;
+            rows[i * STATES + k] = R(0.0);
+            for (int j = k + 1; j < STATES; j++) {
+                rows[i * STATES + j] -= factor * sums[j];
+            }
+        }
+        rows[k * STATES + k] = head * unit;
+    }
+}
+
+//= root_of_rows
+/* The lower root of the sum of squares of some rows, which are used up. */
+static void root_of_rows(real *rows, int count, real *root)
+{
+    triangularise(rows, count);
+    for (int i = 0; i < STATES * STATES; i++) {
+        root[i] = R(0.0);
+    }
+    for (int i = 0; i < STATES && i < count; i++) {
+        const real sign_of_row = rows[i * STATES + i] < R(0.0) ? R(-1.0) : R(1.0);
+        for (int j = i; j < STATES; j++) {
+            root[j * STATES + i] = sign_of_row * rows[i * STATES + j];
+        }
+    }
+}
+
+//= factorise
+/* Cholesky's lower factor of an n x n matrix that has no negative eigenvalue but by rounding: a
+   pivot that rounding cannot tell from zero has none. */
+static void factorise(const real *matrix, int n, real *lower)
+{
+    int begins[LARGER];
+    for (int i = 0; i < n; i++) {
+        int begin = i;
+        for (int j = 0; j < i; j++) {
+            if (begin == i && matrix[i * n + j] != R(0.0)) {
+                begin = j;
+            }
+        }
+        begins[i] = begin;
+    }
+    for (int i = 0; i < n * n; i++) {
+        lower[i] = R(0.0);
+    }
+    for (int j = 0; j < n; j++) {
+        const real own = dot(lower, j * n + begins[j], lower, j * n + begins[j], j - begins[j]);
+        const real pivot = matrix[j * n + j] - own;
+        if (!(pivot > (real)n * EPSILON * fabs(matrix[j * n + j]))) {
+            continue;
+        }
+        lower[j * n + j] = sqrt(pivot);
+        for (int i = j + 1; i < n; i++) {
+            if (begins[i] <= j) {
+                const int begin = begins[i] > begins[j] ? begins[i] : begins[j];
+                const real known = dot(lower, i * n + begin, lower, j * n + begin, j - begin);
+                lower[i * n + j] = (matrix[i * n + j] - known) / lower[j * n + j];
+            }
+        }
+    }
+}
+
+//= project
+/* S'c for row i of C. */
+static void project(const real *root, const real *c, int i, real *projected)
+{
+    for (int k = 0; k < STATES; k++) {
+        projected[k] = R(0.0);
+    }
+    for (int j = 0; j < STATES; j++) {
+        for (int k = 0; k <= j; k++) {
+            projected[k] += c[i * STATES + j] * root[j * STATES + k];
+        }
+    }
+}
+
+//= take_reading
+/* Carlson's update by one reading y = c x + noise: the gain, and the root of what is left of P.
+   projected is S'c. 0 where neither the reading nor the estimate has any variance. */
+static int take_reading(real *root, const real *projected, real variance_of_noise, real *gain)
+{
+    real left[STATES];
+    real taken[STATES];
+    const real variance = dot(projected, 0, projected, 0, STATES) + variance_of_noise;
+    if (!(variance > R(0.0))) {
+        return 0;
+    }
+    real alpha = variance_of_noise;
+    for (int k = STATES - 1; k >= 0; k--) {
+        const real before = alpha;
+        alpha += projected[k] * projected[k];
+        left[k] = R(1.0);
+        taken[k] = R(0.0);
+        if (alpha > R(0.0)) {
+            left[k] = sqrt(before / alpha);
+            if (before > R(0.0)) {
+                taken[k] = projected[k] / (sqrt(before) * sqrt(alpha));
+            }
+        }
+    }
+    for (int i = 0; i < STATES; i++) {
+        real sum = R(0.0);
+        for (int k = i; k >= 0; k--) {
+            const real own = root[i * STATES + k];
+            root[i * STATES + k] = own * left[k] - sum * taken[k];
+            sum += own * projected[k];
+        }
+        gain[i] = sum / variance;
+    }
+    return 1;
+}
+
+//= noise_variance
+/* The variance of a sensor's noise where the model predicts a value. */
+static real noise_variance(int i, real predicted)
+{
+    const real share = noise_shares[i] * predicted;
+    return noise_variances[i] + share * share;
+}
+
+//= widen
+/* Widens what counts as a plausible value. */
+static void widen(STATE *s, real value)
+{
+    const real size = fabs(value);
+    if (size > s->scale) {
+        s->scale = size;
+    }
+}

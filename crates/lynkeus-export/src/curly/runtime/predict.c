@@ -1,0 +1,48 @@
+/* x and the root of P to another time: P = Phi P Phi' + W. 0, and nothing changed, where the flow
+   has no value. */
+static int predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+{
+    real z[DIMENSION];
+    real rows[CARRIED * STATES];
+    for (int i = 0; i < DIMENSION; i++) {
+        z[i] = R(0.0);
+    }
+    for (int i = 0; i < STATES; i++) {
+        z[i] = x[i];
+        z[STATES + i * WIDTH + i] = R(1.0);
+    }
+    if (!integrate(f, from, to, steps, w, z)) {
+        return 0;
+    }
+    for (int i = 0; i < CARRIED * STATES; i++) {
+        rows[i] = R(0.0);
+    }
+//? noisy
+    real noise[STATES * STATES];
+    real lower[STATES * STATES];
+    for (int i = 0; i < STATES; i++) {
+        for (int j = 0; j < STATES; j++) {
+            noise[i * STATES + j] = NOISE_SCALE * z[STATES + i * WIDTH + STATES + j];
+        }
+    }
+    factorise(noise, STATES, lower);
+    for (int i = 0; i < STATES; i++) {
+        for (int k = 0; k <= i; k++) {
+            rows[k * STATES + i] = lower[i * STATES + k];
+        }
+    }
+//?
+    for (int i = 0; i < STATES; i++) {
+        for (int j = 0; j < STATES; j++) {
+            const real phi = z[STATES + i * WIDTH + j];
+            for (int k = 0; k <= j; k++) {
+                rows[(CARRIED - STATES + k) * STATES + i] += phi * root[j * STATES + k];
+            }
+        }
+    }
+    root_of_rows(rows, CARRIED, root);
+    for (int i = 0; i < STATES; i++) {
+        x[i] = z[i];
+    }
+    return 1;
+}

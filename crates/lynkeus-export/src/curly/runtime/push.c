@@ -1,0 +1,36 @@
+/* A sample, whatever it leaves behind. */
+static int take(STATE *s, double t, const real *signals, real *estimates)
+{
+    int code = 0;
+    if (!isfinite(t) || (s->started && t < s->time)) {
+        return TIME;
+    }
+    if (!s->started) {
+        for (int i = SENSORS; i < SIGNALS; i++) {
+            if (!isfinite(signals[i])) {
+                return INPUT;
+            }
+        }
+//? first
+        FIRST_READINGS
+//?
+        for (int i = 0; i < STATES; i++) {
+            widen(s, s->x[i]);
+        }
+//? sampled
+        start(s, signals);
+        code = begin(s, t);
+//?
+    } else if (t > s->time) {
+        code = advance(s, t);
+    }
+    if (code == 0) {
+        code = update(s, t, signals);
+    }
+    if (code == 0) {
+        code = report(s, t, estimates);
+    }
+    s->time = t;
+    s->started = 1;
+    return code;
+}

@@ -1,0 +1,132 @@
+/* Replays a log through the estimator: a table with a column t (or time) and one for each signal,
+   comma separated, from standard input; estimates to standard output. An empty cell is a sensor
+   that did not report. */
+#include "@NAME@.h"
+
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LONGEST = 65536, COLUMNS = 4096 };
+
+static char line[LONGEST];
+static char *cells[COLUMNS];
+
+/* Splits a line at its commas; quotes around a cell are taken off. */
+static int split(char *text)
+{
+    int count = 0;
+    text[strcspn(text, "\r\n")] = '\0';
+    for (char *cell = text; cell != NULL && count < COLUMNS;) {
+        char *next = NULL;
+        while (isspace((unsigned char)*cell)) {
+            cell++;
+        }
+        if (*cell == '"') {
+            char *end = strchr(cell + 1, '"');
+            cell++;
+            if (end != NULL) {
+                *end = '\0';
+                next = strchr(end + 1, ',');
+            }
+        } else {
+            next = strchr(cell, ',');
+        }
+        if (next != NULL) {
+            *next = '\0';
+            next++;
+        }
+        cells[count] = cell;
+        count++;
+        cell = next;
+    }
+    return count;
+}
+
+static int column(const char *name, int count)
+{
+    for (int i = 0; i < count; i++) {
+        if (strcmp(cells[i], name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static double number(int place, int count)
+{
+    char *end = NULL;
+    double value = NAN;
+    if (place < count && cells[place][0] != '\0') {
+        value = strtod(cells[place], &end);
+        if (end == cells[place]) {
+            value = NAN;
+        }
+    }
+    return value;
+}
+
+int main(void)
+{
+    static @NAME@_state state;
+    int places[@CAPITALS@_SIGNALS];
+    @REAL@ signals[@CAPITALS@_SIGNALS];
+    @REAL@ estimates[@CAPITALS@_ESTIMATES];
+    int time = -1;
+    int count = 0;
+    long row = 1;
+
+    if (fgets(line, LONGEST, stdin) == NULL) {
+        (void)fprintf(stderr, "expected a table on standard input, found nothing\n");
+        return 2;
+    }
+    count = split(line);
+    time = column("t", count);
+    if (time < 0) {
+        time = column("time", count);
+    }
+    if (time < 0) {
+        (void)fprintf(stderr, "expected a column t or time\n");
+        return 2;
+    }
+    for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
+        places[i] = column(@NAME@_signal_names[i], count);
+        if (places[i] < 0) {
+            (void)fprintf(stderr, "expected a column %s\n", @NAME@_signal_names[i]);
+            return 2;
+        }
+    }
+    (void)printf("t");
+    for (int i = 0; i < @CAPITALS@_ESTIMATES; i++) {
+        const int is_quoted = strchr(@NAME@_estimate_names[i], ',') != NULL;
+        (void)printf(is_quoted ? ",\"%s\"" : ",%s", @NAME@_estimate_names[i]);
+    }
+    (void)printf("\n");
+    @NAME@_init(&state);
+    while (fgets(line, LONGEST, stdin) != NULL) {
+        int code = 0;
+        double t = 0.0;
+        row++;
+        count = split(line);
+        if (count == 1 && cells[0][0] == '\0') {
+            continue;
+        }
+        t = number(time, count);
+        for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
+            signals[i] = (@REAL@)number(places[i], count);
+        }
+        code = @NAME@_push(&state, t, signals, estimates);
+        if (code != 0) {
+            (void)fprintf(stderr, "row %ld, t = %.17g: code %d, see @NAME@.h\n", row, t, code);
+            return 1;
+        }
+        (void)printf("%.17g", t);
+        for (int i = 0; i < @CAPITALS@_ESTIMATES; i++) {
+            (void)printf(",%.17g", (double)estimates[i]);
+        }
+        (void)printf("\n");
+    }
+    return 0;
+}

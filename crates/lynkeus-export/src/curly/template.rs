@@ -1,0 +1,98 @@
+//! Pieces of the runtime, as they are written once for all languages.
+
+/// Lines between `//? name` (or `//? !name`) and `//?` stay where the name is (not) among those
+/// that hold.
+pub(super) fn chosen(text: &str, holds: &[&str]) -> String {
+    let mut is_kept = true;
+    let mut kept = String::new();
+    for line in text.lines() {
+        match line.strip_prefix("//?").map(str::trim) {
+            Some("") => is_kept = true,
+            Some(name) => {
+                is_kept = match name.strip_prefix('!') {
+                    Some(name) => !holds.contains(&name),
+                    None => holds.contains(&name),
+                };
+            }
+            None if is_kept => {
+                kept += line;
+                kept.push('\n');
+            }
+            None => {}
+        }
+    }
+    kept
+}
+
+/// The parts of a text that begin with a line `//= name`: names and texts.
+pub(super) fn parts(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    text.split("//= ").skip(1).filter_map(|part| {
+        let (name, rest) = part.split_once('\n')?;
+        Some((name, rest.trim_end()))
+    })
+}
+
+/// A piece of source text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Token<'t> {
+    /// a word or a number
+    Word(&'t str),
+    /// anything else
+    Other(&'t str),
+}
+
+/// Words, and what stands between them.
+pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        let first = rest.chars().next()?;
+        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let kind = is_word(first);
+        let end = rest.find(|c| is_word(c) != kind).unwrap_or(rest.len());
+        let (piece, left) = rest.split_at(end);
+        rest = left;
+        Some(match kind {
+            true => Token::Word(piece),
+            false => Token::Other(piece),
+        })
+    })
+}
+
+/// The text with words exchanged.
+pub(super) fn exchanged<'t>(text: &'t str, other: impl Fn(&'t str) -> Option<String>) -> String {
+    let mut result = String::with_capacity(text.len());
+    for token in tokens(text) {
+        match token {
+            Token::Word(word) => match other(word) {
+                Some(new) => result += &new,
+                None => result += word,
+            },
+            Token::Other(piece) => result += piece,
+        }
+    }
+    result
+}
+
+/// Whether a word stands in a text.
+pub(super) fn mentions(text: &str, word: &str) -> bool {
+    tokens(text).any(|token| token == Token::Word(word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_stay_where_their_condition_holds() {
+        let text = "a\n//? gate\nb\n//?\n//? !gate\nc\n//?\nd\n";
+        assert_eq!(chosen(text, &["gate"]), "a\nb\nd\n");
+        assert_eq!(chosen(text, &[]), "a\nc\nd\n");
+    }
+
+    #[test]
+    fn only_whole_words_are_exchanged() {
+        let other = |word: &str| (word == "x").then(|| "z".to_owned());
+        assert_eq!(exchanged("x + x1*ax (x)", other), "z + x1*ax (z)");
+        assert!(mentions("a = sign(b)", "sign") && !mentions("assign", "sign"));
+    }
+}

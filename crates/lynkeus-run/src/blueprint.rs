@@ -1,0 +1,83 @@
+//! What an estimator is made of.
+
+use crate::filter::{FilterModel, FilterSettings};
+use crate::integrator::AUTO_PRODUCT;
+use crate::{
+    Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
+};
+
+/// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
+/// elsewhere (another language, a device) is printed from one.
+#[derive(Clone, Debug)]
+pub enum Blueprint {
+    /// an observer whose sensors report when they do
+    Sampled {
+        /// its equations
+        observer: Box<SampledObserver>,
+        /// how it is integrated
+        method: Method,
+    },
+    /// a Kalman filter
+    Filter {
+        /// the plant with its noises
+        model: Box<FilterModel>,
+        /// which filter
+        settings: FilterSettings,
+        /// how it goes from sample to sample
+        run: EstimatorSettings,
+    },
+}
+
+impl Blueprint {
+    /// The estimator, at its start.
+    ///
+    /// # Errors
+    /// As [`Estimator::sampled`] and [`Estimator::filter`].
+    pub fn estimator(&self) -> Result<Estimator, Error> {
+        match self {
+            Self::Sampled { observer, method } => Estimator::sampled(observer, *method),
+            Self::Filter {
+                model,
+                settings,
+                run,
+            } => Estimator::filter(model, settings.clone(), *run),
+        }
+    }
+
+    /// How it is integrated.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        match self {
+            Self::Sampled { method, .. } => *method,
+            Self::Filter { run, .. } => run.method,
+        }
+    }
+
+    /// The same, integrated by another method.
+    #[must_use]
+    pub fn with_method(mut self, by: Method) -> Self {
+        match &mut self {
+            Self::Sampled { method, .. } => *method = by,
+            Self::Filter { run, .. } => run.method = by,
+        }
+        self
+    }
+}
+
+/// The longest fixed step that is short enough for the fastest mode at the start (|λ|·h ≤ ½), for
+/// known inputs at these values, the others at 0; none where the equations have no slopes there,
+/// or do not move.
+#[must_use]
+pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
+    let system: &System = match blueprint {
+        Blueprint::Sampled { observer, .. } => &observer.system,
+        Blueprint::Filter { model, .. } => model.flow(),
+    };
+    let mut evaluation = system.evaluation();
+    for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
+        let given = inputs.iter().find(|(input, _)| input == name);
+        *signal = given.map_or(0.0, |(_, value)| *value);
+    }
+    let needed = AUTO_PRODUCT / spectral_radius(&mut evaluation, 0.0, system.start());
+    (needed > 0.0 && needed.is_finite()).then_some(needed)
+}

@@ -1,0 +1,98 @@
+//! `lynkeus export`: an estimator as source code.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use lynkeus::{Error, ExportOptions, Precision};
+
+use super::inputs::Source;
+use super::output;
+use super::save::Results;
+
+/// What is exported.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Target {
+    /// C99: a header, a source, a bench that replays a log, a CMakeLists.txt
+    C,
+}
+
+/// [`Precision`] in the words of the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum Numbers {
+    /// double
+    #[default]
+    F64,
+    /// float
+    F32,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// What to write
+    #[arg(long, value_enum, value_name = "WHAT")]
+    to: Target,
+    /// The folder for the files; one that is not empty only with --force
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Replace files of the same names
+    #[arg(long)]
+    force: bool,
+    /// The type of numbers
+    #[arg(long, value_enum, default_value_t, value_name = "TYPE")]
+    precision: Numbers,
+    /// Longest step of the integration, in the unit of time, instead of the study's
+    #[arg(long, value_name = "STEP")]
+    step: Option<f64>,
+    /// No notes
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Everything is made before the first file is written.
+pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
+    let Target::C = options.to;
+    let wanted = ExportOptions {
+        precision: match options.precision {
+            Numbers::F64 => Precision::F64,
+            Numbers::F32 => Precision::F32,
+        },
+        step: options.step,
+    };
+    let folder = &options.output;
+    if !options.force {
+        must_be_empty(folder)?;
+    }
+    let made = lynkeus::export(&source.study, &wanted)?;
+    let failed = |e: std::io::Error| {
+        Error::input(format!("the folder cannot be made: {e}")).at(folder.display())
+    };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    let mut results = Results::default();
+    for file in &made.files {
+        results.put(&folder.join(&file.name), file.text.as_bytes())?;
+    }
+    results.keep()?;
+    if !options.quiet {
+        made.notes.iter().for_each(|note| output::note(note));
+        let names: Vec<&str> = made.files.iter().map(|file| file.name.as_str()).collect();
+        output::note(&format!("{}: {}", folder.display(), names.join(", ")));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn must_be_empty(folder: &Path) -> Result<(), Error> {
+    let is_full = match std::fs::read_dir(folder) {
+        Ok(mut entries) => entries.next().is_some(),
+        // it is made, or that fails with a word of its own
+        Err(_) => folder.exists(),
+    };
+    match is_full {
+        false => Ok(()),
+        true => Err(
+            Error::input("expected an empty folder or none, found one with files")
+                .at(folder.display())
+                .hint("name another after -o, or replace what has the same names with --force"),
+        ),
+    }
+}

@@ -1,0 +1,250 @@
+//! A study's estimator as source code for other machines.
+
+use std::path::Path;
+
+use lynkeus_export::curly::c::{self, File, Precision};
+use lynkeus_export::curly::{Device, Entry, FirstReading};
+use lynkeus_model::Variable;
+use lynkeus_observers::Design;
+use lynkeus_run::{Blueprint, Method, Step, needed_step};
+use lynkeus_structure::short;
+
+use crate::estimate::at_readings;
+use crate::headers::Headers;
+use crate::live::blueprint;
+use crate::prepare::{self, Prepared};
+use crate::study::BetweenSamples;
+use crate::systems::hat;
+use crate::{Error, Study, design};
+
+/// How an estimator is exported.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExportOptions {
+    /// the type of numbers
+    pub precision: Precision,
+    /// longest step of the integration, in the unit of time, instead of the study's
+    pub step: Option<f64>,
+}
+
+/// The answer of `lynkeus export`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Export {
+    /// files of one folder
+    pub files: Vec<File>,
+    /// what the user should know
+    pub notes: Vec<String>,
+}
+
+/// The study's estimator in C99, as `[estimate]` says: with the same fixed step it gives what
+/// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
+/// enough for the fastest mode at the start is taken, and told.
+///
+/// # Errors
+/// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
+/// that jump with time, loops that are searched, smoothing.
+pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
+    let mut notes = vec![];
+    let study = &causal(study, &mut notes);
+    let plant = prepare::plant(study)?;
+    let prepared = Prepared::new(study, &plant)?;
+    let design = prepared.design()?;
+    let made = blueprint(&prepared, &design)?;
+    let made = stepped(study, &prepared, made, options, &mut notes)?;
+    let told = Told::of(&prepared, &design, &made);
+    let first: Vec<FirstReading> = at_readings(&prepared)
+        .iter()
+        .map(|at| FirstReading {
+            sensor: at.sensor,
+            state: at.state,
+            slope: at.slope,
+            offset: at.offset,
+        })
+        .collect();
+    let about = about(study, &made);
+    let device = Device {
+        name: &plant.name,
+        blueprint: &made,
+        first_readings: &first,
+        signals: &told.signals,
+        estimates: &told.estimates,
+        monitors: told.monitors,
+        deviations: study.estimate.deviations,
+        words: &told.words,
+        about: &about,
+    };
+    let files = c::files(&device, options.precision);
+    let files = files.map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))?;
+    Ok(Export { files, notes })
+}
+
+/// The study without what looks ahead, which a device cannot.
+fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
+    let mut study = study.clone();
+    let settings = &mut study.estimate;
+    if settings.between_samples == BetweenSamples::Linear {
+        settings.between_samples = BetweenSamples::Hold;
+        notes.push(
+            "between_samples = \"linear\" of [estimate] looks ahead: here signals are held between samples"
+                .to_owned(),
+        );
+    }
+    if settings.smoothing.take().is_some() {
+        notes.push("smoothing looks ahead: the estimates are those of the filter".to_owned());
+    }
+    study
+}
+
+/// With fixed steps: those asked for, those of the study, or such as the fastest mode needs.
+fn stepped(
+    study: &Study,
+    prepared: &Prepared<'_>,
+    made: Blueprint,
+    options: &ExportOptions,
+    notes: &mut Vec<String>,
+) -> Result<Blueprint, Error> {
+    if let Some(step) = options.step {
+        if !(step > 0.0 && step.is_finite()) {
+            let message = format!("--step: expected a finite number above 0, found {step}");
+            return Err(Error::input(message));
+        }
+        return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
+    }
+    if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
+        return Ok(made);
+    }
+    let typical = |input: &Variable| {
+        let middle = 0.5 * (input.min + input.max);
+        let middle = if middle.is_finite() { middle } else { 0.0 };
+        input.start.or(input.nominal).unwrap_or(middle)
+    };
+    let known = prepared.plant().inputs.iter();
+    let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
+    let Some(needed) = needed_step(&made, &known) else {
+        let message = "the step cannot be chosen: the equations have no slopes at the start";
+        return Err(Error::input(message)
+            .at(&study.file)
+            .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
+    };
+    let step = rounded(needed);
+    notes.push(format!(
+        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`, and --step gives another",
+        short(step)
+    ));
+    Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
+}
+
+/// The next shorter step of one digit: 1, 2 or 5.
+fn rounded(step: f64) -> f64 {
+    let unit = 10.0_f64.powf(step.log10().floor());
+    let digit = match step / unit {
+        d if d >= 5.0 => 5.0,
+        d if d >= 2.0 => 2.0,
+        _ => 1.0,
+    };
+    // the nearest number with these digits
+    format!("{digit}e{}", step.log10().floor())
+        .parse()
+        .unwrap_or(digit * unit)
+}
+
+/// What the code says of names.
+struct Told {
+    signals: Vec<Entry>,
+    estimates: Vec<Entry>,
+    monitors: usize,
+    words: Vec<Entry>,
+}
+
+impl Told {
+    fn of(prepared: &Prepared<'_>, design: &Design, made: &Blueprint) -> Self {
+        let plant = prepared.plant();
+        let variables = plant
+            .inputs
+            .iter()
+            .chain(&plant.outputs)
+            .chain(&plant.states);
+        let words: Vec<Entry> = variables.map(entry).collect();
+        let known = |name: &str| {
+            let own = words.iter().find(|entry| entry.name == name);
+            own.cloned().unwrap_or_else(|| Entry::named(name))
+        };
+        let observer = &design.observer;
+        let read = observer.measured.iter().chain(&observer.inputs);
+        let mut headers = Headers::beside(plant);
+        // as in the table of estimates
+        let _ = headers.time();
+        let has_deviations = prepared.study().estimate.deviations;
+        let mut deviations = vec![];
+        let mut estimates = vec![];
+        for estimate in &observer.estimates {
+            let name = &estimate.variable.name;
+            let about = known(name).about;
+            let header = headers.free(&hat(name), name);
+            estimates.push(Entry {
+                name: header,
+                about,
+            });
+            if has_deviations {
+                let header = headers.free(&format!("{name}_sd"), name);
+                deviations.push(Entry {
+                    name: header,
+                    about: format!("standard deviation of {name}"),
+                });
+            }
+        }
+        let monitors: Vec<Entry> = match made {
+            Blueprint::Filter { .. } => vec![],
+            Blueprint::Sampled { .. } => observer
+                .monitors
+                .iter()
+                .map(|monitor| Entry {
+                    name: headers.free(&monitor.name, &monitor.name),
+                    about: format!("{}, where below {}", monitor.meaning, monitor.alarm_below),
+                })
+                .collect(),
+        };
+        Self {
+            signals: read.map(|signal| known(&signal.name)).collect(),
+            monitors: monitors.len(),
+            estimates: estimates
+                .into_iter()
+                .chain(deviations)
+                .chain(monitors)
+                .collect(),
+            words,
+        }
+    }
+}
+
+/// A variable with its unit and what it is.
+fn entry(variable: &Variable) -> Entry {
+    let unit = variable.unit.as_ref().map(|unit| format!("[{unit}]"));
+    let words = [unit, variable.description.clone()];
+    Entry {
+        name: variable.name.clone(),
+        about: words.into_iter().flatten().collect::<Vec<_>>().join(" "),
+    }
+}
+
+/// What stands at the head of the files: where they come from, and what is guaranteed.
+fn about(study: &Study, made: &Blueprint) -> Vec<String> {
+    let file = Path::new(&study.file).file_name();
+    let file = file.map_or_else(|| study.file.to_string(), |f| f.display().to_string());
+    let step = match made.method() {
+        Method::Rk4(Step::AtMost(h)) => format!("steps of {h:?} at most"),
+        Method::Rk4(Step::Substeps(n)) => format!("{n} steps from sample to sample"),
+        _ => String::new(),
+    };
+    let mut lines = vec![
+        format!(
+            "Generated by lynkeus {} from {file}: change the study, not this file.",
+            env!("CARGO_PKG_VERSION")
+        ),
+        format!("Classical Runge-Kutta method, {step}; signals are held between samples."),
+    ];
+    if let Ok(report) = design(study) {
+        lines.push(String::new());
+        lines.extend(report.to_string().lines().map(str::to_owned));
+    }
+    lines
+}

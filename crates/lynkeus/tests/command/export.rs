@@ -1,0 +1,283 @@
+//! `export --to c`: what a C compiler makes of it gives what `estimate` gives.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use lynkeus::{Study, Table};
+
+use crate::normal::Normal;
+use crate::random::{pick, plant};
+use crate::{Folder, examples, skipped};
+
+/// Examples of every family, whose observers need no log.
+const OBSERVERS: [(&str, &str); 14] = [
+    ("two-tanks", "study.toml"),
+    ("two-tanks", "smoothed.toml"),
+    ("lee", "study.toml"),
+    ("lee", "classical.toml"),
+    ("ltaief", "study.toml"),
+    ("predator-prey", "study.toml"),
+    ("farza", "study-noise.toml"),
+    ("cstr", "study.toml"),
+    ("van-der-pol-pair", "study.toml"),
+    ("quadrotor", "study.toml"),
+    ("flexible-joint", "study.toml"),
+    ("bioreactor", "study.toml"),
+    ("germani-manes", "practical.toml"),
+    ("column", "study-noise.toml"),
+];
+
+/// How many random studies: all of them by `LYNKEUS_STUDIES=200`.
+fn count() -> u64 {
+    let asked = std::env::var("LYNKEUS_STUDIES").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(28)
+}
+
+fn has(command: &str) -> bool {
+    let mut asked = Command::new(command);
+    let asked = asked.arg("--version").stdout(Stdio::null()).status();
+    asked.is_ok_and(|status| status.success())
+}
+
+/// The study without a section.
+fn without(study: &str, section: &str) -> String {
+    let mut is_inside = false;
+    let lines = study.lines().filter(|line| {
+        if line.starts_with('[') {
+            is_inside = line.starts_with(section);
+        }
+        !is_inside
+    });
+    lines.map(|line| format!("{line}\n")).collect()
+}
+
+/// An example with a log of its own simulation, in which some cells are missing.
+fn example(random: &mut Normal, folder: &Folder, place: usize) {
+    let (name, file) = OBSERVERS[place];
+    for entry in std::fs::read_dir(examples().join(name)).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "mo") {
+            let text = std::fs::read_to_string(&path).unwrap();
+            folder.write(path.file_name().unwrap().to_str().unwrap(), &text);
+        }
+    }
+    let study = std::fs::read_to_string(examples().join(name).join(file)).unwrap();
+    let study = without(&study, "[estimate]");
+    folder.write("s.toml", &study);
+    let seed = format!("{}", (random.uniform() * 1e6) as u64);
+    let made = folder.run(&[
+        "simulate",
+        "s.toml",
+        "--log",
+        "whole.csv",
+        "-o",
+        "run.csv",
+        "--seed",
+        &seed,
+    ]);
+    assert!(made.code < 2, "{name}: {}", made.err);
+    let whole = folder.read("whole.csv");
+    let share = *pick(random, &[0.0, 0.1, 0.3]);
+    let rows = whole.lines().take(160).enumerate().map(|(row, line)| {
+        let cells = line.split(',').enumerate().map(|(column, cell)| {
+            let is_lost = row > 1 && column > 0 && random.uniform() < share;
+            if is_lost { "" } else { cell }.to_owned()
+        });
+        cells.collect::<Vec<_>>().join(",") + "\n"
+    });
+    let log: String = rows.collect();
+    folder.write("log.csv", &log);
+    let has_noise = study.contains("\nnoise");
+    let sd = has_noise && random.uniform() < 0.4;
+    let between = *pick(random, &["hold", "predict"]);
+    let step = pick(random, &["substeps = 3", "substeps = 8"]);
+    let estimate = format!(
+        "\n[estimate]\nmethod = \"rk4\"\n{step}\nbetween_samples = \"{between}\"\nsd = {sd}\n"
+    );
+    folder.write("s.toml", &(study + &estimate));
+}
+
+/// A filter of a random plant on a random log.
+fn filter(random: &mut Normal, folder: &Folder) {
+    let (model, unknown) = plant(random);
+    folder.write("m.mo", &model);
+    let number = |random: &mut Normal, low: f64, high: f64| low + (high - low) * random.uniform();
+    let family = *pick(random, &["ekf", "ekf", "ukf"]);
+    let noise = match pick(random, &[0, 1, 2]) {
+        0 => format!("{:.3}", number(random, 0.01, 0.3)),
+        1 => "\"5%\"".to_owned(),
+        _ => "{ uniform = 0.2 }".to_owned(),
+    };
+    let noise = if noise.starts_with('{') {
+        "0.1".to_owned()
+    } else {
+        noise
+    };
+    let mut study = format!(
+        "plant = \"m.mo\"\n[sensors]\nmeasured = [\"y\"]\nunknown = {unknown:?}\nnoise = {{ y = {noise} }}\n"
+    );
+    if random.uniform() < 0.3 {
+        study += "limits = { y = [-1.5, 1.5] }\n";
+    }
+    study += "[process_noise]\n";
+    for name in ["x0", "x1", "x2", "x3"]
+        .iter()
+        .map(|n| (*n).to_owned())
+        .chain(unknown)
+    {
+        if model.contains(&format!("Real {name}(")) {
+            study += &format!("{name} = {:.4}\n", number(random, 0.0, 0.05));
+        }
+    }
+    study += &format!("[observer]\nfamily = \"{family}\"\n");
+    if random.uniform() < 0.5 {
+        study += &format!("gate = {}\n", pick(random, &[2, 3, 5]));
+    }
+    if family == "ukf" && random.uniform() < 0.5 {
+        study += *pick(
+            random,
+            &["alpha = 0.5\nbeta = 2\n", "kappa = 1\n", "alpha = 0.1\n"],
+        );
+    }
+    let step = pick(random, &["step = 0.02", "step = 0.05", "substeps = 4"]);
+    let sd = random.uniform() < 0.7;
+    study += &format!("[estimate]\nmethod = \"rk4\"\n{step}\nsd = {sd}\n");
+    folder.write("s.toml", &study);
+    let inputs: Vec<String> = (0..2).map(|i| format!("u{i}")).collect();
+    let inputs: Vec<&String> = inputs
+        .iter()
+        .filter(|u| model.contains(&format!("Real {u}(")))
+        .collect();
+    let mut log = String::from("t,y");
+    for input in &inputs {
+        log += &format!(",{input}");
+    }
+    log.push('\n');
+    let mut t = 0.0_f64;
+    for row in 0..60 {
+        let y = match random.uniform() < 0.15 {
+            true => String::new(),
+            false => format!("{:.6}", 0.5 * (0.3 * t).sin() + 0.1 * random.next()),
+        };
+        log += &format!("{t:.4},{y}");
+        for _ in &inputs {
+            let u = match row > 0 && random.uniform() < 0.2 {
+                true => String::new(),
+                false => format!("{:.4}", 0.3 * random.next()),
+            };
+            log += &format!(",{u}");
+        }
+        log.push('\n');
+        t += 0.05 + 0.1 * random.uniform();
+    }
+    folder.write("log.csv", &log);
+}
+
+/// Header, rows, and whether the run reached its end.
+type Run = (Vec<String>, Vec<Vec<f64>>, bool);
+
+fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
+    let study = Study::load(folder.join("s.toml"))?;
+    let log = Table::load(folder.join("log.csv"))?;
+    let outcome = lynkeus::estimate(&study, &log, &mut |_| ControlFlow::Continue(()))?;
+    let columns = outcome.columns(false);
+    let header = columns.iter().map(|(name, _)| name.clone()).collect();
+    let columns: Vec<Vec<f64>> = columns.iter().map(|(_, c)| c.iter().collect()).collect();
+    let rows = (0..columns[0].len()).map(|row| columns.iter().map(|c| c[row]).collect());
+    Ok((header, rows.collect(), outcome.ended.is_none()))
+}
+
+fn compiled(folder: &Path, options: &[&str]) {
+    let code = folder.join("c");
+    let mut compiler = Command::new("gcc");
+    compiler.args([
+        "-std=c99",
+        "-O2",
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Werror",
+    ]);
+    compiler
+        .args(["-ffp-contract=off", "-o", "replay"])
+        .args(options);
+    for file in std::fs::read_dir(&code).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_some_and(|e| e == "c") {
+            compiler.arg(path.file_name().unwrap());
+        }
+    }
+    let ended = compiler.arg("-lm").current_dir(&code).output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.success(), "{}\n{told}", code.display());
+}
+
+fn replayed(folder: &Path) -> Run {
+    let log = std::fs::File::open(folder.join("log.csv")).unwrap();
+    let mut command = Command::new(folder.join("c/replay"));
+    let ended = command.stdin(log).output().unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr);
+    assert!(
+        !told.contains("runtime error") && !told.contains("Sanitizer"),
+        "{told}"
+    );
+    let (header, rows) = crate::csv(&String::from_utf8(ended.stdout).unwrap());
+    (header, rows, ended.status.success())
+}
+
+/// The largest difference of two runs, each column in units of its largest value.
+fn difference(a: &Run, b: &Run, study: &str) -> f64 {
+    assert_eq!(a.0, b.0);
+    let length = |run: &Run| (run.1.len(), run.2);
+    assert_eq!(
+        length(a),
+        length(b),
+        "rows, and whether all of them: {study}"
+    );
+    let mut worst = 0.0_f64;
+    for column in 0..a.0.len() {
+        let size =
+            a.1.iter()
+                .fold(1e-300, |m: f64, row| m.max(row[column].abs()));
+        for (x, y) in a.1.iter().zip(&b.1) {
+            let off = (x[column] - y[column]).abs() / size;
+            worst = if off <= worst { worst } else { off };
+        }
+    }
+    worst
+}
+
+#[test]
+fn c_gives_what_estimate_gives() {
+    if !has("gcc") {
+        return skipped("gcc is not there");
+    }
+    let mut looked_at = 0;
+    for seed in 0..count() {
+        let mut random = Normal(1000 + seed);
+        let folder = Folder::empty();
+        match seed % 2 {
+            0 => example(&mut random, &folder, (seed / 2) as usize % OBSERVERS.len()),
+            _ => filter(&mut random, &folder),
+        }
+        let path = folder.path.path();
+        let made = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
+        let expected = estimated(path);
+        if made.code != 0 {
+            // what cannot be estimated is refused by both, in a sentence
+            assert!(expected.is_err(), "seed {seed}: {}", made.err);
+            continue;
+        }
+        let checked: &[&str] = match seed % 4 {
+            1 | 2 => &["-fsanitize=address,undefined"],
+            _ => &[],
+        };
+        compiled(path, checked);
+        let study = folder.read("s.toml");
+        let off = difference(&expected.unwrap(), &replayed(path), &study);
+        assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
+        looked_at += 1;
+    }
+    assert!(2 * looked_at >= count(), "{looked_at} of {}", count());
+}
