@@ -7,7 +7,7 @@ use std::collections::BinaryHeap;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
-use crate::region::Cell;
+use crate::region::{Cell, highest_corner, lowest_corner};
 use crate::{Coordinate, Place, Point, Region};
 
 /// Sides up to which every face of every cell is looked at.
@@ -254,10 +254,10 @@ impl<'a> Search<'a> {
         let Branch { cell, shared, .. } = &self.tree[place];
         let mut points = vec![self.region.middle_point(cell)];
         if *shared != Some(End::Lower) {
-            points.push(cell.iter().map(|side| side.lo()).collect());
+            points.push(lowest_corner(cell));
         }
         if *shared != Some(End::Upper) {
-            points.push(cell.iter().map(|side| side.hi()).collect());
+            points.push(highest_corner(cell));
         }
         if faces {
             points.extend(self.region.faces(cell));
