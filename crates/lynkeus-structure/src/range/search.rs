@@ -126,7 +126,6 @@ impl<'a> Search<'a> {
             highest: None,
         };
         search.add(region.cell(), None);
-        search.sample(0, true);
         Ok(search)
     }
 
@@ -143,6 +142,7 @@ impl<'a> Search<'a> {
     /// A bound of the absolute values, as well as the budget allows. The end that values were
     /// seen further out at is sought first; the other only as far as it is not nearer to zero.
     pub fn magnitude(&mut self) -> f64 {
+        self.sample(0, true);
         let size = |end: End| self.attained(end).map_or(0.0, f64::abs);
         let (first, second) = match size(End::Lower) > size(End::Upper) {
             true => (End::Lower, End::Upper),
@@ -154,6 +154,7 @@ impl<'a> Search<'a> {
 
     /// The same where a bound of `enough` is as good as a better one.
     fn end_beyond(&mut self, end: End, enough: f64) -> Found {
+        self.sample(0, true);
         let mut open = BinaryHeap::from([Open {
             bound: end.bound(self.tree[0].values),
             place: 0,
