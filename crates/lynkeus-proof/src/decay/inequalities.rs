@@ -29,6 +29,15 @@ impl Inequalities {
         bounded
     }
 
+    /// Fails where it is decided that no point is inside, or a limit ended the search; what the
+    /// arithmetic did not decide may be decided with other bounds.
+    pub fn may_have_inside(&self) -> Result<(), Failure> {
+        match self.bounded(WIDEST).has_inside() {
+            Err(Failure::Numerical) => Ok(()),
+            told => told,
+        }
+    }
+
     /// A point inside, from the same problem with P and Y bounded above, scaled so that
     /// P > I: the inequalities are homogeneous.
     pub fn normalised(&self) -> Result<Solution, Failure> {

@@ -211,11 +211,7 @@ impl<'a> Scaled<'a> {
             {
                 return Ok(all.like(&near, &found));
             }
-            match all.bounded(WIDEST).has_inside() {
-                // with other bounds it may be decided
-                Ok(()) | Err(Failure::Numerical) => {}
-                Err(certain) => return Err(certain),
-            }
+            all.may_have_inside()?;
         }
         all.normalised()
     }
