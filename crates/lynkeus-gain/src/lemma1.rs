@@ -22,8 +22,8 @@ mod kernel;
 use lynkeus_expr::Interval;
 use lynkeus_proof::elimination::{self, Column, Tails};
 use lynkeus_proof::search::largest;
-use lynkeus_proof::{Bounds, varying, vertices};
-use nalgebra::{DMatrix, SymmetricEigen};
+use lynkeus_proof::{Bounds, spectrum, varying, vertices};
+use nalgebra::DMatrix;
 
 pub use kernel::{Breaking, Kernel, kernel};
 
@@ -63,6 +63,9 @@ pub enum Error {
         /// the row that failed, from 1
         row: usize,
     },
+    /// AᵀS + SA has no value
+    #[error("the entries of S are so large that AᵀS + SA has no value in floating point")]
+    Overflow,
 }
 
 /// Partials that vary up to which all of their vertices are visited; beyond, the states are
@@ -200,13 +203,12 @@ impl Growth {
 /// fails. λ_max is convex in a, so the vertices decide. With D² = diag S the
 /// largest eigenvalue −μ of D⁻¹PD⁻¹ gives xᵀPx ≤ −μ|Dx|² ≤ −μ·min(S_ii)·|x|²,
 /// and is well conditioned where P itself is not. Of long chains the states are
-/// eliminated instead; a number ≤ 0 may then also mean that (17) is not proved.
+/// eliminated instead; a number ≤ 0 may then also mean that (17) is not proved, as where it
+/// leaves the range of numbers.
 pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
     let μ = match varying(bounds) > VERTICES {
         true => eliminated_decay(S, ρ, bounds),
-        false => vertices(bounds)
-            .map(|a| -SymmetricEigen::new(inequality(S, ρ, &a)).eigenvalues.max())
-            .fold(f64::INFINITY, f64::min),
+        false => least_margin(S, ρ, bounds).unwrap_or(0.0),
     };
     let ends = |f: fn(f64, f64) -> f64, start| S.diagonal().iter().copied().fold(start, f);
     // a negative μ is scaled the other way: P has an eigenvalue above zero anyhow
@@ -214,6 +216,15 @@ pub fn decay(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> f64 {
         true => μ * ends(f64::min, f64::INFINITY),
         false => μ * ends(f64::max, 0.0),
     }
+}
+
+/// The largest μ with D⁻¹PD⁻¹ ≤ −μ at every vertex; none where an eigenvalue is not found.
+fn least_margin(S: &Tridiagonal, ρ: f64, bounds: &[Bounds]) -> Option<f64> {
+    let mut margins = vertices(bounds).map(|a| {
+        let eigen = spectrum::symmetric(inequality(S, ρ, &a))?;
+        Some(-eigen.eigenvalues.max())
+    });
+    margins.try_fold(f64::INFINITY, |least, μ| Some(least.min(μ?)))
 }
 
 /// The largest μ with D⁻¹PD⁻¹ ≤ −μ that elimination proves, or zero.
@@ -251,6 +262,7 @@ fn unforced(S: &Tridiagonal, a: &[f64]) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::SymmetricEigen;
     use proptest::prelude::*;
 
     /// n = 2 by hand: P = [−ρ, a; a, 2sa] with s₁₁ = 1 is negative definite iff
@@ -307,6 +319,18 @@ mod tests {
         };
         let found = construct(&bounds).unwrap();
         assert!(found.η > 0.0 && found.S.is_positive_definite());
+    }
+
+    /// a·s overflows: no η is claimed.
+    #[test]
+    fn what_leaves_the_range_of_numbers_does_not_hold() {
+        let S = Tridiagonal::new(vec![1.0, 1e300], vec![-1e100]).unwrap();
+        let bounds = [Bounds {
+            lower: 1e250,
+            upper: 1e250,
+        }];
+        let η = decay(&S, 2.0, &bounds);
+        assert!(η <= 0.0, "{η}");
     }
 
     #[test]

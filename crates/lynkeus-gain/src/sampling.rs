@@ -12,6 +12,8 @@ const SHORTEST: f64 = 1e-2;
 const LONGEST: f64 = 1e3;
 /// Larger matrices are not looked at.
 const LARGEST: usize = 64;
+/// The exponential of a matrix takes its tenth power, and does not end where that overflows.
+const LARGEST_STEP: f64 = 1e28;
 /// How far from 1 a spectral radius is told from it.
 const ROUNDING: f64 = 1e-9;
 
@@ -53,8 +55,12 @@ pub fn limits(M: &[Vec<f64>], C: &[Vec<f64>]) -> Option<Limits> {
         return None;
     }
     let shrinks = |interval: f64| {
-        let flow = (&M * interval).exp();
-        radius(flow.view((0, 0), (n, n)).into_owned()).is_some_and(|radius| radius < 1.0 - ROUNDING)
+        let step = &M * interval;
+        // also where the flow is not a number: nothing is seen to shrink
+        step.amax() < LARGEST_STEP && {
+            let flow = step.exp().view((0, 0), (n, n)).into_owned();
+            radius(flow).is_some_and(|radius| radius < 1.0 - ROUNDING)
+        }
     };
     let mut interval = SHORTEST / fastest;
     if !shrinks(interval) {
@@ -140,6 +146,21 @@ mod tests {
         );
         let unstable = limits(&M(0.5), &[vec![1.0]]).unwrap().predict;
         assert!((unstable - 3.896).abs() < 0.04, "{unstable}");
+    }
+
+    /// A coupling in a unit of which powers overflow: nothing is told, and soon.
+    #[test]
+    fn a_flow_out_of_range_ends() {
+        for size in [1e40, 1e150, 1e300] {
+            let M = vec![
+                vec![-1.0, size, 1.0],
+                vec![0.0, -1.0, 1.0],
+                vec![0.0, size, 0.0],
+            ];
+            assert_eq!(limits(&M, &[vec![1.0, 0.0]]), None);
+            let alone = vec![vec![-1.0, 1.0], vec![size, 0.0]];
+            assert_eq!(limits(&alone, &[vec![1.0]]), None);
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //!
 //! The print has ‖V⁻¹‖ in (3.20); (3.18), from which it follows, has the square.
 
+use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
 /// K(λ) with the eigenvalues of A_n − K C_n at `poles`: the coefficients of
@@ -140,7 +141,7 @@ pub struct Lemma32 {
     /// K(λ)
     pub K: Vec<f64>,
     /// √cn(P) = cn(V): the factor by which the error may peak, in the
-    /// coordinates of the output's derivatives
+    /// coordinates of the output's derivatives; infinite where V leaves the range of numbers
     pub peaking: f64,
 }
 
@@ -193,8 +194,8 @@ pub fn lemma_3_2(n: usize, α: f64, β: f64, γ: f64) -> Result<Lemma32, Error> 
         }
     }
     let poles = powers(high, n);
-    let peaking =
-        vandermonde(&poles).singular_values().max() * inverse_norm(high, n).ok_or_else(large)?;
+    let inverse_norm = inverse_norm(high, n).ok_or_else(large)?;
+    let peaking = norm(vandermonde(&poles)).map_or(f64::INFINITY, |norm| norm * inverse_norm);
     Ok(Lemma32 {
         σ: high,
         K: place(&poles),
@@ -209,9 +210,16 @@ fn powers(σ: f64, n: usize) -> Vec<f64> {
 
 /// ‖V⁻¹(λ(σ))‖, where it is a number.
 fn inverse_norm(σ: f64, n: usize) -> Option<f64> {
-    let inverse = inverse(&powers(σ, n));
-    let finite = inverse.iter().all(|x| x.is_finite());
-    finite.then(|| inverse.singular_values().max())
+    norm(inverse(&powers(σ, n)))
+}
+
+/// The spectral norm, where it is a number.
+fn norm(matrix: DMatrix<f64>) -> Option<f64> {
+    Some(
+        spectrum::singular(matrix, false, false)?
+            .singular_values
+            .max(),
+    )
 }
 
 /// V_n(λ) of (2.25).
@@ -240,6 +248,19 @@ mod tests {
         let found = lemma_3_2(1, 0.3, 0.2, 0.4).unwrap();
         assert!((found.σ - (0.3 + 0.02 + 0.08)).abs() < 1e-15);
         assert_eq!(found.K, [found.σ]);
+    }
+
+    /// V holds σ^{n(n−1)}, here beyond 1e312, while σⁿ and V⁻¹ stay in range.
+    #[test]
+    fn a_matrix_out_of_range_ends() {
+        let found = lemma_3_2(10, 3e3, 1.0, 1.0).unwrap();
+        // ‖V⁻¹‖ is one there, as near as σ is to its limit
+        assert!((found.σ - (3e3 + 5.0 + 0.5)).abs() < 1e-2, "{}", found.σ);
+        assert!(found.K.iter().all(|k| k.is_finite()));
+        assert_eq!(found.peaking, f64::INFINITY);
+        let long = lemma_3_2(20, 10.0, 0.1, 0.1).unwrap();
+        assert!(long.σ > 10.1 && long.σ < 10.2, "{}", long.σ);
+        assert_eq!(long.peaking, f64::INFINITY);
     }
 
     #[test]

@@ -41,36 +41,53 @@ impl GainedChain<'_> {
     /// are infinite.
     pub fn middle(&self) -> Option<Vec<f64>> {
         let middle = |&(low, high): &(f64, f64)| {
-            let size = (low * high).sqrt();
-            (low * high > 0.0 && size.is_finite()).then(|| size.copysign(low))
+            let one_sign = low > 0.0 && high > 0.0 || low < 0.0 && high < 0.0;
+            let product = low * high;
+            // the product alone may leave the range of numbers
+            let size = match product.is_normal() {
+                true => product.sqrt(),
+                false => low.abs().sqrt() * high.abs().sqrt(),
+            };
+            (one_sign && size.is_finite()).then(|| size.copysign(low))
         };
         self.partials.iter().map(middle).collect()
     }
 
-    /// The eigenvalues of A − KC for these partials, the rightmost first.
+    /// The eigenvalues of A − KC for these partials, the rightmost first; empty where they are
+    /// not found.
     pub fn eigenvalues(&self, a: &[f64]) -> Vec<(f64, f64)> {
         let coefficients = self.coefficients(a.iter().map(|&a| Interval::point(a)));
+        // of a product out of range the middle is no coefficient
+        if !coefficients.iter().all(|c| c.magnitude().is_finite()) {
+            return vec![];
+        }
         let middles: Vec<f64> = coefficients.iter().map(|c| c.midpoint()).collect();
         hurwitz::zeros(&middles)
     }
 
-    /// The partials `a` as a witness, its value the largest real part there.
+    /// The partials `a` as a witness that the chain is not stable: its value is the largest real
+    /// part there, or the zero that it is at least, where it is not found.
     pub fn witness(&self, a: &[f64]) -> Point {
         let name = |j: usize| format!("a{}", j + 1);
-        let rightmost = self.eigenvalues(a).first().map_or(f64::NAN, |λ| λ.0);
+        let rightmost = self.eigenvalues(a).first().map_or(0.0, |λ| λ.0.max(0.0));
+        let coordinates = a.iter().enumerate();
         Point {
-            coordinates: a
-                .iter()
-                .enumerate()
-                .map(|(j, &a)| (name(j), a).into())
-                .collect(),
+            coordinates: coordinates.map(|(j, &a)| (name(j), a).into()).collect(),
             value: rightmost,
         }
     }
 }
 
+/// What is said of eigenvalues: `eigenvalues −1, −2 ± 1i`, or that none were found.
+pub(crate) fn told(eigenvalues: &[(f64, f64)]) -> String {
+    match eigenvalues.is_empty() {
+        true => "eigenvalues beyond the range of numbers".to_owned(),
+        false => format!("eigenvalues {}", listed(eigenvalues)),
+    }
+}
+
 /// Eigenvalues in words: conjugate pairs once.
-pub(crate) fn listed(eigenvalues: &[(f64, f64)]) -> String {
+fn listed(eigenvalues: &[(f64, f64)]) -> String {
     let upper = eigenvalues.iter().filter(|λ| λ.1 >= 0.0);
     let one = |&(re, im): &(f64, f64)| match im == 0.0 {
         true => shown(re),
@@ -123,5 +140,38 @@ mod tests {
             partials: &[(-1.0, 1.0)],
         };
         assert_eq!(mixed.middle(), None);
+    }
+
+    /// √(1e-200 · 1e-140) = 1e-170, whose square is no number beside zero; and its inverse.
+    #[test]
+    fn the_middle_of_small_and_large_bounds() {
+        let middle = |low: f64, high: f64| {
+            let partials = &[(low, high)];
+            GainedChain {
+                K: &[1.0, 1.0],
+                partials,
+            }
+            .middle()
+        };
+        for (low, high, exact) in [(1e-200, 1e-140, 1e-170), (1e140, 1e200, 1e170)] {
+            let found = middle(low, high).unwrap()[0];
+            assert!((found / exact - 1.0).abs() < 1e-14, "{found}");
+            let found = middle(-high, -low).unwrap()[0];
+            assert!((found / exact + 1.0).abs() < 1e-14, "{found}");
+        }
+        assert_eq!(middle(0.0, 1.0), None);
+        assert_eq!(middle(1.0, f64::INFINITY), None);
+        assert_eq!(middle(f64::NAN, 1.0), None);
+    }
+
+    #[test]
+    fn what_is_not_found_is_not_listed() {
+        let chain = GainedChain {
+            K: &[1e200, 1e200],
+            partials: &[(1e200, 1e200)],
+        };
+        assert_eq!(chain.eigenvalues(&[1e200]), []);
+        assert_eq!(chain.witness(&[1e200]).value, 0.0);
+        assert!(!told(&[]).ends_with(' '));
     }
 }

@@ -65,22 +65,36 @@ pub fn first_column(coefficients: &[Interval]) -> Vec<Interval> {
 
 /// The zeros of sⁿ + c₁sⁿ⁻¹ + … + cₙ as (real, imaginary), the rightmost first, in
 /// floating point: for the reader, not for a proof. Empty where a coefficient is not
-/// finite.
+/// finite, or no zeros are found.
 pub fn zeros(coefficients: &[f64]) -> Vec<(f64, f64)> {
     if !coefficients.iter().all(|c| c.is_finite()) || coefficients.is_empty() {
         return vec![];
     }
     let n = coefficients.len();
+    let unit = unit(coefficients);
     let companion = DMatrix::from_fn(n, n, |i, j| match (i, j) {
-        (_, 0) => -coefficients[i],
+        (_, 0) => -(0..=i).fold(coefficients[i], |c, _| c / unit),
         _ => f64::from(u8::from(j == i + 1)),
     });
     let Some(eigenvalues) = spectrum::eigenvalues(companion) else {
         return vec![];
     };
-    let mut found: Vec<(f64, f64)> = eigenvalues.iter().map(|λ| (λ.re, λ.im)).collect();
+    let scaled = eigenvalues.iter().map(|λ| (λ.re * unit, λ.im * unit));
+    let mut found: Vec<(f64, f64)> = scaled.collect();
+    if !found.iter().all(|λ| λ.0.is_finite() && λ.1.is_finite()) {
+        return vec![];
+    }
     found.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
     found
+}
+
+/// A power of two in which the zeros are measured: the polynomial of s/unit has no
+/// coefficient above one, and its companion matrix no entries of very different size.
+fn unit(coefficients: &[f64]) -> f64 {
+    let roots = (1..).zip(coefficients).filter(|(_, c)| **c != 0.0);
+    let exponents = roots.map(|(k, c)| (c.abs().log2() / f64::from(k)).ceil());
+    let largest = exponents.reduce(f64::max).unwrap_or(0.0);
+    largest.clamp(-1022.0, 1023.0).exp2()
 }
 
 #[cfg(test)]
@@ -106,6 +120,23 @@ mod tests {
         assert_eq!(decide(&wide), Stability::Unknown);
         // on the imaginary axis is not in the open half-plane
         assert_eq!(decide(&points(&[0.0, 1.0])), Stability::Unstable);
+    }
+
+    /// (s + r)(s + 2r)(s + 3r), whose coefficients are up to r³.
+    #[test]
+    fn zeros_far_from_one_are_found() {
+        for r in [1e-90, 1e-6, 1e9, 1e90] {
+            let found = zeros(&[6.0 * r, 11.0 * r * r, 6.0 * r * r * r]);
+            for (found, exact) in found.iter().zip([-r, -2.0 * r, -3.0 * r]) {
+                assert!(
+                    (found.0 - exact).abs() < 1e-12 * r && found.1 == 0.0,
+                    "{found:?}"
+                );
+            }
+            assert_eq!(found.len(), 3);
+        }
+        assert_eq!(zeros(&[0.0, 0.0]), [(0.0, 0.0); 2]);
+        assert!(zeros(&[f64::INFINITY, 1.0]).is_empty());
     }
 
     proptest! {

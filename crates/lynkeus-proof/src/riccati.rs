@@ -8,12 +8,13 @@
 
 use lynkeus_expr::Interval;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 
 use crate::definite::{is_below, is_positive_definite};
 use crate::lyapunov;
 use crate::magnitude::{length, size};
 use crate::matrix::{square, sum};
+use crate::spectrum;
 
 /// Newton steps; convergence is quadratic.
 const STEPS: usize = 40;
@@ -75,9 +76,9 @@ impl Riccati {
         }
         let P = DMatrix::from_fn(n, n, |i, j| D[i] * P[(i, j)] * D[j]);
         let inverse = P.clone().cholesky()?.inverse();
-        let top = |P: &DMatrix<f64>| SymmetricEigen::new(P.clone()).eigenvalues.max();
+        let top = |P: &DMatrix<f64>| Some(spectrum::symmetric(P.clone())?.eigenvalues.max());
         let unit = DMatrix::identity(n, n);
-        let (largest, smallest) = (top(&P) * (1.0 + 1e-6), (1.0 - 1e-3) / top(&inverse));
+        let (largest, smallest) = (top(&P)? * (1.0 + 1e-6), (1.0 - 1e-3) / top(&inverse)?);
         let bounded = is_below(&P, 1.0, &(&unit * largest)) && is_below(&unit, smallest, &P);
         if !(bounded && smallest > 0.0) {
             return None;

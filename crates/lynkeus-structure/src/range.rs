@@ -2,8 +2,7 @@
 
 mod search;
 
-use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape};
+use lynkeus_expr::{Graph, Interval, MissingInput, Node};
 
 use crate::{Dimension, Place, Point, Region, Regularity};
 use search::{End, Search};
@@ -49,7 +48,9 @@ pub fn range_within(
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let found = searched(graph, node, &region, budget)?;
+    let mut search = Search::new(graph, node, &region, budget)?;
+    let valued = has_values(graph, node, &region, &search)?;
+    let found = both_ends(&mut search, valued);
     graph.note(question, found.clone());
     Ok(found)
 }
@@ -65,10 +66,17 @@ pub fn enclosure_within(
     region: &Region,
     budget: usize,
 ) -> Result<Interval, MissingInput> {
-    match has_values(graph, node, region)? {
-        true => Ok(range_within(graph, node, region, budget)?.enclosure),
-        false => Ok(Interval::UNKNOWN),
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let question = Question::new(node, &region, budget);
+    if let Some(known) = graph.noted::<_, Range>(&question) {
+        return Ok(known.enclosure);
     }
+    let Some(mut search) = valued(graph, node, &region, budget)? else {
+        return Ok(Interval::UNKNOWN);
+    };
+    let found = both_ends(&mut search, true);
+    graph.note(question, found.clone());
+    Ok(found.enclosure)
 }
 
 /// The magnitude of the [`enclosure_within`], at up to half its cost: the end of the range that
@@ -82,9 +90,6 @@ pub fn magnitude_within(
     region: &Region,
     budget: usize,
 ) -> Result<f64, MissingInput> {
-    if !has_values(graph, node, region)? {
-        return Ok(f64::INFINITY);
-    }
     let region = region.restricted(&graph.symbols_of(&[node]));
     let question = Question::new(node, &region, budget);
     if let Some(known) = graph.noted::<_, Range>(&question) {
@@ -93,22 +98,44 @@ pub fn magnitude_within(
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let size = Search::new(graph, node, &region, budget)?.magnitude();
+    let Some(mut search) = valued(graph, node, &region, budget)? else {
+        return Ok(f64::INFINITY);
+    };
+    let size = search.magnitude();
     graph.note(question, size);
     Ok(size)
 }
 
-/// Whether an expression is seen to have a value everywhere on the box.
-fn has_values(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
-    let own = region.restricted(&graph.symbols_of(&[node]));
-    let question = Glance(Question::new(node, &own, 0));
+/// The search of an expression that has a value everywhere on the region; none of another.
+fn valued<'a>(
+    graph: &'a Graph,
+    node: Node,
+    region: &'a Region,
+    budget: usize,
+) -> Result<Option<Search<'a>>, MissingInput> {
+    if graph.noted(&Glance(Question::new(node, region, 0))) == Some(false) {
+        return Ok(None);
+    }
+    let search = Search::new(graph, node, region, budget)?;
+    let valued = has_values(graph, node, region, &search)?;
+    Ok(valued.then_some(search))
+}
+
+/// Whether an expression is seen to have a value everywhere on the region.
+fn has_values(
+    graph: &Graph,
+    node: Node,
+    region: &Region,
+    search: &Search<'_>,
+) -> Result<bool, MissingInput> {
+    if search.is_defined() {
+        return Ok(true);
+    }
+    let question = Glance(Question::new(node, region, 0));
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let mut whole = [Interval::ENTIRE];
-    let tape = Tape::new(graph, &own.symbols(), &[node])?;
-    tape.evaluator_in(Intervals).eval(&own.cell(), &mut whole);
-    let regular = whole[0].is_defined() || Regularity::of(graph, &[node], &[], &own)?.holds();
+    let regular = Regularity::of(graph, &[node], &[], region)?.holds();
     graph.note(question, regular);
     Ok(regular)
 }
@@ -150,23 +177,16 @@ impl Question {
     }
 }
 
-fn searched(
-    graph: &Graph,
-    node: Node,
-    region: &Region,
-    budget: usize,
-) -> Result<Range, MissingInput> {
-    let mut search = Search::new(graph, node, region, budget)?;
+fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
     let lower = search.end(End::Lower);
     let upper = search.end(End::Upper);
-    let defined = search.is_defined() || Regularity::of(graph, &[node], &[], region)?.holds();
     let values = Interval::new(lower.bound, -upper.bound).ok();
-    Ok(Range {
-        enclosure: values.filter(|_| defined).unwrap_or(Interval::UNKNOWN),
+    Range {
+        enclosure: values.filter(|_| valued).unwrap_or(Interval::UNKNOWN),
         lowest: search.point(End::Lower),
         highest: search.point(End::Upper),
         weakest: lower.weakest,
-    })
+    }
 }
 
 #[cfg(test)]

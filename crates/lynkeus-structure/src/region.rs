@@ -191,8 +191,7 @@ impl Region {
     /// two extreme corners; only finite ones.
     pub(crate) fn samples(&self, cell: &Cell) -> Vec<Vec<f64>> {
         let mut points = vec![self.middle_point(cell)];
-        points.push(cell.iter().map(|side| side.lo()).collect());
-        points.push(cell.iter().map(|side| side.hi()).collect());
+        points.extend([lowest_corner(cell), highest_corner(cell)]);
         points.extend(self.faces(cell));
         points.retain(|p| p.iter().all(|x| x.is_finite()));
         points
@@ -217,6 +216,16 @@ impl Region {
         let sides = self.dimensions.iter().zip(p.iter().zip(q));
         sides.into_iter().all(|(d, (p, q))| !d.integer || p == q)
     }
+}
+
+/// Every side of a cell at its lower end.
+pub(crate) fn lowest_corner(cell: &Cell) -> Vec<f64> {
+    cell.iter().map(|side| side.lo()).collect()
+}
+
+/// Every side of a cell at its upper end.
+pub(crate) fn highest_corner(cell: &Cell) -> Vec<f64> {
+    cell.iter().map(|side| side.hi()).collect()
 }
 
 /// A number inside [low, high], also where an end is infinite.

@@ -11,8 +11,8 @@
 //! Both λ_max(P̂(a)) and pᵀ(−P̂)⁻¹p are convex in a: the vertices decide.
 
 use lynkeus_expr::Interval;
-use lynkeus_proof::{Bounds, elimination, varying, vertices};
-use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
+use lynkeus_proof::{Bounds, elimination, spectrum, varying, vertices};
+use nalgebra::{Cholesky, DMatrix};
 
 use super::{BISECTIONS, Error, VERTICES, check, columns, unforced};
 use crate::Tridiagonal;
@@ -44,7 +44,7 @@ pub struct Breaking {
 ///
 /// # Errors
 /// Bounds that are not positive and finite or of another number than S has
-/// partials for; a long chain of which neither is found.
+/// partials for; a long chain of which neither is found; numbers out of range.
 pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
     check(bounds)?;
     let n = S.size();
@@ -55,24 +55,29 @@ pub fn kernel(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
         return eliminated(S, bounds);
     }
     let (mut least, mut worst): (f64, Option<Breaking>) = (0.0, None);
+    let mut overflows = false;
     for a in vertices(bounds) {
         let P = unforced(S, &a);
         let Phat = P.view((1, 1), (n - 1, n - 1)).into_owned();
         let p = P.view((1, 0), (n - 1, 1)).into_owned();
-        match Cholesky::new(-&Phat) {
-            Some(factor) => least = least.max(p.dot(&factor.solve(&p))),
-            None => {
-                let found = breaking(a, Phat);
-                if worst
-                    .as_ref()
-                    .is_none_or(|w| found.eigenvalue > w.eigenvalue)
-                {
-                    worst = Some(found);
-                }
-            }
+        if let Some(factor) = Cholesky::new(-&Phat) {
+            let ρ = p.dot(&factor.solve(&p));
+            overflows |= !ρ.is_finite() || !P.iter().all(|x| x.is_finite());
+            least = least.max(ρ);
+            continue;
+        }
+        let found = breaking(a, Phat);
+        overflows |= found.is_none();
+        let eigenvalue = |b: &Option<Breaking>| b.as_ref().map(|b| b.eigenvalue);
+        if eigenvalue(&found) > eigenvalue(&worst) {
+            worst = found;
         }
     }
-    Ok(worst.map_or(Kernel::Holds { ρ: least }, Kernel::Breaks))
+    match worst {
+        Some(found) => Ok(Kernel::Breaks(found)),
+        None if overflows => Err(Error::Overflow),
+        None => Ok(Kernel::Holds { ρ: least }),
+    }
 }
 
 /// Powers of two that ρ is sought among.
@@ -86,12 +91,10 @@ fn eliminated(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
     let definite =
         lowest.is_positive() && elimination::positive(lowest, &columns[1..], &bounds[1..], 0.0);
     if !definite {
-        let found = ascended(S, bounds);
-        let lost = Error::Lost { row: S.size() };
-        return if found.eigenvalue > 0.0 {
-            Ok(Kernel::Breaks(found))
-        } else {
-            Err(lost)
+        let found = ascended(S, bounds).ok_or(Error::Overflow)?;
+        return match found.eigenvalue > 0.0 {
+            true => Ok(Kernel::Breaks(found)),
+            false => Err(Error::Lost { row: S.size() }),
         };
     }
     let holds = |ρ: f64| {
@@ -113,44 +116,52 @@ fn eliminated(S: &Tridiagonal, bounds: &[Bounds]) -> Result<Kernel, Error> {
     Ok(Kernel::Holds { ρ: ends.1 })
 }
 
-/// A vertex at which no other end of a single partial gives a larger eigenvalue.
-fn ascended(S: &Tridiagonal, bounds: &[Bounds]) -> Breaking {
+/// Steps uphill; a few are usual.
+const STEPS: usize = 100;
+
+/// A vertex with a large eigenvalue, by steps uphill from the upper ends. λ_max(P̂(a)) is the
+/// largest vᵀP̂(a)v, each linear in a: at the ends that make that of the present eigenvector v
+/// largest λ_max is as large or larger. None where an eigenvalue is not found.
+fn ascended(S: &Tridiagonal, bounds: &[Bounds]) -> Option<Breaking> {
     let n = S.size();
-    let at = |a: &[f64]| {
-        let Phat = unforced(S, a).view((1, 1), (n - 1, n - 1)).into_owned();
-        breaking(a.to_vec(), Phat)
+    let at = |a: Vec<f64>| {
+        let Phat = unforced(S, &a).view((1, 1), (n - 1, n - 1)).into_owned();
+        breaking(a, Phat)
     };
-    let mut best = at(&bounds.iter().map(|b| b.upper).collect::<Vec<f64>>());
-    loop {
-        let flipped = |i: usize| {
-            let mut a = best.a.clone();
-            a[i] = if a[i] == bounds[i].upper {
-                bounds[i].lower
-            } else {
-                bounds[i].upper
-            };
-            at(&a)
-        };
-        let found = (0..bounds.len()).map(flipped);
-        match found.max_by(|x, y| x.eigenvalue.total_cmp(&y.eigenvalue)) {
-            Some(found) if found.eigenvalue > best.eigenvalue => best = found,
-            _ => return best,
+    let mut best = at(bounds.iter().map(|b| b.upper).collect())?;
+    for _ in 0..STEPS {
+        let a = (0..bounds.len()).map(|i| match slope(S, &best.direction, i + 1) >= 0.0 {
+            true => bounds[i].upper,
+            false => bounds[i].lower,
+        });
+        let found = at(a.collect())?;
+        if found.eigenvalue <= best.eigenvalue {
+            break;
         }
+        best = found;
     }
+    Some(best)
 }
 
-fn breaking(a: Vec<f64>, Phat: DMatrix<f64>) -> Breaking {
-    let eigen = SymmetricEigen::new(Phat);
+/// ½ ∂(vᵀPv)/∂a_{j−1} = v_j Σ_i v_i S_{i,j−1}
+fn slope(S: &Tridiagonal, v: &[f64], j: usize) -> f64 {
+    let near = j.saturating_sub(2)..=j;
+    v[j] * near.map(|i| v[i] * S.get(i, j - 1)).sum::<f64>()
+}
+
+/// None where the eigenvalues are not found.
+fn breaking(a: Vec<f64>, Phat: DMatrix<f64>) -> Option<Breaking> {
+    let eigen = spectrum::symmetric(Phat)?;
     let place = eigen.eigenvalues.imax();
     let column = eigen.eigenvectors.column(place);
     // a direction has no sign; the largest entry is shown as positive
     let sign = column[column.iamax()].signum();
     let direction = std::iter::once(0.0).chain(column.iter().map(|x| sign * x));
-    Breaking {
+    Some(Breaking {
         a,
         eigenvalue: eigen.eigenvalues[place],
         direction: direction.collect(),
-    }
+    })
 }
 
 #[cfg(test)]
@@ -196,6 +207,68 @@ mod tests {
         };
         assert!((ρ - 2.0 / 1.6).abs() < 1e-14, "{ρ}");
         assert!(decay(&S, ρ * 1.001, &[bounds]) > 0.0 && decay(&S, ρ * 0.999, &[bounds]) < 0.0);
+    }
+
+    /// Eleven partials, of which the best of all vertices is known: steps uphill lead near to it.
+    #[test]
+    fn steps_uphill_find_a_large_eigenvalue() {
+        let n = 12;
+        for seed in 0..3 {
+            let shaken = |i: usize| (7 * i + 5 * seed + 1) as f64 * 0.618_033_988_749_894_9 % 1.0;
+            let off = (0..n - 1).map(|i| -0.3 - shaken(i)).collect();
+            let diagonal = (0..n).map(|i| 3.0 + shaken(i + n)).collect();
+            let S = Tridiagonal::new(diagonal, off).unwrap();
+            let bounds: Vec<Bounds> = (0..n - 1)
+                .map(|i| (0.5, 0.5 + 1.5 * shaken(i + 2 * n)).into())
+                .collect();
+            let found = ascended(&S, &bounds).unwrap();
+            let eigenvalue = |a: &[f64]| {
+                let P = unforced(&S, a).view((1, 1), (n - 1, n - 1)).into_owned();
+                P.symmetric_eigenvalues().max()
+            };
+            assert!((eigenvalue(&found.a) - found.eigenvalue).abs() < 1e-12);
+            let best = vertices(&bounds)
+                .map(|a| eigenvalue(&a))
+                .fold(0.0, f64::max);
+            assert!(
+                found.eigenvalue > 0.95 * best,
+                "{} {best}",
+                found.eigenvalue
+            );
+            assert!(matches!(kernel(&S, &bounds), Ok(Kernel::Breaks(_))));
+        }
+    }
+
+    /// Of a hundred states with every partial open, in the time of a few decompositions.
+    #[test]
+    fn long_chains_are_climbed_in_a_few_steps() {
+        let n = 100;
+        let S = Tridiagonal::new(vec![3.0; n], vec![-0.5; n - 1]).unwrap();
+        let bounds = Bounds {
+            lower: 0.5,
+            upper: 2.0,
+        };
+        let Kernel::Breaks(found) = kernel(&S, &vec![bounds; n - 1]).unwrap() else {
+            panic!()
+        };
+        assert!(found.eigenvalue > 0.0 && found.direction.len() == n);
+    }
+
+    /// 2sa overflows: neither a least ρ nor a direction is claimed.
+    #[test]
+    fn what_leaves_the_range_of_numbers_is_told() {
+        let S = Tridiagonal::new(vec![1.0, 1e300], vec![-1e100]).unwrap();
+        let bounds = Bounds {
+            lower: 1e250,
+            upper: 1e250,
+        };
+        assert_eq!(kernel(&S, &[bounds]), Err(Error::Overflow));
+        let long = Tridiagonal::new(vec![1.0; 13], vec![-0.4; 12]).unwrap();
+        let wide = Bounds {
+            lower: 1.0,
+            upper: f64::MAX,
+        };
+        assert!(kernel(&long, &[wide; 12]).is_err());
     }
 
     /// The construction keeps its own ρ above the least one.

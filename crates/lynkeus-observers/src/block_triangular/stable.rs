@@ -17,7 +17,7 @@ use lynkeus_structure::Extended;
 use super::settings::{Correction, Settings};
 use crate::conditions::{Partial, names};
 use crate::proof::words::shown;
-use crate::stability::{GainedChain, listed};
+use crate::stability::{GainedChain, told};
 
 /// Whether K stabilises a chain; none where that is known: K by its poles for a chain of
 /// integrators, or the form whose gains are divided by the partials one at a time.
@@ -49,7 +49,7 @@ pub(super) fn stable(
         let detail = "a partial is not known to keep one sign between finite bounds";
         return Some(undecided(name, detail));
     };
-    let eigenvalues = format!("eigenvalues {}", listed(&chain.eigenvalues(&a)));
+    let eigenvalues = told(&chain.eigenvalues(&a));
     let constant = ranges.iter().all(|(low, high)| low == high);
     Some(match (chain.frozen(), constant) {
         (Stability::Unstable, _) => {

@@ -121,7 +121,11 @@ impl Laid<'_, '_> {
         }
         for found in &self.gains.lemma {
             rows.push(("σ of Lemma 3.2".to_owned(), found.σ.to_string()));
-            rows.push(("√cn(P)".to_owned(), found.peaking.to_string()));
+            let peaking = match found.peaking.is_finite() {
+                true => found.peaking.to_string(),
+                false => "beyond the range of numbers".to_owned(),
+            };
+            rows.push(("√cn(P)".to_owned(), peaking));
         }
         self.add_matrices(&mut rows)?;
         Ok(rows)

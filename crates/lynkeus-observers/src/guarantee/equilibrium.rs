@@ -177,11 +177,11 @@ impl<'a> Search<'a> {
                 .collect();
             let scaled = DMatrix::from_fn(rows, columns, |i, j| scaled[(i, j)] / norms[i]);
             let right = DVector::from_fn(rows, |i, _| f[i] / norms[i]);
-            // beside a pole values may overflow, and no decomposition takes that
-            if !scaled.iter().chain(right.iter()).all(|x| x.is_finite()) {
+            // beside a pole values may overflow
+            if !right.iter().all(|x| x.is_finite()) {
                 return None;
             }
-            let svd = scaled.try_svd(true, true, f64::EPSILON, 1000)?;
+            let svd = spectrum::singular(scaled, true, true)?;
             let least = RANK * svd.singular_values.max();
             let found = svd.solve(&right, least).ok()?;
             step = found.amax();

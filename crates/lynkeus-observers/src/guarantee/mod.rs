@@ -155,10 +155,10 @@ fn inequality(system: &ErrorSystem, sample: &Sample, proof: Option<&Proof>) -> C
 /// What can be said without a proof on the whole box.
 fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<String> {
     let mut notes = vec![];
-    if sample.slowest > 0.0 {
+    if let Some(slowest) = sample.slowest.filter(|slowest| *slowest > 0.0) {
         notes.push(format!(
             "at every point examined the error's Jacobian is stable, the slowest mode decaying at {}",
-            short(sample.slowest)
+            short(slowest)
         ));
     }
     if system.is_bounded()

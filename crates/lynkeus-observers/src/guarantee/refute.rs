@@ -27,11 +27,13 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What the search found.
 pub(super) struct Sample {
-    /// the slowest decay over the points examined, in floating point
-    pub slowest: f64,
+    /// the slowest decay over the points examined, in floating point; none where that of a
+    /// point is not found
+    pub slowest: Option<f64>,
     /// no rate above this can be proved by one quadratic form
     pub limit: f64,
-    /// where the decay is slowest, and the largest real part of an eigenvalue there
+    /// where the decay is slowest, of the points where it is found, and the largest real part
+    /// of an eigenvalue there: −∞ where it is found nowhere
     pub worst: Point,
     /// an eigenvalue there is proved to have a positive real part
     pub unstable: bool,
@@ -47,6 +49,7 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
             true => sides.enumerate().map(inner).collect(),
             false => sides.collect(),
         },
+        skipped: false,
     };
     let (mut best, mut highest) = (spread(&search.sides, 0), f64::NEG_INFINITY);
     for index in 0..POINTS {
@@ -66,8 +69,8 @@ pub(super) fn worst(graph: &Graph, system: &ErrorSystem) -> Sample {
     // the mean of all real parts is no higher than the highest, and no matter of rounding
     let mean = system.at(&mut search.evaluator, &best).trace() / system.scale.len() as f64;
     Sample {
-        slowest: -highest,
-        limit: match highest < 0.0 {
+        slowest: (!search.skipped).then_some(-highest),
+        limit: match highest < 0.0 && highest.is_finite() {
             true => -highest,
             false => -mean,
         },
@@ -86,7 +89,7 @@ pub(super) fn growing(
     system: &ErrorSystem,
     sample: &Sample,
 ) -> Result<Option<Check>, MissingInput> {
-    if sample.slowest > 0.0 {
+    if sample.worst.value < 0.0 {
         return Ok(None);
     }
     if sample.unstable && is_linear(extended, observer, system) {
@@ -117,6 +120,8 @@ struct Search<'a> {
     system: &'a ErrorSystem,
     evaluator: Evaluator,
     sides: Vec<Side>,
+    /// the eigenvalues at a point were not found
+    skipped: bool,
 }
 
 /// A side of the box within which points are tried.
@@ -188,7 +193,9 @@ pub(super) fn spread(sides: &[Side], index: usize) -> Vec<f64> {
 impl Search<'_> {
     /// The largest real part of an eigenvalue of A there.
     fn abscissa(&mut self, point: &[f64]) -> Option<f64> {
-        spectrum::abscissa(self.system.at(&mut self.evaluator, point))
+        let found = spectrum::abscissa(self.system.at(&mut self.evaluator, point));
+        self.skipped |= found.is_none();
+        found
     }
 
     /// Coordinate by coordinate to a worse point, with ever smaller steps.

@@ -10,6 +10,7 @@ use lynkeus_proof::decay::Proof;
 use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
+use lynkeus_proof::spectrum;
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
@@ -72,7 +73,8 @@ pub(super) fn bounds(
 pub(super) fn spread(P: &DMatrix<f64>) -> Option<f64> {
     let n = P.nrows();
     let unit = DMatrix::identity(n, n);
-    let largest = raised(P.symmetric_eigenvalues().max(), |α| {
+    let largest = spectrum::symmetric(P.clone())?.eigenvalues.max();
+    let largest = raised(largest, |α| {
         is_below(P, 1.0, &(&unit * α)).then(|| Interval::point(α).sqrt())
     })?;
     Some((largest * width(P, &unit)?).hi())
@@ -84,7 +86,8 @@ fn width(P: &DMatrix<f64>, Q: &DMatrix<f64>) -> Option<Interval> {
     // the largest eigenvalue of P^−½ Q P^−½ is that of QP⁻¹Q
     let inverse = P.clone().cholesky()?.inverse();
     let projected = Q * inverse * Q;
-    raised(projected.symmetric_eigenvalues().max(), |β| {
+    let largest = spectrum::symmetric(projected)?.eigenvalues.max();
+    raised(largest, |β| {
         let share = 1.0 / β;
         is_below(Q, share, P).then(|| (Interval::ONE / Interval::point(share)).sqrt())
     })

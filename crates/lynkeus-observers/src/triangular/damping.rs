@@ -13,7 +13,7 @@ use super::gains::Gains;
 use super::settings::Settings;
 use crate::DesignError;
 use crate::conditions::names;
-use crate::stability::{GainedChain, listed};
+use crate::stability::{GainedChain, told};
 use crate::stages::Found;
 
 /// Most states whose eigenvalues are computed: their number cubed is the work, and those of a long
@@ -34,14 +34,18 @@ fn loose_by(chain: &GainedChain<'_>, states: &[String]) -> Option<String> {
         return Some(format!("{verdict} for ({first} → … → {last})"));
     }
     let eigenvalues = chain.eigenvalues(&a);
-    let rightmost = eigenvalues.first().map_or(f64::NAN, |λ| λ.0);
-    (frozen == Stability::Unstable || rightmost >= 0.0).then(|| {
-        format!(
-            "is not stable for ({}), eigenvalues {} in the middle of the partials' bounds",
-            states.join(" → "),
-            listed(&eigenvalues)
-        )
-    })
+    let states = states.join(" → ");
+    let seen_stable = eigenvalues.first().map(|λ| λ.0 < 0.0);
+    match (frozen, seen_stable) {
+        // what Routh's table proves no rounded eigenvalue takes back
+        (Stability::Stable, _) | (Stability::Unknown, Some(true)) => None,
+        (Stability::Unknown, None) => Some(format!("is not proved to be stable for ({states})")),
+        (Stability::Unstable, None) => Some(format!("is not stable for ({states})")),
+        (_, Some(_)) => Some(format!(
+            "is not stable for ({states}), {} in the middle of the partials' bounds",
+            told(&eigenvalues)
+        )),
+    }
 }
 
 /// Says where A(a) − rS⁻¹CᵀC is not stable. A plant that is damped by itself may carry
@@ -138,5 +142,52 @@ impl Form {
             }
         }
         Ok(spectrum::abscissa(A).is_some_and(|largest| largest < 0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(K: &[f64], partials: &[(f64, f64)]) -> Option<String> {
+        let names: Vec<String> = (1..=K.len()).map(|i| format!("x{i}")).collect();
+        loose_by(&GainedChain { K, partials }, &names)
+    }
+
+    /// s³ + s² + c s + (c less one unit in the last place), with zeros left of the axis by less
+    /// than computed ones are wrong by: Routh's table proves them stable.
+    #[test]
+    fn rounded_eigenvalues_take_no_proof_back() {
+        let ones = [(1.0, 1.0); 2];
+        let mut beyond = 0;
+        for k in 1..60 {
+            let c = 0.37 * f64::from(k);
+            let K = [1.0, c, c.next_down()];
+            let chain = GainedChain {
+                K: &K,
+                partials: &ones,
+            };
+            assert_eq!(chain.frozen(), Stability::Stable);
+            assert_eq!(said(&K, &ones), None, "{c}");
+            beyond += usize::from(chain.eigenvalues(&[1.0; 2])[0].0 >= 0.0);
+        }
+        assert!(beyond > 0);
+    }
+
+    #[test]
+    fn what_is_not_found_is_not_called_stable() {
+        // s³ + s² + 1e400 s + 1e600
+        let large = [(1e200, 1e200); 2];
+        let text = said(&[1.0, 1e200, 1e200], &large).unwrap();
+        assert_eq!(text, "is not proved to be stable for (x1 → x2 → x3)");
+        let text = said(&[-1e200, 1e200], &[(1e200, 1e200)]).unwrap();
+        assert_eq!(text, "is not stable for (x1 → x2)");
+        let text = said(&[-2.0, 5.0], &[(1.0, 1.0)]).unwrap();
+        assert!(
+            text.contains("(x1 → x2), eigenvalues 1 ± 2i in the middle"),
+            "{text}"
+        );
+        // 3·3 > a₂ in the middle only
+        assert_eq!(said(&[3.0, 3.0, 1.0], &[(1.0, 1.0), (4.0, 16.0)]), None);
     }
 }

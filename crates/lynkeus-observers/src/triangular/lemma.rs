@@ -114,10 +114,6 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
 
 /// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
 fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
-    if !found.eigenvalue.is_finite() {
-        let detail = "the entries of S are so large that AᵀS + SA has no value in floating point";
-        return (undecided(title, detail), false);
-    }
     let value = quotient(S, found);
     let direction: Vec<String> = names
         .iter()
@@ -125,15 +121,17 @@ fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) 
         .filter(|(_, v)| v.abs() > 5e-4)
         .map(|(name, v)| format!("{v:+.3}·{name}"))
         .collect();
-    let detail = format!(
-        "this S satisfies it for no ρ: in the direction {}, which the sensor does not see, AᵀS + SA is +{} there (a_j: the partials along the chain), whatever ρ is",
-        direction.join(" "),
-        shown(found.eigenvalue)
-    );
+    let direction = direction.join(" ");
+    let size = shown(found.eigenvalue);
     if !value.is_positive() {
-        let detail = format!("{detail}; rounding errors keep this from being a refutation");
+        let detail = format!(
+            "in the direction {direction}, which the sensor does not see, AᵀS + SA is {size} whatever ρ is, too near to zero for rounding errors to tell its sign (a_j: the partials along the chain)"
+        );
         return (undecided(title, detail), false);
     }
+    let detail = format!(
+        "this S satisfies it for no ρ: in the direction {direction}, which the sensor does not see, AᵀS + SA is +{size} there (a_j: the partials along the chain), whatever ρ is"
+    );
     let name = |j: usize| format!("a{}", j + 1);
     let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
     let point = Point {
@@ -160,20 +158,51 @@ mod tests {
     use super::*;
     use lynkeus_structure::Verdict;
 
-    #[test]
-    fn a_matrix_that_overflows_is_no_refutation() {
-        let S = Tridiagonal::new(vec![1e308, 1e308], vec![-1.0]).unwrap();
-        let found = Breaking {
-            a: vec![1.0],
-            eigenvalue: f64::NAN,
-            direction: vec![0.0, 1.0],
-        };
-        let title = Hammouri::Lemma1 {
+    fn title() -> Hammouri {
+        Hammouri::Lemma1 {
             states: vec!["x".into(), "z".into()],
             ρ: 2.0,
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_overflows_is_no_refutation() {
+        let S = Tridiagonal::new(vec![1.0, 1e300], vec![-1e100]).unwrap();
+        let chain = Chain {
+            states: vec![0, 1],
+            speed: Interval::ONE,
+            scales: vec![Interval::ONE; 2],
+            S: vec![
+                vec![Interval::ONE, Interval::point(-1e100)],
+                vec![Interval::point(-1e100), Interval::point(1e300)],
+            ],
+            g: vec![Interval::ONE; 2],
+            partials: vec![(1e250, 1e250).into()],
         };
-        let (check, is_refuted) = breaks(title, &S, &found, &["x".into(), "z".into()]);
-        assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
-        assert!(!check.detail.contains("NaN"), "{}", check.detail);
+        let found = verify(&chain, &S, 1.0, &["x".into(), "z".into()], "");
+        assert!(!found.broken && found.μ.is_none());
+        assert!(matches!(found.check.verdict, Verdict::Undecided(_)));
+        assert!(
+            found.check.detail.contains("no value"),
+            "{}",
+            found.check.detail
+        );
+    }
+
+    /// AᵀS + SA = 0 on the kernel of C: that rounding does not tell its sign says nothing of ρ.
+    #[test]
+    fn what_rounding_hides_is_no_refutation() {
+        let S = Tridiagonal::new(vec![1.0, 3.0], vec![0.0]).unwrap();
+        for eigenvalue in [0.0, -1e-17] {
+            let found = Breaking {
+                a: vec![1.0],
+                eigenvalue,
+                direction: vec![0.0, 1.0],
+            };
+            let (check, is_refuted) = breaks(title(), &S, &found, &["x".into(), "z".into()]);
+            assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
+            let said = &check.detail;
+            assert!(!said.contains("for no ρ") && !said.contains("+-"), "{said}");
+        }
     }
 }

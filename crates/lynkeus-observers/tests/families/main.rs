@@ -5,6 +5,7 @@ mod block_triangular;
 mod chains;
 mod common;
 mod drift_observable;
+mod guarantee;
 mod names;
 mod peaking;
 mod state_affine;

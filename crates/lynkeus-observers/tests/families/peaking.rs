@@ -106,6 +106,22 @@ fn the_low_power_form_converges_with_gains_of_second_power() {
     assert!(largest(&errors(&plant, &design, 8.0, 6.0)) < 1e-6);
 }
 
+/// A chain of one state has no block, and so no coefficients.
+#[test]
+fn a_chain_of_one_state_takes_no_coefficients() {
+    let plant = plant("model One Real a; output Real y = a; equation der(a) = -a; end One;");
+    let none = Value::List(vec![Value::List(vec![])]);
+    let design = designed(
+        &Triangular,
+        &plant,
+        &low_power(2.0, &[("low_power_k", none)]),
+    );
+    assert_close(
+        &slope(&plant, &design, &[0.3], &[], &[0.1]),
+        &[-0.3 - 2.0 * 0.2],
+    );
+}
+
 /// The blocks by hand, with partials −2 and 5: only the second gain of each keeps one.
 #[test]
 fn partials_enter_one_at_a_time() {

@@ -96,7 +96,9 @@ fn grows(A: &IntervalMatrix, σ: f64, H: &DMatrix<f64>) -> bool {
 }
 
 fn is_positive_somewhere(H: &DMatrix<f64>) -> bool {
-    let eigen = H.clone().symmetric_eigen();
+    let Some(eigen) = spectrum::symmetric(H.clone()) else {
+        return false;
+    };
     let e: DVector<f64> = eigen
         .eigenvectors
         .column(eigen.eigenvalues.imax())

@@ -2,6 +2,7 @@
 
 use crate::lmi::{Affine, Failure, Problem, Solution};
 use crate::lyapunov::symmetric;
+use crate::spectrum;
 
 /// Bound of Y in the first phase, where P ≤ I.
 const WIDE: f64 = 30.0;
@@ -28,14 +29,22 @@ impl Inequalities {
         bounded
     }
 
+    /// Fails where it is decided that no point is inside, or a limit ended the search; what the
+    /// arithmetic did not decide may be decided with other bounds.
+    pub fn may_have_inside(&self) -> Result<(), Failure> {
+        match self.bounded(WIDEST).has_inside() {
+            Err(Failure::Numerical) => Ok(()),
+            told => told,
+        }
+    }
+
     /// A point inside, from the same problem with P and Y bounded above, scaled so that
     /// P > I: the inequalities are homogeneous.
     pub fn normalised(&self) -> Result<Solution, Failure> {
         let inside = |large: f64| self.bounded(large).inside();
         let inside = inside(WIDE).or_else(|_| inside(WIDEST))?;
-        let smallest = symmetric(&inside.value(&self.P))
-            .symmetric_eigenvalues()
-            .min();
+        let eigen = spectrum::symmetric(symmetric(&inside.value(&self.P)));
+        let smallest = eigen.ok_or(Failure::Numerical)?.eigenvalues.min();
         if smallest <= 0.0 {
             return Err(Failure::Numerical);
         }
@@ -54,7 +63,8 @@ impl Inequalities {
 /// Values for Z and β with room to spare, and |P|.
 pub(super) fn roomy(first: &Solution, P: &Affine, Y: &Affine) -> Result<(Solution, f64), Failure> {
     let (P, Y) = (symmetric(&first.value(P)), first.value(Y));
-    let largest = P.symmetric_eigenvalues().max();
+    let eigen = spectrum::symmetric(P.clone()).ok_or(Failure::Numerical)?;
+    let largest = eigen.eigenvalues.max();
     let factor = P.cholesky().ok_or(Failure::Numerical)?;
     let Z = symmetric(&(Y.transpose() * factor.solve(&Y))) * 2.0;
     let room = 1.0 + Z.trace() * 1e-3;

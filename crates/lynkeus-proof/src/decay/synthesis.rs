@@ -211,7 +211,7 @@ impl<'a> Scaled<'a> {
             {
                 return Ok(all.like(&near, &found));
             }
-            all.bounded(WIDEST).has_inside()?;
+            all.may_have_inside()?;
         }
         all.normalised()
     }

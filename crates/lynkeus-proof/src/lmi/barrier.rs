@@ -17,6 +17,14 @@ const PANEL: usize = 64;
 /// Newton steps altogether.
 const STEPS: usize = 400;
 
+/// Where the search for a minimum ended, and why.
+pub(super) struct Ended {
+    /// a point inside
+    pub x: DVector<f64>,
+    /// it is central, and good; else the arithmetic, the budget or the steps gave out
+    pub decided: bool,
+}
+
 /// A barrier problem.
 pub(super) struct Barrier<'a> {
     pub blocks: &'a [Block],
@@ -28,44 +36,36 @@ pub(super) struct Barrier<'a> {
 impl Barrier<'_> {
     /// From a point inside to near the minimum, until `good(x, gap)`: the gap bounds
     /// how far cᵀx is above its minimum. Where the arithmetic gives out, or the budget
-    /// or the steps, the last point is returned: it is still inside. None where the start is
-    /// not.
+    /// or the steps, the last point is returned: it is still inside, but nothing is decided.
+    /// None where the start is not.
     pub(super) fn minimise(
         &self,
         mut x: DVector<f64>,
         good: impl Fn(&DVector<f64>, f64) -> bool,
-    ) -> Option<DVector<f64>> {
+    ) -> Option<Ended> {
         let order = 1.0 + self.blocks.iter().map(|b| b.size as f64).sum::<f64>();
         let mut t = self.first(&x, order)?;
-        for dbg in 0..STEPS {
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "  step {dbg} m {} t {t:.2e} gap {:.2e} last {:.6e}",
-                    x.len(),
-                    order / t,
-                    x[x.len() - 1]
-                );
-            }
+        for _ in 0..STEPS {
             let factors = self.factors(&x)?;
             let (g, H) = self.derivatives(&x, &factors, t);
             let Some(step) = newton(H, &g, self.budget) else {
-                return Some(x);
+                break;
             };
             let decrement = -g.dot(&step);
             let done = good(&x, order / t);
             if decrement < if done { CENTRAL } else { NEAR } {
                 if done {
-                    return Some(x);
+                    return Some(Ended { x, decided: true });
                 }
                 t *= GROWTH;
                 continue;
             }
             match self.advanced(&x, &step, &factors, t, decrement) {
                 Some(next) => x = next,
-                None => return Some(x),
+                None => break,
             }
         }
-        Some(x)
+        Some(Ended { x, decided: false })
     }
 
     /// The t for which the start is most nearly central, within reason:
@@ -217,6 +217,7 @@ fn panel(L: &mut DMatrix<f64>, from: usize, to: usize) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lmi::Affine;
 
     /// Fewer rows than a panel, just as many, and several panels, against the matrix itself.
     #[test]
@@ -231,5 +232,31 @@ mod tests {
             indefinite[(n - 1, n - 1)] = -1.0;
             assert!(cholesky(indefinite, &Budget::default()).is_none());
         }
+    }
+
+    /// x² < 1/4 and x > 0, where x is minimised: a minimum is decided once it is good; where
+    /// nothing is good enough the arithmetic ends it at a point inside, and decides nothing.
+    #[test]
+    fn an_end_for_want_of_digits_decides_nothing() {
+        let x = Affine::unknown(1, 1, |_, _| Some(0));
+        let half = Affine::identity(1).scaled(0.5);
+        let blocks = [
+            Block::new(&Affine::symmetric_blocks(&half, &x, &half)),
+            Block::new(&x),
+        ];
+        let budget = Budget::default();
+        let barrier = Barrier {
+            blocks: &blocks,
+            cost: DVector::from_element(1, 1.0),
+            radius: 1e3,
+            budget: &budget,
+        };
+        let start = || DVector::from_element(1, 0.3);
+        let found = barrier.minimise(start(), |_, gap| gap < 1e-6).unwrap();
+        assert!(found.decided && found.x[0] > 0.0 && found.x[0] < 1e-6);
+        let found = barrier.minimise(start(), |_, _| false).unwrap();
+        assert!(!found.decided && barrier.is_inside(&found.x));
+        let outside = DVector::from_element(1, 0.6);
+        assert!(barrier.minimise(outside, |_, _| true).is_none());
     }
 }

@@ -32,7 +32,7 @@ mod block;
 
 pub use affine::Affine;
 
-use barrier::Barrier;
+use barrier::{Barrier, Ended};
 use block::Block;
 use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
@@ -202,8 +202,9 @@ impl Problem {
             return Err(Failure::Infeasible);
         }
         let good = |x: &DVector<f64>, gap: f64| gap < GAP * (1e-3 + barrier.cost.dot(x).abs());
+        // a point short of the minimum is a solution all the same
         let found = barrier.minimise(start.values.clone(), good);
-        let values = found.ok_or_else(|| self.failure())?;
+        let values = found.ok_or_else(|| self.failure())?.x;
         Ok(Solution { values })
     }
 
@@ -254,15 +255,14 @@ impl Problem {
             budget: &self.budget,
         };
         let decided = |x: &DVector<f64>, gap: f64| x[s] - gap > -MARGIN || enough(x[s], gap);
-        let x = barrier.minimise(start, decided);
-        let x = x.ok_or_else(|| self.failure())?;
+        let ended = barrier.minimise(start, decided);
+        let Ended { x, decided } = ended.ok_or_else(|| self.failure())?;
         match x[s] < -MARGIN {
-            // a search that was ended has decided nothing
-            false if self.budget.marked().is_some() => Err(self.failure()),
             true => Ok(Solution {
                 values: x.rows(0, s).into_owned(),
             }),
-            false => Err(Failure::Infeasible),
+            false if decided => Err(Failure::Infeasible),
+            false => Err(self.failure()),
         }
     }
 }

@@ -7,7 +7,7 @@
 
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{Fate, Ground, Hidden, Told};
 use crate::{Coordinate, Region};
@@ -19,6 +19,8 @@ const ZERO: f64 = 1e-8;
 /// Real parts within this share of the largest entry count as none: multiple eigenvalues on the
 /// imaginary axis are computed with a few digits only.
 const AXIS: f64 = 1e-5;
+/// The rounding of entries that computed eigenvalues stand for.
+const EIGENVALUES: f64 = 10.0 * f64::EPSILON;
 /// Entries within this share of those of the plant may be rounding alone.
 const ROUNDING: f64 = 1e-8;
 
@@ -222,18 +224,37 @@ impl Linear {
     }
 }
 
-/// The slowest mode of x' = Ax that shows in a row; none where its eigenvalues are not found.
+/// The slowest mode of x' = Ax that shows in a row, undecided where rounding may carry it across
+/// the imaginary axis; none where its eigenvalues are not found.
 fn fate(A: &DMatrix<f64>, row: DMatrix<f64>, scale: f64) -> Option<Fate> {
     let shown = reached(&A.transpose(), &row.transpose())?;
-    let slowest = spectrum::abscissa(shown.transpose() * A * &shown)?;
-    Some(match slowest {
-        x if x < -AXIS * scale => Fate::Decays {
+    let modes = spectrum::eigenvalues(shown.transpose() * A * &shown)?;
+    let slowest = modes.iter().max_by(|a, b| a.re.total_cmp(&b.re))?;
+    let blur = AXIS.max(blur(&modes, *slowest, scale)) * scale;
+    Some(match slowest.re {
+        x if x < -blur => Fate::Decays {
             rate: -x,
             ground: Ground::Point,
         },
-        x if x > AXIS * scale => Fate::Grows { rate: x },
-        _ => Fate::Stays,
+        x if x > blur => Fate::Grows { rate: x },
+        x if x.abs() <= AXIS * scale => Fate::Stays,
+        _ => Fate::Undecided,
     })
+}
+
+/// How far a mode may be from where it is computed, in units of `scale`: a k-fold one, which
+/// rounding spreads over a circle, by the k-th root of the rounding.
+fn blur(modes: &DVector<Complex<f64>>, mode: Complex<f64>, scale: f64) -> f64 {
+    let radius = |k: usize| EIGENVALUES.powf(1.0 / k as f64);
+    let near = |k: usize| {
+        let across = 2.0 * radius(k) * scale;
+        modes
+            .iter()
+            .filter(|λ| (**λ - mode).norm() <= across)
+            .count()
+    };
+    let folds = (1..=modes.len()).rev().find(|&k| near(k) >= k);
+    folds.map_or(0.0, radius)
 }
 
 /// Rows of length one, those up to `least` left out.
@@ -308,5 +329,71 @@ fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> Option<DMatrix<f64>> {
             return Some(space);
         }
         space = next;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fate of what `row` shows of x' = Ax, in coordinates that leave no entry of A as it is.
+    fn mirrored(A: &DMatrix<f64>, row: &[f64]) -> Fate {
+        let n = A.nrows();
+        let v = DMatrix::from_fn(n, 1, |i, _| 1.0 + (i as f64).sin());
+        let Q = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared());
+        let row = DMatrix::from_row_slice(1, n, row) * &Q;
+        fate(&(&Q * A * &Q), row, 1.0).unwrap()
+    }
+
+    fn first(n: usize) -> Vec<f64> {
+        (0..n).map(|i| f64::from(u8::from(i == 0))).collect()
+    }
+
+    /// x_i' = x_{i+1} + r x_i
+    fn chain(n: usize, r: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(n, n, |i, j| match j.checked_sub(i) {
+            Some(0) => r,
+            Some(1) => 1.0,
+            _ => 0.0,
+        })
+    }
+
+    /// An n-fold mode is computed with an error of the n-th root of the rounding: of ten states,
+    /// 0.03.
+    #[test]
+    fn a_multiple_mode_near_the_axis_is_undecided() {
+        for r in [-0.01, 0.01, -1e-4] {
+            let fate = mirrored(&chain(10, r), &first(10));
+            assert!(matches!(fate, Fate::Undecided), "{fate:?}");
+        }
+        let fate = mirrored(&chain(10, -0.5), &first(10));
+        assert!(
+            matches!(fate, Fate::Decays { rate, .. } if rate > 0.3),
+            "{fate:?}"
+        );
+        let fate = mirrored(&chain(10, 0.5), &first(10));
+        assert!(matches!(fate, Fate::Grows { .. }), "{fate:?}");
+    }
+
+    /// Ten modes that are apart are computed to all digits, however slow the slowest is.
+    #[test]
+    fn modes_that_are_apart_are_decided() {
+        for slowest in [-1e-3, 1e-3] {
+            let mut A = chain(10, 0.0);
+            for i in 0..10 {
+                A[(i, i)] = if i == 6 {
+                    slowest
+                } else {
+                    -0.2 - 0.3 * i as f64
+                };
+            }
+            let fate = mirrored(&A, &first(10));
+            let found = match fate {
+                Fate::Decays { rate, .. } => -rate,
+                Fate::Grows { rate } => rate,
+                other => panic!("{other:?}"),
+            };
+            assert!((found - slowest).abs() < 1e-9, "{found}");
+        }
     }
 }

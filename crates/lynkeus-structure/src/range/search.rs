@@ -7,7 +7,7 @@ use std::collections::BinaryHeap;
 use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
-use crate::region::Cell;
+use crate::region::{Cell, highest_corner, lowest_corner};
 use crate::{Coordinate, Place, Point, Region};
 
 /// Sides up to which every face of every cell is looked at.
@@ -126,7 +126,6 @@ impl<'a> Search<'a> {
             highest: None,
         };
         search.add(region.cell(), None);
-        search.sample(0, true);
         Ok(search)
     }
 
@@ -143,6 +142,7 @@ impl<'a> Search<'a> {
     /// A bound of the absolute values, as well as the budget allows. The end that values were
     /// seen further out at is sought first; the other only as far as it is not nearer to zero.
     pub fn magnitude(&mut self) -> f64 {
+        self.sample(0, true);
         let size = |end: End| self.attained(end).map_or(0.0, f64::abs);
         let (first, second) = match size(End::Lower) > size(End::Upper) {
             true => (End::Lower, End::Upper),
@@ -154,6 +154,7 @@ impl<'a> Search<'a> {
 
     /// The same where a bound of `enough` is as good as a better one.
     fn end_beyond(&mut self, end: End, enough: f64) -> Found {
+        self.sample(0, true);
         let mut open = BinaryHeap::from([Open {
             bound: end.bound(self.tree[0].values),
             place: 0,
@@ -254,10 +255,10 @@ impl<'a> Search<'a> {
         let Branch { cell, shared, .. } = &self.tree[place];
         let mut points = vec![self.region.middle_point(cell)];
         if *shared != Some(End::Lower) {
-            points.push(cell.iter().map(|side| side.lo()).collect());
+            points.push(lowest_corner(cell));
         }
         if *shared != Some(End::Upper) {
-            points.push(cell.iter().map(|side| side.hi()).collect());
+            points.push(highest_corner(cell));
         }
         if faces {
             points.extend(self.region.faces(cell));

@@ -21,6 +21,8 @@ use walk::Walk;
 
 /// Cells looked at.
 const BUDGET: usize = 3000;
+/// Parts of one expression that are searched alone.
+const PARTS: usize = 16;
 /// A side halved so many times says where it is.
 const FINEST: f64 = 1e-4;
 
@@ -233,7 +235,7 @@ fn search(
             continue;
         };
         let spoils = walk.needs_all() && !known.values.is_defined();
-        if spoils && !asked.contains(&culprit) {
+        if spoils && asked.len() <= PARTS && !asked.contains(&culprit) {
             let found = part(graph, culprit, moving, &region)?;
             if found.as_ref().is_some_and(Trouble::is_undefined) {
                 return Ok(found);

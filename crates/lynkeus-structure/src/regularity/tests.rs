@@ -238,3 +238,20 @@ fn a_part_without_a_value_is_searched_once() {
     let found = Regularity::of(&g, &[chosen.node()], &[], &region).unwrap();
     assert!(found.holds(), "{:?}", found.trouble());
 }
+
+/// More overestimated parts than are searched alone: the others are decided with the whole, and
+/// a pole behind all of them is found.
+#[test]
+fn of_many_parts_the_first_are_searched_alone() {
+    let g = Graph::new();
+    let (x, y) = (g.symbol("x"), g.symbol("y"));
+    let region = Region {
+        dimensions: vec![side(x, -1.0, 2.0), side(y, 0.5, 3.0)],
+    };
+    let moving = [x.node(), y.node()];
+    let of = |f: Expr<'_>| Regularity::of(&g, &[f.node()], &moving, &region).unwrap();
+    let root = |i: u32| (x - x.powi(2) / 4.0 + 1.25 + 1e-3 * f64::from(i + 1)).sqrt();
+    let many = (0..3 * PARTS as u32).fold(y, |sum, i| sum + root(i));
+    assert!(of(many).holds());
+    assert!(undefined(&of(many + 1.0 / (x - 0.5))));
+}

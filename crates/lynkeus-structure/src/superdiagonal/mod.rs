@@ -9,6 +9,7 @@
 //! so some state of block k has to depend on it and it can be no shallower. Hence
 //! x¹ are the states in the outputs and x^{k+1} the new ones in the equations of x^k.
 
+mod constant;
 mod rank;
 
 use lynkeus_expr::{Graph, Node, Tape, jacobian};
@@ -269,6 +270,28 @@ mod tests {
             .map(|c| c.value)
             .collect();
         assert!((ξ[0] + ξ[1]).abs() < 1e-14 && ξ[0].abs() > 0.7);
+    }
+
+    /// Two measured states with units far apart, F_1 = diag(1, 1e-14), hide nothing.
+    #[test]
+    fn units_far_apart_hide_no_direction() {
+        let plant = |d: &str| {
+            format!(
+                "model P Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
+                 equation der(a) = c; der(b) = {d}; der(c) = -c; der(d) = -d; end P;"
+            )
+        };
+        for d in ["1e-14*d", "1e-200*d", "2*c + 1e-14*d"] {
+            assert_eq!(verdicts(&plant(d))[1], Verdict::Proved, "{d}");
+        }
+        let dependent =
+            "model P Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
+             equation der(a) = 3*c + d; der(b) = 6*c + 2*d; der(c) = -c; der(d) = -d; end P;";
+        let Verdict::Refuted(witness) = &verdicts(dependent)[1] else {
+            panic!()
+        };
+        let ξ = |i: usize| witness.points[0].coordinates[i].value;
+        assert_eq!(3.0 * ξ(0) + ξ(1), 0.0);
     }
 
     #[test]

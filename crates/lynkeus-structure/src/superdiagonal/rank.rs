@@ -1,12 +1,12 @@
 //! What the rank of F_k says before any input is known.
 
 use lynkeus_expr::{Graph, MissingInput, Node};
-use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
 use super::Factor;
+use super::constant::{self, Kernel};
 use crate::rank::subsets;
-use crate::{Coordinate, Extended, Finding, Matrix, Point, Region, Verdict, sign};
+use crate::{Extended, Finding, Matrix, Point, Region, Verdict, sign};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -29,11 +29,8 @@ impl Factor {
     ) -> Result<Finding, MissingInput> {
         let graph = extended.graph();
         let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
-        if let Some(direction) = self.hidden(extended) {
-            let detail = format!(
-                "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
-            );
-            return Ok(Finding::refuted(direction, detail));
+        if let Some(F) = self.constant(graph) {
+            return Ok(self.constant_rank(extended, &F, &shape));
         }
         let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
         let used = region.restricted(&graph.symbols_of(&entries));
@@ -62,26 +59,45 @@ impl Factor {
         })
     }
 
-    /// A direction that a matrix of numbers maps to zero.
-    fn hidden(&self, extended: &Extended<'_>) -> Option<Point> {
-        // at least as many rows as columns, for all right singular vectors
-        let rows = self.rows.len().max(self.columns.len());
-        let mut matrix = DMatrix::zeros(rows, self.columns.len());
+    /// The matrix, where all of its entries are numbers.
+    fn constant(&self, graph: &Graph) -> Option<DMatrix<f64>> {
+        let mut matrix = DMatrix::zeros(self.rows.len(), self.columns.len());
         for &(i, j, node) in &self.entries {
-            matrix[(i, j)] = extended.graph().constant_value(node)?;
+            let value = graph.constant_value(node)?;
+            matrix[(i, j)] = Some(value).filter(|x| x.is_finite())?;
         }
-        let svd = spectrum::singular(matrix, false, true)?;
-        let (smallest, value) = svd.singular_values.argmin();
-        if value > 1e-13 * svd.singular_values.max() {
-            return None;
-        }
-        let ξ = svd.v_t?.row(smallest).into_owned();
-        let component =
-            |(&i, &x): (&usize, &f64)| Coordinate::from((extended.states[i].name.clone(), x));
-        Some(Point {
-            coordinates: self.columns.iter().zip(ξ.iter()).map(component).collect(),
+        Some(matrix)
+    }
+
+    /// [`Factor::column_rank`] of a matrix of numbers.
+    fn constant_rank(&self, extended: &Extended<'_>, F: &DMatrix<f64>, shape: &str) -> Finding {
+        let kernel = constant::kernel(F);
+        let Kernel::Direction(ξ) = kernel else {
+            let (verdict, detail) = match kernel {
+                Kernel::Zero => (
+                    Verdict::Proved,
+                    format!(
+                        "{shape} and constant, its columns independent by elimination in interval arithmetic"
+                    ),
+                ),
+                _ => (
+                    Verdict::open(),
+                    format!(
+                        "{shape} and constant, so near to one that hides a direction that rounding errors keep from telling whether it does"
+                    ),
+                ),
+            };
+            return Finding { verdict, detail };
+        };
+        let component = |(&i, x): (&usize, f64)| (extended.states[i].name.clone(), x).into();
+        let direction = Point {
+            coordinates: self.columns.iter().zip(ξ).map(component).collect(),
             value: 0.0,
-        })
+        };
+        let detail = format!(
+            "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
+        );
+        Finding::refuted(direction, detail)
     }
 
     /// det FᵀF as the sum of the squared minors (Cauchy and Binet); none where F

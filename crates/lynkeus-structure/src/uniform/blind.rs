@@ -1,6 +1,6 @@
 //! Constant inputs for which the outputs do not tell states apart.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Graph, MissingInput, Node};
 
@@ -97,6 +97,7 @@ fn hidden(
     let mut open: Vec<usize> = (0..first).collect();
     while let Some(row) = open.pop() {
         let function = graph.substitute(&[functions[row]], fixed)[0];
+        let jumping = jumping(graph, function);
         for (state, partial) in partials[row].iter().enumerate() {
             if seen[state] {
                 continue;
@@ -106,7 +107,7 @@ fn hidden(
             let moves = is_still
                 .transpose()?
                 .is_some_and(|verdict| verdict != Verdict::Proved);
-            if moves || jumps_with(graph, function, symbols[state]) {
+            if moves || jumping.contains(&symbols[state]) {
                 seen[state] = true;
                 open.push(first + state);
             }
@@ -119,9 +120,9 @@ fn hidden(
         .collect())
 }
 
-/// Whether a function may jump with a variable, which its derivative does not show.
-fn jumps_with(graph: &Graph, function: Node, symbol: Node) -> bool {
-    let nodes = graph.reachable(&graph.with_residuals(&[function]));
-    let mut jumps = nodes.into_iter().filter(|&node| graph.jumps(node));
-    jumps.any(|node| graph.symbols_of(&[node]).contains(&symbol))
+/// The variables with which a function may jump, which its derivatives do not show.
+fn jumping(graph: &Graph, function: Node) -> HashSet<Node> {
+    let mut jumps = graph.reachable(&graph.with_residuals(&[function]));
+    jumps.retain(|&node| graph.jumps(node));
+    graph.symbols_of(&jumps).into_iter().collect()
 }
