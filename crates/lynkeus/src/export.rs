@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lynkeus_export::curly::c::{self, File, Precision};
-use lynkeus_export::curly::{Device, Entry, FirstReading};
+use lynkeus_export::curly::{Device, Entry, FirstReading, javascript};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
@@ -17,10 +17,22 @@ use crate::study::BetweenSamples;
 use crate::systems::hat;
 use crate::{Error, Study, design};
 
+/// The language of an export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Target {
+    /// C99: a header, a source, a bench and how they are built
+    #[default]
+    C,
+    /// a JavaScript module
+    JavaScript,
+}
+
 /// How an estimator is exported.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExportOptions {
-    /// the type of numbers
+    /// the language
+    pub to: Target,
+    /// the type of numbers, in C
     pub precision: Precision,
     /// longest step of the integration, in the unit of time, instead of the study's
     pub step: Option<f64>,
@@ -35,7 +47,7 @@ pub struct Export {
     pub notes: Vec<String>,
 }
 
-/// The study's estimator in C99, as `[estimate]` says: with the same fixed step it gives what
+/// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
 /// enough for the fastest mode at the start is taken, and told.
 ///
@@ -72,7 +84,13 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         words: &told.words,
         about: &about,
     };
-    let files = c::files(&device, options.precision);
+    let files = match options.to {
+        Target::C => c::files(&device, options.precision),
+        Target::JavaScript => javascript::module(&device).map(|text| {
+            let name = format!("{}.mjs", c::prefix(&plant.name));
+            vec![File { name, text }]
+        }),
+    };
     let files = files.map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))?;
     Ok(Export { files, notes })
 }

@@ -121,7 +121,7 @@ pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
-pub use export::{Export, ExportOptions, export};
+pub use export::{Export, ExportOptions, Target, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;

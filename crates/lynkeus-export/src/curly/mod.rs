@@ -8,6 +8,7 @@ pub mod c;
 mod device;
 mod dialect;
 mod function;
+pub mod javascript;
 mod kalman;
 mod language;
 mod linear;

@@ -15,6 +15,8 @@ use super::save::Results;
 pub(super) enum Target {
     /// C99: a header, a source, a bench that replays a log, a CMakeLists.txt
     C,
+    /// A JavaScript module, for pages and Node
+    Js,
 }
 
 /// [`Precision`] in the words of the command line.
@@ -51,8 +53,11 @@ pub(super) struct Options {
 
 /// Everything is made before the first file is written.
 pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
-    let Target::C = options.to;
     let wanted = ExportOptions {
+        to: match options.to {
+            Target::C => lynkeus::Target::C,
+            Target::Js => lynkeus::Target::JavaScript,
+        },
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
             Numbers::F32 => Precision::F32,

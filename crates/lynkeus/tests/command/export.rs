@@ -226,6 +226,43 @@ fn replayed(folder: &Path) -> Run {
     (header, rows, ended.status.success())
 }
 
+/// A log through a module.
+const REPLAY: &str = r#"
+import { readFileSync, readdirSync } from "node:fs";
+const file = readdirSync("js").find((name) => name.endsWith(".mjs"));
+const { signals, estimates, init, push } = await import(`${process.cwd()}/js/${file}`);
+const [header, ...rows] = readFileSync("log.csv", "utf8").trim().split("\n").map((row) => row.split(","));
+const places = signals.map((name) => header.indexOf(name));
+const time = header.indexOf("t");
+const number = (cell) => (cell === undefined || cell === "" ? NaN : Number(cell));
+const state = init();
+const found = new Float64Array(estimates.length);
+console.log(["t", ...estimates].join(","));
+for (const row of rows) {
+    const t = Number(row[time]);
+    if (push(state, t, places.map((place) => number(row[place])), found) !== 0) {
+        process.exit(1);
+    }
+    console.log([t, ...found].join(","));
+}
+"#;
+
+fn replayed_by_node(folder: &Folder) -> Run {
+    let made = folder.run(&["export", "s.toml", "--to", "js", "-o", "js", "-q"]);
+    assert_eq!(made.code, 0, "{}", made.err);
+    folder.write("replay.mjs", REPLAY);
+    let mut node = Command::new("node");
+    let ended = node
+        .arg("replay.mjs")
+        .current_dir(folder.path.path())
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&ended.stderr);
+    assert!(told.is_empty(), "{told}");
+    let (header, rows) = crate::csv(&String::from_utf8(ended.stdout).unwrap());
+    (header, rows, ended.status.success())
+}
+
 /// The largest difference of two runs, each column in units of its largest value.
 fn difference(a: &Run, b: &Run, study: &str) -> f64 {
     assert_eq!(a.0, b.0);
@@ -253,6 +290,10 @@ fn c_gives_what_estimate_gives() {
     if !has("gcc") {
         return skipped("gcc is not there");
     }
+    let has_node = has("node");
+    if !has_node {
+        skipped("node is not there");
+    }
     let mut looked_at = 0;
     for seed in 0..count() {
         let mut random = Normal(1000 + seed);
@@ -275,8 +316,14 @@ fn c_gives_what_estimate_gives() {
         };
         compiled(path, checked);
         let study = folder.read("s.toml");
-        let off = difference(&expected.unwrap(), &replayed(path), &study);
+        let expected = expected.unwrap();
+        let off = difference(&expected, &replayed(path), &study);
         assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
+        if has_node {
+            let off = difference(&expected, &replayed_by_node(&folder), &study);
+            // functions of other libraries than the tool's
+            assert!(off <= 1e-12, "seed {seed}, JavaScript: {off:e}\n{study}");
+        }
         looked_at += 1;
     }
     assert!(2 * looked_at >= count(), "{looked_at} of {}", count());

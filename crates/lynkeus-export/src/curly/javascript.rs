@@ -1,0 +1,140 @@
+//! JavaScript: a module without dependencies, for pages and Node.
+
+use super::device::Device;
+use super::function::{Entry, comment};
+use super::language::Language;
+use super::machine::{Field, Machine};
+use super::template::exchanged;
+use crate::Refusal;
+
+/// What the library of the draft is in JavaScript, where that has it.
+const OWN: [(&str, &str); 3] = [
+    (
+        "power_of_two",
+        "/* The power of two of a number. */\nfunction power_of_two(a)\n{\n    return 2 ** Math.floor(Math.log2(a));\n}",
+    ),
+    (
+        "smaller",
+        "function smaller(a, b)\n{\n    return Math.min(a, b);\n}",
+    ),
+    (
+        "larger",
+        "function larger(a, b)\n{\n    return Math.max(a, b);\n}",
+    ),
+];
+
+/// Numbers of the words for what happened, as in C.
+const WORDS: [(&str, usize); 9] = [
+    ("TIME", 1),
+    ("INPUT", 2),
+    ("INTERVAL", 3),
+    ("DIVERGED", 4),
+    ("NOT_FINITE", 5),
+    ("MISSING", 0),
+    ("TAKEN", 1),
+    ("REJECTED", 2),
+    ("AT_LIMIT", 3),
+];
+
+/// A module: `signals` and `estimates` (names), `init()`, which gives a state, and
+/// `push(state, t, signals, estimates)`, which writes the estimates and gives 0 or a code as the
+/// C export has it.
+///
+/// # Errors
+/// What cannot run there, or cannot be written.
+pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
+    let machine = Machine::of(device)?;
+    let about: String = device
+        .about
+        .iter()
+        .map(|line| format!("// {}\n", one_line(line)))
+        .collect();
+    let sizes = machine
+        .sizes
+        .iter()
+        .map(|(name, size)| format!("const {name} = {size};\n"));
+    let library = machine.library().into_iter().map(|(name, text)| {
+        let own = OWN.iter().find(|own| own.0 == name);
+        match own {
+            Some((_, text)) => format!("{text}\n\n"),
+            None => format!("{}\n", numbered(&Language::JavaScript.render(text))),
+        }
+    });
+    let source = Language::JavaScript.render(&format!("{}\n{}", machine.tables, machine.source));
+    Ok(format!(
+        "{about}\nexport const signals = {};\nexport const estimates = {};\n\n{}\n{}{}\n{}\n{PUSH}",
+        names(device.signals),
+        names(device.estimates),
+        sizes.collect::<String>(),
+        library.collect::<String>(),
+        numbered(&source),
+        init(&machine.fields),
+    ))
+}
+
+const PUSH: &str = "export function push(s, t, signals, estimates)
+{
+    const before = structuredClone(s);
+    const code = take(s, t, signals, estimates);
+    if (code !== 0) {
+        Object.assign(s, before);
+    }
+    return code;
+}
+";
+
+fn numbered(text: &str) -> String {
+    exchanged(text, |word| {
+        let found = WORDS.iter().find(|known| known.0 == word);
+        found.map(|(_, number)| number.to_string())
+    })
+}
+
+fn init(fields: &[Field]) -> String {
+    let entry = |field: &Field| {
+        let value = match field.count {
+            None => format!("{:?}", field.start.first().copied().unwrap_or(0.0)),
+            Some(_) => {
+                let numbers: Vec<String> = field.start.iter().map(|v| format!("{v:?}")).collect();
+                format!("Float64Array.of({})", numbers.join(", "))
+            }
+        };
+        let about = match comment(&field.about) {
+            words if words.is_empty() => words,
+            words => format!(" /* {words} */"),
+        };
+        format!("        {}: {value},{about}\n", field.name)
+    };
+    let entries: String = fields.iter().map(entry).collect();
+    format!("export function init()\n{{\n    return {{\n{entries}    }};\n}}\n")
+}
+
+fn names(entries: &[Entry]) -> String {
+    let texts: Vec<String> = entries.iter().map(|entry| string(&entry.name)).collect();
+    format!("[{}]", texts.join(", "))
+}
+
+/// A string, safe inside of a page, too.
+fn string(text: &str) -> String {
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        '<' => "\\u003c".to_owned(),
+        '\u{2028}' | '\u{2029}' => " ".to_owned(),
+        c if c.is_control() => " ".to_owned(),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}
+
+/// A line of a comment.
+fn one_line(text: &str) -> String {
+    let plain = |c: char| match c {
+        '\u{2028}' | '\u{2029}' => ' ',
+        c if c.is_control() => ' ',
+        c => c,
+    };
+    text.chars()
+        .map(plain)
+        .collect::<String>()
+        .replace("</", "< /")
+}
