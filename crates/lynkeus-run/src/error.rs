@@ -215,6 +215,15 @@ impl From<Error> for Box<Interrupted> {
 /// How many states a message lists.
 const LISTED: usize = 6;
 
+/// All digits of a number, without three hundred zeros.
+fn digits(value: f64) -> String {
+    let size = value.abs();
+    match value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&size) {
+        true => format!("{value}"),
+        false => format!("{value:e}"),
+    }
+}
+
 /// "h1 = 0.2, h2 = 1.5, … (12 states)", non-finite entries first.
 pub(crate) fn state_text(names: &[String], values: &[f64]) -> String {
     let mut order: Vec<usize> = (0..names.len().min(values.len())).collect();
@@ -222,7 +231,7 @@ pub(crate) fn state_text(names: &[String], values: &[f64]) -> String {
     let listed: Vec<String> = order
         .iter()
         .take(LISTED)
-        .map(|&i| format!("{} = {}", names[i], values[i]))
+        .map(|&i| format!("{} = {}", names[i], digits(values[i])))
         .collect();
     let mut text = listed.join(", ");
     if order.len() > LISTED {
