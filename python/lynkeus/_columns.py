@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 Counts = NDArray[np.int64]
-#: numbers; counts of so many nanoseconds since 1970, in UTC or not; a kind, a number and nanoseconds
-#: for each cell; why it can be no column; an object with ``__arrow_c_stream__``
-Given = Numbers | tuple[Counts, int, bool] | tuple[NDArray[np.uint8], Numbers, Counts] | str | Any
+#: numbers; seconds since an instant; counts of so many nanoseconds since 1970, in UTC or not; a kind, a
+#: number and nanoseconds for each cell; why it can be no column; an object with ``__arrow_c_stream__``
+Given = Numbers | tuple[Numbers, str] | tuple[Counts, int, bool] | tuple[NDArray[np.uint8], Numbers, Counts] | str | Any
 
 _UNITS = {"W": 604_800 * 10**9, "D": 86_400 * 10**9, "h": 3600 * 10**9, "m": 60 * 10**9}
 _UNITS |= {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}

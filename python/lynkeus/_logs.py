@@ -105,6 +105,13 @@ def _taken(data: Any, name: str) -> Any:
     return data.column(name) if hasattr(data, "column") else data[name]
 
 
-def columns_of(log: _lynkeus.Log) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    """A log's columns by name: what of it travels to other processes."""
-    return {name: log.column(name) for name in log.headers()}
+def columns_of(log: _lynkeus.Log) -> list[tuple[str, Given]]:
+    """A log's columns in the engine's forms: what of it travels to other processes."""
+    return [(name, _given(log, name)) for name in log.headers()]
+
+
+def _given(log: _lynkeus.Log, name: str) -> Given:
+    values, origin = log.values(name), log.origin(name)
+    if values is None:
+        return log.refusal(name)
+    return values if origin is None else (values, origin)

@@ -237,7 +237,8 @@ class Run(Table):
         log = log_of(data)
         if len(log) != len(self):
             raise InputError(f"truth: expected {len(self)} rows, as the run has, found {len(log)}")
-        return {name: log.column(name) for name in log.headers()}
+        read = {name: log.values(name) for name in log.headers()}
+        return {name: values for name, values in read.items() if values is not None}
 
 
 class Simulation(Run):
@@ -301,6 +302,5 @@ def figures(run: Run) -> dict[str, Any]:
     against it (``refusal``, else ``None``), and of a simulation the root mean square error over the
     last half of its rows by estimated quantity, ``rms_NAME``."""
     refusal: LynkeusError | None = run.refusal
-    errors = run.summary["rms_error_last_half"] or {}
-    rms = {f"rms_{name}": error for name, error in errors.items()}
+    rms = {f"rms_{name}": error for name, error in run._core.settled()}
     return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

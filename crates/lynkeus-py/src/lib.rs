@@ -19,6 +19,8 @@ mod _lynkeus {
     #[pymodule_export]
     use crate::answer::Answer;
     #[pymodule_export]
+    const MEMORY: f64 = crate::away::MEMORY;
+    #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]
     use crate::functions::{Functions, families};
