@@ -3,11 +3,38 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _lynkeus
 from ._toml import document
+from .errors import InputError
+from .model import Model
+
+#: keys of ``[sensors]`` that stand for themselves in Python
+SENSORS = ("measured", "unknown", "disturbances", "noise", "limits")
+
+
+def sections(core: _lynkeus.Study) -> dict[str, Any]:
+    """A study's text as dictionaries."""
+    try:
+        return tomllib.loads(core.text)
+    except tomllib.TOMLDecodeError as error:
+        message = f"Python reads TOML 1.0, in which this is not said so: {error}"
+        hint = "write inline tables on one line and without a comma at their end, escapes as \\uXXXX"
+        raise InputError(f"{core.file}: {message}; {hint}", message, core.file, hint) from error
+
+
+def spelled(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """What Python may say briefly as a study's sections: a family, families, keys of sensors."""
+    found = dict(changes)
+    sensors = {name: found.pop(name) for name in SENSORS if name in found}
+    if sensors:
+        found["sensors"] = {**(found.get("sensors") or {}), **sensors}
+    families = found.get("compare")
+    if isinstance(families, Sequence) and not isinstance(families, str):
+        found["compare"] = {"families": families}
+    return found
 
 
 class Base:
@@ -16,14 +43,24 @@ class Base:
     def __init__(self, core: _lynkeus.Study) -> None:
         self._core = core
         self._plant = core.plant
-        self._sections = tomllib.loads(core.text)
+        self._sections = sections(core)
 
     def changed(self, changes: Mapping[str, Any]) -> _lynkeus.Study:
         """See :meth:`Study.replace`."""
-        sections = dict(self._sections)
-        for name, change in changes.items():
-            old = sections.get(name)
-            if isinstance(old, dict) and isinstance(change, Mapping):
+        study, asked = dict(self._sections), spelled(changes)
+        plant, choice = self._plant, self._core.model
+        if "plant" in asked:
+            model = asked.pop("plant")
+            model = model if isinstance(model, Model) else Model.load(model)
+            plant, choice = (model.name, model.text), model.choose
+            study |= {"plant": model.name, "model": model.choose}
+        if "model" in asked:
+            choice = study["model"] = asked.pop("model")
+        for name, change in asked.items():
+            old = study.get(name)
+            if name == "observer" and isinstance(change, str):
+                change = {"family": change}  # whose tuning is its own
+            elif isinstance(old, dict) and isinstance(change, Mapping):
                 change = {**old, **change}
-            sections[name] = change
-        return _lynkeus.Study.parse(document(sections), self._core.file, self._plant, self._core.model)
+            study[name] = change
+        return _lynkeus.Study.parse(document(study), self._core.file, plant, choice)

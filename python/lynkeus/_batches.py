@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._base import Base
 from ._each import Errors, Tell, each
-from ._fleet import split
+from ._fleet import is_one, split
 from ._logs import log_of
 from ._progress import Progress
 from .errors import InputError, NotCredible
@@ -36,6 +36,8 @@ class Options:
 
 def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> Many:
     """See :meth:`Study.estimate_each`."""
+    if by is None and not isinstance(logs, Mapping) and is_one(logs):
+        raise InputError('the logs: found one table: by="asset" names the column that tells them apart')
     named = split(logs, by) if by is not None else logs
     if isinstance(named, (str, bytes)) or not isinstance(named, (Mapping, Iterable)):
         raise InputError(

@@ -63,11 +63,11 @@ def each(
         try:
             tell(0.0)  # ended while it waited
             return work(items[place], tell)
-        except LynkeusError as error:
+        except Exception as error:
             error.add_note(f"in {names[place]}")
-            if errors == "raise":
-                raise
-            return error
+            if errors == "return" and isinstance(error, LynkeusError):
+                return error
+            raise
         finally:
             fractions.done[place] = 1.0
 

@@ -1,5 +1,6 @@
 """The compiled half of the package."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -26,7 +27,6 @@ class Answer:
     def arrow_stream(self) -> object: ...
     def svg(self) -> str | None: ...
     def refusal(self) -> LynkeusError | None: ...
-    def notes(self) -> list[str]: ...
     def log(self) -> list[tuple[str, _Column]]: ...
     def settled(self) -> list[tuple[str, float | None]]:
         """Root mean square errors over the last half of the rows, by name."""
@@ -35,7 +35,7 @@ class Log:
     """A table of named columns of equal length."""
 
     @staticmethod
-    def load(path: str) -> Log:
+    def load(path: str | os.PathLike[str]) -> Log:
         """A CSV or Parquet file."""
 
     @staticmethod

@@ -45,12 +45,12 @@ def campaign(
     Columns are ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by
     default :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
     the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. With
-    ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, Ray's
-    choice where it is left out; ``options`` are those of ``Dataset.map_batches``
+    ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, 200
+    where it is left out; ``options`` are those of ``Dataset.map_batches``
     (``num_cpus``, ``concurrency``, …)."""
     chosen(errors)
     asked = [_seed(seed) for seed in seeds]
-    data = needed("ray.data", "ray")
+    data = needed("ray.data", "lynkeus.ray")
     items = [{"seed": seed} for seed in asked]
     work = _Work(study, "seed", _seeded, keep, errors, None)
     return _mapped(data, items, work, blocks, options)
@@ -72,7 +72,7 @@ def sweep(
     Columns are ``place`` (of the change in the list), ``error`` and what ``keep`` makes of a run. The
     options are those of :func:`campaign`."""
     chosen(errors)
-    data = needed("ray.data", "ray")
+    data = needed("ray.data", "lynkeus.ray")
     items = [{"place": place, "change": pickle.dumps(dict(change))} for place, change in enumerate(changes)]
     columns = None if log is None else columns_of(log_of(log))
     work = _Work(study, "place", _changed, keep, errors, columns)
@@ -137,11 +137,14 @@ class _Work:
     def _row(self, base: Base, log: _lynkeus.Log | None, row: Mapping[str, Any]) -> dict[str, Any]:
         told = {self.key: row[self.key], "error": None}
         try:
-            return {**told, **self.keep(_run(base.changed(self.change(row)), log))}
+            kept = self.keep(_run(base.changed(self.change(row)), log))
         except LynkeusError as error:
             if self.errors == "raise":
                 raise
             return {**told, "error": str(error)}
+        if not isinstance(kept, Mapping):
+            raise InputError(f"keep: expected a dictionary, the row's columns by name, found {kept!r}")
+        return {**told, **kept}
 
 
 def _run(study: _lynkeus.Study, log: _lynkeus.Log | None) -> Run:
@@ -151,7 +154,7 @@ def _run(study: _lynkeus.Study, log: _lynkeus.Log | None) -> Run:
 def _table(key: str, rows: list[dict[str, Any]]) -> Any:
     """Rows as a table of Arrow in which texts are texts even where all are null, and in which what a
     failed run lacks is null."""
-    arrow = needed("pyarrow", "ray")
+    arrow = needed("pyarrow", "lynkeus.ray")
     names = list(dict.fromkeys(name for row in rows for name in row))
     texts = {"error", "refusal"}
     return arrow.table(

@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
 from . import _batches, _lynkeus
-from ._base import Base
+from ._base import Base, spelled
 from ._batches import Options
 from ._each import Errors
 from ._logs import log_of
@@ -87,23 +87,22 @@ class Study:
             "noise": noise,
             "limits": limits,
         }
-        given = {k: v for k, v in named.items() if v is not None}
-        text = document(
-            {
-                "tables": tables,
-                "sensors": {**(sensors or {}), **given} or None,
-                "process_noise": process_noise,
-                "parameters": parameters,
-                "observer": {"family": observer} if isinstance(observer, str) else observer,
-                "box": box,
-                "certify": certify,
-                "simulate": simulate,
-                "estimate": estimate,
-                "tune": tune,
-                "compare": compare if compare is None or isinstance(compare, Mapping) else {"families": compare},
-                "plot": plot,
-            }
-        )
+        given = {
+            "tables": tables,
+            "sensors": sensors,
+            "process_noise": process_noise,
+            "parameters": parameters,
+            "observer": {"family": observer} if isinstance(observer, str) else observer,
+            "box": box,
+            "certify": certify,
+            "simulate": simulate,
+            "estimate": estimate,
+            "tune": tune,
+            "compare": compare,
+            "plot": plot,
+            **{name: value for name, value in named.items() if value is not None},
+        }
+        text = document(spelled(given))
         plant = model if isinstance(model, Model) else Model.load(model)
         self._core = _lynkeus.Study.parse(text, "study", (plant.name, plant.text), plant.choose)
 
@@ -142,7 +141,9 @@ class Study:
     def replace(self, **changes: Any) -> Study:
         """The same study with other keys; those of a section are added to it:
         ``study.replace(observer={"theta": 2.0}, parameters={"k": 0.1})``. A key that is ``None`` is
-        left out."""
+        left out. What :class:`Study` takes briefly is taken here as well (``unknown=["inflow"]``,
+        ``compare=["ekf", "ukf"]``; ``observer="ekf"`` leaves no other tuning); ``plant`` is a :class:`Model` or
+        the path of one, ``model`` the name of the one to take in it."""
         return Study._of(Base(self._core).changed(changes))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:

@@ -97,6 +97,31 @@ def test_a_sweep_is_a_loop_over_changes(study: lynkeus.Study, logs: list[dict[st
         study.sweep([{"observer": {"nix": 1}}])
 
 
+def test_an_exception_of_keep_names_its_log(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    with pytest.raises(ZeroDivisionError) as raised:
+        study.estimate_each({"a": logs[0]}, keep=lambda run: 1 / 0)
+    assert raised.value.__notes__ == ["in the log of 'a'"]
+
+
+def test_one_table_of_many_assets_as_it_comes(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
+    expected = study.estimate(logs[0])
+    frame = pandas.DataFrame({**logs[0], "asset": "a"})
+    same(study.estimate_each(frame.set_index("t"), by="asset")["a"], expected)
+    gaps = [None, *frame["y"][1:]]
+    batch = pyarrow.record_batch({"t": frame["t"], "y": pyarrow.array(gaps), "asset": frame["asset"]})
+    run = study.estimate_each(batch, by="asset")["a"]
+    same(run, study.estimate({"t": logs[0]["t"], "y": np.array(gaps, float)}))
+    frame["asset"] = pandas.array(["a", None, *["a"] * (len(frame) - 2)], dtype="string")
+    with pytest.raises(lynkeus.InputError, match="row 2 names no asset"):
+        study.estimate_each(frame, by="asset")
+    with pytest.raises(lynkeus.InputError, match='column "y": expected one value per row, found float'):
+        study.estimate_each({"asset": ["a"], "t": [0.0], "y": 4.0}, by="asset")
+    for table in (frame, batch):
+        with pytest.raises(lynkeus.InputError, match="found one table: by="):
+            study.estimate_each(table)
+
+
 def test_figures_are_those_of_the_summary(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
     run = study.simulate()
     rms = {f"rms_{name}": error for name, error in run.summary["rms_error_last_half"].items()}
@@ -111,7 +136,7 @@ def test_what_is_asked_for_wrongly(study: lynkeus.Study, logs: list[dict[str, An
             study.estimate_each(wrong)  # type: ignore[call-overload]
     with pytest.raises(lynkeus.InputError, match='no column "asset": there are t, y'):
         study.estimate_each(logs[0], by="asset")
-    with pytest.raises(lynkeus.InputError, match="row 1 names no asset"):
+    with pytest.raises(lynkeus.InputError, match="row 2 names no asset"):
         study.estimate_each({"asset": ["a", None], "t": [0.0, 1.0], "y": [4.0, 4.0]}, by="asset")
     with pytest.raises(lynkeus.InputError, match='column "y": expected as many rows'):
         study.estimate_each({"asset": ["a", "a"], "t": [0.0, 1.0], "y": [4.0]}, by="asset")

@@ -47,6 +47,34 @@ def test_a_study_changes_and_travels(study: lynkeus.Study) -> None:
     np.testing.assert_array_equal(twin.simulate()["inflow_hat"], faster.simulate()["inflow_hat"])
 
 
+def test_changes_say_what_studies_say(study: lynkeus.Study) -> None:
+    two = lynkeus.Model.from_modelica(TEXT + TEXT.replace("Tank", "Half").replace("0.5*", "0.25*"))
+    both = study.replace(plant=two, model="Tank")
+    first, second = both.sweep([{"model": "Tank"}, {"model": "Half"}])
+    assert (first.summary["plant"], second.summary["plant"]) == ("Tank", "Half")
+    np.testing.assert_array_equal(first["inflow_hat"], study.simulate()["inflow_hat"])
+    noisy = study.replace(noise={"y": 0.1}, process_noise={"inflow": 1.0}, observer="ekf")
+    assert noisy.simulate().summary["family"] == "ekf"
+    assert "0.1" in noisy.text and 'unknown = ["inflow"]' in noisy.text
+    compared = noisy.replace(compare=["ekf", "ukf"]).compare()
+    assert [row["family"] for row in compared.summary["families"]] == ["ekf", "ukf"]
+
+
+def test_what_python_does_not_read_is_an_input_error(study: lynkeus.Study) -> None:
+    text = study.text + "[estimate]\ncolumns = { y = 'level', }\n"
+    newer = lynkeus.Study.parse(text, study.model, "s.toml")
+    with pytest.raises(lynkeus.InputError, match="s.toml: Python reads TOML 1.0"):
+        newer.replace(observer={"theta": 2.0})
+
+
+def test_a_design_tells_its_notes(examples: Path) -> None:
+    answers = [lynkeus.design(examples / "two-tanks" / "study.toml"), lynkeus.design(examples / "lee" / "study.toml")]
+    for answer in answers:
+        certificate = answer.summary["certificate"] or {}
+        assert answer.notes == [*answer.summary["notes"], *certificate.get("notes", [])]
+    assert any(answer.notes for answer in answers)
+
+
 def test_a_study_from_a_file_goes_without_it(tmp_path: Path) -> None:
     (tmp_path / "tank.mo").write_text(TEXT)
     (tmp_path / "s.toml").write_text('plant = "tank.mo"\n[sensors]\nunknown = ["inflow"]\n')
@@ -151,7 +179,7 @@ def test_progress_is_told_and_may_raise(study: lynkeus.Study) -> None:
     long = study.replace(simulate={"until": 1e5, "output_step": 1.0})
     told: list[float] = []
     long.simulate(progress=told.append)
-    assert told == sorted(told)
+    assert told == sorted(told) and told.count(1.0) == 1
 
     class Stopped(Exception):
         pass

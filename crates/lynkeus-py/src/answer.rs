@@ -33,10 +33,6 @@ pub trait Told: Send {
     fn refusal(&self) -> Option<Error> {
         None
     }
-    /// What the user should know.
-    fn notes(&self) -> Vec<String> {
-        vec![]
-    }
     /// Root mean square errors over the last half of the rows, of what is estimated.
     fn settled(&self) -> Vec<(String, f64)> {
         vec![]
@@ -142,10 +138,6 @@ impl Answer {
         self.ask(py, |told| told.refusal()).map(|e| exception(&e))
     }
 
-    fn notes(&self, py: Python<'_>) -> Vec<String> {
-        self.ask(py, |told| told.notes())
-    }
-
     /// By name; none where one is no number.
     fn settled(&self, py: Python<'_>) -> Vec<(String, Option<f64>)> {
         let errors = self.ask(py, |told| told.settled()).into_iter();
@@ -203,10 +195,6 @@ impl Told for Ran {
         self.outcome.refusal()
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.outcome.notes.clone()
-    }
-
     fn settled(&self) -> Vec<(String, f64)> {
         let estimated = self.outcome.quantities.iter();
         let estimated = estimated.filter(|q| q.estimate.is_some());
@@ -255,10 +243,6 @@ impl Told for Of<MonteCarlo> {
     fn refusal(&self) -> Option<Error> {
         self.found.refusal()
     }
-
-    fn notes(&self) -> Vec<String> {
-        self.found.notes.clone()
-    }
 }
 
 impl Told for Of<Comparison> {
@@ -306,10 +290,6 @@ impl Told for Sweep {
 
     fn svg(&self) -> Result<Option<String>, Error> {
         self.to_svg().map(Some)
-    }
-
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
     }
 }
 
