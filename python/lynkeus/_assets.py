@@ -135,7 +135,9 @@ class Follower:
         estimator.restore(start if known is None else bytes(known[0]))
         pandas = needed("pandas", "lynkeus.spark")
         table = pandas.concat(list(rows), ignore_index=True)
-        yield self._followed(estimator, key[0], table.sort_values(self.signals.time, kind="stable"))
+        # rows of one time in an order of their own: they come in any
+        ordered = table.sort_values([self.signals.time, *self.signals.read], kind="stable")
+        yield self._followed(estimator, key[0], ordered)
         self.state.update((estimator.snapshot(),))
 
     def _followed(self, estimator: _lynkeus.Estimator, asset: Any, table: Any) -> Any:

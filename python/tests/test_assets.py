@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from tank_study import log, tank
 
 import lynkeus
-from lynkeus._assets import Replay, Signals
+from lynkeus._assets import Follower, Replay, Signals
 
 pyarrow = pytest.importorskip("pyarrow")
 
@@ -59,3 +60,34 @@ def test_rows_of_one_time_in_whatever_order() -> None:
     order = np.random.default_rng(2).permutation(50)
     found = [at_rest(tank(), {name: x[rows] for name, x in data.items()}) for rows in (order, order[::-1])]
     assert found[0].equals(found[1])
+
+
+class Kept:
+    """A value of Spark's state."""
+
+    value: tuple[bytes] | None = None
+
+    def exists(self) -> bool:
+        return self.value is not None
+
+    def get(self) -> tuple[bytes] | None:
+        return self.value
+
+    def update(self, value: tuple[bytes]) -> None:
+        self.value = value
+
+
+def test_rows_in_motion_of_one_time_in_whatever_order() -> None:
+    pandas = pytest.importorskip("pandas")
+    data = {**log(rows=8), "asset": ["a"] * 8}
+    data["t"][5] = data["t"][4]
+    found = []
+    for rows in ([0, 4, 5, 2, 3, 1], [5, 4, 3, 2, 1, 0]):
+        follower = Follower(tank(), Signals.live(tank(), "asset", None))
+        kept = Kept()
+        follower.init(SimpleNamespace(getValueState=lambda *_: kept))  # noqa: B023
+        frame = pandas.DataFrame(data)
+        batches = [follower.handleInputRows(("a",), iter([frame.iloc[part]]), None) for part in (rows, [7, 6])]
+        found.append(pandas.concat([table for batch in batches for table in batch], ignore_index=True))
+    pandas.testing.assert_frame_equal(found[0], found[1])
+    assert found[0]["error"].isna().all() and found[0]["t"].is_monotonic_increasing
