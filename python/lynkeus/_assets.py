@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from . import _lynkeus
-from ._base import sections
 from ._logs import log_of
 from ._optional import needed
 from .errors import LynkeusError
@@ -32,14 +31,14 @@ class Signals:
         """Of the estimator of samples that come one by one."""
         estimator = study.estimator()
         read = estimator.signals
-        return cls(by, time or _time(sections(study._core), read), tuple(read), tuple(estimator.names))
+        return cls(by, time or _time(study._core.sections(), read), tuple(read), tuple(estimator.names))
 
     @classmethod
     def recorded(cls, study: Study, by: str, time: str | None) -> Signals:
         """Of logs, for which a study may ask for what no estimator of single samples gives."""
         observer, known = study.observer(), study.plant().inputs
         read = [*observer.sensors, *(name for name in observer.signals if name in known)]
-        told = sections(study._core)
+        told = study._core.sections()
         columns = told.get("estimate", {}).get("columns", {})
         read = list(dict.fromkeys(columns.get(name, name) for name in read))
         names = (header.removesuffix("_hat") for header in observer.outputs)

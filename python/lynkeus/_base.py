@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _lynkeus
 from ._toml import document
-from .errors import InputError
 from .model import Model
 
 #: keys of ``[sensors]`` that stand for themselves in Python
 SENSORS = ("measured", "unknown", "disturbances", "noise", "limits")
-
-
-def sections(core: _lynkeus.Study) -> dict[str, Any]:
-    """A study's text as dictionaries."""
-    try:
-        return tomllib.loads(core.text)
-    except tomllib.TOMLDecodeError as error:
-        message = f"Python reads TOML 1.0, in which this is not said so: {error}"
-        hint = "write inline tables on one line and without a comma at their end, escapes as \\uXXXX"
-        raise InputError(f"{core.file}: {message}; {hint}", message, core.file, hint) from error
 
 
 def spelled(changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,7 +31,7 @@ class Base:
     def __init__(self, core: _lynkeus.Study) -> None:
         self._core = core
         self._plant = core.plant
-        self._sections = sections(core)
+        self._sections = core.sections()
 
     def changed(self, changes: Mapping[str, Any]) -> _lynkeus.Study:
         """See :meth:`Study.replace`."""

@@ -72,6 +72,9 @@ class Study:
     def file(self) -> str: ...
     @property
     def text(self) -> str: ...
+    def sections(self) -> dict[str, Any]:
+        """The text as dictionaries."""
+
     @property
     def plant(self) -> tuple[str, str | None] | None: ...
     @property

@@ -11,6 +11,7 @@ mod errors;
 mod estimator;
 mod functions;
 mod log;
+mod sections;
 mod study;
 
 /// The module `lynkeus._lynkeus`.

@@ -8,6 +8,7 @@ use lynkeus::study::Whole;
 use lynkeus::{CheckOptions, Error};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::answer::{Answer, Of, Ran};
 use crate::away::{MEMORY, Terms, Watch, away};
@@ -15,6 +16,7 @@ use crate::errors::exception;
 use crate::estimator::Estimator;
 use crate::functions::Functions;
 use crate::log::Log;
+use crate::sections;
 
 /// A study with the texts that it was made from.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
@@ -70,6 +72,11 @@ impl Study {
     #[getter]
     fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The text as dictionaries.
+    fn sections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        sections::of(py, &self.text)
     }
 
     /// The name and the text of the plant.
