@@ -31,6 +31,8 @@ PICTURES: set[str] = set()
 LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)\s]+)(?=\))")
 #: what everything else is met through
 FIRST = ["Study", "Model", "Estimator", "Log", "Answer", "Table", "Run"]
+#: what modules have that are imported by themselves
+MODULES = ["ray.campaign", "ray.sweep", "spark.estimate", "spark.follow", "mpc.Estimator", "results.figures"]
 ROLE = re.compile(r":(?:attr|class|exc|func|meth|mod):(?=<code>)")
 CODE = re.compile(r"(^(?:```|~~~).*?^(?:```|~~~)\s*?$|`[^`\n]+`)", re.MULTILINE | re.DOTALL)
 
@@ -124,7 +126,7 @@ def python_reference() -> str:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
     )
     ordered = sorted(names, key=lambda name: (FIRST.index(name) if name in FIRST else len(FIRST), name))
-    blocks = "\n\n".join(f"::: lynkeus.{name}" for name in ordered)
+    blocks = "\n\n".join(f"::: lynkeus.{name}" for name in [*ordered, *MODULES])
     return f"# Python reference\n\n[Lynkeus in Python](../python.md) shows how they go together.\n\n{blocks}\n"
 
 

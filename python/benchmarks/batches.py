@@ -16,7 +16,7 @@ def main(count: int) -> None:
     study = lynkeus.Study.load("examples/column/study-noise.toml")
     changes = [{"simulate": {"seed": seed, "until": 30}} for seed in range(1, count + 1)]
     logs = study.sweep(changes, keep=lambda run: lynkeus.Log.from_columns(list(run.log.items())))
-    loop = cost(lambda: [study._core.estimate(log, None, None) for log in logs])
+    loop = cost(lambda: [study._core.estimate(log) for log in logs])
     each = cost(lambda: study.estimate_each(logs))
     print(f"{count} logs: one by one in the engine {loop:.2f} s, estimate_each {each:.2f} s, {each / loop:.2f} times")
 

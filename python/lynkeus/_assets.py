@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,12 +27,22 @@ class Signals:
     names: tuple[str, ...]
 
     @classmethod
-    def of(cls, study: Study, by: str, time: str | None) -> Signals:
+    def live(cls, study: Study, by: str, time: str | None) -> Signals:
+        """Of the estimator of samples that come one by one."""
         estimator = study.estimator()
-        read = tuple(estimator.signals)
-        named = tomllib.loads(study.text).get("estimate", {}).get("time")
-        time = time or named or ("time" if "t" in read else "t")
-        return cls(by, time, read, tuple(estimator.names))
+        read = estimator.signals
+        return cls(by, time or _time(study._core.sections(), read), tuple(read), tuple(estimator.names))
+
+    @classmethod
+    def recorded(cls, study: Study, by: str, time: str | None) -> Signals:
+        """Of logs, for which a study may ask for what no estimator of single samples gives."""
+        observer, known = study.observer(), study.plant().inputs
+        read = [*observer.sensors, *(name for name in observer.signals if name in known)]
+        told = study._core.sections()
+        columns = told.get("estimate", {}).get("columns", {})
+        read = list(dict.fromkeys(columns.get(name, name) for name in read))
+        names = (header.removesuffix("_hat") for header in observer.outputs)
+        return cls(by, time or _time(told, read), tuple(read), tuple(names))
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -42,6 +51,12 @@ class Signals:
     @property
     def headers(self) -> tuple[str, ...]:
         return tuple(f"{name}_hat" for name in self.names)
+
+
+def _time(study: dict[str, Any], read: list[str]) -> str:
+    """The header of the log's time column."""
+    named = study.get("estimate", {}).get("time")
+    return str(named or ("time" if "t" in read else "t"))
 
 
 class Replay:
@@ -54,7 +69,8 @@ class Replay:
     def asset(self, table: Any) -> Any:
         """The estimates of one asset, from a table of Arrow that holds its rows."""
         signals = self.signals
-        ordered = table.sort_by(signals.time)
+        # rows of one time in an order of their own: they come in any
+        ordered = table.sort_by([(name, "ascending") for name in (signals.time, *signals.read)])
         asset = table.column(signals.by)[0].as_py()
         log = {name: ordered.column(name) for name in (signals.time, *signals.read)}
         try:
@@ -69,7 +85,7 @@ class Replay:
     def _table(
         self, table: Any, asset: Any, columns: list[Any], credible: bool | None, error: str | None
     ) -> Any:
-        arrow = needed("pyarrow", "spark")
+        arrow = needed("pyarrow", "lynkeus.spark")
         rows, signals = len(columns[0]), self.signals
         numbers = [arrow.array(column, from_pandas=error is not None) for column in columns]
         made = {signals.by: arrow.array([asset] * rows, table.schema.field(signals.by).type)}
@@ -80,7 +96,7 @@ class Replay:
 
     def partition(self, batches: Iterable[Any]) -> Iterator[Any]:
         """The estimates of all assets of a partition, in the order in which they come first."""
-        arrow = needed("pyarrow", "spark")
+        arrow = needed("pyarrow", "lynkeus.spark")
         gathered = list(batches)
         if not gathered:
             return
@@ -116,9 +132,11 @@ class Follower:
         estimator, start = self._estimator
         known = self.state.get() if self.state.exists() else None
         estimator.restore(start if known is None else bytes(known[0]))
-        pandas = needed("pandas", "spark")
+        pandas = needed("pandas", "lynkeus.spark")
         table = pandas.concat(list(rows), ignore_index=True)
-        yield self._followed(estimator, key[0], table.sort_values(self.signals.time, kind="stable"))
+        # rows of one time in an order of their own: they come in any
+        ordered = table.sort_values([self.signals.time, *self.signals.read], kind="stable")
+        yield self._followed(estimator, key[0], ordered)
         self.state.update((estimator.snapshot(),))
 
     def _followed(self, estimator: _lynkeus.Estimator, asset: Any, table: Any) -> Any:
@@ -135,7 +153,7 @@ class Follower:
                 errors[row] = str(error)
         made = {signals.by: [asset] * len(times), signals.time: times}
         made |= {header: estimates[:, place] for place, header in enumerate(signals.headers)}
-        return needed("pandas", "spark").DataFrame({**made, "error": errors})
+        return needed("pandas", "lynkeus.spark").DataFrame({**made, "error": errors})
 
     def close(self) -> None:
         pass

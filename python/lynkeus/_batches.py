@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ._base import Base
 from ._each import Errors, Tell, each
-from ._fleet import split
+from ._fleet import is_one, split
 from ._logs import log_of
 from ._progress import Progress
 from .errors import InputError, NotCredible
@@ -20,18 +22,22 @@ Keep = Callable[[Any], Any] | None
 Many = list[Any] | dict[Hashable, Any]
 
 
-def estimate_each(
-    study: Study,
-    logs: Any,
-    *,
-    by: str | None,
-    keep: Keep,
-    workers: int | None,
-    errors: Errors,
-    progress: Progress,
-    time_limit: float | None,
-) -> Many:
+@dataclass(frozen=True)
+class Options:
+    """How many runs are made; see :meth:`Study.estimate_each`."""
+
+    keep: Keep
+    workers: int | None
+    errors: Errors
+    progress: Progress
+    time_limit: float | None
+    memory_limit: float
+
+
+def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> Many:
     """See :meth:`Study.estimate_each`."""
+    if by is None and not isinstance(logs, Mapping) and is_one(logs):
+        raise InputError('the logs: found one table: by="asset" names the column that tells them apart')
     named = split(logs, by) if by is not None else logs
     if isinstance(named, (str, bytes)) or not isinstance(named, (Mapping, Iterable)):
         raise InputError(
@@ -40,74 +46,57 @@ def estimate_each(
     logs = list(named.values() if isinstance(named, Mapping) else named)
     keys = list(named) if isinstance(named, Mapping) else None
     names = [f"the log of {key!r}" for key in keys] if keys is not None else _places("log", logs)
-    doubted: dict[int, str] = {}
 
-    def work(item: tuple[int, Any], tell: Tell) -> Any:
-        place, log = item
-        run = Estimation(study._core.estimate(log_of(log), tell, time_limit))
-        return _kept(run, keep, place, doubted)
+    def run(log: Any, tell: Tell) -> Run:
+        found = study._core.estimate(log_of(log), tell, options.time_limit, options.memory_limit)
+        return Estimation(found)
 
-    found = each(
-        work,
-        list(enumerate(logs)),
-        names,
-        workers=workers,
-        errors=errors,
-        progress=progress,
-        what="estimating",
-    )
-    _warn(doubted, names)
+    found = _all(run, logs, names, "estimating", options)
     return found if keys is None else dict(zip(keys, found, strict=True))
 
 
-def sweep(
-    study: Study,
-    changes: Iterable[Mapping[str, Any]],
-    log: Any,
-    *,
-    keep: Keep,
-    workers: int | None,
-    errors: Errors,
-    progress: Progress,
-    time_limit: float | None,
-) -> list[Any]:
+def sweep(study: Study, changes: Iterable[Mapping[str, Any]], log: Any, options: Options) -> list[Any]:
     """See :meth:`Study.sweep`."""
     asked = list(changes)
-    names = _places("change", asked)
     recorded = None if log is None else log_of(log)
-    doubted: dict[int, str] = {}
+    base = Base(study._core)
 
-    def work(item: tuple[int, Mapping[str, Any]], tell: Tell) -> Any:
-        place, change = item
-        core = study.replace(**change)._core
-        run: Run
+    def run(change: Mapping[str, Any], tell: Tell) -> Run:
+        core, limits = base.changed(change), (options.time_limit, options.memory_limit)
         if recorded is None:
-            run = Simulation(core.simulate(tell, time_limit))
-        else:
-            run = Estimation(core.estimate(recorded, tell, time_limit))
-        return _kept(run, keep, place, doubted)
+            return Simulation(core.simulate(tell, *limits))
+        return Estimation(core.estimate(recorded, tell, *limits))
 
-    found = each(
-        work,
-        list(enumerate(asked)),
-        names,
-        workers=workers,
-        errors=errors,
-        progress=progress,
-        what="sweeping",
-    )
-    _warn(doubted, names)
-    return found
+    return _all(run, asked, _places("change", asked), "sweeping", options)
 
 
 def _places(what: str, items: Sequence[Any]) -> list[str]:
     return [f"{what} {place}" for place in range(len(items))]
 
 
-def _kept(run: Run, keep: Keep, place: int, doubted: dict[int, str]) -> Any:
-    if run.refusal is not None:
-        doubted[place] = str(run.refusal)
-    return run if keep is None else keep(run)
+def _all(
+    run: Callable[[Any, Tell], Run], items: Sequence[Any], names: Sequence[str], what: str, options: Options
+) -> list[Any]:
+    """What is kept of the run of each item, in their order; one warning for all that are not credible."""
+    doubted: dict[int, str] = {}
+
+    def work(place: int, tell: Tell) -> Any:
+        found = run(items[place], tell)
+        if found.refusal is not None:
+            doubted[place] = str(found.refusal)
+        return found if options.keep is None else options.keep(found)
+
+    found = each(
+        work,
+        range(len(items)),
+        names,
+        workers=options.workers,
+        errors=options.errors,
+        progress=options.progress,
+        what=what,
+    )
+    _warn(doubted, names)
+    return found
 
 
 def _warn(doubted: dict[int, str], names: Sequence[str]) -> None:
@@ -116,4 +105,4 @@ def _warn(doubted: dict[int, str], names: Sequence[str]) -> None:
         return
     first = min(doubted)
     text = f"{len(doubted)} of {len(names)} results are not credible, first {names[first]}: {doubted[first]}"
-    warnings.warn(text, NotCredible, stacklevel=4)
+    warnings.warn(text, NotCredible, stacklevel=5)  # where the method of the study is called

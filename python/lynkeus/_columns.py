@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]
 Counts = NDArray[np.int64]
-#: numbers; counts of so many nanoseconds since 1970, in UTC or not; a kind, a number and nanoseconds
-#: for each cell; why it can be no column; an object with ``__arrow_c_stream__``
-Given = Numbers | tuple[Counts, int, bool] | tuple[NDArray[np.uint8], Numbers, Counts] | str | Any
+#: numbers; seconds since an instant; counts of so many nanoseconds since 1970, in UTC or not; a kind, a
+#: number and nanoseconds for each cell; why it can be no column; an object with ``__arrow_c_stream__``
+Given = Numbers | tuple[Numbers, str] | tuple[Counts, int, bool] | tuple[NDArray[np.uint8], Numbers, Counts] | str | Any
 
 _UNITS = {"W": 604_800 * 10**9, "D": 86_400 * 10**9, "h": 3600 * 10**9, "m": 60 * 10**9}
 _UNITS |= {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _MISSING, _NUMBER, _LOCAL, _ZONED = range(4)
+_SECOND = np.timedelta64(1, "s")
 _UTC = datetime.timezone.utc
 
 
@@ -57,7 +58,7 @@ def _array(values: Any) -> Given:
         return f"expected one value per row, found {shape}"
     kind = array.dtype.kind
     if kind == "m":
-        array, kind = array / np.timedelta64(1, "s"), "f"
+        array, kind = array / _SECOND, "f"
     if kind in "fiub":
         with np.errstate(over="ignore"):  # what is beyond all numbers is missing
             array = array.astype(np.float64, copy=False)
@@ -88,12 +89,14 @@ def _cells(array: NDArray[Any]) -> Given:
     kinds = np.zeros(rows, np.uint8)
     numbers, instants = np.zeros(rows), np.zeros(rows, np.int64)
     for row, value in enumerate(array):
-        if _is_missing(value):
+        if is_missing(value):
             continue
         if isinstance(value, (datetime.date, np.datetime64)):
             zoned = getattr(value, "tzinfo", None) is not None
             kinds[row] = _ZONED if zoned else _LOCAL
             instants[row] = _nanoseconds(value)
+        elif isinstance(value, (datetime.timedelta, np.timedelta64)):
+            kinds[row], numbers[row] = _NUMBER, value / _SECOND
         elif isinstance(value, (str, bytes, complex, np.complexfloating)):
             return f"row {row + 1}: {_refused(repr(value))}"
         else:
@@ -107,7 +110,8 @@ def _cells(array: NDArray[Any]) -> Given:
     return kinds, numbers, instants
 
 
-def _is_missing(value: Any) -> bool:
+def is_missing(value: Any) -> bool:
+    """Whether an object stands for no value; of a number that is for itself to say."""
     if value is None or value is np.ma.masked:
         return True
     if isinstance(value, (float, int, str, bytes)):

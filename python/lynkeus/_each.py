@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
+from queue import Empty, SimpleQueue
 from typing import Literal, TypeVar
 
 from ._progress import Progress, told
@@ -61,11 +63,11 @@ def each(
         try:
             tell(0.0)  # ended while it waited
             return work(items[place], tell)
-        except LynkeusError as error:
+        except Exception as error:
             error.add_note(f"in {names[place]}")
-            if errors == "raise":
-                raise
-            return error
+            if errors == "return" and isinstance(error, LynkeusError):
+                return error
+            raise
         finally:
             fractions.done[place] = 1.0
 
@@ -101,10 +103,17 @@ def _watch(
     shown: Callable[[float], object] | None,
 ) -> None:
     """Until all are done; what one of them raises is raised at once."""
-    waiting = set(futures)
+    done: SimpleQueue[Future[Kept | LynkeusError]] = SimpleQueue()
+    for future in futures:
+        future.add_done_callback(done.put)
+    waiting, due = len(futures), 0.0
     while waiting:
-        done, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
-        for future in done:
-            future.result()
-        if shown is not None:
+        try:
+            done.get(timeout=LOOK).result()
+            waiting -= 1
+        except Empty:
+            pass
+        now = time.monotonic()
+        if shown is not None and (now >= due or not waiting):
             shown(sum(fractions.done) / len(fractions.done))
+            due = now + LOOK

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from ._columns import is_missing
+from ._logs import frame
 from .errors import InputError
 
 
 def split(table: Any, by: str) -> dict[Any, dict[str, Any]]:
     """The rows of each asset that column ``by`` names, in the order in which assets and rows come:
     a mapping of columns, a data frame or a table of Arrow."""
-    columns = {name: _array(values) for name, values in _columns(table)}
+    columns = {name: _array(name, values) for name, values in _columns(table)}
     if by not in columns:
         raise InputError(f'by: the table has no column "{by}": there are {", ".join(columns)}')
     rows = _rows(columns.pop(by), by)
@@ -26,27 +29,50 @@ def split(table: Any, by: str) -> dict[Any, dict[str, Any]]:
     }
 
 
+def is_one(logs: Any) -> bool:
+    """Whether it is a single table, not several."""
+    return hasattr(type(logs), "__arrow_c_stream__") or hasattr(logs, "columns") or hasattr(logs, "column_names")
+
+
 def _columns(table: Any) -> Iterable[tuple[str, Any]]:
     if isinstance(table, Mapping):
         return ((str(name), values) for name, values in table.items())
+    pandas = sys.modules.get("pandas")
+    if pandas is not None and isinstance(table, pandas.DataFrame):
+        return ((str(name), values()) for name, values in frame(table))
     if hasattr(table, "column_names"):  # Arrow
         return ((name, table.column(name)) for name in table.column_names)
     if hasattr(table, "columns") and hasattr(table, "__getitem__"):
         return ((str(name), table[name]) for name in table.columns)
+    if hasattr(table, "schema") and hasattr(table, "column"):  # a batch of older Arrow
+        return ((name, table.column(name)) for name in table.schema.names)
     raise InputError(
         "the logs: expected, with `by`, a mapping of columns, a data frame or a table of Arrow, "
         f"found {type(table).__name__}"
     )
 
 
-def _array(values: Any) -> np.ndarray[Any, np.dtype[Any]]:
-    return np.asarray(values.to_numpy() if hasattr(values, "to_numpy") else values)
+def _array(name: str, values: Any) -> np.ndarray[Any, np.dtype[Any]]:
+    array = np.asarray(_numpy(values))
+    if array.ndim != 1:
+        found = f"an array of shape {array.shape}" if array.ndim else type(values).__name__
+        raise InputError(f'column "{name}": expected one value per row, found {found}')
+    return array
+
+
+def _numpy(values: Any) -> Any:
+    if not hasattr(values, "to_numpy"):
+        return values
+    try:
+        return values.to_numpy(zero_copy_only=False)  # of Arrow, which else refuses nulls
+    except TypeError:
+        return values.to_numpy()
 
 
 def _rows(assets: np.ndarray[Any, np.dtype[Any]], by: str) -> dict[Any, np.ndarray[Any, Any]]:
     places: dict[Any, list[int]] = {}
     for row, asset in enumerate(assets.tolist()):
-        if asset is None or asset != asset:
-            raise InputError(f'column "{by}": row {row} names no asset')
+        if is_missing(asset) or asset != asset:
+            raise InputError(f'column "{by}": row {row + 1} names no asset')
         places.setdefault(asset, []).append(row)
     return {asset: np.array(rows) for asset, rows in places.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,9 @@ def _arity(function: Any, role: str) -> int:
     if len(taken) < 2 or len(required) > 4 or named:
         found = f"({', '.join(map(str, parameters))})"
         raise refusal(f"{role}: expected arguments {_SIGNATURES}, found {found}", defined(function))
-    return min(len(taken), 4)
+    # one with a default of its own is the function's, None waits for what is given
+    given = [*taken[:2], *takewhile(lambda p: p.default in (p.empty, None), taken[2:4])]
+    return len(given)
 
 
 class Result:

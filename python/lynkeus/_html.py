@@ -228,7 +228,7 @@ def page(answer: Answer) -> str:
 
 
 def _credible(answer: Answer) -> str:
-    if "credible" not in answer.summary or answer.refusal is None:
+    if answer.refusal is None:
         return ""
     return f" {verdict('not credible')}: {escape(str(answer.refusal))}"
 

@@ -30,7 +30,7 @@ def log_of(data: Any) -> _lynkeus.Log:
         return _gathered(_fields(data))
     pandas = sys.modules.get("pandas")
     if pandas is not None and isinstance(data, pandas.DataFrame):
-        return _gathered(_frame(data))
+        return _gathered(frame(data))
     recorded = getattr(type(data), "log", None)
     if recorded is not None and isinstance(data.log, Mapping):  # what a simulation's logger saw
         return log_of(data.log)
@@ -78,7 +78,7 @@ def _fields(data: np.ndarray[Any, Any]) -> Iterator[tuple[Any, Any]]:
         yield name, lambda name=name: data[name]
 
 
-def _frame(data: Any) -> Iterator[tuple[Any, Any]]:
+def frame(data: Any) -> Iterator[tuple[Any, Any]]:
     """Columns of a frame of pandas, and what its index is called by name."""
     if data.columns.nlevels > 1:
         raise InputError(
@@ -105,6 +105,13 @@ def _taken(data: Any, name: str) -> Any:
     return data.column(name) if hasattr(data, "column") else data[name]
 
 
-def columns_of(log: _lynkeus.Log) -> dict[str, np.ndarray[Any, np.dtype[np.float64]]]:
-    """A log's columns by name: what of it travels to other processes."""
-    return {name: log.column(name) for name in log.headers()}
+def columns_of(log: _lynkeus.Log) -> list[tuple[str, Given]]:
+    """A log's columns in the engine's forms: what of it travels to other processes."""
+    return [(name, _given(log, name)) for name in log.headers()]
+
+
+def _given(log: _lynkeus.Log, name: str) -> Given:
+    values, origin = log.values(name), log.origin(name)
+    if values is None:
+        return log.refusal(name)
+    return values if origin is None else (values, origin)

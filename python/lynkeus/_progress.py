@@ -17,7 +17,16 @@ def told(progress: Progress, what: str) -> Iterator[Callable[[float], Any] | Non
         yield None
         return
     if callable(progress):
-        yield progress
+        last = None
+
+        def heard(fraction: float) -> None:
+            nonlocal last
+            last = fraction
+            progress(fraction)
+
+        yield heard
+        if last != 1.0:
+            progress(1.0)
         return
     try:
         from tqdm.auto import tqdm

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from . import _from_function, _lynkeus
+from ._columns import why
 from ._flatten import flattened, is_read
 from ._toml import key, number
+from .errors import InputError
 from .systems import Functions
 
 
@@ -28,10 +30,13 @@ class Model:
     @classmethod
     def load(cls, path: str | os.PathLike[str], choose: str | None = None) -> Model:
         """A file: ``.mo`` or ``.jl``. Where connectors or libraries keep it from being read and the
-        compiler ``rumoca`` is installed (``pip install lynkeus[modelica]``), what that makes of it:
+        compiler ``rumoca`` is installed (``pip install '.[modelica]'`` from a clone), what that makes of it:
         names come out dotted, ``r1.p.v``."""
         name = os.fspath(path)
-        text = Path(path).read_text(encoding="utf-8-sig")
+        try:
+            text = Path(path).read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"the model {name} cannot be read: {why(error)}") from error
         if not name.endswith(".mo") or is_read(text, name, choose):
             return cls(text, name, choose)
         flat = flattened(name, choose)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import InputError
 from .study import Study
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """What was read at a time, and the snapshot of the estimator before it was taken."""
+
+    before: bytes
+    t: float
+    readings: dict[str, float]
 
 
 class Estimator:
@@ -43,6 +53,7 @@ class Estimator:
         """Back to the start of the study, at time 0."""
         self._estimator = self._study.estimator()
         self._steps = 0
+        self._last: _Sample | None = None
 
     def set_initial_guess(self) -> None:
         """Nothing is guessed: the start is the study's."""
@@ -55,14 +66,32 @@ class Estimator:
 
     def make_step(self, y0: ArrayLike, u0: ArrayLike | None = None) -> NDArray[np.float64]:
         """The states from the measurements ``y0`` and, where the study has known inputs, the inputs
-        ``u0`` from here on; NaN is a sensor that did not report."""
-        given = dict(zip(self._measured, np.ravel(y0), strict=True))
-        if u0 is not None:
-            given |= zip(self._inputs, np.ravel(u0), strict=True)
-        readings = {name: float(given[name]) for name in self._estimator.signals if name in given}
-        self._estimator.update(self._steps * self._t_step, readings)
+        ``u0`` that were applied since the last call, as do-mpc's ``EKF`` takes them; NaN is a sensor
+        that did not report. A call that fails changes nothing but the time."""
+        t = self._steps * self._t_step
         self._steps += 1
+        readings = self._given(self._measured, y0)
+        inputs = {} if u0 is None else self._given(self._inputs, u0)
+        before = self._estimator.snapshot()
+        try:
+            if self._last is not None and inputs:
+                self._take_again(self._last, inputs)
+            last = _Sample(self._estimator.snapshot(), t, readings)
+            self._estimator.update(t, {**readings, **inputs})
+        except BaseException:
+            self._estimator.restore(before)
+            raise
+        self._last = last
         return self.x0
+
+    def _given(self, names: list[str], values: ArrayLike) -> dict[str, float]:
+        given = zip(names, np.ravel(values), strict=True)
+        return {name: float(x) for name, x in given if name in self._estimator.signals}
+
+    def _take_again(self, last: _Sample, inputs: dict[str, float]) -> None:
+        """The sample before, of which only now is known which inputs followed it."""
+        self._estimator.restore(last.before)
+        self._estimator.update(last.t, {**last.readings, **inputs})
 
 
 def _entries(structure: Any, names: Mapping[str, str]) -> list[str]:

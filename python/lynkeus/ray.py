@@ -15,6 +15,9 @@ import pickle
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from . import _lynkeus
+from ._base import Base
+from ._columns import Given
 from ._each import Errors, chosen
 from ._logs import columns_of, log_of
 from ._optional import needed
@@ -42,12 +45,12 @@ def campaign(
     Columns are ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by
     default :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
     the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. With
-    ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, Ray's
-    choice where it is left out; ``options`` are those of ``Dataset.map_batches``
+    ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, 200
+    where it is left out; ``options`` are those of ``Dataset.map_batches``
     (``num_cpus``, ``concurrency``, …)."""
     chosen(errors)
     asked = [_seed(seed) for seed in seeds]
-    data = needed("ray.data", "ray")
+    data = needed("ray.data", "lynkeus.ray")
     items = [{"seed": seed} for seed in asked]
     work = _Work(study, "seed", _seeded, keep, errors, None)
     return _mapped(data, items, work, blocks, options)
@@ -69,7 +72,7 @@ def sweep(
     Columns are ``place`` (of the change in the list), ``error`` and what ``keep`` makes of a run. The
     options are those of :func:`campaign`."""
     chosen(errors)
-    data = needed("ray.data", "ray")
+    data = needed("ray.data", "lynkeus.ray")
     items = [{"place": place, "change": pickle.dumps(dict(change))} for place, change in enumerate(changes)]
     columns = None if log is None else columns_of(log_of(log))
     work = _Work(study, "place", _changed, keep, errors, columns)
@@ -98,12 +101,13 @@ def _seed(seed: Any) -> int:
         raise InputError(f"seeds: expected whole numbers, found {seed!r}") from None
 
 
-def _seeded(study: Study, row: Mapping[str, Any]) -> Study:
-    return study.replace(simulate={"seed": row["seed"]})
+def _seeded(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {"simulate": {"seed": row["seed"]}}
 
 
-def _changed(study: Study, row: Mapping[str, Any]) -> Study:
-    return study.replace(**pickle.loads(row["change"]))
+def _changed(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    change: Mapping[str, Any] = pickle.loads(row["change"])
+    return change
 
 
 class _Work:
@@ -113,40 +117,44 @@ class _Work:
         self,
         study: Study,
         key: str,
-        change: Callable[[Study, Mapping[str, Any]], Study],
+        change: Callable[[Mapping[str, Any]], Mapping[str, Any]],
         keep: Keep,
         errors: Errors,
-        log: Mapping[str, Any] | None,
+        columns: list[tuple[str, Given]] | None,
     ) -> None:
         self.study = study
         self.key = key
         self.change = change
         self.keep = keep
         self.errors = errors
-        self.log = log
+        self.columns = columns
 
     def __call__(self, batch: Any) -> Any:
-        return _table(self.key, [self._row(row) for row in batch.to_pylist()])
+        base = Base(self.study._core)
+        log = None if self.columns is None else _lynkeus.Log.from_columns(self.columns)
+        return _table(self.key, [self._row(base, log, row) for row in batch.to_pylist()])
 
-    def _row(self, row: Mapping[str, Any]) -> dict[str, Any]:
+    def _row(self, base: Base, log: _lynkeus.Log | None, row: Mapping[str, Any]) -> dict[str, Any]:
         told = {self.key: row[self.key], "error": None}
         try:
-            return {**told, **self.keep(self._run(self.change(self.study, row)))}
+            kept = self.keep(_run(base.changed(self.change(row)), log))
         except LynkeusError as error:
             if self.errors == "raise":
                 raise
             return {**told, "error": str(error)}
+        if not isinstance(kept, Mapping):
+            raise InputError(f"keep: expected a dictionary, the row's columns by name, found {kept!r}")
+        return {**told, **kept}
 
-    def _run(self, study: Study) -> Run:
-        if self.log is None:
-            return Simulation(study._core.simulate(None, None))
-        return Estimation(study._core.estimate(log_of(self.log), None, None))
+
+def _run(study: _lynkeus.Study, log: _lynkeus.Log | None) -> Run:
+    return Simulation(study.simulate()) if log is None else Estimation(study.estimate(log))
 
 
 def _table(key: str, rows: list[dict[str, Any]]) -> Any:
     """Rows as a table of Arrow in which texts are texts even where all are null, and in which what a
     failed run lacks is null."""
-    arrow = needed("pyarrow", "ray")
+    arrow = needed("pyarrow", "lynkeus.ray")
     names = list(dict.fromkeys(name for row in rows for name in row))
     texts = {"error", "refusal"}
     return arrow.table(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Iterator, Sequence
 from functools import cached_property
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from . import _html, _lynkeus, _plot
 from ._logs import log_of
+from ._optional import needed
 from .errors import InputError, LynkeusError
 
 if TYPE_CHECKING:
@@ -59,7 +59,8 @@ class Answer:
     @cached_property
     def notes(self) -> list[str]:
         """What the user should know."""
-        return self._core.notes()
+        certificate = self.summary.get("certificate") or {}
+        return [*self.summary.get("notes", ()), *certificate.get("notes", ())]
 
     @cached_property
     def refusal(self) -> LynkeusError | None:
@@ -181,26 +182,19 @@ class Table(Answer):
     def to_pandas(self) -> pandas.DataFrame:
         """As a data frame of pandas."""
         columns = {name: self._core.column(place) for place, name in enumerate(self.columns)}
-        frame: pandas.DataFrame = _needed("pandas").DataFrame(columns, copy=False)
+        frame: pandas.DataFrame = needed("pandas", "to_pandas").DataFrame(columns, copy=False)
         return frame
 
     def to_polars(self) -> polars.DataFrame:
         """As a data frame of polars; a NaN is a null."""
-        frame: polars.DataFrame = _needed("polars").DataFrame(self)
+        frame: polars.DataFrame = needed("polars", "to_polars").DataFrame(self)
         return frame
 
     def to_arrow(self) -> pyarrow.Table:
         """As a table of pyarrow; a NaN is a null. Without the whole in memory:
         ``pyarrow.RecordBatchReader.from_stream(result)``."""
-        table: pyarrow.Table = _needed("pyarrow").table(self)
+        table: pyarrow.Table = needed("pyarrow", "to_arrow").table(self)
         return table
-
-
-def _needed(package: str) -> Any:
-    try:
-        return importlib.import_module(package)
-    except ImportError as error:
-        raise ImportError(f"expected the package {package}, found none: pip install {package}") from error
 
 
 class Run(Table):
@@ -237,7 +231,13 @@ class Run(Table):
         log = log_of(data)
         if len(log) != len(self):
             raise InputError(f"truth: expected {len(self)} rows, as the run has, found {len(log)}")
-        return {name: log.column(name) for name in log.headers()}
+        read = {name: log.values(name) for name in log.headers()}
+        columns = {name: values for name, values in read.items() if values is not None}
+        time = columns.get(self.columns[0])
+        if time is None or np.isnan(time).any():
+            return columns
+        order = np.argsort(time, kind="stable")  # a run's rows are
+        return {name: values[order] for name, values in columns.items()}
 
 
 class Simulation(Run):
@@ -301,6 +301,5 @@ def figures(run: Run) -> dict[str, Any]:
     against it (``refusal``, else ``None``), and of a simulation the root mean square error over the
     last half of its rows by estimated quantity, ``rms_NAME``."""
     refusal: LynkeusError | None = run.refusal
-    errors = run.summary["rms_error_last_half"] or {}
-    rms = {f"rms_{name}": error for name, error in errors.items()}
+    rms = {f"rms_{name}": error for name, error in run._core.settled()}
     return {"credible": refusal is None, "refusal": None if refusal is None else str(refusal), **rms}

@@ -36,14 +36,14 @@ def estimate(
     asset that fails has one row, with the reason under ``error``. Rows are brought together by asset
     (``applyInArrow``); where each partition holds all rows of its assets already, as after
     ``repartition(by)``, ``is_partitioned=True`` goes without (``mapInArrow``)."""
-    needed("pyarrow", "spark")
-    signals = Signals.of(study, by, time)
+    needed("pyarrow", "lynkeus.spark")
+    signals = Signals.recorded(study, by, time)
     taken = _taken(frame, signals)
     schema = _schema(frame, signals, [("credible", "boolean"), ("error", "string")])
     replay = Replay(study, signals)
     if is_partitioned:
         return taken.mapInArrow(replay.partition, schema)
-    return taken.groupBy(by).applyInArrow(lambda table: replay.asset(table), schema)  # one argument: a method has two
+    return taken.groupBy(f"`{by}`").applyInArrow(lambda table: replay.asset(table), schema)  # one argument: a method has two
 
 
 def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None) -> DataFrame:
@@ -54,8 +54,8 @@ def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None)
     order of ``time``, which is to be numbers. The state of an asset is the snapshot of its estimator
     (``transformWithStateInPandas``; Spark wants its RocksDB state store for it, and a checkpoint of the
     query survives a restart)."""
-    processor = needed("pyspark.sql.streaming", "spark").StatefulProcessor
-    signals = Signals.of(study, by, time)
+    processor = needed("pyspark.sql.streaming", "lynkeus.spark").StatefulProcessor
+    signals = Signals.live(study, by, time)
     taken = _taken(stream, signals)
     kind = dict(taken.dtypes)[signals.time]
     if kind not in ("double", "float", "bigint", "int", "smallint", "tinyint") and not kind.startswith("decimal"):
@@ -64,7 +64,7 @@ def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None)
             f'count from: stream.withColumn("{signals.time}", col("{signals.time}").cast("double"))'
         )
     follower = type("Follower", (Follower, processor), {})(study, signals)
-    return taken.groupBy(by).transformWithStateInPandas(
+    return taken.groupBy(f"`{by}`").transformWithStateInPandas(
         statefulProcessor=follower,
         outputStructType=_schema(stream, signals, [("error", "string")]),
         outputMode="append",
@@ -83,7 +83,7 @@ def _taken(frame: DataFrame, signals: Signals) -> DataFrame:
 
 
 def _schema(frame: DataFrame, signals: Signals, further: list[tuple[str, str]]) -> Any:
-    types = needed("pyspark.sql.types", "spark")
+    types = needed("pyspark.sql.types", "lynkeus.spark")
     number = types.DoubleType()
     kinds = {"boolean": types.BooleanType(), "string": types.StringType()}
     fields = [types.StructField(signals.by, frame.schema[signals.by].dataType)]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-import tomllib
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar, overload
 
 from . import _batches, _lynkeus
+from ._base import Base, spelled
+from ._batches import Options
 from ._each import Errors
 from ._logs import log_of
+from ._lynkeus import MEMORY
 from ._progress import Progress, told
 from ._toml import document
 from .errors import InputError, NotCredible
@@ -85,23 +87,22 @@ class Study:
             "noise": noise,
             "limits": limits,
         }
-        given = {k: v for k, v in named.items() if v is not None}
-        text = document(
-            {
-                "tables": tables,
-                "sensors": {**(sensors or {}), **given} or None,
-                "process_noise": process_noise,
-                "parameters": parameters,
-                "observer": {"family": observer} if isinstance(observer, str) else observer,
-                "box": box,
-                "certify": certify,
-                "simulate": simulate,
-                "estimate": estimate,
-                "tune": tune,
-                "compare": compare if compare is None or isinstance(compare, Mapping) else {"families": compare},
-                "plot": plot,
-            }
-        )
+        given = {
+            "tables": tables,
+            "sensors": sensors,
+            "process_noise": process_noise,
+            "parameters": parameters,
+            "observer": {"family": observer} if isinstance(observer, str) else observer,
+            "box": box,
+            "certify": certify,
+            "simulate": simulate,
+            "estimate": estimate,
+            "tune": tune,
+            "compare": compare,
+            "plot": plot,
+            **{name: value for name, value in named.items() if value is not None},
+        }
+        text = document(spelled(given))
         plant = model if isinstance(model, Model) else Model.load(model)
         self._core = _lynkeus.Study.parse(text, "study", (plant.name, plant.text), plant.choose)
 
@@ -140,15 +141,10 @@ class Study:
     def replace(self, **changes: Any) -> Study:
         """The same study with other keys; those of a section are added to it:
         ``study.replace(observer={"theta": 2.0}, parameters={"k": 0.1})``. A key that is ``None`` is
-        left out."""
-        study = tomllib.loads(self.text)
-        for name, change in changes.items():
-            old = study.get(name)
-            if isinstance(old, dict) and isinstance(change, Mapping):
-                study[name] = {**old, **change}
-            else:
-                study[name] = change
-        return Study.parse(document(study), self.model, self._core.file)
+        left out. What :class:`Study` takes briefly is taken here as well (``unknown=["inflow"]``,
+        ``compare=["ekf", "ukf"]``; ``observer="ekf"`` leaves no other tuning); ``plant`` is a :class:`Model` or
+        the path of one, ``model`` the name of the one to take in it."""
+        return Study._of(Base(self._core).changed(changes))
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         core = self._core
@@ -158,45 +154,77 @@ class Study:
         return f"<Study of {self.model.name}\n{self.text.rstrip()}>"
 
     def check(
-        self, *, parameters: bool = False, about: Sequence[str] = (), time_limit: float | None = None
+        self,
+        *,
+        parameters: bool = False,
+        about: Sequence[str] = (),
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> Check:
         """Which states, unknown inputs and (with ``parameters``) parameters can be known, and which
-        observers fit; ``about``: expressions to decide on. ``time_limit`` in seconds, as everywhere."""
-        return Check(self._core.check(parameters, list(about), time_limit))
+        observers fit; ``about``: expressions to decide on. ``time_limit`` in seconds and ``memory_limit`` in
+        MiB, as everywhere: what a call may take until it ends with what is done by then."""
+        return Check(self._core.check(parameters, list(about), time_limit, memory_limit))
 
-    def design(self, *, time_limit: float | None = None) -> Design:
+    def design(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
         """The observer, with its gains and certificate."""
-        return Design(self._core.design(time_limit))
+        return Design(self._core.design(time_limit, memory_limit))
 
-    def certify(self, *, time_limit: float | None = None) -> Certificate:
+    def certify(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Certificate:
         """What can be proved of the observer."""
-        return Certificate(self._core.certify(time_limit))
+        return Certificate(self._core.certify(time_limit, memory_limit))
 
     def how_well(
-        self, *, horizon: float | None = None, sensors: str | None = None, time_limit: float | None = None
+        self,
+        *,
+        horizon: float | None = None,
+        sensors: str | None = None,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> HowWell:
         """Standard errors for the declared noise; ``sensors``: try every ``"outputs"`` of the model, or
         ``"all"`` with its states."""
-        return HowWell(self._core.how_well(horizon, sensors, time_limit))
+        return HowWell(self._core.how_well(horizon, sensors, time_limit, memory_limit))
 
     @overload
-    def simulate(self, *, progress: Progress = ..., time_limit: float | None = ...) -> Simulation: ...
-    @overload
-    def simulate(self, *, runs: int, progress: Progress = ..., time_limit: float | None = ...) -> MonteCarlo: ...
     def simulate(
-        self, *, runs: int | None = None, progress: Progress = False, time_limit: float | None = None
+        self, *, progress: Progress = ..., time_limit: float | None = ..., memory_limit: float = ...
+    ) -> Simulation: ...
+    @overload
+    def simulate(
+        self,
+        *,
+        runs: int,
+        progress: Progress = ...,
+        time_limit: float | None = ...,
+        memory_limit: float = ...,
+    ) -> MonteCarlo: ...
+    def simulate(
+        self,
+        *,
+        runs: int | None = None,
+        progress: Progress = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> Simulation | MonteCarlo:
         """The plant with its observer; ``runs``: so many of them with other noise and starts."""
         with told(progress, "simulating") as tell:
             if runs is None:
-                return _judged(Simulation(self._core.simulate(tell, time_limit)))
-            return _judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit)))
+                return _judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))
+            return _judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit, memory_limit)))
 
-    def estimate(self, log: Any, *, progress: Progress = False, time_limit: float | None = None) -> Estimation:
+    def estimate(
+        self,
+        log: Any,
+        *,
+        progress: Progress = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
+    ) -> Estimation:
         """A log through the observer: a path, a mapping of columns, a data frame, an Arrow table or a
         simulation."""
         with told(progress, "estimating") as tell:
-            return _judged(Estimation(self._core.estimate(log_of(log), tell, time_limit)))
+            return _judged(Estimation(self._core.estimate(log_of(log), tell, time_limit, memory_limit)))
 
     @overload
     def estimate_each(
@@ -209,6 +237,7 @@ class Study:
         errors: Errors = ...,
         progress: Progress = ...,
         time_limit: float | None = ...,
+        memory_limit: float = ...,
     ) -> dict[Hashable, Any]: ...
     @overload
     def estimate_each(  # type: ignore[overload-overlap]  # a mapping is no list, but for types
@@ -220,6 +249,7 @@ class Study:
         errors: Errors = ...,
         progress: Progress = ...,
         time_limit: float | None = ...,
+        memory_limit: float = ...,
     ) -> dict[Hashable, Any]: ...
     @overload
     def estimate_each(
@@ -231,6 +261,7 @@ class Study:
         errors: Errors = ...,
         progress: Progress = ...,
         time_limit: float | None = ...,
+        memory_limit: float = ...,
     ) -> list[Any]: ...
     def estimate_each(
         self,
@@ -242,6 +273,7 @@ class Study:
         errors: Errors = "raise",
         progress: Progress = False,
         time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> list[Any] | dict[Hashable, Any]:
         """Many logs through the observer, on all cores: what :meth:`estimate` gives for each, in their
         order.
@@ -251,17 +283,9 @@ class Study:
         dictionary by name. ``keep`` makes of each result what is kept of it: so thousands of them need
         no memory. With ``errors="return"`` the exception of a log that fails stands in its place,
         instead of ending the rest. ``workers`` are threads, as many as there are cores; ``time_limit``
-        is that of one log, in seconds."""
-        return _batches.estimate_each(
-            self,
-            logs,
-            by=by,
-            keep=keep,
-            workers=workers,
-            errors=errors,
-            progress=progress,
-            time_limit=time_limit,
-        )
+        is that of one log, in seconds, ``memory_limit`` that of all that run together, in MiB."""
+        options = Options(keep, workers, errors, progress, time_limit, memory_limit)
+        return _batches.estimate_each(self, logs, by, options)
 
     def sweep(
         self,
@@ -273,43 +297,46 @@ class Study:
         errors: Errors = "raise",
         progress: Progress = False,
         time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> list[Any]:
         """The study with each of the changes, simulated, or estimating from ``log``, on all cores.
 
         A change is what :meth:`replace` takes: ``{"observer": {"theta": 2.0}, "simulate": {"seed": 7}}``.
         The other options are those of :meth:`estimate_each`."""
-        return _batches.sweep(
-            self,
-            changes,
-            log,
-            keep=keep,
-            workers=workers,
-            errors=errors,
-            progress=progress,
-            time_limit=time_limit,
-        )
+        options = Options(keep, workers, errors, progress, time_limit, memory_limit)
+        return _batches.sweep(self, changes, log, options)
 
     def tune(
-        self, log: Any = None, *, progress: Progress = False, time_limit: float | None = None
+        self,
+        log: Any = None,
+        *,
+        progress: Progress = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> Sweep:
         """The tuning of ``[tune]`` over its values, judged by simulation or by a log."""
         with told(progress, "tuning") as tell:
-            return Sweep(self._core.tune(_some(log), tell, time_limit))
+            return Sweep(self._core.tune(_some(log), tell, time_limit, memory_limit))
 
     def compare(
-        self, log: Any = None, *, progress: Progress = False, time_limit: float | None = None
+        self,
+        log: Any = None,
+        *,
+        progress: Progress = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
     ) -> Comparison:
         """Families side by side, on a simulation or on a log."""
         with told(progress, "comparing") as tell:
-            return Comparison(self._core.compare(_some(log), tell, time_limit))
+            return Comparison(self._core.compare(_some(log), tell, time_limit, memory_limit))
 
     def plant(self) -> Functions:
         """The plant as functions, with the study's parameters and start."""
         return Functions(self._core.functions())
 
-    def observer(self, *, time_limit: float | None = None) -> Observer:
+    def observer(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Observer:
         """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
-        return Observer(self._core.observer(time_limit))
+        return Observer(self._core.observer(time_limit, memory_limit))
 
     def estimator(self) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one."""
@@ -320,7 +347,7 @@ def _some(log: Any) -> _lynkeus.Log | None:
     return None if log is None else log_of(log)
 
 
-def _restored(text: str, file: str, plant: tuple[str, str] | None, model: str | None) -> Study:
+def _restored(text: str, file: str, plant: tuple[str, str | None] | None, model: str | None) -> Study:
     return Study._of(_lynkeus.Study.parse(text, file, plant, model))
 
 

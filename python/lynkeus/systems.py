@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lynkeus
+from ._optional import needed
 from .errors import InputError, RefusedError
 
 if TYPE_CHECKING:
@@ -91,10 +92,7 @@ class Functions:
         """A system of python-control with named signals. Names hold no dot there: ``r1.v`` becomes
         ``r1_v``."""
         self._refuse_updates("to_nlsys")
-        try:
-            import control
-        except ImportError:
-            raise _absent("to_nlsys", "control") from None
+        control = needed("control", "to_nlsys")
 
         def update(t: float, x: Column, u: Column, _: Mapping[str, Any]) -> Column:
             return self.f(t, x, u)
@@ -114,10 +112,7 @@ class Functions:
     def to_casadi(self) -> Pair:
         """``casadi.Function``s f and h of (t, x, u), of scalar operations unless linear systems are
         solved in them."""
-        try:
-            import casadi
-        except ImportError:
-            raise _absent("to_casadi", "casadi") from None
+        casadi = needed("casadi", "to_casadi")
         text, has_systems = self._core.source("casadi")
         module = _executed(text)
         # the symbolic solution of a matrix of scalars has no pivots
@@ -127,7 +122,7 @@ class Functions:
         x, u = symbols.sym(vectors[0], len(self.states)), symbols.sym(vectors[1], len(self.inputs))
         names = ["t", *vectors]
 
-        def function(name: str, result: str) -> casadi.Function:
+        def function(name: str, result: str) -> Any:
             return casadi.Function(name, [t, x, u], [module[name](casadi, t, x, u)], names, [result])
 
         return Pair(function("f", "der"), function("h", "y"))
@@ -135,10 +130,7 @@ class Functions:
     def to_jax(self) -> Pair:
         """Functions f and h of (t, x, u) over ``jax.numpy``, to be given to ``jit``, ``vmap`` and
         ``grad``; in double precision where ``jax_enable_x64`` is set."""
-        try:
-            import jax.numpy as jnp
-        except ImportError:
-            raise _absent("to_jax", "jax") from None
+        jnp = needed("jax.numpy", "to_jax")
         module = _executed(self._core.source("python")[0])
 
         def f(t: Any, x: Any, u: Any = ()) -> Any:
@@ -251,7 +243,3 @@ def _executed(text: str) -> dict[str, Any]:
     module: dict[str, Any] = {}
     exec(compile(text, "<printed by lynkeus>", "exec"), module)
     return module
-
-
-def _absent(what: str, package: str) -> ImportError:
-    return ImportError(f"{what} needs the package {package}: pip install {package}", name=package)

@@ -6,6 +6,9 @@ import os
 from pathlib import Path
 
 import pytest
+from tank_study import SIMULATE, tank
+
+import lynkeus
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -23,3 +26,9 @@ def command() -> Path:
     if not named:
         pytest.skip("LYNKEUS_COMMAND names no command: `cargo xtask package` does")
     return Path(named)
+
+
+@pytest.fixture(scope="session")
+def study() -> lynkeus.Study:
+    """The tank with noise, ready to be simulated."""
+    return tank(noise={"y": 0.01}, observer={"theta": 1.0}, simulate=SIMULATE)

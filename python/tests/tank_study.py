@@ -7,20 +7,21 @@ from typing import Any
 import lynkeus
 import numpy as np
 
-MODEL = lynkeus.Model.from_modelica(
-    """
+TEXT = """
 model Tank
   input Real inflow(min = 0, max = 5);
   Real level(start = 4, min = 0.1, max = 10);
   output Real y = level;
 equation
   der(level) = inflow - 0.5*sqrt(level);
-end Tank;"""
-)
+end Tank;
+"""
+MODEL = lynkeus.Model.from_modelica(TEXT)
+SIMULATE = {"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}}
 
 
 def tank(**sections: Any) -> lynkeus.Study:
-    return lynkeus.Study(MODEL, unknown=["inflow"], observer={"theta": 2.0}, **sections)
+    return lynkeus.Study(MODEL, unknown=["inflow"], **{"observer": {"theta": 2.0}, **sections})
 
 
 def log(rows: int = 50, step: float = 0.25) -> dict[str, Any]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import datetime
 import pickle
 import sys
 from decimal import Decimal
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -129,10 +131,29 @@ def test_what_is_missing_is_missing_however_it_is_said() -> None:
         assert same(estimated(with_y(column)), expected), name
 
 
+def test_durations_are_seconds_however_they_are_held() -> None:
+    held = np.timedelta64(5, "ms")
+    for column in ([held, None], np.array([held, "NaT"], dtype="timedelta64[ms]")):
+        assert np.array_equal(log_of({"x": column}).column("x"), [0.005, np.nan], equal_nan=True)
+    found = log_of({"x": [datetime.timedelta(minutes=2), np.timedelta64(1, "h"), 7.0]}).column("x")
+    assert found.tolist() == [120.0, 3600.0, 7.0]
+
+
 def test_whole_numbers_of_any_size_come_in() -> None:
     for numbers in ([2**53 + 1, 1], [10**30, -(10**300)], [True, False], [Decimal("1.5"), 2]):
         found = log_of({"x": numbers}).column("x")
         assert found.tolist() == [float(x) for x in numbers]
+
+
+# --- models ----------------------------------------------------------------------------------
+
+
+def test_a_model_that_is_no_file_is_told(tmp_path: Path) -> None:
+    with pytest.raises(lynkeus.InputError, match="nix.mo cannot be read"):
+        lynkeus.Model.load(tmp_path / "nix.mo")
+    (tmp_path / "bytes.mo").write_bytes(b"\xff\xff")
+    with pytest.raises(lynkeus.InputError, match="bytes.mo cannot be read"):
+        lynkeus.Model.load(tmp_path / "bytes.mo")
 
 
 # --- tables ----------------------------------------------------------------------------------
@@ -180,6 +201,13 @@ def test_headers_twice_and_in_levels() -> None:
 
 
 # --- readings -------------------------------------------------------------------------------
+
+
+def test_any_mapping_has_readings() -> None:
+    estimator, other = tank().estimator(), tank().estimator()
+    estimator.update(0.0, MappingProxyType({"y": 4.1}))
+    other.update(0.0, {"y": 4.1})
+    assert estimator.estimate == other.estimate
 
 
 def test_bad_readings_change_nothing() -> None:

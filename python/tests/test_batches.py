@@ -11,30 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tank_study import MODEL
 
 import lynkeus
-
-TANK = """
-model Tank
-  input Real inflow(min = 0, max = 5);
-  Real level(start = 4, min = 0.1, max = 10);
-  output Real y = level;
-equation
-  der(level) = inflow - 0.5*sqrt(level);
-end Tank;
-"""
-
-
-@pytest.fixture
-def study() -> lynkeus.Study:
-    return lynkeus.Study(
-        lynkeus.Model.from_modelica(TANK),
-        unknown=["inflow"],
-        noise={"y": 0.01},
-        observer={"theta": 1.0},
-        simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}},
-    )
-
+from lynkeus._each import each
+from lynkeus.results import figures
 
 @pytest.fixture
 def logs(study: lynkeus.Study) -> list[dict[str, Any]]:
@@ -116,13 +97,46 @@ def test_a_sweep_is_a_loop_over_changes(study: lynkeus.Study, logs: list[dict[st
         study.sweep([{"observer": {"nix": 1}}])
 
 
+def test_an_exception_of_keep_names_its_log(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    with pytest.raises(ZeroDivisionError) as raised:
+        study.estimate_each({"a": logs[0]}, keep=lambda run: 1 / 0)
+    assert raised.value.__notes__ == ["in the log of 'a'"]
+
+
+def test_one_table_of_many_assets_as_it_comes(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    pandas, pyarrow = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
+    expected = study.estimate(logs[0])
+    frame = pandas.DataFrame({**logs[0], "asset": "a"})
+    same(study.estimate_each(frame.set_index("t"), by="asset")["a"], expected)
+    gaps = [None, *frame["y"][1:]]
+    batch = pyarrow.record_batch({"t": frame["t"], "y": pyarrow.array(gaps), "asset": frame["asset"]})
+    run = study.estimate_each(batch, by="asset")["a"]
+    same(run, study.estimate({"t": logs[0]["t"], "y": np.array(gaps, float)}))
+    frame["asset"] = pandas.array(["a", None, *["a"] * (len(frame) - 2)], dtype="string")
+    with pytest.raises(lynkeus.InputError, match="row 2 names no asset"):
+        study.estimate_each(frame, by="asset")
+    with pytest.raises(lynkeus.InputError, match='column "y": expected one value per row, found float'):
+        study.estimate_each({"asset": ["a"], "t": [0.0], "y": 4.0}, by="asset")
+    for table in (frame, batch):
+        with pytest.raises(lynkeus.InputError, match="found one table: by="):
+            study.estimate_each(table)
+
+
+def test_figures_are_those_of_the_summary(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
+    run = study.simulate()
+    rms = {f"rms_{name}": error for name, error in run.summary["rms_error_last_half"].items()}
+    assert len(rms) == 2
+    assert figures(run) == {"credible": run.is_credible, "refusal": None, **rms}
+    assert list(figures(study.estimate({name: logs[0][name] for name in "ty"}))) == ["credible", "refusal"]
+
+
 def test_what_is_asked_for_wrongly(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:
     for wrong in ("log.csv", 3, None):
         with pytest.raises(lynkeus.InputError, match="expected a list or a mapping of logs"):
             study.estimate_each(wrong)  # type: ignore[call-overload]
     with pytest.raises(lynkeus.InputError, match='no column "asset": there are t, y'):
         study.estimate_each(logs[0], by="asset")
-    with pytest.raises(lynkeus.InputError, match="row 1 names no asset"):
+    with pytest.raises(lynkeus.InputError, match="row 2 names no asset"):
         study.estimate_each({"asset": ["a", None], "t": [0.0, 1.0], "y": [4.0, 4.0]}, by="asset")
     with pytest.raises(lynkeus.InputError, match='column "y": expected as many rows'):
         study.estimate_each({"asset": ["a", "a"], "t": [0.0, 1.0], "y": [4.0]}, by="asset")
@@ -135,7 +149,7 @@ def test_what_is_asked_for_wrongly(study: lynkeus.Study, logs: list[dict[str, An
 
 def test_doubts_are_told_once() -> None:
     filtered = lynkeus.Study(
-        lynkeus.Model.from_modelica(TANK),
+        MODEL,
         unknown=["inflow"],
         noise={"y": 1e-3},
         process_noise={"inflow": 1e-6, "level": 1e-9},
@@ -158,6 +172,19 @@ def test_progress_rises_to_the_end(study: lynkeus.Study) -> None:
     seen: list[float] = []
     study.sweep(seeds(30), progress=seen.append)
     assert seen == sorted(seen) and seen[-1] == 1.0
+
+
+def test_what_is_left_of_many_is_not_looked_at_again_and_again() -> None:
+    """By the time that the calls themselves do not take, which grows with their number alone."""
+
+    def cost(count: int) -> float:
+        began = time.process_time()
+        nothing: dict[str, Any] = {"workers": 2, "errors": "raise", "progress": False, "what": ""}
+        assert each(lambda item, _: item, range(count), [""] * count, **nothing) == list(range(count))
+        return time.process_time() - began
+
+    cost(100)
+    assert cost(8000) < 40 * min(cost(1000) for _ in range(3))
 
 
 def test_what_progress_raises_ends_it(study: lynkeus.Study) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from tank_study import estimated, log, same, tank
 
 import lynkeus
-from lynkeus._logs import log_of
+from lynkeus._logs import columns_of, log_of
 
 FIRST = datetime.datetime(2026, 11, 22, 1, 2, 3, 250_000, tzinfo=datetime.timezone.utc)
 
@@ -342,6 +343,27 @@ def test_a_mixture_of_dates_is_refused_with_its_row() -> None:
         estimated({"t": [zoned, 7.0], "y": [4.0, 4.0]})
     with pytest.raises(lynkeus.InputError, match="log:2: .*expected a number, found the date"):
         estimated({"t": [7.0, zoned], "y": [4.0, 4.0]})
+
+
+@pytest.mark.parametrize("times", [[0, 1, 1, 2], [0, 2, 1, 3], [0, 1, np.nan, 2]])
+def test_a_text_column_beside_times_out_of_order(times: list[float]) -> None:
+    data: dict[str, Any] = {"t": times, "y": [4.0, 4.1, 4.0, 4.2]}
+    assert same(estimated({**data, "note": ["a", "b", "c", "d"]}), estimated(data))
+
+
+def test_a_log_travels_by_its_columns() -> None:
+    """Dates keep their origin, texts their refusal."""
+    data = {"t": instants(zoned=True), "y": log()["y"], "note": ["a"] * len(log()["t"])}
+    given = log_of(data)
+    again = lynkeus.Log.from_columns(pickle.loads(pickle.dumps(columns_of(given))))
+    assert again.headers() == given.headers() and again.origin("t") == given.origin("t") is not None
+    assert same(estimated(again), estimated(data))
+    told = []
+    for recorded in (given, again):
+        with pytest.raises(lynkeus.InputError) as error:
+            recorded.column("note")
+        told.append(str(error.value))
+    assert told[0] == told[1] and "texts" in told[0]
 
 
 # --- memory ----------------------------------------------------------------------------------

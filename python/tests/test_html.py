@@ -68,3 +68,23 @@ def test_nothing_of_a_model_becomes_markup() -> None:
         tags = {element.tag for element in ElementTree.fromstring(answer._repr_html_()).iter()}
         assert not tags & {"script", "img", "i"}
     assert _html.table("<", ["&"], [["<td>"]]).count("&lt;") == 2
+
+
+@pytest.mark.filterwarnings("ignore::lynkeus.NotCredible")
+def test_many_runs_tell_what_speaks_against_them() -> None:
+    """x' = x³/10 leaves every range before the end from some of the starts."""
+    model = lynkeus.Model.from_modelica(
+        """
+        model Growth
+          Real x(start = 1, min = -10, max = 10);
+          output Real y = x;
+        equation
+          der(x) = x^3/10;
+        end Growth;"""
+    )
+    simulate = {"until": 4, "output_step": 0.1, "spread": {"x": 0.3}, "method": "rk4", "step": 0.01, "seed": 5}
+    study = lynkeus.Study(model, observer={"family": "triangular", "theta": 2}, simulate=simulate)
+    runs = study.simulate(runs=12)
+    assert runs.refusal is not None
+    page = ElementTree.fromstring(runs._repr_html_())
+    assert f"not credible: {runs.refusal}" in "".join(page.itertext())

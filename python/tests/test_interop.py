@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -300,6 +302,53 @@ TANK = """
     equation
       der(level) = inflow - 0.5*sqrt(level) - leak;
     end Tank;"""
+
+
+class Structure(dict[str, Any]):
+    """Names of a structure of do-mpc."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__({name: np.zeros(1) for name in names})
+
+    def __getitem__(self, name: str) -> Any:
+        return SimpleNamespace(numel=lambda: 1)
+
+
+def in_a_loop(study: Study, levels: Sequence[float], inflows: Sequence[float]) -> list[list[float]]:
+    """States after each call; an inflow is applied from its level to the next."""
+    from lynkeus.mpc import Estimator
+
+    names = SimpleNamespace(y=Structure("y"), u=Structure("inflow"), x=Structure("level", "leak"))
+    estimator = Estimator(study, names, 0.5)
+    before = [inflows[0], *inflows]  # what had been applied before the first call is of no use
+    return [estimator.make_step([y], [u]).ravel().tolist() for y, u in zip(levels, before)]
+
+
+@pytest.mark.parametrize("observer", [{"theta": 0.5}, "ekf"])
+def test_an_input_counts_from_the_sample_before(observer: Any) -> None:
+    noise = {"noise": {"y": 0.1}, "process_noise": {"leak": 1e-3}}
+    study = Study(Model.from_modelica(TANK), unknown=["leak"], observer=observer, **noise)
+    levels = 3 + 0.3 * np.sin(0.7 * np.arange(12))
+    inflows = np.where(np.arange(12) % 3 == 0, 4.0, 0.2)  # switches
+    run = study.estimate({"t": 0.5 * np.arange(12), "y": levels, "inflow": inflows})
+    found = np.array(in_a_loop(study, levels.tolist(), inflows.tolist()))
+    assert deviation(found[:, 0], run["level_hat"]) < 1e-9
+    assert deviation(found[:, 1], run["leak_hat"]) < 1e-9
+
+
+def test_time_goes_on_after_a_sample_that_is_refused() -> None:
+    from lynkeus.mpc import Estimator
+
+    study = Study(Model.from_modelica(TANK), unknown=["leak"], observer={"theta": 3.0})
+    names = SimpleNamespace(y=Structure("y"), u=Structure("inflow"), x=Structure("level", "leak"))
+    estimator = Estimator(study, names, 0.5)
+    estimator.make_step([3.0], [1.0])
+    before = estimator.x0
+    with pytest.raises((InputError, ValueError)):
+        estimator.make_step([3.0, 4.0], [1.0])
+    assert estimator.x0.tolist() == before.tolist()
+    estimator.make_step([3.1], [1.0])
+    assert estimator._estimator.time == 1.0
 
 
 def test_a_loop_of_do_mpc_takes_the_estimates() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tank_study import estimated, log
 
 import lynkeus
 
@@ -97,3 +98,10 @@ def test_many_runs_and_precision(tanks: lynkeus.Study) -> None:
     precision = tanks.how_well()
     (ax,) = precision.plot()
     assert set(lines(ax)) == {"upper", "lower", "pump"} and ax.get_xscale() == "log"
+
+
+def test_the_truth_may_lie_in_any_order_beside_texts() -> None:
+    run = estimated(log())
+    order = np.random.default_rng(3).permutation(len(run))
+    truth = {"t": run.t[order], "level": log()["y"][order], "note": ["a"] * len(run)}
+    np.testing.assert_array_equal(run._truth(truth)["level"], log()["y"])

@@ -18,17 +18,6 @@ from lynkeus.results import figures
 ray = pytest.importorskip("ray", reason="skipped: ray is not installed")
 data = pytest.importorskip("ray.data")
 
-TANK = """
-model Tank
-  input Real inflow(min = 0, max = 5);
-  Real level(start = 4, min = 0.1, max = 10);
-  output Real y = level;
-equation
-  der(level) = inflow - 0.5*sqrt(level);
-end Tank;
-"""
-
-
 @pytest.fixture(scope="module", autouse=True)
 def cluster() -> Iterator[None]:
     os.environ["RAY_worker_niceness"] = "0"  # at Ray's 15 a busy machine takes minutes
@@ -36,17 +25,6 @@ def cluster() -> Iterator[None]:
     data.DataContext.get_current().enable_progress_bars = False
     yield
     ray.shutdown()
-
-
-@pytest.fixture
-def study() -> lynkeus.Study:
-    return lynkeus.Study(
-        lynkeus.Model.from_modelica(TANK),
-        unknown=["inflow"],
-        noise={"y": 0.01},
-        observer={"theta": 1.0},
-        simulate={"until": 20, "output_step": 0.5, "inputs": {"inflow": 1.2}},
-    )
 
 
 def ordered(dataset: Any, key: str = "seed") -> list[dict[str, Any]]:
@@ -76,6 +54,16 @@ def test_columns_and_failures(study: lynkeus.Study) -> None:
     kept = lynkeus.ray.sweep(study, changes[:1], log, keep=lambda run: {"last": float(run["inflow_hat"][-1])})
     replayed = ordered(kept, "place")
     assert replayed[0]["last"] == study.replace(**changes[0]).estimate(log)["inflow_hat"][-1]
+
+
+def test_a_log_with_texts_and_dates(study: lynkeus.Study) -> None:
+    times = np.datetime64("2026-11-22T01:02:03") + np.arange(41) * np.timedelta64(500, "ms")
+    log = {"t": times, "y": 4.0 + 0.1 * np.sin(np.arange(41.0)), "note": ["a"] * 41}
+    change = {"observer": {"theta": 2.0}}
+    rows = ordered(lynkeus.ray.sweep(study, [change], log, keep=lambda run: {"notes": " ".join(run.notes)}), "place")
+    assert rows[0]["error"] is None
+    assert rows[0]["notes"] == " ".join(study.replace(**change).estimate(log).notes)
+    assert "since 2026-11-22T01:02:03" in rows[0]["notes"]
 
 
 def last(run: lynkeus.Run) -> dict[str, float]:

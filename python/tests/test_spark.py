@@ -24,27 +24,7 @@ if shutil.which("java") is None:
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
-TANK = """
-model Tank
-  input Real inflow(min = 0, max = 5);
-  Real level(start = 4, min = 0.1, max = 10);
-  output Real y = level;
-equation
-  der(level) = inflow - 0.5*sqrt(level);
-end Tank;
-"""
 ASSETS = 4
-
-
-@pytest.fixture(scope="module")
-def study() -> lynkeus.Study:
-    return lynkeus.Study(
-        lynkeus.Model.from_modelica(TANK),
-        unknown=["inflow"],
-        noise={"y": 0.01},
-        observer={"theta": 1.0},
-        simulate={"until": 10, "output_step": 0.5, "inputs": {"inflow": 1.2}},
-    )
 
 
 @pytest.fixture(scope="module")

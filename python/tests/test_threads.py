@@ -37,7 +37,7 @@ def long_log() -> dict[str, Any]:
 
 VERBS: dict[str, Callable[[lynkeus.Study, Any], Any]] = {
     "simulate": lambda study, tell: study.simulate(progress=tell),
-    "runs": lambda study, tell: study.simulate(runs=1000, progress=tell),
+    "runs": lambda study, tell: study.simulate(runs=1000, progress=tell, memory_limit=np.inf),
     "estimate": lambda study, tell: study.estimate(long_log(), progress=tell),
     "tune": lambda study, tell: study.tune(progress=tell),
     "compare": lambda study, tell: study.compare(progress=tell),

@@ -246,3 +246,16 @@ def test_the_examples_of_the_documentation() -> None:
     names: dict[str, Any] = {}
     exec(blocks["python"], names)
     assert names["tanks"].text == blocks["modelica"]
+
+
+def test_a_default_is_the_functions_own() -> None:
+    def f(t: Any, x: Any, k: Any = 3.0) -> Any:
+        return [-k * x[0]]
+
+    def optional(t: Any, x: Any, u: Any = None) -> Any:
+        return [x[0] if u is None else u[0]]
+
+    model = ly.Model.from_function(f, states=["x"], inputs=["v"])
+    assert "der(x) = -3" in model.text
+    model = ly.Model.from_function(optional, states=["x"], inputs=["v"])
+    assert "der(x) = v" in model.text

@@ -2,10 +2,11 @@
 //! documentation site, which shows it.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::process::{cargo, root, run};
+use crate::process::{cargo, root, run, target};
 use crate::python;
 
 /// What its tests need, pinned.
@@ -27,7 +28,7 @@ pub fn test(python: &Path) -> Result<(), String> {
         .arg(wheel);
     run(&mut install)?;
     run(&mut cargo(&["build", "--package", "lynkeus"]))?;
-    let command = root().join("target").join("debug").join("lynkeus");
+    let command = target().join("debug").join("lynkeus");
     let command = command.with_extension(std::env::consts::EXE_EXTENSION);
     let mut tests = Command::new(python);
     tests
@@ -64,9 +65,15 @@ pub fn site() -> Result<(), String> {
 
 /// The only wheel in a folder that is made anew.
 fn wheel(python: &Path) -> Result<PathBuf, String> {
-    let folder = root().join("target").join("package");
-    // there is none at first
-    let _ = fs::remove_dir_all(&folder);
+    let folder = target().join("package");
+    match fs::remove_dir_all(&folder) {
+        // there is none at first
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            let folder = folder.display();
+            return Err(format!("cannot remove the old wheels in {folder}: {error}"));
+        }
+        _ => {}
+    }
     let mut build = Command::new(python);
     build
         .args(["-m", "maturin", "build", "--quiet", "--profile", "dev"])

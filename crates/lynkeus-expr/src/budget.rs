@@ -24,6 +24,15 @@ pub struct Memory {
     pub limit: usize,
     /// bytes in use now
     pub used: fn() -> usize,
+    /// bytes that were in use before the work and do not count
+    pub before: usize,
+}
+
+impl Memory {
+    /// Bytes that the work uses now.
+    fn own(&self) -> usize {
+        (self.used)().saturating_sub(self.before)
+    }
 }
 
 /// What ended work early.
@@ -162,7 +171,7 @@ impl Budget {
             return Some(known);
         }
         // memory comes back when a part that took too much of it has ended: the whole goes on
-        if !self.is_over() && shared.memory.is_some_and(|m| (m.used)() > m.limit) {
+        if !self.is_over() && shared.memory.is_some_and(|m| m.own() > m.limit) {
             shared.set(MEMORY);
         }
         self.marked()
@@ -199,7 +208,7 @@ impl Budget {
     /// Bytes that may still be asked for; none where memory has no limit.
     pub fn room(&self) -> Option<usize> {
         let memory = self.memory()?;
-        Some(memory.limit.saturating_sub((memory.used)()))
+        Some(memory.limit.saturating_sub(memory.own()))
     }
 
     /// Whether there is room for so many more bytes; the budget is spent where there is not,
@@ -208,7 +217,7 @@ impl Budget {
         let Some(shared) = self.shared.as_deref() else {
             return true;
         };
-        let over = |m: Memory| (m.used)().saturating_add(bytes) > m.limit;
+        let over = |m: Memory| m.own().saturating_add(bytes) > m.limit;
         if shared.memory.is_some_and(over) {
             shared.set(MEMORY);
         }
@@ -297,6 +306,7 @@ mod tests {
         let memory = Memory {
             limit: 100 << 20,
             used: || 60 << 20,
+            before: 0,
         };
         let budget = Budget::new(None, Some(memory));
         let part = budget.part(0.3);
@@ -307,6 +317,23 @@ mod tests {
         assert_eq!(spent.to_string(), "the limit of 100 MiB ended it");
         // it may have come back
         assert_eq!(budget.marked(), None);
+    }
+
+    #[test]
+    fn what_was_in_use_before_does_not_count() {
+        let memory = |before| Memory {
+            limit: 20 << 20,
+            used: || 60 << 20,
+            before,
+        };
+        let budget = Budget::new(None, Some(memory(50 << 20)));
+        assert_eq!((budget.spent(), budget.room()), (None, Some(10 << 20)));
+        assert!(budget.affords(10 << 20) && !budget.affords(11 << 20));
+        let ended = Budget::new(None, Some(memory(30 << 20))).spent();
+        assert_eq!(ended, Some(Spent::Memory(20 << 20)));
+        // what was in use may be given back meanwhile
+        let room = Budget::new(None, Some(memory(90 << 20))).room();
+        assert_eq!(room, Some(20 << 20));
     }
 
     #[test]

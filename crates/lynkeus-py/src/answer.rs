@@ -1,6 +1,6 @@
 //! What commands answer: a text, a JSON object, columns and a picture.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use lynkeus::study::Name;
 use lynkeus::{
@@ -21,13 +21,9 @@ pub trait Told: Send {
     fn text(&self) -> String;
     /// As the command's `--json`.
     fn json(&self) -> Value;
-    /// Headers of its columns.
-    fn headers(&self) -> Vec<String> {
+    /// Its columns under their headers.
+    fn columns(&self) -> Vec<(String, Series)> {
         vec![]
-    }
-    /// The column of that place.
-    fn column(&self, _place: usize) -> Option<Series> {
-        None
     }
     /// Its picture, where it has one.
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -37,8 +33,8 @@ pub trait Told: Send {
     fn refusal(&self) -> Option<Error> {
         None
     }
-    /// What the user should know.
-    fn notes(&self) -> Vec<String> {
+    /// Root mean square errors over the last half of the rows, of what is estimated.
+    fn settled(&self) -> Vec<(String, f64)> {
         vec![]
     }
     /// What a logger would have seen.
@@ -52,12 +48,25 @@ pub trait Told: Send {
 pub struct Answer {
     /// a graph in it may be used by one thread at a time
     told: Mutex<Box<dyn Told>>,
+    /// made when first asked for
+    columns: OnceLock<Vec<(String, Series)>>,
 }
 
 impl Answer {
     pub fn of(told: impl Told + 'static) -> Self {
         Self {
             told: Mutex::new(Box::new(told)),
+            columns: OnceLock::new(),
+        }
+    }
+
+    fn columns(&self, py: Python<'_>) -> &[(String, Series)] {
+        match self.columns.get() {
+            Some(known) => known,
+            None => {
+                let made = self.ask(py, |told| told.columns());
+                self.columns.get_or_init(|| made)
+            }
         }
     }
 
@@ -83,12 +92,15 @@ impl Answer {
     }
 
     fn headers(&self, py: Python<'_>) -> Vec<String> {
-        self.ask(py, |told| told.headers())
+        let headers = self.columns(py).iter().map(|(header, _)| header.clone());
+        headers.collect()
     }
 
     /// The number of rows.
     fn rows(&self, py: Python<'_>) -> usize {
-        self.ask(py, |told| told.column(0).map_or(0, |column| column.len()))
+        self.columns(py)
+            .first()
+            .map_or(0, |(_, column)| column.len())
     }
 
     fn column<'py>(
@@ -96,7 +108,7 @@ impl Answer {
         py: Python<'py>,
         place: usize,
     ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
-        let Some(column) = self.ask(py, |told| told.column(place)) else {
+        let Some((_, column)) = self.columns(py).get(place) else {
             return Ok(None);
         };
         let values = py.detach(|| {
@@ -114,13 +126,7 @@ impl Answer {
 
     /// The columns for Arrow, read as they are asked for.
     fn arrow_stream<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
-        let columns = self.ask(py, |told| {
-            let headers = told.headers().into_iter().enumerate();
-            headers
-                .filter_map(|(place, header)| Some((header, told.column(place)?)))
-                .collect()
-        });
-        export::stream(py, columns)
+        export::stream(py, self.columns(py).to_vec())
     }
 
     fn svg(&self, py: Python<'_>) -> PyResult<Option<String>> {
@@ -132,8 +138,12 @@ impl Answer {
         self.ask(py, |told| told.refusal()).map(|e| exception(&e))
     }
 
-    fn notes(&self, py: Python<'_>) -> Vec<String> {
-        self.ask(py, |told| told.notes())
+    /// By name; none where one is no number.
+    fn settled(&self, py: Python<'_>) -> Vec<(String, Option<f64>)> {
+        let errors = self.ask(py, |told| told.settled()).into_iter();
+        errors
+            .map(|(name, error)| (name, Some(error).filter(|x| x.is_finite())))
+            .collect()
     }
 
     fn log<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
@@ -169,14 +179,9 @@ impl Told for Ran {
         self.outcome.to_json(self.is_simulated)
     }
 
-    fn headers(&self) -> Vec<String> {
-        let columns = self.outcome.columns(self.is_simulated);
-        columns.into_iter().map(|(name, _)| name).collect()
-    }
-
-    fn column(&self, place: usize) -> Option<Series> {
-        let columns = self.outcome.columns(self.is_simulated);
-        columns.get(place).map(|(_, values)| (*values).clone())
+    fn columns(&self) -> Vec<(String, Series)> {
+        let columns = self.outcome.columns(self.is_simulated).into_iter();
+        columns.map(|(name, x)| (name, x.clone())).collect()
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -190,8 +195,11 @@ impl Told for Ran {
         self.outcome.refusal()
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.outcome.notes.clone()
+    fn settled(&self) -> Vec<(String, f64)> {
+        let estimated = self.outcome.quantities.iter();
+        let estimated = estimated.filter(|q| q.estimate.is_some());
+        let errors = estimated.filter_map(|q| Some((q.name.clone(), q.settled_error()?)));
+        errors.collect()
     }
 
     fn log(&self) -> Result<Vec<(String, Vec<f64>)>, Error> {
@@ -222,14 +230,9 @@ impl Told for Of<MonteCarlo> {
         self.found.to_json()
     }
 
-    fn headers(&self) -> Vec<String> {
-        let columns = self.found.columns();
-        columns.into_iter().map(|(name, _)| name).collect()
-    }
-
-    fn column(&self, place: usize) -> Option<Series> {
-        let columns = self.found.columns();
-        columns.get(place).map(|(_, values)| values.to_vec().into())
+    fn columns(&self) -> Vec<(String, Series)> {
+        let columns = self.found.columns().into_iter();
+        columns.map(|(name, x)| (name, x.to_vec().into())).collect()
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
@@ -239,10 +242,6 @@ impl Told for Of<MonteCarlo> {
 
     fn refusal(&self) -> Option<Error> {
         self.found.refusal()
-    }
-
-    fn notes(&self) -> Vec<String> {
-        self.found.notes.clone()
     }
 }
 
@@ -261,6 +260,12 @@ impl Told for Of<Comparison> {
     }
 }
 
+/// A column in which NaN stands where there is no value.
+fn whole(values: impl Iterator<Item = Option<f64>>) -> Series {
+    let values = values.map(|x| x.unwrap_or(f64::NAN));
+    values.collect::<Vec<f64>>().into()
+}
+
 impl Told for Sweep {
     fn text(&self) -> String {
         self.to_string()
@@ -270,28 +275,21 @@ impl Told for Sweep {
         self.to_json()
     }
 
-    fn headers(&self) -> Vec<String> {
-        let keys = self.axes.iter().map(|a| a.key.clone());
-        let figures = self.measures.iter().map(|m| m.name.to_owned());
+    fn columns(&self) -> Vec<(String, Series)> {
+        let keys = self.axes.iter().enumerate().map(|(place, axis)| {
+            let values = self.rows.iter().map(|row| row.values.get(place).copied());
+            (axis.key.clone(), whole(values))
+        });
+        let measures = self.measures.iter().enumerate();
+        let figures = measures.map(|(place, measure)| {
+            let values = self.rows.iter().map(|row| *row.figures.get(place)?);
+            (measure.name.to_owned(), whole(values))
+        });
         keys.chain(figures).collect()
-    }
-
-    fn column(&self, place: usize) -> Option<Series> {
-        let cell = |row: &lynkeus::tune::Row| match place.checked_sub(self.axes.len()) {
-            None => row.values.get(place).copied(),
-            Some(figure) => row.figures.get(figure).copied().flatten(),
-        };
-        let rows = self.rows.iter();
-        let values = rows.map(|row| cell(row).unwrap_or(f64::NAN));
-        Some(values.collect::<Vec<f64>>().into())
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {
         self.to_svg().map(Some)
-    }
-
-    fn notes(&self) -> Vec<String> {
-        self.notes.clone()
     }
 }
 
@@ -304,12 +302,9 @@ impl Told for precision::Report {
         self.to_json()
     }
 
-    fn headers(&self) -> Vec<String> {
-        self.columns().into_iter().map(|(name, _)| name).collect()
-    }
-
-    fn column(&self, place: usize) -> Option<Series> {
-        Some(self.columns().into_iter().nth(place)?.1.into())
+    fn columns(&self) -> Vec<(String, Series)> {
+        let columns = Self::columns(self).into_iter();
+        columns.map(|(name, x)| (name, x.into())).collect()
     }
 
     fn svg(&self) -> Result<Option<String>, Error> {

@@ -1,5 +1,6 @@
-//! Work away from the interpreter: without its lock, ended by Ctrl-C and by a time limit.
+//! Work away from the interpreter: without its lock, ended by Ctrl-C and by limits.
 
+use std::alloc::System;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -7,9 +8,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{self, Builder};
 use std::time::Duration;
 
-use lynkeus::expr::Budget;
-use lynkeus::{Error, Study};
-use pyo3::exceptions::PyValueError;
+use cap::Cap;
+use lynkeus::Error;
+use lynkeus::expr::{Budget, Memory};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::errors::exception;
@@ -20,13 +22,73 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Models nest, and so do the calls that walk over them; as much as a main thread has.
 const STACK: usize = 8 << 20;
 
+/// MiB that a call may take where nothing else is said, as many as the command's.
+pub const MEMORY: f64 = 2048.0;
+
+/// Counts what is in use, for the limit of memory.
+#[global_allocator]
+static ALLOCATOR: Cap<System> = Cap::new(System, usize::MAX);
+
 /// What a call may take, and whom it tells.
-#[derive(Default)]
 pub struct Terms<'py> {
-    /// in seconds
-    pub time_limit: Option<f64>,
     /// called with the fraction done
-    pub progress: Option<Bound<'py, PyAny>>,
+    progress: Option<Bound<'py, PyAny>>,
+    /// in seconds
+    time_limit: Option<f64>,
+    /// in MiB
+    memory_limit: f64,
+}
+
+impl Default for Terms<'_> {
+    fn default() -> Self {
+        Self::new(None, None, MEMORY)
+    }
+}
+
+impl<'py> Terms<'py> {
+    pub fn new(
+        progress: Option<Bound<'py, PyAny>>,
+        time_limit: Option<f64>,
+        memory_limit: f64,
+    ) -> Self {
+        Self {
+            progress,
+            time_limit,
+            memory_limit,
+        }
+    }
+
+    /// From now on; what others have in memory by now does not count.
+    fn budget(&self) -> PyResult<Budget> {
+        let time = self.time_limit.map(|seconds| {
+            let limit = Duration::try_from_secs_f64(seconds);
+            limit.map_err(|_| refused("time_limit: expected seconds >= 0", seconds))
+        });
+        if self.memory_limit.is_nan() || self.memory_limit < 0.0 {
+            let expected = "memory_limit: expected MiB >= 0";
+            return Err(refused(expected, self.memory_limit));
+        }
+        let memory = Memory {
+            // a limit beyond all memory is none
+            limit: (self.memory_limit * f64::from(1 << 20)) as usize,
+            used: || ALLOCATOR.allocated(),
+            before: ALLOCATOR.allocated(),
+        };
+        Ok(Budget::new(time.transpose()?, Some(memory)))
+    }
+
+    /// Whether Ctrl-C was pressed, and tells the progress.
+    fn look(&self, py: Python<'_>, fraction: f64) -> PyResult<()> {
+        py.check_signals()?;
+        match &self.progress {
+            Some(progress) => progress.call1((fraction,)).map(|_| ()),
+            None => Ok(()),
+        }
+    }
+}
+
+fn refused(expected: &str, found: f64) -> PyErr {
+    PyValueError::new_err(format!("{expected}, found {found}"))
 }
 
 /// What work is told its progress by.
@@ -38,17 +100,13 @@ pub type Watch<'a> = dyn FnMut(f64) -> ControlFlow<()> + 'a;
 /// What the work ends with; `KeyboardInterrupt`, and what `progress` raises.
 pub fn away<T: Send>(
     py: Python<'_>,
-    study: &Study,
     terms: &Terms<'_>,
-    work: impl FnOnce(&Study, &mut Watch<'_>) -> Result<T, Error> + Send,
+    work: impl FnOnce(Budget, &mut Watch<'_>) -> Result<T, Error> + Send,
 ) -> PyResult<T> {
     let stop = Arc::new(AtomicBool::new(false));
     let fraction = AtomicU64::new(0);
-    let study = Study {
-        budget: Budget::new(limit(terms.time_limit)?, None).stopped_by(Arc::clone(&stop)),
-        ..study.clone()
-    };
-    let (study, stopped, told) = (&study, &stop, &fraction);
+    let budget = terms.budget()?.stopped_by(Arc::clone(&stop));
+    let (stopped, told) = (&stop, &fraction);
     thread::scope(|scope| {
         let (sender, mut receiver) = channel();
         let run = move || {
@@ -60,10 +118,11 @@ pub fn away<T: Send>(
                 }
             };
             // the receiver only goes away with the scope
-            let _ = sender.send(work(study, &mut watch));
+            let _ = sender.send(work(budget, &mut watch));
         };
         let worker = Builder::new().stack_size(STACK).spawn_scoped(scope, run);
-        worker.map_err(|e| exception(&Error::input(format!("no thread can be started: {e}"))))?;
+        let worker = worker
+            .map_err(|e| exception(&Error::input(format!("no thread can be started: {e}"))))?;
         let mut raised = None;
         loop {
             let found;
@@ -78,15 +137,16 @@ pub fn away<T: Send>(
                         None => result.map_err(|error| exception(&error)),
                     };
                 }
-                // a fault of ours, which its message on standard error tells
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(exception(&Error::input(
-                        "internal fault: the work panicked",
-                    )));
+                    // else the scope panics as well
+                    let _ = worker.join();
+                    return Err(PyRuntimeError::new_err(
+                        "internal fault: the work panicked, as standard error tells",
+                    ));
                 }
                 Err(RecvTimeoutError::Timeout) => {
                     let seen = match raised {
-                        None => look(py, terms, f64::from_bits(told.load(Ordering::Relaxed))),
+                        None => terms.look(py, f64::from_bits(told.load(Ordering::Relaxed))),
                         Some(_) => Ok(()),
                     };
                     if let Err(error) = seen {
@@ -97,24 +157,4 @@ pub fn away<T: Send>(
             }
         }
     })
-}
-
-fn look(py: Python<'_>, terms: &Terms<'_>, fraction: f64) -> PyResult<()> {
-    py.check_signals()?;
-    match &terms.progress {
-        Some(progress) => progress.call1((fraction,)).map(|_| ()),
-        None => Ok(()),
-    }
-}
-
-fn limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
-    let Some(seconds) = seconds else {
-        return Ok(None);
-    };
-    match Duration::try_from_secs_f64(seconds) {
-        Ok(limit) => Ok(Some(limit)),
-        Err(_) => Err(PyValueError::new_err(format!(
-            "time_limit: expected seconds >= 0, found {seconds}"
-        ))),
-    }
 }

@@ -6,7 +6,7 @@ use lynkeus::run::{self, filter::Reading};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict, PyString, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyMapping, PyString, PyTuple};
 
 use crate::errors::{exception, from_source};
 
@@ -100,6 +100,14 @@ impl Estimator {
     }
 }
 
+/// A dictionary of any mapping.
+fn mapped<'py>(readings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
+    match readings.cast::<PyDict>() {
+        Ok(known) => Ok(known.clone()),
+        Err(_) => PyDict::from_sequence(readings.cast::<PyMapping>()?.items()?.as_any()),
+    }
+}
+
 /// A value that is no number; what its own conversion raises is passed on.
 fn wrong_reading(name: &Bound<'_, PyString>, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
     let py = value.py();
@@ -121,7 +129,8 @@ impl Estimator {
     }
 
     /// Goes to a time and takes what was read there, by name.
-    fn update(&self, t: f64, readings: &Bound<'_, PyDict>) -> PyResult<()> {
+    fn update(&self, t: f64, readings: &Bound<'_, PyAny>) -> PyResult<()> {
+        let readings = &mapped(readings)?;
         match [f64::NAN; FEW].get_mut(..self.signals.len()) {
             Some(sample) => self.taken(t, readings, sample),
             None => self.taken(t, readings, &mut vec![f64::NAN; self.signals.len()]),

@@ -4,7 +4,7 @@
 use std::sync::{Mutex, OnceLock};
 
 use lynkeus::Error;
-use lynkeus::expr::{Evaluator, Graph, MissingInput, Node, Tape, jacobian};
+use lynkeus::expr::{Budget, Evaluator, Graph, MissingInput, Node, Tape, jacobian};
 use lynkeus::model::{Plant, Variable};
 use lynkeus::observers::{self, Observer};
 use lynkeus::study::SimulateSettings;
@@ -14,14 +14,24 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::errors::{exception, from_source};
+use crate::away::{Terms, away};
+use crate::errors::exception;
 
 type Values<'py> = PyReadonlyArray1<'py, f64>;
 
 /// x' = f(t, x, u), y = h(t, x, u).
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Functions {
-    /// what it is, for people
+    about: About,
+    equations: Mutex<Equations>,
+    f: Compiled,
+    h: Compiled,
+    jacobian: OnceLock<Jacobian>,
+}
+
+/// What the functions are of.
+struct About {
+    /// for people
     title: String,
     states: Vector,
     inputs: Vector,
@@ -33,10 +43,6 @@ pub struct Functions {
     is_filter: bool,
     /// how many of the inputs are sensors
     sensors: usize,
-    equations: Mutex<Equations>,
-    f: Compiled,
-    h: Compiled,
-    jacobian: OnceLock<Jacobian>,
 }
 
 /// Expressions over one graph.
@@ -108,8 +114,8 @@ impl Functions {
     /// The plant; its start is that of `[simulate]` where the study has one.
     ///
     /// # Errors
-    /// An equation reads what has no value.
-    pub fn of_plant(plant: &Plant, settings: Option<&SimulateSettings>) -> PyResult<Self> {
+    /// An equation reads what has no value, or a limit ended the work.
+    pub fn of_plant(plant: &Plant, settings: Option<&SimulateSettings>) -> Result<Self, Error> {
         let initial = settings.map_or(&[][..], |settings| &settings.initial);
         let start = |state: &Variable| {
             let given = initial.iter().find(|(name, _)| name.text == state.name);
@@ -123,7 +129,7 @@ impl Functions {
             derivatives: plant.derivatives.clone(),
             outputs: nodes(&plant.outputs),
         };
-        Ok(Self {
+        let about = About {
             title: format!("{}: x' = f(t, x, u), y = h(t, x, u)", plant.name),
             states: vector("x", names(&plant.states)),
             inputs: vector("u", names(&plant.inputs)),
@@ -132,24 +138,17 @@ impl Functions {
             family: None,
             is_filter: false,
             sensors: 0,
-            f: equations
-                .compiled(&equations.derivatives)
-                .map_err(from_source)?,
-            h: equations
-                .compiled(&equations.outputs)
-                .map_err(from_source)?,
-            equations: Mutex::new(equations),
-            jacobian: OnceLock::new(),
-        })
+        };
+        Self::new(about, equations)
     }
 
     /// The observer: its inputs are the sensors, the known inputs and the derivatives of these
     /// that it reads; its outputs the estimates.
     ///
     /// # Errors
-    /// An equation reads what has no value.
-    pub fn of_observer(plant: &Plant, observer: &Observer) -> PyResult<Self> {
-        let system = lynkeus::observer_system(plant, observer).map_err(|e| exception(&e))?;
+    /// As [`Functions::of_plant`].
+    pub fn of_observer(plant: &Plant, observer: &Observer) -> Result<Self, Error> {
+        let system = lynkeus::observer_system(plant, observer)?;
         let read = observer.measured.iter().chain(&observer.inputs);
         let signals = read.chain(observer.input_derivatives.iter().map(|d| &d.signal));
         let estimates = observer.estimates.iter();
@@ -163,7 +162,7 @@ impl Functions {
         };
         let outputs = system.outputs().iter().take(equations.outputs.len());
         let (family, name) = (observer.family, &plant.name);
-        Ok(Self {
+        let about = About {
             title: format!("{family} observer of {name}: z' = f(t, z, w), estimates h(t, z, w)"),
             states: vector("z", system.states().to_vec()),
             inputs: vector("w", system.signals().to_vec()),
@@ -172,12 +171,26 @@ impl Functions {
             family: Some(family),
             is_filter: observer.filter.is_some(),
             sensors: observer.measured.len(),
-            f: equations
-                .compiled(&equations.derivatives)
-                .map_err(from_source)?,
-            h: equations
-                .compiled(&equations.outputs)
-                .map_err(from_source)?,
+        };
+        Self::new(about, equations)
+    }
+
+    fn new(about: About, equations: Equations) -> Result<Self, Error> {
+        let compiled = |values| equations.compiled(values).map_err(Error::from_source);
+        let (f, h) = (
+            compiled(&equations.derivatives)?,
+            compiled(&equations.outputs)?,
+        );
+        // what a limit left of the graph says nothing
+        if let Some(spent) = equations.graph.spent() {
+            return Err(Error::ended(spent));
+        }
+        // the call ends here; later ones have limits of their own
+        equations.graph.set_budget(Budget::default());
+        Ok(Self {
+            about,
+            f,
+            h,
             equations: Mutex::new(equations),
             jacobian: OnceLock::new(),
         })
@@ -185,7 +198,8 @@ impl Functions {
 
     fn arguments(&self, t: f64, x: &Values<'_>, u: &Values<'_>) -> PyResult<Vec<f64>> {
         let mut arguments = vec![t];
-        for (Vector { name, entries }, values) in [(&self.states, x), (&self.inputs, u)] {
+        for (Vector { name, entries }, values) in [(&self.about.states, x), (&self.about.inputs, u)]
+        {
             let values = values.as_array();
             if values.len() != entries.len() {
                 return Err(exception(&Error::input(format!(
@@ -200,13 +214,28 @@ impl Functions {
         Ok(arguments)
     }
 
+    /// A function at a point.
+    fn value<'py>(
+        &self,
+        py: Python<'py>,
+        function: &Compiled,
+        (t, x, u): (f64, &Values<'_>, &Values<'_>),
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let arguments = self.arguments(t, x, u)?;
+        Ok(function.at(&arguments).into_pyarray(py))
+    }
+
     /// Made when first asked for.
-    fn slopes(&self) -> PyResult<&Jacobian> {
+    fn slopes(&self, py: Python<'_>) -> PyResult<&Jacobian> {
         if let Some(known) = self.jacobian.get() {
             return Ok(known);
         }
-        let equations = self.equations.lock().unwrap_or_else(|e| e.into_inner());
-        let made = equations.jacobian().map_err(from_source)?;
+        let made = away(py, &Terms::default(), |budget, _| {
+            let equations = self.equations.lock().unwrap_or_else(|e| e.into_inner());
+            let made = equations.graph.budgeted(budget, || equations.jacobian());
+            made.map_err(Error::ended)?.map_err(Error::from_source)
+        });
+        let made = made?;
         Ok(self.jacobian.get_or_init(|| made))
     }
 }
@@ -215,43 +244,43 @@ impl Functions {
 impl Functions {
     #[getter]
     fn title(&self) -> &str {
-        &self.title
+        &self.about.title
     }
 
     #[getter]
     fn states(&self) -> Vec<String> {
-        self.states.entries.clone()
+        self.about.states.entries.clone()
     }
 
     #[getter]
     fn inputs(&self) -> Vec<String> {
-        self.inputs.entries.clone()
+        self.about.inputs.entries.clone()
     }
 
     #[getter]
     fn outputs(&self) -> Vec<String> {
-        self.outputs.clone()
+        self.about.outputs.clone()
     }
 
     /// Start values, NaN where the model gives none.
     #[getter]
     fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.start.clone().into_pyarray(py)
+        self.about.start.clone().into_pyarray(py)
     }
 
     #[getter]
     fn family(&self) -> Option<&'static str> {
-        self.family
+        self.about.family
     }
 
     #[getter]
     fn is_filter(&self) -> bool {
-        self.is_filter
+        self.about.is_filter
     }
 
     #[getter]
     fn sensors(&self) -> usize {
-        self.sensors
+        self.about.sensors
     }
 
     /// x'
@@ -262,8 +291,7 @@ impl Functions {
         x: Values<'_>,
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let arguments = self.arguments(t, &x, &u)?;
-        Ok(self.f.at(&arguments).into_pyarray(py))
+        self.value(py, &self.f, (t, &x, &u))
     }
 
     /// y
@@ -274,8 +302,7 @@ impl Functions {
         x: Values<'_>,
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let arguments = self.arguments(t, &x, &u)?;
-        Ok(self.h.at(&arguments).into_pyarray(py))
+        self.value(py, &self.h, (t, &x, &u))
     }
 
     /// ∂f/∂x, row by row of x'
@@ -287,8 +314,8 @@ impl Functions {
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let arguments = self.arguments(t, &x, &u)?;
-        let slopes = self.slopes()?;
-        let mut found = Array2::zeros((self.start.len(), self.start.len()));
+        let slopes = self.slopes(py)?;
+        let mut found = Array2::zeros([self.about.start.len(); 2]);
         for (&place, value) in slopes.places.iter().zip(slopes.entries.at(&arguments)) {
             found[place] = value;
         }
@@ -296,7 +323,7 @@ impl Functions {
     }
 
     /// A module with f and h, and whether it leaves linear systems to its namespace.
-    fn source(&self, language: &str) -> PyResult<(String, bool)> {
+    fn source(&self, py: Python<'_>, language: &str) -> PyResult<(String, bool)> {
         let namespace = match language {
             "python" => Namespace::Numpy,
             "casadi" => Namespace::Casadi,
@@ -311,8 +338,14 @@ impl Functions {
             name,
             tape: &compiled.tape,
         });
-        let vectors = [self.states.clone(), self.inputs.clone()];
-        let printed = module(&self.title, &functions, &vectors, namespace);
+        let About {
+            title,
+            states,
+            inputs,
+            ..
+        } = &self.about;
+        let vectors = [states.clone(), inputs.clone()];
+        let printed = py.detach(|| module(title, &functions, &vectors, namespace));
         let printed = printed.map_err(|e| exception(&Error::refused(e.to_string())))?;
         Ok((printed.text, printed.has_systems))
     }

@@ -11,6 +11,7 @@ mod errors;
 mod estimator;
 mod functions;
 mod log;
+mod sections;
 mod study;
 
 /// The module `lynkeus._lynkeus`.
@@ -18,6 +19,8 @@ mod study;
 mod _lynkeus {
     #[pymodule_export]
     use crate::answer::Answer;
+    #[pymodule_export]
+    const MEMORY: f64 = crate::away::MEMORY;
     #[pymodule_export]
     use crate::estimator::Estimator;
     #[pymodule_export]

@@ -14,7 +14,7 @@ use crate::errors::exception;
 const NAME: &str = "log";
 
 /// What to do about a column that cannot be read.
-const HINT: &str = "convert it before, or name another column under [estimate] columns";
+pub const HINT: &str = "convert it before, or name another column under [estimate] columns";
 
 /// A table of named columns of equal length.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
@@ -35,6 +35,8 @@ enum Column<'py> {
         PyReadonlyArray1<'py, f64>,
         PyReadonlyArray1<'py, i64>,
     ),
+    /// seconds since an instant
+    Since(PyReadonlyArray1<'py, f64>, String),
     /// why it can be no column
     Refused(String),
     /// has `__arrow_c_stream__` or `__arrow_c_array__`
@@ -44,13 +46,10 @@ enum Column<'py> {
 impl Column<'_> {
     fn gathered(&self, name: &str, log: &Gathering) -> PyResult<Gathered> {
         match self {
-            Self::Numbers(values) => {
-                let values = match values.as_slice() {
-                    Ok(values) => values.to_vec(),
-                    Err(_) => values.as_array().to_vec(),
-                };
-                Ok(log.owned(name, values))
-            }
+            Self::Numbers(values) => Ok(log.owned(name, numbers(values))),
+            Self::Since(values, origin) => log
+                .since(name, numbers(values), origin)
+                .map_err(|error| exception(&error)),
             Self::Instants(counts, unit, zoned) => {
                 let mut column = log.column(name);
                 let counts = counts.as_array();
@@ -70,6 +69,13 @@ impl Column<'_> {
             Self::Refused(why) => Ok(log.refused(name, why, HINT)),
             Self::Arrow(object) => import::column(object, name, log),
         }
+    }
+}
+
+fn numbers(values: &PyReadonlyArray1<'_, f64>) -> Vec<f64> {
+    match values.as_slice() {
+        Ok(values) => values.to_vec(),
+        Err(_) => values.as_array().to_vec(),
     }
 }
 
@@ -110,7 +116,8 @@ impl Log {
         Self::of(py, &log, gathered)
     }
 
-    /// Anything with `__arrow_c_stream__` or `__arrow_c_array__` that is a table.
+    /// Anything with `__arrow_c_stream__` or `__arrow_c_array__` that is a table. A single array of it
+    /// is read where it lies, as long as the log lives.
     #[staticmethod]
     fn from_arrow(py: Python<'_>, table: &Bound<'_, PyAny>) -> PyResult<Self> {
         let log = Gathering::new(NAME);
@@ -125,6 +132,17 @@ impl Log {
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let values = py.detach(|| self.table.readings(name).map(lynkeus::Series::to_vec));
         Ok(values.map_err(|e| exception(&e))?.into_pyarray(py))
+    }
+
+    /// Why a column cannot be read, where that is so.
+    fn refusal(&self, name: &str) -> Option<&str> {
+        self.table.refusal(name)
+    }
+
+    /// A column as it is, NaN where a reading is missing; `None` where it cannot be read.
+    fn values<'py>(&self, py: Python<'py>, name: &str) -> Option<Bound<'py, PyArray1<f64>>> {
+        let values = py.detach(|| self.table.get(name).map(lynkeus::Series::to_vec))?;
+        Some(values.into_pyarray(py))
     }
 
     /// What stands for zero in a column of dates and times.

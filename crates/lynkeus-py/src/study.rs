@@ -1,20 +1,22 @@
 //! Studies, and what is asked of them.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
 use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
+use lynkeus::study::Whole;
 use lynkeus::{CheckOptions, Error};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::answer::{Answer, Of, Ran};
-use crate::away::{Terms, away};
+use crate::away::{MEMORY, Terms, Watch, away};
 use crate::errors::exception;
 use crate::estimator::Estimator;
 use crate::functions::Functions;
 use crate::log::Log;
+use crate::sections;
 
 /// A study with the texts that it was made from.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
@@ -29,17 +31,6 @@ pub fn schema() -> String {
     lynkeus::schema().to_string()
 }
 
-/// The text of a file, told as `what` where it cannot be read.
-fn text_of(path: &Path, what: &str) -> Result<Arc<str>, Error> {
-    let text = std::fs::read_to_string(path);
-    text.map(Arc::from).map_err(|e| {
-        Error::input(format!(
-            "cannot read the {what} file {}: {e}",
-            path.display()
-        ))
-    })
-}
-
 #[pymethods]
 impl Study {
     /// A study file, or a model for which it stands with every output measured; the plant's text
@@ -47,37 +38,27 @@ impl Study {
     #[staticmethod]
     #[pyo3(signature = (path, model=None))]
     fn load(py: Python<'_>, path: PathBuf, model: Option<String>) -> PyResult<Self> {
-        let loaded = py.detach(|| {
-            let mut study = lynkeus::Study::load_or_bare(&path, model)?;
-            // told where the plant is asked for
-            study.plant_text = match &study.plant {
-                Some(plant) if plant.is_file() => Some(text_of(plant, "plant")?),
-                _ => None,
-            };
-            let is_model = study.plant.as_deref() == Some(path.as_path());
-            let text = match is_model {
-                true => String::new(),
-                false => text_of(&path, "study")?.to_string(),
-            };
-            Ok(Self { study, text })
-        });
-        loaded.map_err(|e| exception(&e))
+        let whole = py.detach(|| Whole::load(&path, model));
+        let Whole { study, text } = whole.map_err(|e| exception(&e))?;
+        Ok(Self { study, text })
     }
 
-    /// A study's text; `file` names it in messages. `plant` is the name and the text of the
-    /// model where that is no file.
+    /// A study's text; `file` names it in messages. `plant` is the name of the model, and its text
+    /// where that is no file.
     #[staticmethod]
     #[pyo3(signature = (text, file, plant=None, model=None))]
     fn parse(
+        py: Python<'_>,
         text: String,
         file: &str,
-        plant: Option<(PathBuf, String)>,
+        plant: Option<(PathBuf, Option<String>)>,
         model: Option<String>,
     ) -> PyResult<Self> {
-        let mut study = lynkeus::Study::parse(&text, file).map_err(|e| exception(&e))?;
+        let parsed = py.detach(|| lynkeus::Study::parse(&text, file));
+        let mut study = parsed.map_err(|e| exception(&e))?;
         if let Some((name, text)) = plant {
             study.plant = Some(name);
-            study.plant_text = Some(text.into());
+            study.plant_text = text.map(Into::into);
         }
         study.model = model.or(study.model);
         Ok(Self { study, text })
@@ -93,6 +74,11 @@ impl Study {
         &self.text
     }
 
+    /// The text as dictionaries.
+    fn sections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        sections::of(py, &self.text)
+    }
+
     /// The name and the text of the plant.
     #[getter]
     fn plant(&self) -> Option<(String, Option<&str>)> {
@@ -106,44 +92,53 @@ impl Study {
         self.study.model.as_deref()
     }
 
-    #[pyo3(signature = (parameters=false, about=vec![], time_limit=None))]
+    #[pyo3(signature = (parameters=false, about=vec![], time_limit=None, memory_limit=MEMORY))]
     fn check(
         &self,
         py: Python<'_>,
         parameters: bool,
         about: Vec<String>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
         let options = CheckOptions { parameters, about };
-        let report = away(py, &self.study, &timed(time_limit), |study, _| {
-            lynkeus::check(study, &options)
-        });
+        let terms = Terms::new(None, time_limit, memory_limit);
+        let report = self.ask(py, &terms, |study, _| lynkeus::check(study, &options));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (time_limit=None))]
-    fn design(&self, py: Python<'_>, time_limit: Option<f64>) -> PyResult<Answer> {
-        let report = away(py, &self.study, &timed(time_limit), |study, _| {
-            lynkeus::design(study)
-        });
+    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
+    fn design(
+        &self,
+        py: Python<'_>,
+        time_limit: Option<f64>,
+        memory_limit: f64,
+    ) -> PyResult<Answer> {
+        let terms = Terms::new(None, time_limit, memory_limit);
+        let report = self.ask(py, &terms, |study, _| lynkeus::design(study));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (time_limit=None))]
-    fn certify(&self, py: Python<'_>, time_limit: Option<f64>) -> PyResult<Answer> {
-        let report = away(py, &self.study, &timed(time_limit), |study, _| {
-            lynkeus::certify(study)
-        });
+    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
+    fn certify(
+        &self,
+        py: Python<'_>,
+        time_limit: Option<f64>,
+        memory_limit: f64,
+    ) -> PyResult<Answer> {
+        let terms = Terms::new(None, time_limit, memory_limit);
+        let report = self.ask(py, &terms, |study, _| lynkeus::certify(study));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (horizon=None, sensors=None, time_limit=None))]
+    #[pyo3(signature = (horizon=None, sensors=None, time_limit=None, memory_limit=MEMORY))]
     fn how_well(
         &self,
         py: Python<'_>,
         horizon: Option<f64>,
         sensors: Option<&str>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
         let sensors = match sensors {
             None => None,
@@ -156,78 +151,67 @@ impl Study {
             }
         };
         let options = precision::Options { horizon, sensors };
-        let report = away(py, &self.study, &timed(time_limit), |study, _| {
-            lynkeus::precision(study, &options)
-        });
+        let terms = Terms::new(None, time_limit, memory_limit);
+        let report = self.ask(py, &terms, |study, _| lynkeus::precision(study, &options));
         report.map(Answer::of)
     }
 
-    #[pyo3(signature = (progress=None, time_limit=None))]
+    #[pyo3(signature = (progress=None, time_limit=None, memory_limit=MEMORY))]
     fn simulate(
         &self,
         py: Python<'_>,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
-        let terms = Terms {
-            time_limit,
-            progress,
-        };
-        let outcome = away(py, &self.study, &terms, |study, watch| {
-            lynkeus::simulate(study, watch)
-        })?;
+        let terms = Terms::new(progress, time_limit, memory_limit);
+        let outcome = self.ask(py, &terms, |study, watch| lynkeus::simulate(study, watch))?;
         Ok(self.ran(outcome, true))
     }
 
-    #[pyo3(signature = (runs, progress=None, time_limit=None))]
+    #[pyo3(signature = (runs, progress=None, time_limit=None, memory_limit=MEMORY))]
     fn monte_carlo(
         &self,
         py: Python<'_>,
         runs: usize,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
-        let terms = Terms {
-            time_limit,
-            progress,
-        };
-        let found = away(py, &self.study, &terms, |study, watch| {
+        let terms = Terms::new(progress, time_limit, memory_limit);
+        let found = self.ask(py, &terms, |study, watch| {
             lynkeus::monte_carlo(study, runs, watch)
         })?;
         Ok(Answer::of(self.of(found)))
     }
 
-    #[pyo3(signature = (log, progress=None, time_limit=None))]
+    #[pyo3(signature = (log, progress=None, time_limit=None, memory_limit=MEMORY))]
     fn estimate(
         &self,
         py: Python<'_>,
         log: &Log,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
-        let terms = Terms {
-            time_limit,
-            progress,
-        };
-        let outcome = away(py, &self.study, &terms, |study, watch| {
+        let terms = Terms::new(progress, time_limit, memory_limit);
+        let outcome = self.ask(py, &terms, |study, watch| {
             lynkeus::estimate(study, &log.table, watch)
         })?;
         Ok(self.ran(outcome, false))
     }
 
-    #[pyo3(signature = (log=None, progress=None, time_limit=None))]
+    #[pyo3(signature = (log=None, progress=None, time_limit=None, memory_limit=MEMORY))]
     fn tune(
         &self,
         py: Python<'_>,
         log: Option<&Log>,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
-        let terms = Terms {
-            time_limit,
-            progress,
-        };
-        let sweep = away(py, &self.study, &terms, |study, watch| {
+        let terms = Terms::new(progress, time_limit, memory_limit);
+        let sweep = self.ask(py, &terms, |study, watch| {
             let sweep = lynkeus::tune(study, log.map(|log| &log.table), watch)?;
             match sweep.is_empty_handed() {
                 true => Err(sweep.refusal().at(&study.file)),
@@ -237,19 +221,17 @@ impl Study {
         sweep.map(Answer::of)
     }
 
-    #[pyo3(signature = (log=None, progress=None, time_limit=None))]
+    #[pyo3(signature = (log=None, progress=None, time_limit=None, memory_limit=MEMORY))]
     fn compare(
         &self,
         py: Python<'_>,
         log: Option<&Log>,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
+        memory_limit: f64,
     ) -> PyResult<Answer> {
-        let terms = Terms {
-            time_limit,
-            progress,
-        };
-        let found = away(py, &self.study, &terms, |study, watch| {
+        let terms = Terms::new(progress, time_limit, memory_limit);
+        let found = self.ask(py, &terms, |study, watch| {
             lynkeus::compare(study, log.map(|log| &log.table), watch)
         })?;
         Ok(Answer::of(self.of(found)))
@@ -257,34 +239,52 @@ impl Study {
 
     /// The plant as functions, with the study's parameters.
     fn functions(&self, py: Python<'_>) -> PyResult<Functions> {
-        let plant = away(py, &self.study, &Terms::default(), |study, _| {
-            lynkeus::prepare::plant(study)
-        });
-        Functions::of_plant(&plant?, self.study.simulate.as_ref())
+        self.ask(py, &Terms::default(), |study, _| {
+            let plant = lynkeus::prepare::plant(study)?;
+            Functions::of_plant(&plant, study.simulate.as_ref())
+        })
     }
 
     /// The observer as functions.
-    #[pyo3(signature = (time_limit=None))]
-    fn observer(&self, py: Python<'_>, time_limit: Option<f64>) -> PyResult<Functions> {
-        let made = away(py, &self.study, &timed(time_limit), |study, _| {
+    #[pyo3(signature = (time_limit=None, memory_limit=MEMORY))]
+    fn observer(
+        &self,
+        py: Python<'_>,
+        time_limit: Option<f64>,
+        memory_limit: f64,
+    ) -> PyResult<Functions> {
+        let terms = Terms::new(None, time_limit, memory_limit);
+        self.ask(py, &terms, |study, _| {
             let plant = lynkeus::prepare::plant(study)?;
             let design = Prepared::new(study, &plant)?.design()?;
-            Ok((plant, design.observer))
-        });
-        let (plant, observer) = made?;
-        Functions::of_observer(&plant, &observer)
+            Functions::of_observer(&plant, &design.observer)
+        })
     }
 
     /// `study` is what a copy or an unpickled estimator is made of again.
     fn estimator(&self, py: Python<'_>, study: Py<PyAny>) -> PyResult<Estimator> {
-        let made = away(py, &self.study, &Terms::default(), |study, _| {
-            lynkeus::estimator(study)
-        });
+        let made = self.ask(py, &Terms::default(), |study, _| lynkeus::estimator(study));
         Ok(Estimator::of(py, made?, study))
     }
 }
 
 impl Study {
+    /// Does something with the study, away from the interpreter.
+    fn ask<T: Send>(
+        &self,
+        py: Python<'_>,
+        terms: &Terms<'_>,
+        work: impl FnOnce(&lynkeus::Study, &mut Watch<'_>) -> Result<T, Error> + Send,
+    ) -> PyResult<T> {
+        away(py, terms, |budget, watch| {
+            let study = lynkeus::Study {
+                budget,
+                ..self.study.clone()
+            };
+            work(&study, watch)
+        })
+    }
+
     fn ran(&self, outcome: lynkeus::Outcome, is_simulated: bool) -> Answer {
         Answer::of(Ran {
             outcome,
@@ -298,12 +298,5 @@ impl Study {
             found,
             study: self.study.clone(),
         }
-    }
-}
-
-fn timed<'py>(time_limit: Option<f64>) -> Terms<'py> {
-    Terms {
-        time_limit,
-        progress: None,
     }
 }

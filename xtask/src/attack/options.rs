@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::options;
-use crate::process::{cargo, root, run};
+use crate::process::{cargo, root, run, target};
 
 /// What was asked for.
 #[derive(Clone, Debug)]
@@ -59,9 +59,7 @@ impl Options {
             false => (&["--release"], "release"),
         };
         run(&mut cargo(&[&["build", "-p", "lynkeus"], profile].concat()))?;
-        let target = std::env::var_os("CARGO_TARGET_DIR");
-        let target = target.map_or_else(|| root().join("target"), PathBuf::from);
         let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
-        Ok(target.join(folder).join(name))
+        Ok(target().join(folder).join(name))
     }
 }

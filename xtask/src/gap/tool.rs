@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 use serde_json::Value;
 
-use crate::process::root;
+use crate::process::target;
 
 /// The answer of `lynkeus certify --json`.
 pub struct Certificate(Value);
@@ -113,8 +113,6 @@ fn lynkeus(command: &str, study: &str, arguments: &[&str]) -> Result<Output, Str
 }
 
 fn program() -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR");
-    let target = target.map_or_else(|| root().join("target"), PathBuf::from);
     let name = format!("lynkeus{}", std::env::consts::EXE_SUFFIX);
-    root().join(target).join("release").join(name)
+    target().join("release").join(name)
 }

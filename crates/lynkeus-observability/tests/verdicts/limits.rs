@@ -102,6 +102,7 @@ fn memory_ends_it_as_well() {
             Some(Memory {
                 limit: 1 << 20,
                 used: || 0,
+                before: 0,
             }),
         ),
         ..question()

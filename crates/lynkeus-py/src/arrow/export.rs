@@ -52,25 +52,12 @@ impl Batches for Rest {
         }
         let count = BATCH.min(self.rows - self.row);
         let columns = self.columns.iter();
-        let parts = columns.map(|column| part(column.part(self.row, count)));
+        let parts = columns.map(|column| Part::of(column.part(self.row, count)));
         let parts = parts.collect();
         for column in &self.columns {
             column.check().map_err(|error| error.to_string())?;
         }
         self.row += count;
         Ok(Some(parts))
-    }
-}
-
-fn part(values: Vec<f64>) -> Part {
-    let missing = values.iter().filter(|x| x.is_nan()).count();
-    let bits = |values: &[f64]| {
-        let bits = values.iter().enumerate();
-        bits.fold(0, |byte, (i, x)| byte | u8::from(!x.is_nan()) << i)
-    };
-    Part {
-        validity: (missing > 0).then(|| values.chunks(8).map(bits).collect()),
-        missing,
-        values,
     }
 }

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 
 use super::ffi::{self, Array, Schema, Stream, View};
 use super::kind::Kind;
+use crate::log::HINT;
 
 /// Where the arrays come from.
 enum Source {
@@ -101,7 +102,7 @@ impl Field {
             Err(found) => log.refused(
                 &self.name,
                 &format!("expected numbers or instants, found {found}"),
-                "convert it before, or name another column under [estimate] columns",
+                HINT,
             ),
         }
     }
@@ -126,7 +127,8 @@ impl Batch {
         }
     }
 
-    /// The column as it lies there, where it is numbers in every row.
+    /// The column as it lies there, where it is numbers in every row. Nobody may change it from then
+    /// on, which is Arrow's contract.
     fn lent(&self, place: usize, field: &Field, log: &Gathering) -> Option<Gathered> {
         let view = self.column(place).ok()?;
         let is_whole = view.validity().is_none() && !(self.is_table && self.has_gaps());
@@ -160,7 +162,7 @@ fn gathered(
         let array = py.detach(|| source.next()).map_err(failed)?;
         let batch = array.map(|array| Batch::of(array, is_table)).transpose();
         match batch.map_err(failed)? {
-            Some(batch) if batch.view.rows == 0 => {}
+            Some(batch) if batch.view.rows() == 0 => {}
             batch => return Ok::<_, PyErr>(batch),
         }
     };

@@ -126,12 +126,12 @@ impl Kind {
             Self::Time { unit, zoned, .. } => rows.instants(unit, zoned, i64::from_ne_bytes),
             Self::Boolean => {
                 let bits = view.bits()?;
-                let values = (0..view.rows).map(|row| f64::from(u8::from(bits.get(row))));
+                let values = (0..view.rows()).map(|row| f64::from(u8::from(bits.get(row))));
                 rows.put(values);
                 Ok(())
             }
             Self::Null => {
-                rows.put(std::iter::repeat_n(f64::NAN, view.rows));
+                rows.put(std::iter::repeat_n(f64::NAN, view.rows()));
                 Ok(())
             }
         }

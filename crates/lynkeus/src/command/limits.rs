@@ -36,6 +36,7 @@ impl Limits {
         let memory = Memory {
             limit: self.memory_limit.saturating_mul(1 << 20),
             used: || ALLOCATOR.allocated(),
+            before: 0,
         };
         Budget::new(self.time_limit, Some(memory)).stopped_by(interrupt::flag())
     }

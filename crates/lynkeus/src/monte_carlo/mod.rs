@@ -12,7 +12,7 @@ mod report;
 mod statistics;
 mod together;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::OnceLock;
 
 use lynkeus_model::{Plant, Variable};
@@ -125,7 +125,7 @@ struct Followed {
 }
 
 /// Runs the study's plant with its observer `runs` times, on all processors; `watch` is told the
-/// fraction done and may stop it. A run that diverges or is refused is counted, and in no figure.
+/// fraction done, which never falls, and may stop it. A run that diverges or is refused is counted, and in no figure.
 ///
 /// # Errors
 /// A study that cannot be run, runs that would not fit into the memory, or no run that reached its
@@ -149,7 +149,13 @@ pub fn monte_carlo(
     let prepared = Prepared::new(study, &plant)?;
     let rig = Rig::new(&prepared)?;
     let followed = followed(&plant, &rig);
-    let seeds = || (settings.seed..=last).collect::<Vec<u64>>();
+    let seeds = || seeds_of(settings.seed..=last, runs).map_err(|error| error.at(&study.file));
+    // runs that are done once more begin again
+    let mut most = 0.0_f64;
+    let watch = &mut |done: f64| {
+        most = most.max(done);
+        watch(most)
+    };
     let together = Together {
         prepared: &prepared,
         rig: &rig,
@@ -165,16 +171,25 @@ pub fn monte_carlo(
     if together.can(runs)? {
         // what a limit of time leaves has to be kept
         if study.budget.left().is_some() && fits().is_ok() {
-            if let Some(done) = together.portions(&job, &plant, &seeds(), watch)? {
+            if let Some(done) = together.portions(&job, &plant, &seeds()?, watch)? {
                 return job.gathered(done.singles, done.again).map(told);
             }
-        } else if let Some(done) = together.figures(&seeds(), watch)? {
+        } else if let Some(done) = together.figures(&seeds()?, watch)? {
             return job.screened(&plant, &rig, done, watch).map(told);
         }
     }
     fits()?;
-    let singles = job.singles(&plant, &rig, &seeds(), watch)?;
+    let singles = job.singles(&plant, &rig, &seeds()?, watch)?;
     job.gathered(singles, Again::Alone).map(told)
+}
+
+/// The seeds of so many runs. Where memory has no limit of ours, the machine's may be less.
+fn seeds_of(runs: RangeInclusive<u64>, count: usize) -> Result<Vec<u64>, Error> {
+    let mut seeds = vec![];
+    let reserved = seeds.try_reserve_exact(count);
+    reserved.map_err(|_| Error::input(format!("{count} runs: there is no memory for so many")))?;
+    seeds.extend(runs);
+    Ok(seeds)
 }
 
 /// Estimates whose truth a run has.

@@ -47,7 +47,7 @@ impl Together<'_> {
         let mut size = FIRST;
         while done.singles.len() < seeds.len() && budget.spent().is_none() {
             let (begun, before) = (Instant::now(), done.singles.len());
-            let own = &seeds[before..seeds.len().min(before + size)];
+            let own = &seeds[before..seeds.len().min(before.saturating_add(size))];
             let told = |part: f64| (before as f64 + part * own.len() as f64) / seeds.len() as f64;
             let pass = self.pass(own, &whole, &mut |part| watch(told(part)));
             let pass = match pass {

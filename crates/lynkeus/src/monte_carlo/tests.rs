@@ -69,6 +69,7 @@ fn runs_that_go_on_together_are_refused_before_they_fill_the_memory() {
             Some(lynkeus_expr::Memory {
                 limit: 64 << 20,
                 used: || 0,
+                before: 0,
             }),
         ),
         ..study(
@@ -80,6 +81,13 @@ fn runs_that_go_on_together_are_refused_before_they_fill_the_memory() {
     assert!(runs(&limited, 100).is_ok());
     let text = runs(&limited, 1_000_000_000).unwrap_err().to_string();
     assert!(text.contains("1000000000 runs of 41 rows take"), "{text}");
+    // more than any machine has
+    let free = Study {
+        budget: lynkeus_expr::Budget::default(),
+        ..limited
+    };
+    let text = runs(&free, 1 << 50).unwrap_err().to_string();
+    assert!(text.contains("no memory for so many"), "{text}");
 }
 
 /// x' = x³/10 ends at 5/x₀², which is before the end of the run where x₀ is above 1.118.
@@ -90,7 +98,14 @@ fn runs_that_go_on_together_and_do_not_reach_their_end_are_in_no_figure() {
     let study = study(&folder, "noise = { y = 0.1 }", simulate);
     let growing = PLANT.replace("-p*x", "x^3/10");
     std::fs::write(folder.path().join("decay.mo"), growing).unwrap();
-    let found = runs(&study, 12).unwrap();
+    let mut told = vec![];
+    let found = monte_carlo(&study, 12, &mut |done| {
+        told.push(done);
+        ControlFlow::Continue(())
+    });
+    let found = found.unwrap();
+    // the others are done once more
+    assert!(told.is_sorted() && told.last() == Some(&1.0), "{told:?}");
     let failed: Vec<u64> = found.failures.iter().map(|f| f.seed).collect();
     let escaping = (5..17).filter(|seed| 1.0 + 0.3 * deviate(*seed, "x") > 5_f64.sqrt() / 2.0);
     let escaping: Vec<u64> = escaping.collect();
@@ -244,6 +259,7 @@ fn an_unknown_name_a_negative_deviation_and_too_many_runs_are_refused() {
             Some(lynkeus_expr::Memory {
                 limit: 1 << 20,
                 used: || 0,
+                before: 0,
             }),
         ),
         ..one

@@ -31,6 +31,7 @@ mod sensors;
 mod simulate;
 mod source;
 mod tune;
+mod whole;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -46,6 +47,7 @@ pub use sensors::{Noise, Sensors};
 pub use simulate::{Expression, Method, Rk4Step, SimulateSettings, Solver};
 pub use source::{Name, Place};
 pub use tune::{Scale, TuneSettings, Values};
+pub use whole::Whole;
 
 use lynkeus_expr::Budget;
 use lynkeus_model::Tables;
@@ -111,8 +113,12 @@ impl Study {
     /// type or out of range, or a number that is not finite; the message names the place.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
+        Self::of_file(&crate::files::read_text(path, "study")?, path)
+    }
+
+    /// Reads the text of that file.
+    fn of_file(text: &str, path: &Path) -> Result<Self, Error> {
         let file = path.display().to_string();
-        let text = crate::files::read_text(path, "study")?;
         if is_model(path) {
             return Err(Error::input("expected a study (TOML), found a model")
                 .at(&file)
@@ -120,7 +126,7 @@ impl Study {
                     "`lynkeus check {file}` makes a study to begin with"
                 )));
         }
-        let mut study = Self::parse(&text, &file)?;
+        let mut study = Self::parse(text, &file)?;
         if let (Some(plant), Some(folder)) = (study.plant.as_mut(), path.parent()) {
             *plant = folder.join(&*plant);
         }
@@ -135,15 +141,20 @@ impl Study {
     pub fn load_or_bare(path: impl AsRef<Path>, model: Option<String>) -> Result<Self, Error> {
         let path = path.as_ref();
         let mut study = match is_model(path) {
-            true => Self {
-                file: path.display().to_string(),
-                plant: Some(path.to_owned()),
-                ..Self::default()
-            },
+            true => Self::bare(path),
             false => Self::load(path)?,
         };
         study.model = model.or(study.model);
         Ok(study)
+    }
+
+    /// What stands for a model.
+    fn bare(path: &Path) -> Self {
+        Self {
+            file: path.display().to_string(),
+            plant: Some(path.to_owned()),
+            ..Self::default()
+        }
     }
 
     /// Whether it stands for a bare model: see [`Study::load_or_bare`].

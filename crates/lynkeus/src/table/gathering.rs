@@ -2,7 +2,7 @@
 
 use super::Table;
 use super::column::Column;
-use super::instant::Instant;
+use super::instant::{self, Instant};
 use super::lines::Lines;
 use super::marks::Refusal;
 use crate::series::{Lent, Store};
@@ -91,6 +91,21 @@ impl Gathering {
         }
         gathered.values = values;
         gathered
+    }
+
+    /// A column of seconds since an instant, which is written as in a log; what is not finite is
+    /// missing.
+    ///
+    /// # Errors
+    /// `origin` is no instant.
+    pub fn since(&self, header: &str, values: Vec<f64>, origin: &str) -> Result<Gathered, Error> {
+        let instant = instant::read(origin).ok_or_else(|| {
+            Error::input(format!("expected an instant, found \"{origin}\"")).at(&self.name)
+        })?;
+        let mut gathered = self.owned(header, values);
+        // its only cell so far
+        gathered.column.instant(instant, 1, origin);
+        Ok(gathered)
     }
 
     /// A column that is refused where it is asked for, whatever its rows are.

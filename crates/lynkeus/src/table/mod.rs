@@ -104,6 +104,12 @@ impl Table {
         column.refusal.is_none().then_some(&column.values)
     }
 
+    /// Why the cells of a column cannot be told, where that is so.
+    pub fn refusal(&self, name: &str) -> Option<&str> {
+        let column = self.columns.iter().find(|c| c.name == name)?;
+        column.refusal.as_ref().map(|r| r.message.as_str())
+    }
+
     /// How many cells of a column are missing; 0 where there is no such column.
     pub fn missing(&self, name: &str) -> usize {
         let column = self.columns.iter().find(|c| c.name == name);

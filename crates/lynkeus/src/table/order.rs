@@ -52,6 +52,10 @@ impl Table {
         let timeless = times.len() - groups.rows.len();
         let repeated = groups.rows.len() - groups.count;
         let merged = |column: &Column| {
+            // nobody reads it, and it may have no rows
+            if column.refusal.is_some() {
+                return Ok(column.clone());
+            }
             let values = groups.merged(&column.values)?;
             let faults = groups.faults_left(&column.faults, &values, &self.lines);
             Ok(column.with(values, faults))
@@ -159,6 +163,7 @@ impl Groups {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::Gathering;
 
     fn read(text: &str, late: Option<f64>) -> Result<Option<Ordered>, Error> {
         Table::parse(text, "log.csv").unwrap().in_order("t", late)
@@ -196,6 +201,27 @@ mod tests {
         assert!(table.faults("y").is_empty());
         let error = table.readings("y").unwrap_err().to_string();
         assert!(error.contains("column \"y\" has no number"), "{error}");
+    }
+
+    /// Of a column of texts that a program holds no row is known.
+    #[test]
+    fn a_refused_column_stays_refused() {
+        let log = Gathering::new("log");
+        for times in [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [0.0, f64::NAN, 1.0]] {
+            let table = log.table(vec![
+                log.owned("t", times.to_vec()),
+                log.owned("y", vec![1.0, 2.0, 3.0]),
+                log.refused("note", "expected numbers, found texts", "leave it out"),
+            ]);
+            let ordered = table.unwrap().in_order("t", None).unwrap().unwrap().table;
+            assert!(ordered.readings("y").is_ok(), "{times:?}");
+            let error = ordered.readings("note").unwrap_err().to_string();
+            assert!(error.contains("found texts"), "{error}");
+        }
+        let table = Table::parse("t,y,note\n0,1,1a\n2,3,2b\n1,2,3c\n", "log.csv").unwrap();
+        let ordered = table.in_order("t", None).unwrap().unwrap().table;
+        let (one, other) = (table.readings("note"), ordered.readings("note"));
+        assert_eq!(one.unwrap_err().to_string(), other.unwrap_err().to_string());
     }
 
     #[test]

@@ -336,6 +336,18 @@ fn assertions_are_followed() {
     assert!(ended.err.contains(told), "{}", ended.err);
 }
 
+/// The runs of a portion are reckoned from the time that is left.
+#[test]
+fn a_limit_of_time_may_be_any() {
+    let folder = Folder::new();
+    let fixed = "seed = 1\nmethod = \"rk4\"\nstep = 4";
+    folder.change("study.toml", "seed = 1", fixed);
+    let many = ["simulate", "study.toml", "-q", "--json", "--runs", "20"];
+    let ended = folder.run(&[&many[..], &["--time-limit", "1e18"]].concat());
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_eq!(ended.json()["completed"], 20);
+}
+
 /// The table, the words, the picture and the object of many runs; one of them alone is the same.
 #[test]
 fn many_runs_give_bands() {

@@ -9,10 +9,26 @@ use super::{Array, Carried, Schema, Stream};
 /// Rows of a column.
 #[derive(Default)]
 pub struct Part {
-    pub values: Vec<f64>,
+    values: Vec<f64>,
     /// a bit for each row that is there; none where all are
-    pub validity: Option<Vec<u8>>,
-    pub missing: usize,
+    validity: Option<Vec<u8>>,
+    missing: usize,
+}
+
+impl Part {
+    /// Of these numbers; a NaN is a null.
+    pub fn of(values: Vec<f64>) -> Self {
+        let missing = values.iter().filter(|x| x.is_nan()).count();
+        let bits = |values: &[f64]| {
+            let bits = values.iter().enumerate();
+            bits.fold(0, |byte, (i, x)| byte | u8::from(!x.is_nan()) << i)
+        };
+        Self {
+            validity: (missing > 0).then(|| values.chunks(8).map(bits).collect()),
+            missing,
+            values,
+        }
+    }
 }
 
 /// Rows of a table, batch by batch.
@@ -108,15 +124,20 @@ fn field(name: &str, format: &'static CStr, children: impl Iterator<Item = Schem
     }
 }
 
-fn batch(parts: Vec<Part>) -> Array {
+/// So many columns, equally long: a reader trusts these lengths.
+fn batch(parts: Vec<Part>, count: usize) -> Result<Array, String> {
     let rows = parts.first().map_or(0, |part| part.values.len());
+    if parts.len() != count || parts.iter().any(|part| part.values.len() != rows) {
+        return Err("internal fault: the columns differ in length".into());
+    }
     let columns = Children::of(parts.into_iter().map(|part| {
         let validity = part.validity.as_ref();
         let validity = validity.map_or(ptr::null(), |bits| bits.as_ptr().cast());
         let buffers = vec![validity, part.values.as_ptr().cast()];
         array(part.values.len(), part, buffers, Children(vec![]))
     }));
-    array(rows, Part::default(), vec![ptr::null()], columns)
+    let nothing = Part::default();
+    Ok(array(rows, nothing, vec![ptr::null()], columns))
 }
 
 fn array(rows: usize, part: Part, buffers: Vec<*const c_void>, children: Children<Array>) -> Array {
@@ -182,9 +203,13 @@ unsafe extern "C" fn get_schema(stream: *mut Stream, out: *mut Schema) -> c_int 
 unsafe extern "C" fn get_next(stream: *mut Stream, out: *mut Array) -> c_int {
     // SAFETY: the consumer calls it on our own stream
     let giving = unsafe { giving(stream) };
-    let next = catch_unwind(AssertUnwindSafe(|| giving.batches.next()));
+    let next = catch_unwind(AssertUnwindSafe(|| {
+        let parts = giving.batches.next()?;
+        let count = giving.batches.names().len();
+        parts.map(|parts| batch(parts, count)).transpose()
+    }));
     let found = match next.unwrap_or_else(|_| Err("internal fault".into())) {
-        Ok(Some(parts)) => batch(parts),
+        Ok(Some(array)) => array,
         Ok(None) => Array::released(),
         Err(why) => {
             giving.failure = CString::new(why.replace('\0', " ")).unwrap_or_default();

@@ -82,7 +82,7 @@ pub struct View {
     array: *const Array,
     /// where the rows start in the buffers
     start: usize,
-    pub rows: usize,
+    rows: usize,
 }
 
 // SAFETY: `array` points into `whole`, which is shared, alive and never changed
@@ -106,6 +106,11 @@ impl View {
             rows: usize::try_from(whole.length).map_err(|_| BROKEN)?,
             whole,
         })
+    }
+
+    /// How many rows it has.
+    pub fn rows(&self) -> usize {
+        self.rows
     }
 
     fn array(&self) -> &Array {
@@ -153,7 +158,9 @@ impl View {
         if buffer.is_null() {
             return (bytes == 0).then_some(&[]);
         }
-        // SAFETY: the interface promises a buffer as long as offset and length make it
+        isize::try_from(from.checked_add(bytes)?).ok()?;
+        // SAFETY: the interface promises a buffer as long as offset and length make it, which is no
+        // longer than memory
         Some(unsafe { std::slice::from_raw_parts(buffer.add(from), bytes) })
     }
 
@@ -162,7 +169,10 @@ impl View {
     /// # Errors
     /// There is no such buffer.
     pub fn values(&self, width: usize) -> Result<&[u8], String> {
-        let values = self.buffer(1, self.start * width, self.rows * width);
+        let (from, bytes) = (self.start.checked_mul(width), self.rows.checked_mul(width));
+        let values = from
+            .zip(bytes)
+            .and_then(|(from, bytes)| self.buffer(1, from, bytes));
         values.ok_or_else(|| BROKEN.into())
     }
 
@@ -183,7 +193,7 @@ impl View {
     }
 
     fn bits_of(&self, place: usize) -> Option<Bits<'_>> {
-        let bytes = (self.start + self.rows).div_ceil(8);
+        let bytes = self.start.checked_add(self.rows)?.div_ceil(8);
         Some(Bits {
             bytes: self.buffer(place, 0, bytes)?,
             start: self.start,

@@ -300,3 +300,6 @@ impl Horizon {
         Ok(passes)
     }
 }
+
+#[cfg(test)]
+mod tests;

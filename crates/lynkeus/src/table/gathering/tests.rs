@@ -135,3 +135,21 @@ fn what_is_no_table_is_refused_and_a_refused_column_only_where_asked_for() {
         Some(0)
     );
 }
+
+/// A log that travels says since when its times count.
+#[test]
+fn seconds_since_an_instant_are_what_instants_give() {
+    let log = Gathering::new("log");
+    let first = 1_795_305_600 * SECOND + SECOND / 4;
+    let mut given = log.column("t");
+    given.instants((0..4).map(|i| (i != 2).then(|| Instant::at(first + i * SECOND / 3, true))));
+    let given = log.table(vec![given]).unwrap();
+    let origin = given.origin("t").unwrap();
+    let seconds = given.get("t").unwrap().to_vec();
+    let again = log.since("t", seconds.clone(), origin).unwrap();
+    let again = log.table(vec![again]).unwrap();
+    assert_eq!(again.origin("t"), Some(origin));
+    let found = again.readings("t").unwrap().to_vec();
+    assert_eq!((found[3], again.missing("t")), (seconds[3], 1));
+    assert!(log.since("t", seconds, "midnight").is_err());
+}
