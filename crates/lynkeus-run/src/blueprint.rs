@@ -3,7 +3,7 @@
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
 use crate::{
-    Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
+    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
 };
 
 /// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
@@ -65,8 +65,8 @@ impl Blueprint {
 }
 
 /// The longest fixed step that is short enough for the fastest mode at the start (|λ|·h ≤ ½), for
-/// known inputs at these values, the others at 0; none where the equations have no slopes there,
-/// or do not move.
+/// known inputs at these values, the others at 0; infinite where nothing moves, none where the
+/// equations have no slopes there.
 #[must_use]
 pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
     let system: &System = match blueprint {
@@ -78,6 +78,7 @@ pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64>
         let given = inputs.iter().find(|(input, _)| input == name);
         *signal = given.map_or(0.0, |(_, value)| *value);
     }
+    evaluation.enter(0.0);
     let needed = AUTO_PRODUCT / spectral_radius(&mut evaluation, 0.0, system.start());
-    (needed > 0.0 && needed.is_finite()).then_some(needed)
+    (needed > 0.0).then_some(needed)
 }

@@ -143,7 +143,12 @@ fn stepped(
             .at(&study.file)
             .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
     };
-    let step = rounded(needed);
+    // where nothing moves any step does
+    let step = if needed.is_finite() {
+        rounded(needed)
+    } else {
+        1.0
+    };
     notes.push(format!(
         "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`, and --step gives another",
         short(step)

@@ -30,7 +30,7 @@ pub struct File {
     pub text: String,
 }
 
-/// What [`push`](files) can say, from 1 on.
+/// What `push` can say, from 1 on.
 const CODES: [(&str, &str); 5] = [
     (
         "TIME",

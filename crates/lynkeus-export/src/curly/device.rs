@@ -15,8 +15,7 @@ pub struct Device<'a> {
     pub first_readings: &'a [FirstReading],
     /// measured outputs, then known inputs, in the order in which they are given
     pub signals: &'a [Entry],
-    /// what is reported: estimates, with [`deviations`](Self::deviations) their standard
-    /// deviations, monitors
+    /// what is reported: estimates, their standard deviations where there are any, monitors
     pub estimates: &'a [Entry],
     /// how many of them are monitors
     pub monitors: usize,

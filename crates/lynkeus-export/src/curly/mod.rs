@@ -1,7 +1,7 @@
 //! Estimators as source text in languages with braces: C and JavaScript.
 //!
 //! Everything is drafted once, in C whose type of numbers is called `real`: the functions of the
-//! graph by [`function`](self::function), what is done with them from `runtime/*.c`, of which only
+//! graph, what is done with them from `runtime/*.c`, of which only
 //! what is called is taken. A [`Language`] renders the draft; a frame ([`c`]) makes files of it.
 
 pub mod c;

@@ -328,3 +328,115 @@ fn c_gives_what_estimate_gives() {
     }
     assert!(2 * looked_at >= count(), "{looked_at} of {}", count());
 }
+
+/// Names that C forbids, that the runtime has itself, or that end a comment.
+const HOSTILE: &str = "
+model 'my */ model?'
+  Real 'a b'(start = 1, min = 0, max = 5, unit = \"m\") \"height */ of ??/\";
+  Real double(start = 0.5);
+  Real x(start = 0.2);
+  Real STATES(start = 0.1);
+  Real s1_matrix(start = 0.3);
+  input Real sin(start = 0);
+  input Real t;
+  output Real 'y[1]' = 'a b';
+  output Real R = x;
+equation
+  der('a b') = -0.5*'a b' + double;
+  der(double) = -double + 0.3*sin('a b')*t;
+  der(x) = STATES - x + abs(x)*0.1;
+  der(STATES) = -STATES^3 + s1_matrix;
+  der(s1_matrix) = -s1_matrix + sin + max(x, 0.1)^2.5 + (if x > 0.1 then 1 else 0.5);
+end 'my */ model?';
+";
+
+const HOSTILE_STUDY: &str = r#"
+plant = "m.mo"
+sensors = { measured = ["y[1]", "R"], noise = { "y[1]" = 0.1, R = 0.05 } }
+process_noise = { "a b" = 0.01, double = 0.01, x = 0.01, STATES = 0.01, s1_matrix = 0.01 }
+observer = { family = "ekf" }
+estimate = { method = "rk4", step = 0.05, sd = true }
+"#;
+
+#[test]
+fn any_name_can_be_exported() {
+    if !has("gcc") {
+        return skipped("gcc is not there");
+    }
+    let folder = Folder::empty();
+    folder.write("m.mo", HOSTILE);
+    folder.write("s.toml", HOSTILE_STUDY);
+    let mut log = String::from("time,y[1],R,sin,t\n");
+    for k in 0..40 {
+        let t = 0.1 * f64::from(k);
+        let (y, u) = (1.0 + 0.3 * t.sin(), 0.1 * (2.0 * t).cos());
+        log += &format!("{t},{y},{u},{u},{y}\n");
+    }
+    folder.write("log.csv", &log);
+    let made = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
+    assert_eq!(made.code, 0, "{}", made.err);
+    assert!(made.err.contains("my____model_.h"), "{}", made.err);
+    compiled(folder.path.path(), &[]);
+    let expected = estimated(folder.path.path()).unwrap();
+    let off = difference(&expected, &replayed(folder.path.path()), "");
+    assert!(off <= 1e-12, "{off:e}");
+}
+
+#[test]
+fn what_cannot_run_elsewhere_is_refused_and_nothing_is_written() {
+    let folder = Folder::empty();
+    let study = |observer: &str| {
+        format!(
+            "plant = \"m.mo\"\nsensors = {{ noise = {{ y = 0.1 }} }}\nprocess_noise = {{ x = 0.01 }}\nobserver = {{ family = \"{observer}\" }}\n"
+        )
+    };
+    let model = |equations: &str| {
+        format!(
+            "model M\n  Real x(start = 1);\n  Real z(start = 0.5);\n  output Real y = x;\nequation\n  {equations}\nend M;\n"
+        )
+    };
+    let plain = model("der(x) = -z; z = x;");
+    let cases = [
+        ("mhe", plain.clone(), "moving horizon"),
+        (
+            "ekf",
+            model("der(x) = -z; z + 0.1*exp(z) = x;"),
+            "algebraic loop for z",
+        ),
+        (
+            "ekf",
+            model("der(x) = -z; z = if time < 5 then x else 1;"),
+            "jumps with time",
+        ),
+    ];
+    for (observer, model, word) in cases {
+        folder.write("m.mo", &model);
+        folder.write("s.toml", &study(observer));
+        let refused = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
+        assert_eq!(refused.code, 1, "{}", refused.err);
+        assert!(refused.err.contains(word), "{}", refused.err);
+        assert!(!folder.path.path().join("c").exists());
+    }
+    folder.write("m.mo", &plain);
+    folder.write("s.toml", &study("ekf"));
+    let asked = ["export", "s.toml", "--to", "c", "-o", "c"];
+    let made = folder.run(&asked);
+    assert_eq!(made.code, 0, "{}", made.err);
+    assert!(
+        made.err
+            .contains("which the fastest mode at the start needs"),
+        "{}",
+        made.err
+    );
+    let first = folder.read("c/m.c");
+    let again = folder.run(&asked);
+    assert_eq!(again.code, 2);
+    assert!(again.err.contains("--force"), "{}", again.err);
+    let forced = folder.run(&["export", "s.toml", "--to", "c", "-o", "c", "--force"]);
+    assert_eq!(forced.code, 0, "{}", forced.err);
+    assert_eq!(
+        folder.read("c/m.c"),
+        first,
+        "the text is the same every time"
+    );
+}

@@ -1,6 +1,6 @@
-/* Replays a log through the estimator: a table with a column t (or time) and one for each signal,
-   comma separated, from standard input; estimates to standard output. An empty cell is a sensor
-   that did not report. */
+/* Replays a log through the estimator: a table with a column t (time, where a signal is called t)
+   and one for each signal, comma separated, from standard input; estimates to standard output. An
+   empty cell is a sensor that did not report. */
 #include "@NAME@.h"
 
 #include <ctype.h>
@@ -74,6 +74,7 @@ int main(void)
     int places[@CAPITALS@_SIGNALS];
     @REAL@ signals[@CAPITALS@_SIGNALS];
     @REAL@ estimates[@CAPITALS@_ESTIMATES];
+    const char *time_name = "t";
     int time = -1;
     int count = 0;
     long row = 1;
@@ -83,12 +84,14 @@ int main(void)
         return 2;
     }
     count = split(line);
-    time = column("t", count);
-    if (time < 0) {
-        time = column("time", count);
+    for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
+        if (strcmp(@NAME@_signal_names[i], "t") == 0) {
+            time_name = "time";
+        }
     }
+    time = column(time_name, count);
     if (time < 0) {
-        (void)fprintf(stderr, "expected a column t or time\n");
+        (void)fprintf(stderr, "expected a column %s\n", time_name);
         return 2;
     }
     for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
@@ -98,7 +101,7 @@ int main(void)
             return 2;
         }
     }
-    (void)printf("t");
+    (void)printf("%s", time_name);
     for (int i = 0; i < @CAPITALS@_ESTIMATES; i++) {
         const int is_quoted = strchr(@NAME@_estimate_names[i], ',') != NULL;
         (void)printf(is_quoted ? ",\"%s\"" : ",%s", @NAME@_estimate_names[i]);
