@@ -117,6 +117,10 @@ pub trait Dialect {
     fn select(&self, condition: &Text, x: &Text, y: &Text) -> Text;
     /// A line that names a value.
     fn assignment(&self, name: &str, value: &Text) -> String;
+    /// A line that names a truth value.
+    fn truth(&self, name: &str, value: &Text) -> String {
+        self.assignment(name, value)
+    }
     /// Lines that name the solution of A x = b; `a` is n×n row by row.
     fn solution(&self, name: &str, a: &[Text], b: &[Text]) -> Option<Vec<String>>;
     /// An entry of a solution.

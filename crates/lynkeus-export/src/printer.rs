@@ -140,7 +140,12 @@ impl Printer<'_> {
             return text;
         }
         let name = self.names.numbered('v');
-        self.lines.push(self.dialect.assignment(&name, &text));
+        let line = if is_truth(self.code.graph().op(node)) {
+            self.dialect.truth(&name, &text)
+        } else {
+            self.dialect.assignment(&name, &text)
+        };
+        self.lines.push(line);
         Text::atom(name)
     }
 

@@ -248,6 +248,10 @@ impl Dialect for Draft {
         format!("const real {name} = {};", value.text)
     }
 
+    fn truth(&self, name: &str, value: &Text) -> String {
+        format!("const int {name} = {};", value.text)
+    }
+
     /// The solution, then the reciprocal condition.
     fn solution(&self, name: &str, a: &[Text], b: &[Text]) -> Option<Vec<String>> {
         let n = b.len();
@@ -264,5 +268,29 @@ impl Dialect for Draft {
 
     fn entry(&self, solution: &str, place: usize) -> Text {
         Text::atom(format!("{solution}[{place}]"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Body, Code, Names};
+    use lynkeus_expr::{Graph, Tape};
+
+    #[test]
+    fn a_truth_that_is_used_twice_is_no_number() {
+        let g = Graph::new();
+        let [a, b, c] = ["a", "b", "c"].map(|name| g.symbol(name));
+        let is_less = a.less(b);
+        let outputs = [is_less.select(a, c), is_less.select(c, b), is_less + c];
+        let inputs = [a, b, c].map(|e| e.node());
+        let tape = Tape::new(&g, &inputs, &outputs.map(|e| e.node())).unwrap();
+        let texts = ["a", "b", "c"].map(Text::atom);
+        let code = Code::of(&tape).unwrap();
+        let body = Body::of(&code, &Draft, &texts, &mut Names::default()).unwrap();
+        assert_eq!(body.lines, ["const int v1 = a < b;"]);
+        assert_eq!(body.outputs[0].text, "(v1 ? a : c)");
+        assert_eq!(body.outputs[1].text, "(v1 ? c : b)");
+        assert!(body.outputs[2].text.contains("(v1 ? R(1.0) : R(0.0))"));
     }
 }

@@ -75,20 +75,25 @@ impl Machine {
             noise: model.process_noise(),
         };
         let field = self.engine(&settings.kind, &free, &arguments)?;
+        let which_inside = Which::Inside {
+            is_shared: settings.kind == FilterKind::Extended,
+        };
         if let Some(confined) = confined {
             let inside = Linear {
                 flow: &confined.flow,
                 entries: &confined.entries,
                 noise: model.process_noise(),
             };
-            self.linear(Which::Inside, &inside, &arguments)?;
+            self.linear(which_inside, &inside, &arguments)?;
             let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
                 confined.bounds.iter().map(end).collect()
             };
             self.tables += &table("range_from", &ends(|b| b.low));
             self.tables += &table("range_to", &ends(|b| b.high));
         }
-        let text = chosen(FILTER, &holds).replace("FIELD_INSIDE", "linearised_inside");
+        let text = chosen(FILTER, &holds)
+            .replace("FIELD_INSIDE", "linearised_inside")
+            .replace("predict_inside", &which_inside.renamed("predict"));
         self.add(&text.replace("FIELD", field));
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! What the draft becomes in each language.
 
-use super::template::exchanged;
+use super::template::{chosen, exchanged};
 
 /// A language with braces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,10 +21,12 @@ const FUNCTIONS: [&str; 21] = [
 
 impl Language {
     /// A draft in this language.
+    /// What is between `//? single` and `//?` is for `float` alone, with `!single` for all others.
     pub(super) fn render(self, draft: &str) -> String {
         match self {
-            Self::C | Self::SingleC => self.c(draft),
-            Self::JavaScript => javascript(draft),
+            Self::C => self.c(&chosen(draft, &[])),
+            Self::SingleC => self.c(&chosen(draft, &["single"])),
+            Self::JavaScript => javascript(&chosen(draft, &[])),
         }
     }
 
@@ -40,6 +42,9 @@ impl Language {
             ("SMALLEST", true) => "1.1754944e-38f",
             ("RANK", false) => "1e-13",
             ("RANK", true) => "1e-6f",
+            // what math.h calls so is `float`
+            ("NAN", false) => "(double)NAN",
+            ("INFINITY", false) => "(double)INFINITY",
             _ => return None,
         })
     }
@@ -206,6 +211,23 @@ mod tests {
         assert_eq!(
             Language::JavaScript.render(DRAFT),
             "function half(s, a, i)\n{\n    const b = new Float64Array(3);\n    const c = 0.5 * a[i];\n    s.x[0] = Math.sqrt(Math.abs(c)) + i;\n    return c;\n}\n"
+        );
+    }
+
+    #[test]
+    fn no_number_changes_its_precision_unasked() {
+        let draft = "    const real a = (b ? NAN : -INFINITY);\n//? single\n    const real h = R(1.0);\n//?\n//? !single\n    const real h = R(2.0);\n//?\n";
+        assert_eq!(
+            Language::C.render(draft),
+            "    const double a = (b ? (double)NAN : -(double)INFINITY);\n    const double h = 2.0;\n"
+        );
+        assert_eq!(
+            Language::SingleC.render(draft),
+            "    const float a = (b ? NAN : -INFINITY);\n    const float h = 1.0f;\n"
+        );
+        assert_eq!(
+            Language::JavaScript.render(draft),
+            "    const a = (b ? NaN : -Infinity);\n    const h = 2.0;\n"
         );
     }
 

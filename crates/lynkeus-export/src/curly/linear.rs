@@ -25,29 +25,43 @@ pub(super) struct Linear<'a> {
 pub(super) enum Which {
     Free,
     /// inside the declared ranges
-    Inside,
+    Inside {
+        /// whether the free flow is linearised, too: then both are integrated by the same functions
+        is_shared: bool,
+    },
 }
 
 /// Names and sizes of which there is one for each flow.
-const OWN: [&str; 12] = [
+const OWN: [&str; 6] = [
     "linear_flow",
     "linearised",
-    "integrate",
-    "predict",
     "entry_rows",
     "entry_columns",
-    "process_noise",
-    "WIDTH",
     "ENTRIES",
     "ENTRIES_ROOM",
+];
+
+/// And where the free flow has no covariance along it.
+const SHARED: [&str; 6] = [
+    "integrate",
+    "predict",
+    "process_noise",
+    "WIDTH",
     "CARRIED",
     "DIMENSION",
 ];
 
 impl Which {
-    fn renamed(self, text: &str) -> String {
+    /// Whether the free flow has left these functions, sizes and tables.
+    fn shares(self) -> bool {
+        self == Self::Inside { is_shared: true }
+    }
+
+    /// The text, in which what this flow has for itself is called so.
+    pub fn renamed(self, text: &str) -> String {
         exchanged(text, |word| {
-            let is_own = self == Self::Inside && OWN.contains(&word);
+            let is_own = OWN.contains(&word) || (SHARED.contains(&word) && !self.shares());
+            let is_own = is_own && self != Self::Free;
             is_own.then(|| match word.chars().all(|c| !c.is_lowercase()) {
                 true => format!("{word}_INSIDE"),
                 false => format!("{word}_inside"),
@@ -102,18 +116,16 @@ impl Machine {
             true => (2 * n, &["noisy"]),
             false => (n, &[]),
         };
-        for (name, size) in [
-            ("WIDTH", width),
-            ("ENTRIES", entries.len()),
-            ("ENTRIES_ROOM", entries.len().max(1)),
-            ("CARRIED", width),
-            ("DIMENSION", n + n * width),
-        ] {
-            self.size(which.renamed(name), size);
+        self.size(which.renamed("ENTRIES"), entries.len());
+        self.size(which.renamed("ENTRIES_ROOM"), entries.len().max(1));
+        if !which.shares() {
+            self.size(which.renamed("WIDTH"), width);
+            self.size(which.renamed("CARRIED"), width);
+            self.size(which.renamed("DIMENSION"), n + n * width);
         }
         let mut tables = places("entry_rows", entries.iter().map(|e| e.0));
         tables += &places("entry_columns", entries.iter().map(|e| e.1));
-        if scale > 0.0 {
+        if scale > 0.0 && !which.shares() {
             let shares: Vec<f64> = noise.iter().map(|q| q / scale).collect();
             tables += &table("process_noise", &shares);
         }
@@ -132,8 +144,11 @@ impl Machine {
         let predict = chosen(PREDICT, holds).replace("NOISE_SCALE", &format!("R({scale:?})"));
         let linearised = chosen(LINEARISED, holds);
         let kind = if which == Which::Free { FIELD } else { "" };
-        let own = [kind, &flow, &linearised, INTEGRATE, &predict].join("\n");
+        let own = [kind, &flow, &linearised].join("\n");
         self.add(&which.renamed(&own));
+        if !which.shares() {
+            self.add(&which.renamed(&[INTEGRATE, &predict].join("\n")));
+        }
         Ok(())
     }
 }

@@ -7,6 +7,7 @@ static int correct(STATE *s, double t)
     real before[STATES];
     real projected[STATES];
     real gain[STATES];
+    int believed[SENSORS];
     for (int i = 0; i < SENSORS * STATES; i++) {
         c[i] = R(0.0);
     }
@@ -27,10 +28,10 @@ static int correct(STATE *s, double t)
     for (int i = 0; i < SENSORS; i++) {
         project(s->root, c, i, projected);
         const real variance = dot(projected, 0, projected, 0, STATES) + noise_variance(i, h[i]);
-        judge(s, i, s->readings[i], h[i], variance);
+        believed[i] = judge(s, i, s->readings[i], h[i], variance);
     }
     for (int i = 0; i < SENSORS; i++) {
-        if (s->became[i] == TAKEN) {
+        if (believed[i] != 0) {
             real moved = R(0.0);
             for (int j = 0; j < STATES; j++) {
                 moved += c[i * STATES + j] * (s->x[j] - before[j]);

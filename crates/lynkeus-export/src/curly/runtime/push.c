@@ -23,6 +23,8 @@ static int take(STATE *s, double t, const real *signals, real *estimates)
 //?
     } else if (t > s->time) {
         code = advance(s, t);
+    } else {
+        /* the same time again: more readings */
     }
     if (code == 0) {
         code = update(s, t, signals);

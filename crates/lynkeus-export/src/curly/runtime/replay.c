@@ -58,11 +58,11 @@ static int column(const char *name, int count)
 static double number(int place, int count)
 {
     char *end = NULL;
-    double value = NAN;
+    double value = (double)NAN;
     if (place < count && cells[place][0] != '\0') {
         value = strtod(cells[place], &end);
         if (end == cells[place]) {
-            value = NAN;
+            value = (double)NAN;
         }
     }
     return value;

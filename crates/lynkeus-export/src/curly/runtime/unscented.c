@@ -90,8 +90,9 @@ static int predict(field f, double from, double to, int steps, const real *w, re
     for (int i = 0; i < STATES * STATES; i++) {
         extra[i] = R(0.0);
     }
+    const double span = to - from;
     for (int i = 0; i < STATES; i++) {
-        extra[i * STATES + i] = sqrt(process_noise[i] * (real)(to - from));
+        extra[i * STATES + i] = sqrt(process_noise[i] * (real)span);
     }
     centre(points, STATES, x);
     root_of_points(points, extra, STATES, root);
