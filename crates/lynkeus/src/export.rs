@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::{Device, Entry, FirstReading};
 use lynkeus_model::Variable;
@@ -44,12 +45,32 @@ pub struct Export {
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let mut notes = vec![];
-    let study = &causal(study, &mut notes);
+    let files = with_device(study, options, &mut notes, |made| {
+        c::files(made.device, options.precision)
+    })?;
+    Ok(Export { files, notes })
+}
+
+/// A study's estimator, ready to be written.
+pub(crate) struct Made<'a> {
+    pub device: &'a Device<'a>,
+    pub prepared: &'a Prepared<'a>,
+    pub design: &'a Design,
+}
+
+/// What a frame makes of the study's estimator.
+pub(crate) fn with_device<T>(
+    study: &Study,
+    options: &ExportOptions,
+    notes: &mut Vec<String>,
+    write: impl FnOnce(&Made<'_>) -> Result<T, Refusal>,
+) -> Result<T, Error> {
+    let study = &causal(study, notes);
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let design = prepared.design()?;
     let made = blueprint(&prepared, &design)?;
-    let made = stepped(study, &prepared, made, options, &mut notes)?;
+    let made = stepped(study, &prepared, made, options, notes)?;
     let told = Told::of(&prepared, &design, &made);
     let first: Vec<FirstReading> = at_readings(&prepared)
         .iter()
@@ -72,9 +93,12 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         words: &told.words,
         about: &about,
     };
-    let files = c::files(&device, options.precision);
-    let files = files.map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))?;
-    Ok(Export { files, notes })
+    let written = write(&Made {
+        device: &device,
+        prepared: &prepared,
+        design: &design,
+    });
+    written.map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
 }
 
 /// The study without what looks ahead, which a device cannot.
@@ -112,11 +136,6 @@ fn stepped(
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
         return Ok(made);
     }
-    let typical = |input: &Variable| {
-        let middle = 0.5 * (input.min + input.max);
-        let middle = if middle.is_finite() { middle } else { 0.0 };
-        input.start.or(input.nominal).unwrap_or(middle)
-    };
     let known = prepared.plant().inputs.iter();
     let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
     let Some(needed) = needed_step(&made, &known) else {
@@ -131,6 +150,13 @@ fn stepped(
         short(step)
     ));
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
+}
+
+/// A value that an input may have.
+pub(crate) fn typical(input: &Variable) -> f64 {
+    let middle = 0.5 * (input.min + input.max);
+    let middle = if middle.is_finite() { middle } else { 0.0 };
+    input.start.or(input.nominal).unwrap_or(middle)
 }
 
 /// The next shorter step of one digit: 1, 2 or 5.

@@ -77,6 +77,7 @@ mod export;
 mod figure;
 mod files;
 mod filter;
+mod fmu;
 mod frozen;
 mod headers;
 mod innovations;
@@ -124,6 +125,7 @@ pub use estimate::{estimate, estimate_resumed};
 pub use export::{Export, ExportOptions, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
+pub use fmu::{Fmu, export_fmu};
 pub use frozen::Frozen;
 pub use innovations::Innovations;
 pub use interval::Intervals;
@@ -143,6 +145,7 @@ pub use table::Table;
 pub use tune::tune;
 
 pub use lynkeus_export::curly::c::{File, Precision};
+pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use lynkeus::{Error, ExportOptions, Precision};
+use lynkeus::{Error, ExportOptions, FmiVersion, Precision};
 
 use super::inputs::Source;
 use super::output;
@@ -15,6 +15,20 @@ use super::save::Results;
 pub(super) enum Target {
     /// C99: a header, a source, a bench that replays a log, a CMakeLists.txt
     C,
+    /// An archive for tools of simulation: FMI co-simulation
+    Fmu,
+}
+
+/// [`FmiVersion`] in the words of the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum Fmi {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[default]
+    #[value(name = "3")]
+    Three,
 }
 
 /// [`Precision`] in the words of the command line.
@@ -44,6 +58,9 @@ pub(super) struct Options {
     /// Longest step of the integration, in the unit of time, instead of the study's
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
+    /// With --to fmu: the version of the standard
+    #[arg(long, value_enum, default_value_t, value_name = "VERSION")]
+    fmi: Fmi,
     /// No notes
     #[arg(short, long)]
     quiet: bool,
@@ -51,7 +68,6 @@ pub(super) struct Options {
 
 /// Everything is made before the first file is written.
 pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
-    let Target::C = options.to;
     let wanted = ExportOptions {
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
@@ -63,22 +79,52 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
     if !options.force {
         must_be_empty(folder)?;
     }
-    let made = lynkeus::export(&source.study, &wanted)?;
+    let made = made(source, options, &wanted)?;
     let failed = |e: std::io::Error| {
         Error::input(format!("the folder cannot be made: {e}")).at(folder.display())
     };
     std::fs::create_dir_all(folder).map_err(failed)?;
     let mut results = Results::default();
-    for file in &made.files {
-        results.put(&folder.join(&file.name), file.text.as_bytes())?;
+    for (name, content) in &made.files {
+        results.put(&folder.join(name), content.as_slice())?;
     }
     results.keep()?;
     if !options.quiet {
         made.notes.iter().for_each(|note| output::note(note));
-        let names: Vec<&str> = made.files.iter().map(|file| file.name.as_str()).collect();
+        let names: Vec<&str> = made.files.iter().map(|(name, _)| name.as_str()).collect();
         output::note(&format!("{}: {}", folder.display(), names.join(", ")));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Names and contents of files.
+struct Made {
+    files: Vec<(String, Vec<u8>)>,
+    notes: Vec<String>,
+}
+
+fn made(source: &Source, options: &Options, wanted: &ExportOptions) -> Result<Made, Error> {
+    match options.to {
+        Target::C => {
+            let made = lynkeus::export(&source.study, wanted)?;
+            let files = made.files.into_iter();
+            Ok(Made {
+                files: files.map(|f| (f.name, f.text.into_bytes())).collect(),
+                notes: made.notes,
+            })
+        }
+        Target::Fmu => {
+            let version = match options.fmi {
+                Fmi::Two => FmiVersion::Two,
+                Fmi::Three => FmiVersion::Three,
+            };
+            let made = lynkeus::export_fmu(&source.study, wanted, version)?;
+            Ok(Made {
+                files: vec![(made.name, made.bytes)],
+                notes: made.notes,
+            })
+        }
+    }
 }
 
 fn must_be_empty(folder: &Path) -> Result<(), Error> {
