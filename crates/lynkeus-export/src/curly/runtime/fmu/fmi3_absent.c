@@ -122,3 +122,56 @@ API fmi3Status fmi3ExitConfigurationMode(void *instance)
 {
     return told(instance, NOT_NOW);
 }
+
+/* Of model exchange and scheduled execution; some tools look for these functions in every FMU. */
+API fmi3Status fmi3EnterContinuousTimeMode(void *instance)
+{
+    return told(instance, NOT_NOW);
+}
+
+API fmi3Status fmi3CompletedIntegratorStep(void *instance, bool is_past_fixed, bool *has_event, bool *is_over)
+{
+    (void)is_past_fixed, (void)has_event, (void)is_over;
+    return told(instance, NOT_NOW);
+}
+
+API fmi3Status fmi3SetTime(void *instance, double time)
+{
+    (void)time;
+    return told(instance, NOT_NOW);
+}
+
+API fmi3Status fmi3SetContinuousStates(void *instance, const double *values, size_t count)
+{
+    (void)values;
+    return absent(instance, count);
+}
+
+#define NO_STATES(NAME)                                                          \
+    API fmi3Status fmi3Get##NAME(void *instance, double *values, size_t count)   \
+    {                                                                            \
+        (void)values;                                                            \
+        return absent(instance, count);                                          \
+    }
+
+NO_STATES(ContinuousStates)
+NO_STATES(ContinuousStateDerivatives)
+NO_STATES(NominalsOfContinuousStates)
+NO_STATES(EventIndicators)
+
+#define NO_NUMBER(NAME)                                                \
+    API fmi3Status fmi3GetNumberOf##NAME(void *instance, size_t *count) \
+    {                                                                  \
+        (void)instance;                                                \
+        *count = 0;                                                    \
+        return fmi3OK;                                                 \
+    }
+
+NO_NUMBER(ContinuousStates)
+NO_NUMBER(EventIndicators)
+
+API fmi3Status fmi3ActivateModelPartition(void *instance, uint32_t clock, double time)
+{
+    (void)clock, (void)time;
+    return told(instance, NOT_NOW);
+}
