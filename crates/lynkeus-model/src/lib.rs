@@ -81,3 +81,4 @@ pub use language::model_names;
 pub use plant::{Assertion, LoadOptions, Parameter, Plant, Tables, Variable};
 pub use study::parse_expression;
 pub use syntax::Span;
+pub use units::BaseUnit;

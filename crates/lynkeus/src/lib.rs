@@ -77,6 +77,7 @@ mod export;
 mod figure;
 mod files;
 mod filter;
+mod fmu;
 mod frozen;
 mod headers;
 mod innovations;
@@ -121,7 +122,7 @@ pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
-pub use export::{Export, ExportOptions, Target, export};
+pub use export::{Artifact, Export, ExportOptions, Target, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;
@@ -142,7 +143,8 @@ pub use table::Table;
 #[cfg(feature = "tune")]
 pub use tune::tune;
 
-pub use lynkeus_export::curly::c::{File, Precision};
+pub use lynkeus_export::curly::c::Precision;
+pub use lynkeus_export::curly::fmu::Version as FmiVersion;
 
 pub use lynkeus_expr as expr;
 pub use lynkeus_gain as gain;

@@ -31,7 +31,7 @@ pub struct File {
 }
 
 /// What `push` can say, from 1 on.
-const CODES: [(&str, &str); 5] = [
+pub(super) const CODES: [(&str, &str); 5] = [
     (
         "TIME",
         "the time is no number, or before that of the last sample",

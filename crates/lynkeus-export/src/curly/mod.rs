@@ -5,8 +5,10 @@
 //! what is called is taken. A [`Language`] renders the draft; a frame ([`c`]) makes files of it.
 
 pub mod c;
+mod description;
 mod device;
 mod dialect;
+pub mod fmu;
 mod function;
 pub mod javascript;
 mod kalman;

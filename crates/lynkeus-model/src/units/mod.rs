@@ -8,6 +8,31 @@ pub(crate) use check::check;
 /// Powers of kg, m, s, A, K, mol and cd.
 const BASE: [&str; 7] = ["kg", "m", "s", "A", "K", "mol", "cd"];
 
+/// A unit in SI base units: `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseUnit {
+    /// powers of kg, m, s, A, K, mol and cd
+    pub powers: [i32; 7],
+    /// how many of the base unit one of it is
+    pub factor: f64,
+    /// where its zero lies, in the base unit
+    pub offset: f64,
+}
+
+impl BaseUnit {
+    /// A unit as Modelica writes it (`kg.m2/s`, `degC`); none where a part is not known.
+    pub fn of(text: &str) -> Option<Self> {
+        let unit = Unit::parse(text)?;
+        // the readers' powers are products of whole numbers
+        let powers = unit.powers.map(|power| power as i32);
+        Some(Self {
+            powers,
+            factor: unit.scale,
+            offset: if unit.has_offset { 273.15 } else { 0.0 },
+        })
+    }
+}
+
 /// A unit over the base units.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Unit {
@@ -267,6 +292,16 @@ fn symbol(name: &str) -> Option<Unit> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn base_units_of_texts() {
+        let celsius = BaseUnit::of("degC").unwrap();
+        assert_eq!((celsius.factor, celsius.offset), (1.0, 273.15));
+        let flow = BaseUnit::of("l/min").unwrap();
+        assert_eq!(flow.powers, [0, 3, -1, 0, 0, 0, 0]);
+        assert!((flow.factor - 1e-3 / 60.0).abs() < 1e-18 && flow.offset == 0.0);
+        assert_eq!(BaseUnit::of("cells"), None);
+    }
 
     #[test]
     fn units_over_the_base_units() {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use lynkeus::{Error, ExportOptions, Precision};
+use lynkeus::{Error, ExportOptions, FmiVersion, Precision};
 
 use super::inputs::Source;
 use super::output;
@@ -17,6 +17,20 @@ pub(super) enum Target {
     C,
     /// A JavaScript module, for pages and Node
     Js,
+    /// An archive for tools of simulation: FMI co-simulation
+    Fmu,
+}
+
+/// [`FmiVersion`] in the words of the command line.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(super) enum Fmi {
+    /// FMI 2.0
+    #[value(name = "2")]
+    Two,
+    /// FMI 3.0
+    #[default]
+    #[value(name = "3")]
+    Three,
 }
 
 /// [`Precision`] in the words of the command line.
@@ -46,6 +60,9 @@ pub(super) struct Options {
     /// Longest step of the integration, in the unit of time, instead of the study's
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
+    /// With --to fmu: the version of the standard
+    #[arg(long, value_enum, default_value_t, value_name = "VERSION")]
+    fmi: Fmi,
     /// No notes
     #[arg(short, long)]
     quiet: bool,
@@ -54,10 +71,7 @@ pub(super) struct Options {
 /// Everything is made before the first file is written.
 pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
     let wanted = ExportOptions {
-        to: match options.to {
-            Target::C => lynkeus::Target::C,
-            Target::Js => lynkeus::Target::JavaScript,
-        },
+        to: options.target(),
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
             Numbers::F32 => Precision::F32,
@@ -75,7 +89,7 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
     std::fs::create_dir_all(folder).map_err(failed)?;
     let mut results = Results::default();
     for file in &made.files {
-        results.put(&folder.join(&file.name), file.text.as_bytes())?;
+        results.put(&folder.join(&file.name), file.bytes.as_slice())?;
     }
     results.keep()?;
     if !options.quiet {
@@ -84,6 +98,17 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
         output::note(&format!("{}: {}", folder.display(), names.join(", ")));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+impl Options {
+    fn target(&self) -> lynkeus::Target {
+        match (self.to, self.fmi) {
+            (Target::C, _) => lynkeus::Target::C,
+            (Target::Js, _) => lynkeus::Target::JavaScript,
+            (Target::Fmu, Fmi::Two) => lynkeus::Target::Fmu(FmiVersion::Two),
+            (Target::Fmu, Fmi::Three) => lynkeus::Target::Fmu(FmiVersion::Three),
+        }
+    }
 }
 
 fn must_be_empty(folder: &Path) -> Result<(), Error> {

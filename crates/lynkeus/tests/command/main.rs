@@ -8,6 +8,7 @@ mod export;
 mod families;
 mod faulty;
 mod filters;
+mod fmu;
 mod hostile;
 mod how_well;
 mod limits;

@@ -1,0 +1,279 @@
+//! What an archive says of itself: `modelDescription.xml` and `buildDescription.xml`.
+
+use super::fmu::{Base, Component, Quantity, Unit, Version};
+
+/// The place of a variable in the model, from which its value reference follows.
+struct Variable<'q> {
+    quantity: &'q Quantity,
+    role: Role,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Time,
+    Signal,
+    Estimate,
+    Start,
+}
+
+/// `modelDescription.xml`.
+pub(super) fn description(component: &Component<'_>, version: Version, token: &str) -> String {
+    let time = Quantity {
+        name: "time".into(),
+        description: component.time.into(),
+        ..Quantity::default()
+    };
+    let variables = variables(component, &time);
+    let units: String = component.units.iter().map(unit).collect();
+    let units = match units.is_empty() {
+        true => units,
+        false => format!("  <UnitDefinitions>\n{units}  </UnitDefinitions>\n"),
+    };
+    let (edition, token_name) = match version {
+        Version::Two => ("2.0", "guid"),
+        Version::Three => ("3.0", "instantiationToken"),
+    };
+    let written: String = match version {
+        Version::Two => variables.iter().enumerate().map(scalar).collect(),
+        Version::Three => variables.iter().enumerate().map(float).collect(),
+    };
+    let about = component.device.about.join("\n");
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
+         description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
+         {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n\
+         \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
+         \x20 <ModelStructure>\n{}  </ModelStructure>\n\
+         </fmiModelDescription>\n",
+        escaped(component.device.name),
+        escaped(&about),
+        env!("CARGO_PKG_VERSION"),
+        interface(component, version),
+        structure(&variables, version),
+    )
+}
+
+fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<'q>> {
+    let of = |quantities: &'q [Quantity], role| {
+        quantities
+            .iter()
+            .map(move |quantity| Variable { quantity, role })
+    };
+    let mut all = vec![Variable {
+        quantity: time,
+        role: Role::Time,
+    }];
+    all.extend(of(component.signals, Role::Signal));
+    all.extend(of(component.estimates, Role::Estimate));
+    all.extend(of(component.starts, Role::Start));
+    all
+}
+
+fn interface(component: &Component<'_>, version: Version) -> String {
+    let name = component.identifier();
+    match version {
+        Version::Two => format!(
+            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
+             canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\">\n\
+             \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
+             \x20 </CoSimulation>\n",
+            version.wrapper()
+        ),
+        Version::Three => format!(
+            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
+             canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" hasEventMode=\"true\"/>\n"
+        ),
+    }
+}
+
+fn unit(unit: &Unit) -> String {
+    let name = escaped(&unit.name);
+    let Some(Base {
+        powers,
+        factor,
+        offset,
+    }) = unit.base
+    else {
+        return format!("    <Unit name=\"{name}\"/>\n");
+    };
+    let names = ["kg", "m", "s", "A", "K", "mol", "cd"].iter().zip(powers);
+    let mut base: String = names
+        .filter(|(_, power)| *power != 0)
+        .map(|(name, power)| format!(" {name}=\"{power}\""))
+        .collect();
+    for (word, value, usual) in [("factor", factor, 1.0), ("offset", offset, 0.0)] {
+        if value != usual {
+            base += &format!(" {word}=\"{value:?}\"");
+        }
+    }
+    format!("    <Unit name=\"{name}\">\n      <BaseUnit{base}/>\n    </Unit>\n")
+}
+
+/// A number as XML Schema writes it.
+fn number(value: f64) -> String {
+    match value {
+        v if v == f64::INFINITY => "INF".to_owned(),
+        v if v == f64::NEG_INFINITY => "-INF".to_owned(),
+        v => format!("{v:?}"),
+    }
+}
+
+impl Variable<'_> {
+    fn causality(&self) -> &'static str {
+        match self.role {
+            Role::Time => "independent",
+            Role::Signal => "input",
+            Role::Estimate => "output",
+            Role::Start => "parameter",
+        }
+    }
+
+    fn variability(&self) -> &'static str {
+        match self.role {
+            Role::Time | Role::Estimate => "continuous",
+            // a sample, which nobody should draw lines between
+            Role::Signal => "discrete",
+            Role::Start => "fixed",
+        }
+    }
+
+    fn name(&self) -> String {
+        let description = match self.quantity.description.is_empty() {
+            true => String::new(),
+            false => format!(" description=\"{}\"", escaped(&self.quantity.description)),
+        };
+        format!("name=\"{}\"", escaped(&self.quantity.name)) + &description
+    }
+
+    fn unit(&self) -> String {
+        let Some(unit) = &self.quantity.unit else {
+            return String::new();
+        };
+        let relative = match self.quantity.is_difference {
+            true => " relativeQuantity=\"true\"",
+            false => "",
+        };
+        format!(" unit=\"{}\"{relative}", escaped(unit))
+    }
+
+    fn start(&self) -> String {
+        match self.role {
+            Role::Signal | Role::Start => format!(" start=\"{}\"", number(self.quantity.start)),
+            Role::Time | Role::Estimate => String::new(),
+        }
+    }
+}
+
+/// A variable of FMI 3.0.
+fn float((reference, variable): (usize, &Variable<'_>)) -> String {
+    format!(
+        "    <Float64 {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}{}/>\n",
+        variable.name(),
+        variable.causality(),
+        variable.variability(),
+        variable.unit(),
+        variable.start(),
+    )
+}
+
+/// A variable of FMI 2.0.
+fn scalar((reference, variable): (usize, &Variable<'_>)) -> String {
+    format!(
+        "    <ScalarVariable {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\">\n\
+         \x20     <Real{}{}/>\n    </ScalarVariable>\n",
+        variable.name(),
+        variable.causality(),
+        variable.variability(),
+        variable.unit(),
+        variable.start(),
+    )
+}
+
+/// What is computed: every estimate, from everything.
+fn structure(variables: &[Variable<'_>], version: Version) -> String {
+    let all = variables.iter().enumerate();
+    let estimates = all.filter(|(_, variable)| variable.role == Role::Estimate);
+    let places: Vec<usize> = estimates.map(|(place, _)| place).collect();
+    let each = |line: &dyn Fn(usize) -> String| places.iter().map(|p| line(*p)).collect::<String>();
+    match version {
+        Version::Two => {
+            let unknowns = each(&|place| format!("      <Unknown index=\"{}\"/>\n", place + 1));
+            format!(
+                "    <Outputs>\n{unknowns}    </Outputs>\n    <InitialUnknowns>\n{unknowns}    </InitialUnknowns>\n"
+            )
+        }
+        Version::Three => {
+            each(&|place| format!("    <Output valueReference=\"{place}\"/>\n"))
+                + &each(&|place| format!("    <InitialUnknown valueReference=\"{place}\"/>\n"))
+        }
+    }
+}
+
+/// `buildDescription.xml` of FMI 3.0.
+pub(super) fn build(component: &Component<'_>) -> String {
+    let name = component.identifier();
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <fmiBuildDescription fmiVersion=\"3.0\">\n\
+         \x20 <BuildConfiguration modelIdentifier=\"{name}\">\n\
+         \x20   <SourceFileSet language=\"C99\">\n\
+         \x20     <SourceFile name=\"{name}.c\"/>\n\
+         \x20     <SourceFile name=\"{}\"/>\n\
+         \x20   </SourceFileSet>\n\
+         \x20 </BuildConfiguration>\n\
+         </fmiBuildDescription>\n",
+        Version::Three.wrapper()
+    )
+}
+
+/// In an attribute of XML; what XML has no way to write becomes a question mark.
+fn escaped(text: &str) -> String {
+    let each = |c: char| match c {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '>' => "&gt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        '\n' => "&#10;".to_owned(),
+        '\u{fffe}' | '\u{ffff}' => "?".to_owned(),
+        c if c.is_control() => "?".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(each).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_in_base_units() {
+        let written = |name: &str, base| {
+            unit(&Unit {
+                name: name.into(),
+                base,
+            })
+        };
+        assert_eq!(written("a<b", None), "    <Unit name=\"a&lt;b\"/>\n");
+        let litre = Base {
+            powers: [0, 3, -1, 0, 0, 0, 0],
+            factor: 1e-3,
+            offset: 0.0,
+        };
+        assert_eq!(
+            written("l/s", Some(litre)),
+            "    <Unit name=\"l/s\">\n      <BaseUnit m=\"3\" s=\"-1\" factor=\"0.001\"/>\n    </Unit>\n"
+        );
+    }
+
+    #[test]
+    fn numbers_and_texts_of_xml() {
+        assert_eq!(number(f64::NAN), "NaN");
+        assert_eq!(number(f64::NEG_INFINITY), "-INF");
+        assert_eq!(number(1e-300), "1e-300");
+        assert_eq!(
+            escaped("a \"<&>\"\u{1}\n"),
+            "a &quot;&lt;&amp;&gt;&quot;?&#10;"
+        );
+    }
+}

@@ -1,0 +1,203 @@
+//! Functional mock-up units: the files of the archive, of which the C is [`c`]'s.
+
+use super::c::{self, CODES, File, Precision, prefix};
+use super::description::{build, description};
+use super::device::Device;
+use super::function::comment;
+use crate::Refusal;
+
+const CORE: &str = include_str!("runtime/fmu/core.c");
+const THREE: &str = include_str!("runtime/fmu/fmi3.c");
+const THREE_ABSENT: &str = include_str!("runtime/fmu/fmi3_absent.c");
+const TWO: &str = include_str!("runtime/fmu/fmi2.c");
+
+/// Which edition of the standard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// FMI 2.0, co-simulation
+    Two,
+    /// FMI 3.0, co-simulation
+    #[default]
+    Three,
+}
+
+/// A unit, in SI base units where it can be written in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// as the model writes it
+    pub name: String,
+    /// none where a part of it is not known
+    pub base: Option<Base>,
+}
+
+/// `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Base {
+    /// powers of kg, m, s, A, K, mol and cd
+    pub powers: [i32; 7],
+    /// how many of the base unit one of it is
+    pub factor: f64,
+    /// where its zero lies, in the base unit
+    pub offset: f64,
+}
+
+/// What the description says of a variable.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Quantity {
+    /// its name, unlike all others
+    pub name: String,
+    /// one line; may be empty
+    pub description: String,
+    /// the name of a unit
+    pub unit: Option<String>,
+    /// a difference of values: the zero of its unit does not count
+    pub is_difference: bool,
+    /// before anything is set; not finite where nothing was measured
+    pub start: f64,
+}
+
+/// A device as a functional mock-up unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Component<'a> {
+    /// the estimator
+    pub device: &'a Device<'a>,
+    /// its signals, in the order of the device
+    pub signals: &'a [Quantity],
+    /// its estimates, in the order of the device
+    pub estimates: &'a [Quantity],
+    /// the starts of its first states, in their order
+    pub starts: &'a [Quantity],
+    /// every unit that a quantity names, once
+    pub units: &'a [Unit],
+    /// what time is counted in, in words
+    pub time: &'a str,
+}
+
+impl Component<'_> {
+    /// The name of the archive, of its library and of its functions' source: a name of C.
+    pub fn identifier(&self) -> String {
+        prefix(self.device.name)
+    }
+}
+
+/// The texts of the archive: `modelDescription.xml`, and under `sources/` what a C compiler needs.
+///
+/// # Errors
+/// As [`c::files`].
+pub fn files(
+    component: &Component<'_>,
+    version: Version,
+    precision: Precision,
+) -> Result<Vec<File>, Refusal> {
+    let name = component.identifier();
+    let mut files = c::files(component.device, precision)?;
+    files.retain(|file| file.name == format!("{name}.h") || file.name == format!("{name}.c"));
+    let texts = files.iter().map(|file| file.text.as_str());
+    let token = token(texts.chain([description(component, version, "").as_str()]));
+    let wrapper = File {
+        name: version.wrapper().to_owned(),
+        text: wrapper(component, version, precision, &token),
+    };
+    files.push(wrapper);
+    if version == Version::Three {
+        files.push(File {
+            name: "buildDescription.xml".into(),
+            text: build(component),
+        });
+    }
+    for file in &mut files {
+        file.name.insert_str(0, "sources/");
+    }
+    let description = File {
+        name: "modelDescription.xml".into(),
+        text: description(component, version, &token),
+    };
+    files.insert(0, description);
+    Ok(files)
+}
+
+impl Version {
+    /// The source that answers as the standard asks.
+    pub(super) fn wrapper(self) -> &'static str {
+        match self {
+            Self::Two => "fmi2.c",
+            Self::Three => "fmi3.c",
+        }
+    }
+}
+
+fn wrapper(
+    component: &Component<'_>,
+    version: Version,
+    precision: Precision,
+    token: &str,
+) -> String {
+    let name = component.identifier();
+    let edition = match version {
+        Version::Two => TWO.to_owned(),
+        Version::Three => format!("{THREE}{THREE_ABSENT}"),
+    };
+    let starts = component.signals.iter().map(|signal| match signal.start {
+        start if start.is_finite() => match precision {
+            Precision::F64 => format!("{start:?}"),
+            Precision::F32 => format!("{:?}f", start as f32),
+        },
+        _ => "NAN".to_owned(),
+    });
+    let reasons = CODES.iter().enumerate().map(|(k, (_, about))| {
+        let about = comment(about);
+        format!("    case {}:\n        return \"{about}\";\n", k + 1)
+    });
+    let real = match precision {
+        Precision::F64 => "double",
+        Precision::F32 => "float",
+    };
+    let title = format!(
+        "/* {}: {name} as a functional mock-up unit. */\n",
+        version.wrapper()
+    );
+    let values = [
+        ("@NAME@", name.clone()),
+        ("@CAPITALS@", name.to_ascii_uppercase()),
+        ("@REAL@", real.to_owned()),
+        ("@SENSORS@", component.device.sensors().to_string()),
+        ("@STARTS@", component.starts.len().to_string()),
+        ("@TOKEN@", token.to_owned()),
+        ("@FIRST_SIGNALS@", starts.collect::<Vec<_>>().join(", ")),
+        ("@REASONS@", reasons.collect()),
+    ];
+    values.iter().fold(
+        format!("{title}{CORE}\n{edition}"),
+        |text, (word, value)| text.replace(word, value),
+    )
+}
+
+/// A name for these texts and no others, as a UUID is written: FNV-1a with 128 bits.
+fn token<'t>(texts: impl Iterator<Item = &'t str>) -> String {
+    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+    const BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+    let hash = texts.flat_map(str::bytes).fold(BASIS, |hash, byte| {
+        (hash ^ u128::from(byte)).wrapping_mul(PRIME)
+    });
+    let digits = format!("{hash:032x}");
+    let parts = [0..8, 8..12, 12..16, 16..20, 20..32].map(|part| &digits[part]);
+    parts.join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_is_that_of_the_texts() {
+        // the reference values of the hash's authors: of nothing, and of "a"
+        assert_eq!(
+            token([].into_iter()),
+            "6c62272e-07bb-0142-62b8-21756295c58d"
+        );
+        assert_eq!(
+            token(["a"].into_iter()),
+            "d228cb69-6f1a-8caf-7891-2b704e4a8964"
+        );
+    }
+}

@@ -1,0 +1,181 @@
+#include "@NAME@.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(_WIN32)
+#define API __declspec(dllexport)
+#elif defined(__GNUC__)
+#define API __attribute__((visibility("default")))
+#else
+#define API
+#endif
+
+/* Value references: time, the signals, the estimates, the starts. */
+enum {
+    SIGNALS = @CAPITALS@_SIGNALS,
+    SENSORS = @SENSORS@,
+    ESTIMATES = @CAPITALS@_ESTIMATES,
+    STARTS = @STARTS@,
+    FIRST_SIGNAL = 1,
+    FIRST_ESTIMATE = FIRST_SIGNAL + SIGNALS,
+    FIRST_START = FIRST_ESTIMATE + ESTIMATES,
+    VALUES = FIRST_START + STARTS
+};
+
+/* What can go wrong besides the codes of @NAME@.h, which are above 0. */
+enum { NO_VALUE = -1, NOT_SETTABLE = -2, NOT_NOW = -3, NO_MEMORY = -4 };
+
+static const char token[] = "@TOKEN@";
+
+/* Before inputs are given. */
+static const @REAL@ first_signals[SIGNALS] = {@FIRST_SIGNALS@};
+
+/* All that changes: a copy is a state of the FMU. */
+typedef struct {
+    @NAME@_state past;         /* with every sample before the communication point */
+    @NAME@_state now;          /* with that of the communication point, once it is settled */
+    double time;               /* the communication point */
+    double starts[STARTS];
+    @REAL@ signals[SIGNALS];
+    @REAL@ estimates[ESTIMATES];
+    int is_given;              /* whether inputs have been given at this point */
+    int is_settled;            /* whether `now` and `estimates` hold */
+    int is_running;            /* whether initialization is over */
+} course;
+
+static void begin(course *c)
+{
+    memset(c, 0, sizeof *c);
+    @NAME@_init(&c->past);
+    c->now = c->past;
+    for (int i = 0; i < SIGNALS; i++) {
+        c->signals[i] = first_signals[i];
+    }
+    for (int i = 0; i < STARTS; i++) {
+        c->starts[i] = (double)c->past.x[i];
+    }
+    c->is_given = 1;
+}
+
+/* The inputs at a communication point are a sample of that time. Until they are given, after a
+   step, the estimates are the prediction: no sensor has reported yet. */
+static int settle(course *c)
+{
+    @REAL@ sample[SIGNALS];
+    int code = 0;
+    if (c->is_settled) {
+        return 0;
+    }
+    for (int i = 0; i < SIGNALS; i++) {
+        sample[i] = (c->is_given || i >= SENSORS) ? c->signals[i] : (@REAL@)NAN;
+    }
+    c->now = c->past;
+    code = @NAME@_push(&c->now, c->time, sample, c->estimates);
+    c->is_settled = code == 0;
+    return code;
+}
+
+/* Takes the sample of the communication point, and goes to the next. */
+static int step(course *c, double from, double to)
+{
+    const course before = *c;
+    int code = 0;
+    if (!c->is_running) {
+        return NOT_NOW;
+    }
+    /* inputs that are not given again have stayed */
+    if (from < c->time || from > c->time || !c->is_given) {
+        c->time = from;
+        c->is_given = 1;
+        c->is_settled = 0;
+    }
+    code = settle(c);
+    if (code != 0) {
+        *c = before;
+        return code;
+    }
+    c->past = c->now;
+    c->time = to;
+    c->is_given = 0;
+    c->is_settled = 0;
+    return 0;
+}
+
+static int read_value(course *c, uint32_t reference, double *value)
+{
+    if (reference >= VALUES) {
+        return NO_VALUE;
+    }
+    if (reference >= FIRST_START) {
+        *value = c->starts[reference - FIRST_START];
+    } else if (reference >= FIRST_ESTIMATE) {
+        const int code = settle(c);
+        if (code != 0) {
+            return code;
+        }
+        *value = (double)c->estimates[reference - FIRST_ESTIMATE];
+    } else if (reference >= FIRST_SIGNAL) {
+        *value = (double)c->signals[reference - FIRST_SIGNAL];
+    } else {
+        *value = c->time;
+    }
+    return 0;
+}
+
+static int write_value(course *c, uint32_t reference, double value)
+{
+    if (reference >= VALUES) {
+        return NO_VALUE;
+    }
+    if (reference >= FIRST_START) {
+        if (c->is_running) {
+            return NOT_NOW;
+        }
+        c->starts[reference - FIRST_START] = value;
+        c->past.x[reference - FIRST_START] = (@REAL@)value;
+    } else if (reference >= FIRST_SIGNAL && reference < FIRST_ESTIMATE) {
+        c->signals[reference - FIRST_SIGNAL] = (@REAL@)value;
+        c->is_given = 1;
+    } else {
+        return NOT_SETTABLE;
+    }
+    c->is_settled = 0;
+    return 0;
+}
+
+/* A copy on the heap, into *kept where that is one already. */
+static int keep(const course *c, void **kept)
+{
+    if (*kept == NULL) {
+        *kept = malloc(sizeof *c);
+    }
+    if (*kept == NULL) {
+        return NO_MEMORY;
+    }
+    memcpy(*kept, c, sizeof *c);
+    return 0;
+}
+
+static int is_ours(const char *given)
+{
+    return given != NULL && strcmp(given, token) == 0;
+}
+
+static const char *reason(int code)
+{
+    switch (code) {
+@REASONS@    case NO_VALUE:
+        return "there is no variable of this type with such a value reference";
+    case NOT_SETTABLE:
+        return "only inputs and start values can be set";
+    case NOT_NOW:
+        return "this cannot be done in the present mode";
+    default:
+        return "there is not enough memory";
+    }
+}

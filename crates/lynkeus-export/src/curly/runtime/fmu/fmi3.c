@@ -1,0 +1,210 @@
+/* What is needed of the headers of FMI 3.0, https://fmi-standard.org. */
+typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
+typedef const char *fmi3String;
+typedef const uint8_t *fmi3Binary;
+typedef void (*logger)(void *environment, fmi3Status status, fmi3String category, fmi3String message);
+
+typedef struct {
+    course at;
+    void *environment;
+    logger log;
+} component;
+
+static fmi3Status told(component *m, int code)
+{
+    if (code == 0) {
+        return fmi3OK;
+    }
+    if (m->log != NULL) {
+        m->log(m->environment, fmi3Error, "logStatusError", reason(code));
+    }
+    return fmi3Error;
+}
+
+API const char *fmi3GetVersion(void)
+{
+    return "3.0";
+}
+
+API fmi3Status fmi3SetDebugLogging(void *instance, bool on, size_t count, const fmi3String *categories)
+{
+    (void)instance, (void)on, (void)count, (void)categories;
+    return fmi3OK;
+}
+
+API void *fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, bool events,
+    bool early, const uint32_t *required, size_t count, void *environment, logger log, void (*update)(void))
+{
+    component *m = NULL;
+    (void)name, (void)resources, (void)visible, (void)logging, (void)events, (void)early;
+    (void)required, (void)count, (void)update;
+    if (!is_ours(given)) {
+        if (log != NULL) {
+            log(environment, fmi3Error, "logStatusError", "the instantiation token is that of another FMU");
+        }
+        return NULL;
+    }
+    m = calloc(1, sizeof *m);
+    if (m != NULL) {
+        m->environment = environment;
+        m->log = log;
+        begin(&m->at);
+    }
+    return m;
+}
+
+API void *fmi3InstantiateModelExchange(
+    fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, void *environment,
+    logger log)
+{
+    (void)name, (void)given, (void)resources, (void)visible, (void)logging, (void)environment, (void)log;
+    return NULL;
+}
+
+API void *fmi3InstantiateScheduledExecution(
+    fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, void *environment,
+    logger log, void (*update)(void), void (*lock)(void), void (*unlock)(void))
+{
+    (void)name, (void)given, (void)resources, (void)visible, (void)logging, (void)environment, (void)log;
+    (void)update, (void)lock, (void)unlock;
+    return NULL;
+}
+
+API void fmi3FreeInstance(void *instance)
+{
+    free(instance);
+}
+
+API fmi3Status fmi3EnterInitializationMode(
+    void *instance, bool has_tolerance, double tolerance, double start, bool has_stop, double stop)
+{
+    component *m = instance;
+    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    m->at.time = start;
+    m->at.is_settled = 0;
+    return fmi3OK;
+}
+
+API fmi3Status fmi3ExitInitializationMode(void *instance)
+{
+    component *m = instance;
+    m->at.is_running = 1;
+    return fmi3OK;
+}
+
+API fmi3Status fmi3Reset(void *instance)
+{
+    component *m = instance;
+    begin(&m->at);
+    return fmi3OK;
+}
+
+API fmi3Status fmi3GetFloat64(
+    void *instance, const uint32_t *references, size_t count, double *values, size_t size)
+{
+    component *m = instance;
+    int code = count == size ? 0 : NO_VALUE;
+    for (size_t i = 0; i < count && code == 0; i++) {
+        code = read_value(&m->at, references[i], &values[i]);
+    }
+    return told(m, code);
+}
+
+API fmi3Status fmi3SetFloat64(
+    void *instance, const uint32_t *references, size_t count, const double *values, size_t size)
+{
+    component *m = instance;
+    int code = count == size ? 0 : NO_VALUE;
+    for (size_t i = 0; i < count && code == 0; i++) {
+        code = write_value(&m->at, references[i], values[i]);
+    }
+    return told(m, code);
+}
+
+API fmi3Status fmi3DoStep(
+    void *instance, double from, double length, bool is_past_fixed, bool *has_event, bool *is_over,
+    bool *is_early, double *reached)
+{
+    component *m = instance;
+    const int code = step(&m->at, from, from + length);
+    (void)is_past_fixed;
+    *has_event = false;
+    *is_over = false;
+    *is_early = false;
+    *reached = m->at.time;
+    return told(m, code);
+}
+
+API fmi3Status fmi3GetFMUState(void *instance, void **kept)
+{
+    component *m = instance;
+    return told(m, keep(&m->at, kept));
+}
+
+API fmi3Status fmi3SetFMUState(void *instance, void *kept)
+{
+    component *m = instance;
+    memcpy(&m->at, kept, sizeof m->at);
+    return fmi3OK;
+}
+
+API fmi3Status fmi3FreeFMUState(void *instance, void **kept)
+{
+    (void)instance;
+    free(*kept);
+    *kept = NULL;
+    return fmi3OK;
+}
+
+API fmi3Status fmi3SerializedFMUStateSize(void *instance, void *kept, size_t *size)
+{
+    (void)instance, (void)kept;
+    *size = sizeof(course);
+    return fmi3OK;
+}
+
+API fmi3Status fmi3SerializeFMUState(void *instance, void *kept, uint8_t *bytes, size_t size)
+{
+    if (size != sizeof(course)) {
+        return told(instance, NO_VALUE);
+    }
+    memcpy(bytes, kept, size);
+    return fmi3OK;
+}
+
+API fmi3Status fmi3DeserializeFMUState(void *instance, const uint8_t *bytes, size_t size, void **kept)
+{
+    course saved;
+    if (size != sizeof saved) {
+        return told(instance, NO_VALUE);
+    }
+    memcpy(&saved, bytes, size);
+    return told(instance, keep(&saved, kept));
+}
+
+/* Outputs follow what is set at once: in event mode there is nothing to do. */
+API fmi3Status fmi3UpdateDiscreteStates(
+    void *instance, bool *is_unfinished, bool *is_over, bool *has_nominals, bool *has_values, bool *has_next,
+    double *next)
+{
+    (void)instance, (void)next;
+    *is_unfinished = false;
+    *is_over = false;
+    *has_nominals = false;
+    *has_values = false;
+    *has_next = false;
+    return fmi3OK;
+}
+
+#define MODE(NAME)                            \
+    API fmi3Status fmi3##NAME(void *instance) \
+    {                                         \
+        (void)instance;                       \
+        return fmi3OK;                        \
+    }
+
+MODE(EnterEventMode)
+MODE(EnterStepMode)
+MODE(EvaluateDiscreteStates)
+MODE(Terminate)
