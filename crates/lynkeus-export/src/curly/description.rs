@@ -37,7 +37,7 @@ pub(super) fn description(component: &Component<'_>, version: Version, token: &s
         Version::Two => variables.iter().enumerate().map(scalar).collect(),
         Version::Three => variables.iter().enumerate().map(float).collect(),
     };
-    let about = component.device.about.join("\n");
+    let about = format!("Estimator for {}", component.device.name);
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
@@ -224,6 +224,21 @@ pub(super) fn build(component: &Component<'_>) -> String {
          \x20 </BuildConfiguration>\n\
          </fmiBuildDescription>\n",
         Version::Three.wrapper()
+    )
+}
+
+/// `documentation/index.html`: the study, the design and what is guaranteed.
+pub(super) fn page(component: &Component<'_>) -> String {
+    let name = escaped(component.device.name);
+    let about = component
+        .device
+        .about
+        .iter()
+        .map(|line| escaped(line) + "\n");
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
+         <h1>Estimator for {name}</h1>\n<pre>\n{}</pre>\n</html>\n",
+        about.collect::<String>()
     )
 }
 

@@ -1,7 +1,7 @@
 //! Functional mock-up units: the files of the archive, of which the C is [`c`]'s.
 
 use super::c::{self, CODES, File, Precision, prefix};
-use super::description::{build, description};
+use super::description::{build, description, page};
 use super::device::Device;
 use super::function::comment;
 use crate::Refusal;
@@ -80,7 +80,8 @@ impl Component<'_> {
     }
 }
 
-/// The texts of the archive: `modelDescription.xml`, and under `sources/` what a C compiler needs.
+/// The texts of the archive: `modelDescription.xml`, under `sources/` what a C compiler needs, and a page
+/// for people.
 ///
 /// # Errors
 /// As [`c::files`].
@@ -113,6 +114,10 @@ pub fn files(
         text: description(component, version, &token),
     };
     files.insert(0, description);
+    files.push(File {
+        name: "documentation/index.html".into(),
+        text: page(component),
+    });
     Ok(files)
 }
 
