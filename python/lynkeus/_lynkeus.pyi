@@ -86,6 +86,15 @@ class Study:
         time_limit: float | None = None,
         memory_limit: float = ...,
     ) -> Answer: ...
+    def export(
+        self,
+        to: str,
+        precision: str,
+        fmi: str,
+        step: float | None = None,
+        time_limit: float | None = None,
+        memory_limit: float = ...,
+    ) -> tuple[list[tuple[str, bytes]], list[str]]: ...
     def design(self, time_limit: float | None = None, memory_limit: float = ...) -> Answer: ...
     def certify(self, time_limit: float | None = None, memory_limit: float = ...) -> Answer: ...
     def how_well(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeVar, overload
 
 from . import _batches, _lynkeus
 from ._base import Base, spelled
 from ._batches import Options
 from ._each import Errors
+from ._export import Export, write
 from ._logs import log_of
 from ._lynkeus import MEMORY
 from ._progress import Progress, told
@@ -337,6 +339,24 @@ class Study:
     def observer(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Observer:
         """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
         return Observer(self._core.observer(time_limit, memory_limit))
+
+    def export(
+        self,
+        folder: str | os.PathLike[str],
+        to: str = "c",
+        *,
+        precision: str = "f64",
+        step: float | None = None,
+        fmi: str = "3",
+        force: bool = False,
+        time_limit: float | None = None,
+        memory_limit: float = MEMORY,
+    ) -> Export:
+        """The estimator for other machines, as files in a folder that is new or empty (``force``: that
+        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"fmu"`` (``fmi`` its version) or
+        ``"html"``; ``step`` is the longest step of the integration, instead of the study's."""
+        files, notes = self._core.export(to, precision, fmi, step, time_limit, memory_limit)
+        return write(Path(folder), files, notes, force=force)
 
     def estimator(self) -> _lynkeus.Estimator:
         """An estimator for samples that come one by one."""

@@ -261,6 +261,35 @@ impl Study {
         })
     }
 
+    /// Names and contents of files, and what the user should know.
+    #[pyo3(signature = (to, precision, fmi, step=None, time_limit=None, memory_limit=MEMORY))]
+    #[allow(clippy::too_many_arguments, reason = "the options of a call from Python")]
+    fn export<'py>(
+        &self,
+        py: Python<'py>,
+        to: &str,
+        precision: &str,
+        fmi: &str,
+        step: Option<f64>,
+        time_limit: Option<f64>,
+        memory_limit: f64,
+    ) -> PyResult<(Vec<(String, Bound<'py, PyBytes>)>, Vec<String>)> {
+        let options = ExportOptions {
+            to: target(to, fmi)?,
+            precision: match precision {
+                "f64" => Precision::F64,
+                "f32" => Precision::F32,
+                other => return Err(unknown("precision", "\"f64\" or \"f32\"", other)),
+            },
+            step,
+        };
+        let terms = Terms::new(None, time_limit, memory_limit);
+        let made = self.ask(py, &terms, |study, _| lynkeus::export(study, &options))?;
+        let files = made.files.into_iter();
+        let files = files.map(|file| (file.name, PyBytes::new(py, &file.bytes)));
+        Ok((files.collect(), made.notes))
+    }
+
     /// `study` is what a copy or an unpickled estimator is made of again.
     fn estimator(&self, py: Python<'_>, study: Py<PyAny>) -> PyResult<Estimator> {
         let made = self.ask(py, &Terms::default(), |study, _| lynkeus::estimator(study));
@@ -299,4 +328,23 @@ impl Study {
             study: self.study.clone(),
         }
     }
+}
+
+fn target(to: &str, fmi: &str) -> PyResult<Target> {
+    Ok(match (to, fmi) {
+        ("c", _) => Target::C,
+        ("js", _) => Target::JavaScript,
+        ("html", _) => Target::Html,
+        ("fmu", "3") => Target::Fmu(FmiVersion::Three),
+        ("fmu", "2") => Target::Fmu(FmiVersion::Two),
+        ("fmu", other) => return Err(unknown("fmi", "\"3\" or \"2\"", other)),
+        (other, _) => {
+            let expected = "\"c\", \"js\", \"fmu\" or \"html\"";
+            return Err(unknown("to", expected, other));
+        }
+    })
+}
+
+fn unknown(argument: &str, expected: &str, found: &str) -> PyErr {
+    PyValueError::new_err(format!("{argument}: expected {expected}, found \"{found}\""))
 }
