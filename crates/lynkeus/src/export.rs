@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::{Device, Entry, FirstReading, javascript};
 use lynkeus_model::Variable;
@@ -25,6 +26,9 @@ pub enum Target {
     C,
     /// a JavaScript module
     JavaScript,
+    /// a page that explains the estimates and moves them: [`report()`](crate::report())
+    #[cfg(feature = "tune")]
+    Html,
 }
 
 /// How an estimator is exported.
@@ -55,15 +59,57 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
+    #[cfg(feature = "tune")]
+    if options.to == Target::Html {
+        return page(study, options.step);
+    }
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let design = prepared.design()?;
     let made = blueprint(&prepared, &design)?;
-    let made = stepped(study, &prepared, made, options, &mut notes)?;
-    let told = Told::of(&prepared, &design, &made);
-    let first: Vec<FirstReading> = at_readings(&prepared)
+    let made = stepped(&prepared, made, options.step, &mut notes)?;
+    let about = about(study, &made);
+    let files = printed(&prepared, &design, &made, &about, |device| {
+        match options.to {
+            Target::C => c::files(device, options.precision),
+            _ => javascript::module(device).map(|text| {
+                let name = format!("{}.mjs", c::prefix(&plant.name));
+                vec![File { name, text }]
+            }),
+        }
+    })?;
+    Ok(Export { files, notes })
+}
+
+/// The report on the study's simulation.
+#[cfg(feature = "tune")]
+fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let page = crate::report::page(study, None, step, watch)?;
+    Ok(Export {
+        files: vec![File {
+            name: page.name,
+            text: page.html,
+        }],
+        notes: page.notes,
+    })
+}
+
+/// What `print` makes of an estimator, with `about` at its head.
+///
+/// # Errors
+/// What cannot run elsewhere.
+pub(crate) fn printed<T>(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    made: &Blueprint,
+    about: &[String],
+    print: impl FnOnce(&Device<'_>) -> Result<T, Refusal>,
+) -> Result<T, Error> {
+    let told = Told::of(prepared, design, made);
+    let first: Vec<FirstReading> = at_readings(prepared)
         .iter()
         .map(|at| FirstReading {
             sensor: at.sensor,
@@ -72,31 +118,23 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
             offset: at.offset,
         })
         .collect();
-    let about = about(study, &made);
+    let study = prepared.study();
     let device = Device {
-        name: &plant.name,
-        blueprint: &made,
+        name: &prepared.plant().name,
+        blueprint: made,
         first_readings: &first,
         signals: &told.signals,
         estimates: &told.estimates,
         monitors: told.monitors,
         deviations: study.estimate.deviations,
         words: &told.words,
-        about: &about,
+        about,
     };
-    let files = match options.to {
-        Target::C => c::files(&device, options.precision),
-        Target::JavaScript => javascript::module(&device).map(|text| {
-            let name = format!("{}.mjs", c::prefix(&plant.name));
-            vec![File { name, text }]
-        }),
-    };
-    let files = files.map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))?;
-    Ok(Export { files, notes })
+    print(&device).map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
 }
 
 /// The study without what looks ahead, which a device cannot.
-fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
+pub(crate) fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
     let mut study = study.clone();
     let settings = &mut study.estimate;
     if settings.between_samples == BetweenSamples::Linear {
@@ -113,14 +151,13 @@ fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
 }
 
 /// With fixed steps: those asked for, those of the study, or such as the fastest mode needs.
-fn stepped(
-    study: &Study,
+pub(crate) fn stepped(
     prepared: &Prepared<'_>,
     made: Blueprint,
-    options: &ExportOptions,
+    step: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Blueprint, Error> {
-    if let Some(step) = options.step {
+    if let Some(step) = step {
         if !(step > 0.0 && step.is_finite()) {
             let message = format!("--step: expected a finite number above 0, found {step}");
             return Err(Error::input(message));
@@ -140,12 +177,12 @@ fn stepped(
     let Some(needed) = needed_step(&made, &known) else {
         let message = "the step cannot be chosen: the equations have no slopes at the start";
         return Err(Error::input(message)
-            .at(&study.file)
+            .at(&prepared.study().file)
             .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
     };
     let step = rounded(needed);
     notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`, and --step gives another",
+        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; `export` takes another as --step",
         short(step)
     ));
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
@@ -246,13 +283,8 @@ fn entry(variable: &Variable) -> Entry {
 
 /// What stands at the head of the files: where they come from, and what is guaranteed.
 fn about(study: &Study, made: &Blueprint) -> Vec<String> {
-    let file = Path::new(&study.file).file_name();
-    let file = file.map_or_else(|| study.file.to_string(), |f| f.display().to_string());
-    let step = match made.method() {
-        Method::Rk4(Step::AtMost(h)) => format!("steps of {h:?} at most"),
-        Method::Rk4(Step::Substeps(n)) => format!("{n} steps from sample to sample"),
-        _ => String::new(),
-    };
+    let file = file_name(study);
+    let step = steps(made.method()).unwrap_or_default();
     let mut lines = vec![
         format!(
             "Generated by lynkeus {} from {file}: change the study, not this file.",
@@ -265,4 +297,19 @@ fn about(study: &Study, made: &Blueprint) -> Vec<String> {
         lines.extend(report.to_string().lines().map(str::to_owned));
     }
     lines
+}
+
+/// The study's file without its folder.
+pub(crate) fn file_name(study: &Study) -> String {
+    let file = Path::new(&study.file).file_name();
+    file.map_or_else(|| study.file.clone(), |f| f.display().to_string())
+}
+
+/// Fixed steps in words.
+pub(crate) fn steps(method: Method) -> Option<String> {
+    match method {
+        Method::Rk4(Step::AtMost(h)) => Some(format!("steps of {h:?} at most")),
+        Method::Rk4(Step::Substeps(n)) => Some(format!("{n} steps from sample to sample")),
+        _ => None,
+    }
 }

@@ -17,6 +17,8 @@ pub(super) enum Target {
     C,
     /// A JavaScript module, for pages and Node
     Js,
+    /// The page of `lynkeus report`, on the study's simulation
+    Html,
 }
 
 /// [`Precision`] in the words of the command line.
@@ -57,6 +59,7 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
         to: match options.to {
             Target::C => lynkeus::Target::C,
             Target::Js => lynkeus::Target::JavaScript,
+            Target::Html => lynkeus::Target::Html,
         },
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
