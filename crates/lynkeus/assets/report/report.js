@@ -104,15 +104,17 @@ function settledError(truth, estimate) {
     return count > 0 ? Math.sqrt(sum / count) : null;
 }
 
+// Whether the observer in the page estimates it.
+const moves = (quantity) => data.knob !== null && quantity.header !== null;
+
 const edge = (estimate, deviation, side) => estimate.map((x, row) => (x === null || deviation[row] === null ? null : x + 2 * side * deviation[row]));
 
 // What a chart draws, each with a curve over the rows; `found` is the last run of the page.
 function curves(quantity, found, readings) {
-    const is = (header) => header !== null && header !== undefined && found !== null;
-    const estimate = is(quantity.header) ? found[quantity.header] : quantity.estimate;
-    const deviation = is(quantity.deviation_header) ? found[quantity.deviation_header] : quantity.deviation;
+    const estimate = found?.[quantity.header] ?? quantity.estimate;
+    const deviation = found?.[quantity.deviation_header] ?? quantity.deviation;
     const list = [];
-    if (quantity.sensor !== null && quantity.sensor !== undefined) {
+    if (Number.isInteger(quantity.sensor)) {
         const values = Array.from(readings[quantity.sensor], (v) => (Number.isFinite(v) ? v : null));
         list.push([{ label: "reading", stroke: () => color("reading"), paths: () => null, points: { show: true, size: 3, width: 0, fill: () => color("reading") } }, values]);
     }
@@ -123,8 +125,8 @@ function curves(quantity, found, readings) {
     if (quantity.truth) {
         list.push([line("true", "truth", { width: 2 }), quantity.truth]);
     }
-    if (is(quantity.header)) {
-        list.push([line("as in the study", "study", { dash: [5, 4], show: false }), quantity.estimate]);
+    if (moves(quantity)) {
+        list.push([line("as in the study", "study", { class: "study", dash: [5, 4], show: false }), quantity.estimate]);
     }
     list.push([line("estimate", "estimate"), estimate]);
     return list;
@@ -196,7 +198,7 @@ function chart(quantity) {
     const title = document.createElement("b");
     title.textContent = withUnit(quantity.name, quantity.unit);
     const words = document.createElement("span");
-    words.textContent = quantity.description ?? quantity.meaning ?? "";
+    words.textContent = quantity.description ?? (quantity.meaning ? `${quantity.meaning} below ${quantity.alarm_below}` : "");
     const error = document.createElement("span");
     error.className = "error";
     caption.append(title, words, error);
@@ -242,6 +244,18 @@ function show(found, readings) {
 
 /* ---- sliders ---- */
 
+// The largest difference between two runs, in units of each column's largest value.
+function difference(found) {
+    let worst = 0;
+    for (const { header, estimate } of data.quantities.filter((quantity) => found[quantity.header])) {
+        const size = estimate.reduce((most, x) => Math.max(most, Math.abs(x ?? 0)), 1e-300);
+        estimate.forEach((x, row) => {
+            worst = Math.max(worst, Math.abs((found[header][row] ?? 0) - (x ?? 0)) / size);
+        });
+    }
+    return worst;
+}
+
 function told() {
     const words = [];
     const { label, positions } = data.knob;
@@ -273,6 +287,10 @@ async function rerun() {
     show(done.columns, readings);
     const { steps } = data.knob.positions[chosen.position];
     const status = [`The observer ran in this page with ${steps}, signals held between samples.`];
+    if (chosen.position === data.knob.own && chosen.noise === 0) {
+        const off = difference(done.columns);
+        status.push(off === 0 ? "It gives what the command gave, to the last bit." : `It gives what the command gave, but for ${off.toExponential(1)} of each curve's largest value.`);
+    }
     if (done.ended) {
         status.push(`It stopped: ${done.ended}.`);
     }

@@ -9,7 +9,7 @@ use super::{Told, proof};
 use crate::check::{Known, Report};
 use crate::export::file_name;
 use crate::words::{instant, number};
-use crate::{Accuracy, Error, Settling};
+use crate::{Accuracy, Error, Knowledge, Settling};
 
 impl Told<'_> {
     /// The whole page, but for its script.
@@ -50,10 +50,6 @@ impl Told<'_> {
             let words = format!("{words}: {}", refusal.message());
             html.element("p class=\"alarm\" role=\"alert\"", &words);
         }
-        let names = |names: &[String]| match names.is_empty() {
-            true => "nothing".to_owned(),
-            false => names.join(", "),
-        };
         let observer = &outcome.design.observer;
         let measured: Vec<String> = observer.measured.iter().map(|m| m.name.clone()).collect();
         let estimated: Vec<String> = observer
@@ -65,10 +61,10 @@ impl Told<'_> {
         html.element(
             "p class=\"lead\"",
             &format!(
-                "A {} observer estimates {} from {}.",
+                "The {} observer estimates {} from {}.",
                 observer.family,
-                names(&estimated),
-                names(&measured)
+                listed(&estimated),
+                listed(&measured)
             ),
         );
         let verdict = match &self.certified {
@@ -82,7 +78,7 @@ impl Told<'_> {
             "refuted" => badge("refuted"),
             _ => badge("undecided"),
         };
-        html.raw(&format!("<p>{word} {rest}</p>"));
+        html.raw(&format!("<p>Convergence: {word} {rest}</p>"));
     }
 
     fn estimates(&self, html: &mut Html) {
@@ -127,19 +123,24 @@ impl Told<'_> {
         let Some(first) = report.knowledge.first() else {
             return whole(html, report);
         };
+        let is_same = |k: &&Knowledge| !std::ptr::eq(*k, first) && k.quantities == first.quantities;
+        let (same, told): (Vec<_>, Vec<_>) = report.knowledge.iter().partition(is_same);
         let mut head = vec!["quantity".to_owned()];
-        head.extend(report.knowledge.iter().map(|k| k.words()));
+        head.extend(told.iter().map(|k| k.words()));
         let line = |known: Option<&(String, Known)>| {
             known.map_or(Cell::from(""), |(_, known)| Cell::from(known.line(unit)))
         };
         let rows = first.quantities.iter().map(|(name, _)| {
-            let of = |k: &crate::Knowledge| line(k.quantities.iter().find(|(n, _)| n == name));
+            let of = |k: &&Knowledge| line(k.quantities.iter().find(|(n, _)| n == name));
             let mut row = vec![Cell::from(name.clone())];
-            row.extend(report.knowledge.iter().map(of));
+            row.extend(told.iter().map(of));
             row
         });
         let head: Vec<&str> = head.iter().map(String::as_str).collect();
         html.table(&head, rows.collect());
+        for same in same {
+            html.element("p", &format!("It is {}.", same.words()));
+        }
         whole(html, report);
     }
 
@@ -161,7 +162,7 @@ impl Told<'_> {
         let rows = design
             .parameters
             .iter()
-            .map(|(name, value)| vec![Cell::from(name.as_str()), Cell::Number(value.to_string())]);
+            .map(|(name, value)| vec![Cell::from(name.as_str()), Cell::from(value.to_string())]);
         html.table(&["parameter", "value"], rows.collect());
         if let Ok(certified) = &self.certified {
             proof::correction(html, &certified.correction);
@@ -186,6 +187,18 @@ impl Told<'_> {
         html.element("h2", "Notes");
         html.list(&self.notes);
         html.list(self.plant.warnings.iter().map(|w| w.one_line()));
+    }
+}
+
+/// Names that are told one by one.
+const NAMED: usize = 8;
+
+/// Names, the first of them where they are many.
+fn listed(names: &[String]) -> String {
+    match names.len() {
+        0 => "nothing".to_owned(),
+        count if count <= NAMED => names.join(", "),
+        count => format!("{} and {} more", names[..NAMED].join(", "), count - NAMED),
     }
 }
 
