@@ -3,7 +3,7 @@
 use lynkeus_model::Plant;
 use serde_json::{Value, json};
 
-use super::knob::Moving;
+use super::knob::Knob;
 use super::shown;
 use crate::course::Samples;
 use crate::prepare::Prepared;
@@ -17,7 +17,7 @@ pub(super) fn json(
     prepared: &Prepared<'_>,
     outcome: &Outcome,
     samples: &Samples,
-    moving: &Result<Moving, Error>,
+    moving: &Result<Knob, Error>,
 ) -> Value {
     let extended = prepared.extended();
     let outputs = extended.outputs.iter().map(|o| &o.variable);
@@ -61,10 +61,10 @@ pub(super) fn json(
         "signals": signals,
         "quantities": quantities.collect::<Vec<_>>(),
         "watches": watches.collect::<Vec<_>>(),
-        "knob": moving.as_ref().ok().map(|moving| json!({
-            "label": moving.knob.label,
-            "own": moving.knob.own,
-            "positions": moving.knob.variants.iter().map(|v| json!({
+        "knob": moving.as_ref().ok().map(|knob| json!({
+            "label": knob.label,
+            "own": knob.own,
+            "positions": knob.variants.iter().map(|v| json!({
                 "factor": v.factor,
                 "value": v.value,
                 "steps": v.steps,
@@ -86,7 +86,7 @@ fn quantity(quantity: &Quantity, plant: &Plant, sensors: &[&str]) -> Value {
         let is_own = **sensor == quantity.name;
         is_own || output.is_some_and(|o| state.is_some_and(|s| s.node == o.node))
     };
-    let sensor = sensors.iter().position(|name| shows(&name));
+    let sensor = sensors.iter().position(shows);
     let is_estimated = quantity.estimate.is_some();
     let estimate = quantity.estimate.as_ref().or(quantity.expected.as_ref());
     let header = |header: &str, series: &Option<Series>| {

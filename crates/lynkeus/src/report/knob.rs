@@ -2,8 +2,7 @@
 
 use lynkeus_export::curly::javascript;
 use lynkeus_observers::{Design, Tuning};
-use lynkeus_run::Method;
-use lynkeus_run::Step;
+use lynkeus_run::{Blueprint, Method, Step};
 
 use crate::export::{printed, stepped, steps};
 use crate::live::blueprint;
@@ -19,12 +18,17 @@ const REACH: f64 = 4.0;
 /// and the process noise of a filter by this.
 const NOISE_REACH: f64 = 100.0;
 
-/// An estimator that runs in a page.
+/// The study's own estimator with fixed steps, as it runs in a page.
 #[derive(Debug)]
-pub(super) struct Moving {
-    /// the study with the steps of the page
+pub(super) struct Fixed {
+    /// the study with these steps
     pub study: Study,
-    pub knob: Knob,
+    /// whether they are not the study's
+    pub is_chosen: bool,
+    pub own: Variant,
+    /// the steps that were chosen are so many times shorter than the start needs
+    shorter: f64,
+    method: Method,
 }
 
 /// What a slider moves.
@@ -39,7 +43,7 @@ pub(super) struct Knob {
 }
 
 /// One position.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Variant {
     /// by which the study's own value is multiplied
     pub factor: f64,
@@ -51,23 +55,27 @@ pub(super) struct Variant {
     pub text: String,
 }
 
-impl Moving {
-    /// The study's own estimator with fixed steps, and its neighbours as far as they can be made.
+impl Fixed {
+    /// With the steps of the study, steps of `step` at most, or such as the fastest mode at the start
+    /// needs and so many times shorter.
     ///
     /// # Errors
-    /// Why the study's own cannot run in a page.
+    /// Why it cannot run in a page.
     pub fn new(
         prepared: &Prepared<'_>,
         design: &Design,
         step: Option<f64>,
-        notes: &mut Vec<String>,
+        shorter: f64,
     ) -> Result<Self, Error> {
         let is_filter = design.observer.filter.is_some();
         let mut study = prepared.study().clone();
         // a filter has them anyway
         study.estimate.deviations |= is_filter;
         let asked = prepared.run_by(&study);
-        let made = stepped(&asked, blueprint(&asked, design)?, step, notes)?;
+        let plain = blueprint(&asked, design)?;
+        let is_chosen = step.is_none() && fixed(plain.method()).is_none();
+        let made = stepped(&asked, plain, step, &mut vec![])?;
+        let made = shortened(made, is_chosen, shorter);
         let method = made.method();
         let tuning = prepared.tuning()?;
         let own = Variant {
@@ -77,17 +85,39 @@ impl Moving {
             text: printed(&asked, design, &made, &[], javascript::expression)?,
         };
         study.estimate.method = fixed(method).unwrap_or(study.estimate.method);
+        Ok(Self {
+            study,
+            is_chosen,
+            own,
+            shorter,
+            method,
+        })
+    }
+}
+
+fn shortened(made: Blueprint, is_chosen: bool, shorter: f64) -> Blueprint {
+    match made.method() {
+        Method::Rk4(Step::AtMost(h)) if is_chosen => {
+            made.with_method(Method::Rk4(Step::AtMost(h / shorter)))
+        }
+        _ => made,
+    }
+}
+
+impl Knob {
+    /// The study's own estimator and its neighbours, as far as they can be made.
+    ///
+    /// # Errors
+    /// Keys of `[observer]` that cannot be used.
+    pub fn new(prepared: &Prepared<'_>, design: &Design, fixed: &Fixed) -> Result<Self, Error> {
         let source = Source {
-            prepared: prepared.run_by(&study),
-            is_filter,
-            // one that was not the study's own is chosen for each position anew
-            method: step.is_some().then_some(method),
-            was: prepared.study(),
+            prepared,
+            is_filter: design.observer.filter.is_some(),
+            fixed,
             family: design.observer.family,
-            tuning,
+            tuning: prepared.tuning()?,
         };
-        let knob = source.knob(own);
-        Ok(Self { study, knob })
+        Ok(source.knob(fixed.own.clone()))
     }
 }
 
@@ -115,12 +145,10 @@ fn value(tuning: &Tuning, factor: f64) -> Option<f64> {
 
 /// What positions are made from.
 struct Source<'a> {
-    prepared: Prepared<'a>,
+    /// of the study before its steps were chosen
+    prepared: &'a Prepared<'a>,
     is_filter: bool,
-    /// the steps of all positions
-    method: Option<Method>,
-    /// the study before its steps were chosen
-    was: &'a Study,
+    fixed: &'a Fixed,
     family: &'static str,
     tuning: Tuning,
 }
@@ -159,7 +187,7 @@ impl Source<'_> {
 
     fn variant(&self, factor: f64) -> Result<Variant, Error> {
         let mut study = self.prepared.study().clone();
-        study.estimate.method = self.was.estimate.method;
+        study.estimate.deviations = self.fixed.study.estimate.deviations;
         match (self.is_filter, axis::speed_of(&self.tuning)) {
             (true, _) => {
                 let densities = study.process_noise.iter_mut();
@@ -178,10 +206,12 @@ impl Source<'_> {
         };
         let design = prepared.design()?;
         let made = blueprint(&prepared, &design)?;
-        let made = match self.method {
-            Some(method) => made.with_method(method),
-            None => stepped(&prepared, made, None, &mut vec![])?,
+        // every position needs steps of its own, but where the study has some
+        let made = match self.fixed.is_chosen {
+            true => stepped(&prepared, made, None, &mut vec![])?,
+            false => made.with_method(self.fixed.method),
         };
+        let made = shortened(made, self.fixed.is_chosen, self.fixed.shorter);
         Ok(Variant {
             factor,
             value: match self.is_filter {

@@ -7,6 +7,7 @@ mod data;
 mod html;
 mod knob;
 mod proof;
+mod run;
 mod sections;
 
 use std::ops::ControlFlow;
@@ -18,11 +19,10 @@ use serde_json::Value;
 use crate::columns::Log;
 use crate::prepare::Prepared;
 use crate::{
-    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare,
-    simulate, visible,
+    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare, visible,
 };
 use html::Html;
-use knob::Moving;
+use knob::Knob;
 
 /// A report.
 #[derive(Clone, Debug)]
@@ -62,28 +62,29 @@ pub(crate) fn page(
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Page, Error> {
     let plant = prepare::plant(study)?;
+    let mut notes = vec![];
+    let causal = export::causal(study, &mut notes);
+    let prepared = Prepared::new(&causal, &plant)?;
     let recorded = match log {
         Some(_) => None,
-        None => Some(simulated(study, &plant)?),
+        None => Some(run::simulated(&prepared, study, &plant, &mut notes)?),
     };
     let Some(table) = log.or(recorded.as_ref()) else {
         return Err(Error::input("neither a log nor a simulation"));
     };
-    let mut notes = vec![];
-    let causal = export::causal(study, &mut notes);
-    let prepared = Prepared::new(&causal, &plant)?;
     let design = prepared.design()?;
-    let moving = Moving::new(&prepared, &design, step, &mut notes);
     let as_it_is = Prepared::new(study, &plant)?;
-    let prepared = match &moving {
-        Ok(moving) => prepared.run_by(&moving.study),
-        // the estimates are then the command's own
-        Err(_) => {
+    let (moving, outcome) = match run::fixed(&prepared, &design, step, table, watch)? {
+        Ok((fixed, outcome)) => {
+            run::told(&fixed, &mut notes);
+            (Ok(Knob::new(&prepared, &design, &fixed)?), outcome)
+        }
+        Err(why) => {
+            // the estimates are then the command's own
             notes.clear();
-            as_it_is
+            (Err(why), estimate::estimated(&as_it_is, table, watch)?)
         }
     };
-    let outcome = estimate::estimated(&prepared, table, watch)?;
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.notes);
     let told = Told {
@@ -108,15 +109,6 @@ pub(crate) fn page(
     })
 }
 
-/// The study's plant as a logger would have it, with what is true.
-fn simulated(study: &Study, plant: &Plant) -> Result<Table, Error> {
-    let settings = simulate::settings(study).map_err(|error| {
-        error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
-    })?;
-    let step = settings.sample_step.unwrap_or(settings.row_step());
-    simulate::recorded(study, plant, step)
-}
-
 /// All that a page tells.
 struct Told<'a> {
     study: &'a Study,
@@ -126,7 +118,7 @@ struct Told<'a> {
     outcome: Outcome,
     checked: Result<check::Report, Error>,
     certified: Result<certify::CertifyReport, Error>,
-    moving: Result<Moving, Error>,
+    moving: Result<Knob, Error>,
     data: Value,
     notes: Vec<String>,
 }
@@ -146,7 +138,7 @@ impl Told<'_> {
         self.tell(&mut body);
         let title = html::escaped(&format!("{}: what is estimated", self.outcome.plant));
         let body = body.text();
-        let variants = self.moving.as_ref().map_or(&[][..], |m| &m.knob.variants);
+        let variants = self.moving.as_ref().map_or(&[][..], |knob| &knob.variants);
         let observers: Vec<String> = variants
             .iter()
             .map(|variant| format!("() => {}", variant.text))

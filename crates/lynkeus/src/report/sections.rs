@@ -94,10 +94,11 @@ impl Told<'_> {
         }
         match &self.moving {
             Ok(_) => html.raw("<div id=\"controls\"></div>\n<p id=\"status\" role=\"status\"></p>"),
-            Err(why) => html.element(
-                "p",
-                &format!("The observer cannot run in this page: {}. The pictures are what the command gives.", why.message()),
-            ),
+            Err(why) => {
+                let remedy = why.remedy().map(|remedy| format!("; {remedy}"));
+                let why = format!("{}{}", why.message(), remedy.unwrap_or_default());
+                html.element("p", &format!("The observer cannot run in this page: {why}. The pictures are what the command gives."));
+            }
         }
         html.raw(
             "<noscript><p>The pictures need JavaScript.</p></noscript>\n<div id=\"charts\"></div>",

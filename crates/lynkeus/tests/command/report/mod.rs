@@ -256,3 +256,51 @@ fn an_estimate_that_is_not_credible_is_told_at_the_top() {
     assert_eq!(ended.code, 2);
     assert!(ended.err.contains("would replace"), "{}", ended.err);
 }
+
+/// Steps that are long enough at the start are too long later on, and the rows of a picture are too far apart
+/// to be samples: the page finds both out.
+#[test]
+fn steps_and_samples_are_short_enough_for_the_whole_run() {
+    for (name, file) in [
+        ("induction-motor", "study.toml"),
+        ("column", "study-peaking.toml"),
+        ("farza", "study.toml"),
+    ] {
+        let folder = example(name, file);
+        let data = data(&page(&folder, &["study.toml"]));
+        assert!(data["knob"].is_object(), "{name}");
+        for quantity in data["quantities"].as_array().unwrap() {
+            let curve = |key: &str| -> Vec<f64> {
+                let curve = quantity[key].as_array().unwrap();
+                curve.iter().map(|x| x.as_f64().unwrap()).collect()
+            };
+            let (truth, estimate) = (curve("truth"), curve("estimate"));
+            let size = truth.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let half = truth.len() / 2;
+            let errors = truth
+                .iter()
+                .zip(&estimate)
+                .skip(half)
+                .map(|(x, y)| (x - y).powi(2));
+            let rms = (errors.sum::<f64>() / half as f64).sqrt();
+            assert!(
+                rms < 0.2 * size,
+                "{name}, {}: {rms} of {size}",
+                quantity["name"]
+            );
+        }
+    }
+}
+
+/// A mode that grows as fast as it likes: no fixed step of the page is short enough.
+#[test]
+fn a_page_whose_steps_do_not_do_says_so() {
+    let folder = example("ltaief", "study-frozen.toml");
+    let ended = folder.run(&["report", "study.toml", "-o", "r.html", "-q"]);
+    assert!(ended.code < 2, "{}", ended.err);
+    let page = folder.read("r.html");
+    assert!(
+        page.contains("The observer cannot run in this page: it needs fixed steps, and steps of")
+    );
+    assert!(data(&page)["knob"].is_null());
+}
