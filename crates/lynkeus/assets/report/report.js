@@ -156,6 +156,9 @@ function fit(plot) {
 
 const withUnit = (name, unit) => (unit ? `${name} (${unit})` : name);
 
+// The time that a chart shows, if it was drawn.
+const seen = (plot) => (Number.isFinite(plot.scales.x.min) ? plot.scales.x : {});
+
 // All charts show the same time.
 function zoomed(plot, key) {
     const { min, max } = plot.scales.x;
@@ -198,7 +201,7 @@ function chart(quantity) {
     const title = document.createElement("b");
     title.textContent = withUnit(quantity.name, quantity.unit);
     const words = document.createElement("span");
-    words.textContent = quantity.description ?? (quantity.meaning ? `${quantity.meaning} below ${quantity.alarm_below}` : "");
+    words.textContent = quantity.description ?? (quantity.meaning ? `below ${quantity.alarm_below}: ${quantity.meaning}` : "");
     const error = document.createElement("span");
     error.className = "error";
     caption.append(title, words, error);
@@ -227,7 +230,8 @@ function show(found, readings) {
     for (const { quantity, plot, error } of charts) {
         const list = curves(quantity, found, readings);
         const before = list.findIndex(([series]) => series.label === "as in the study") + 1;
-        const { min, max } = plot.scales.x;
+        // what is seen stays; at first that is all
+        const { min = data.time[0], max = data.time[rows - 1] } = seen(plot);
         plot.batch(() => {
             plot.setData([data.time, ...list.map(([, values]) => values)], false);
             plot.setScale("x", { min, max });

@@ -99,9 +99,16 @@ async function shot(name, width, scheme, height = 900) {
 
 // The last series of every chart is the estimate.
 const CURVES = "charts.map(({ plot }) => Array.from(plot.data[plot.data.length - 1]))";
-const PAINTED = `[...document.querySelectorAll("canvas")].map((canvas) => {
-    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-    return data.some((v) => v !== 0);
+// Whether the canvas of every chart has points of the estimate's colour.
+const PAINTED = `charts.map(({ plot }) => {
+    const { width, height } = plot.ctx.canvas;
+    const pixels = plot.ctx.getImageData(0, 0, width, height).data;
+    const wanted = [1, 3, 5].map((k) => parseInt(color("estimate").slice(k, k + 2), 16));
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+        count += pixels[i + 3] > 128 && wanted.every((v, k) => Math.abs(pixels[i + k] - v) < 8);
+    }
+    return count;
 })`;
 
 try {
@@ -121,6 +128,7 @@ try {
     seen.last = await value("charts.map(({ plot }) => plot.series.findLast((series) => series.show).label)");
     seen.status = await value(`document.getElementById("status")?.textContent`);
     await shot("light", 1280, "light");
+    seen.all = await value("charts.every(({ plot }) => plot.scales.x.min === data.time[0] && plot.scales.x.max === data.time[data.time.length - 1])");
     if (await value(`document.getElementById("knob") !== null`)) {
         await move("knob", 0);
         seen.slow = await value(CURVES);

@@ -303,4 +303,7 @@ fn a_page_whose_steps_do_not_do_says_so() {
         page.contains("The observer cannot run in this page: it needs fixed steps, and steps of")
     );
     assert!(data(&page)["knob"].is_null());
+    if let Some(seen) = browser::browsed(&folder) {
+        browser::sound(&seen);
+    }
 }
