@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
-use lynkeus::{CheckOptions, Error};
+use lynkeus::{CheckOptions, Error, ExportOptions, FmiVersion, Precision, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::answer::{Answer, Of, Ran};
 use crate::away::{MEMORY, Terms, Watch, away};
@@ -263,7 +263,10 @@ impl Study {
 
     /// Names and contents of files, and what the user should know.
     #[pyo3(signature = (to, precision, fmi, step=None, time_limit=None, memory_limit=MEMORY))]
-    #[allow(clippy::too_many_arguments, reason = "the options of a call from Python")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "the options of a call from Python"
+    )]
     fn export<'py>(
         &self,
         py: Python<'py>,
@@ -273,7 +276,7 @@ impl Study {
         step: Option<f64>,
         time_limit: Option<f64>,
         memory_limit: f64,
-    ) -> PyResult<(Vec<(String, Bound<'py, PyBytes>)>, Vec<String>)> {
+    ) -> PyResult<(Vec<Written<'py>>, Vec<String>)> {
         let options = ExportOptions {
             to: target(to, fmi)?,
             precision: match precision {
@@ -330,6 +333,9 @@ impl Study {
     }
 }
 
+/// A file's name and content.
+type Written<'py> = (String, Bound<'py, PyBytes>);
+
 fn target(to: &str, fmi: &str) -> PyResult<Target> {
     Ok(match (to, fmi) {
         ("c", _) => Target::C,
@@ -346,5 +352,7 @@ fn target(to: &str, fmi: &str) -> PyResult<Target> {
 }
 
 fn unknown(argument: &str, expected: &str, found: &str) -> PyErr {
-    PyValueError::new_err(format!("{argument}: expected {expected}, found \"{found}\""))
+    PyValueError::new_err(format!(
+        "{argument}: expected {expected}, found \"{found}\""
+    ))
 }

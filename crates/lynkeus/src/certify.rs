@@ -253,6 +253,12 @@ impl CertifyReport {
         self.certificate.verdict() == Standing::Refuted && theorem == Some(Standing::Proved)
     }
 
+    /// The verdict of one of its certificates, in a word or two.
+    #[cfg(feature = "tune")]
+    pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
+        print::word(self, certificate)
+    }
+
     /// Whether a certificate of this report is the theorem's.
     fn is_theorem(&self, certificate: &Certificate) -> bool {
         let theorem = self.theorem.as_ref();

@@ -30,6 +30,9 @@ pub enum Target {
     /// a functional mock-up unit for co-simulation: the same C in an archive with a description and, where
     /// a C compiler is at hand, a library for this machine; a note says where there is none
     Fmu(Version),
+    /// a page that explains the estimates and moves them: [`report()`](crate::report())
+    #[cfg(feature = "tune")]
+    Html,
 }
 
 /// How an estimator is exported.
@@ -78,6 +81,10 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
+    #[cfg(feature = "tune")]
+    if options.to == Target::Html {
+        return page(study, options.step);
+    }
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
@@ -98,7 +105,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
                 let archive = fmu::archive(&of, version, options.precision, &mut notes)?;
                 return Ok(vec![archive]);
             }
-            Target::JavaScript => vec![File {
+            _ => vec![File {
                 name: format!("{}.mjs", c::prefix(&plant.name)),
                 text: javascript::module(device)?,
             }],
@@ -106,6 +113,20 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         Ok(files.into_iter().map(Artifact::from).collect())
     })?;
     Ok(Export { files, notes })
+}
+
+/// The report on the study's simulation.
+#[cfg(feature = "tune")]
+fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
+    let watch = &mut |_| std::ops::ControlFlow::Continue(());
+    let page = crate::report::page(study, None, step, watch)?;
+    Ok(Export {
+        files: vec![Artifact {
+            name: page.name,
+            bytes: page.html.into_bytes(),
+        }],
+        notes: page.notes,
+    })
 }
 
 /// What `print` makes of an estimator, with `about` at its head.

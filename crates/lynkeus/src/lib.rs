@@ -98,6 +98,8 @@ mod propose;
 mod quantity;
 mod recorded;
 mod replay;
+#[cfg(feature = "tune")]
+mod report;
 mod sampled;
 pub mod series;
 mod simulate;
@@ -135,6 +137,8 @@ pub use outside::{Excursion, Outside};
 pub use precision::precision;
 pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
+#[cfg(feature = "tune")]
+pub use report::{Page, report};
 pub use series::Series;
 pub use simulate::simulate;
 pub use study::{Study, schema};

@@ -138,6 +138,19 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// The same with another way of running what was designed: families are not asked again.
+    #[cfg(feature = "tune")]
+    pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Prepared<'b>
+    where
+        'a: 'b,
+    {
+        Prepared {
+            examinations: self.examinations.clone(),
+            choice: self.choice.clone(),
+            ..self.with_study(study)
+        }
+    }
+
     /// What every family that the study allows finds in the plant.
     ///
     /// # Errors

@@ -43,6 +43,25 @@ const WORDS: [(&str, usize); 9] = [
 /// # Errors
 /// What cannot run there, or cannot be written.
 pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
+    text(device, "export ")
+}
+
+/// An expression whose value is an object with what a [`module`] exports, so that several live in
+/// one script. It can stand in a page: nothing in it ends a script or begins a comment of HTML.
+///
+/// # Errors
+/// As [`module`].
+pub fn expression(device: &Device<'_>) -> Result<String, Refusal> {
+    let text = text(device, "")?;
+    // strings have no <, and in code and comments a blank after one changes nothing
+    let text = text.replace("</", "< /").replace("<!", "< !");
+    Ok(format!(
+        "(function () {{\n\"use strict\";\n{text}return {{ signals, estimates, init, push }};\n}})()"
+    ))
+}
+
+/// What a module exports, each with the word for it before.
+fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
     let machine = Machine::of(device)?;
     let about: String = device
         .about
@@ -62,7 +81,7 @@ pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
     });
     let source = Language::JavaScript.render(&format!("{}\n{}", machine.tables, machine.source));
     Ok(format!(
-        "{about}\nexport const signals = {};\nexport const estimates = {};\n\n{}\n{}{}\n{}\n{PUSH}",
+        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n\n{}\n{}{}\n{export}{}\n{export}{PUSH}",
         names(device.signals),
         names(device.estimates),
         sizes.collect::<String>(),
@@ -72,7 +91,7 @@ pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
     ))
 }
 
-const PUSH: &str = "export function push(s, t, signals, estimates)
+const PUSH: &str = "function push(s, t, signals, estimates)
 {
     const before = structuredClone(s);
     const code = take(s, t, signals, estimates);
@@ -106,7 +125,7 @@ fn init(fields: &[Field]) -> String {
         format!("        {}: {value},{about}\n", field.name)
     };
     let entries: String = fields.iter().map(entry).collect();
-    format!("export function init()\n{{\n    return {{\n{entries}    }};\n}}\n")
+    format!("function init()\n{{\n    return {{\n{entries}    }};\n}}\n")
 }
 
 fn names(entries: &[Entry]) -> String {

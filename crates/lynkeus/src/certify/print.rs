@@ -25,20 +25,10 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .collect();
     writeln!(f, "box: {}", abbreviated(&sides))?;
     writeln!(f)?;
-    certificate(
-        f,
-        report,
-        &report.certificate,
-        word(report, &report.certificate),
-    )?;
+    certificate(f, report, &report.certificate)?;
     if let Some(theorem) = &report.theorem {
         writeln!(f)?;
-        // the observer may converge all the same
-        let verdict = match theorem.verdict() {
-            Standing::Refuted => "does not apply",
-            _ => word(report, theorem),
-        };
-        certificate(f, report, theorem, verdict)?;
+        certificate(f, report, theorem)?;
     }
     // where something is proved, the first line says it
     let strays = report.strays.words(false).filter(|_| !report.is_proved());
@@ -64,9 +54,11 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
 }
 
 /// The verdict in a word or two: never "proved" alone where the study is not in the box.
-fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
+pub(super) fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
     let strays = |certificate| report.strays.words(report.is_theorem(certificate));
     match certificate.verdict() {
+        // the observer may converge all the same
+        Standing::Refuted if report.is_theorem(certificate) => "does not apply",
         Standing::Proved if strays(certificate).is_some() => "proved inside the box",
         verdict => verdict.word(),
     }
@@ -166,9 +158,8 @@ fn certificate(
     f: &mut fmt::Formatter<'_>,
     report: &CertifyReport,
     certificate: &Certificate,
-    verdict: &str,
 ) -> fmt::Result {
-    writeln!(f, "{}: {verdict}", certificate.basis)?;
+    writeln!(f, "{}: {}", certificate.basis, word(report, certificate))?;
     conditions(f, &certificate.hypotheses, "hypotheses")?;
     for constant in &certificate.constants {
         writeln!(

@@ -238,8 +238,8 @@ impl Known {
         entry
     }
 
-    /// The line under which it stands.
-    fn line(&self, unit: &str) -> String {
+    /// The line under which it stands; `unit` is that of time.
+    pub(crate) fn line(&self, unit: &str) -> String {
         match self {
             Known::Everywhere => "known everywhere (proved on the box)".to_owned(),
             Known::WhileConstant => {

@@ -17,6 +17,8 @@ pub(super) enum Target {
     C,
     /// A JavaScript module, for pages and Node
     Js,
+    /// The page of `lynkeus report`, on the study's simulation
+    Html,
     /// An archive for tools of simulation: FMI co-simulation
     Fmu,
 }
@@ -105,6 +107,7 @@ impl Options {
         match (self.to, self.fmi) {
             (Target::C, _) => lynkeus::Target::C,
             (Target::Js, _) => lynkeus::Target::JavaScript,
+            (Target::Html, _) => lynkeus::Target::Html,
             (Target::Fmu, Fmi::Two) => lynkeus::Target::Fmu(FmiVersion::Two),
             (Target::Fmu, Fmi::Three) => lynkeus::Target::Fmu(FmiVersion::Three),
         }

@@ -8,6 +8,7 @@ mod limits;
 mod monte_carlo;
 mod output;
 mod progress;
+mod report;
 mod run;
 mod save;
 mod signals;
@@ -71,6 +72,7 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
   lynkeus export study.toml --to c -o device
+  lynkeus report study.toml log.csv -o report.html
 
 A file called - is standard input or output.
 
@@ -194,6 +196,17 @@ enum Command {
         study: PathBuf,
         #[command(flatten)]
         options: export::Options,
+        #[command(flatten)]
+        limits: Limits,
+    },
+    /// One self-contained page: what can be known, the design, its certificate, and estimates with sliders
+    Report {
+        /// The study (TOML; "-": standard input)
+        study: PathBuf,
+        /// A log (CSV or Parquet); without one the study's simulation
+        log: Option<PathBuf>,
+        #[command(flatten)]
+        options: report::Options,
         #[command(flatten)]
         limits: Limits,
     },
@@ -340,6 +353,15 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
         } => {
             let source = Source::load(&study)?.within(limits.for_a_proof());
             export::export(&source, &options)
+        }
+        Command::Report {
+            study,
+            log,
+            options,
+            limits,
+        } => {
+            let source = Source::load(&study)?.within(limits.for_a_proof());
+            report::report(&source, log.as_deref(), &options)
         }
         Command::Schema => {
             output::print(output::json(&lynkeus::schema()).as_bytes())?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use lynkeus_observers::{FAMILIES, Value};
+use lynkeus_observers::{FAMILIES, Tuning, Value};
 
 use crate::near::suggest;
 use crate::study::{Name, Place, Scale, Values};
@@ -84,13 +84,31 @@ impl Axis {
     }
 
     fn scale(&self, slot: &mut Value, value: f64) {
-        match slot {
-            Value::Number(x) => *x = self.chosen(*x, value),
-            Value::List(entries) => entries.iter_mut().for_each(|e| self.scale(e, value)),
-            // a conjugate pair of poles
-            Value::Table(parts) => parts.values_mut().for_each(|x| self.scale(x, value)),
-            _ => {}
-        }
+        each(slot, &|x| self.chosen(x, value));
+    }
+}
+
+/// Exchanges every number of a value.
+fn each(slot: &mut Value, by: &impl Fn(f64) -> f64) {
+    match slot {
+        Value::Number(x) => *x = by(*x),
+        Value::List(entries) => entries.iter_mut().for_each(|e| each(e, by)),
+        // a conjugate pair of poles
+        Value::Table(parts) => parts.values_mut().for_each(|x| each(x, by)),
+        _ => {}
+    }
+}
+
+/// The key of a tuning that its speed belongs to, if it has one with numbers.
+pub(crate) fn speed_of(tuning: &Tuning) -> Option<&'static str> {
+    let mut keys = SPEED.iter().copied();
+    keys.find(|key| tuning.values.get(*key).is_some_and(numeric))
+}
+
+/// Scales all numbers of a key.
+pub(crate) fn scale(tuning: &mut Tuning, key: &str, factor: f64) {
+    if let Some(slot) = tuning.values.get_mut(key) {
+        each(slot, &|x| rounded(x * factor, DIGITS));
     }
 }
 

@@ -4,7 +4,7 @@
 //! first figure is least: the mean error with noise in simulation, the prediction error of
 //! held-out samples on a log. `docs/tune.md` defines them all.
 
-mod axis;
+pub(crate) mod axis;
 pub(crate) mod errors;
 mod holdout;
 mod measures;

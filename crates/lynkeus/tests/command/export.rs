@@ -34,9 +34,10 @@ fn count() -> u64 {
     asked.and_then(|n| n.parse().ok()).unwrap_or(28)
 }
 
-fn has(command: &str) -> bool {
+pub(super) fn has(command: &str) -> bool {
     let mut asked = Command::new(command);
-    let asked = asked.arg("--version").stdout(Stdio::null()).status();
+    let asked = asked.arg("--version").stdout(Stdio::null());
+    let asked = asked.stderr(Stdio::null()).status();
     asked.is_ok_and(|status| status.success())
 }
 
@@ -175,9 +176,10 @@ fn filter(random: &mut Normal, folder: &Folder) {
 }
 
 /// Header, rows, and whether the run reached its end.
-type Run = (Vec<String>, Vec<Vec<f64>>, bool);
+pub(super) type Run = (Vec<String>, Vec<Vec<f64>>, bool);
 
-fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
+/// Of the study s.toml and the log log.csv.
+pub(super) fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
     let study = Study::load(folder.join("s.toml"))?;
     let log = Table::load(folder.join("log.csv"))?;
     let outcome = lynkeus::estimate(&study, &log, &mut |_| ControlFlow::Continue(()))?;
@@ -264,7 +266,7 @@ fn replayed_by_node(folder: &Folder) -> Run {
 }
 
 /// The largest difference of two runs, each column in units of its largest value.
-fn difference(a: &Run, b: &Run, study: &str) -> f64 {
+pub(super) fn difference(a: &Run, b: &Run, study: &str) -> f64 {
     assert_eq!(a.0, b.0);
     let length = |run: &Run| (run.1.len(), run.2);
     assert_eq!(

@@ -24,6 +24,7 @@ mod outside;
 mod random;
 mod references;
 mod refused;
+mod report;
 mod results;
 mod runs;
 mod story;

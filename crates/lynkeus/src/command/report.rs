@@ -1,0 +1,50 @@
+//! `lynkeus report`: a study as one page.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use lynkeus::Error;
+
+use super::inputs::{self, Source};
+use super::progress::Progress;
+use super::save::Results;
+use super::{limits, output};
+
+#[derive(Debug, Args)]
+pub(super) struct Options {
+    /// The page ("-": standard output)
+    #[arg(short, long, value_name = "FILE.html")]
+    output: PathBuf,
+    /// No progress bar and no notes
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+pub(super) fn report(
+    source: &Source,
+    log: Option<&Path>,
+    options: &Options,
+) -> Result<ExitCode, Error> {
+    let path = &options.output;
+    let files = source.files().reads("the log", log);
+    files.writes("-o", Some(path)).check()?;
+    let table = log.map(inputs::log).transpose()?;
+    let mut progress = Progress::new("reporting", options.quiet);
+    let page = lynkeus::report(&source.study, table.as_ref(), &mut progress.watch())?;
+    progress.finish();
+    if !options.quiet {
+        page.notes.iter().for_each(|note| output::note(note));
+    }
+    let mut results = Results::default();
+    results.put(path, page.html)?;
+    results.keep()?;
+    let code = match &page.refusal {
+        None => ExitCode::SUCCESS,
+        Some(refusal) => {
+            output::complain(refusal);
+            ExitCode::from(1)
+        }
+    };
+    Ok(limits::code(&source.study, code))
+}

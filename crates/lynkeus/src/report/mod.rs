@@ -1,0 +1,187 @@
+//! A study as one page: what can be known, the design, its certificate, and estimates that move.
+//!
+//! The page holds the samples and the estimator itself, as JavaScript from the same printer as the
+//! export's, once for every position of a slider.
+
+mod data;
+mod html;
+mod knob;
+mod proof;
+mod run;
+mod sections;
+
+use std::ops::ControlFlow;
+
+use lynkeus_export::curly::c::prefix;
+use lynkeus_model::Plant;
+use serde_json::Value;
+
+use crate::columns::Log;
+use crate::prepare::Prepared;
+use crate::{
+    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare, visible,
+};
+use html::Html;
+use knob::Knob;
+
+/// A report.
+#[derive(Clone, Debug)]
+pub struct Page {
+    /// the file: the model's name in lower case, what file names and C forbid replaced by `_`
+    pub name: String,
+    /// the page: one file that asks for nothing else
+    pub html: String,
+    /// what the user should know
+    pub notes: Vec<String>,
+    /// the answer "no", where the estimates of the page are not credible
+    pub refusal: Option<Error>,
+}
+
+/// What is known of a study as one self-contained page of HTML, with its estimates on a log, or
+/// on its simulation as a logger would have it. The estimates are those of
+/// [`estimate()`](crate::estimate()) with the fixed steps that the page tells, and sliders run the
+/// observer anew in the page; where it cannot run there the page says why, and shows estimates as
+/// `[estimate]` says. `watch` is told the fraction done and may stop the run.
+///
+/// # Errors
+/// As [`estimate()`](crate::estimate()); a study without `[simulate]` where there is no log. What cannot be
+/// checked or certified is told in the page.
+pub fn report(
+    study: &Study,
+    log: Option<&Table>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Page, Error> {
+    page(study, log, None, watch)
+}
+
+/// The same with the longest step of the integration.
+pub(crate) fn page(
+    study: &Study,
+    log: Option<&Table>,
+    step: Option<f64>,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Page, Error> {
+    let plant = prepare::plant(study)?;
+    let mut notes = vec![];
+    let causal = export::causal(study, &mut notes);
+    let prepared = Prepared::new(&causal, &plant)?;
+    let recorded = match log {
+        Some(_) => None,
+        None => Some(run::simulated(&prepared, study, &plant, &mut notes)?),
+    };
+    let Some(table) = log.or(recorded.as_ref()) else {
+        return Err(Error::input("neither a log nor a simulation"));
+    };
+    let design = prepared.design()?;
+    let as_it_is = Prepared::new(study, &plant)?;
+    let (moving, outcome) = match run::fixed(&prepared, &design, step, table, watch)? {
+        Ok((fixed, outcome)) => {
+            run::told(&fixed, &mut notes);
+            (Ok(Knob::new(&prepared, &design, &fixed)?), outcome)
+        }
+        Err(why) => {
+            // the estimates are then the command's own
+            notes.clear();
+            (Err(why), estimate::estimated(&as_it_is, table, watch)?)
+        }
+    };
+    let samples = Log::read(&prepared, table)?.samples;
+    notes.extend_from_slice(&outcome.notes);
+    let told = Told {
+        study,
+        plant: &plant,
+        source: match log {
+            Some(log) => format!("the log {}", log.place()),
+            None => "a simulation of the study".to_owned(),
+        },
+        checked: check(study, &CheckOptions::default()),
+        certified: certify(study),
+        data: data::json(&prepared, &outcome, &samples, &moving),
+        outcome,
+        moving,
+        notes,
+    };
+    Ok(Page {
+        name: format!("{}.html", prefix(&plant.name)),
+        html: told.page(),
+        refusal: told.outcome.refusal(),
+        notes: told.notes,
+    })
+}
+
+/// All that a page tells.
+struct Told<'a> {
+    study: &'a Study,
+    plant: &'a Plant,
+    /// where the samples come from
+    source: String,
+    outcome: Outcome,
+    checked: Result<check::Report, Error>,
+    certified: Result<certify::CertifyReport, Error>,
+    moving: Result<Knob, Error>,
+    data: Value,
+    notes: Vec<String>,
+}
+
+const STYLE: &str = include_str!("../../assets/report/report.css");
+const SCRIPT: &str = include_str!("../../assets/report/report.js");
+const PLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
+const PLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
+const PLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
+
+/// Nothing is asked for, whatever the page holds.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+
+impl Told<'_> {
+    fn page(&self) -> String {
+        let mut body = Html::default();
+        self.tell(&mut body);
+        let title = html::escaped(&format!("{}: what is estimated", self.outcome.plant));
+        let body = body.text();
+        let variants = self.moving.as_ref().map_or(&[][..], |knob| &knob.variants);
+        let observers: Vec<String> = variants
+            .iter()
+            .map(|variant| format!("() => {}", variant.text))
+            .collect();
+        let observers = observers.join(",\n");
+        let data = data::in_a_script(&self.data);
+        format!(
+            "<!DOCTYPE html>
+<html lang=\"en\">
+<head>
+<meta charset=\"utf-8\">
+<meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">
+<meta name=\"color-scheme\" content=\"light dark\">
+<meta name=\"generator\" content=\"lynkeus {}\">
+<link rel=\"icon\" href=\"data:,\">
+<title>{title}</title>
+<style>
+{PLOT_STYLE}
+{STYLE}</style>
+</head>
+<body>
+{body}<script>
+/*
+{PLOT_LICENSE}*/
+{PLOT}</script>
+<script id=\"observers\">
+const observers = [
+{observers}
+];
+</script>
+<script type=\"application/json\" id=\"data\">{data}</script>
+<script>
+{SCRIPT}</script>
+</body>
+</html>
+",
+            env!("CARGO_PKG_VERSION"),
+        )
+    }
+}
+
+/// Names of others as they can be shown.
+fn shown(text: &str) -> String {
+    visible::lines(text).into_owned()
+}
