@@ -317,7 +317,7 @@ fn entry(variable: &Variable) -> Entry {
 
 /// What stands at the head of the files: where they come from, and what is guaranteed.
 fn about(study: &Study, made: &Blueprint) -> Vec<String> {
-    let file = file_name(study);
+    let file = file_name(&study.file);
     let step = steps(made.method()).unwrap_or_default();
     let mut lines = vec![
         format!(
@@ -333,10 +333,10 @@ fn about(study: &Study, made: &Blueprint) -> Vec<String> {
     lines
 }
 
-/// The study's file without its folder.
-pub(crate) fn file_name(study: &Study) -> String {
-    let file = Path::new(&study.file).file_name();
-    file.map_or_else(|| study.file.clone(), |f| f.display().to_string())
+/// A file without its folder.
+pub(crate) fn file_name(path: &str) -> String {
+    let file = Path::new(path).file_name();
+    file.map_or_else(|| path.to_owned(), |f| f.display().to_string())
 }
 
 /// Fixed steps in words.

@@ -17,6 +17,7 @@ use lynkeus_model::Plant;
 use serde_json::Value;
 
 use crate::columns::Log;
+use crate::export::file_name;
 use crate::prepare::Prepared;
 use crate::{
     CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare, visible,
@@ -91,7 +92,8 @@ pub(crate) fn page(
         study,
         plant: &plant,
         source: match log {
-            Some(log) => format!("the log {}", log.place()),
+            // a page goes to others: no folder of this machine
+            Some(log) => format!("the log {}", file_name(&log.place())),
             None => "a simulation of the study".to_owned(),
         },
         checked: check(study, &CheckOptions::default()),

@@ -34,7 +34,7 @@ impl Told<'_> {
             &format!(
                 "Made by lynkeus {} from {}. Pictures by uPlot.",
                 env!("CARGO_PKG_VERSION"),
-                file_name(self.study)
+                file_name(&self.study.file)
             ),
         );
     }
@@ -43,11 +43,12 @@ impl Told<'_> {
         let outcome = &self.outcome;
         html.element("h1", &outcome.plant);
         if let Some(refusal) = outcome.refusal() {
-            let words = match &outcome.ended {
-                Some(_) => "The run ended early",
-                None => "These estimates are not credible",
-            };
-            let words = format!("{words}: {}", refusal.message());
+            let remedy = refusal.remedy().map(|remedy| format!("; {remedy}"));
+            let words = format!(
+                "Do not trust these estimates: {}{}",
+                refusal.message(),
+                remedy.unwrap_or_default()
+            );
             html.element("p class=\"alarm\" role=\"alert\"", &words);
         }
         let observer = &outcome.design.observer;

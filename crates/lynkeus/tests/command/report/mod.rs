@@ -240,7 +240,7 @@ fn an_estimate_that_is_not_credible_is_told_at_the_top() {
     let page = folder.read("r.html");
     let head = page.split("</header>").next().unwrap();
     assert!(
-        head.contains("role=\"alert\">These estimates are not credible"),
+        head.contains("role=\"alert\">Do not trust these estimates: "),
         "{head}"
     );
 
