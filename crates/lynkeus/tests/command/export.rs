@@ -249,6 +249,24 @@ for (const row of rows) {
 }
 "#;
 
+/// Whether an exported module calls functions that no standard defines to the last digit.
+fn calls_functions(folder: &Folder) -> bool {
+    let file = std::fs::read_dir(folder.path.path().join("js"));
+    let text = std::fs::read_to_string(file.unwrap().next().unwrap().unwrap().path()).unwrap();
+    let exact = ["sqrt", "abs", "floor", "ceil", "min", "max", "log2"];
+    text.split("Math.").skip(1).any(|call| {
+        !exact
+            .iter()
+            .any(|name| call.starts_with(&format!("{name}(")))
+    })
+}
+
+/// Whether a row, time first, is still of the size of the first one.
+fn is_tame(row: &[f64], first: &[f64]) -> bool {
+    let mut pairs = row.iter().zip(first).skip(1);
+    pairs.all(|(x, start)| x.abs() <= 100.0 * (1.0 + start.abs()))
+}
+
 fn replayed_by_node(folder: &Folder) -> Run {
     let made = folder.run(&["export", "s.toml", "--to", "js", "-o", "js", "-q"]);
     assert_eq!(made.code, 0, "{}", made.err);
@@ -322,9 +340,22 @@ fn c_gives_what_estimate_gives() {
         let off = difference(&expected, &replayed(path), &study);
         assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
         if has_node {
-            let off = difference(&expected, &replayed_by_node(&folder), &study);
-            // functions of other libraries than the tool's
-            assert!(off <= 1e-12, "seed {seed}, JavaScript: {off:e}\n{study}");
+            let (mut expected, mut found) = (expected, replayed_by_node(&folder));
+            let mut limit = 1e-12;
+            if calls_functions(&folder) {
+                // sin, exp and the like are not those of the C library: they may differ in the last
+                // digit, which the plant carries on, and a filter that runs away multiplies
+                limit = 1e-9;
+                let first = expected.1[0].clone();
+                let tame = expected.1.iter().take_while(|row| is_tame(row, &first));
+                let tame = tame.count();
+                for run in [&mut expected, &mut found] {
+                    run.1.truncate(tame);
+                    run.2 = true;
+                }
+            }
+            let off = difference(&expected, &found, &study);
+            assert!(off <= limit, "seed {seed}, JavaScript: {off:e}\n{study}");
         }
         looked_at += 1;
     }
