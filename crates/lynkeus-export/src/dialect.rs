@@ -39,6 +39,17 @@ impl Text {
         }
     }
 
+    /// A number's digits with their sign.
+    pub fn signed(digits: impl Into<String>, is_negative: bool) -> Self {
+        match is_negative {
+            true => Self {
+                text: format!("-{}", digits.into()),
+                binding: Binding::Sign,
+            },
+            false => Self::atom(digits),
+        }
+    }
+
     /// The text where at least this binding is needed.
     pub fn at_least(&self, binding: Binding) -> String {
         match self.binding >= binding {

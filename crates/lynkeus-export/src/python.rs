@@ -225,13 +225,7 @@ impl Dialect for Namespace {
             v if v.is_infinite() => ("float(\"inf\")".to_owned(), v < 0.0),
             v => (format!("{:?}", v.abs()), v.is_sign_negative()),
         };
-        match is_negative {
-            true => Text {
-                text: format!("-{text}"),
-                binding: Binding::Sign,
-            },
-            false => Text::atom(text),
-        }
+        Text::signed(text, is_negative)
     }
 
     fn unary(&self, op: Unary) -> Option<Form> {

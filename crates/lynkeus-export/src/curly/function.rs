@@ -3,11 +3,17 @@
 use crate::curly::dialect::Draft;
 use crate::{Body, Code, Dialect, Names, Refusal, Text};
 
-/// A vector argument: its name, and what its entries are called.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Argument<'a> {
-    pub name: &'a str,
-    pub entries: &'a [Entry],
+/// What functions read: x and w, entry by entry.
+#[derive(Clone, Debug)]
+pub(super) struct Arguments {
+    pub x: Vec<Entry>,
+    pub w: Vec<Entry>,
+}
+
+impl Arguments {
+    fn vectors(&self) -> [(&'static str, &[Entry]); 2] {
+        [("x", &self.x), ("w", &self.w)]
+    }
 }
 
 /// An entry of a vector.
@@ -71,7 +77,7 @@ pub(super) fn draft(
     about: &str,
     name: &str,
     code: &Code,
-    arguments: &[Argument<'_>],
+    arguments: &Arguments,
     targets: &[Target],
 ) -> Result<String, Refusal> {
     let mut names = Names::default();
@@ -85,9 +91,9 @@ pub(super) fn draft(
         lines.push("(void)t;".to_owned());
     }
     let mut inputs = vec![Text::atom("t")];
-    for argument in arguments {
+    for (vector, entries) in arguments.vectors() {
         let before = lines.len();
-        for (place, entry) in argument.entries.iter().enumerate() {
+        for (place, entry) in entries.iter().enumerate() {
             if !is_needed(inputs.len()) {
                 inputs.push(Text::atom("R(0.0)"));
                 continue;
@@ -103,12 +109,12 @@ pub(super) fn draft(
             };
             lines.push(format!(
                 "const real {identifier} = {}[{place}];{about}",
-                argument.name
+                vector
             ));
             inputs.push(Text::atom(identifier));
         }
         if lines.len() == before {
-            lines.push(format!("(void){};", argument.name));
+            lines.push(format!("(void){};", vector));
         }
     }
     let body = Body::of(code, &Draft, &inputs, &mut names)?;
@@ -122,7 +128,10 @@ pub(super) fn draft(
     for target in targets.iter().filter(|target| target.places.is_empty()) {
         lines.push(format!("(void){};", target.name));
     }
-    let parameters = arguments.iter().map(|a| format!("const real *{}", a.name));
+    let parameters = arguments
+        .vectors()
+        .into_iter()
+        .map(|(vector, _)| format!("const real *{vector}"));
     let results = targets
         .iter()
         .map(|target| format!("real *{}", target.name));

@@ -4,9 +4,9 @@ use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sigma
 use lynkeus_run::{BetweenSamples, Blueprint};
 
 use super::device::Device;
-use super::function::{Argument, Target, draft};
+use super::function::{Arguments, Target, draft};
 use super::linear::{Linear, Which};
-use super::machine::{FIELD, Kind, Machine, code, entries, refuse_jumps};
+use super::machine::{FIELD, Kind, Machine, arguments, code, refuse_jumps};
 use super::tables::{number, table};
 use super::template::{chosen, exchanged};
 use crate::Refusal;
@@ -33,17 +33,7 @@ impl Machine {
             return Err(Refusal::LooksAhead);
         }
         let (states, inputs) = (model.states(), model.inputs());
-        let (x, w) = (entries(states, device), entries(inputs, device));
-        let arguments = [
-            Argument {
-                name: "x",
-                entries: &x,
-            },
-            Argument {
-                name: "w",
-                entries: &w,
-            },
-        ];
+        let arguments = arguments(states, inputs, device);
         let room = vec![0.0; inputs.len().max(1)];
         self.size("STATES", states.len());
         self.field(
@@ -103,7 +93,7 @@ impl Machine {
         &mut self,
         kind: &FilterKind,
         free: &Linear<'_>,
-        arguments: &[Argument<'_>],
+        arguments: &Arguments,
     ) -> Result<&'static str, Refusal> {
         let n = free.flow.states().len();
         match kind {
@@ -125,7 +115,7 @@ impl Machine {
     fn measure(
         &mut self,
         model: &FilterModel,
-        arguments: &[Argument<'_>],
+        arguments: &Arguments,
         kind: &FilterKind,
     ) -> Result<(), Refusal> {
         let (n, m) = (model.dimension(), model.sensors().len());
@@ -181,7 +171,7 @@ impl Machine {
         &mut self,
         points: &SigmaPoints,
         free: &Linear<'_>,
-        arguments: &[Argument<'_>],
+        arguments: &Arguments,
     ) -> Result<(), Refusal> {
         let n = free.flow.states().len();
         let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");

@@ -2,7 +2,7 @@
 
 use lynkeus_run::{Level, System};
 
-use super::function::{Argument, Target, draft};
+use super::function::{Arguments, Target, draft};
 use super::machine::{FIELD, Kind, Machine, code, refuse_jumps};
 use super::tables::{places, table};
 use super::template::{chosen, exchanged};
@@ -102,7 +102,7 @@ impl Machine {
         &mut self,
         which: Which,
         linear: &Linear<'_>,
-        arguments: &[Argument<'_>],
+        arguments: &Arguments,
     ) -> Result<(), Refusal> {
         let Linear {
             flow,

@@ -3,7 +3,7 @@
 use lynkeus_run::{Blueprint, Method, Step, System};
 
 use super::device::{Device, FirstReading};
-use super::function::{Argument, Entry, Target, draft};
+use super::function::{Arguments, Entry, Target, draft};
 use super::tables::number;
 use super::template::{chosen, mentions, parts};
 use crate::code::{Part, Solver};
@@ -122,7 +122,7 @@ impl Machine {
     }
 
     /// x' alone.
-    pub fn flow(&mut self, system: &System, arguments: &[Argument<'_>]) -> Result<(), Refusal> {
+    pub fn flow(&mut self, system: &System, arguments: &Arguments) -> Result<(), Refusal> {
         refuse_jumps(system)?;
         let text = draft(
             "The derivatives.",
@@ -173,9 +173,12 @@ fn first_reading(first: &FirstReading) -> String {
     )
 }
 
-/// Names with what the device knows of them.
-pub(super) fn entries(names: &[String], device: &Device<'_>) -> Vec<Entry> {
+/// States and signals with what the device knows of them.
+pub(super) fn arguments(states: &[String], signals: &[String], device: &Device<'_>) -> Arguments {
     let known = |name: &String| device.words.iter().find(|entry| entry.name == *name);
     let entry = |name: &String| known(name).cloned().unwrap_or_else(|| Entry::named(name));
-    names.iter().map(entry).collect()
+    Arguments {
+        x: states.iter().map(entry).collect(),
+        w: signals.iter().map(entry).collect(),
+    }
 }

@@ -3,9 +3,9 @@
 use lynkeus_run::{ErrorModel, SampledObserver};
 
 use super::device::Device;
-use super::function::{Argument, Target, draft};
+use super::function::{Arguments, Target, draft};
 use super::linear::{Linear, Which};
-use super::machine::{FIELD, Kind, Machine, code, entries, refuse_jumps};
+use super::machine::{FIELD, Kind, Machine, arguments, code, refuse_jumps};
 use super::template::chosen;
 use crate::Refusal;
 use crate::code::Part;
@@ -41,18 +41,7 @@ impl Machine {
             &about,
             vec![0.0; system.signals().len()],
         );
-        let x = entries(system.states(), device);
-        let w = entries(system.signals(), device);
-        let arguments = [
-            Argument {
-                name: "x",
-                entries: &x,
-            },
-            Argument {
-                name: "w",
-                entries: &w,
-            },
-        ];
+        let arguments = arguments(system.states(), system.signals(), device);
         let outputs = draft(
             "What the observer reports, then what it expects of each sensor.",
             "outputs",
@@ -81,7 +70,7 @@ impl Machine {
     }
 
     /// The covariance of an observer's error.
-    fn spread(&mut self, errors: &ErrorModel, arguments: &[Argument<'_>]) -> Result<(), Refusal> {
+    fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
         let noise = errors.noise();
         let flow = errors.flow();
         let n = flow.states().len();

@@ -56,13 +56,7 @@ fn without(study: &str, section: &str) -> String {
 /// An example with a log of its own simulation, in which some cells are missing.
 fn example(random: &mut Normal, folder: &Folder, place: usize) {
     let (name, file) = OBSERVERS[place];
-    for entry in std::fs::read_dir(examples().join(name)).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "mo") {
-            let text = std::fs::read_to_string(&path).unwrap();
-            folder.write(path.file_name().unwrap().to_str().unwrap(), &text);
-        }
-    }
+    folder.copy_models(name);
     let study = std::fs::read_to_string(examples().join(name).join(file)).unwrap();
     let study = without(&study, "[estimate]");
     folder.write("s.toml", &study);

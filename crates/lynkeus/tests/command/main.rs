@@ -55,6 +55,16 @@ impl Folder {
         folder
     }
 
+    /// The models of an example.
+    fn copy_models(&self, example: &str) {
+        for entry in std::fs::read_dir(examples().join(example)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.extension().is_some_and(|e| e == "mo") {
+                std::fs::copy(&path, self.path.path().join(path.file_name().unwrap())).unwrap();
+            }
+        }
+    }
+
     fn write(&self, file: &str, text: &str) {
         std::fs::write(self.path.path().join(file), text).unwrap();
     }

@@ -77,13 +77,7 @@ fn is(curve: &Value, run: &Run, place: usize) -> bool {
 /// An example with a log of its own simulation.
 fn example(name: &str, file: &str) -> Folder {
     let folder = Folder::empty();
-    for entry in std::fs::read_dir(examples().join(name)).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "mo") {
-            let text = std::fs::read_to_string(&path).unwrap();
-            folder.write(path.file_name().unwrap().to_str().unwrap(), &text);
-        }
-    }
+    folder.copy_models(name);
     let study = std::fs::read_to_string(examples().join(name).join(file)).unwrap();
     folder.write("study.toml", &study);
     let made = folder.run(&["simulate", "study.toml", "--log", "log.csv", "-q"]);
