@@ -46,7 +46,7 @@ pub(super) const CODES: [(&str, &str); 5] = [
 ];
 
 /// What can become of a reading of a filter.
-const READINGS: [(&str, &str); 4] = [
+pub(super) const READINGS: [(&str, &str); 4] = [
     ("MISSING", "the sensor did not report"),
     ("TAKEN", "it corrected the estimate"),
     ("REJECTED", "the gate kept it out"),
@@ -207,7 +207,7 @@ impl Frame<'_> {
         let kind = match field.kind {
             Kind::Real => self.real(),
             Kind::Double => "double",
-            Kind::Int => "int",
+            Kind::Int | Kind::Truth => "int",
         };
         let size = field
             .count
@@ -291,7 +291,7 @@ fn start(field: &Field) -> String {
     let value = |value: f64| match kind {
         Kind::Real => number(value),
         Kind::Double => format!("{value:?}"),
-        Kind::Int => format!("{}", value as i64),
+        Kind::Int | Kind::Truth => format!("{}", value as i64),
     };
     match count {
         None => format!(

@@ -1,4 +1,4 @@
-//! How operations are written in the text that all languages with braces are rendered from.
+//! How operations are written in the draft.
 
 use lynkeus_expr::{Binary, Unary};
 
@@ -111,6 +111,7 @@ const RESERVED: &[&str] = &[
     "this",
     "throw",
     "true",
+    "truth",
     "try",
     "typedef",
     "typeof",
@@ -243,7 +244,7 @@ impl Dialect for Draft {
     }
 
     fn truth(&self, name: &str, value: &Text) -> String {
-        format!("const int {name} = {};", value.text)
+        format!("const truth {name} = {};", value.text)
     }
 
     /// The solution, then the reciprocal condition.
@@ -282,7 +283,7 @@ mod tests {
         let texts = ["a", "b", "c"].map(Text::atom);
         let code = Code::of(&tape).unwrap();
         let body = Body::of(&code, &Draft, &texts, &mut Names::default()).unwrap();
-        assert_eq!(body.lines, ["const int v1 = a < b;"]);
+        assert_eq!(body.lines, ["const truth v1 = a < b;"]);
         assert_eq!(body.outputs[0].text, "(v1 ? a : c)");
         assert_eq!(body.outputs[1].text, "(v1 ? c : b)");
         assert!(body.outputs[2].text.contains("(v1 ? R(1.0) : R(0.0))"));
