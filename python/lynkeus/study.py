@@ -348,14 +348,16 @@ class Study:
         precision: str = "f64",
         step: float | None = None,
         fmi: str = "3",
+        system: str | None = None,
         force: bool = False,
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Export:
         """The estimator for other machines, as files in a folder that is new or empty (``force``: that
         may hold other files): ``to`` is ``"c"``, ``"js"``, ``"fmu"`` (``fmi`` its version) or
-        ``"html"``; ``step`` is the longest step of the integration, instead of the study's."""
-        files, notes = self._core.export(to, precision, fmi, step, time_limit, memory_limit)
+        ``"html"``; ``step`` is the longest step of the integration, instead of the study's. With
+        ``to="fmu"`` the ``system`` is ``"estimator"``, or in continuous time ``"plant"`` or ``"observer"``."""
+        files, notes = self._core.export(to, precision, fmi, step, system, time_limit, memory_limit)
         return write(Path(folder), files, notes, force=force)
 
     def estimator(self) -> _lynkeus.Estimator:

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use lynkeus_expr::{Algebra, Binary, Graph, Implicit, Node, Nodes, Op, Tape, Unary};
+use lynkeus_expr::{Algebra, Binary, Graph, Implicit, Node, Nodes, Op, Tape, Unary, jacobian};
 
 use crate::factorise::{LARGEST, factorised};
 use crate::{Refusal, dialect};
@@ -106,6 +106,25 @@ impl Code {
                 conditions,
             )),
         }
+    }
+
+    /// How the outputs change along a direction: the product of their Jacobian with it, by the rules
+    /// of differentiation. Its inputs are those of the code, then the direction, an entry for each.
+    #[must_use]
+    pub fn along(&self) -> Self {
+        let graph = self.graph.clone();
+        let part = |i| graph.fresh(format!("direction {i}")).node();
+        let direction: Vec<Node> = (0..self.inputs.len()).map(part).collect();
+        Self {
+            outputs: jacobian::along(&graph, &self.outputs, &self.inputs, &direction),
+            inputs: [&self.inputs[..], &direction].concat(),
+            graph,
+        }
+    }
+
+    /// Which inputs each output depends on, in their order.
+    pub fn dependencies(&self) -> Vec<Vec<usize>> {
+        jacobian::pattern(&self.graph, &self.outputs, &self.inputs)
     }
 
     /// The operations.

@@ -76,12 +76,42 @@ impl Builder<'_> {
 /// The Jacobian by forward accumulation: cheap where each node depends on few
 /// inputs, as in a column of trays.
 pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
-    let build = Builder { graph };
-    let mut tangents: HashMap<Node, Tangent> = HashMap::new();
-    let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
-    for (column, &input) in inputs.iter().enumerate() {
-        tangents.insert(input, Tangent::from([(column, graph.constant(1.0).node())]));
+    let one = graph.constant(1.0).node();
+    let seeds = inputs.iter().enumerate();
+    let seeds = seeds.map(|(column, &input)| (input, Tangent::from([(column, one)])));
+    let tangents = accumulated(graph, outputs, seeds.collect());
+    let entries = outputs.iter().enumerate().flat_map(|(row, output)| {
+        let tangent = tangents.get(output).cloned().unwrap_or_default();
+        tangent
+            .into_iter()
+            .map(move |(column, node)| (row, column, node))
+    });
+    Jacobian {
+        rows: outputs.len(),
+        columns: inputs.len(),
+        entries: entries.collect(),
     }
+}
+
+/// The product of the Jacobian with a direction, one entry for each input, by forward
+/// accumulation: some operations for each of the graph's, however many inputs there are.
+pub fn along(graph: &Graph, outputs: &[Node], inputs: &[Node], direction: &[Node]) -> Vec<Node> {
+    let seeds = inputs.iter().zip(direction);
+    let seeds = seeds.map(|(&input, &part)| (input, Tangent::from([(0, part)])));
+    let tangents = accumulated(graph, outputs, seeds.collect());
+    let of = |output| tangents.get(output)?.get(&0).copied();
+    let zero = graph.constant(0.0).node();
+    outputs.iter().map(|o| of(o).unwrap_or(zero)).collect()
+}
+
+/// The derivatives of every node that outputs need, from those of the inputs.
+fn accumulated(
+    graph: &Graph,
+    outputs: &[Node],
+    mut tangents: HashMap<Node, Tangent>,
+) -> HashMap<Node, Tangent> {
+    let build = Builder { graph };
+    let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
     for node in graph.reachable(outputs) {
         let results = match graph.op(node) {
             Op::Solve(_) => Some(solve_tangents(&build, node, &tangents)),
@@ -104,17 +134,7 @@ pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
             tangents.entry(node).or_insert(tangent);
         }
     }
-    let entries = outputs.iter().enumerate().flat_map(|(row, output)| {
-        let tangent = tangents.get(output).cloned().unwrap_or_default();
-        tangent
-            .into_iter()
-            .map(move |(column, node)| (row, column, node))
-    });
-    Jacobian {
-        rows: outputs.len(),
-        columns: inputs.len(),
-        entries: entries.collect(),
-    }
+    tangents
 }
 
 fn sum_tangent(
@@ -345,6 +365,7 @@ fn local_symbols(graph: &Graph, root: Node) -> Vec<Node> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Tape;
 
     /// A chain has one derivative for each operation and each of the few inputs below it; a sum
     /// of all of them has all.
@@ -361,5 +382,44 @@ mod tests {
         assert_eq!(size(&g, &[sum.node()], &inputs, 100), Some(2 + 3 + 4 + 5));
         let parameter = g.symbol("p").exp().node();
         assert_eq!(size(&g, &[parameter, inputs[0]], &inputs, 0), Some(0));
+    }
+
+    /// Products of both with the same direction, at a point where each choice is off its edge.
+    #[test]
+    fn a_derivative_along_a_direction_is_the_jacobian_times_it() {
+        let g = Graph::new();
+        let symbols = |stem: char| [0, 1, 2].map(|i| g.symbol(&format!("{stem}{i}")));
+        let ([a, b, c], direction) = (symbols('x'), symbols('v'));
+        let system = [a + 3.0, b, c, a * b].map(|e| e.node());
+        let solution = g.solve(&system, &[(a * c).node(), b.node()]);
+        let chosen = g.select(a.less(b).node(), (a * b).node(), c.sin().node());
+        let outputs = [
+            solution.x[1],
+            chosen,
+            (a / b + c.powi(3)).node(),
+            g.constant(2.0).node(),
+            b.node(),
+        ];
+        let inputs = [a, b, c].map(|e| e.node());
+        let direction = direction.map(|e| e.node());
+        let all = [inputs, direction].concat();
+        let at = [0.3, 0.8, -0.5, 0.7, -0.2, 1.1];
+        let value = |outputs: &[Node]| {
+            let tape = Tape::new(&g, &all, outputs).unwrap();
+            let mut found = vec![0.0; outputs.len()];
+            tape.evaluator().eval(&at, &mut found);
+            found
+        };
+        let jacobian = forward(&g, &outputs, &inputs);
+        let entries: Vec<Node> = jacobian.entries.iter().map(|(.., node)| *node).collect();
+        let mut expected = [0.0; 5];
+        for ((row, column, _), slope) in jacobian.entries.iter().zip(value(&entries)) {
+            expected[*row] += slope * at[3 + column];
+        }
+        let found = value(&along(&g, &outputs, &inputs, &direction));
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+        }
+        assert_eq!((found[3], found[4]), (0.0, -0.2));
     }
 }

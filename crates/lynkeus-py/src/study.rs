@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
-use lynkeus::{CheckOptions, Error, ExportOptions, FmiVersion, Precision, Target};
+use lynkeus::{CheckOptions, Error, ExportOptions, FmiVersion, Precision, Subject, Target};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -262,7 +262,7 @@ impl Study {
     }
 
     /// Names and contents of files, and what the user should know.
-    #[pyo3(signature = (to, precision, fmi, step=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (to, precision, fmi, step=None, system=None, time_limit=None, memory_limit=MEMORY))]
     #[allow(
         clippy::too_many_arguments,
         reason = "the options of a call from Python"
@@ -274,11 +274,13 @@ impl Study {
         precision: &str,
         fmi: &str,
         step: Option<f64>,
+        system: Option<&str>,
         time_limit: Option<f64>,
         memory_limit: f64,
     ) -> PyResult<(Vec<Written<'py>>, Vec<String>)> {
         let options = ExportOptions {
             to: target(to, fmi)?,
+            subject: system.map(subject).transpose()?,
             precision: match precision {
                 "f64" => Precision::F64,
                 "f32" => Precision::F32,
@@ -335,6 +337,19 @@ impl Study {
 
 /// A file's name and content.
 type Written<'py> = (String, Bound<'py, PyBytes>);
+
+fn subject(system: &str) -> PyResult<Subject> {
+    match system {
+        "estimator" => Ok(Subject::Estimator),
+        "plant" => Ok(Subject::Plant),
+        "observer" => Ok(Subject::Observer),
+        other => Err(unknown(
+            "system",
+            "\"estimator\", \"plant\" or \"observer\"",
+            other,
+        )),
+    }
+}
 
 fn target(to: &str, fmi: &str) -> PyResult<Target> {
     Ok(match (to, fmi) {

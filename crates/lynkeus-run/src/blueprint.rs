@@ -2,6 +2,7 @@
 
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
+use crate::system::Evaluation;
 use crate::{
     Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
 };
@@ -78,7 +79,14 @@ pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64>
         let given = inputs.iter().find(|(input, _)| input == name);
         *signal = given.map_or(0.0, |(_, value)| *value);
     }
+    step_of(&mut evaluation, system.start())
+}
+
+/// The longest fixed step of a system under the signals that are set, as [`needed_step`] of an
+/// estimator.
+#[must_use]
+pub fn step_of(evaluation: &mut Evaluation, start: &[f64]) -> Option<f64> {
     evaluation.enter(0.0);
-    let needed = AUTO_PRODUCT / spectral_radius(&mut evaluation, 0.0, system.start());
+    let needed = AUTO_PRODUCT / spectral_radius(evaluation, 0.0, start);
     (needed > 0.0).then_some(needed)
 }

@@ -64,6 +64,7 @@ mod choice;
 mod columns;
 #[cfg(feature = "tune")]
 mod compare;
+mod continuous;
 mod correction;
 mod course;
 mod credible;
@@ -124,7 +125,7 @@ pub use credible::Doubt;
 pub use design::{DesignReport, design};
 pub use error::{Error, ErrorKind};
 pub use estimate::{estimate, estimate_resumed};
-pub use export::{Artifact, Export, ExportOptions, Target, export};
+pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
 #[cfg(feature = "plot")]
 pub use figure::figure;
 pub use frozen::Frozen;

@@ -81,23 +81,12 @@ pub(crate) fn plant_reading(
     settings: &SimulateSettings,
     signals: &[(String, Node)],
 ) -> Result<System, Error> {
-    for (name, _) in &settings.initial {
-        if !plant.states.iter().any(|s| s.name == name.text) {
-            return Err(name.blame(unknown(plant, "state", &plant.states, name)));
-        }
-    }
-    let start = |variable: &Variable| {
-        let given = settings
-            .initial
-            .iter()
-            .find(|(name, _)| name.text == variable.name);
-        // Modelica's own default
-        given.map(|(_, x)| *x).or(variable.start).unwrap_or(0.0)
-    };
+    let starts = starts(plant, &settings.initial)?;
     let states: Vec<(String, Node, f64)> = plant
         .states
         .iter()
-        .map(|s| (s.name.clone(), s.node, start(s)))
+        .zip(starts)
+        .map(|(s, start)| (s.name.clone(), s.node, start))
         .collect();
     System::new(
         &plant.graph,
@@ -108,6 +97,24 @@ pub(crate) fn plant_reading(
         &named(&plant.outputs),
     )
     .map_err(Error::from_source)
+}
+
+/// Where the plant's states start.
+///
+/// # Errors
+/// A name that is no state.
+pub(crate) fn starts(plant: &Plant, given: &[(Name, f64)]) -> Result<Vec<f64>, Error> {
+    for (name, _) in given {
+        if !plant.states.iter().any(|s| s.name == name.text) {
+            return Err(name.blame(unknown(plant, "state", &plant.states, name)));
+        }
+    }
+    let start = |variable: &Variable| {
+        let given = given.iter().find(|(name, _)| name.text == variable.name);
+        // Modelica's own default
+        given.map(|(_, x)| *x).or(variable.start).unwrap_or(0.0)
+    };
+    Ok(plant.states.iter().map(start).collect())
 }
 
 /// Variables with the nodes that stand for them.

@@ -111,6 +111,22 @@ pub fn prefix(name: &str) -> String {
     prefix
 }
 
+/// What is said at the head of a file.
+pub(super) fn title(what: &str, about: &[String]) -> String {
+    let lines = about.iter().map(|line| comment(line));
+    let lines = lines.map(|line| format!(" * {line}").trim_end().to_owned() + "\n");
+    format!("/* {what}\n{} */\n", lines.collect::<String>())
+}
+
+/// The entries of an array with what they are, as lines of a comment.
+pub(super) fn listed(entries: &[super::Entry]) -> String {
+    let line = |(place, entry): (usize, &super::Entry)| {
+        let about = comment(&format!("{} {}", entry.name, entry.about));
+        format!(" *   {place}  {}\n", about.trim())
+    };
+    entries.iter().enumerate().map(line).collect()
+}
+
 struct Frame<'a> {
     device: &'a Device<'a>,
     machine: &'a Machine,
@@ -130,25 +146,11 @@ impl Frame<'_> {
         }
     }
 
-    /// What is said at the head of a file.
-    fn title(&self, what: &str) -> String {
-        let lines = self.device.about.iter().map(|line| comment(line));
-        let lines = lines.map(|line| format!(" * {line}").trim_end().to_owned() + "\n");
-        format!("/* {what}\n{} */\n", lines.collect::<String>())
-    }
-
     fn header(&self) -> String {
         let (name, capitals, real) = (&self.prefix, self.capitals(), self.real());
         let Device {
             signals, estimates, ..
         } = self.device;
-        let listed = |entries: &[super::Entry]| -> String {
-            let line = |(place, entry): (usize, &super::Entry)| {
-                let about = comment(&format!("{} {}", entry.name, entry.about));
-                format!(" *   {place}  {}\n", about.trim())
-            };
-            entries.iter().enumerate().map(line).collect()
-        };
         let codes = CODES.iter().enumerate().map(|(k, (code, about))| {
             format!("#define {capitals}_{code} {} /* {about} */\n", k + 1)
         });
@@ -195,7 +197,7 @@ impl Frame<'_> {
              \x20  state and the estimates are what they were. The first sample only updates the start. */\n\
              int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates);\n\n\
              #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
-            title = self.title(&format!("{name}.h")),
+            title = title(&format!("{name}.h"), self.device.about),
             signal_list = listed(signals),
             signal_count = signals.len(),
             estimate_list = listed(estimates),
@@ -221,25 +223,7 @@ impl Frame<'_> {
 
     fn source(&self) -> String {
         let (name, capitals, machine) = (&self.prefix, self.capitals(), self.machine);
-        let sizes = machine
-            .sizes
-            .iter()
-            .map(|(name, size)| format!("    {name} = {size}"));
-        let sizes = sizes.collect::<Vec<_>>().join(",\n");
-        let library = machine.library();
-        let library: String = library
-            .iter()
-            .map(|(_, text)| format!("{text}\n\n"))
-            .collect();
-        let tables = match machine.tables.is_empty() {
-            true => String::new(),
-            false => format!("{}\n", machine.tables),
-        };
-        let draft = format!(
-            "enum {{\n{sizes}\n}};\n\n{tables}{library}{}{}",
-            machine.source,
-            self.init()
-        );
+        let draft = machine.text() + &self.init();
         let draft = exchanged(&draft, |word| {
             if word == "STATE" {
                 return Some(format!("{name}_state"));
@@ -264,7 +248,7 @@ impl Frame<'_> {
              \x20   const {name}_state before = *s;\n\
              \x20   const int code = take(s, t, signals, estimates);\n\
              \x20   if (code != 0) {{\n        *s = before;\n    }}\n    return code;\n}}\n",
-            title = self.title(&format!("{name}.c")),
+            title = title(&format!("{name}.c"), self.device.about),
             signals = names(self.device.signals),
             estimates = names(self.device.estimates),
             body = self.language.render(&draft),

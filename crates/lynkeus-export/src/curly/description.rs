@@ -3,55 +3,98 @@
 use super::fmu::{Base, Component, Quantity, Unit, Version};
 
 /// The place of a variable in the model, from which its value reference follows.
-struct Variable<'q> {
-    quantity: &'q Quantity,
-    role: Role,
+pub(super) struct Variable<'q> {
+    pub quantity: &'q Quantity,
+    pub role: Role,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Role {
+pub(super) enum Role {
     Time,
     Signal,
     Estimate,
     Start,
+    /// continuous, as those that follow
+    Input,
+    State {
+        is_output: bool,
+    },
+    /// of the state with this value reference
+    Derivative {
+        of: usize,
+    },
 }
 
-/// `modelDescription.xml`.
+/// What every `modelDescription.xml` has.
+pub(super) struct Description<'a> {
+    /// the name of the model
+    pub model: &'a str,
+    /// what the component is, in words
+    pub title: &'a str,
+    pub units: &'a [Unit],
+    /// in the order of their value references
+    pub variables: &'a [Variable<'a>],
+    /// the elements of the interfaces that are offered
+    pub interface: String,
+    /// what `ModelStructure` holds
+    pub structure: String,
+}
+
+/// `modelDescription.xml` of an estimator.
 pub(super) fn description(component: &Component<'_>, version: Version, token: &str) -> String {
-    let time = Quantity {
-        name: "time".into(),
-        description: component.time.into(),
-        ..Quantity::default()
-    };
+    let time = time(component.time);
     let variables = variables(component, &time);
-    let units: String = component.units.iter().map(unit).collect();
-    let units = match units.is_empty() {
-        true => units,
-        false => format!("  <UnitDefinitions>\n{units}  </UnitDefinitions>\n"),
-    };
-    let (edition, token_name) = match version {
-        Version::Two => ("2.0", "guid"),
-        Version::Three => ("3.0", "instantiationToken"),
-    };
-    let written: String = match version {
-        Version::Two => variables.iter().enumerate().map(scalar).collect(),
-        Version::Three => variables.iter().enumerate().map(float).collect(),
-    };
-    let about = format!("Estimator for {}", component.device.name);
-    format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
-         description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
-         {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n\
-         \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
-         \x20 <ModelStructure>\n{}  </ModelStructure>\n\
-         </fmiModelDescription>\n",
-        escaped(component.device.name),
-        escaped(&about),
-        env!("CARGO_PKG_VERSION"),
-        interface(component, version),
-        structure(&variables, version),
-    )
+    Description {
+        model: component.device.name,
+        title: &component.title(),
+        units: component.units,
+        variables: &variables,
+        interface: interface(component, version),
+        structure: structure(&variables, version),
+    }
+    .text(version, token)
+}
+
+/// The independent variable.
+pub(super) fn time(counted: &str) -> Quantity {
+    Quantity {
+        name: "time".into(),
+        description: counted.into(),
+        ..Quantity::default()
+    }
+}
+
+impl Description<'_> {
+    pub fn text(&self, version: Version, token: &str) -> String {
+        let units: String = self.units.iter().map(unit).collect();
+        let units = match units.is_empty() {
+            true => units,
+            false => format!("  <UnitDefinitions>\n{units}  </UnitDefinitions>\n"),
+        };
+        let (edition, token_name) = match version {
+            Version::Two => ("2.0", "guid"),
+            Version::Three => ("3.0", "instantiationToken"),
+        };
+        let variables = self.variables.iter().enumerate();
+        let written: String = match version {
+            Version::Two => variables.map(scalar).collect(),
+            Version::Three => variables.map(float).collect(),
+        };
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+             <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
+             description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
+             {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n\
+             \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
+             \x20 <ModelStructure>\n{}  </ModelStructure>\n\
+             </fmiModelDescription>\n",
+            escaped(self.model),
+            escaped(self.title),
+            env!("CARGO_PKG_VERSION"),
+            self.interface,
+            self.structure,
+        )
+    }
 }
 
 fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<'q>> {
@@ -123,15 +166,17 @@ impl Variable<'_> {
     fn causality(&self) -> &'static str {
         match self.role {
             Role::Time => "independent",
-            Role::Signal => "input",
-            Role::Estimate => "output",
+            Role::Signal | Role::Input => "input",
+            Role::Estimate | Role::State { is_output: true } => "output",
             Role::Start => "parameter",
+            Role::State { is_output: false } | Role::Derivative { .. } => "local",
         }
     }
 
     fn variability(&self) -> &'static str {
         match self.role {
             Role::Time | Role::Estimate => "continuous",
+            Role::Input | Role::State { .. } | Role::Derivative { .. } => "continuous",
             // a sample, which nobody should draw lines between
             Role::Signal => "discrete",
             Role::Start => "fixed",
@@ -159,8 +204,39 @@ impl Variable<'_> {
 
     fn start(&self) -> String {
         match self.role {
-            Role::Signal | Role::Start => format!(" start=\"{}\"", number(self.quantity.start)),
-            Role::Time | Role::Estimate => String::new(),
+            Role::Signal | Role::Start | Role::Input | Role::State { .. } => {
+                format!(" start=\"{}\"", number(self.quantity.start))
+            }
+            Role::Time | Role::Estimate | Role::Derivative { .. } => String::new(),
+        }
+    }
+
+    /// A state is what it is set to.
+    fn initial(&self) -> &'static str {
+        match self.role {
+            Role::State { .. } => " initial=\"exact\"",
+            _ => "",
+        }
+    }
+
+    /// Ends of the range and the typical size.
+    fn range(&self) -> String {
+        let Quantity { range, nominal, .. } = self.quantity;
+        let [min, max] = range;
+        let parts = [("min", min), ("max", max), ("nominal", nominal)];
+        let written = parts.into_iter().filter_map(|(word, value)| {
+            let value = value.as_ref()?;
+            Some(format!(" {word}=\"{}\"", number(*value)))
+        });
+        written.collect()
+    }
+
+    /// Whose derivative it is: a value reference, or in FMI 2.0 a place from 1 on.
+    fn derivative(&self, version: Version) -> String {
+        match (self.role, version) {
+            (Role::Derivative { of }, Version::Three) => format!(" derivative=\"{of}\""),
+            (Role::Derivative { of }, Version::Two) => format!(" derivative=\"{}\"", of + 1),
+            _ => String::new(),
         }
     }
 }
@@ -168,25 +244,31 @@ impl Variable<'_> {
 /// A variable of FMI 3.0.
 fn float((reference, variable): (usize, &Variable<'_>)) -> String {
     format!(
-        "    <Float64 {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}{}/>\n",
+        "    <Float64 {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}{}{}{}{}/>\n",
         variable.name(),
         variable.causality(),
         variable.variability(),
+        variable.initial(),
         variable.unit(),
+        variable.range(),
         variable.start(),
+        variable.derivative(Version::Three),
     )
 }
 
 /// A variable of FMI 2.0.
 fn scalar((reference, variable): (usize, &Variable<'_>)) -> String {
     format!(
-        "    <ScalarVariable {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\">\n\
-         \x20     <Real{}{}/>\n    </ScalarVariable>\n",
+        "    <ScalarVariable {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}>\n\
+         \x20     <Real{}{}{}{}/>\n    </ScalarVariable>\n",
         variable.name(),
         variable.causality(),
         variable.variability(),
+        variable.initial(),
         variable.unit(),
+        variable.range(),
         variable.start(),
+        variable.derivative(Version::Two),
     )
 }
 
@@ -211,8 +293,7 @@ fn structure(variables: &[Variable<'_>], version: Version) -> String {
 }
 
 /// `buildDescription.xml` of FMI 3.0.
-pub(super) fn build(component: &Component<'_>) -> String {
-    let name = component.identifier();
+pub(super) fn build(name: &str) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <fmiBuildDescription fmiVersion=\"3.0\">\n\
@@ -227,17 +308,13 @@ pub(super) fn build(component: &Component<'_>) -> String {
     )
 }
 
-/// `documentation/index.html`: the study, the design and what is guaranteed.
-pub(super) fn page(component: &Component<'_>) -> String {
-    let name = escaped(component.device.name);
-    let about = component
-        .device
-        .about
-        .iter()
-        .map(|line| escaped(line) + "\n");
+/// `documentation/index.html`: what the component is, in lines for people.
+pub(super) fn page(model: &str, title: &str, about: &[String]) -> String {
+    let (name, title) = (escaped(model), escaped(title));
+    let about = about.iter().map(|line| escaped(line) + "\n");
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
-         <h1>Estimator for {name}</h1>\n<pre>\n{}</pre>\n</html>\n",
+         <h1>{title}</h1>\n<pre>\n{}</pre>\n</html>\n",
         about.collect::<String>()
     )
 }

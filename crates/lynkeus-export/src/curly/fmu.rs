@@ -4,19 +4,27 @@ use super::c::{self, CODES, File, Precision, prefix};
 use super::description::{build, description, page};
 use super::device::Device;
 use super::function::comment;
+use super::template::chosen;
 use crate::Refusal;
 
+const HEAD: &str = include_str!("runtime/fmu/head.c");
 const CORE: &str = include_str!("runtime/fmu/core.c");
+const TAIL: &str = include_str!("runtime/fmu/tail.c");
 const THREE: &str = include_str!("runtime/fmu/fmi3.c");
 const THREE_ABSENT: &str = include_str!("runtime/fmu/fmi3_absent.c");
 const TWO: &str = include_str!("runtime/fmu/fmi2.c");
+const THREE_EXCHANGE: &str = include_str!("runtime/fmu/fmi3_exchange.c");
+const TWO_EXCHANGE: &str = include_str!("runtime/fmu/fmi2_exchange.c");
+
+/// The part of the templates that is for continuous states.
+pub(super) const EXCHANGE: &str = "exchange";
 
 /// Which edition of the standard.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Version {
-    /// FMI 2.0, co-simulation
+    /// FMI 2.0
     Two,
-    /// FMI 3.0, co-simulation
+    /// FMI 3.0
     #[default]
     Three,
 }
@@ -54,6 +62,10 @@ pub struct Quantity {
     pub is_difference: bool,
     /// before anything is set; not finite where nothing was measured
     pub start: f64,
+    /// the ends of its range, where it has any
+    pub range: [Option<f64>; 2],
+    /// its typical size, above 0
+    pub nominal: Option<f64>,
 }
 
 /// A device as a functional mock-up unit.
@@ -78,6 +90,10 @@ impl Component<'_> {
     pub fn identifier(&self) -> String {
         prefix(self.device.name)
     }
+
+    pub(super) fn title(&self) -> String {
+        format!("Estimator for {}", self.device.name)
+    }
 }
 
 /// The texts of the archive: `modelDescription.xml`, under `sources/` what a C compiler needs, and a page
@@ -91,34 +107,66 @@ pub fn files(
     precision: Precision,
 ) -> Result<Vec<File>, Refusal> {
     let name = component.identifier();
-    let mut files = c::files(component.device, precision)?;
-    files.retain(|file| file.name == format!("{name}.h") || file.name == format!("{name}.c"));
-    let texts = files.iter().map(|file| file.text.as_str());
-    let token = token(texts.chain([description(component, version, "").as_str()]));
-    let wrapper = File {
-        name: version.wrapper().to_owned(),
-        text: wrapper(component, version, precision, &token),
-    };
-    files.push(wrapper);
-    if version == Version::Three {
+    let mut sources = c::files(component.device, precision)?;
+    sources.retain(|file| file.name == format!("{name}.h") || file.name == format!("{name}.c"));
+    Ok(Archive {
+        name: &name,
+        version,
+        sources,
+        description: &|token| description(component, version, token),
+        wrapper: &|token| wrapper(component, version, precision, token),
+        page: page(
+            component.device.name,
+            &component.title(),
+            component.device.about,
+        ),
+    }
+    .files())
+}
+
+/// What an archive is made of.
+pub(super) struct Archive<'a> {
+    pub name: &'a str,
+    pub version: Version,
+    /// the C that is wrapped
+    pub sources: Vec<File>,
+    /// `modelDescription.xml`, with the token of the archive
+    pub description: &'a dyn Fn(&str) -> String,
+    /// what answers as the standard asks, with the same token
+    pub wrapper: &'a dyn Fn(&str) -> String,
+    /// for people
+    pub page: String,
+}
+
+impl Archive<'_> {
+    pub fn files(self) -> Vec<File> {
+        let mut files = self.sources;
+        let texts = files.iter().map(|file| file.text.as_str());
+        let token = token(texts.chain([(self.description)("").as_str()]));
         files.push(File {
-            name: "buildDescription.xml".into(),
-            text: build(component),
+            name: self.version.wrapper().to_owned(),
+            text: (self.wrapper)(&token),
         });
+        if self.version == Version::Three {
+            files.push(File {
+                name: "buildDescription.xml".into(),
+                text: build(self.name),
+            });
+        }
+        for file in &mut files {
+            file.name.insert_str(0, "sources/");
+        }
+        let description = File {
+            name: "modelDescription.xml".into(),
+            text: (self.description)(&token),
+        };
+        files.insert(0, description);
+        files.push(File {
+            name: "documentation/index.html".into(),
+            text: self.page,
+        });
+        files
     }
-    for file in &mut files {
-        file.name.insert_str(0, "sources/");
-    }
-    let description = File {
-        name: "modelDescription.xml".into(),
-        text: description(component, version, &token),
-    };
-    files.insert(0, description);
-    files.push(File {
-        name: "documentation/index.html".into(),
-        text: page(component),
-    });
-    Ok(files)
 }
 
 impl Version {
@@ -129,6 +177,33 @@ impl Version {
             Self::Three => "fmi3.c",
         }
     }
+
+    /// The functions of the standard around what they call, of which what `holds` names is chosen, with
+    /// places filled.
+    pub(super) fn wrapped(self, core: &str, holds: &[&str], places: &[(&str, String)]) -> String {
+        let has = |part| holds.contains(&part);
+        let edition: Vec<&str> = match self {
+            Self::Two if has(EXCHANGE) => vec![TWO, TWO_EXCHANGE],
+            Self::Two => vec![TWO],
+            Self::Three if has(EXCHANGE) => vec![THREE, THREE_ABSENT, THREE_EXCHANGE],
+            Self::Three => vec![THREE, THREE_ABSENT],
+        };
+        let draft = [HEAD, core, TAIL, &edition.concat()].join("\n");
+        places
+            .iter()
+            .fold(chosen(&draft, holds), |text, (word, value)| {
+                text.replace(word, value)
+            })
+    }
+}
+
+/// Cases of a `switch` that say what went wrong.
+pub(super) fn reasons(codes: &[(&str, &str)]) -> String {
+    let case = |(k, (_, about)): (usize, &(&str, &str))| {
+        let about = comment(about);
+        format!("    case {}:\n        return \"{about}\";\n", k + 1)
+    };
+    codes.iter().enumerate().map(case).collect()
 }
 
 fn wrapper(
@@ -138,20 +213,12 @@ fn wrapper(
     token: &str,
 ) -> String {
     let name = component.identifier();
-    let edition = match version {
-        Version::Two => TWO.to_owned(),
-        Version::Three => format!("{THREE}{THREE_ABSENT}"),
-    };
     let starts = component.signals.iter().map(|signal| match signal.start {
         start if start.is_finite() => match precision {
             Precision::F64 => format!("{start:?}"),
             Precision::F32 => format!("{:?}f", start as f32),
         },
         _ => "NAN".to_owned(),
-    });
-    let reasons = CODES.iter().enumerate().map(|(k, (_, about))| {
-        let about = comment(about);
-        format!("    case {}:\n        return \"{about}\";\n", k + 1)
     });
     let real = match precision {
         Precision::F64 => "double",
@@ -169,12 +236,9 @@ fn wrapper(
         ("@STARTS@", component.starts.len().to_string()),
         ("@TOKEN@", token.to_owned()),
         ("@FIRST_SIGNALS@", starts.collect::<Vec<_>>().join(", ")),
-        ("@REASONS@", reasons.collect()),
+        ("@REASONS@", reasons(&CODES)),
     ];
-    values.iter().fold(
-        format!("{title}{CORE}\n{edition}"),
-        |text, (word, value)| text.replace(word, value),
-    )
+    title + &version.wrapped(CORE, &[], &values)
 }
 
 /// A name for these texts and no others, as a UUID is written: FNV-1a with 128 bits.

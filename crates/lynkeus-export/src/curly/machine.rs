@@ -42,6 +42,7 @@ pub(super) struct Machine {
 
 const LIBRARY: &str = include_str!("runtime/library.c");
 const STEPS: &str = include_str!("runtime/steps.c");
+const INTEGRATE: &str = include_str!("runtime/integrate.c");
 const PUSH: &str = include_str!("runtime/push.c");
 
 impl Machine {
@@ -49,7 +50,6 @@ impl Machine {
     /// [`Refusal`]: what solves an optimisation, looks ahead, has no fixed step or jumps with time,
     /// and operations that no language has.
     pub fn of(device: &Device<'_>) -> Result<Self, Refusal> {
-        let step = step_length(device.blueprint.method())?;
         let mut machine = Self::default();
         let sensors = device.sensors();
         machine.size("SENSORS", sensors);
@@ -64,7 +64,7 @@ impl Machine {
             "the largest start, reading or input so far",
             1.0,
         );
-        machine.add(&STEPS.replace("STEP_LENGTH", &step));
+        machine.steps(device.blueprint.method())?;
         let mut holds = vec![];
         match device.blueprint {
             Blueprint::Sampled { observer, .. } => {
@@ -92,6 +92,33 @@ impl Machine {
             }
         }
         needed
+    }
+
+    /// Sizes, tables, what is called of the library, and the functions.
+    pub fn text(&self) -> String {
+        let sizes = self.sizes.iter();
+        let sizes: Vec<String> = sizes.map(|(name, n)| format!("    {name} = {n}")).collect();
+        let sizes = sizes.join(",\n");
+        let library = self.library().into_iter();
+        let library: String = library.map(|(_, text)| format!("{text}\n\n")).collect();
+        let tables = match self.tables.is_empty() {
+            true => String::new(),
+            false => format!("{}\n", self.tables),
+        };
+        format!("enum {{\n{sizes}\n}};\n\n{tables}{library}{}", self.source)
+    }
+
+    /// How an interval is divided.
+    pub fn steps(&mut self, method: Method) -> Result<(), Refusal> {
+        self.add(&STEPS.replace("STEP_LENGTH", &step_length(method)?));
+        Ok(())
+    }
+
+    /// The classical Runge-Kutta method for x' that [`Machine::flow`] writes.
+    pub fn integrate(&mut self, dimension: usize) {
+        self.size("DIMENSION", dimension);
+        self.add(FIELD);
+        self.add(INTEGRATE);
     }
 
     pub fn size(&mut self, name: impl Into<String>, value: usize) {

@@ -3,12 +3,14 @@
 //! Everything is drafted once, in C whose type of numbers is called `real`: the functions of the
 //! graph, what is done with them from `runtime/*.c`, of which only
 //! what is called is taken. C exchanges words of the draft; every other language prints its tree (`syntax`).
-//! A frame ([`c`], [`javascript`]) makes files of it.
+//! A frame ([`c`], [`javascript`]) makes files of it. Equations alone ([`Ode`]), of a plant or of an
+//! observer, are drafted likewise and become an [`Exchange`].
 
 pub mod c;
 mod description;
 mod device;
 mod dialect;
+mod exchange;
 pub mod fmu;
 mod function;
 pub mod javascript;
@@ -17,9 +19,12 @@ mod language;
 mod linear;
 mod machine;
 mod observer;
+mod ode;
 mod syntax;
 mod tables;
 mod template;
 
 pub use device::{Device, FirstReading};
+pub use exchange::Exchange;
 pub use function::Entry;
+pub use ode::{Ode, State};

@@ -5,12 +5,11 @@ use lynkeus_run::{ErrorModel, SampledObserver};
 use super::device::Device;
 use super::function::{Arguments, Target, draft};
 use super::linear::{Linear, Which};
-use super::machine::{FIELD, Kind, Machine, arguments, code, refuse_jumps};
+use super::machine::{Kind, Machine, arguments, code, refuse_jumps};
 use super::template::chosen;
 use crate::Refusal;
 use crate::code::Part;
 
-const INTEGRATE: &str = include_str!("runtime/integrate.c");
 const SPREAD: &str = include_str!("runtime/spread.c");
 const SAMPLED: &str = include_str!("runtime/sampled.c");
 
@@ -53,9 +52,7 @@ impl Machine {
         let (field, holds): (&str, &[&str]) = match &observer.errors {
             None => {
                 self.flow(system, &arguments)?;
-                self.size("DIMENSION", n);
-                self.add(FIELD);
-                self.add(INTEGRATE);
+                self.integrate(n);
                 ("flow", &[])
             }
             Some(errors) => {

@@ -1,10 +1,10 @@
-//! `lynkeus export`: an estimator as source code.
+//! `lynkeus export`: an estimator as source code, or a plant for simulators.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
-use lynkeus::{Error, ExportOptions, FmiVersion, Precision};
+use lynkeus::{Error, ExportOptions, FmiVersion, Precision, Subject};
 
 use super::inputs::Source;
 use super::output;
@@ -19,8 +19,29 @@ pub(super) enum Target {
     Js,
     /// The page of `lynkeus report`, on the study's simulation
     Html,
-    /// An archive for tools of simulation: FMI co-simulation
+    /// An archive for tools of simulation: the estimator for FMI co-simulation; a plant or an observer in continuous time for model exchange, too
     Fmu,
+}
+
+/// [`Subject`] in the words of the command line.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum System {
+    /// The observer or filter with its samples
+    Estimator,
+    /// The model alone
+    Plant,
+    /// The observer in continuous time, its measurements as inputs
+    Observer,
+}
+
+impl From<System> for Subject {
+    fn from(system: System) -> Self {
+        match system {
+            System::Estimator => Self::Estimator,
+            System::Plant => Self::Plant,
+            System::Observer => Self::Observer,
+        }
+    }
 }
 
 /// [`FmiVersion`] in the words of the command line.
@@ -65,6 +86,9 @@ pub(super) struct Options {
     /// With --to fmu: the version of the standard
     #[arg(long, value_enum, default_value_t, value_name = "VERSION")]
     fmi: Fmi,
+    /// With --to fmu: what is exported; by default the estimator of a study, the plant of a model
+    #[arg(long, value_enum, value_name = "WHAT")]
+    system: Option<System>,
     /// No notes
     #[arg(short, long)]
     quiet: bool,
@@ -74,6 +98,7 @@ pub(super) struct Options {
 pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
     let wanted = ExportOptions {
         to: options.target(),
+        subject: options.system.map(Subject::from),
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
             Numbers::F32 => Precision::F32,

@@ -72,6 +72,7 @@ Examples:
   lynkeus estimate study.toml log.csv -o estimates.csv --plot estimates.svg
   lynkeus tune study.toml --plot tune.svg
   lynkeus export study.toml --to c -o device
+  lynkeus export model.mo --to fmu -o plant
   lynkeus report study.toml log.csv -o report.html
 
 A file called - is standard input or output.
@@ -190,10 +191,13 @@ enum Command {
         #[command(flatten)]
         limits: Limits,
     },
-    /// The estimator as source code for other machines: the observer or filter with its fixed steps
+    /// The estimator as source code for other machines, with its fixed steps; a plant for simulators
     Export {
-        /// The study (TOML; "-": standard input)
+        /// The study (TOML; "-": standard input), or a model (.mo, .jl): then the plant, with --to fmu
         study: PathBuf,
+        /// Which model, where a bare file holds several
+        #[arg(long, value_name = "NAME")]
+        model: Option<String>,
         #[command(flatten)]
         options: export::Options,
         #[command(flatten)]
@@ -348,10 +352,11 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
         }
         Command::Export {
             study,
+            model,
             options,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.for_a_proof());
+            let source = Source::load_or_bare(&study, model)?.within(limits.for_a_proof());
             export::export(&source, &options)
         }
         Command::Report {

@@ -1,19 +1,21 @@
-//! A study's estimator as a functional mock-up unit: an archive with sources, a description and, where a
-//! compiler is at hand, a library for this machine.
+//! Functional mock-up units: archives with sources, a description and, where a compiler is at hand, a
+//! library for this machine. Here those of estimators.
 
 mod archive;
+pub(crate) mod equations;
 mod library;
 
 use std::collections::BTreeSet;
 
 use lynkeus_export::Refusal;
-use lynkeus_export::curly::c::Precision;
+use lynkeus_export::curly::c::{File, Precision};
 use lynkeus_export::curly::fmu::{self, Base, Component, Quantity, Unit, Version};
 use lynkeus_export::curly::{Device, Entry};
 use lynkeus_model::{BaseUnit, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::Blueprint;
 
+use crate::Study;
 use crate::export::{Artifact, typical};
 use crate::prepare::Prepared;
 
@@ -37,21 +39,31 @@ pub(crate) fn archive(
 ) -> Result<Artifact, Refusal> {
     let described = Described::of(made);
     let component = described.component(made);
-    let identifier = component.identifier();
-    let files = fmu::files(&component, version, precision)?.into_iter();
+    let files = fmu::files(&component, version, precision)?;
+    Ok(packed(&component.identifier(), files, version, notes))
+}
+
+/// The archive of these texts with the library that the system's C compiler makes of them.
+fn packed(
+    identifier: &str,
+    files: Vec<File>,
+    version: Version,
+    notes: &mut Vec<String>,
+) -> Artifact {
     let mut entries: Vec<(String, Vec<u8>)> = files
+        .into_iter()
         .map(|file| (file.name, file.text.into_bytes()))
         .collect();
-    match library::compile(&identifier, &entries) {
-        Ok(library) => entries.push((library::place(&identifier, version), library)),
+    match library::compile(identifier, &entries) {
+        Ok(library) => entries.push((library::place(identifier, version), library)),
         Err(why) => notes.push(format!(
             "sources only, which not every tool takes: {why}. Where there is a C compiler, export again"
         )),
     }
-    Ok(Artifact {
+    Artifact {
         name: format!("{identifier}.fmu"),
         bytes: archive::stored(&entries),
-    })
+    }
 }
 
 /// What the description says of the variables.
@@ -93,10 +105,7 @@ impl Described {
         let mut taken: BTreeSet<String> = ["time".to_owned()].into();
         taken.extend(signals.iter().chain(&estimates).map(|q| q.name.clone()));
         let starts = starts(made).into_iter().map(|(state, start)| {
-            let mut name = format!("{state}_start");
-            while !taken.insert(name.clone()) {
-                name.push('_');
-            }
+            let name = free(&mut taken, format!("{state}_start"));
             let told = known(&state);
             Quantity {
                 description: format!("where the estimator begins with {state}"),
@@ -104,18 +113,12 @@ impl Described {
             }
         });
         let starts: Vec<Quantity> = starts.collect();
-        let named = signals.iter().chain(&estimates).chain(&starts);
-        let named: BTreeSet<&String> = named.filter_map(|q| q.unit.as_ref()).collect();
-        let unit = made.prepared.study().time_unit.as_deref();
         Self {
-            units: named.into_iter().map(|name| unit_of(name)).collect(),
+            units: units(signals.iter().chain(&estimates).chain(&starts)),
             signals,
             estimates,
             starts,
-            time: unit.map_or_else(
-                || "in the model's unit of time".to_owned(),
-                |unit| format!("in {unit}"),
-            ),
+            time: time(made.prepared.study()),
         }
     }
 
@@ -179,9 +182,31 @@ fn quantity(name: String, variable: Option<&Variable>, start: f64) -> Quantity {
         unit: variable
             .and_then(|v| v.unit.clone())
             .filter(|u| !u.trim().is_empty()),
-        is_difference: false,
         start,
+        ..Quantity::default()
     }
+}
+
+/// A name that no other variable has.
+fn free(taken: &mut BTreeSet<String>, mut name: String) -> String {
+    while !taken.insert(name.clone()) {
+        name.push('_');
+    }
+    name
+}
+
+/// What time is counted in, in words.
+fn time(study: &Study) -> String {
+    study.time_unit.as_ref().map_or_else(
+        || "in the model's unit of time".to_owned(),
+        |unit| format!("in {unit}"),
+    )
+}
+
+/// Every unit that is named, once.
+fn units<'q>(quantities: impl Iterator<Item = &'q Quantity>) -> Vec<Unit> {
+    let named: BTreeSet<&String> = quantities.filter_map(|q| q.unit.as_ref()).collect();
+    named.into_iter().map(|name| unit_of(name)).collect()
 }
 
 fn unit_of(name: &str) -> Unit {

@@ -1,20 +1,3 @@
-#include "@NAME@.h"
-
-#include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#if defined(_WIN32)
-#define API __declspec(dllexport)
-#elif defined(__GNUC__)
-#define API __attribute__((visibility("default")))
-#else
-#define API
-#endif
-
 /* Value references: time, the signals, the estimates, the starts. */
 enum {
     SIGNALS = @CAPITALS@_SIGNALS,
@@ -26,11 +9,6 @@ enum {
     FIRST_START = FIRST_ESTIMATE + ESTIMATES,
     VALUES = FIRST_START + STARTS
 };
-
-/* What can go wrong besides the codes of @NAME@.h, which are above 0. */
-enum { NO_VALUE = -1, NOT_SETTABLE = -2, NOT_NOW = -3, NO_MEMORY = -4 };
-
-static const char token[] = "@TOKEN@";
 
 /* Before inputs are given. */
 static const @REAL@ first_signals[SIGNALS] = {@FIRST_SIGNALS@};
@@ -146,36 +124,4 @@ static int write_value(course *c, uint32_t reference, double value)
     }
     c->is_settled = 0;
     return 0;
-}
-
-/* A copy on the heap, into *kept where that is one already. */
-static int keep(const course *c, void **kept)
-{
-    if (*kept == NULL) {
-        *kept = malloc(sizeof *c);
-    }
-    if (*kept == NULL) {
-        return NO_MEMORY;
-    }
-    memcpy(*kept, c, sizeof *c);
-    return 0;
-}
-
-static int is_ours(const char *given)
-{
-    return given != NULL && strcmp(given, token) == 0;
-}
-
-static const char *reason(int code)
-{
-    switch (code) {
-@REASONS@    case NO_VALUE:
-        return "there is no variable of this type with such a value reference";
-    case NOT_SETTABLE:
-        return "only inputs and start values can be set";
-    case NOT_NOW:
-        return "this cannot be done in the present mode";
-    default:
-        return "there is not enough memory";
-    }
 }

@@ -22,13 +22,20 @@ typedef struct {
 
 static fmi2Status told(component *m, int code)
 {
+//? exchange
+    /* a shorter step may stay where the equations have values */
+    const fmi2Status status = code == @CAPITALS@_NOT_FINITE ? fmi2Discard : fmi2Error;
+//?
+//? !exchange
+    const fmi2Status status = fmi2Error;
+//?
     if (code == 0) {
         return fmi2OK;
     }
     if (m->calls != NULL && m->calls->log != NULL) {
-        m->calls->log(m->calls->environment, "@NAME@", fmi2Error, "logStatusError", "%s", reason(code));
+        m->calls->log(m->calls->environment, "@NAME@", status, "logStatusError", "%s", reason(code));
     }
-    return fmi2Error;
+    return status;
 }
 
 API const char *fmi2GetTypesPlatform(void)
@@ -53,11 +60,17 @@ API void *fmi2Instantiate(
 {
     component *m = NULL;
     (void)name, (void)resources, (void)visible, (void)logging;
-    if (type != fmi2CoSimulation || !is_ours(given)) {
+//? exchange
+    const int is_offered = type == fmi2CoSimulation || type == fmi2ModelExchange;
+    const char *const expected = "expected the GUID of this FMU";
+//?
+//? !exchange
+    const int is_offered = type == fmi2CoSimulation;
+    const char *const expected = "expected co-simulation, and the GUID of this FMU";
+//?
+    if (!is_offered || !is_ours(given)) {
         if (calls != NULL && calls->log != NULL) {
-            calls->log(
-                calls->environment, "@NAME@", fmi2Error, "logStatusError",
-                "expected co-simulation, and the GUID of this FMU");
+            calls->log(calls->environment, "@NAME@", fmi2Error, "logStatusError", "%s", expected);
         }
         return NULL;
     }
@@ -243,14 +256,6 @@ API fmi2Status fmi2CancelStep(void *instance)
     return told(instance, NOT_NOW);
 }
 
-API fmi2Status fmi2GetDirectionalDerivative(
-    void *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
-    const double *seed, double *result)
-{
-    (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)result;
-    return told(instance, NOT_NOW);
-}
-
 API fmi2Status fmi2SetRealInputDerivatives(
     void *instance, const unsigned *references, size_t count, const int *orders, const double *values)
 {
@@ -264,3 +269,13 @@ API fmi2Status fmi2GetRealOutputDerivatives(
     (void)references, (void)orders, (void)values;
     return absent(instance, count);
 }
+//? !exchange
+
+API fmi2Status fmi2GetDirectionalDerivative(
+    void *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
+    const double *seed, double *result)
+{
+    (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)result;
+    return told(instance, NOT_NOW);
+}
+//?

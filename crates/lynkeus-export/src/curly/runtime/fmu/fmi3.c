@@ -12,13 +12,20 @@ typedef struct {
 
 static fmi3Status told(component *m, int code)
 {
+//? exchange
+    /* a shorter step may stay where the equations have values */
+    const fmi3Status status = code == @CAPITALS@_NOT_FINITE ? fmi3Discard : fmi3Error;
+//?
+//? !exchange
+    const fmi3Status status = fmi3Error;
+//?
     if (code == 0) {
         return fmi3OK;
     }
     if (m->log != NULL) {
-        m->log(m->environment, fmi3Error, "logStatusError", reason(code));
+        m->log(m->environment, status, "logStatusError", reason(code));
     }
-    return fmi3Error;
+    return status;
 }
 
 API const char *fmi3GetVersion(void)
@@ -32,13 +39,9 @@ API fmi3Status fmi3SetDebugLogging(void *instance, bool on, size_t count, const 
     return fmi3OK;
 }
 
-API void *fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, bool events,
-    bool early, const uint32_t *required, size_t count, void *environment, logger log, void (*update)(void))
+static void *made(fmi3String given, void *environment, logger log)
 {
     component *m = NULL;
-    (void)name, (void)resources, (void)visible, (void)logging, (void)events, (void)early;
-    (void)required, (void)count, (void)update;
     if (!is_ours(given)) {
         if (log != NULL) {
             log(environment, fmi3Error, "logStatusError", "the instantiation token is that of another FMU");
@@ -54,12 +57,27 @@ API void *fmi3InstantiateCoSimulation(
     return m;
 }
 
+API void *fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, bool events,
+    bool early, const uint32_t *required, size_t count, void *environment, logger log, void (*update)(void))
+{
+    (void)name, (void)resources, (void)visible, (void)logging, (void)events, (void)early;
+    (void)required, (void)count, (void)update;
+    return made(given, environment, log);
+}
+
 API void *fmi3InstantiateModelExchange(
     fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, void *environment,
     logger log)
 {
-    (void)name, (void)given, (void)resources, (void)visible, (void)logging, (void)environment, (void)log;
+    (void)name, (void)resources, (void)visible, (void)logging;
+//? exchange
+    return made(given, environment, log);
+//?
+//? !exchange
+    (void)given, (void)environment, (void)log;
     return NULL;
+//?
 }
 
 API void *fmi3InstantiateScheduledExecution(

@@ -102,7 +102,9 @@ API fmi3Status fmi3GetVariableDependencies(
         return told(instance, NOT_NOW);                                                                  \
     }
 
+//? !exchange
 NO_DERIVATIVES(Directional)
+//?
 NO_DERIVATIVES(Adjoint)
 
 API fmi3Status fmi3GetOutputDerivatives(
@@ -123,7 +125,15 @@ API fmi3Status fmi3ExitConfigurationMode(void *instance)
     return told(instance, NOT_NOW);
 }
 
-/* Of model exchange and scheduled execution; some tools look for these functions in every FMU. */
+/* Of scheduled execution; some tools look for such functions in every FMU. */
+API fmi3Status fmi3ActivateModelPartition(void *instance, uint32_t clock, double time)
+{
+    (void)clock, (void)time;
+    return told(instance, NOT_NOW);
+}
+//? !exchange
+
+/* Of model exchange. */
 API fmi3Status fmi3EnterContinuousTimeMode(void *instance)
 {
     return told(instance, NOT_NOW);
@@ -169,9 +179,4 @@ NO_STATES(EventIndicators)
 
 NO_NUMBER(ContinuousStates)
 NO_NUMBER(EventIndicators)
-
-API fmi3Status fmi3ActivateModelPartition(void *instance, uint32_t clock, double time)
-{
-    (void)clock, (void)time;
-    return told(instance, NOT_NOW);
-}
+//?

@@ -1,0 +1,181 @@
+/* Value references: time, the inputs, the states, their derivatives, the outputs. */
+enum {
+    INPUTS = @CAPITALS@_INPUTS,
+    STATES = @CAPITALS@_STATES,
+    OUTPUTS = @CAPITALS@_OUTPUTS,
+    FIRST_INPUT = 1,
+    FIRST_STATE = FIRST_INPUT + INPUTS,
+    FIRST_DERIVATIVE = FIRST_STATE + STATES,
+    FIRST_OUTPUT = FIRST_DERIVATIVE + STATES,
+    VALUES = FIRST_OUTPUT + OUTPUTS
+};
+
+/* C has no array without entries: where there may be none, there is room for one more. */
+static const double first_inputs[INPUTS + 1] = {@FIRST_INPUTS@};
+static const double nominals[STATES] = {@NOMINALS@};
+
+/* All that changes: a copy is a state of the FMU. */
+typedef struct {
+    double time;
+    double inputs[INPUTS + 1];
+    double states[STATES];
+    double derivatives[STATES];
+    double outputs[OUTPUTS + 1];
+    int is_settled; /* whether derivatives and outputs are those of the values above */
+    int is_running; /* whether initialization is over */
+} course;
+
+static void begin(course *c)
+{
+    memset(c, 0, sizeof *c);
+    @NAME@_init(c->states);
+    for (int i = 0; i < INPUTS; i++) {
+        c->inputs[i] = first_inputs[i];
+    }
+}
+
+static void settle(course *c)
+{
+    if (!c->is_settled) {
+        @NAME@_derivatives(c->time, c->states, c->inputs, c->derivatives);
+        @NAME@_outputs(c->time, c->states, c->inputs, c->outputs);
+        c->is_settled = 1;
+    }
+}
+
+/* Goes on under the inputs as they are. */
+static int step(course *c, double from, double to)
+{
+    int code = 0;
+    if (!c->is_running) {
+        return NOT_NOW;
+    }
+    code = @NAME@_advance(from, to, c->inputs, c->states);
+    if (code == 0) {
+        c->time = to;
+        c->is_settled = 0;
+    }
+    return code;
+}
+
+static int read_value(course *c, uint32_t reference, double *value)
+{
+    if (reference >= VALUES) {
+        return NO_VALUE;
+    }
+    if (reference >= FIRST_DERIVATIVE) {
+        settle(c);
+        *value = reference >= FIRST_OUTPUT ? c->outputs[reference - FIRST_OUTPUT]
+                                           : c->derivatives[reference - FIRST_DERIVATIVE];
+        return isfinite(*value) ? 0 : @CAPITALS@_NOT_FINITE;
+    }
+    if (reference >= FIRST_STATE) {
+        *value = c->states[reference - FIRST_STATE];
+    } else if (reference >= FIRST_INPUT) {
+        *value = c->inputs[reference - FIRST_INPUT];
+    } else {
+        *value = c->time;
+    }
+    return 0;
+}
+
+static int write_value(course *c, uint32_t reference, double value)
+{
+    if (reference >= VALUES) {
+        return NO_VALUE;
+    }
+    if (reference >= FIRST_INPUT && reference < FIRST_STATE) {
+        c->inputs[reference - FIRST_INPUT] = value;
+    } else if (reference >= FIRST_STATE && reference < FIRST_DERIVATIVE) {
+        if (c->is_running) {
+            return NOT_NOW;
+        }
+        c->states[reference - FIRST_STATE] = value;
+    } else {
+        return NOT_SETTABLE;
+    }
+    c->is_settled = 0;
+    return 0;
+}
+
+/* Model exchange: the states are the tool's. */
+static int read_states(course *c, double *values, size_t count)
+{
+    for (size_t i = 0; i < count && count == STATES; i++) {
+        values[i] = c->states[i];
+    }
+    return count == STATES ? 0 : NO_VALUE;
+}
+
+static int write_states(course *c, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count && count == STATES; i++) {
+        c->states[i] = values[i];
+    }
+    c->is_settled = 0;
+    return count == STATES ? 0 : NO_VALUE;
+}
+
+static int read_derivatives(course *c, double *values, size_t count)
+{
+    int code = count == STATES ? 0 : NO_VALUE;
+    for (size_t i = 0; i < count && code == 0; i++) {
+        code = read_value(c, (uint32_t)(FIRST_DERIVATIVE + i), &values[i]);
+    }
+    return code;
+}
+
+static int read_nominals(double *values, size_t count)
+{
+    for (size_t i = 0; i < count && count == STATES; i++) {
+        values[i] = nominals[i];
+    }
+    return count == STATES ? 0 : NO_VALUE;
+}
+
+static void set_time(course *c, double time)
+{
+    c->time = time;
+    c->is_settled = 0;
+}
+
+/* The Jacobian of the unknowns by the knowns, times the seed. */
+static int directional(
+    const course *c, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
+    const double *seed, double *result)
+{
+    /* of time, the states, the inputs */
+    double direction[1 + STATES + INPUTS] = {0.0};
+    double derivatives[STATES];
+    double outputs[OUTPUTS + 1];
+    for (size_t i = 0; i < known_count; i++) {
+        const uint32_t known = knowns[i];
+        if (known >= FIRST_DERIVATIVE) {
+            return NO_VALUE;
+        } else if (known >= FIRST_STATE) {
+            direction[1 + known - FIRST_STATE] = seed[i];
+        } else if (known >= FIRST_INPUT) {
+            direction[1 + STATES + known - FIRST_INPUT] = seed[i];
+        } else {
+            direction[0] = seed[i];
+        }
+    }
+    @NAME@_along(c->time, c->states, c->inputs, direction, derivatives, outputs);
+    for (size_t i = 0; i < unknown_count; i++) {
+        const uint32_t unknown = unknowns[i];
+        if (unknown < FIRST_STATE || unknown >= VALUES) {
+            return NO_VALUE;
+        } else if (unknown >= FIRST_OUTPUT) {
+            result[i] = outputs[unknown - FIRST_OUTPUT];
+        } else if (unknown >= FIRST_DERIVATIVE) {
+            result[i] = derivatives[unknown - FIRST_DERIVATIVE];
+        } else {
+            result[i] = direction[1 + unknown - FIRST_STATE];
+        }
+        if (!isfinite(result[i])) {
+            return @CAPITALS@_NOT_FINITE;
+        }
+    }
+    return 0;
+}
+
