@@ -112,6 +112,12 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let design = prepared.design()?;
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
+    if made.flow().has_instants() {
+        notes.push(
+            "the model bends with time alone (max, min, abs of time): `estimate` stops at these instants, here a step goes across them"
+                .to_owned(),
+        );
+    }
     let about = about(study, &made);
     let files = printed(&prepared, &design, &made, &about, |device| {
         let files = match options.to {
@@ -223,6 +229,10 @@ pub(crate) fn stepped(
             .at(&prepared.study().file)
             .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
     };
+    if needed.is_infinite() {
+        // nothing moves by itself: any step is short enough
+        return Ok(made.with_method(Method::Rk4(Step::Substeps(1))));
+    }
     let step = rounded(needed);
     notes.push(format!(
         "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; `export` takes another as --step",

@@ -2,6 +2,7 @@
 
 use lynkeus_expr::{Binary, Unary};
 
+use super::language::FUNCTIONS;
 use crate::{Binding, Dialect, Form, Text};
 
 /// C in which the type of numbers is `real` and their literals are `R(…)`.
@@ -11,13 +12,9 @@ pub(super) struct Draft;
 /// Words of C99 and JavaScript, of their headers, and of the runtime.
 const RESERVED: &[&str] = &[
     "abs",
-    "acos",
     "arguments",
     "as",
-    "asin",
     "async",
-    "atan",
-    "atan2",
     "auto",
     "await",
     "began",
@@ -26,14 +23,11 @@ const RESERVED: &[&str] = &[
     "c",
     "case",
     "catch",
-    "ceil",
     "char",
     "class",
     "complex",
     "const",
     "continue",
-    "cos",
-    "cosh",
     "count",
     "debugger",
     "default",
@@ -45,18 +39,15 @@ const RESERVED: &[&str] = &[
     "else",
     "enum",
     "eval",
-    "exp",
     "export",
     "extends",
     "extern",
-    "fabs",
     "false",
     "field",
     "finally",
     "float",
-    "floor",
+    "Float64Array",
     "for",
-    "frexp",
     "function",
     "goto",
     "h",
@@ -64,6 +55,7 @@ const RESERVED: &[&str] = &[
     "implements",
     "import",
     "in",
+    "Infinity",
     "inline",
     "instanceof",
     "int",
@@ -72,16 +64,17 @@ const RESERVED: &[&str] = &[
     "isfinite",
     "isnan",
     "larger",
-    "ldexp",
     "let",
-    "log",
+    "linux",
     "long",
+    "Math",
     "math",
     "memcpy",
+    "NaN",
     "new",
     "null",
+    "Number",
     "package",
-    "pow",
     "private",
     "protected",
     "public",
@@ -93,21 +86,16 @@ const RESERVED: &[&str] = &[
     "sign",
     "signbit",
     "signed",
-    "sin",
-    "sinh",
     "sizeof",
     "slopes",
     "smaller",
     "solve",
-    "sqrt",
     "square",
     "static",
     "struct",
     "super",
     "switch",
     "t",
-    "tan",
-    "tanh",
     "this",
     "throw",
     "true",
@@ -117,6 +105,7 @@ const RESERVED: &[&str] = &[
     "typeof",
     "undefined",
     "union",
+    "unix",
     "unsigned",
     "var",
     "void",
@@ -176,7 +165,15 @@ impl Dialect for Draft {
     }
 
     fn is_reserved(&self, word: &str) -> bool {
-        RESERVED.contains(&word) || SIZES.contains(&word) || word.ends_with("_matrix")
+        let is_listed = |word: &str| RESERVED.contains(&word) || FUNCTIONS.contains(&word);
+        // math.h defines constants in capitals; each of its functions has a sibling for `float`
+        is_listed(word)
+            || word.strip_suffix('f').is_some_and(is_listed)
+            || SIZES.contains(&word)
+            || word.ends_with("_matrix")
+            || ["M_", "FP_", "HUGE_", "MATH_"]
+                .iter()
+                .any(|head| word.starts_with(head))
     }
 
     fn number(&self, value: f64) -> Text {
@@ -230,6 +227,8 @@ impl Dialect for Draft {
 
     fn power(&self, base: &Text, exponent: i32) -> Text {
         match exponent {
+            // whose magnitude is no `int`
+            i32::MIN => Text::call("pow", &[base, &self.number(f64::from(i32::MIN))]),
             2 => Text::call("square", &[base]),
             n => Text::atom(format!("integer_power({}, {n})", base.text)),
         }

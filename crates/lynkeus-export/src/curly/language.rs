@@ -1,6 +1,6 @@
 //! What the draft becomes in C.
 
-use super::template::{chosen, exchanged};
+use super::template::{chosen, exchanged, outside_comments};
 
 /// A kind of C.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,9 +12,9 @@ pub(super) enum Language {
 }
 
 /// Functions of the C library, which have an `f` at the end for `float`.
-pub(super) const FUNCTIONS: [&str; 21] = [
+pub(super) const FUNCTIONS: [&str; 19] = [
     "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fabs", "floor", "frexp", "ldexp",
-    "log", "pow", "sin", "sinh", "sqrt", "tan", "tanh", "ceil", "fmin", "fmax",
+    "log", "pow", "sin", "sinh", "sqrt", "tan", "tanh", "ceil",
 ];
 
 impl Language {
@@ -60,10 +60,11 @@ impl Language {
             let is_single = self == Self::SingleC && word != "ceil" && FUNCTIONS.contains(&word);
             is_single.then(|| format!("{word}f"))
         });
-        literals(&words, |number| match self {
+        let literal = |number: &str| match self {
             Self::SingleC => single(number),
-            _ => number.to_owned(),
-        })
+            Self::C => number.to_owned(),
+        };
+        outside_comments(&words, |code| literals(code, literal))
     }
 }
 
