@@ -81,6 +81,29 @@ pub(crate) fn plant_reading(
     settings: &SimulateSettings,
     signals: &[(String, Node)],
 ) -> Result<System, Error> {
+    let starts = starts(plant, settings)?.into_iter();
+    let states: Vec<(String, Node, f64)> = plant
+        .states
+        .iter()
+        .zip(starts)
+        .map(|(s, start)| (s.name.clone(), s.node, start))
+        .collect();
+    System::new(
+        &plant.graph,
+        plant.time,
+        &states,
+        signals,
+        &plant.derivatives,
+        &named(&plant.outputs),
+    )
+    .map_err(Error::from_source)
+}
+
+/// Start values of the plant's states, in their order: the study's, else the model's.
+///
+/// # Errors
+/// The study names a state that the plant does not have.
+pub(crate) fn starts(plant: &Plant, settings: &SimulateSettings) -> Result<Vec<f64>, Error> {
     for (name, _) in &settings.initial {
         if !plant.states.iter().any(|s| s.name == name.text) {
             return Err(name.blame(unknown(plant, "state", &plant.states, name)));
@@ -94,20 +117,7 @@ pub(crate) fn plant_reading(
         // Modelica's own default
         given.map(|(_, x)| *x).or(variable.start).unwrap_or(0.0)
     };
-    let states: Vec<(String, Node, f64)> = plant
-        .states
-        .iter()
-        .map(|s| (s.name.clone(), s.node, start(s)))
-        .collect();
-    System::new(
-        &plant.graph,
-        plant.time,
-        &states,
-        signals,
-        &plant.derivatives,
-        &named(&plant.outputs),
-    )
-    .map_err(Error::from_source)
+    Ok(plant.states.iter().map(start).collect())
 }
 
 /// Variables with the nodes that stand for them.
