@@ -101,6 +101,7 @@ mod recorded;
 mod replay;
 #[cfg(feature = "tune")]
 mod report;
+mod runner;
 mod sampled;
 pub mod series;
 mod simulate;
@@ -140,6 +141,7 @@ pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 #[cfg(feature = "tune")]
 pub use report::{Page, report};
+pub use runner::{Runner, Runners};
 pub use series::Series;
 pub use simulate::simulate;
 pub use study::{Study, schema};

@@ -38,7 +38,15 @@ pub(crate) fn simulated(
     prepared: &Prepared<'_>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let rig = Rig::new(prepared)?;
+    of_rig(prepared, Rig::new(prepared)?, watch)
+}
+
+/// The same of a plant with its observer.
+pub(crate) fn of_rig(
+    prepared: &Prepared<'_>,
+    rig: Rig,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
     let Ran { run, course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
     outcome(prepared, rig.design, &run, course)
 }
@@ -82,6 +90,27 @@ impl Rig {
             spread: Spread::new(plant, settings)?,
             simulation,
             design,
+        })
+    }
+
+    /// The same for a study with another noise, other starts or another `spread`; `plant` is this
+    /// rig's.
+    ///
+    /// # Errors
+    /// Names that the plant does not have.
+    pub fn redrawn(self, study: &Study, plant: &Plant) -> Result<Self, Error> {
+        let settings = settings(study)?;
+        let start = systems::starts(plant, &settings.initial)?;
+        let system = self.simulation.plant.with_start(start);
+        let simulation = Simulation {
+            plant: system.map_err(Error::from_source)?,
+            noise: noise(study, settings, plant)?,
+            ..self.simulation
+        };
+        Ok(Self {
+            spread: Spread::new(plant, settings)?,
+            simulation,
+            design: self.design,
         })
     }
 
