@@ -11,6 +11,8 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
 use lynkeus_structure::short;
 
+#[cfg(feature = "tune")]
+use crate::ReportOptions;
 use crate::estimate::at_readings;
 use crate::headers::Headers;
 use crate::live::blueprint;
@@ -119,7 +121,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
 #[cfg(feature = "tune")]
 fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let page = crate::report::page(study, None, step, watch)?;
+    let page = crate::report::report(study, None, &ReportOptions { step }, watch)?;
     Ok(Export {
         files: vec![Artifact {
             name: page.name,
@@ -189,11 +191,7 @@ pub(crate) fn stepped(
     step: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Blueprint, Error> {
-    if let Some(step) = step {
-        if !(step > 0.0 && step.is_finite()) {
-            let message = format!("--step: expected a finite number above 0, found {step}");
-            return Err(Error::input(message));
-        }
+    if let Some(step) = sound(step)? {
         return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
     }
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
@@ -209,10 +207,23 @@ pub(crate) fn stepped(
     };
     let step = rounded(needed);
     notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; `export` takes another as --step",
+        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; --step takes another",
         short(step)
     ));
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
+}
+
+/// A step that is asked for.
+///
+/// # Errors
+/// It is none.
+pub(crate) fn sound(step: Option<f64>) -> Result<Option<f64>, Error> {
+    match step {
+        Some(step) if !(step > 0.0 && step.is_finite()) => Err(Error::input(format!(
+            "--step: expected a finite number above 0, found {step}"
+        ))),
+        step => Ok(step),
+    }
 }
 
 /// A value that an input may have.

@@ -138,7 +138,7 @@ pub use precision::precision;
 pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 #[cfg(feature = "tune")]
-pub use report::{Page, report};
+pub use report::{Page, ReportOptions, report};
 pub use series::Series;
 pub use simulate::simulate;
 pub use study::{Study, schema};
