@@ -4,7 +4,7 @@ use lynkeus_run::{Method, Step, step_of};
 use lynkeus_structure::short;
 
 use crate::export::{
-    Export, ExportOptions, Subject, Target, asked, designed, origin, rounded, steps,
+    Export, ExportOptions, Subject, Target, designed, origin, rounded, sound, steps,
 };
 use crate::fmu::equations::Equations;
 use crate::prepare::{self, Prepared};
@@ -50,8 +50,8 @@ pub(crate) fn export(
         }
     };
     let mut notes = vec![];
-    let method = match options.step {
-        Some(step) => asked(step)?,
+    let method = match sound(options.step)? {
+        Some(step) => Method::Rk4(Step::AtMost(step)),
         None => stepped(study, &equations, settings, &mut notes)?,
     };
     let about = about(study, subject, &plant.name, method);

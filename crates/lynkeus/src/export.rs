@@ -11,6 +11,8 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
 use lynkeus_structure::short;
 
+#[cfg(feature = "tune")]
+use crate::ReportOptions;
 use crate::estimate::at_readings;
 use crate::headers::Headers;
 use crate::live::blueprint;
@@ -145,7 +147,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
 #[cfg(feature = "tune")]
 fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let page = crate::report::page(study, None, step, watch)?;
+    let page = crate::report::report(study, None, &ReportOptions { step }, watch)?;
     Ok(Export {
         files: vec![Artifact {
             name: page.name,
@@ -215,8 +217,8 @@ pub(crate) fn stepped(
     step: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Blueprint, Error> {
-    if let Some(step) = step {
-        return Ok(made.with_method(asked(step)?));
+    if let Some(step) = sound(step)? {
+        return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
     }
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
         return Ok(made);
@@ -230,24 +232,27 @@ pub(crate) fn stepped(
             .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
     };
     if needed.is_infinite() {
-        // nothing moves by itself: any step is short enough
+        notes.push("one step from each sample to the next: at the start nothing moves by itself; --step takes a longest step".to_owned());
         return Ok(made.with_method(Method::Rk4(Step::Substeps(1))));
     }
     let step = rounded(needed);
     notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; `export` takes another as --step",
+        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; --step takes another",
         short(step)
     ));
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
 }
 
-/// The steps of an option.
-pub(crate) fn asked(step: f64) -> Result<Method, Error> {
-    match step > 0.0 && step.is_finite() {
-        true => Ok(Method::Rk4(Step::AtMost(step))),
-        false => Err(Error::input(format!(
+/// A step that is asked for.
+///
+/// # Errors
+/// It is none.
+pub(crate) fn sound(step: Option<f64>) -> Result<Option<f64>, Error> {
+    match step {
+        Some(step) if !(step > 0.0 && step.is_finite()) => Err(Error::input(format!(
             "--step: expected a finite number above 0, found {step}"
         ))),
+        step => Ok(step),
     }
 }
 

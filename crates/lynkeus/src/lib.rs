@@ -140,7 +140,7 @@ pub use precision::precision;
 pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 #[cfg(feature = "tune")]
-pub use report::{Page, report};
+pub use report::{Page, ReportOptions, report};
 pub use runner::{Runner, Runners};
 pub use series::Series;
 pub use simulate::simulate;
