@@ -3,7 +3,8 @@
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
 use crate::{
-    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
+    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,
+    spectral_radius,
 };
 
 /// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
@@ -69,14 +70,19 @@ impl Blueprint {
 /// equations have no slopes there.
 #[must_use]
 pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
-    let system: &System = match blueprint {
-        Blueprint::Sampled { observer, .. } => &observer.system,
-        Blueprint::Filter { model, .. } => model.flow(),
+    let (system, tuned): (&System, Option<&Tuned>) = match blueprint {
+        Blueprint::Sampled { observer, .. } => (&observer.system, observer.tuned.as_ref()),
+        Blueprint::Filter { model, .. } => (model.flow(), None),
     };
     let mut evaluation = system.evaluation();
     for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
         let given = inputs.iter().find(|(input, _)| input == name);
         *signal = given.map_or(0.0, |(_, value)| *value);
+    }
+    let tuned = tuned.map(Tuned::signals).unwrap_or_default();
+    let signals = evaluation.signals_mut().iter_mut();
+    for (signal, value) in signals.rev().zip(tuned.into_iter().rev()) {
+        *signal = value;
     }
     evaluation.enter(0.0);
     let needed = AUTO_PRODUCT / spectral_radius(&mut evaluation, 0.0, system.start());
