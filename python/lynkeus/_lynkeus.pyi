@@ -92,6 +92,7 @@ class Study:
         precision: str,
         fmi: str,
         step: float | None = None,
+        tunable: bool = False,
         time_limit: float | None = None,
         memory_limit: float = ...,
     ) -> tuple[list[tuple[str, bytes]], list[str]]: ...

@@ -262,7 +262,7 @@ impl Study {
     }
 
     /// Names and contents of files, and what the user should know.
-    #[pyo3(signature = (to, precision, fmi, step=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (to, precision, fmi, step=None, tunable=false, time_limit=None, memory_limit=MEMORY))]
     #[allow(
         clippy::too_many_arguments,
         reason = "the options of a call from Python"
@@ -274,6 +274,7 @@ impl Study {
         precision: &str,
         fmi: &str,
         step: Option<f64>,
+        tunable: bool,
         time_limit: Option<f64>,
         memory_limit: f64,
     ) -> PyResult<(Vec<Written<'py>>, Vec<String>)> {
@@ -285,6 +286,7 @@ impl Study {
                 other => return Err(unknown("precision", "\"f64\" or \"f32\"", other)),
             },
             step,
+            tunable,
         };
         let terms = Terms::new(None, time_limit, memory_limit);
         let made = self.ask(py, &terms, |study, _| lynkeus::export(study, &options))?;

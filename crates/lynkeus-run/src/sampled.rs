@@ -81,7 +81,10 @@ impl Sampled {
         let tuned = tuned.as_ref().map(Tuned::signals).unwrap_or_default();
         for (what, found) in [
             ("states", system.states().len()),
-            ("signals", system.signals().len().saturating_sub(tuned.len())),
+            (
+                "signals",
+                system.signals().len().saturating_sub(tuned.len()),
+            ),
             ("outputs", system.outputs().len()),
         ] {
             if found < count {
@@ -252,6 +255,56 @@ mod tests {
             errors: None,
             tuned: None,
         }
+    }
+
+    /// The gain 2 as the square of a number.
+    fn tuned(value: f64) -> SampledObserver {
+        let g = Graph::new();
+        let [time, x, w, s, k, root] = ["time", "x", "w", "s", "k", "root"].map(|n| g.symbol(n));
+        let plain = observer(true);
+        let states = [("x", x, 3.0), ("w", w, 0.0)];
+        let states = states.map(|(name, symbol, start)| (name.to_string(), symbol.node(), start));
+        let derivatives = [(-x + (w - x) * k).node(), (s * -x).node()];
+        let outputs = ["x_hat", "y"].map(|name| (name.to_string(), x.node()));
+        let signals = [("s".to_string(), s.node()), ("k".to_string(), k.node())];
+        let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
+        let made = [("k".to_string(), root.powi(2).node())];
+        let number = [("root".to_string(), root.node())];
+        let gains = System::new(&g, time.node(), &[], &number, &[], &made).unwrap();
+        SampledObserver {
+            system: system.unwrap(),
+            tuned: Some(Tuned {
+                system: gains,
+                values: vec![value],
+            }),
+            ..plain
+        }
+    }
+
+    #[test]
+    fn numbers_stand_where_constants_stood() {
+        let fixed = observer(true);
+        let tuned = tuned(2.0_f64.sqrt());
+        let mut pair = [&fixed, &tuned].map(|o| Estimator::sampled(o, method()).unwrap());
+        assert_eq!(pair[0].signals(), pair[1].signals());
+        for k in 0..10 {
+            let [a, b] = &mut pair;
+            let t = f64::from(k);
+            let (a, b) = (a.push(t, &[1.0]).unwrap()[0], b.push(t, &[1.0]).unwrap()[0]);
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+        // a snapshot is of these numbers
+        let other = self::tuned(3.0);
+        let mut other = Estimator::sampled(&other, method()).unwrap();
+        assert!(other.restore(&pair[1].snapshot()).is_err());
+        let step = |observer: &SampledObserver| {
+            let blueprint = crate::Blueprint::Sampled {
+                observer: Box::new(observer.clone()),
+                method: method(),
+            };
+            crate::needed_step(&blueprint, &[]).unwrap()
+        };
+        assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }
 
     fn method() -> Method {

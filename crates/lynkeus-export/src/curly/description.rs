@@ -14,7 +14,11 @@ enum Role {
     Signal,
     Estimate,
     Start,
+    Tunable,
 }
+
+/// A number above 0 in either type of numbers.
+const LEAST: f64 = f32::MIN_POSITIVE as f64;
 
 /// `modelDescription.xml`.
 pub(super) fn description(component: &Component<'_>, version: Version, token: &str) -> String {
@@ -67,6 +71,7 @@ fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<
     all.extend(of(component.signals, Role::Signal));
     all.extend(of(component.estimates, Role::Estimate));
     all.extend(of(component.starts, Role::Start));
+    all.extend(of(component.tunables, Role::Tunable));
     all
 }
 
@@ -125,7 +130,7 @@ impl Variable<'_> {
             Role::Time => "independent",
             Role::Signal => "input",
             Role::Estimate => "output",
-            Role::Start => "parameter",
+            Role::Start | Role::Tunable => "parameter",
         }
     }
 
@@ -135,6 +140,7 @@ impl Variable<'_> {
             // a sample, which nobody should draw lines between
             Role::Signal => "discrete",
             Role::Start => "fixed",
+            Role::Tunable => "tunable",
         }
     }
 
@@ -160,6 +166,10 @@ impl Variable<'_> {
     fn start(&self) -> String {
         match self.role {
             Role::Signal | Role::Start => format!(" start=\"{}\"", number(self.quantity.start)),
+            Role::Tunable => format!(
+                " min=\"{LEAST:?}\" start=\"{}\"",
+                number(self.quantity.start)
+            ),
             Role::Time | Role::Estimate => String::new(),
         }
     }

@@ -1,9 +1,10 @@
 //! Functional mock-up units: the files of the archive, of which the C is [`c`]'s.
 
-use super::c::{self, CODES, File, Precision, prefix};
+use super::c::{self, File, Precision, codes, prefix};
 use super::description::{build, description, page};
 use super::device::Device;
 use super::function::comment;
+use super::template::chosen;
 use crate::Refusal;
 
 const CORE: &str = include_str!("runtime/fmu/core.c");
@@ -67,6 +68,8 @@ pub struct Component<'a> {
     pub estimates: &'a [Quantity],
     /// the starts of its first states, in their order
     pub starts: &'a [Quantity],
+    /// the numbers that may be changed while it runs, in the order of the device
+    pub tunables: &'a [Quantity],
     /// every unit that a quantity names, once
     pub units: &'a [Unit],
     /// what time is counted in, in words
@@ -149,7 +152,7 @@ fn wrapper(
         },
         _ => "NAN".to_owned(),
     });
-    let reasons = CODES.iter().enumerate().map(|(k, (_, about))| {
+    let reasons = codes(component.device).enumerate().map(|(k, (_, about))| {
         let about = comment(about);
         format!("    case {}:\n        return \"{about}\";\n", k + 1)
     });
@@ -161,6 +164,11 @@ fn wrapper(
         "/* {}: {name} as a functional mock-up unit. */\n",
         version.wrapper()
     );
+    let holds: &[&str] = match component.tunables {
+        [] => &[],
+        _ => &["tunable"],
+    };
+    let core = chosen(CORE, holds);
     let values = [
         ("@NAME@", name.clone()),
         ("@CAPITALS@", name.to_ascii_uppercase()),
@@ -172,7 +180,7 @@ fn wrapper(
         ("@REASONS@", reasons.collect()),
     ];
     values.iter().fold(
-        format!("{title}{CORE}\n{edition}"),
+        format!("{title}{core}\n{edition}"),
         |text, (word, value)| text.replace(word, value),
     )
 }

@@ -18,7 +18,8 @@ mod machine;
 mod observer;
 mod tables;
 mod template;
+mod tuning;
 
-pub use device::{Device, FirstReading};
+pub use device::{Device, FirstReading, Tunable};
 pub use function::Entry;
 pub use language::Language;

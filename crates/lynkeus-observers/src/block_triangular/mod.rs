@@ -128,7 +128,13 @@ fn observer(
         };
         let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
         let steady: Vec<(f64, f64)> = K[*output].iter().enumerate().map(power).collect();
-        let timed = transient::gains(transient.as_ref(), &copy, *output, &speeds[*output], &steady);
+        let timed = transient::gains(
+            transient.as_ref(),
+            &copy,
+            *output,
+            &speeds[*output],
+            &steady,
+        );
         let gain = match correction {
             Correction::Classical => timed,
             Correction::Lee => lee(extended, chain, &timed),

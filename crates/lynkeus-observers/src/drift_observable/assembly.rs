@@ -94,9 +94,9 @@ struct Filters {
 
 /// What the factor on the poles does.
 fn scale_of_poles(gains: &Gains) -> String {
-    let follows = gains.filter_follows.iter().zip(&gains.K2);
-    let (mut follows, what) = (follows, "multiplies the poles of the observer");
-    match follows.any(|(follows, K2)| *follows && !K2.is_empty()) {
+    let what = "multiplies the poles of the observer";
+    let mut filters = gains.filter_follows.iter().zip(&gains.K2);
+    match filters.any(|(follows, K2)| *follows && !K2.is_empty()) {
         true => format!("{what} and of the input filters that the study gives none for"),
         false => what.to_owned(),
     }
@@ -212,7 +212,11 @@ fn innovations(
     // K₂(u − C x̂_a), an entry per column of Q̄_a; none without a filter
     let filtered: Vec<Expr<'_>> = (0..form.U.len())
         .filter_map(|j| Some((j, filters.innovation(graph, j)?)))
-        .flat_map(|(j, e_a)| filters.K2[j].iter().map(move |&gain| graph.expr(gain) * e_a))
+        .flat_map(|(j, e_a)| {
+            filters.K2[j]
+                .iter()
+                .map(move |&gain| graph.expr(gain) * e_a)
+        })
         .collect();
     let Q_a = numbers(graph, &form.Q_a, at);
     let row = |(place, &(i, k)): (usize, &(usize, usize))| {

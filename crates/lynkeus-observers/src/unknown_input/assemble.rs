@@ -33,7 +33,9 @@ pub(super) fn design(
     let start = Start::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by([&speeds.θ1, &speeds.θ2]),
+        observer: copy
+            .observer(NAME, derivatives)?
+            .tuned_by([&speeds.θ1, &speeds.θ2]),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
         notes: chosen.notes,
@@ -50,10 +52,19 @@ struct Speeds {
 impl Speeds {
     fn new(copy: &Copy<'_, '_>, thetas: &Thetas) -> Self {
         let speed = |place: usize, value: f64, of: &str| {
-            Speed::new(copy, format!("theta[{place}]"), value, format!("θ{place}, of {of}"))
+            Speed::new(
+                copy,
+                format!("theta[{place}]"),
+                value,
+                format!("θ{place}, of {of}"),
+            )
         };
         Self {
-            θ1: speed(1, thetas.θ1, "the unknown inputs and of the outputs that show them"),
+            θ1: speed(
+                1,
+                thetas.θ1,
+                "the unknown inputs and of the outputs that show them",
+            ),
             θ2: speed(2, thetas.θ2, "the other states"),
         }
     }

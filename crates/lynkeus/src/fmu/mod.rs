@@ -59,6 +59,7 @@ struct Described {
     signals: Vec<Quantity>,
     estimates: Vec<Quantity>,
     starts: Vec<Quantity>,
+    tunables: Vec<Quantity>,
     units: Vec<Unit>,
     time: String,
 }
@@ -92,18 +93,25 @@ impl Described {
         let estimates = estimates(made);
         let mut taken: BTreeSet<String> = ["time".to_owned()].into();
         taken.extend(signals.iter().chain(&estimates).map(|q| q.name.clone()));
-        let starts = starts(made).into_iter().map(|(state, start)| {
-            let mut name = format!("{state}_start");
+        let mut free = |mut name: String| {
             while !taken.insert(name.clone()) {
                 name.push('_');
             }
-            let told = known(&state);
-            Quantity {
-                description: format!("where the estimator begins with {state}"),
-                ..quantity(name, told, start)
-            }
+            name
+        };
+        let starts = starts(made).into_iter().map(|(state, start)| Quantity {
+            description: format!("where the estimator begins with {state}"),
+            ..quantity(free(format!("{state}_start")), known(&state), start)
         });
         let starts: Vec<Quantity> = starts.collect();
+        let tunables = made.device.tunables.iter().map(|tunable| Quantity {
+            description: format!(
+                "{}; what is guaranteed holds for the value at the start only",
+                tunable.entry.about
+            ),
+            ..quantity(free(tunable.entry.name.clone()), None, tunable.start)
+        });
+        let tunables = tunables.collect();
         let named = signals.iter().chain(&estimates).chain(&starts);
         let named: BTreeSet<&String> = named.filter_map(|q| q.unit.as_ref()).collect();
         let unit = made.prepared.study().time_unit.as_deref();
@@ -112,6 +120,7 @@ impl Described {
             signals,
             estimates,
             starts,
+            tunables,
             time: unit.map_or_else(
                 || "in the model's unit of time".to_owned(),
                 |unit| format!("in {unit}"),
@@ -125,6 +134,7 @@ impl Described {
             signals: &self.signals,
             estimates: &self.estimates,
             starts: &self.starts,
+            tunables: &self.tunables,
             units: &self.units,
             time: &self.time,
         }
