@@ -99,6 +99,7 @@ class Study:
         precision: str,
         fmi: str,
         step: float | None = None,
+        tunable: bool = False,
         system: str | None = None,
         time_limit: float | None = None,
         memory_limit: float = ...,

@@ -347,6 +347,7 @@ class Study:
         *,
         precision: str = "f64",
         step: float | None = None,
+        tunable: bool = False,
         fmi: str = "3",
         system: str | None = None,
         force: bool = False,
@@ -355,9 +356,13 @@ class Study:
     ) -> Export:
         """The estimator for other machines, as files in a folder that is new or empty (``force``: that
         may hold other files): ``to`` is ``"c"``, ``"js"``, ``"fmu"`` (``fmi`` its version) or
-        ``"html"``; ``step`` is the longest step of the integration, instead of the study's. With
-        ``to="fmu"`` the ``system`` is ``"estimator"``, or in continuous time ``"plant"`` or ``"observer"``."""
-        files, notes = self._core.export(to, precision, fmi, step, system, time_limit, memory_limit)
+        ``"html"``; ``step`` is the longest step of the integration, instead of the study's; with
+        ``tunable`` θ, or what stands for it, may be changed while the estimator runs (an FMU has it
+        anyway). With ``to="fmu"`` the ``system`` is ``"estimator"``, or in continuous time ``"plant"`` or
+        ``"observer"``."""
+        files, notes = self._core.export(
+            to, precision, fmi, step, tunable, system, time_limit, memory_limit
+        )
         return write(Path(folder), files, notes, force=force)
 
     def estimator(self) -> _lynkeus.Estimator:

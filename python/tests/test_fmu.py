@@ -252,3 +252,53 @@ def test_starts_can_be_set(command: Path, tmp_path: Path) -> None:
         assert tool.get(["upper_start"]) == [3.99]
         tool.fmu.exitInitializationMode()
         tool.close()
+
+
+def theta(study: str, value: float, more: str = "") -> str:
+    """The two tanks' study with another θ."""
+    assert "theta = 0.03 " in study
+    return study.replace("theta = 0.03 ", f"theta = {value} {more}")
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_theta_can_be_changed(command: Path, tmp_path: Path, version: int) -> None:
+    """From the start on, and on the way, where `transient` says the same."""
+    prepare("two-tanks", command, tmp_path)
+    log, study = table(tmp_path / "log.csv"), (tmp_path / "s.toml").read_text()
+    middle = log["t"][100]
+    file = exported(command, tmp_path, version)
+    later = f"\ntransient = {{ theta = 0.03, until = {middle} }}\n"
+    for name, text in (("from_start", theta(study, 0.05)), ("later", theta(study, 0.05, later))):
+        (tmp_path / f"{name}.toml").write_text(text)
+        run(command, tmp_path, "estimate", f"{name}.toml", "log.csv", "-q", "-o", f"{name}.csv")
+    for name, change in (("estimates", None), ("from_start", log["t"][0]), ("later", middle)):
+        expected = table(tmp_path / f"{name}.csv")
+        tool, past, kept = Tool(file, log["t"][0]), None, None
+        (parameter,) = (v for v in tool.model.modelVariables if v.variability == "tunable")
+        assert (parameter.name, parameter.causality, float(parameter.start)) == ("theta", "parameter", 0.03)
+        assert float(parameter.min) > 0 and "guaranteed" in parameter.description
+        names = [v.name for v in tool.model.modelVariables if v.causality == "output"]
+        for row, (t, inputs) in enumerate(samples(log, tool)):
+            if past is not None:
+                tool.step(past, t)
+            tool.set(inputs)
+            if t == change:
+                tool.set({"theta": 0.05})
+                for wrong in (0.0, -1.0, float("nan"), float("inf")):
+                    with pytest.raises(Exception, match="(?i)fmi[23]Set"):
+                        tool.set({"theta": wrong})
+            if row == 0:
+                tool.fmu.exitInitializationMode()
+            if row == 120:
+                # a state of the FMU has the number, too
+                kept = tool.fmu.getFMUState()
+                tool.set({"theta": 1.0})
+                tool.fmu.setFMUState(tool.fmu.deserializeFMUState(tool.fmu.serializeFMUState(kept)))
+            wanted = [expected[name][row] for name in names]
+            np.testing.assert_allclose(tool.get(names), wanted, rtol=1e-9, atol=1e-9)
+            past = t
+        assert tool.get(["theta"]) == [0.03 if change is None else 0.05]
+        tool.fmu.reset()
+        tool.begin(0.0)
+        assert tool.get(["theta"]) == [0.03]
+        tool.close()

@@ -7,7 +7,7 @@ use lynkeus_model::Variable;
 use lynkeus_structure::{Extended, Measurement};
 
 use crate::kalman::is_or_has;
-use crate::{Estimate, Initial, Observer, Signal, Tuning, TuningError, prolongation};
+use crate::{Estimate, Initial, Observer, Signal, Tunables, Tuning, TuningError, prolongation};
 
 /// The keys of every observer, read.
 pub struct Common {
@@ -16,6 +16,8 @@ pub struct Common {
     pub clamp: bool,
     /// outside of it they are continued (`prolongation`)
     pub prolong: bool,
+    /// θ is a symbol
+    pub tunable: bool,
 }
 
 impl Common {
@@ -24,6 +26,7 @@ impl Common {
             initial: tuning.initial.clone(),
             clamp: tuning.clamp,
             prolong: tuning.flag(prolongation::PROLONG.name)?,
+            tunable: tuning.tunable,
         })
     }
 }
@@ -158,6 +161,7 @@ impl Copy<'_, '_> {
             estimates: self.estimates(),
             monitors: vec![],
             filter: None,
+            tunables: Tunables::default(),
         })
     }
 }

@@ -33,6 +33,7 @@ mod stages;
 pub mod state_affine;
 mod statement;
 pub mod triangular;
+mod tunable;
 mod tuning;
 pub mod unknown_input;
 
@@ -43,4 +44,5 @@ pub use keys::{KeySpec, REQUIRED, Shape};
 pub use observer::{Estimate, FilterTuning, InputDerivative, Monitor, Observer, Signal};
 pub use sampled::Sampled;
 pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};
+pub use tunable::{Tunable, Tunables};
 pub use tuning::{Initial, Tuning, TuningError, Value};

@@ -5,6 +5,8 @@ use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Variable;
 use lynkeus_run::filter::FilterKind;
 
+use crate::Tunables;
+
 /// A named symbol.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
@@ -79,6 +81,8 @@ pub struct Observer {
     /// the filter that corrects the estimate when sensors report; none where the correction
     /// is part of the derivatives
     pub filter: Option<FilterTuning>,
+    /// numbers of the derivatives that may be changed while it runs
+    pub tunables: Tunables,
 }
 
 /// A Kalman filter over the observer's flow. The noises are the study's, not the family's.

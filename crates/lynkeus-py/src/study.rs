@@ -274,7 +274,7 @@ impl Study {
     }
 
     /// Names and contents of files, and what the user should know.
-    #[pyo3(signature = (to, precision, fmi, step=None, system=None, time_limit=None, memory_limit=MEMORY))]
+    #[pyo3(signature = (to, precision, fmi, step=None, tunable=false, system=None, time_limit=None, memory_limit=MEMORY))]
     #[allow(
         clippy::too_many_arguments,
         reason = "the options of a call from Python"
@@ -286,6 +286,7 @@ impl Study {
         precision: &str,
         fmi: &str,
         step: Option<f64>,
+        tunable: bool,
         system: Option<&str>,
         time_limit: Option<f64>,
         memory_limit: f64,
@@ -299,6 +300,7 @@ impl Study {
                 other => return Err(unknown("precision", "\"f64\" or \"f32\"", other)),
             },
             step,
+            tunable,
         };
         let terms = Terms::new(None, time_limit, memory_limit);
         let made = self.ask(py, &terms, |study, _| lynkeus::export(study, &options))?;

@@ -4,7 +4,8 @@ use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
 use crate::system::Evaluation;
 use crate::{
-    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, spectral_radius,
+    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,
+    spectral_radius,
 };
 
 /// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
@@ -80,10 +81,19 @@ impl Blueprint {
 #[must_use]
 pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
     let system = blueprint.flow();
+    let tuned = match blueprint {
+        Blueprint::Sampled { observer, .. } => observer.tuned.as_ref(),
+        Blueprint::Filter { .. } => None,
+    };
     let mut evaluation = system.evaluation();
     for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
         let given = inputs.iter().find(|(input, _)| input == name);
         *signal = given.map_or(0.0, |(_, value)| *value);
+    }
+    let tuned = tuned.map(Tuned::signals).unwrap_or_default();
+    let signals = evaluation.signals_mut().iter_mut();
+    for (signal, value) in signals.rev().zip(tuned.into_iter().rev()) {
+        *signal = value;
     }
     step_of(&mut evaluation, system.start())
 }

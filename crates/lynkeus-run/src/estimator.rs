@@ -113,7 +113,9 @@ impl Estimator {
         let core = Core::Sampled(Box::new(Sampled::new(observer, method)?));
         let count = observer.sensors.len();
         let system = &observer.system;
-        let known = system.signals().len().saturating_sub(count);
+        let tuned = observer.tuned.as_ref();
+        let tuned = tuned.map_or(0, |tuned| tuned.system.outputs().len());
+        let known = system.signals().len().saturating_sub(count + tuned);
         let inputs = system.signals().iter().take(known);
         let names = observer.sensors.iter().chain(inputs).cloned().collect();
         let told = system.outputs().len().saturating_sub(count);
@@ -121,7 +123,11 @@ impl Estimator {
         let mut systems = vec![system.clone()];
         systems.extend(observer.errors.iter().map(|e| e.flow().clone()));
         let noises = observer.errors.as_ref().map(|e| e.noises());
-        let settings = format!("{method:?} {} {noises:?}", observer.predict);
+        let mut settings = format!("{method:?} {} {noises:?}", observer.predict);
+        if let Some(tuned) = &observer.tuned {
+            systems.push(tuned.system.clone());
+            settings += &format!(" {:?}", tuned.values);
+        }
         let program = Program::new(systems, settings);
         Ok(Self::of(
             core,

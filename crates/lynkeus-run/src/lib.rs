@@ -131,7 +131,7 @@ pub use method::{Method, Step, Tolerances};
 pub use noise::{Level, Noise, deviate};
 pub use rk4::Rk4;
 pub use routine::Backend;
-pub use sampled::SampledObserver;
+pub use sampled::{SampledObserver, Tuned};
 pub use simulate::Simulation;
 pub use slopes::{Place, Slopes};
 pub use snapshot::{Digest, SnapshotFault};

@@ -14,8 +14,8 @@ use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
 /// w' = L_f h(x̂) (the inter-sample predictor of Karafyllis and Kravaris, *From
 /// continuous-time design to sampled-data design of observers*, 2009).
 ///
-/// With one for each of the `sensors`, the system's last states are w; its last signals say
-/// whether w follows the model (1) or stays (0); its last outputs are h(x̂).
+/// With one for each of the `sensors`, the system's last states are w; its signals are known inputs,
+/// then whether w follows the model (1) or stays (0), then what `tuned` makes; its last outputs are h(x̂).
 #[derive(Clone, Debug)]
 pub struct SampledObserver {
     /// the system
@@ -26,6 +26,30 @@ pub struct SampledObserver {
     pub predict: bool,
     /// how errors spread, where standard deviations are asked for
     pub errors: Option<ErrorModel>,
+    /// numbers of the equations that may be changed while it runs elsewhere; here they stay
+    pub tuned: Option<Tuned>,
+}
+
+/// Numbers of an observer's equations, and what the equations make of them.
+#[derive(Clone, Debug)]
+pub struct Tuned {
+    /// without states: its signals are the numbers, its outputs the last signals of the observer
+    pub system: System,
+    /// the numbers
+    pub values: Vec<f64>,
+}
+
+impl Tuned {
+    /// The last signals of the observer.
+    pub fn signals(&self) -> Vec<f64> {
+        let mut evaluation = self.system.evaluation();
+        for (signal, value) in evaluation.signals_mut().iter_mut().zip(&self.values) {
+            *signal = *value;
+        }
+        let mut signals = vec![0.0; self.system.outputs().len()];
+        evaluation.outputs(0.0, &[], &mut signals);
+        signals
+    }
 }
 
 /// A [`SampledObserver`] under way.
@@ -35,7 +59,7 @@ pub(crate) struct Sampled {
     integrator: Integrator,
     x: Vec<f64>,
     outputs: Vec<f64>,
-    /// known inputs, then whether each sensor's w follows the model
+    /// known inputs, then whether each sensor's w follows the model, then what is tuned
     signals: Vec<f64>,
     sensors: usize,
     predict: bool,
@@ -51,11 +75,16 @@ impl Sampled {
             sensors,
             predict,
             errors,
+            tuned,
         } = observer;
         let count = sensors.len();
+        let tuned = tuned.as_ref().map(Tuned::signals).unwrap_or_default();
         for (what, found) in [
             ("states", system.states().len()),
-            ("signals", system.signals().len()),
+            (
+                "signals",
+                system.signals().len().saturating_sub(tuned.len()),
+            ),
             ("outputs", system.outputs().len()),
         ] {
             if found < count {
@@ -63,13 +92,15 @@ impl Sampled {
                 return Err(Error::setting(what, expected, found));
             }
         }
+        let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
+        signals.extend(tuned);
         let spread = errors.as_ref().map(|model| Spread::new(model, method));
         Ok(Self {
             driven: Driven::new(system, BetweenSamples::Hold),
             integrator: Integrator::new(method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.outputs().len()],
-            signals: vec![0.0; system.signals().len()],
+            signals,
             sensors: count,
             predict: *predict,
             bound: Bound::new(system.start()),
@@ -222,7 +253,58 @@ mod tests {
             sensors: vec!["y".to_string()],
             predict,
             errors: None,
+            tuned: None,
         }
+    }
+
+    /// The gain 2 as the square of a number.
+    fn tuned(value: f64) -> SampledObserver {
+        let g = Graph::new();
+        let [time, x, w, s, k, root] = ["time", "x", "w", "s", "k", "root"].map(|n| g.symbol(n));
+        let plain = observer(true);
+        let states = [("x", x, 3.0), ("w", w, 0.0)];
+        let states = states.map(|(name, symbol, start)| (name.to_string(), symbol.node(), start));
+        let derivatives = [(-x + (w - x) * k).node(), (s * -x).node()];
+        let outputs = ["x_hat", "y"].map(|name| (name.to_string(), x.node()));
+        let signals = [("s".to_string(), s.node()), ("k".to_string(), k.node())];
+        let system = System::new(&g, time.node(), &states, &signals, &derivatives, &outputs);
+        let made = [("k".to_string(), root.powi(2).node())];
+        let number = [("root".to_string(), root.node())];
+        let gains = System::new(&g, time.node(), &[], &number, &[], &made).unwrap();
+        SampledObserver {
+            system: system.unwrap(),
+            tuned: Some(Tuned {
+                system: gains,
+                values: vec![value],
+            }),
+            ..plain
+        }
+    }
+
+    #[test]
+    fn numbers_stand_where_constants_stood() {
+        let fixed = observer(true);
+        let tuned = tuned(2.0_f64.sqrt());
+        let mut pair = [&fixed, &tuned].map(|o| Estimator::sampled(o, method()).unwrap());
+        assert_eq!(pair[0].signals(), pair[1].signals());
+        for k in 0..10 {
+            let [a, b] = &mut pair;
+            let t = f64::from(k);
+            let (a, b) = (a.push(t, &[1.0]).unwrap()[0], b.push(t, &[1.0]).unwrap()[0]);
+            assert!((a - b).abs() < 1e-14, "{a} {b}");
+        }
+        // a snapshot is of these numbers
+        let other = self::tuned(3.0);
+        let mut other = Estimator::sampled(&other, method()).unwrap();
+        assert!(other.restore(&pair[1].snapshot()).is_err());
+        let step = |observer: &SampledObserver| {
+            let blueprint = crate::Blueprint::Sampled {
+                observer: Box::new(observer.clone()),
+                method: method(),
+            };
+            crate::needed_step(&blueprint, &[]).unwrap()
+        };
+        assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }
 
     fn method() -> Method {

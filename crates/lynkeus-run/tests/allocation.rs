@@ -50,6 +50,7 @@ fn sampled() -> Estimator {
         sensors: vec!["y".to_string()],
         predict: true,
         errors: None,
+        tuned: None,
     };
     Estimator::sampled(&observer, METHOD).unwrap()
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::fmu::Version;
-use lynkeus_export::curly::{Device, Entry, FirstReading, javascript};
+use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
@@ -19,7 +19,7 @@ use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
 use crate::study::BetweenSamples;
 use crate::systems::hat;
-use crate::{Error, Study, continuous, design, fmu};
+use crate::{Error, Study, continuous, design, fmu, tunable};
 
 /// The language of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,6 +59,9 @@ pub struct ExportOptions {
     pub precision: Precision,
     /// longest step of the integration, in the unit of time, instead of the study's
     pub step: Option<f64>,
+    /// θ, or what stands for it, may be changed while the estimator runs, where its family allows that;
+    /// a functional mock-up unit has it anyway
+    pub tunable: bool,
 }
 
 /// A file of an export.
@@ -98,6 +101,10 @@ pub struct Export {
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     #[cfg(feature = "tune")]
     if options.to == Target::Html {
+        if options.tunable {
+            let message = "what is tunable: expected C, JavaScript or an FMU, found a page, whose slider moves it";
+            return Err(Error::input(message));
+        }
         return page(study, options.step);
     }
     match options.subject {
@@ -111,7 +118,11 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let design = prepared.design()?;
+    let is_tunable = options.tunable || matches!(options.to, Target::Fmu(_));
+    let design = match is_tunable {
+        true => tunable::design(&prepared)?,
+        false => prepared.design()?,
+    };
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
     if made.flow().has_instants() {
@@ -119,6 +130,9 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
             "the model bends with time alone (max, min, abs of time): `estimate` stops at these instants, here a step goes across them"
                 .to_owned(),
         );
+    }
+    if is_tunable {
+        notes.push(tunable::note(&design, &made));
     }
     let about = about(study, &made);
     let files = printed(&prepared, &design, &made, &about, |device| {
@@ -187,6 +201,7 @@ pub(crate) fn printed<T>(
         estimates: &told.estimates,
         monitors: told.monitors,
         deviations: study.estimate.deviations,
+        tunables: &told.tunables,
         words: &told.words,
         about,
     };
@@ -282,6 +297,7 @@ struct Told {
     signals: Vec<Entry>,
     estimates: Vec<Entry>,
     monitors: usize,
+    tunables: Vec<Tunable>,
     words: Vec<Entry>,
 }
 
@@ -341,6 +357,7 @@ impl Told {
                 .chain(deviations)
                 .chain(monitors)
                 .collect(),
+            tunables: tunable::printed(design, made),
             words,
         }
     }

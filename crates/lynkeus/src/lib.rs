@@ -109,6 +109,7 @@ mod spread;
 pub mod study;
 mod systems;
 pub mod table;
+mod tunable;
 #[cfg(feature = "tune")]
 pub mod tune;
 pub mod visible;

@@ -1,8 +1,8 @@
 //! A log through an observer of the five families, where sensors report when they do.
 
-use lynkeus_expr::Node;
-use lynkeus_observers::{Design, Sampled};
-use lynkeus_run::{ErrorModel, ErrorNoise, Estimator, Method, SampledObserver, System};
+use lynkeus_expr::{Graph, Node};
+use lynkeus_observers::{Design, Sampled, Signal, Tunable};
+use lynkeus_run::{ErrorModel, ErrorNoise, Estimator, Method, SampledObserver, System, Tuned};
 
 use crate::course::{Course, Samples};
 use crate::filter::noise;
@@ -52,10 +52,10 @@ pub(crate) fn observer(
     notes: &mut Vec<String>,
 ) -> Result<SampledObserver, Error> {
     let (study, extended) = (prepared.study(), prepared.extended());
-    let Sampled { observer, outputs } = design
-        .observer
-        .sampled(extended)
-        .map_err(Error::from_source)?;
+    let sampled = design.observer.sampled(extended);
+    let mut sampled = sampled.map_err(Error::from_source)?;
+    let tuned = tuned(extended.graph(), &mut sampled)?;
+    let Sampled { observer, outputs } = sampled;
     let states: Vec<(String, Node, f64)> = observer
         .states
         .iter()
@@ -104,7 +104,46 @@ pub(crate) fn observer(
         sensors,
         predict: study.estimate.between_samples == BetweenSamples::Predict,
         errors,
+        tuned,
     })
+}
+
+/// What the equations make of the numbers that may be changed, as inputs of the observer after all
+/// others; none where there are no such numbers.
+fn tuned(
+    graph: &Graph,
+    Sampled { observer, outputs }: &mut Sampled,
+) -> Result<Option<Tuned>, Error> {
+    let numbers = &observer.tunables.numbers;
+    let named = |tunable: &Tunable| (tunable.name.clone(), tunable.symbol);
+    let signals: Vec<(String, Node)> = numbers.iter().map(named).collect();
+    let values = numbers.iter().map(|tunable| tunable.value).collect();
+    let mut places: Vec<&mut Node> = observer.derivatives.iter_mut().chain(outputs).collect();
+    places.extend(observer.estimates.iter_mut().map(|e| &mut e.node));
+    // a condition number is found along with the solution, which a gain is part of
+    places.extend(observer.monitors.iter_mut().map(|m| &mut m.node));
+    let roots: Vec<Node> = places.iter().map(|place| **place).collect();
+    let symbols: Vec<Node> = signals.iter().map(|signal| signal.1).collect();
+    let hoisted = graph.hoisted(&roots, &symbols);
+    if hoisted.parts.is_empty() {
+        return Ok(None);
+    }
+    for (place, root) in places.into_iter().zip(hoisted.roots) {
+        *place = root;
+    }
+    let (mut made, mut read) = (vec![], vec![]);
+    for (i, part) in hoisted.parts.iter().enumerate() {
+        let name = format!("tuned {}", i + 1);
+        made.push((name.clone(), part.value));
+        let symbol = part.symbol;
+        read.push(Signal { name, symbol });
+    }
+    observer.inputs.extend(read);
+    let system = System::new(graph, observer.time, &[], &signals, &[], &made);
+    Ok(Some(Tuned {
+        system: system.map_err(Error::from_source)?,
+        values,
+    }))
 }
 
 fn measured(design: &Design) -> Vec<String> {

@@ -1,11 +1,11 @@
 //! C99: a header, a source, a bench that replays a log, and how they are built.
 
-use super::device::Device;
-use super::function::comment;
+use super::device::{Device, Tunable};
+use super::function::{Entry, comment};
 use super::language::Language;
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
-use super::template::exchanged;
+use super::template::{chosen, exchanged};
 use crate::Refusal;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
@@ -31,7 +31,7 @@ pub struct File {
 }
 
 /// What `push` can say, from 1 on.
-pub(super) const CODES: [(&str, &str); 5] = [
+const CODES: [(&str, &str); 5] = [
     (
         "TIME",
         "the time is no number, or before that of the last sample",
@@ -45,6 +45,18 @@ pub(super) const CODES: [(&str, &str); 5] = [
     ("NOT_FINITE", "the equations have no value there"),
 ];
 
+/// What it says of numbers that may be changed, after the other codes.
+const TUNING: (&str, &str) = (
+    "TUNING",
+    "a number that may be changed is not finite and above 0",
+);
+
+/// What `push` of a device can say, from 1 on.
+pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let tuning = (!device.tunables.is_empty()).then_some(TUNING);
+    CODES.into_iter().chain(tuning)
+}
+
 /// What can become of a reading of a filter.
 pub(super) const READINGS: [(&str, &str); 4] = [
     ("MISSING", "the sensor did not report"),
@@ -57,12 +69,13 @@ pub(super) const READINGS: [(&str, &str); 4] = [
 ];
 
 /// The words of the draft that have the device's name before them in C.
-const PREFIXED: [&str; 9] = [
+const PREFIXED: [&str; 10] = [
     "TIME",
     "INPUT",
     "INTERVAL",
     "DIVERGED",
     "NOT_FINITE",
+    "TUNING",
     "MISSING",
     "TAKEN",
     "REJECTED",
@@ -93,7 +106,7 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
     Ok(vec![
         file(format!("{}.h", frame.prefix), frame.header()),
         file(format!("{}.c", frame.prefix), frame.source()),
-        file("replay.c".into(), named(REPLAY)),
+        file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
         file("CMakeLists.txt".into(), named(CMAKE)),
     ])
 }
@@ -164,7 +177,7 @@ impl Frame<'_> {
         let Device {
             signals, estimates, ..
         } = self.device;
-        let codes = CODES.iter().enumerate().map(|(k, (code, about))| {
+        let codes = codes(self.device).enumerate().map(|(k, (code, about))| {
             format!("#define {capitals}_{code} {} /* {about} */\n", k + 1)
         });
         let codes: String = codes.collect();
@@ -201,7 +214,7 @@ impl Frame<'_> {
              /* Estimates, as they are returned:\n{estimate_list} */\n\
              #define {capitals}_ESTIMATES {estimate_count}\n\
              extern const char *const {name}_estimate_names[{capitals}_ESTIMATES];\n\n\
-             /* Why a sample was refused; nothing has changed then. */\n{codes}\n{readings}\
+             {tunables}/* Why a sample was refused; nothing has changed then. */\n{codes}\n{readings}\
              /* All there is to an estimator under way: a copy is a snapshot. */\n\
              typedef struct {{\n{fields}}} {name}_state;\n\n\
              /* Before the first sample. */\n\
@@ -213,8 +226,39 @@ impl Frame<'_> {
             title = title(&format!("{name}.h"), self.device.about),
             signal_list = listed(signals),
             signal_count = signals.len(),
+            tunables = self.tunables(),
             estimate_list = listed(estimates),
             estimate_count = estimates.len(),
+        )
+    }
+
+    /// What holds in pieces of the runtime.
+    fn holds(&self) -> Vec<&'static str> {
+        match self.device.tunables.is_empty() {
+            true => vec![],
+            false => vec!["tunable"],
+        }
+    }
+
+    /// The numbers that may be changed, in the header.
+    fn tunables(&self) -> String {
+        let (name, capitals, tunables) = (&self.prefix, self.capitals(), self.device.tunables);
+        if tunables.is_empty() {
+            return String::new();
+        }
+        let line = |(place, tunable): (usize, &Tunable)| {
+            let Entry { name, about } = &tunable.entry;
+            let about = comment(&format!("{name} {about}"));
+            format!(" *   {place}  {}; {:?}\n", about.trim(), tunable.start)
+        };
+        let lines: String = tunables.iter().enumerate().map(line).collect();
+        let count = tunables.len();
+        format!(
+            "/* Numbers that may be changed between any two samples, in `tuning` of the state, with what\n\
+             \x20* {name}_init makes them: finite and above 0. A change counts from the last sample on. What\n\
+             \x20* is guaranteed above holds for these values alone, and steps stay as long as they are:\n{lines} */\n\
+             #define {capitals}_TUNABLES {count}\n\
+             extern const char *const {name}_tunable_names[{capitals}_TUNABLES];\n\n"
         )
     }
 
@@ -245,18 +289,28 @@ impl Frame<'_> {
                 .contains(&word)
                 .then(|| format!("{capitals}_{word}"))
         });
-        let names = |entries: &[super::Entry]| -> String {
+        let names = |entries: &[Entry]| -> String {
             let texts = entries
                 .iter()
                 .map(|e| format!("    \"{}\",\n", escaped(&e.name)));
             texts.collect()
+        };
+        let tunables = match self.device.tunables {
+            [] => String::new(),
+            tunables => {
+                let entries: Vec<Entry> = tunables.iter().map(|t| t.entry.clone()).collect();
+                format!(
+                    "const char *const {name}_tunable_names[{capitals}_TUNABLES] = {{\n{}}};\n\n",
+                    names(&entries)
+                )
+            }
         };
         let real = self.real();
         format!(
             "{title}#include \"{name}.h\"\n\n#include <math.h>\n\n\
              const char *const {name}_signal_names[{capitals}_SIGNALS] = {{\n{signals}}};\n\n\
              const char *const {name}_estimate_names[{capitals}_ESTIMATES] = {{\n{estimates}}};\n\n\
-             {body}\n\
+             {tunables}{body}\n\
              int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
              \x20   const {name}_state before = *s;\n\
              \x20   const int code = take(s, t, signals, estimates);\n\

@@ -14,6 +14,7 @@ pub(super) enum Role {
     Signal,
     Estimate,
     Start,
+    Tunable,
     /// continuous, as those that follow
     Input,
     State {
@@ -110,6 +111,7 @@ fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<
     all.extend(of(component.signals, Role::Signal));
     all.extend(of(component.estimates, Role::Estimate));
     all.extend(of(component.starts, Role::Start));
+    all.extend(of(component.tunables, Role::Tunable));
     all
 }
 
@@ -168,7 +170,7 @@ impl Variable<'_> {
             Role::Time => "independent",
             Role::Signal | Role::Input => "input",
             Role::Estimate | Role::State { is_output: true } => "output",
-            Role::Start => "parameter",
+            Role::Start | Role::Tunable => "parameter",
             Role::State { is_output: false } | Role::Derivative { .. } => "local",
         }
     }
@@ -180,6 +182,7 @@ impl Variable<'_> {
             // a sample, which nobody should draw lines between
             Role::Signal => "discrete",
             Role::Start => "fixed",
+            Role::Tunable => "tunable",
         }
     }
 
@@ -204,7 +207,7 @@ impl Variable<'_> {
 
     fn start(&self) -> String {
         match self.role {
-            Role::Signal | Role::Start | Role::Input | Role::State { .. } => {
+            Role::Signal | Role::Start | Role::Tunable | Role::Input | Role::State { .. } => {
                 format!(" start=\"{}\"", number(self.quantity.start))
             }
             Role::Time | Role::Estimate | Role::Derivative { .. } => String::new(),

@@ -21,10 +21,23 @@ pub struct Device<'a> {
     pub monitors: usize,
     /// whether a filter's standard deviations are reported
     pub deviations: bool,
+    /// numbers that may be changed while it runs: those of a sampled observer's
+    /// [`tuned`](lynkeus_run::SampledObserver::tuned), in its order; of a filter none, or a factor on
+    /// its process noise
+    pub tunables: &'a [Tunable],
     /// units and meanings of the model's names, where there are any
     pub words: &'a [Entry],
     /// lines for people: the study, the design, the certificate
     pub about: &'a [String],
+}
+
+/// A number that may be changed while the estimator runs. It is finite and above 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tunable {
+    /// what it is called, and what it does
+    pub entry: Entry,
+    /// its value until it is changed
+    pub start: f64,
 }
 
 /// A state that starts where a sensor's first reading says: (reading − offset)/slope.

@@ -99,7 +99,7 @@ impl Exchange<'_> {
             ("@TOKEN@", token.to_owned()),
             ("@FIRST_INPUTS@", listed(inputs.collect())),
             ("@NOMINALS@", listed(nominals.collect())),
-            ("@REASONS@", reasons(&CODES)),
+            ("@REASONS@", reasons(CODES.into_iter())),
         ];
         let file = version.wrapper();
         format!("/* {file}: {name} as a functional mock-up unit. */\n")

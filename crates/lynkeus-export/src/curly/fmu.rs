@@ -1,6 +1,6 @@
 //! Functional mock-up units: the files of the archive, of which the C is [`c`]'s.
 
-use super::c::{self, CODES, File, Precision, prefix};
+use super::c::{self, File, Precision, codes, prefix};
 use super::description::{build, description, page};
 use super::device::Device;
 use super::function::comment;
@@ -79,6 +79,8 @@ pub struct Component<'a> {
     pub estimates: &'a [Quantity],
     /// the starts of its first states, in their order
     pub starts: &'a [Quantity],
+    /// the numbers that may be changed while it runs, in the order of the device
+    pub tunables: &'a [Quantity],
     /// every unit that a quantity names, once
     pub units: &'a [Unit],
     /// what time is counted in, in words
@@ -198,12 +200,12 @@ impl Version {
 }
 
 /// Cases of a `switch` that say what went wrong.
-pub(super) fn reasons(codes: &[(&str, &str)]) -> String {
-    let case = |(k, (_, about)): (usize, &(&str, &str))| {
+pub(super) fn reasons(codes: impl Iterator<Item = (&'static str, &'static str)>) -> String {
+    let case = |(k, (_, about)): (usize, (&str, &str))| {
         let about = comment(about);
         format!("    case {}:\n        return \"{about}\";\n", k + 1)
     };
-    codes.iter().enumerate().map(case).collect()
+    codes.enumerate().map(case).collect()
 }
 
 fn wrapper(
@@ -228,6 +230,10 @@ fn wrapper(
         "/* {}: {name} as a functional mock-up unit. */\n",
         version.wrapper()
     );
+    let holds: &[&str] = match component.tunables {
+        [] => &[],
+        _ => &["tunable"],
+    };
     let values = [
         ("@NAME@", name.clone()),
         ("@CAPITALS@", name.to_ascii_uppercase()),
@@ -236,9 +242,9 @@ fn wrapper(
         ("@STARTS@", component.starts.len().to_string()),
         ("@TOKEN@", token.to_owned()),
         ("@FIRST_SIGNALS@", starts.collect::<Vec<_>>().join(", ")),
-        ("@REASONS@", reasons(&CODES)),
+        ("@REASONS@", reasons(codes(component.device))),
     ];
-    title + &version.wrapped(CORE, &[], &values)
+    title + &version.wrapped(CORE, holds, &values)
 }
 
 /// A name for these texts and no others, as a UUID is written: FNV-1a with 128 bits.

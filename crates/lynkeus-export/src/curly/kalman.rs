@@ -34,7 +34,8 @@ impl Machine {
         }
         let (states, inputs) = (model.states(), model.inputs());
         let arguments = arguments(states, inputs, device);
-        let room = vec![0.0; inputs.len().max(1)];
+        let room = inputs.len() + device.tunables.len();
+        let room = vec![0.0; room.max(1)];
         self.size("STATES", states.len());
         self.field(
             "x",
@@ -63,7 +64,9 @@ impl Machine {
             flow: model.flow(),
             entries: model.flow_entries(),
             noise: model.process_noise(),
+            is_tuned: !device.tunables.is_empty(),
         };
+        self.tuned(device, None)?;
         let field = self.engine(&settings.kind, &free, &arguments)?;
         let which_inside = Which::Inside {
             is_shared: settings.kind == FilterKind::Extended,
@@ -73,6 +76,7 @@ impl Machine {
                 flow: &confined.flow,
                 entries: &confined.entries,
                 noise: model.process_noise(),
+                is_tuned: free.is_tuned,
             };
             self.linear(which_inside, &inside, &arguments)?;
             let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
@@ -185,12 +189,12 @@ impl Machine {
         self.add(FIELD);
         self.add(INTEGRATE);
         self.tables += &table("process_noise", free.noise);
-        let holds: &[&str] = if weights.centre >= 0.0 {
-            &["definite"]
-        } else {
-            &[]
-        };
-        let text = exchanged(&chosen(UNSCENTED, holds), |word| {
+        let facts = [
+            (weights.centre >= 0.0, "definite"),
+            (free.is_tuned, "tunable"),
+        ];
+        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let text = exchanged(&chosen(UNSCENTED, &holds), |word| {
             Some(number(match word {
                 "SPREAD" => weights.spread,
                 "WEIGHT_OF_CENTRE" => weights.centre,

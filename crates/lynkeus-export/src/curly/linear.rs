@@ -6,6 +6,7 @@ use super::function::{Arguments, Target, draft};
 use super::machine::{FIELD, Kind, Machine, code, refuse_jumps};
 use super::tables::{places, table};
 use super::template::{chosen, exchanged};
+use super::tuning::NOISE_FACTOR;
 use crate::Refusal;
 use crate::code::Part;
 
@@ -18,6 +19,8 @@ pub(super) struct Linear<'a> {
     pub flow: &'a System,
     pub entries: &'a [(usize, usize)],
     pub noise: &'a [f64],
+    /// the densities are multiplied by a number that may be changed
+    pub is_tuned: bool,
 }
 
 /// Which of two flows.
@@ -108,6 +111,7 @@ impl Machine {
             flow,
             entries,
             noise,
+            is_tuned,
         } = linear;
         refuse_jumps(flow)?;
         let n = flow.states().len();
@@ -141,7 +145,11 @@ impl Machine {
             arguments,
             &[Target::all("dx", n), Target::all("slopes", entries.len())],
         )?;
-        let predict = chosen(PREDICT, holds).replace("NOISE_SCALE", &format!("R({scale:?})"));
+        let scale = match is_tuned {
+            true => format!("R({scale:?}) * {NOISE_FACTOR}"),
+            false => format!("R({scale:?})"),
+        };
+        let predict = chosen(PREDICT, holds).replace("NOISE_SCALE", &scale);
         let linearised = chosen(LINEARISED, holds);
         let kind = if which == Which::Free { FIELD } else { "" };
         let own = [kind, &flow, &linearised].join("\n");

@@ -76,6 +76,9 @@ impl Machine {
         if !device.first_readings.is_empty() {
             holds.push("first");
         }
+        if !device.tunables.is_empty() {
+            holds.push("tunable");
+        }
         let first: Vec<String> = device.first_readings.iter().map(first_reading).collect();
         machine.add(&chosen(PUSH, &holds).replace("        FIRST_READINGS\n", &first.concat()));
         Ok(machine)

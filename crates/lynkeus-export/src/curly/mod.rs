@@ -23,8 +23,9 @@ mod ode;
 mod syntax;
 mod tables;
 mod template;
+mod tuning;
 
-pub use device::{Device, FirstReading};
+pub use device::{Device, FirstReading, Tunable};
 pub use exchange::Exchange;
 pub use function::Entry;
 pub use ode::{Ode, State};

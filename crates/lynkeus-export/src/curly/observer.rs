@@ -30,9 +30,18 @@ impl Machine {
         self.size("ESTIMATED", told.saturating_sub(device.monitors));
         let about = system.states().join(", ");
         self.field("x", Kind::Real, &about, system.start().to_vec());
+        let (tuned, behind) = match &observer.tuned {
+            Some(tuned) => (
+                tuned.system.outputs().len(),
+                ", then what follows from tuning",
+            ),
+            None => (0, ""),
+        };
+        let own = system.signals().len().saturating_sub(tuned);
+        let own = &system.signals()[..own];
         let about = format!(
-            "{}; the last {m} say whether a measurement follows the model",
-            system.signals().join(", ")
+            "{}; the last {m} say whether a measurement follows the model{behind}",
+            own.join(", ")
         );
         self.field(
             "inputs",
@@ -60,6 +69,7 @@ impl Machine {
                 ("linearised", &["deviations"])
             }
         };
+        self.tuned(device, observer.tuned.as_ref())?;
         let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
         let text = chosen(SAMPLED, holds).replace("FIELD", field);
         self.add(&text.replace("FOLLOWS", follows));
@@ -78,6 +88,7 @@ impl Machine {
             flow,
             entries: errors.flow_entries(),
             noise: &noise.process,
+            is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
         let tape = flow.output_tape();

@@ -11,6 +11,7 @@ use crate::conditions::Partial;
 use crate::estimate::Copy;
 use crate::peaking::{Part, Run, Transient, factor_rows, nominal, variation};
 use crate::stages::Found;
+use crate::tunable::Speed;
 use crate::{Design, DesignError, TuningError, prolongation};
 
 /// Why there is no such form of the default observer.
@@ -33,6 +34,7 @@ pub(super) fn assemble(
     let transient = remedies.transient.as_ref();
     let coefficients = remedies.coefficients(&blocks.lengths())?;
     let mut run = Run::new(&copy, transient)?;
+    let speeds = Speed::of_chains(&copy, &θ);
     let (mut notes, mut factors) = (vec![], vec![]);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
         let Some(innovation) = remedies.limit.innovation(&copy, *output) else {
@@ -53,7 +55,7 @@ pub(super) fn assemble(
             divisors: &divisors(extended, found)?,
             innovation,
             K: &coefficients.K[*output],
-            θ: θ[*output],
+            θ: &speeds[*output],
             δ: 1.0,
             number: *output,
         });
@@ -66,7 +68,7 @@ pub(super) fn assemble(
     parameters.extend(factors);
     notes.extend(chain_rule(blocks, &θ));
     Ok(Design {
-        observer: run.finish(NAME)?,
+        observer: run.finish(NAME)?.tuned_by(&speeds),
         notes,
         examination,
         gains: vec![],

@@ -34,6 +34,7 @@ use crate::estimate::Copy;
 use crate::peaking::{Remedies, Transient, transient};
 use crate::prolongation::{Continued, prolong};
 use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::tunable::Speed;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
@@ -119,6 +120,7 @@ fn observer(
     parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let mut gains = vec![];
+    let speeds = Speed::of_chains(&copy, &θ);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
         let injected = injected(&copy, blocks, place);
         let Some(innovation) = limit.innovation(&copy, *output) else {
@@ -126,7 +128,13 @@ fn observer(
         };
         let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
         let steady: Vec<(f64, f64)> = K[*output].iter().enumerate().map(power).collect();
-        let timed = transient::gains(transient.as_ref(), &copy, *output, θ[*output], &steady);
+        let timed = transient::gains(
+            transient.as_ref(),
+            &copy,
+            *output,
+            &speeds[*output],
+            &steady,
+        );
         let gain = match correction {
             Correction::Classical => timed,
             Correction::Lee => lee(extended, chain, &timed),
@@ -165,7 +173,7 @@ fn observer(
     }
     prolong(&copy, continued(&form), &mut derivatives)?;
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?,
+        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         notes: chain_rule(blocks, &θ).into_iter().collect(),
         examination,
         gains,

@@ -13,6 +13,7 @@ use super::variant::Variant;
 use super::{NAME, derivative_name};
 use crate::estimate::{Common, Copy};
 use crate::stages::Found;
+use crate::tunable::Speed;
 use crate::{Design, DesignError, InputDerivative, Monitor, Signal};
 
 /// Below this rcond of Q̄, with rows and columns scaled, the flag is raised.
@@ -32,11 +33,17 @@ pub(super) fn design(
 ) -> Result<Design, DesignError> {
     let graph = extended.graph();
     let copy = Copy::new(extended, common);
-    let filters = filters(extended, &form, &gains);
+    let speed = Speed::new(&copy, "pole_scale", 1.0, scale_of_poles(&gains));
+    let filters = filters(extended, &form, &gains, &speed);
     let seen = filters.seen();
     // the plant and its map at x̂, and at x̂_a where (4.22) has it
     let at = |expressions: &[Node]| graph.substitute(&copy.at_estimate(expressions), &seen);
-    let right = innovations(extended, &copy, &form, &gains, &filters, &at);
+    let K = Corrections {
+        gains: &gains,
+        speed: &speed,
+        filters: &filters,
+    };
+    let right = innovations(extended, &copy, &form, &K, &at);
     let Q = numbers(graph, &form.Q, &at);
     let solution = solve(extended, &Q, &right);
     let f = at(&extended.derivatives);
@@ -44,8 +51,8 @@ pub(super) fn design(
     let mut derivatives: Vec<Node> = derivatives
         .map(|(&f, &x)| (graph.expr(f) + graph.expr(x)).node())
         .collect();
-    derivatives.extend(filters.derivatives(graph, &gains));
-    let mut observer = copy.observer(NAME, derivatives)?;
+    derivatives.extend(filters.derivatives(graph));
+    let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&speed]);
     observer.states.extend(filters.states(&gains));
     observer.monitors.push(Monitor {
         name: "rcond".into(),
@@ -81,14 +88,30 @@ struct Filters {
     input: Vec<Variable>,
     x_a: Vec<Vec<Signal>>,
     U: Vec<Vec<Node>>,
+    /// K₂ per input
+    K2: Vec<Vec<Node>>,
 }
 
-fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Filters {
+/// What the factor on the poles does.
+fn scale_of_poles(gains: &Gains) -> String {
+    let what = "multiplies the poles of the observer";
+    let mut filters = gains.filter_follows.iter().zip(&gains.K2);
+    match filters.any(|(follows, K2)| *follows && !K2.is_empty()) {
+        true => format!("{what} and of the input filters that the study gives none for"),
+        false => what.to_owned(),
+    }
+}
+
+fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains, speed: &Speed) -> Filters {
     let graph = extended.graph();
     let state = |input: &Variable, k: usize| {
         let name = format!("filter of {}", derivative_name(&input.name, k));
         let symbol = graph.fresh(&name).node();
         Signal { name, symbol }
+    };
+    let gain = |(k, gain): (usize, &f64), follows: bool| match follows {
+        true => speed.scaled(graph, *gain, (k + 1) as f64).node(),
+        false => graph.constant(*gain).node(),
     };
     let pairs = extended.inputs.iter().zip(&gains.K2);
     Filters {
@@ -97,6 +120,12 @@ fn filters(extended: &Extended<'_>, form: &Form, gains: &Gains) -> Filters {
             .map(|(input, K2)| (0..K2.len()).map(|k| state(input, k)).collect())
             .collect(),
         U: form.U.clone(),
+        K2: gains
+            .K2
+            .iter()
+            .zip(&gains.filter_follows)
+            .map(|(K2, follows)| K2.iter().enumerate().map(|k| gain(k, *follows)).collect())
+            .collect(),
     }
 }
 
@@ -121,14 +150,14 @@ impl Filters {
     }
 
     /// x̂_a' = A x̂_a + K₂(u − C x̂_a)
-    fn derivatives(&self, graph: &Graph, gains: &Gains) -> Vec<Node> {
+    fn derivatives(&self, graph: &Graph) -> Vec<Node> {
         let mut derivatives = vec![];
         for (j, x_a) in self.x_a.iter().enumerate() {
             let Some(e) = self.innovation(graph, j) else {
                 continue;
             };
-            for (k, &gain) in gains.K2[j].iter().enumerate() {
-                let correction = gain * e;
+            for (k, &gain) in self.K2[j].iter().enumerate() {
+                let correction = graph.expr(gain) * e;
                 derivatives.push(match x_a.get(k + 1) {
                     Some(next) => (graph.expr(next.symbol) + correction).node(),
                     None => correction.node(),
@@ -139,13 +168,23 @@ impl Filters {
     }
 }
 
+/// What the innovations are multiplied with.
+struct Corrections<'a> {
+    gains: &'a Gains,
+    speed: &'a Speed,
+    filters: &'a Filters,
+}
+
 /// K(y − h(x̂)) and, for (4.22), − Q̄_a K₂(u − C x̂_a).
 fn innovations(
     extended: &Extended<'_>,
     copy: &Copy<'_, '_>,
     form: &Form,
-    gains: &Gains,
-    filters: &Filters,
+    Corrections {
+        gains,
+        speed,
+        filters,
+    }: &Corrections<'_>,
     at: &dyn Fn(&[Node]) -> Vec<Node>,
 ) -> Vec<Node> {
     let graph = extended.graph();
@@ -173,11 +212,16 @@ fn innovations(
     // K₂(u − C x̂_a), an entry per column of Q̄_a; none without a filter
     let filtered: Vec<Expr<'_>> = (0..form.U.len())
         .filter_map(|j| Some((j, filters.innovation(graph, j)?)))
-        .flat_map(|(j, e_a)| gains.K2[j].iter().map(move |&gain| gain * e_a))
+        .flat_map(|(j, e_a)| {
+            filters.K2[j]
+                .iter()
+                .map(move |&gain| graph.expr(gain) * e_a)
+        })
         .collect();
     let Q_a = numbers(graph, &form.Q_a, at);
     let row = |(place, &(i, k)): (usize, &(usize, usize))| {
-        let mut sum = gains.K[i][k] * e[i];
+        let gain = speed.scaled(graph, gains.K[i][k], (k + 1) as f64);
+        let mut sum = gain * e[i];
         let entries = form.Q_a.get(place).into_iter().flatten().enumerate();
         for ((column, entry), &e_a) in entries.zip(&filtered) {
             if entry.is_some() {

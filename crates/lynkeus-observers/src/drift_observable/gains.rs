@@ -25,6 +25,8 @@ pub(super) struct Gains {
     pub filter_λ: Vec<Vec<Pole>>,
     pub K2: Vec<Vec<f64>>,
     pub filter_start: Vec<Vec<f64>>,
+    /// per input: the filter's eigenvalues are set by the observer's slowest one, not by the study
+    pub filter_follows: Vec<bool>,
     /// what Lemma 3.2 gave, per output that it was used for
     pub lemma: Vec<Lemma32>,
 }
@@ -45,8 +47,10 @@ impl Gains {
         };
         let needed = Needed::new(extended, filters.clone());
         let filter_slowest = -FILTER_SPEED * slowest(&λ);
-        let filter_λ = settings.filter_poles(&needed)?.into_iter();
-        let filter_λ: Vec<Vec<Pole>> = filter_λ
+        let filter_given = settings.filter_poles(&needed)?;
+        let filter_follows = filter_given.iter().map(Option::is_none).collect();
+        let filter_λ: Vec<Vec<Pole>> = filter_given
+            .into_iter()
             .zip(&filters)
             .map(|(given, &order)| given.unwrap_or_else(|| spaced(filter_slowest, order)))
             .collect();
@@ -69,6 +73,7 @@ impl Gains {
             λ,
             filter_λ,
             filter_start,
+            filter_follows,
             lemma,
         })
     }

@@ -14,6 +14,9 @@ use crate::{
     ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, prolongation,
 };
 
+/// Why nothing of such an observer may be changed.
+const NO_SPEED: &str =
+    "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole";
 /// Bisections of the rate where only the gain is limited.
 const HALVINGS: usize = 9;
 
@@ -236,6 +239,8 @@ fn assemble(
             entries,
         });
     }
+    let mut observer = copy.observer(family, derivatives)?;
+    observer.tunables.refused = copy.common.tunable.then_some(NO_SPEED);
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let parameters = vec![
         ("rate".to_owned(), format!("{}", request.rate)),
@@ -243,7 +248,7 @@ fn assemble(
         ("slopes".to_owned(), format!("{slopes}")),
     ];
     Ok(Design {
-        observer: copy.observer(family, derivatives)?,
+        observer,
         examination,
         gains,
         parameters,

@@ -23,12 +23,17 @@ use crate::family::Form;
 use crate::observer::FilterTuning;
 use crate::stages::{FormBox, Found, Searched, Stages};
 use crate::statement::{Statement, undecided};
+use crate::tunable::Speed;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
 use settings::Settings;
 
 pub(crate) use settings::is_or_has;
+
+/// The tunable number of a filter: no equation reads it, the noises are the study's.
+const NOISE_SCALE: &str = "process_noise_scale";
+const NOISE_MEANING: &str = "multiplies the densities of process noise";
 
 /// The family `ekf`.
 #[derive(Clone, Copy, Debug)]
@@ -152,6 +157,8 @@ impl<K: Kalman> Stages for K {
             limits.map(|(hat, state)| (hat.symbol, limited(extended.graph(), hat.symbol, state)));
         let confined = extended.graph().substitute(&derivatives, &limits.collect());
         let mut observer = copy.observer(K::NAME, derivatives)?;
+        let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
+        observer = observer.tuned_by([&scale]);
         let variance = settings.variances(extended, &observer.states);
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),

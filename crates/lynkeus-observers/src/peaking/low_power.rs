@@ -25,6 +25,7 @@ use lynkeus_gain::low_power::{self, Coefficients};
 
 use super::transient::{self, Transient};
 use crate::estimate::Copy;
+use crate::tunable::Speed;
 use crate::{KeySpec, Observer, Shape, Signal, Tuning, TuningError, Value};
 
 /// Eigenvalues of M.
@@ -232,7 +233,7 @@ pub(crate) struct Part<'a> {
     /// K_i
     pub K: &'a [[f64; 2]],
     /// ℓ = θ^δ
-    pub θ: f64,
+    pub θ: &'a Speed,
     pub δ: f64,
     /// number of the chain in `theta`
     pub number: usize,
@@ -346,7 +347,7 @@ impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
 
 /// (ℓk_i1, 1), (ℓ²k_i2, 2), … with their powers of ℓ as powers of θ.
 fn constants(part: &Part<'_>) -> Vec<(f64, f64)> {
-    let (L, δ) = (part.θ.powf(part.δ), part.δ);
+    let (L, δ) = (part.θ.value().powf(part.δ), part.δ);
     if part.K.is_empty() {
         return vec![(L, δ)];
     }

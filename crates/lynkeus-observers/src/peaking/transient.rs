@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use lynkeus_expr::Node;
 
 use crate::estimate::Copy;
+use crate::tunable::Speed;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
@@ -78,29 +79,31 @@ impl Transient {
         }))
     }
 
-    /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the steady `θ`.
+    /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the study's steady θ.
     pub(crate) fn gains(
         &self,
         copy: &Copy<'_, '_>,
         i: usize,
-        θ: f64,
+        θ: &Speed,
         steady: &[(f64, f64)],
     ) -> Vec<Node> {
         let graph = copy.extended.graph();
         let time = graph.expr(copy.extended.plant.time);
         let until = graph.constant(self.until);
-        let ratio = self.θ[i] / θ;
         let gain = |&(gain, exponent): &(f64, f64)| match self.fall {
             None => {
+                let ratio = self.θ[i] / θ.value();
                 let transient = graph.constant(gain * ratio.powf(exponent));
-                time.less(until).select(transient, graph.constant(gain))
+                let steady = θ.scaled(graph, gain, exponent);
+                time.less(until).select(transient, steady)
             }
             Some(fall) => {
                 let since = (time - until).max(graph.constant(0.0));
                 let left = (-since / graph.constant(fall)).exp();
                 // θ(t)/θ
-                let ratio = graph.constant(1.0) + graph.constant(ratio - 1.0) * left;
-                graph.constant(gain) * ratio.pow(graph.constant(exponent))
+                let change = graph.constant(self.θ[i]) / θ.expr(graph) - 1.0;
+                let ratio = graph.constant(1.0) + change * left;
+                θ.scaled(graph, gain, exponent) * ratio.pow(graph.constant(exponent))
             }
         };
         steady.iter().map(gain).map(|gain| gain.node()).collect()
@@ -122,7 +125,7 @@ pub(crate) fn gains(
     transient: Option<&Transient>,
     copy: &Copy<'_, '_>,
     i: usize,
-    θ: f64,
+    θ: &Speed,
     steady: &[(f64, f64)],
 ) -> Vec<Node> {
     let graph = copy.extended.graph();
@@ -130,7 +133,7 @@ pub(crate) fn gains(
         Some(transient) => transient.gains(copy, i, θ, steady),
         None => steady
             .iter()
-            .map(|(gain, _)| graph.constant(*gain).node())
+            .map(|&(gain, exponent)| θ.scaled(graph, gain, exponent).node())
             .collect(),
     }
 }

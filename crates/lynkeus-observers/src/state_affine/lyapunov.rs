@@ -125,7 +125,12 @@ impl<'g> Factor<'g> {
     }
 
     /// δ' and U', in the order of `states`.
-    pub fn derivatives(&self, θ: f64, F: &[Vec<Sparse<'g>>], v: &[Vec<Sparse<'g>>]) -> Vec<Node> {
+    pub fn derivatives(
+        &self,
+        θ: Expr<'g>,
+        F: &[Vec<Sparse<'g>>],
+        v: &[Vec<Sparse<'g>>],
+    ) -> Vec<Node> {
         let n = self.δ.len();
         let δ = (0..n).map(|i| {
             let square = sum(v.iter().map(|v| v[i].map(|x| x.powi(2))));

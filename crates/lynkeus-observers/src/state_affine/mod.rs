@@ -32,6 +32,7 @@ use lynkeus_structure::{Extended, Region, Superdiagonal, range, superdiagonal};
 use crate::conditions::{lipschitz, names};
 use crate::estimate::Copy;
 use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::tunable::Speed;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Monitor, Tuning,
     TuningError,
@@ -140,19 +141,22 @@ fn assemble(
     let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
-    let powers = form
+    let meaning = "the speed θ of the gain and of S".to_owned();
+    let θ = Speed::new(&copy, "theta", numbers.θ, meaning);
+    let exponents = form
         .blocks()
         .enumerate()
-        .flat_map(|(k, block)| block.iter().map(move |_| numbers.θ.powi(k as i32 + 1)));
+        .flat_map(|(k, block)| block.iter().map(move |_| k as i32 + 1));
     let correction = factor.gain(&v, &innovations(&copy));
-    for ((&state, power), z) in order.iter().zip(powers).zip(correction) {
+    for ((&state, exponent), z) in order.iter().zip(exponents).zip(correction) {
         if let Some(z) = z {
+            let power = θ.scaled(graph, numbers.θ.powi(exponent), f64::from(exponent));
             derivatives[state] = (graph.expr(derivatives[state]) - power * z).node();
         }
     }
-    derivatives.extend(factor.derivatives(numbers.θ, &F, &v));
+    derivatives.extend(factor.derivatives(θ.expr(graph), &F, &v));
     let alarm = alarm(extended, form, settings)?;
-    let mut observer = copy.observer(NAME, derivatives)?;
+    let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&θ]);
     observer.monitors.extend(monitor(&factor, alarm));
     observer.states.extend(factor.states);
     let parameters = gain::parameters(&copy, form, &order, &numbers, alarm)?;

@@ -10,6 +10,7 @@ use crate::TuningError;
 use crate::conditions::Partial;
 use crate::estimate::Copy;
 use crate::peaking::{Transient, transient};
+use crate::tunable::Speed;
 
 /// The numbers of the gain.
 pub(super) struct Gains<'s> {
@@ -57,12 +58,12 @@ impl<'s> Gains<'s> {
         column.map(|(j, s)| self.r[i] * power(j) * s).collect()
     }
 
-    /// The same at time t.
-    pub fn timed(&self, copy: &Copy<'_, '_>, i: usize) -> Vec<Node> {
+    /// The same at time t, for the chain's θ.
+    pub fn timed(&self, copy: &Copy<'_, '_>, i: usize, θ: &Speed) -> Vec<Node> {
         let exponent = |j: usize| self.δ[i] * (j + 1) as f64;
         let constants = self.chain(i).into_iter().enumerate();
         let steady: Vec<(f64, f64)> = constants.map(|(j, gain)| (gain, exponent(j))).collect();
-        transient::gains(self.transient, copy, i, self.θ[i], &steady)
+        transient::gains(self.transient, copy, i, θ, &steady)
     }
 
     /// The numbers, for the reader.

@@ -14,6 +14,7 @@ use crate::conditions::Partial;
 use crate::estimate::Copy;
 use crate::peaking::{Part, Run, Transient, factor_rows, nominal, variation};
 use crate::stages::Found;
+use crate::tunable::Speed;
 use crate::{Design, TuningError, prolongation};
 
 pub(super) fn assemble(
@@ -32,6 +33,7 @@ pub(super) fn assemble(
     let divided = settings.divided;
     let copy = Copy::new(extended, common);
     let mut run = Run::new(&copy, transient)?;
+    let speeds = Speed::of_chains(&copy, &θ);
     let (mut factors, mut notes) = (vec![], vec![]);
     for (i, chain) in chains.iter().enumerate() {
         let Some(innovation) = remedies.limit.innovation(&copy, i) else {
@@ -50,7 +52,7 @@ pub(super) fn assemble(
             divisors: &divisors(extended, &form.partials[i], divided)?,
             innovation,
             K: &coefficients.K[i],
-            θ: θ[i],
+            θ: &speeds[i],
             δ: δ[i],
             number: i,
         });
@@ -69,7 +71,7 @@ pub(super) fn assemble(
     parameters.extend(coefficients.parameters());
     parameters.extend(factors);
     Ok(Design {
-        observer: run.finish(NAME)?,
+        observer: run.finish(NAME)?.tuned_by(&speeds),
         examination,
         gains: vec![],
         parameters,

@@ -26,6 +26,7 @@ use crate::correction::{Correction, Start};
 use crate::estimate::Copy;
 use crate::prolongation::{Continued, prolong};
 use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::tunable::Speed;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
@@ -99,11 +100,12 @@ fn observer(
     let start = Start::new(&copy)?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let (mut table, mut parameters) = (vec![], gains.parameters());
-    for (i, chain) in form.assignment.chains.iter().enumerate() {
+    let speeds = Speed::of_chains(&copy, &gains.θ);
+    for (i, (chain, θ)) in form.assignment.chains.iter().zip(&speeds).enumerate() {
         let Some(innovation) = limit.innovation(&copy, i) else {
             continue;
         };
-        let timed = gains.timed(&copy, i);
+        let timed = gains.timed(&copy, i, θ);
         let scaled = scaled(graph, &copy, &form.partials[i], &timed, gains.divided);
         for (&state, gain) in chain.states.iter().zip(&scaled) {
             let correction = graph.expr(*gain) * graph.expr(innovation);
@@ -126,7 +128,7 @@ fn observer(
     }
     prolong(&copy, continued(form), &mut derivatives)?;
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?,
+        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         parameters,
         notes: gains.notes.clone(),
         gains: table,

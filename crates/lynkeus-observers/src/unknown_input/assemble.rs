@@ -13,6 +13,7 @@ use super::matrices::Matrices;
 use super::settings::{Settings, Thetas};
 use crate::estimate::{Copy, limited};
 use crate::matrices::Start;
+use crate::tunable::Speed;
 use crate::{Design, DesignError, Examination};
 
 pub(super) fn design(
@@ -27,11 +28,14 @@ pub(super) fn design(
     };
     let copy = Copy::new(extended, &settings.common);
     let thetas = chosen.thetas;
-    let derivatives = derivatives(form, &copy, settings, &thetas);
+    let speeds = Speeds::new(&copy, &thetas);
+    let derivatives = derivatives(form, &copy, settings, &speeds);
     let start = Start::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy.observer(NAME, derivatives)?,
+        observer: copy
+            .observer(NAME, derivatives)?
+            .tuned_by([&speeds.θ1, &speeds.θ2]),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
         notes: chosen.notes,
@@ -39,12 +43,39 @@ pub(super) fn design(
     })
 }
 
+/// θ₁ and θ₂ of the observer.
+struct Speeds {
+    θ1: Speed,
+    θ2: Speed,
+}
+
+impl Speeds {
+    fn new(copy: &Copy<'_, '_>, thetas: &Thetas) -> Self {
+        let speed = |place: usize, value: f64, of: &str| {
+            Speed::new(
+                copy,
+                format!("theta[{place}]"),
+                value,
+                format!("θ{place}, of {of}"),
+            )
+        };
+        Self {
+            θ1: speed(
+                1,
+                thetas.θ1,
+                "the unknown inputs and of the outputs that show them",
+            ),
+            θ2: speed(2, thetas.θ2, "the other states"),
+        }
+    }
+}
+
 /// The right-hand side of (14), in the order of the extended states.
 fn derivatives(
     form: &Form<'_, '_>,
     copy: &Copy<'_, '_>,
     settings: &Settings,
-    thetas: &Thetas,
+    Speeds { θ1, θ2 }: &Speeds,
 ) -> Vec<Node> {
     let extended = form.extended;
     let (graph, n) = (extended.graph(), extended.plant_states());
@@ -59,15 +90,15 @@ fn derivatives(
     let at_s = factors.map(|node| graph.substitute(&[node], &measured)[0]);
     let e1 = column(graph, &innovations(copy, &form.first));
     let e2 = column(graph, &innovations(copy, &form.second));
-    let Thetas { θ1, θ2 } = *thetas;
     let drift = copy.at_estimate(&form.layers.drift);
     let input = at_s.times(&v̂);
     let mut total: Vec<Expr<'_>> = (0..n)
         .map(|i| graph.expr(drift[i]) + graph.expr(input.node(i, 0)))
         .collect();
 
+    let twice = |θ: &Speed| θ.scaled(graph, 2.0 * θ.value(), 1.0);
     for (row, &state) in form.x11().iter().enumerate() {
-        total[state] = total[state] - 2.0 * θ1 * graph.expr(e1.node(row, 0));
+        total[state] = total[state] - twice(θ1) * graph.expr(e1.node(row, 0));
     }
     // D (9) at s; G at s makes left inverses and products at s
     let at_measured = Form {
@@ -84,15 +115,17 @@ fn derivatives(
     let K = integrators::Chain::new(form.q()).gain;
     for k in 1..=form.q() {
         let correction = Λ2[k - 1].left_divide(&e2);
-        let gain = θ2.powi(k as i32) * K[k - 1];
+        let gain = θ2.value().powi(k as i32) * K[k - 1];
+        let gain = θ2.scaled(graph, gain, k as f64);
         for (row, &state) in form.block(k).iter().enumerate() {
             total[state] = total[state]
                 - gain * graph.expr(correction.node(row, 0))
-                - 2.0 * θ1 * graph.expr(D_e1[k - 1].node(row, 0));
+                - twice(θ1) * graph.expr(D_e1[k - 1].node(row, 0));
         }
     }
     let v_correction = at_measured.G11().left_divide(&e1);
-    total.extend((0..v.len()).map(|j| -(θ1 * θ1) * graph.expr(v_correction.node(j, 0))));
+    let squared = θ1.scaled(graph, -(θ1.value() * θ1.value()), 2.0);
+    total.extend((0..v.len()).map(|j| squared * graph.expr(v_correction.node(j, 0))));
     total.into_iter().map(Expr::node).collect()
 }
 

@@ -66,6 +66,7 @@ pub fn observer(extended: &Extended<'_>, K: &DMatrix<f64>) -> Observer {
         measured,
         monitors: vec![],
         filter: None,
+        tunables: lynkeus_observers::Tunables::default(),
         states: hats.into_iter().map(|hat| (hat, 0.0)).collect(),
     }
 }

@@ -83,6 +83,10 @@ pub(super) struct Options {
     /// Longest step of the integration, in the unit of time, instead of the study's
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
+    /// With --to c or js: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
+    /// anyway
+    #[arg(long)]
+    tunable: bool,
     /// With --to fmu: the version of the standard
     #[arg(long, value_enum, default_value_t, value_name = "VERSION")]
     fmi: Fmi,
@@ -104,6 +108,7 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
             Numbers::F32 => Precision::F32,
         },
         step: options.step,
+        tunable: options.tunable,
     };
     let folder = &options.output;
     if !options.force {

@@ -71,6 +71,7 @@ struct Described {
     signals: Vec<Quantity>,
     estimates: Vec<Quantity>,
     starts: Vec<Quantity>,
+    tunables: Vec<Quantity>,
     units: Vec<Unit>,
     time: String,
 }
@@ -113,11 +114,24 @@ impl Described {
             }
         });
         let starts: Vec<Quantity> = starts.collect();
+        let tunables = made.device.tunables.iter().map(|tunable| {
+            let name = free(&mut taken, tunable.entry.name.clone());
+            Quantity {
+                description: format!(
+                    "{}; what is guaranteed holds for the value at the start only",
+                    tunable.entry.about
+                ),
+                range: [Some(f64::from(f32::MIN_POSITIVE)), None],
+                ..quantity(name, None, tunable.start)
+            }
+        });
+        let tunables = tunables.collect();
         Self {
             units: units(signals.iter().chain(&estimates).chain(&starts)),
             signals,
             estimates,
             starts,
+            tunables,
             time: time(made.prepared.study()),
         }
     }
@@ -128,6 +142,7 @@ impl Described {
             signals: &self.signals,
             estimates: &self.estimates,
             starts: &self.starts,
+            tunables: &self.tunables,
             units: &self.units,
             time: &self.time,
         }

@@ -103,6 +103,7 @@ fn study(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) 
                 .collect(),
         },
         clamp: false,
+        tunable: false,
         values: BTreeMap::from([("initial_variance".to_owned(), Value::Table(variances))]),
     };
     let sensors = setup.experiment.sensors.iter().take(setup.measured);

@@ -42,7 +42,7 @@ pub(super) fn has(command: &str) -> bool {
 }
 
 /// The study without a section.
-fn without(study: &str, section: &str) -> String {
+pub(super) fn without(study: &str, section: &str) -> String {
     let mut is_inside = false;
     let lines = study.lines().filter(|line| {
         if line.starts_with('[') {
@@ -184,7 +184,7 @@ pub(super) fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
     Ok((header, rows.collect(), outcome.ended.is_none()))
 }
 
-fn compiled(folder: &Path, options: &[&str]) {
+pub(super) fn compiled(folder: &Path, options: &[&str]) {
     let code = folder.join("c");
     let mut compiler = Command::new("gcc");
     compiler.args([
@@ -209,10 +209,10 @@ fn compiled(folder: &Path, options: &[&str]) {
     assert!(ended.status.success(), "{}\n{told}", code.display());
 }
 
-fn replayed(folder: &Path) -> Run {
+pub(super) fn replayed(folder: &Path, arguments: &[&str]) -> Run {
     let log = std::fs::File::open(folder.join("log.csv")).unwrap();
     let mut command = Command::new(folder.join("c/replay"));
-    let ended = command.stdin(log).output().unwrap();
+    let ended = command.args(arguments).stdin(log).output().unwrap();
     let told = String::from_utf8_lossy(&ended.stderr);
     assert!(
         !told.contains("runtime error") && !told.contains("Sanitizer"),
@@ -264,7 +264,13 @@ fn is_tame(row: &[f64], first: &[f64]) -> bool {
 fn replayed_by_node(folder: &Folder) -> Run {
     let made = folder.run(&["export", "s.toml", "--to", "js", "-o", "js", "-q"]);
     assert_eq!(made.code, 0, "{}", made.err);
-    folder.write("replay.mjs", REPLAY);
+    replayed_by(folder, "")
+}
+
+/// By the module in `js`, once more is done with its state at the start.
+pub(super) fn replayed_by(folder: &Folder, more: &str) -> Run {
+    let text = REPLAY.replace("const found", &format!("{more}\nconst found"));
+    folder.write("replay.mjs", &text);
     let mut node = Command::new("node");
     let ended = node
         .arg("replay.mjs")
@@ -331,7 +337,7 @@ fn c_gives_what_estimate_gives() {
         compiled(path, checked);
         let study = folder.read("s.toml");
         let expected = expected.unwrap();
-        let off = difference(&expected, &replayed(path), &study);
+        let off = difference(&expected, &replayed(path, &[]), &study);
         assert!(off <= 1e-12, "seed {seed}: {off:e}\n{study}");
         if has_node {
             let (mut expected, mut found) = (expected, replayed_by_node(&folder));
@@ -405,7 +411,7 @@ fn any_name_can_be_exported() {
     assert!(made.err.contains("my____model_.h"), "{}", made.err);
     compiled(folder.path.path(), &[]);
     let expected = estimated(folder.path.path()).unwrap();
-    let off = difference(&expected, &replayed(folder.path.path()), "");
+    let off = difference(&expected, &replayed(folder.path.path(), &[]), "");
     assert!(off <= 1e-12, "{off:e}");
 }
 

@@ -29,6 +29,7 @@ mod results;
 mod runs;
 mod story;
 mod tables;
+mod tunable;
 mod tune;
 
 use std::path::{Path, PathBuf};

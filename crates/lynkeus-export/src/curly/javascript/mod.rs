@@ -26,12 +26,13 @@ const OWN: [(&str, &str); 3] = [
 ];
 
 /// Numbers of the words for what happened, as in C.
-const WORDS: [(&str, usize); 9] = [
+const WORDS: [(&str, usize); 10] = [
     ("TIME", 1),
     ("INPUT", 2),
     ("INTERVAL", 3),
     ("DIVERGED", 4),
     ("NOT_FINITE", 5),
+    ("TUNING", 6),
     ("MISSING", 0),
     ("TAKEN", 1),
     ("REJECTED", 2),

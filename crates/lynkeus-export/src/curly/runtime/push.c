@@ -5,6 +5,12 @@ static int take(STATE *s, double t, const real *signals, real *estimates)
     if (!isfinite(t) || (s->started && t < s->time)) {
         return TIME;
     }
+//? tunable
+    code = tuned(s);
+    if (code != 0) {
+        return code;
+    }
+//?
     if (!s->started) {
         for (int i = SENSORS; i < SIGNALS; i++) {
             if (!isfinite(signals[i])) {

@@ -1,6 +1,12 @@
 /* Replays a log through the estimator: a table with a column t (time, where a signal is called t)
    and one for each signal, comma separated, from standard input; estimates to standard output. An
+//? tunable
+   empty cell is a sensor that did not report. Arguments NAME=VALUE change numbers of the estimator
+   before the first row. */
+//?
+//? !tunable
    empty cell is a sensor that did not report. */
+//?
 #include "@NAME@.h"
 
 #include <ctype.h>
@@ -70,8 +76,29 @@ static int number(int place, int count, double *value)
     return end != cells[place] && *end == '\0';
 }
 
+//? tunable
+/* NAME=VALUE; 0 where there is no such name, or no value. */
+static int changed(@NAME@_state *s, const char *argument)
+{
+    const char *value = strrchr(argument, '=');
+    for (int i = 0; value != NULL && i < @CAPITALS@_TUNABLES; i++) {
+        const size_t length = strlen(@NAME@_tunable_names[i]);
+        if (length == (size_t)(value - argument) && strncmp(argument, @NAME@_tunable_names[i], length) == 0) {
+            char *end = NULL;
+            s->tuning[i] = (@REAL@)strtod(value + 1, &end);
+            return end != value + 1;
+        }
+    }
+    return 0;
+}
+
+int main(int argument_count, char **arguments)
+{
+//?
+//? !tunable
 int main(void)
 {
+//?
     static @NAME@_state state;
     int places[@CAPITALS@_SIGNALS];
     @REAL@ signals[@CAPITALS@_SIGNALS];
@@ -111,6 +138,14 @@ int main(void)
     }
     (void)printf("\n");
     @NAME@_init(&state);
+//? tunable
+    for (int i = 1; i < argument_count; i++) {
+        if (!changed(&state, arguments[i])) {
+            (void)fprintf(stderr, "expected NAME=VALUE of a number in @NAME@.h, found %s\n", arguments[i]);
+            return 2;
+        }
+    }
+//?
     while (fgets(line, LONGEST, stdin) != NULL) {
         int code = 0;
         double t = 0.0;

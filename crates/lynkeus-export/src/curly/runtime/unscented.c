@@ -92,7 +92,12 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
     }
     const double span = to - from;
     for (int i = 0; i < STATES; i++) {
+//? tunable
+        extra[i * STATES + i] = sqrt(process_noise[i] * w[INPUTS] * (real)span);
+//?
+//? !tunable
         extra[i * STATES + i] = sqrt(process_noise[i] * (real)span);
+//?
     }
     centre(points, STATES, x);
     root_of_points(points, extra, STATES, root);

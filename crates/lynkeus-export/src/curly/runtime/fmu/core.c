@@ -1,4 +1,4 @@
-/* Value references: time, the signals, the estimates, the starts. */
+/* Value references: time, the signals, the estimates, the starts, then what may be changed. */
 enum {
     SIGNALS = @CAPITALS@_SIGNALS,
     SENSORS = @SENSORS@,
@@ -7,7 +7,14 @@ enum {
     FIRST_SIGNAL = 1,
     FIRST_ESTIMATE = FIRST_SIGNAL + SIGNALS,
     FIRST_START = FIRST_ESTIMATE + ESTIMATES,
+//? tunable
+    TUNABLES = @CAPITALS@_TUNABLES,
+    FIRST_TUNABLE = FIRST_START + STARTS,
+    VALUES = FIRST_TUNABLE + TUNABLES
+//?
+//? !tunable
     VALUES = FIRST_START + STARTS
+//?
 };
 
 /* Before inputs are given. */
@@ -19,6 +26,9 @@ typedef struct {
     @NAME@_state now;          /* with that of the communication point, once it is settled */
     double time;               /* the communication point */
     double starts[STARTS];
+//? tunable
+    double tuning[TUNABLES];   /* from the communication point on */
+//?
     @REAL@ signals[SIGNALS];
     @REAL@ estimates[ESTIMATES];
     int is_given;              /* whether inputs have been given at this point */
@@ -37,6 +47,11 @@ static void begin(course *c)
     for (int i = 0; i < STARTS; i++) {
         c->starts[i] = (double)c->past.x[i];
     }
+//? tunable
+    for (int i = 0; i < TUNABLES; i++) {
+        c->tuning[i] = (double)c->past.tuning[i];
+    }
+//?
     c->is_given = 1;
 }
 
@@ -78,6 +93,11 @@ static int step(course *c, double from, double to)
         return code;
     }
     c->past = c->now;
+//? tunable
+    for (int i = 0; i < TUNABLES; i++) {
+        c->past.tuning[i] = (@REAL@)c->tuning[i];
+    }
+//?
     c->time = to;
     c->is_given = 0;
     c->is_settled = 0;
@@ -89,6 +109,12 @@ static int read_value(course *c, uint32_t reference, double *value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
+//? tunable
+    if (reference >= FIRST_TUNABLE) {
+        *value = c->tuning[reference - FIRST_TUNABLE];
+        return 0;
+    }
+//?
     if (reference >= FIRST_START) {
         *value = c->starts[reference - FIRST_START];
     } else if (reference >= FIRST_ESTIMATE) {
@@ -110,6 +136,15 @@ static int write_value(course *c, uint32_t reference, double value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
+//? tunable
+    if (reference >= FIRST_TUNABLE) {
+        if (!((@REAL@)value > 0) || !isfinite((@REAL@)value)) {
+            return NOT_POSITIVE;
+        }
+        c->tuning[reference - FIRST_TUNABLE] = value;
+        return 0;
+    }
+//?
     if (reference >= FIRST_START) {
         if (c->is_running) {
             return NOT_NOW;

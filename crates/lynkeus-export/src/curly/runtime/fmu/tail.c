@@ -23,6 +23,8 @@ static const char *reason(int code)
         return "there is no variable of this type with such a value reference";
     case NOT_SETTABLE:
         return "only inputs and start values can be set";
+    case NOT_POSITIVE:
+        return "expected a finite number above 0";
     case NOT_NOW:
         return "this cannot be done in the present mode";
     default:
