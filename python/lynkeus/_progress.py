@@ -21,6 +21,8 @@ def told(progress: Progress, what: str) -> Iterator[Callable[[float], Any] | Non
 
         def heard(fraction: float) -> None:
             nonlocal last
+            if last == 1.0:
+                return  # a run is done before what is said of it
             last = fraction
             progress(fraction)
 

@@ -16,6 +16,7 @@ import pytest
 from tank_study import MODEL, SIMULATE, TEXT, tank
 
 import lynkeus
+from lynkeus import _progress
 
 @pytest.fixture
 def study() -> lynkeus.Study:
@@ -195,6 +196,16 @@ def test_progress_is_told_and_may_raise(study: lynkeus.Study) -> None:
 
     with pytest.raises(Stopped):
         long.replace(simulate={"until": 1e7}).simulate(progress=stop)
+
+
+def test_the_end_is_told_once() -> None:
+    for fractions in ([0.5], [0.5, 1.0], [0.5, 1.0, 1.0]):
+        seen: list[float] = []
+        with _progress.told(seen.append, "work") as tell:
+            for fraction in fractions:
+                assert tell is not None
+                tell(fraction)
+        assert seen == [0.5, 1.0]
 
 
 def test_functions_are_those_of_the_model() -> None:
