@@ -286,6 +286,9 @@ const NAMES = {
 };
 const COLORS = { mean_error: "estimate", mean_error_exact: "truth", mean_error_noise: "reading", held_out_error: "estimate", innovation: "reading" };
 
+// Whether other positions than the knee are nearly as good.
+const isWide = Boolean(compromise?.good) && compromise.good[0] < compromise.good[1];
+
 // The row of the trade-off that the slider stands at; -1 where there is no slider.
 const present = () => data.knob?.positions[chosen.position].place ?? -1;
 
@@ -299,6 +302,19 @@ function scale(values) {
     };
     return least > 0 && most > 4 * least ? { distr: 3, time: false, range: ends } : { time: false };
 }
+
+// 1, 2 and 5 of every decade, or the decades alone where they are many.
+function decades(plot, place, low, high) {
+    const digits = high > 300 * low ? [1] : [1, 2, 5];
+    const found = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
+        found.push(...digits.map((digit) => Number(`${digit}e${power}`)).filter((v) => low <= v && v <= high));
+    }
+    return found;
+}
+
+// An axis of such a scale.
+const along = ({ distr }, label) => ({ ...axis(label), ...(distr === 3 ? { splits: decades, filter: (plot, splits) => splits } : {}) });
 
 const dots = (name) => ({ show: true, size: 5, width: 0, fill: () => color(name) });
 
@@ -318,7 +334,7 @@ function mark(plot, name, draw) {
 function upright(plot) {
     const at = (value) => plot.valToPos(value, "x", true);
     const { ctx, bbox } = plot;
-    if (compromise.good && compromise.good[0] < compromise.good[1]) {
+    if (isWide) {
         const [from, to] = compromise.good.map(at).sort((a, b) => a - b);
         ctx.save();
         ctx.fillStyle = color("band");
@@ -343,10 +359,11 @@ function overPositions() {
     const places = compromise.values.map((_, k) => k).sort((a, b) => compromise.values[a] - compromise.values[b]);
     const pick = (values) => places.map((k) => values[k]);
     const names = Object.keys(compromise.figures);
+    const [x, y] = [scale(compromise.values), scale(Object.values(compromise.figures).flat())];
     const figure = panel("compromise", `error over ${compromise.label}`, "share of the range");
     compromises.push(drawn(figure, {
-        scales: { x: scale(compromise.values), y: scale(Object.values(compromise.figures).flat()) },
-        axes: [axis(compromise.label), axis()],
+        scales: { x, y },
+        axes: [along(x, compromise.label), along(y)],
         series: [{ label: compromise.label, value: shownValue }, ...names.map((name) => line(NAMES[name], COLORS[name], { width: 2, points: dots(COLORS[name]) }))],
         cursor: { drag: { x: false, y: false } },
         hooks: { drawClear: [upright] },
@@ -375,10 +392,11 @@ function against() {
             });
         }
     };
+    const [x, y] = [scale(noise), scale(exact)];
     const figure = panel("compromise", "error without noise over error made by the noise", "shares of the range");
     compromises.push(drawn(figure, {
-        scales: { x: scale(noise), y: scale(exact), position: { auto: true } },
-        axes: [axis("error made by the noise"), axis()],
+        scales: { x, y, position: { auto: true } },
+        axes: [along(x, "error made by the noise"), along(y)],
         series: [
             { label: NAMES.mean_error_noise, value: shownValue },
             line(NAMES.mean_error_exact, "estimate", { paths: joined, points: dots("estimate") }),
@@ -396,7 +414,13 @@ function against() {
 function key() {
     const words = document.createElement("p");
     words.className = "hint key";
-    const entries = [["study", "the study"], ...(data.knob ? [["present", "the slider"]] : []), ["good", "within 10 % of the knee"]];
+    const entries = [["study", "the study"]];
+    if (data.knob) {
+        entries.push(["present", "the slider"]);
+    }
+    if (isWide) {
+        entries.push(["good", "within 10 % of the knee"]);
+    }
     for (const [name, text] of entries) {
         const entry = document.createElement("span");
         entry.className = name;

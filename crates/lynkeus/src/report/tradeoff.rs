@@ -29,6 +29,8 @@ pub(super) struct Tradeoff {
     /// a row for each of them, or why there are none
     sweep: Result<Sweep, Error>,
     is_filter: bool,
+    /// of a simulation everything is known, of a log what it holds
+    has_truth: bool,
     /// samples that are judged, where the log has more
     first: Option<usize>,
 }
@@ -60,6 +62,7 @@ impl Tradeoff {
             },
             positions,
             is_filter: design.observer.filter.is_some(),
+            has_truth: matches!(ground, Ground::Simulation { .. }),
             first: match ground {
                 Ground::Log(table) => Some(slider::ROWS).filter(|most| table.rows() > *most),
                 Ground::Simulation { .. } => None,
@@ -104,12 +107,12 @@ impl Tradeoff {
             }
         };
         if let Some(knee) = sweep.chosen() {
-            html.element("p", &self.how_to_read(sweep));
+            html.element("p", &self.how_to_read());
             html.element("p", &best(sweep, knee));
             html.raw("<div id=\"compromise\"></div>");
         }
         self.table(html, sweep);
-        html.element("p class=\"hint\"", self.definitions(sweep));
+        html.element("p class=\"hint\"", self.definitions());
         let first = self
             .first
             .map(|first| format!("judged on the first {first} samples"));
@@ -122,34 +125,32 @@ impl Tradeoff {
         }
     }
 
-    fn how_to_read(&self, sweep: &Sweep) -> String {
-        let faster = match self.is_filter {
-            true => "With more process noise a filter trusts its readings more: it",
-            false => "A faster observer",
+    fn how_to_read(&self) -> String {
+        let faster = if self.is_filter {
+            "With more process noise a filter trusts its readings more: it"
+        } else {
+            "A faster observer"
         };
-        let read = match sweep.measures.first().map(|m| m.name) {
-            Some("mean_error") => {
-                "Each point is a position of the slider: the further down, the nearer to the truth it would be without noise; the further left, the less noise it passes on. At the knee the error that is left with both is least."
-            }
-            _ => {
-                "A log has no truth: each position is judged by how well it foretells samples that it is not shown. At the knee that error is least."
-            }
+        let read = if self.has_truth {
+            "Each point is a position of the slider: the further down, the nearer to the truth it would be without noise; the further left, the less noise it passes on. At the knee the error that is left with both is least."
+        } else {
+            "A log has no truth: each position is judged by how well it foretells samples that it is not shown. At the knee that error is least."
         };
         format!("{faster} follows sooner and passes on more noise. {read}")
     }
 
-    fn definitions(&self, sweep: &Sweep) -> &'static str {
-        match (sweep.measures.first().map(|m| m.name), self.is_filter) {
-            (Some("mean_error"), false) => {
+    fn definitions(&self) -> &'static str {
+        match (self.has_truth, self.is_filter) {
+            (true, false) => {
                 "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, in the study's simulation with noise, without it, and their difference: the figures of lynkeus tune."
             }
-            (Some("mean_error"), true) => {
+            (true, true) => {
                 "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, on samples of the study's simulation with noise, without it, and their difference: the figures that lynkeus tune has for observers."
             }
-            (_, false) => {
+            (false, false) => {
                 "Errors are root mean squares, as shares of each reading's range: the figures of lynkeus tune --log."
             }
-            (_, true) => {
+            (false, true) => {
                 "Errors are root mean squares, as shares of each reading's range, as lynkeus tune --log has them for observers."
             }
         }
@@ -215,7 +216,7 @@ fn best(sweep: &Sweep, knee: &Row) -> String {
         format!("; from {low} to {high} it is within 10 % of that")
     });
     format!(
-        "The knee is at {} {sign}{}: {title} {least}{}.",
+        "The knee is at {} {sign}{} ({title}: {least}){}.",
         swept(sweep),
         at.unwrap_or_default(),
         good.unwrap_or_default()
