@@ -89,7 +89,7 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
         "outputs",
         &report,
         &arguments,
-        &[y.clone()],
+        std::slice::from_ref(&y),
     )?);
     let parts = [system.derivative_tape(), system.output_tape()].map(Part::all);
     // a condition of a linear system has a derivative where it is spelled out
