@@ -110,6 +110,7 @@ impl Code {
 
     /// How the outputs change along a direction: the product of their Jacobian with it, by the rules
     /// of differentiation. Its inputs are those of the code, then the direction, an entry for each.
+    /// The condition of a linear system counts as constant where it is not spelled out.
     #[must_use]
     pub fn along(&self) -> Self {
         let graph = self.graph.clone();

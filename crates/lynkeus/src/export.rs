@@ -1,4 +1,4 @@
-//! A study's estimator as source code for other machines.
+//! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
 use std::path::Path;
 
@@ -93,12 +93,19 @@ pub struct Export {
 
 /// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
-/// enough for the fastest mode at the start is taken, and told.
+/// enough for the fastest mode at the start is taken, and told. With another [`Subject`], and of a bare
+/// model, the plant or the observer in continuous time for simulators ([`Target::Fmu`]).
 ///
 /// # Errors
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
+    match options.subject {
+        None if study.is_bare() => return continuous::plant(study, options),
+        Some(Subject::Plant) => return continuous::plant(study, options),
+        Some(Subject::Observer) => return continuous::observer(study, options),
+        None | Some(Subject::Estimator) => {}
+    }
     #[cfg(feature = "tune")]
     if options.to == Target::Html {
         if options.tunable {
@@ -106,13 +113,6 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
             return Err(Error::input(message));
         }
         return page(study, options.step);
-    }
-    match options.subject {
-        None if study.is_bare() => return continuous::export(study, Subject::Plant, options),
-        Some(subject @ (Subject::Plant | Subject::Observer)) => {
-            return continuous::export(study, subject, options);
-        }
-        None | Some(Subject::Estimator) => {}
     }
     let mut notes = vec![];
     let study = &causal(study, &mut notes);

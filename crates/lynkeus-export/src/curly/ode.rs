@@ -9,8 +9,8 @@ use super::function::{Arguments, Entry, Target, draft};
 use super::language::Language;
 use super::machine::{Machine, code, refuse_jumps};
 use super::template::exchanged;
-use crate::Refusal;
-use crate::code::Part;
+use crate::code::{Part, Solver};
+use crate::{Code, Refusal};
 
 const ADVANCE: &str = include_str!("runtime/ode.c");
 const INTERFACE: &str = include_str!("runtime/ode_interface.c");
@@ -89,12 +89,11 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
         "outputs",
         &report,
         &arguments,
-        &[y.clone()],
+        std::slice::from_ref(&y),
     )?);
-    let all = code(&[
-        Part::all(system.derivative_tape()),
-        Part::all(system.output_tape()),
-    ])?;
+    let parts = [system.derivative_tape(), system.output_tape()].map(Part::all);
+    // a condition of a linear system has a derivative where it is spelled out
+    let all = Code::of_parts(&parts, Solver::Plain)?;
     machine.add(&draft(
         "How both change along a direction, which is at the end of w: of time, x and the inputs.",
         "along",

@@ -24,7 +24,7 @@ sd = true
 "#;
 
 /// Files by name, read from the central directory on.
-fn unpacked(archive: &[u8]) -> BTreeMap<String, Vec<u8>> {
+pub(super) fn unpacked(archive: &[u8]) -> BTreeMap<String, Vec<u8>> {
     let two = |at: usize| usize::from(u16::from_le_bytes(archive[at..at + 2].try_into().unwrap()));
     let four = |at: usize| u32::from_le_bytes(archive[at..at + 4].try_into().unwrap()) as usize;
     let end = archive.len() - 22;
@@ -55,12 +55,12 @@ fn export(folder: &Folder, study: &str, to: &str, more: &[&str]) -> BTreeMap<Str
     unpacked(&std::fs::read(folder.path.path().join(to).join("twotanks.fmu")).unwrap())
 }
 
-fn text(files: &BTreeMap<String, Vec<u8>>, name: &str) -> String {
+pub(super) fn text(files: &BTreeMap<String, Vec<u8>>, name: &str) -> String {
     String::from_utf8(files[name].clone()).unwrap()
 }
 
 /// The variables with what each says, in the order of their value references.
-fn variables(description: &str) -> Vec<(String, String)> {
+pub(super) fn variables(description: &str) -> Vec<(String, String)> {
     let lines = description.split("<ModelVariables>").nth(1).unwrap();
     let lines = lines.split("</ModelVariables>").next().unwrap();
     let named = lines.split(" name=\"").skip(1).enumerate();

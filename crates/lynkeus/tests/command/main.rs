@@ -9,6 +9,7 @@ mod families;
 mod faulty;
 mod filters;
 mod fmu;
+mod fmu_equations;
 mod hostile;
 mod how_well;
 mod limits;

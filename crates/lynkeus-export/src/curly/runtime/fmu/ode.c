@@ -84,15 +84,15 @@ static int write_value(course *c, uint32_t reference, double value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
-    if (reference >= FIRST_INPUT && reference < FIRST_STATE) {
-        c->inputs[reference - FIRST_INPUT] = value;
-    } else if (reference >= FIRST_STATE && reference < FIRST_DERIVATIVE) {
-        if (c->is_running) {
-            return NOT_NOW;
-        }
-        c->states[reference - FIRST_STATE] = value;
-    } else {
+    if (reference >= FIRST_DERIVATIVE || reference < FIRST_INPUT) {
         return NOT_SETTABLE;
+    }
+    if (reference < FIRST_STATE) {
+        c->inputs[reference - FIRST_INPUT] = value;
+    } else if (c->is_running) {
+        return NOT_NOW;
+    } else {
+        c->states[reference - FIRST_STATE] = value;
     }
     c->is_settled = 0;
     return 0;

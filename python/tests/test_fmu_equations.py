@@ -1,0 +1,301 @@
+"""FMUs of plants and of observers in continuous time, run by FMPy: what ``lynkeus simulate`` gives."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conftest import ROOT
+from test_fmu import run, table
+
+fmpy = pytest.importorskip("fmpy")
+fmi2 = pytest.importorskip("fmpy.fmi2")
+fmi3 = pytest.importorskip("fmpy.fmi3")
+validation = pytest.importorskip("fmpy.validation")
+
+pytestmark = pytest.mark.skipif(
+    not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="there is no C compiler"
+)
+
+Array = np.ndarray[Any, Any]
+
+STAIRS = 16
+"""How often the inputs of a run jump; between two jumps they stay, as in co-simulation."""
+
+STUDIES = sorted((ROOT / "examples").glob("*/*.toml"))
+PLANTS = {study.parent / tomllib.loads(study.read_text())["plant"]: study for study in STUDIES}
+NAMES = [model.relative_to(ROOT).as_posix() for model in PLANTS]
+
+
+def export(command: Path, folder: Path, source: Path, *options: str) -> Path:
+    folder.mkdir(exist_ok=True)
+    run(command, folder, "export", str(source), "--to", "fmu", "-o", "fmu", "--force", *options)
+    (file,) = (folder / "fmu").glob("*.fmu")
+    assert validation.validate_fmu(str(file)) == []
+    return file
+
+
+def simulated(command: Path, folder: Path, study: Path, changes: dict[str, str]) -> dict[str, Array]:
+    """The columns of a study whose ``[simulate]`` has other keys, and whose sensors have no noise."""
+    before, _, rest = study.read_text().partition("[simulate]\n")
+    assert "\nnoise = " not in rest
+    lines, *others = rest.split("\n[")
+    kept = [line for line in lines.splitlines() if line.split(" = ")[0] not in changes]
+    kept += [f"{key} = {value}" for key, value in changes.items()]
+    before = re.sub(r"(?m)^noise = .*$", "", before)
+    (folder / "changed.toml").write_text("\n[".join([before + "[simulate]\n" + "\n".join(kept), *others]))
+    shutil.copy(study.parent / tomllib.loads(before)["plant"], folder)
+    run(command, folder, "simulate", "changed.toml", "-q", "-o", "run.csv")
+    columns = table(folder / "run.csv")
+    # whole steps, also of a run that the observer ends early
+    rows = len(columns["t"]) // 2 * 2 - 1
+    return {column: values[:rows] for column, values in columns.items()}
+
+
+def stairs(study: Path) -> tuple[float, dict[str, str]]:
+    """How long a step of the inputs is, and ``[simulate]`` with such steps and two rows for each."""
+    settings = tomllib.loads(study.read_text())["simulate"]
+    length = settings["until"] / STAIRS
+    held = re.compile(r"\btime\b")
+    written = {
+        name: repr(str(value)).replace("'", '"')
+        for name, value in settings.get("inputs", {}).items()
+    }
+    inputs = ", ".join(
+        f"{name} = " + held.sub(f"({length}*floor(time/{length}))", value) for name, value in written.items()
+    )
+    return length, {"inputs": f"{{ {inputs} }}", "output_step": repr(length / 2)}
+
+
+def signals(model: Any, columns: dict[str, Array]) -> Array | None:
+    """Inputs for FMPy that are in each step what they are in its middle."""
+    names = [v.name for v in model.modelVariables if v.causality == "input"]
+    if not names:
+        return None
+    time = np.repeat(columns["t"][::2], 2)[1:-1]
+    values = [np.repeat(columns[name][1::2], 2) for name in names]
+    return np.array(
+        list(zip(time, *values, strict=True)), dtype=[("time", float), *((name, float) for name in names)]
+    )
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_plant_runs_as_simulate_runs_it(command: Path, tmp_path: Path, name: str, version: int) -> None:
+    model = ROOT / name
+    length, changes = stairs(PLANTS[model])
+    expected = simulated(command, tmp_path, PLANTS[model], changes)
+    options = ["--fmi", str(version), "--step", repr(length / 2000)]
+    file = export(command, tmp_path, model, *options)
+    assert len(expected["t"]) > 6
+    told = fmpy.read_model_description(str(file))
+    assert told.coSimulation is not None and told.modelExchange is not None
+    recorded = [v.name for v in told.modelVariables if v.name in expected and v.causality != "input"]
+    states = [v.derivative.name for v in told.modelVariables if v.derivative]
+    assert set(states) <= set(recorded)
+    starts = {state: expected[state][0] for state in states}
+    for kind in ("CoSimulation", "ModelExchange"):
+        result = fmpy.simulate_fmu(
+            str(file),
+            fmi_type=kind,
+            start_time=expected["t"][0],
+            stop_time=expected["t"][-1],
+            output_interval=length / 16,
+            input=signals(told, expected),
+            output=recorded,
+            start_values=starts,
+            relative_tolerance=1e-10,
+        )
+        for column in recorded:
+            values = [result[column][np.abs(result["time"] - t) < 1e-9 * length][0] for t in expected["t"]]
+            size = np.max(np.abs(expected[column])) or 1.0
+            error = np.max(np.abs(values - expected[column])) / size
+            assert error <= 1e-6, (kind, column)
+
+
+class Equations:
+    """An FMU for model exchange, in either version of the standard, in continuous-time mode."""
+
+    def __init__(self, file: Path) -> None:
+        self.model = fmpy.read_model_description(str(file))
+        is_three = self.model.fmiVersion.startswith("3")
+        variables = self.model.modelVariables
+        self.places = {v.name: v.valueReference for v in variables}
+        derivatives = [v for v in variables if v.derivative]
+        self.derivatives = [v.name for v in derivatives]
+        self.states = [v.derivative.name for v in derivatives]
+        self.inputs = [v.name for v in variables if v.causality == "input"]
+        self.starts = {v.name: float(v.start) for v in variables if v.start is not None}
+        self.fmu = (fmi3.FMU3Model if is_three else fmi2.FMU2Model)(
+            guid=self.model.guid,
+            unzipDirectory=fmpy.extract(str(file)),
+            modelIdentifier=self.model.modelExchange.modelIdentifier,
+            instanceName="equations",
+        )
+        self.fmu.instantiate()
+        if not is_three:
+            self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        self.fmu.enterContinuousTimeMode()
+        self.read = self.fmu.getFloat64 if is_three else self.fmu.getReal
+        self.write = self.fmu.setFloat64 if is_three else self.fmu.setReal
+
+    def get(self, names: list[str]) -> Array:
+        return np.array(self.read([self.places[name] for name in names]))
+
+    def at(self, time: float, states: Array, inputs: Array) -> None:
+        self.fmu.setTime(time)
+        self.fmu.setContinuousStates((ctypes.c_double * len(states))(*states), len(states))
+        self.write([self.places[name] for name in self.inputs], list(inputs))
+
+    def along(self, unknowns: list[str], knowns: list[str], seed: Array) -> Array:
+        places = [[self.places[name] for name in names] for names in (unknowns, knowns)]
+        return np.array(self.fmu.getDirectionalDerivative(*places, list(seed)))
+
+    def close(self) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+def inside(model: Any, name: str, random: np.random.Generator) -> float:
+    """A value of a variable that is off its start, within its range."""
+    (variable,) = (v for v in model.modelVariables if v.name == name)
+    value = float(variable.start) * (1 + 0.1 * random.uniform()) + 0.05 * random.uniform()
+    low, high = (float(v) if v is not None else None for v in (variable.min, variable.max))
+    return float(np.clip(value, low, high)) if low is not None or high is not None else value
+
+
+def jacobian(equations: Equations, unknowns: list[str], point: Array) -> Array:
+    """By central differences in time, the states and the inputs."""
+    n = len(equations.states)
+
+    def values(moved: Array) -> Array:
+        equations.at(moved[0], moved[1 : 1 + n], moved[1 + n :])
+        return equations.get(unknowns)
+
+    columns = []
+    for place, value in enumerate(point):
+        step = np.zeros_like(point)
+        step[place] = 1e-5 * max(1.0, abs(value))
+        columns.append((values(point + step) - values(point - step)) / (2 * step[place]))
+    values(point)
+    return np.column_stack(columns)
+
+
+def check_derivatives(file: Path) -> None:
+    """Columns, and the product with a seed, against differences; nothing outside of what is declared."""
+    random = np.random.default_rng(1)
+    equations = Equations(file)
+    outputs = [v.variable.name for v in equations.model.outputs]
+    unknowns = equations.derivatives + outputs
+    knowns = ["time", *equations.states, *equations.inputs]
+    point = np.array([0.7, *(inside(equations.model, name, random) for name in knowns[1:])])
+    expected = jacobian(equations, unknowns, point)
+    found = np.column_stack([equations.along(unknowns, [known], np.ones(1)) for known in knowns])
+    size = np.max(np.abs(expected), axis=1, keepdims=True)
+    assert np.all(np.abs(found - expected) <= 1e-6 * size + 1e-8)
+    seed = random.standard_normal(len(knowns))
+    np.testing.assert_allclose(equations.along(unknowns, knowns, seed), found @ seed, rtol=1e-9, atol=1e-9)
+    declared = {v.variable.name: {d.name for d in v.dependencies} for v in equations.model.outputs}
+    declared |= {v.variable.name: {d.name for d in v.dependencies} for v in equations.model.derivatives}
+    for row, unknown in zip(found, unknowns, strict=True):
+        assert {known for known, slope in zip(knowns, row, strict=True) if slope} <= declared[unknown]
+    with pytest.raises(Exception, match="DirectionalDerivative"):
+        equations.along(["time"], knowns, seed)
+    equations.close()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", NAMES)
+def test_directional_derivatives_are_those_of_the_plant(
+    command: Path, tmp_path: Path, name: str, version: int
+) -> None:
+    check_derivatives(export(command, tmp_path, ROOT / name, "--fmi", str(version)))
+
+
+OBSERVERS: dict[str, dict[str, str]] = {
+    "two-tanks/study.toml": {"pump": "3 + sin(time/50)"},
+    "lee/study.toml": {"u": "2*sin(3*time)"},
+    "farza/study.toml": {"v": "5*sin(5*time)"},
+    "ltaief/study.toml": {
+        "u1": "sin(11*pi*time)",
+        "u2": "cos(11*pi*time)",
+        "u3": "5*cos(2*pi*time)",
+        "e1": "0.1*sin(0.1*pi*time)",
+    },
+    "predator-prey/study.toml": {},
+    "germani-manes/theoretical.toml": {"u": "5 + 2*sin(2*pi*time)"},
+}
+"""Studies of several families, and inputs that are written alike in Modelica and Python."""
+
+SLOPES = {f"u{chr(39) * k}": f"2*(2*pi)**{k}*sin(2*pi*time + {k}*pi/2)" for k in (1, 2, 3)}
+"""Derivatives of the input that the last of these observers reads."""
+
+
+def runge_kutta(slopes: Callable[[float, Array], Array], time: float, x: Array, step: float) -> Array:
+    first = slopes(time, x)
+    second = slopes(time + step / 2, x + step / 2 * first)
+    third = slopes(time + step / 2, x + step / 2 * second)
+    fourth = slopes(time + step, x + step * third)
+    return x + step / 6 * (first + 2 * (second + third) + fourth)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_plant_and_observer_run_together_as_simulate_runs_them(
+    command: Path, tmp_path: Path, name: str, version: int
+) -> None:
+    study, inputs = ROOT / "examples" / name, OBSERVERS[name]
+    until = tomllib.loads(study.read_text())["simulate"]["until"]
+    step = until / 4000
+    given = ", ".join(f'{name} = "{value}"' for name, value in inputs.items())
+    changes = {
+        "inputs": f"{{ {given} }}",
+        "until": repr(step * 400),
+        "output_step": repr(step * 4),
+        "method": '"rk4"',
+        "step": repr(step),
+    }
+    expected = simulated(command, tmp_path, study, changes)
+    changed = tmp_path / "changed.toml"
+    options = ["--fmi", str(version), "--system"]
+    plant = Equations(export(command, tmp_path / "p", changed, *options, "plant"))
+    observer = Equations(export(command, tmp_path / "o", changed, *options, "observer"))
+    known = {name: compile(text, name, "eval") for name, text in (inputs | SLOPES).items()}
+    words = {"sin": np.sin, "cos": np.cos, "pi": np.pi}
+
+    def value(name: str, time: float) -> float:
+        return float(eval(known[name], words | {"time": time}))
+
+    def slopes(time: float, both: Array) -> Array:
+        x, z = np.split(both, [len(plant.states)])
+        plant.at(time, x, np.array([value(name, time) for name in plant.inputs]))
+        measured = {name: plant.get([name])[0] for name in observer.inputs if name in plant.places}
+        of = [value(name, time) if name in known else measured[name] for name in observer.inputs]
+        observer.at(time, z, np.array(of))
+        return np.concatenate([plant.get(plant.derivatives), observer.get(observer.derivatives)])
+
+    both = np.array([e.starts[state] for e in (plant, observer) for state in e.states])
+    told = [v.variable.name for v in observer.model.outputs]
+    assert {f"{state}_hat" for state in plant.states} <= set(told)
+    for row, time in enumerate(expected["t"]):
+        slopes(time, both)
+        for names, values in ((plant.states, both), (told, observer.get(told))):
+            for column, found in zip(names, values, strict=False):
+                size = np.max(np.abs(expected[column])) or 1.0
+                assert abs(found - expected[column][row]) <= 1e-9 * size, (column, time)
+        for k in range(4):
+            both = runge_kutta(slopes, time + k * step, both, step)
+    plant.close()
+    observer.close()
+    check_derivatives(tmp_path / "o" / "fmu" / f"{observer.model.modelExchange.modelIdentifier}.fmu")
