@@ -115,3 +115,15 @@ fn what_cannot_be_swept_is_refused_with_its_place() {
             .contains("an entry of one such as")
     );
 }
+
+#[test]
+fn a_slider_has_the_studys_own_value_in_its_middle() {
+    let theta = around(&study("observer = { theta = 3.1234567 }"), 5).unwrap();
+    assert_eq!((theta.values.len(), theta.values[5]), (11, 3.1234567));
+    assert_eq!([theta.values[0], theta.values[10]], [0.7809, 12.49]);
+    let poles = around(&study("observer = { poles = [-2, -3] }"), 5).unwrap();
+    assert_eq!((poles.is_factor, poles.values[5]), (true, 1.0));
+    assert_eq!(around(&study(""), 5), None);
+    let noise = Axis::of_factors("process noise", 100.0, 2);
+    assert_eq!(noise.values, [0.01, 0.1, 1.0, 10.0, 100.0]);
+}
