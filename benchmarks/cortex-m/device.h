@@ -7,7 +7,7 @@
 /* Writes a text. */
 void device_write(const char *text);
 
-/* Instructions since some moment; differences count, below a million. */
+/* Instructions since some moment; differences count, below five million. */
 uint32_t device_instructions(void);
 
 /* Loops of as many instructions as given, at least 8. Returns how many: what the counter must show. */

@@ -74,7 +74,7 @@ class Replay:
         asset = table.column(signals.by)[0].as_py()
         log = {name: ordered.column(name) for name in (signals.time, *signals.read)}
         try:
-            run = Estimation(self.study._core.estimate(log_of(log), None, None))
+            run = Estimation(self.study._core.estimate(log_of(log)))
         except LynkeusError as error:
             nothing = [np.array([np.nan])] * (1 + len(signals.names))
             return self._table(table, asset, nothing, None, str(error))

@@ -51,4 +51,4 @@ class Base:
             elif isinstance(old, dict) and isinstance(change, Mapping):
                 change = {**old, **change}
             study[name] = change
-        return _lynkeus.Study.parse(document(study), self._core.file, plant, choice)
+        return _lynkeus.Study.parse(document(study), self._core.file, plant, choice, self._core)

@@ -24,7 +24,7 @@ Many = list[Any] | dict[Hashable, Any]
 
 @dataclass(frozen=True)
 class Options:
-    """How many runs are made; see :meth:`Study.estimate_each`."""
+    """In what way a batch is run; see :meth:`Study.estimate_each`."""
 
     keep: Keep
     workers: int | None

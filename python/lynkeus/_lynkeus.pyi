@@ -66,8 +66,15 @@ class Study:
     def load(path: str, model: str | None = None) -> Study: ...
     @staticmethod
     def parse(
-        text: str, file: str, plant: tuple[str, str | None] | None = None, model: str | None = None
-    ) -> Study: ...
+        text: str,
+        file: str,
+        plant: tuple[str, str | None] | None = None,
+        model: str | None = None,
+        origin: Study | None = None,
+    ) -> Study:
+        """``origin`` is the study that this is a change of: what it and its other changes have prepared is used
+        where it is the same."""
+
     @property
     def file(self) -> str: ...
     @property

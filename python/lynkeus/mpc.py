@@ -70,8 +70,8 @@ class Estimator:
         that did not report. A call that fails changes nothing but the time."""
         t = self._steps * self._t_step
         self._steps += 1
-        readings = self._given(self._measured, y0)
-        inputs = {} if u0 is None else self._given(self._inputs, u0)
+        readings = self._given("y0", self._measured, y0)
+        inputs = {} if u0 is None else self._given("u0", self._inputs, u0)
         before = self._estimator.snapshot()
         try:
             if self._last is not None and inputs:
@@ -84,8 +84,11 @@ class Estimator:
         self._last = last
         return self.x0
 
-    def _given(self, names: list[str], values: ArrayLike) -> dict[str, float]:
-        given = zip(names, np.ravel(values), strict=True)
+    def _given(self, what: str, names: list[str], values: ArrayLike) -> dict[str, float]:
+        flat = np.ravel(values)
+        if len(flat) != len(names):
+            raise InputError(f"{what}: expected a value for each of {', '.join(names)}, found {len(flat)} values")
+        given = zip(names, flat, strict=True)
         return {name: float(x) for name, x in given if name in self._estimator.signals}
 
     def _take_again(self, last: _Sample, inputs: dict[str, float]) -> None:

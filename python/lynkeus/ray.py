@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import _lynkeus
@@ -44,7 +45,8 @@ def campaign(
 
     Columns are ``seed``, ``error`` (why a run failed, else null) and what ``keep`` makes of a run: by
     default :func:`lynkeus.results.figures`, that is ``credible``, ``refusal`` and ``rms_NAME``; columns of
-    the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. With
+    the run where they are asked for: ``keep=lambda run: {"Zf_hat": run["Zf_hat"]}``. Of a run that
+    failed these are null; a block in which every run failed runs the study as it is to know them. With
     ``errors="raise"`` a run that fails ends the campaign. ``blocks`` is the number of pieces, 200
     where it is left out; ``options`` are those of ``Dataset.map_batches``
     (``num_cpus``, ``concurrency``, …)."""
@@ -84,6 +86,8 @@ def _mapped(
 ) -> Dataset:
     if not items:
         raise InputError("nothing to run: expected at least one seed or change")
+    if blocks is not None and blocks < 1:
+        raise InputError(f"blocks: expected at least 1, found {blocks}")
     given: Any = data.from_items(items, override_num_blocks=min(blocks or _BLOCKS, len(items)))
     mapped: Dataset = given.map_batches(work, batch_format="pyarrow", batch_size=None, **options)
     return mapped
@@ -110,56 +114,62 @@ def _changed(row: Mapping[str, Any]) -> Mapping[str, Any]:
     return change
 
 
+@dataclass(frozen=True, eq=False)
 class _Work:
     """What a worker does with its rows."""
 
-    def __init__(
-        self,
-        study: Study,
-        key: str,
-        change: Callable[[Mapping[str, Any]], Mapping[str, Any]],
-        keep: Keep,
-        errors: Errors,
-        columns: list[tuple[str, Given]] | None,
-    ) -> None:
-        self.study = study
-        self.key = key
-        self.change = change
-        self.keep = keep
-        self.errors = errors
-        self.columns = columns
+    study: Study
+    #: the first column, by which rows are known
+    key: str
+    #: of the study, from a row
+    change: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+    keep: Keep
+    errors: Errors
+    #: of the log, where there is one
+    columns: list[tuple[str, Given]] | None
 
     def __call__(self, batch: Any) -> Any:
         base = Base(self.study._core)
         log = None if self.columns is None else _lynkeus.Log.from_columns(self.columns)
-        return _table(self.key, [self._row(base, log, row) for row in batch.to_pylist()])
+        rows = [self._row(base, log, row) for row in batch.to_pylist()]
+        has_run = any(row["error"] is None for row in rows)
+        return _table(rows, {} if has_run else self._example(log))
 
     def _row(self, base: Base, log: _lynkeus.Log | None, row: Mapping[str, Any]) -> dict[str, Any]:
         told = {self.key: row[self.key], "error": None}
         try:
-            kept = self.keep(_run(base.changed(self.change(row)), log))
+            return {**told, **self._kept(base.changed(self.change(row)), log)}
         except LynkeusError as error:
             if self.errors == "raise":
                 raise
             return {**told, "error": str(error)}
+
+    def _kept(self, study: _lynkeus.Study, log: _lynkeus.Log | None) -> Mapping[str, Any]:
+        kept = self.keep(_run(study, log))
         if not isinstance(kept, Mapping):
-            raise InputError(f"keep: expected a dictionary, the row's columns by name, found {kept!r}")
-        return {**told, **kept}
+            raise TypeError(f"keep: expected a dictionary, the row's columns by name, found {kept!r}")
+        return kept
+
+    def _example(self, log: _lynkeus.Log | None) -> Mapping[str, Any]:
+        """What is kept of the study as it is: blocks in which every run failed have its columns, as
+        the others do."""
+        try:
+            return self._kept(self.study._core, log)
+        except LynkeusError:
+            return {}
 
 
 def _run(study: _lynkeus.Study, log: _lynkeus.Log | None) -> Run:
     return Simulation(study.simulate()) if log is None else Estimation(study.estimate(log))
 
 
-def _table(key: str, rows: list[dict[str, Any]]) -> Any:
+def _table(rows: list[dict[str, Any]], example: Mapping[str, Any]) -> Any:
     """Rows as a table of Arrow in which texts are texts even where all are null, and in which what a
-    failed run lacks is null."""
+    failed run lacks is null, of the kind that it has in ``example``."""
     arrow = needed("pyarrow", "lynkeus.ray")
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    texts = {"error", "refusal"}
+    names = list(dict.fromkeys(name for row in [*rows, example] for name in row))
+    kinds = {name: arrow.array([value]).type for name, value in example.items()}
+    kinds |= {"error": arrow.string(), "refusal": arrow.string()}
     return arrow.table(
-        {
-            name: arrow.array([row.get(name) for row in rows], arrow.string() if name in texts else None)
-            for name in names
-        }
+        {name: arrow.array([row.get(name) for row in rows], kinds.get(name)) for name in names}
     )

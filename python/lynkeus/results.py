@@ -222,7 +222,14 @@ class Run(Table):
         each, or into a new figure; these axes are returned. ``truth`` is a log with true values in
         columns by the quantities' names, one for each row of the run."""
         panels, time = self._panels(names, {} if truth is None else self._truth(truth))
-        return _plot.draw(panels, self.t, time, ax)
+        axes = _plot.draw(panels, self.t, time, ax)
+        for each in axes if self._is_logarithmic else ():
+            each.set_xscale("log")
+            each.set_yscale("log")
+        return axes
+
+    #: whether both axes of its picture are
+    _is_logarithmic = False
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
         return _plot.of_run(self, names, truth)
@@ -265,20 +272,9 @@ class Sweep(Table):
 
 
 class HowWell(Run):
-    """Standard errors over the horizon."""
+    """Standard errors over the horizon; drawn with both axes logarithmic."""
 
-    def plot(
-        self,
-        ax: Axes | Sequence[Axes] | None = None,
-        names: Sequence[str] | None = None,
-        truth: Any = None,
-    ) -> list[Axes]:
-        """The standard errors over the horizon, both axes logarithmic."""
-        axes = super().plot(ax, names, truth)
-        for each in axes:
-            each.set_xscale("log")
-            each.set_yscale("log")
-        return axes
+    _is_logarithmic = True
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:
         return _plot.of_precision(self, names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import threading
 import time
@@ -95,6 +96,19 @@ def test_a_sweep_is_a_loop_over_changes(study: lynkeus.Study, logs: list[dict[st
     assert kept == [study.replace(**change).simulate()["inflow_hat"][-1] for change in seeds(3)]
     with pytest.raises(lynkeus.InputError, match="nix"):
         study.sweep([{"observer": {"nix": 1}}])
+
+
+def test_what_is_prepared_once_gives_what_each_gives_alone(study: lynkeus.Study) -> None:
+    """A copy by pickle has prepared nothing."""
+    changes: list[dict[str, Any]] = [*seeds(3), {"noise": {"y": 0.05}}, {"simulate": {"initial": {"level": 5}}}]
+    changes += [{"simulate": {"spread": {"level": 1.0}, "seed": 3}}, {"observer": {"theta": 3.0}}]
+    changes += [{"observer": {"family": "ekf", "theta": None}, "process_noise": {"inflow": 0.01, "level": 1e-6}}]
+    alone = [pickle.loads(pickle.dumps(study.replace(**change))) for change in changes]
+    for other, run in zip(alone, study.sweep(changes, workers=1), strict=True):
+        same(run, other.simulate())
+    log = study.simulate().log
+    for other, run in zip(alone, study.sweep(changes, log, workers=1), strict=True):
+        same(run, other.estimate(log))
 
 
 def test_an_exception_of_keep_names_its_log(study: lynkeus.Study, logs: list[dict[str, Any]]) -> None:

@@ -18,6 +18,9 @@ from lynkeus.results import figures
 ray = pytest.importorskip("ray", reason="skipped: ray is not installed")
 data = pytest.importorskip("ray.data")
 
+pytestmark = pytest.mark.filterwarnings("ignore")  # Ray's own
+
+
 @pytest.fixture(scope="module", autouse=True)
 def cluster() -> Iterator[None]:
     os.environ["RAY_worker_niceness"] = "0"  # at Ray's 15 a busy machine takes minutes
@@ -56,6 +59,25 @@ def test_columns_and_failures(study: lynkeus.Study) -> None:
     assert replayed[0]["last"] == study.replace(**changes[0]).estimate(log)["inflow_hat"][-1]
 
 
+def test_a_block_in_which_every_run_failed_has_the_columns(study: lynkeus.Study) -> None:
+    changes: list[dict[str, Any]] = [{"observer": {"theta": 2.0}}, {"observer": {"nix": 1}}, {"nix": 1}]
+
+    def kept(run: lynkeus.Run) -> dict[str, Any]:
+        return {"inflow_hat": run["inflow_hat"], "rows": len(run), "refusal": None}
+
+    for keep in (figures, kept):
+        dataset = lynkeus.ray.sweep(study, changes, keep=keep, blocks=3)
+        found = ordered(dataset, "place")
+        names = ["place", "error", *keep(study.simulate())]
+        assert [list(row) for row in found] == [names] * 3
+        assert all(row[name] is None for row in found[1:] for name in names[2:]) and found[1]["error"]
+        frame = dataset.to_pandas()
+        assert list(frame.columns) == names and frame["error"].notna().sum() == 2
+    # of a study that fails itself nothing is known
+    rows = ordered(lynkeus.ray.sweep(study.replace(observer={"theta": -1.0}), changes[1:], blocks=1), "place")
+    assert [list(row) for row in rows] == [["place", "error"]] * 2
+
+
 def test_a_log_with_texts_and_dates(study: lynkeus.Study) -> None:
     times = np.datetime64("2026-11-22T01:02:03") + np.arange(41) * np.timedelta64(500, "ms")
     log = {"t": times, "y": 4.0 + 0.1 * np.sin(np.arange(41.0)), "note": ["a"] * 41}
@@ -90,3 +112,5 @@ def test_what_is_asked_for_wrongly(study: lynkeus.Study) -> None:
         lynkeus.ray.campaign(study, [1.5])  # type: ignore[list-item]
     with pytest.raises(lynkeus.InputError, match="nothing to run"):
         lynkeus.ray.campaign(study, [])
+    with pytest.raises(lynkeus.InputError, match="blocks: expected at least 1, found 0"):
+        lynkeus.ray.campaign(study, range(3), blocks=0)

@@ -70,6 +70,18 @@ pub enum Refusal {
         /// what was expected
         error: String,
     },
+    /// A draft that is none: a defect of this crate.
+    #[error(
+        "internal error: line {line} of the draft: expected {expected}, found `{found}`; please report this"
+    )]
+    Draft {
+        /// line of the draft, from 1 on
+        line: usize,
+        /// what should stand there
+        expected: String,
+        /// what does
+        found: String,
+    },
     /// An operation that the language has not.
     #[error("{language} has no way to write {operation}")]
     Lacks {

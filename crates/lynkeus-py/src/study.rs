@@ -1,11 +1,14 @@
 //! Studies, and what is asked of them.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
-use lynkeus::{CheckOptions, Error, ExportOptions, FmiVersion, Precision, Subject, Target};
+use lynkeus::{
+    CheckOptions, Error, ExportOptions, FmiVersion, Precision, Runner, Runners, Subject, Target,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -23,6 +26,10 @@ use crate::sections;
 pub struct Study {
     study: lynkeus::Study,
     text: String,
+    /// its own plant and observer, made when first run
+    runner: Arc<Runner>,
+    /// those of the studies that were made from the same one
+    runners: Arc<Runners>,
 }
 
 /// The JSON Schema of study files.
@@ -40,19 +47,21 @@ impl Study {
     fn load(py: Python<'_>, path: PathBuf, model: Option<String>) -> PyResult<Self> {
         let whole = py.detach(|| Whole::load(&path, model));
         let Whole { study, text } = whole.map_err(|e| exception(&e))?;
-        Ok(Self { study, text })
+        Ok(Self::new(study, text, Arc::default()))
     }
 
     /// A study's text; `file` names it in messages. `plant` is the name of the model, and its text
-    /// where that is no file.
+    /// where that is no file. What `origin` and its other changes have prepared is used where it is
+    /// the same.
     #[staticmethod]
-    #[pyo3(signature = (text, file, plant=None, model=None))]
+    #[pyo3(signature = (text, file, plant=None, model=None, origin=None))]
     fn parse(
         py: Python<'_>,
         text: String,
         file: &str,
         plant: Option<(PathBuf, Option<String>)>,
         model: Option<String>,
+        origin: Option<PyRef<'_, Self>>,
     ) -> PyResult<Self> {
         let parsed = py.detach(|| lynkeus::Study::parse(&text, file));
         let mut study = parsed.map_err(|e| exception(&e))?;
@@ -61,7 +70,8 @@ impl Study {
             study.plant_text = text.map(Into::into);
         }
         study.model = model.or(study.model);
-        Ok(Self { study, text })
+        let runners = origin.map(|origin| Arc::clone(&origin.runners));
+        Ok(Self::new(study, text, runners.unwrap_or_default()))
     }
 
     #[getter]
@@ -165,7 +175,9 @@ impl Study {
         memory_limit: f64,
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
-        let outcome = self.ask(py, &terms, |study, watch| lynkeus::simulate(study, watch))?;
+        let outcome = self.ask(py, &terms, |study, watch| {
+            self.runner.simulate(study, watch)
+        })?;
         Ok(self.ran(outcome, true))
     }
 
@@ -196,7 +208,7 @@ impl Study {
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
         let outcome = self.ask(py, &terms, |study, watch| {
-            lynkeus::estimate(study, &log.table, watch)
+            self.runner.estimate(study, &log.table, watch)
         })?;
         Ok(self.ran(outcome, false))
     }
@@ -303,6 +315,15 @@ impl Study {
 }
 
 impl Study {
+    fn new(study: lynkeus::Study, text: String, runners: Arc<Runners>) -> Self {
+        Self {
+            runner: runners.of(&study),
+            study,
+            text,
+            runners,
+        }
+    }
+
     /// Does something with the study, away from the interpreter.
     fn ask<T: Send>(
         &self,

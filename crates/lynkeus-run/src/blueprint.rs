@@ -45,6 +45,15 @@ impl Blueprint {
         }
     }
 
+    /// What runs between samples.
+    #[must_use]
+    pub fn flow(&self) -> &System {
+        match self {
+            Self::Sampled { observer, .. } => &observer.system,
+            Self::Filter { model, .. } => model.flow(),
+        }
+    }
+
     /// How it is integrated.
     #[must_use]
     pub fn method(&self) -> Method {
@@ -70,10 +79,7 @@ impl Blueprint {
 /// equations have no slopes there.
 #[must_use]
 pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
-    let system: &System = match blueprint {
-        Blueprint::Sampled { observer, .. } => &observer.system,
-        Blueprint::Filter { model, .. } => model.flow(),
-    };
+    let system = blueprint.flow();
     let mut evaluation = system.evaluation();
     for (name, signal) in system.signals().iter().zip(evaluation.signals_mut()) {
         let given = inputs.iter().find(|(input, _)| input == name);

@@ -216,6 +216,12 @@ impl System {
         self.code.modes
     }
 
+    /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
+    /// which an integration stops.
+    pub fn has_instants(&self) -> bool {
+        !self.code.switches.is_empty()
+    }
+
     /// An evaluator with its own working memory, signals at zero.
     pub fn evaluation(&self) -> Evaluation {
         Evaluation::new(self)

@@ -125,6 +125,21 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
     }))
 }
 
+/// Whether the decision follows from plant, sensors and tuning alone: every family was examined to its
+/// end, and no key that is missing was looked for in simulations, which depend on seed and noise.
+pub(crate) fn is_fixed(prepared: &Prepared<'_>) -> bool {
+    let is_lacking = |examination: &Examination| {
+        examination.has_theorem()
+            && examination.fit() != Standing::Refuted
+            && lacked_speed(prepared, examination).is_some()
+    };
+    let is_asked_for_gain = is_certified_gain(&prepared.study().observer.tuning);
+    prepared.examinations().is_ok_and(|examinations| {
+        let is_whole = examinations.iter().all(|e| e.spent().is_none());
+        is_whole && (is_asked_for_gain || !examinations.iter().any(is_lacking))
+    })
+}
+
 fn chosen(
     examination: &Examination,
     grounds: Grounds,

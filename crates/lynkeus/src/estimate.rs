@@ -52,7 +52,8 @@ pub fn estimate_resumed(
         watch,
         checkpoint: Some(checkpoint),
     };
-    watched(&Prepared::new(study, &plant)?, table, watch)
+    let prepared = Prepared::new(study, &plant)?;
+    watched(&prepared, prepared.design()?, table, watch)
 }
 
 /// The replay of a study that is prepared.
@@ -61,13 +62,27 @@ pub(crate) fn estimated(
     table: &Table,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    watched(prepared, table, Watch::only(watch))
+    with_design(prepared, prepared.design()?, table, watch)
 }
 
-fn watched(prepared: &Prepared<'_>, table: &Table, watch: Watch<'_>) -> Result<Outcome, Error> {
+/// The same by the observer that was designed for the study.
+pub(crate) fn with_design(
+    prepared: &Prepared<'_>,
+    design: Design,
+    table: &Table,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
+    watched(prepared, design, table, Watch::only(watch))
+}
+
+fn watched(
+    prepared: &Prepared<'_>,
+    mut design: Design,
+    table: &Table,
+    watch: Watch<'_>,
+) -> Result<Outcome, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
-    let mut design = prepared.design()?;
     refuse_derivatives(study, &design)?;
     let log = Log::read(prepared, table)?;
     let samples = &log.samples;

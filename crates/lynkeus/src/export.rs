@@ -11,7 +11,10 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
 use lynkeus_structure::short;
 
+#[cfg(feature = "tune")]
+use crate::ReportOptions;
 use crate::estimate::at_readings;
+use crate::fixed_steps::{bends, rounded, sound};
 use crate::headers::Headers;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
@@ -112,6 +115,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let design = prepared.design()?;
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
+    notes.extend(bends(made.flow()));
     let about = about(study, &made);
     let files = printed(&prepared, &design, &made, &about, |device| {
         let files = match options.to {
@@ -139,7 +143,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
 #[cfg(feature = "tune")]
 fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let page = crate::report::page(study, None, step, watch)?;
+    let page = crate::report::report(study, None, &ReportOptions { step }, watch)?;
     Ok(Export {
         files: vec![Artifact {
             name: page.name,
@@ -209,8 +213,8 @@ pub(crate) fn stepped(
     step: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Blueprint, Error> {
-    if let Some(step) = step {
-        return Ok(made.with_method(asked(step)?));
+    if let Some(step) = sound(step)? {
+        return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
     }
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
         return Ok(made);
@@ -223,22 +227,16 @@ pub(crate) fn stepped(
             .at(&prepared.study().file)
             .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
     };
+    if needed.is_infinite() {
+        notes.push("one step from each sample to the next: at the start nothing moves by itself; --step takes a longest step".to_owned());
+        return Ok(made.with_method(Method::Rk4(Step::Substeps(1))));
+    }
     let step = rounded(needed);
     notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; `export` takes another as --step",
+        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; --step takes another",
         short(step)
     ));
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
-}
-
-/// The steps of an option.
-pub(crate) fn asked(step: f64) -> Result<Method, Error> {
-    match step > 0.0 && step.is_finite() {
-        true => Ok(Method::Rk4(Step::AtMost(step))),
-        false => Err(Error::input(format!(
-            "--step: expected a finite number above 0, found {step}"
-        ))),
-    }
 }
 
 /// A value that an input may have.
@@ -246,20 +244,6 @@ pub(crate) fn typical(input: &Variable) -> f64 {
     let middle = 0.5 * (input.min + input.max);
     let middle = if middle.is_finite() { middle } else { 0.0 };
     input.start.or(input.nominal).unwrap_or(middle)
-}
-
-/// The next shorter step of one digit: 1, 2 or 5.
-pub(crate) fn rounded(step: f64) -> f64 {
-    let unit = 10.0_f64.powf(step.log10().floor());
-    let digit = match step / unit {
-        d if d >= 5.0 => 5.0,
-        d if d >= 2.0 => 2.0,
-        _ => 1.0,
-    };
-    // the nearest number with these digits
-    format!("{digit}e{}", step.log10().floor())
-        .parse()
-        .unwrap_or(digit * unit)
 }
 
 /// What the code says of names.

@@ -78,6 +78,7 @@ mod export;
 mod figure;
 mod files;
 mod filter;
+mod fixed_steps;
 mod fmu;
 mod frozen;
 mod headers;
@@ -101,6 +102,7 @@ mod recorded;
 mod replay;
 #[cfg(feature = "tune")]
 mod report;
+mod runner;
 mod sampled;
 pub mod series;
 mod simulate;
@@ -139,7 +141,8 @@ pub use precision::precision;
 pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 #[cfg(feature = "tune")]
-pub use report::{Page, report};
+pub use report::{Page, ReportOptions, report};
+pub use runner::{Runner, Runners};
 pub use series::Series;
 pub use simulate::simulate;
 pub use study::{Study, schema};

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_observers::Design;
+use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Level, Role, Simulation};
 
 use crate::course::{Course, Samples};
@@ -38,7 +38,15 @@ pub(crate) fn simulated(
     prepared: &Prepared<'_>,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let rig = Rig::new(prepared)?;
+    of_rig(prepared, Rig::new(prepared)?, watch)
+}
+
+/// The same of a plant with its observer.
+pub(crate) fn of_rig(
+    prepared: &Prepared<'_>,
+    rig: Rig,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Outcome, Error> {
     let Ran { run, course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
     outcome(prepared, rig.design, &run, course)
 }
@@ -82,6 +90,27 @@ impl Rig {
             spread: Spread::new(plant, settings)?,
             simulation,
             design,
+        })
+    }
+
+    /// The same for a study with another noise, other starts or another `spread`; `plant` is this
+    /// rig's.
+    ///
+    /// # Errors
+    /// Names that the plant does not have.
+    pub fn redrawn(self, study: &Study, plant: &Plant) -> Result<Self, Error> {
+        let settings = settings(study)?;
+        let start = systems::starts(plant, &settings.initial)?;
+        let system = self.simulation.plant.with_start(start);
+        let simulation = Simulation {
+            plant: system.map_err(Error::from_source)?,
+            noise: noise(study, settings, plant)?,
+            ..self.simulation
+        };
+        Ok(Self {
+            spread: Spread::new(plant, settings)?,
+            simulation,
+            design: self.design,
         })
     }
 
@@ -144,30 +173,10 @@ fn sampled(
     simulation: &Simulation,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Ran, Error> {
-    let (study, plant) = (prepared.study(), prepared.plant());
+    let study = prepared.study();
     let watch = &mut within(&study.budget, watch);
-    let mut run = Recorded::new(simulation);
-    let plant_alone = simulation.run_into(&mut |time, row| run.push(time, row), &mut |done| {
-        watch(0.5 * done)
-    });
-    plant_alone.map_err(|error| ended_early(error, study))?;
-    let observer = &design.observer;
-    let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
-    let column = |role: Role, at: Option<usize>| {
-        let values = at.and_then(|i| run.column(role.at(i)));
-        values.cloned().unwrap_or_default()
-    };
-    let readings = observer.measured.iter();
-    let inputs = observer.inputs.iter();
-    let samples = Samples {
-        time: run.time.clone(),
-        readings: readings
-            .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
-            .collect(),
-        inputs: inputs
-            .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
-            .collect(),
-    };
+    let mut run = alone(study, simulation, &mut |done| watch(0.5 * done))?;
+    let samples = seen(prepared.plant(), &design.observer, &run);
     let mut course = estimate::course(prepared, design, &samples, &mut |done| {
         watch(0.5 + 0.5 * done)
     })?;
@@ -175,6 +184,41 @@ fn sampled(
     settle(&mut course, rows, study, &study.file)?;
     run.truncate(rows);
     Ok(Ran { run, course })
+}
+
+/// The run of a plant without an observer.
+///
+/// # Errors
+/// What ends it early.
+pub(crate) fn alone(
+    study: &Study,
+    simulation: &Simulation,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Recorded, Error> {
+    let mut run = Recorded::new(simulation);
+    let done = simulation.run_into(&mut |time, row| run.push(time, row), watch);
+    done.map_err(|error| ended_early(error, study))?;
+    Ok(run)
+}
+
+/// What an observer reads of a plant's run: every row is a sample.
+pub(crate) fn seen(plant: &Plant, observer: &Observer, run: &Recorded) -> Samples {
+    let place = |variables: &[Variable], name: &str| variables.iter().position(|v| v.name == name);
+    let column = |role: Role, at: Option<usize>| {
+        let values = at.and_then(|i| run.column(role.at(i)));
+        values.cloned().unwrap_or_default()
+    };
+    let readings = observer.measured.iter();
+    let inputs = observer.inputs.iter();
+    Samples {
+        time: run.time.clone(),
+        readings: readings
+            .map(|s| column(Role::Measured, place(&plant.outputs, &s.name)))
+            .collect(),
+        inputs: inputs
+            .map(|s| column(Role::Input, place(&plant.inputs, &s.name)))
+            .collect(),
+    }
 }
 
 /// A watch that also ends a run whose budget is spent.

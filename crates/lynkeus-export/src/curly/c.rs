@@ -46,7 +46,7 @@ pub(super) const CODES: [(&str, &str); 5] = [
 ];
 
 /// What can become of a reading of a filter.
-const READINGS: [(&str, &str); 4] = [
+pub(super) const READINGS: [(&str, &str); 4] = [
     ("MISSING", "the sensor did not report"),
     ("TAKEN", "it corrected the estimate"),
     ("REJECTED", "the gate kept it out"),
@@ -98,7 +98,17 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
     ])
 }
 
-/// A model's name in lower case, what C forbids replaced by `_`.
+/// Files that are there already: the bench, the answers of FMUs, the headers of C99 and of what
+/// systems add to them.
+const TAKEN: [&str; 30] = [
+    "replay", "fmi2", "fmi3", "assert", "complex", "ctype", "errno", "fenv", "float", "inttypes",
+    "iso646", "limits", "locale", "math", "setjmp", "signal", "stdarg", "stdbool", "stddef",
+    "stdint", "stdio", "stdlib", "string", "strings", "tgmath", "time", "features", "unistd",
+    "wchar", "wctype",
+];
+
+/// A model's name in lower case, what C forbids replaced by `_`, and one more where a file of that
+/// name is there already.
 pub fn prefix(name: &str) -> String {
     let letters = name.chars().map(|c| match c.to_ascii_lowercase() {
         c if c.is_ascii_alphanumeric() => c,
@@ -107,6 +117,9 @@ pub fn prefix(name: &str) -> String {
     let mut prefix: String = letters.collect();
     if !prefix.starts_with(|c: char| c.is_ascii_alphabetic()) {
         prefix.insert(0, '_');
+    }
+    if TAKEN.contains(&prefix.as_str()) {
+        prefix.push('_');
     }
     prefix
 }
@@ -209,7 +222,7 @@ impl Frame<'_> {
         let kind = match field.kind {
             Kind::Real => self.real(),
             Kind::Double => "double",
-            Kind::Int => "int",
+            Kind::Int | Kind::Truth => "int",
         };
         let size = field
             .count
@@ -275,7 +288,7 @@ fn start(field: &Field) -> String {
     let value = |value: f64| match kind {
         Kind::Real => number(value),
         Kind::Double => format!("{value:?}"),
-        Kind::Int => format!("{}", value as i64),
+        Kind::Int | Kind::Truth => format!("{}", value as i64),
     };
     match count {
         None => format!(

@@ -1,7 +1,8 @@
-//! How operations are written in the text that all languages with braces are rendered from.
+//! How operations are written in the draft.
 
 use lynkeus_expr::{Binary, Unary};
 
+use super::language::FUNCTIONS;
 use crate::{Binding, Dialect, Form, Text};
 
 /// C in which the type of numbers is `real` and their literals are `R(…)`.
@@ -11,13 +12,9 @@ pub(super) struct Draft;
 /// Words of C99 and JavaScript, of their headers, and of the runtime.
 const RESERVED: &[&str] = &[
     "abs",
-    "acos",
     "arguments",
     "as",
-    "asin",
     "async",
-    "atan",
-    "atan2",
     "auto",
     "await",
     "began",
@@ -26,14 +23,11 @@ const RESERVED: &[&str] = &[
     "c",
     "case",
     "catch",
-    "ceil",
     "char",
     "class",
     "complex",
     "const",
     "continue",
-    "cos",
-    "cosh",
     "count",
     "debugger",
     "default",
@@ -45,18 +39,15 @@ const RESERVED: &[&str] = &[
     "else",
     "enum",
     "eval",
-    "exp",
     "export",
     "extends",
     "extern",
-    "fabs",
     "false",
     "field",
     "finally",
     "float",
-    "floor",
+    "Float64Array",
     "for",
-    "frexp",
     "function",
     "goto",
     "h",
@@ -64,6 +55,7 @@ const RESERVED: &[&str] = &[
     "implements",
     "import",
     "in",
+    "Infinity",
     "inline",
     "instanceof",
     "int",
@@ -72,16 +64,17 @@ const RESERVED: &[&str] = &[
     "isfinite",
     "isnan",
     "larger",
-    "ldexp",
     "let",
-    "log",
+    "linux",
     "long",
+    "Math",
     "math",
     "memcpy",
+    "NaN",
     "new",
     "null",
+    "Number",
     "package",
-    "pow",
     "private",
     "protected",
     "public",
@@ -93,29 +86,26 @@ const RESERVED: &[&str] = &[
     "sign",
     "signbit",
     "signed",
-    "sin",
-    "sinh",
     "sizeof",
     "slopes",
     "smaller",
     "solve",
-    "sqrt",
     "square",
     "static",
     "struct",
     "super",
     "switch",
     "t",
-    "tan",
-    "tanh",
     "this",
     "throw",
     "true",
+    "truth",
     "try",
     "typedef",
     "typeof",
     "undefined",
     "union",
+    "unix",
     "unsigned",
     "var",
     "void",
@@ -175,7 +165,15 @@ impl Dialect for Draft {
     }
 
     fn is_reserved(&self, word: &str) -> bool {
-        RESERVED.contains(&word) || SIZES.contains(&word) || word.ends_with("_matrix")
+        let is_listed = |word: &str| RESERVED.contains(&word) || FUNCTIONS.contains(&word);
+        // math.h defines constants in capitals; each of its functions has a sibling for `float`
+        is_listed(word)
+            || word.strip_suffix('f').is_some_and(is_listed)
+            || SIZES.contains(&word)
+            || word.ends_with("_matrix")
+            || ["M_", "FP_", "HUGE_", "MATH_"]
+                .iter()
+                .any(|head| word.starts_with(head))
     }
 
     fn number(&self, value: f64) -> Text {
@@ -229,6 +227,8 @@ impl Dialect for Draft {
 
     fn power(&self, base: &Text, exponent: i32) -> Text {
         match exponent {
+            // whose magnitude is no `int`
+            i32::MIN => Text::call("pow", &[base, &self.number(f64::from(i32::MIN))]),
             2 => Text::call("square", &[base]),
             n => Text::atom(format!("integer_power({}, {n})", base.text)),
         }
@@ -243,7 +243,7 @@ impl Dialect for Draft {
     }
 
     fn truth(&self, name: &str, value: &Text) -> String {
-        format!("const int {name} = {};", value.text)
+        format!("const truth {name} = {};", value.text)
     }
 
     /// The solution, then the reciprocal condition.
@@ -282,7 +282,7 @@ mod tests {
         let texts = ["a", "b", "c"].map(Text::atom);
         let code = Code::of(&tape).unwrap();
         let body = Body::of(&code, &Draft, &texts, &mut Names::default()).unwrap();
-        assert_eq!(body.lines, ["const int v1 = a < b;"]);
+        assert_eq!(body.lines, ["const truth v1 = a < b;"]);
         assert_eq!(body.outputs[0].text, "(v1 ? a : c)");
         assert_eq!(body.outputs[1].text, "(v1 ? c : b)");
         assert!(body.outputs[2].text.contains("(v1 ? R(1.0) : R(0.0))"));

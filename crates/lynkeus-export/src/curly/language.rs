@@ -1,22 +1,20 @@
-//! What the draft becomes in each language.
+//! What the draft becomes in C.
 
-use super::template::{chosen, exchanged};
+use super::template::{chosen, exchanged, outside_comments};
 
-/// A language with braces.
+/// A kind of C.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Language {
+pub(super) enum Language {
     /// C99 with `double`
     C,
     /// C99 with `float`
     SingleC,
-    /// JavaScript, a module
-    JavaScript,
 }
 
 /// Functions of the C library, which have an `f` at the end for `float`.
-const FUNCTIONS: [&str; 21] = [
+pub(super) const FUNCTIONS: [&str; 19] = [
     "acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fabs", "floor", "frexp", "ldexp",
-    "log", "pow", "sin", "sinh", "sqrt", "tan", "tanh", "ceil", "fmin", "fmax",
+    "log", "pow", "sin", "sinh", "sqrt", "tan", "tanh", "ceil",
 ];
 
 impl Language {
@@ -26,14 +24,14 @@ impl Language {
         match self {
             Self::C => self.c(&chosen(draft, &[])),
             Self::SingleC => self.c(&chosen(draft, &["single"])),
-            Self::JavaScript => javascript(&chosen(draft, &[])),
         }
     }
 
-    /// Numbers that depend on their type.
-    fn constant(self, word: &str) -> Option<&'static str> {
+    /// Types, and numbers that depend on them.
+    pub(super) fn constant(self, word: &str) -> Option<&'static str> {
         let is_single = self == Self::SingleC;
         Some(match (word, is_single) {
+            ("truth", _) => "int",
             ("real", false) => "double",
             ("real", true) => "float",
             ("EPSILON", false) => "2.220446049250313e-16",
@@ -62,10 +60,11 @@ impl Language {
             let is_single = self == Self::SingleC && word != "ceil" && FUNCTIONS.contains(&word);
             is_single.then(|| format!("{word}f"))
         });
-        literals(&words, |number| match self {
+        let literal = |number: &str| match self {
             Self::SingleC => single(number),
-            _ => number.to_owned(),
-        })
+            Self::C => number.to_owned(),
+        };
+        outside_comments(&words, |code| literals(code, literal))
     }
 }
 
@@ -105,113 +104,21 @@ fn single(number: &str) -> String {
     }
 }
 
-/// A draft is written one statement per line, comments on lines of their own or at the end of one.
-fn javascript(draft: &str) -> String {
-    let mut is_comment = false;
-    let mut result = String::new();
-    for line in draft.lines() {
-        is_comment |= line.trim_start().starts_with("/*");
-        match is_comment {
-            true => result += &format!("{line}\n"),
-            false => result += &statement(line).unwrap_or_default(),
-        }
-        is_comment &= !line.contains("*/");
-    }
-    result
-}
-
-fn statement(line: &str) -> Option<String> {
-    let (line, comment) = match line.find("/*") {
-        Some(place) => line.split_at(place),
-        None => (line, ""),
-    };
-    let (indent, code) = line.split_at(line.len() - line.trim_start().len());
-    if code.starts_with("(void)") || code.starts_with("typedef ") {
-        return None;
-    }
-    let mut code = ["(real)", "(double)", "(int)"]
-        .iter()
-        .fold(code.to_owned(), |code, cast| code.replace(cast, ""));
-    code = code.replace("s->", "s.");
-    code = literals(&code, str::to_owned);
-    code = code
-        .replace("for (int ", "for (let ")
-        .replace("(STATE *s", "(s");
-    code = declaration(&code);
-    let words = exchanged(&code, |word| {
-        Some(match word {
-            "EPSILON" | "SMALLEST" | "RANK" => Language::C.constant(word)?.to_owned(),
-            "isfinite" => "Number.isFinite".to_owned(),
-            "isnan" => "Number.isNaN".to_owned(),
-            "INFINITY" => "Infinity".to_owned(),
-            "NAN" => "NaN".to_owned(),
-            "fabs" => "Math.abs".to_owned(),
-            function if FUNCTIONS.contains(&function) => format!("Math.{function}"),
-            _ => return None,
-        })
-    });
-    Some(format!("{indent}{words}{comment}\n"))
-}
-
-/// Functions and variables without types.
-fn declaration(code: &str) -> String {
-    const TYPES: [&str; 5] = ["real ", "int ", "double ", "void ", "STATE "];
-    let is_static = code.starts_with("static ");
-    let bare = code.strip_prefix("static ").unwrap_or(code);
-    let is_const = bare.starts_with("const ");
-    let bare = bare.strip_prefix("const ").unwrap_or(bare);
-    let Some(rest) = TYPES.iter().find_map(|kind| bare.strip_prefix(kind)) else {
-        return code.to_owned();
-    };
-    if is_static && rest.ends_with(')') {
-        return function(rest);
-    }
-    let name_end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
-    let (name, tail) = rest.split_at(name_end.unwrap_or(rest.len()));
-    let Some(size) = tail.strip_prefix('[') else {
-        let word = if is_const { "const" } else { "let" };
-        return format!("{word} {name}{tail}");
-    };
-    let (size, value) = size.split_once(']').unwrap_or((size, ";"));
-    match value.trim().strip_prefix('=') {
-        Some(list) => {
-            let list = list.replace('{', "[").replace('}', "]");
-            format!("const {name} ={list}")
-        }
-        None => format!("const {name} = new Float64Array({size});"),
-    }
-}
-
-/// The head of a function, its parameters without types.
-fn function(head: &str) -> String {
-    let (name, rest) = head.split_once('(').unwrap_or((head, ""));
-    let parameters = rest.trim_end_matches(')').split(',').map(|parameter| {
-        let name = parameter.rsplit([' ', '*']).next();
-        name.unwrap_or_default()
-    });
-    let parameters: Vec<&str> = parameters.collect();
-    format!("function {name}({})", parameters.join(", "))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const DRAFT: &str = "static real half(STATE *s, const real *a, int i)\n{\n    real b[3];\n    const real c = R(0.5) * a[i];\n    (void)i;\n    s->x[0] = sqrt(fabs(c)) + (real)i;\n    return c;\n}\n";
+    const DRAFT: &str = "static truth half(STATE *s, const real *a, int i)\n{\n    real b[3];\n    const real c = R(0.5) * a[i];\n    (void)i;\n    s->x[0] = sqrt(fabs(c)) + (real)i;\n    return c;\n}\n";
 
     #[test]
     fn a_draft_is_text_in_each_language() {
         let c = Language::C.render(DRAFT);
-        assert!(c.starts_with("static double half(STATE *s, const double *a, int i)\n"));
+        assert!(c.starts_with("static int half(STATE *s, const double *a, int i)\n"));
         assert!(c.contains("const double c = 0.5 * a[i];"));
         let single = Language::SingleC.render(DRAFT);
         assert!(single.contains("const float c = 0.5f * a[i];"));
         assert!(single.contains("sqrtf(fabsf(c)) + (float)i"));
         assert!(c.contains("sqrt(fabs(c)) + i;"));
-        assert_eq!(
-            Language::JavaScript.render(DRAFT),
-            "function half(s, a, i)\n{\n    const b = new Float64Array(3);\n    const c = 0.5 * a[i];\n    s.x[0] = Math.sqrt(Math.abs(c)) + i;\n    return c;\n}\n"
-        );
     }
 
     #[test]
@@ -224,10 +131,6 @@ mod tests {
         assert_eq!(
             Language::SingleC.render(draft),
             "    const float a = (b ? NAN : -INFINITY);\n    const float h = 1.0f;\n"
-        );
-        assert_eq!(
-            Language::JavaScript.render(draft),
-            "    const a = (b ? NaN : -Infinity);\n    const h = 2.0;\n"
         );
     }
 

@@ -26,6 +26,8 @@ pub(super) enum Kind {
     Real,
     Double,
     Int,
+    /// 0 or 1
+    Truth,
 }
 
 /// The estimator as a draft, but for the frame that each language has of its own.
@@ -55,7 +57,7 @@ impl Machine {
         machine.size("SIGNALS", device.signals.len());
         machine.size("REPORTED", device.estimates.len());
         machine.single("time", Kind::Double, "of the last sample", 0.0);
-        machine.single("started", Kind::Int, "whether there was one", 0.0);
+        machine.single("started", Kind::Truth, "whether there was one", 0.0);
         machine.single(
             "scale",
             Kind::Real,

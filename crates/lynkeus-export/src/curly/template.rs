@@ -41,14 +41,21 @@ pub(super) enum Token<'t> {
     Other(&'t str),
 }
 
-/// Words, and what stands between them.
+/// Words, and what stands between them. A comment is none.
 pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     let mut rest = text;
     std::iter::from_fn(move || {
         let first = rest.chars().next()?;
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         let kind = is_word(first);
-        let end = rest.find(|c| is_word(c) != kind).unwrap_or(rest.len());
+        let end = match comment_end(rest) {
+            Some(end) => end,
+            None => {
+                let end = rest.find(|c| is_word(c) != kind).unwrap_or(rest.len());
+                // a comment begins a piece of its own
+                rest[..end].find("/*").unwrap_or(end)
+            }
+        };
         let (piece, left) = rest.split_at(end);
         rest = left;
         Some(match kind {
@@ -56,6 +63,26 @@ pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
             false => Token::Other(piece),
         })
     })
+}
+
+/// Where the comment ends that a text begins with.
+fn comment_end(text: &str) -> Option<usize> {
+    let inside = text.strip_prefix("/*")?;
+    Some(inside.find("*/").map_or(text.len(), |place| place + 4))
+}
+
+/// A text with what is between its comments rewritten.
+pub(super) fn outside_comments(text: &str, write: impl Fn(&str) -> String) -> String {
+    let mut result = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(place) = rest.find("/*") {
+        let (code, comment) = rest.split_at(place);
+        result += &write(code);
+        let end = comment_end(comment).unwrap_or(comment.len());
+        result += &comment[..end];
+        rest = &comment[end..];
+    }
+    result + &write(rest)
 }
 
 /// The text with words exchanged.
@@ -93,6 +120,9 @@ mod tests {
     fn only_whole_words_are_exchanged() {
         let other = |word: &str| (word == "x").then(|| "z".to_owned());
         assert_eq!(exchanged("x + x1*ax (x)", other), "z + x1*ax (z)");
+        assert_eq!(exchanged("x /* x */ + x", other), "z /* x */ + z");
+        assert!(!mentions("a = b; /* its sign */", "sign"));
+        assert_eq!(exchanged("x /* open x", other), "z /* open x");
         assert!(mentions("a = sign(b)", "sign") && !mentions("assign", "sign"));
     }
 }

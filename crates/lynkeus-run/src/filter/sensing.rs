@@ -71,13 +71,23 @@ impl Sensing {
 
     /// h(t, x, u), and the entries of C there.
     pub fn evaluate(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+        self.values_at(t, x, u, self.values.len())
+    }
+
+    /// h(t, x, u), whether or not C has values there.
+    pub fn predict(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&[f64], Error> {
+        self.values_at(t, x, u, self.sensors.len())
+    }
+
+    /// h, where the first `needed` values are finite.
+    fn values_at(&mut self, t: f64, x: &[f64], u: &[f64], needed: usize) -> Result<&[f64], Error> {
         let signals = self.output_map.signals_mut();
         let (own, known) = signals.split_at_mut(x.len());
         own.copy_from_slice(x);
         known.copy_from_slice(u);
         self.output_map.enter(t);
         self.output_map.outputs(t, &[], &mut self.values);
-        match self.values.iter().all(|v| v.is_finite()) {
+        match self.values[..needed].iter().all(|v| v.is_finite()) {
             true => Ok(&self.values[..self.sensors.len()]),
             false => Err(self.output_map.not_finite(t, &[])),
         }

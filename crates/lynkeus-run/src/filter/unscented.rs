@@ -245,7 +245,7 @@ impl Unscented {
         let points = self.points(belief);
         let shown = points
             .iter()
-            .map(|x| Ok(sensing.evaluate(t, x, inputs)?.to_vec()));
+            .map(|x| Ok(sensing.predict(t, x, inputs)?.to_vec()));
         let outputs = self.cloud(shown.collect::<Result<_, Error>>()?);
         let mut taken = vec![];
         for (i, reading) in readings.iter().enumerate() {

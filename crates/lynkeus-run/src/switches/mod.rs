@@ -76,6 +76,11 @@ impl Switches {
         }
     }
 
+    /// Whether there is nothing to find.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.indicators.is_empty()
+    }
+
     /// Appends the switching instants strictly inside (`from`, `to`).
     pub(crate) fn between(
         &mut self,

@@ -90,7 +90,8 @@ async function run(position, signals, mine) {
 /* ---- the curves of a chart ---- */
 
 const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const line = (label, name, more) => ({ label, stroke: () => color(name), width: 1.5, points: { show: false }, ...more });
+const shownValue = (plot, value) => rounded(value, 5);
+const line = (label, name, more) => ({ label, stroke: () => color(name), width: 1.5, points: { show: rows === 1 }, value: shownValue, ...more });
 
 // Root of the mean square error over the last half, where the truth is known.
 function settledError(truth, estimate) {
@@ -116,7 +117,8 @@ function curves(quantity, found, readings) {
     const list = [];
     if (Number.isInteger(quantity.sensor)) {
         const values = Array.from(readings[quantity.sensor], (v) => (Number.isFinite(v) ? v : null));
-        list.push([{ label: "reading", stroke: () => color("reading"), paths: () => null, points: { show: true, size: 3, width: 0, fill: () => color("reading") } }, values]);
+        const points = { show: true, size: 3, width: 0, fill: () => color("reading") };
+        list.push([line("reading", "reading", { paths: () => null, points }), values]);
     }
     if (deviation) {
         list.push([{ label: "+2 sd", class: "edge", stroke: "transparent", points: { show: false } }, edge(estimate, deviation, 1)]);
@@ -153,6 +155,9 @@ function fit(plot) {
 }
 
 /* ---- charts ---- */
+
+// A number with so many digits and no more; small ones stay numbers.
+const rounded = (x, digits) => (x === null || x === undefined ? "–" : String(Number(x.toPrecision(digits))).replace("-", "−"));
 
 const withUnit = (name, unit) => (unit ? `${name} (${unit})` : name);
 
@@ -195,34 +200,56 @@ function pinch(plot) {
     }, { passive: false });
 }
 
-function chart(quantity) {
+// A place for a picture, with a line above it.
+function panel(host, title, words) {
     const figure = document.createElement("figure");
     const caption = document.createElement("figcaption");
-    const title = document.createElement("b");
-    title.textContent = withUnit(quantity.name, quantity.unit);
-    const words = document.createElement("span");
-    words.textContent = quantity.description ?? (quantity.meaning ? `below ${quantity.alarm_below}: ${quantity.meaning}` : "");
+    const name = document.createElement("b");
+    name.textContent = title;
+    const more = document.createElement("span");
+    more.textContent = words;
+    caption.append(name, more);
+    figure.append(caption);
+    document.getElementById(host).append(figure);
+    return figure;
+}
+
+// How an axis looks: the one below with its label, the one at the left without.
+function axis(label) {
+    const [stroke, line] = [() => color("text"), { stroke: () => color("grid"), width: 1 }];
+    const place = label === undefined ? { size: 64 } : { label, labelSize: 20, size: 36 };
+    return { stroke, grid: line, ticks: line, values: (plot, splits) => splits.map((v) => (v === null ? "" : rounded(v, 6))), ...place };
+}
+
+// A picture as wide as its place, which readers of the screen know by its caption.
+function drawn(figure, options, values) {
+    const size = () => ({ width: figure.clientWidth, height: 260 });
+    const plot = new uPlot({ ...size(), ...options }, values, figure);
+    plot.ctx.canvas.setAttribute("role", "img");
+    plot.ctx.canvas.setAttribute("aria-label", figure.firstChild.textContent);
+    new ResizeObserver(() => plot.setSize(size())).observe(figure);
+    return plot;
+}
+
+function chart(quantity) {
+    const alarm = quantity.alarm_below == null ? quantity.meaning : `below ${quantity.alarm_below}: ${quantity.meaning}`;
+    const words = quantity.description ?? (quantity.meaning ? alarm : "");
+    const figure = panel("charts", withUnit(quantity.name, quantity.unit), words);
     const error = document.createElement("span");
     error.className = "error";
-    caption.append(title, words, error);
-    figure.append(caption);
-    document.getElementById("charts").append(figure);
+    figure.firstChild.append(error);
     const list = curves(quantity, null, samples);
     const labels = list.map(([series]) => series.label);
     const high = labels.indexOf("+2 sd") + 1;
-    const axis = { stroke: () => color("text"), grid: { stroke: () => color("grid"), width: 1 }, ticks: { stroke: () => color("grid"), width: 1 } };
-    const plot = new uPlot({
-        width: figure.clientWidth,
-        height: 260,
+    const plot = drawn(figure, {
         scales: { x: { time: false }, y: { range: fit } },
-        axes: [{ ...axis, label: withUnit("time", data.time_unit), labelSize: 20, size: 36 }, { ...axis, size: 64 }],
-        series: [{ label: "time" }, ...list.map(([series]) => series)],
+        axes: [axis(withUnit("time", data.time_unit)), axis()],
+        series: [{ label: "time", value: shownValue }, ...list.map(([series]) => series)],
         bands: high > 0 ? [{ series: [high, high + 1], fill: () => color("band") }] : [],
         cursor: { sync: { key: "time", filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false } },
         hooks: { setScale: [zoomed], ready: [pinch] },
-    }, [data.time, ...list.map(([, values]) => values)], figure);
+    }, [data.time, ...list.map(([, values]) => values)]);
     charts.push({ quantity, plot, error });
-    new ResizeObserver(() => plot.setSize({ width: figure.clientWidth, height: 260 })).observe(figure);
 }
 
 function show(found, readings) {
@@ -246,6 +273,147 @@ function show(found, readings) {
     }
 }
 
+/* ---- the trade-off ---- */
+
+const compromise = data.tradeoff;
+const compromises = [];
+const NAMES = {
+    mean_error: "with noise",
+    mean_error_exact: "without noise",
+    mean_error_noise: "made by the noise",
+    held_out_error: "on held-out samples",
+    innovation: "innovation",
+};
+const COLORS = { mean_error: "estimate", mean_error_exact: "truth", mean_error_noise: "reading", held_out_error: "estimate", innovation: "reading" };
+
+// The row of the trade-off that the slider stands at; -1 where there is no slider.
+const present = () => data.knob?.positions[chosen.position].place ?? -1;
+
+// Numbers over decades are drawn on a scale of decades.
+function scale(values) {
+    const known = values.filter((v) => v !== null);
+    const [least, most] = [Math.min(...known), Math.max(...known)];
+    const ends = (plot, low, high) => {
+        const air = (high / low) ** 0.04;
+        return [low / air, high * air];
+    };
+    return least > 0 && most > 4 * least ? { distr: 3, time: false, range: ends } : { time: false };
+}
+
+const dots = (name) => ({ show: true, size: 5, width: 0, fill: () => color(name) });
+
+// A mark of the canvas at a value of either axis: of the study's position, or of the slider's.
+function mark(plot, name, draw) {
+    const { ctx } = plot;
+    ctx.save();
+    ctx.strokeStyle = color(name);
+    ctx.lineWidth = 2 * devicePixelRatio;
+    ctx.beginPath();
+    draw(ctx, plot.bbox);
+    ctx.stroke();
+    ctx.restore();
+}
+
+// Lines across the picture where the study and the slider are, and a band where all is nearly as good as at the knee.
+function upright(plot) {
+    const at = (value) => plot.valToPos(value, "x", true);
+    const { ctx, bbox } = plot;
+    if (compromise.good && compromise.good[0] < compromise.good[1]) {
+        const [from, to] = compromise.good.map(at).sort((a, b) => a - b);
+        ctx.save();
+        ctx.fillStyle = color("band");
+        ctx.fillRect(from, bbox.top, to - from, bbox.height);
+        ctx.restore();
+    }
+    const across = (row, dash) => (to) => {
+        to.setLineDash(dash.map((x) => x * devicePixelRatio));
+        to.moveTo(at(compromise.values[row]), bbox.top);
+        to.lineTo(at(compromise.values[row]), bbox.top + bbox.height);
+    };
+    if (compromise.own !== null) {
+        mark(plot, "study", across(compromise.own, [5, 4]));
+    }
+    if (present() >= 0) {
+        mark(plot, "text", across(present(), []));
+    }
+}
+
+// Every error over what the slider moves.
+function overPositions() {
+    const places = compromise.values.map((_, k) => k).sort((a, b) => compromise.values[a] - compromise.values[b]);
+    const pick = (values) => places.map((k) => values[k]);
+    const names = Object.keys(compromise.figures);
+    const figure = panel("compromise", `error over ${compromise.label}`, "share of the range");
+    compromises.push(drawn(figure, {
+        scales: { x: scale(compromise.values), y: scale(Object.values(compromise.figures).flat()) },
+        axes: [axis(compromise.label), axis()],
+        series: [{ label: compromise.label, value: shownValue }, ...names.map((name) => line(NAMES[name], COLORS[name], { width: 2, points: dots(COLORS[name]) }))],
+        cursor: { drag: { x: false, y: false } },
+        hooks: { drawClear: [upright] },
+    }, [pick(compromise.values), ...names.map((name) => pick(compromise.figures[name]))]));
+}
+
+// The error without noise over the one that noise makes: one point for every position, joined in their order.
+function against() {
+    const { mean_error_exact: exact, mean_error_noise: noise } = compromise.figures;
+    if (!exact || !noise) {
+        return;
+    }
+    const known = compromise.values.map((_, k) => k).filter((k) => exact[k] !== null && noise[k] !== null);
+    const sorted = [...known].sort((a, b) => noise[a] - noise[b]);
+    const place = (plot, k) => [plot.valToPos(noise[k], "x", true), plot.valToPos(exact[k], "y", true)];
+    const joined = (plot) => {
+        const stroke = new Path2D();
+        known.forEach((k) => stroke.lineTo(...place(plot, k)));
+        return { stroke };
+    };
+    const circle = (plot, name, k, radius, dash) => {
+        if (known.includes(k)) {
+            mark(plot, name, (to) => {
+                to.setLineDash(dash.map((x) => x * devicePixelRatio));
+                to.arc(...place(plot, k), radius * devicePixelRatio, 0, 2 * Math.PI);
+            });
+        }
+    };
+    const figure = panel("compromise", "error without noise over error made by the noise", "shares of the range");
+    compromises.push(drawn(figure, {
+        scales: { x: scale(noise), y: scale(exact), position: { auto: true } },
+        axes: [axis("error made by the noise"), axis()],
+        series: [
+            { label: NAMES.mean_error_noise, value: shownValue },
+            line(NAMES.mean_error_exact, "estimate", { paths: joined, points: dots("estimate") }),
+            line(compromise.label, "text", { scale: "position", paths: () => null }),
+        ],
+        cursor: { drag: { x: false, y: false } },
+        hooks: { draw: [(plot) => {
+            circle(plot, "study", compromise.own, 7, [4, 2]);
+            circle(plot, "text", present(), 10, []);
+        }] },
+    }, [sorted.map((k) => noise[k]), sorted.map((k) => exact[k]), sorted.map((k) => compromise.values[k])]));
+}
+
+// What the marks mean.
+function key() {
+    const words = document.createElement("p");
+    words.className = "hint key";
+    const entries = [["study", "the study"], ...(data.knob ? [["present", "the slider"]] : []), ["good", "within 10 % of the knee"]];
+    for (const [name, text] of entries) {
+        const entry = document.createElement("span");
+        entry.className = name;
+        entry.textContent = text;
+        words.append(entry, " ");
+    }
+    document.getElementById("compromise").after(words);
+}
+
+// The slider was moved.
+function remarked() {
+    if (compromise) {
+        compromises.forEach((plot) => plot.redraw(false));
+        document.querySelectorAll("#tradeoff .wide tbody tr").forEach((row, k) => row.classList.toggle("present", k === present()));
+    }
+}
+
 /* ---- sliders ---- */
 
 // The largest difference between two runs, in units of each column's largest value.
@@ -260,13 +428,19 @@ function difference(found) {
     return worst;
 }
 
+// What a slider stands at, in sight and for readers of the screen.
+function inform(id, words) {
+    document.getElementById(`${id}-value`).textContent = words;
+    document.getElementById(id).setAttribute("aria-valuetext", words);
+}
+
 function told() {
     const words = [];
     const { label, positions } = data.knob;
     if (label) {
         const { factor, value } = positions[chosen.position];
         const times = `${Number(factor.toPrecision(3))} × the study's`;
-        document.getElementById("knob-value").textContent = value === null ? times : `${Number(value.toPrecision(4))} (${times})`;
+        inform("knob", value === null ? times : `${Number(value.toPrecision(4))} (${times})`);
     }
     data.signals.forEach((signal, k) => {
         if (signal.measured) {
@@ -275,7 +449,7 @@ function told() {
         }
     });
     const some = words.length > 3 ? [...words.slice(0, 3), "…"] : words;
-    document.getElementById("noise-value").textContent = chosen.noise === 0 ? "none" : some.join(", ");
+    inform("noise", chosen.noise === 0 ? "none" : some.join(", "));
 }
 
 async function rerun() {
@@ -283,6 +457,7 @@ async function rerun() {
     const mine = ticket;
     document.body.dataset.state = "running";
     told();
+    remarked();
     const readings = noisy(chosen.noise);
     const done = await run(chosen.position, readings, mine);
     if (done === null) {
@@ -307,6 +482,8 @@ function slider(id, words, most, value, moved) {
     const name = document.createElement("span");
     name.textContent = words;
     const input = Object.assign(document.createElement("input"), { type: "range", id, min: 0, max: most, step: 1, value });
+    // without the value, which is told apart
+    input.setAttribute("aria-label", words);
     const output = Object.assign(document.createElement("output"), { id: `${id}-value` });
     input.addEventListener("input", () => {
         moved(Number(input.value));
@@ -323,8 +500,7 @@ function sliders() {
     const controls = document.getElementById("controls");
     const { label, own, positions } = data.knob;
     if (label) {
-        const name = label === "theta" ? "θ" : label;
-        controls.append(slider("knob", name, positions.length - 1, own, (k) => {
+        controls.append(slider("knob", label, positions.length - 1, own, (k) => {
             chosen.position = k;
         }));
     }
@@ -353,11 +529,17 @@ function begin() {
     hint.append(all);
     document.getElementById("charts").before(hint);
     [...data.quantities, ...data.watches].forEach(chart);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.forEach(({ plot }) => plot.redraw(false)));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => [...charts.map(({ plot }) => plot), ...compromises].forEach((plot) => plot.redraw(false)));
+    if (compromise) {
+        overPositions();
+        against();
+        key();
+    }
     if (data.knob) {
         sliders();
         rerun();
     } else {
+        remarked();
         show(null, samples);
         document.body.dataset.state = "ready";
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use lynkeus::Error;
+use lynkeus::{Error, ReportOptions};
 
 use super::inputs::{self, Source};
 use super::progress::Progress;
@@ -16,6 +16,9 @@ pub(super) struct Options {
     /// The page ("-": standard output)
     #[arg(short, long, value_name = "FILE.html")]
     output: PathBuf,
+    /// Longest step of the integration, in the unit of time, instead of the study's
+    #[arg(long, value_name = "STEP")]
+    step: Option<f64>,
     /// No progress bar and no notes
     #[arg(short, long)]
     quiet: bool,
@@ -31,7 +34,13 @@ pub(super) fn report(
     files.writes("-o", Some(path)).check()?;
     let table = log.map(inputs::log).transpose()?;
     let mut progress = Progress::new("reporting", options.quiet);
-    let page = lynkeus::report(&source.study, table.as_ref(), &mut progress.watch())?;
+    let wanted = ReportOptions { step: options.step };
+    let page = lynkeus::report(
+        &source.study,
+        table.as_ref(),
+        &wanted,
+        &mut progress.watch(),
+    )?;
     progress.finish();
     if !options.quiet {
         page.notes.iter().for_each(|note| output::note(note));

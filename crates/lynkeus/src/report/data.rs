@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::knob::Knob;
 use super::shown;
+use super::tradeoff::Tradeoff;
 use crate::course::Samples;
 use crate::prepare::Prepared;
 use crate::{Error, Outcome, Quantity, Series};
@@ -18,6 +19,7 @@ pub(super) fn json(
     outcome: &Outcome,
     samples: &Samples,
     moving: &Result<Knob, Error>,
+    tradeoff: Option<&Tradeoff>,
 ) -> Value {
     let extended = prepared.extended();
     let outputs = extended.outputs.iter().map(|o| &o.variable);
@@ -61,15 +63,28 @@ pub(super) fn json(
         "signals": signals,
         "quantities": quantities.collect::<Vec<_>>(),
         "watches": watches.collect::<Vec<_>>(),
-        "knob": moving.as_ref().ok().map(|knob| json!({
-            "label": knob.label,
-            "own": knob.own,
-            "positions": knob.variants.iter().map(|v| json!({
-                "factor": v.factor,
-                "value": v.value,
-                "steps": v.steps,
-            })).collect::<Vec<_>>(),
-        })),
+        "knob": moving.as_ref().ok().map(|knob| slider(knob, tradeoff)),
+        "tradeoff": tradeoff.and_then(Tradeoff::json),
+    })
+}
+
+/// The estimators of the page, with their places among the positions.
+fn slider(knob: &Knob, tradeoff: Option<&Tradeoff>) -> Value {
+    let positions = tradeoff.map(|tradeoff| &tradeoff.positions);
+    let variants = knob.variants.iter().map(|variant| {
+        let place = positions.and_then(|p| p.all.iter().position(|p| p.factor == variant.factor));
+        let position = place.and_then(|place| positions?.all.get(place));
+        json!({
+            "place": place,
+            "factor": variant.factor,
+            "value": position.and_then(|p| p.value),
+            "steps": variant.steps,
+        })
+    });
+    json!({
+        "label": positions.map(|p| &p.label),
+        "own": knob.own,
+        "positions": variants.collect::<Vec<_>>(),
     })
 }
 

@@ -92,7 +92,9 @@ impl Html {
         self.within("div class=\"wide\"", |html| {
             html.within("table", |html| {
                 html.within("thead", |html| {
-                    let cells = head.iter().map(|h| format!("<th>{}</th>", escaped(h)));
+                    let cells = head
+                        .iter()
+                        .map(|h| format!("<th scope=\"col\">{}</th>", escaped(h)));
                     html.raw(&format!("<tr>{}</tr>", cells.collect::<String>()));
                 });
                 html.within("tbody", |html| {

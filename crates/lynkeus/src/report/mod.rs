@@ -6,24 +6,30 @@
 mod data;
 mod html;
 mod knob;
+mod positions;
 mod proof;
 mod run;
 mod sections;
+mod tradeoff;
 
 use std::ops::ControlFlow;
 
 use lynkeus_export::curly::c::prefix;
-use lynkeus_model::Plant;
+use lynkeus_model::{Diagnostic, Plant};
 use serde_json::Value;
 
 use crate::columns::Log;
 use crate::export::file_name;
 use crate::prepare::Prepared;
+use crate::tune::slider::Ground;
 use crate::{
-    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare, visible,
+    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, fixed_steps,
+    prepare, visible,
 };
 use html::Html;
 use knob::Knob;
+use positions::Positions;
+use tradeoff::Tradeoff;
 
 /// A report.
 #[derive(Clone, Debug)]
@@ -38,30 +44,30 @@ pub struct Page {
     pub refusal: Option<Error>,
 }
 
+/// How a page is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReportOptions {
+    /// longest step of the integration, in the unit of time, instead of the study's
+    pub step: Option<f64>,
+}
+
 /// What is known of a study as one self-contained page of HTML, with its estimates on a log, or
 /// on its simulation as a logger would have it. The estimates are those of
 /// [`estimate()`](crate::estimate()) with the fixed steps that the page tells, and sliders run the
 /// observer anew in the page; where it cannot run there the page says why, and shows estimates as
-/// `[estimate]` says. `watch` is told the fraction done and may stop the run.
+/// `[estimate]` says. What every position of the slider is worth is judged as by [`tune()`](crate::tune()).
+/// `watch` is told the fraction done and may stop the run.
 ///
 /// # Errors
-/// As [`estimate()`](crate::estimate()); a study without `[simulate]` where there is no log. What cannot be
-/// checked or certified is told in the page.
+/// As [`estimate()`](crate::estimate()); a step that is none; a study without `[simulate]` where there is no log.
+/// What cannot be checked or certified is told in the page.
 pub fn report(
     study: &Study,
     log: Option<&Table>,
+    options: &ReportOptions,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Page, Error> {
-    page(study, log, None, watch)
-}
-
-/// The same with the longest step of the integration.
-pub(crate) fn page(
-    study: &Study,
-    log: Option<&Table>,
-    step: Option<f64>,
-    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> Result<Page, Error> {
+    let step = fixed_steps::sound(options.step)?;
     let plant = prepare::plant(study)?;
     let mut notes = vec![];
     let causal = export::causal(study, &mut notes);
@@ -70,21 +76,31 @@ pub(crate) fn page(
         Some(_) => None,
         None => Some(run::simulated(&prepared, study, &plant, &mut notes)?),
     };
-    let Some(table) = log.or(recorded.as_ref()) else {
-        return Err(Error::input("neither a log nor a simulation"));
+    let (table, ground) = match (log, &recorded) {
+        (Some(log), _) => (log, Ground::Log(log)),
+        (None, Some(run::Simulated { table, step })) => (table, Ground::Simulation { step: *step }),
+        (None, None) => return Err(Error::input("neither a log nor a simulation")),
     };
     let design = prepared.design()?;
-    let as_it_is = Prepared::new(study, &plant)?;
+    let as_it_is = prepared.run_by(study);
+    let positions = Positions::new(&as_it_is, &design)?;
     let (moving, outcome) = match run::fixed(&prepared, &design, step, table, watch)? {
         Ok((fixed, outcome)) => {
             run::told(&fixed, &mut notes);
-            (Ok(Knob::new(&prepared, &design, &fixed)?), outcome)
+            let knob = Knob::new(&prepared, &fixed, positions.as_ref());
+            (Ok(knob), outcome)
         }
         Err(why) => {
             // the estimates are then the command's own
             notes.clear();
             (Err(why), estimate::estimated(&as_it_is, table, watch)?)
         }
+    };
+    // a filter that cannot move takes too long, or has no noises to move
+    let positions = positions.filter(|_| moving.is_ok() || design.observer.filter.is_none());
+    let tradeoff = match positions {
+        Some(positions) => Some(Tradeoff::new(&as_it_is, &design, positions, ground, watch)?),
+        None => None,
     };
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.notes);
@@ -96,9 +112,10 @@ pub(crate) fn page(
             Some(log) => format!("the log {}", file_name(&log.place())),
             None => "a simulation of the study".to_owned(),
         },
-        checked: check(study, &CheckOptions::default()),
+        checked: checked(study),
         certified: certify(study),
-        data: data::json(&prepared, &outcome, &samples, &moving),
+        data: data::json(&prepared, &outcome, &samples, &moving, tradeoff.as_ref()),
+        tradeoff,
         outcome,
         moving,
         notes,
@@ -111,6 +128,23 @@ pub(crate) fn page(
     })
 }
 
+/// What `check` says to others: files without the folders of this machine.
+fn checked(study: &Study) -> Result<check::Report, Error> {
+    let named = Study {
+        file: file_name(&study.file),
+        ..study.clone()
+    };
+    let mut report = check(&named, &CheckOptions::default())?;
+    report.warnings = report.warnings.iter().map(without_folder).collect();
+    Ok(report)
+}
+
+fn without_folder(warning: &Diagnostic) -> Diagnostic {
+    let mut warning = warning.clone();
+    warning.file = file_name(&warning.file);
+    warning
+}
+
 /// All that a page tells.
 struct Told<'a> {
     study: &'a Study,
@@ -121,6 +155,7 @@ struct Told<'a> {
     checked: Result<check::Report, Error>,
     certified: Result<certify::CertifyReport, Error>,
     moving: Result<Knob, Error>,
+    tradeoff: Option<Tradeoff>,
     data: Value,
     notes: Vec<String>,
 }

@@ -28,6 +28,13 @@ const HALVINGS: u32 = 8;
 /// What a run is told of, and what may stop it.
 pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
 
+/// Samples of a simulation.
+pub(super) struct Simulated {
+    pub table: Table,
+    /// from one to the next
+    pub step: f64,
+}
+
 /// The study's plant as a logger would have it, with what is true. Where the study says neither noise
 /// nor `sample_step`, samples are so dense that holding them decides nothing.
 pub(super) fn simulated(
@@ -35,14 +42,15 @@ pub(super) fn simulated(
     study: &Study,
     plant: &Plant,
     notes: &mut Vec<String>,
-) -> Result<Table, Error> {
+) -> Result<Simulated, Error> {
     let settings = simulate::settings(study).map_err(|error| {
         error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
     })?;
     let first = settings.sample_step.unwrap_or(settings.row_step());
     let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
     if is_noisy || settings.sample_step.is_some() {
-        return simulate::recorded(study, plant, first);
+        let table = simulate::recorded(study, plant, first)?;
+        return Ok(Simulated { table, step: first });
     }
     let since = Instant::now();
     let mut step = first;
@@ -60,7 +68,7 @@ pub(super) fn simulated(
                     short(step)
                 ));
             }
-            return Ok(table);
+            return Ok(Simulated { table, step });
         }
         (coarse, step) = (fine, step / 2.0);
     }

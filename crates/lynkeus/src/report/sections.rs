@@ -5,7 +5,7 @@ use lynkeus_structure::{Verdict, counted, figures};
 
 use super::data::ROWS;
 use super::html::{Cell, Html, badge};
-use super::{Told, proof};
+use super::{Told, proof, without_folder};
 use crate::check::{Known, Report};
 use crate::export::file_name;
 use crate::words::{instant, number};
@@ -43,20 +43,19 @@ impl Told<'_> {
         let outcome = &self.outcome;
         html.element("h1", &outcome.plant);
         if let Some(refusal) = outcome.refusal() {
-            let remedy = refusal.remedy().map(|remedy| format!("; {remedy}"));
-            let words = format!(
-                "Do not trust these estimates: {}{}",
-                refusal.message(),
-                remedy.unwrap_or_default()
-            );
+            let words = format!("Do not trust these estimates: {}", words(&refusal));
             html.element("p class=\"alarm\" role=\"alert\"", &words);
         }
         let observer = &outcome.design.observer;
         let measured: Vec<String> = observer.measured.iter().map(|m| m.name.clone()).collect();
-        let estimated: Vec<String> = observer
-            .estimates
-            .iter()
+        let estimates = observer.estimates.iter();
+        let mut estimated: Vec<_> = estimates
             .filter(|e| !measured.contains(&e.variable.name))
+            .collect();
+        // what is least expected first
+        estimated.sort_by_key(|e| !e.unknown_input);
+        let estimated: Vec<String> = estimated
+            .into_iter()
             .map(|e| e.variable.name.clone())
             .collect();
         html.element(
@@ -96,8 +95,7 @@ impl Told<'_> {
         match &self.moving {
             Ok(_) => html.raw("<div id=\"controls\"></div>\n<p id=\"status\" role=\"status\"></p>"),
             Err(why) => {
-                let remedy = why.remedy().map(|remedy| format!("; {remedy}"));
-                let why = format!("{}{}", why.message(), remedy.unwrap_or_default());
+                let why = words(why);
                 html.element("p", &format!("The observer cannot run in this page: {why}. The pictures are what the command gives."));
             }
         }
@@ -113,6 +111,10 @@ impl Told<'_> {
             "within 5 % of its range",
         ];
         html.table(&head, rows);
+        // in the same section, so that the sliders stay in sight
+        if let Some(tradeoff) = &self.tradeoff {
+            html.within("section id=\"tradeoff\"", |html| tradeoff.tell(html));
+        }
     }
 
     fn known(&self, html: &mut Html) {
@@ -188,7 +190,8 @@ impl Told<'_> {
         }
         html.element("h2", "Notes");
         html.list(&self.notes);
-        html.list(self.plant.warnings.iter().map(|w| w.one_line()));
+        let warnings = self.plant.warnings.iter().map(without_folder);
+        html.list(warnings.map(|warning| warning.one_line()));
     }
 }
 
@@ -212,7 +215,13 @@ fn whole(html: &mut Html, report: &Report) {
 }
 
 fn failed(html: &mut Html, error: &Error) {
-    html.element("p class=\"alarm\"", &error.to_string());
+    html.element("p class=\"alarm\"", &words(error));
+}
+
+/// What happened and what to do, without where: a page goes to others, and no folder of this machine with it.
+pub(super) fn words(error: &Error) -> String {
+    let remedy = error.remedy().map(|remedy| format!("; {remedy}"));
+    format!("{}{}", error.message(), remedy.unwrap_or_default())
 }
 
 fn accuracy(accuracy: &Accuracy) -> Vec<Cell> {

@@ -43,6 +43,11 @@ impl ObserverSettings {
         self.tuning.values.keys().all(|key| family.owns(key))
     }
 
+    /// Whether it asks for the same observer.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        self.family == other.family && self.tuning == other.tuning
+    }
+
     /// Messages about `key` are to blame another place, where its value comes from.
     pub(crate) fn comes_from(&mut self, key: &str, place: &Place) {
         self.places.insert(key.to_owned(), place.clone());

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use lynkeus_observers::{FAMILIES, Tuning, Value};
+use lynkeus_observers::{FAMILIES, Value};
 
 use crate::near::suggest;
 use crate::study::{Name, Place, Scale, Values};
@@ -43,6 +43,27 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Of what is no key of `[observer]`: factors on what the study says, so many to either side of 1, the last
+    /// of them `reach` and its inverse.
+    pub(crate) fn of_factors(name: &str, reach: f64, to_a_side: usize) -> Self {
+        let range = Values::Spread {
+            from: Some(1.0 / reach),
+            to: Some(reach),
+            points: 2 * to_a_side + 1,
+            scale: Scale::Log,
+        };
+        Self {
+            key: name.to_owned(),
+            is_factor: true,
+            values: spread(&range, None).unwrap_or_default(),
+            present: Some(1.0),
+            proposed: None,
+            base: name.to_owned(),
+            path: vec![],
+            place: None,
+        }
+    }
+
     /// The key with what its values mean: `theta`, `theta ×`.
     pub fn label(&self) -> String {
         match self.is_factor {
@@ -99,17 +120,22 @@ fn each(slot: &mut Value, by: &impl Fn(f64) -> f64) {
     }
 }
 
-/// The key of a tuning that its speed belongs to, if it has one with numbers.
-pub(crate) fn speed_of(tuning: &Tuning) -> Option<&'static str> {
+/// The key that the speed of a study belongs to, at so many values to either side of the study's own, from a
+/// quarter of it to four times of it in equal ratios. None where it has no such key with numbers.
+pub(crate) fn around(study: &Study, to_a_side: usize) -> Option<Axis> {
+    let tuning = &study.observer.tuning.values;
     let mut keys = SPEED.iter().copied();
-    keys.find(|key| tuning.values.get(*key).is_some_and(numeric))
-}
-
-/// Scales all numbers of a key.
-pub(crate) fn scale(tuning: &mut Tuning, key: &str, factor: f64) {
-    if let Some(slot) = tuning.values.get_mut(key) {
-        each(slot, &|x| rounded(x * factor, DIGITS));
-    }
+    let key = keys.find(|key| tuning.get(*key).is_some_and(numeric))?;
+    let range = Values::Spread {
+        from: None,
+        to: None,
+        points: 2 * to_a_side + 1,
+        scale: Scale::Log,
+    };
+    let mut axis = axis(study, &Name::from(key), &range).ok()?;
+    // to its last digit
+    *axis.values.get_mut(to_a_side)? = axis.present?;
+    Some(axis)
 }
 
 /// The keys that a study sweeps.
@@ -157,7 +183,7 @@ fn speed(study: &Study) -> Option<&'static str> {
 ///
 /// # Errors
 /// Too many.
-pub(super) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)>, Error> {
+pub(crate) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)>, Error> {
     let mut counts = axes.iter().map(|a| a.values.len());
     let count = counts.clone().try_fold(1_usize, usize::checked_mul);
     if count.is_none_or(|count| count > MOST_VALUES) {

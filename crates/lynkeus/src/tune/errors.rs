@@ -79,6 +79,11 @@ impl Errors {
         known.max_by(|a, b| a.2.total_cmp(&b.2))
     }
 
+    /// The largest magnitude; none without rows.
+    pub fn largest(&self) -> Option<f64> {
+        self.worst().into_iter().max_by(f64::total_cmp)
+    }
+
     /// What makes the difference to `other`, which has the same rows.
     pub fn minus(&self, other: &Self) -> Self {
         let pairs = self.scaled.iter().zip(&other.scaled);

@@ -5,8 +5,11 @@
 //! held-out samples on a log. `docs/tune.md` defines them all.
 
 pub(crate) mod axis;
+mod bench;
 pub(crate) mod errors;
+mod filtered;
 mod holdout;
+mod judge;
 mod measures;
 #[cfg(feature = "plot")]
 mod picture;
@@ -16,6 +19,7 @@ mod reference;
 mod replay;
 mod report;
 mod rewrite;
+pub(crate) mod slider;
 mod speed;
 mod trial;
 mod whiteness;
@@ -24,15 +28,14 @@ use std::ops::ControlFlow;
 
 pub use axis::Axis;
 pub use measures::Measure;
+pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
 
-use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::within;
-use crate::{Error, ErrorKind, Study, Table, prepare};
+use crate::{Error, Study, Table, crew, prepare};
+use bench::{Bench, filter_refused};
 use pinned::pinned;
-use record::Record;
-use reference::Reference;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.
 const NEARLY: f64 = 1.1;
@@ -137,11 +140,34 @@ pub fn tune(
     let grid = axis::grid(study, &axes)?;
     let prepared = Prepared::new(study, &plant)?;
     let bench = Bench::new(&prepared, log)?;
+    let mut sweep = judged(&prepared, &bench, axes, &grid, watch)?;
+    sweep.notes.splice(0..0, pinned.notes);
+    sweep.log = log.map(|table| table.file().to_owned());
+    let at_an_end = sweep.at_an_end().map(|(axis, value)| {
+        format!(
+            "the knee, {} = {}, is at an end of what was swept: the best value may lie beyond; widen `keys` of [tune]",
+            axis.label(),
+            axis::shown(value)
+        )
+    });
+    sweep.notes.extend(at_an_end);
+    Ok(sweep)
+}
+
+/// Every study of a grid on a bench.
+fn judged(
+    prepared: &Prepared<'_>,
+    bench: &Bench<'_>,
+    axes: Vec<Axis>,
+    grid: &[(Vec<f64>, Study)],
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Sweep, Error> {
+    let (study, plant) = (prepared.study(), prepared.plant());
     // what is proved here comes with every clone of the plant; a refusal is the rows' to tell
     let _ = prepared.examinations();
     let rows = crew::every(
         grid.len(),
-        &plant,
+        plant,
         &|plant, i, watch| match grid.get(i) {
             Some((values, study)) => {
                 let ended = |spent| Ok(Row::empty(values, bench.measures().len()).failed(spent));
@@ -161,74 +187,19 @@ pub fn tune(
         },
         watch,
     )?;
-    let mut notes = pinned.notes.clone();
-    notes.extend_from_slice(bench.notes());
+    let mut notes = bench.notes().to_vec();
     let ended = |spent| format!("the sweep is not whole: {spent}");
     notes.extend(study.budget.marked().map(ended));
-    let knee = least(&rows);
-    notes.extend(knee.and_then(|knee| at_an_end(&axes, rows.get(knee)?)));
     Ok(Sweep {
         plant: plant.name.clone(),
-        log: log.map(|table| table.file().to_owned()),
+        log: None,
         measures: bench.measures(),
         axes,
+        knee: least(&rows),
         rows,
-        knee,
         time_unit: study.time_unit.clone(),
         notes,
     })
-}
-
-/// What a value is judged on.
-enum Bench<'a> {
-    Simulation(Box<Reference>),
-    Log(Box<Record<'a>>),
-}
-
-impl<'a> Bench<'a> {
-    fn new(prepared: &Prepared<'_>, log: Option<&'a Table>) -> Result<Self, Error> {
-        Ok(match log {
-            Some(table) => Self::Log(Box::new(Record::new(prepared, table)?)),
-            None => Self::Simulation(Box::new(Reference::new(prepared)?)),
-        })
-    }
-
-    fn row(
-        &self,
-        prepared: &Prepared<'_>,
-        values: &[f64],
-        watch: &mut Watch<'_>,
-    ) -> Result<Row, Error> {
-        let row = Row::empty(values, self.measures().len());
-        let design = match prepared.design() {
-            Ok(design) => design,
-            Err(error) if error.kind() == ErrorKind::Refused => return Ok(row.failed(error)),
-            Err(error) => return Err(error),
-        };
-        if design.observer.filter.is_some() {
-            return Err(filter_refused(prepared.study(), design.observer.family));
-        }
-        match self {
-            Self::Simulation(reference) => {
-                trial::simulated(prepared, &design, reference, row, watch)
-            }
-            Self::Log(record) => replay::logged(prepared, design, record, row, watch),
-        }
-    }
-
-    fn notes(&self) -> &[String] {
-        match self {
-            Self::Simulation(reference) => &reference.notes,
-            Self::Log(record) => &record.notes,
-        }
-    }
-
-    fn measures(&self) -> &'static [Measure] {
-        match self {
-            Self::Simulation(_) => measures::SIMULATED,
-            Self::Log(_) => measures::LOGGED,
-        }
-    }
 }
 
 /// A filter that the study names has nothing to sweep, whatever its keys.
@@ -241,15 +212,6 @@ fn refuse_named_filter(study: &Study) -> Result<(), Error> {
     }
 }
 
-/// A filter's equations without its updates are the plant alone.
-fn filter_refused(study: &Study, family: &str) -> Error {
-    Error::input(format!(
-        "`tune` judges observers whose correction is in their equations: expected another family than the filter \"{family}\""
-    ))
-    .at(&study.file)
-    .hint("name another `family` in [observer], if `lynkeus check` finds one that fits; `lynkeus compare` judges filters as they are")
-}
-
 fn least(rows: &[Row]) -> Option<usize> {
     let objective = |row: &Row| row.figure(measures::OBJECTIVE);
     let judged = rows.iter().enumerate();
@@ -257,21 +219,6 @@ fn least(rows: &[Row]) -> Option<usize> {
         .filter_map(|(i, row)| Some((i, objective(row)?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(i, _)| i)
-}
-
-/// Advice where the best value may lie beyond the range.
-fn at_an_end(axes: &[Axis], knee: &Row) -> Option<String> {
-    let ends = |(axis, value): &(&Axis, &f64)| {
-        let beyond =
-            |x: &f64| axis.values.iter().all(|v| v <= x) || axis.values.iter().all(|v| v >= x);
-        axis.values.len() > 1 && beyond(value)
-    };
-    let (axis, value) = axes.iter().zip(&knee.values).find(ends)?;
-    Some(format!(
-        "the knee, {} = {}, is at an end of what was swept: the best value may lie beyond; widen `keys` of [tune]",
-        axis.label(),
-        axis::shown(*value)
-    ))
 }
 
 impl Sweep {
@@ -293,6 +240,17 @@ impl Sweep {
         let high = beyond.iter().take_while(is_good).last();
         let end = |found: Option<&(f64, f64)>| found.map_or(at, |(x, _)| *x);
         Some(end(low)..=end(high))
+    }
+
+    /// The axis at whose end the knee is: the best value may lie beyond.
+    pub(crate) fn at_an_end(&self) -> Option<(&Axis, f64)> {
+        let ends = |(axis, value): &(&Axis, &f64)| {
+            let beyond =
+                |x: &f64| axis.values.iter().all(|v| v <= x) || axis.values.iter().all(|v| v >= x);
+            axis.values.len() > 1 && beyond(value)
+        };
+        let mut pairs = self.axes.iter().zip(&self.chosen()?.values);
+        pairs.find(ends).map(|(axis, value)| (axis, *value))
     }
 
     /// True for rows that differ from the knee in the first key at most.

@@ -1,5 +1,6 @@
 //! A log as every value of a sweep is judged on it.
 
+use super::errors::rms;
 use super::holdout::{FEWER, Plan};
 use crate::columns::Log;
 use crate::course::Samples;
@@ -83,6 +84,37 @@ impl<'t> Record<'t> {
     pub fn readings(&self) -> &[Series] {
         &self.log.samples.readings
     }
+
+    /// The samples less those that are held out, without a switch: for what takes readings when they are there.
+    pub fn left(&self) -> Samples {
+        held_out(&self.log.samples, &self.plan, BetweenSamples::Hold)
+    }
+
+    /// The root mean square over outputs of each one's error on the scored rows, over the span
+    /// of its values on the whole log; outputs that do not report there are left out.
+    pub fn held_out_error(&self, predicted: &[Series]) -> Option<f64> {
+        let error = |(values, prediction): (&Series, &Series)| {
+            let rows = values.iter().zip(prediction).zip(self.plan.scored());
+            let scored = rows.filter(|((y, _), is_scored)| *is_scored && y.is_finite());
+            let errors: Vec<f64> = scored.map(|((y, hat), _)| y - hat).collect();
+            (!errors.is_empty()).then(|| rms(&errors) / span(values))
+        };
+        let pairs = self.readings().iter().zip(predicted);
+        let errors: Vec<f64> = pairs.filter_map(error).collect();
+        (!errors.is_empty()).then(|| rms(&errors))
+    }
+}
+
+/// From the least to the greatest of the values that are there, or the magnitude of a constant,
+/// or 1.
+pub(super) fn span(values: &Series) -> f64 {
+    let low = values.iter().fold(f64::INFINITY, f64::min);
+    let high = values.iter().fold(f64::NEG_INFINITY, f64::max);
+    match high - low {
+        span if span > 0.0 => span,
+        _ if high.abs() > 0.0 => high.abs(),
+        _ => 1.0,
+    }
 }
 
 fn switched(mut samples: Samples, switch: Vec<f64>) -> Samples {
@@ -153,5 +185,10 @@ mod tests {
             let is_whole = a.iter().all(|y| y.is_finite());
             assert_eq!(is_whole, between == Linear);
         }
+    }
+    #[test]
+    fn gaps_are_no_part_of_what_values_span() {
+        assert_eq!(span(&vec![f64::NAN, 2.0, -1.0, f64::NAN].into()), 3.0);
+        assert_eq!(span(&vec![f64::NAN, -2.0].into()), 2.0);
     }
 }

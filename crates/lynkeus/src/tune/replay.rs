@@ -5,7 +5,7 @@ use lynkeus_run::EstimatorSettings;
 
 use super::errors::{rms, run_away};
 use super::holdout::{predicted, switchable};
-use super::record::{Record, Replayed};
+use super::record::{Record, Replayed, span};
 use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
@@ -68,7 +68,11 @@ impl Replay<'_> {
         }
         match self.run(&self.record.parts, &mut part(watch, 1, 2))? {
             Ok(run) => {
-                row.set(measures::HELD_OUT_ERROR, self.held_out_error(&run));
+                let predicted = predicted(&self.design.observer, &run);
+                row.set(
+                    measures::HELD_OUT_ERROR,
+                    self.record.held_out_error(predicted),
+                );
                 Ok(None)
             }
             Err(reason) => Ok(Some(format!("with samples held out: {reason}"))),
@@ -99,21 +103,6 @@ impl Replay<'_> {
                 Err(interrupted_on(error, &log, &study.file))
             }
         }
-    }
-
-    /// The root mean square over outputs of each one's error on the scored rows, over the span
-    /// of its values on the whole log; outputs that do not report there are left out.
-    fn held_out_error(&self, run: &Course) -> Option<f64> {
-        let error = |(values, prediction): (&Series, &Series)| {
-            let rows = values.iter().zip(prediction).zip(self.record.plan.scored());
-            let scored = rows.filter(|((y, _), is_scored)| *is_scored && y.is_finite());
-            let errors: Vec<f64> = scored.map(|((y, hat), _)| y - hat).collect();
-            (!errors.is_empty()).then(|| rms(&errors) / span(values))
-        };
-        let predicted = predicted(&self.design.observer, run);
-        let pairs = self.record.readings().iter().zip(predicted);
-        let errors: Vec<f64> = pairs.filter_map(error).collect();
-        (!errors.is_empty()).then(|| rms(&errors))
     }
 
     /// The innovation of a replay that looks at no later sample, past the first block, in the
@@ -170,18 +159,6 @@ impl Replay<'_> {
     }
 }
 
-/// From the least to the greatest of the values that are there, or the magnitude of a constant,
-/// or 1.
-fn span(values: &Series) -> f64 {
-    let low = values.iter().fold(f64::INFINITY, f64::min);
-    let high = values.iter().fold(f64::NEG_INFINITY, f64::max);
-    match high - low {
-        span if span > 0.0 => span,
-        _ if high.abs() > 0.0 => high.abs(),
-        _ => 1.0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::ops::ControlFlow;
@@ -230,11 +207,5 @@ mod tests {
         }
         let out = record.parts.samples.inputs.last().unwrap().iter();
         assert_eq!(out.sum::<f64>(), record.plan.held_out.iter().sum::<f64>());
-    }
-
-    #[test]
-    fn gaps_are_no_part_of_what_values_span() {
-        assert_eq!(span(&vec![f64::NAN, 2.0, -1.0, f64::NAN].into()), 3.0);
-        assert_eq!(span(&vec![f64::NAN, -2.0].into()), 2.0);
     }
 }

@@ -105,7 +105,7 @@ impl Sweep {
 }
 
 /// Three significant digits.
-pub(super) fn brief(x: f64) -> String {
+pub(crate) fn brief(x: f64) -> String {
     let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
     match rounded.abs() {
         1e5.. => format!("{rounded:e}"),
@@ -164,7 +164,7 @@ impl fmt::Display for Sweep {
 }
 
 /// The beginning of a reason, for a line of a table.
-fn shortened(reason: &str) -> String {
+pub(crate) fn shortened(reason: &str) -> String {
     const MOST: usize = 72;
     let line = reason.lines().next().unwrap_or_default();
     match line.chars().count() > MOST {

@@ -3,22 +3,22 @@
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
-use lynkeus_model::Plant;
-use lynkeus_observers::{Design, Estimate, Observer, Signal};
+use lynkeus_observers::Design;
 use lynkeus_run::{
     Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
 };
 
-use super::errors::{Errors, rms, run_away};
+use super::errors::run_away;
+use super::judge::Judge;
 use super::reference::Reference;
 use super::speed::{longest_step, transparent};
-use super::{Peak, Row, measures};
+use super::{Row, measures};
+use crate::Error;
 use crate::crew::{Watch, part};
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
 use crate::systems::{self, monitor_column, named};
-use crate::{Error, Study};
 
 /// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
 /// parts, but never fewer than the second number.
@@ -37,10 +37,12 @@ pub(super) fn simulated(
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
     let trial = Trial {
-        study: prepared.study(),
-        plant: prepared.plant(),
-        observer: transparent(&design.observer),
-        reference,
+        judge: Judge {
+            study: prepared.study(),
+            plant: prepared.plant(),
+            observer: transparent(&design.observer),
+            reference,
+        },
     };
     match trial.judge(&mut row, watch)? {
         None => Ok(row),
@@ -50,10 +52,8 @@ pub(super) fn simulated(
 
 /// One value of the sweep.
 struct Trial<'a> {
-    study: &'a Study,
-    plant: &'a Plant,
-    observer: Observer,
-    reference: &'a Reference,
+    /// its observer is transparent
+    judge: Judge<'a>,
 }
 
 /// A run, or why its estimate is none.
@@ -62,37 +62,38 @@ type Ran = Result<Trajectory, String>;
 impl Trial<'_> {
     /// Fills the row in; the reason where a run failed.
     fn judge(&self, row: &mut Row, watch: &mut Watch<'_>) -> Result<Option<String>, Error> {
-        let disturbed = !self.study.tune.disturbance.is_empty();
+        let judge = &self.judge;
+        let disturbed = !judge.study.tune.disturbance.is_empty();
         let runs = if disturbed { 3 } else { 2 };
         let simulation = self.simulation()?;
         let exact_run = match self.run(&simulation, &mut part(watch, 0, runs))? {
             Ok(run) => run,
             Err(reason) => return Ok(Some(reason)),
         };
-        let exact = self.errors(&exact_run);
+        let exact = judge.errors(&exact_run);
         if let Some(reason) = run_away(&exact.scaled) {
             return Ok(Some(reason));
         }
-        self.judge_exact(row, &exact, &exact_run);
+        judge.exact(row, &exact, &exact_run);
         row.set(
             measures::SAMPLING_MARGIN,
             self.margin(&simulation, &exact_run),
         );
 
         let noisy = Simulation {
-            noise: self.reference.noise.clone(),
+            noise: judge.reference.noise.clone(),
             ..simulation
         };
         let mut failure = None;
         match self.run(&noisy, &mut part(watch, 1, runs))? {
-            Ok(run) => self.judge_noisy(row, &exact, &self.errors(&run), &run),
+            Ok(run) => judge.noisy(row, &exact, &run),
             Err(reason) => failure = Some(format!("with noise: {reason}")),
         }
         if disturbed {
             match self.run(&self.disturbed(noisy)?, &mut part(watch, 2, runs))? {
                 Ok(run) => {
-                    let bound = self.errors(&run).from(self.reference.tail);
-                    row.set(measures::ULTIMATE_BOUND, largest(&bound));
+                    let bound = judge.errors(&run).from(judge.reference.tail);
+                    row.set(measures::ULTIMATE_BOUND, bound.largest());
                 }
                 Err(reason) => {
                     row.set(measures::ULTIMATE_BOUND, None);
@@ -105,12 +106,13 @@ impl Trial<'_> {
 
     /// The exact run.
     fn simulation(&self) -> Result<Simulation, Error> {
-        let (study, plant, settings) = (self.study, self.plant, settings(self.study)?);
+        let Judge { study, plant, .. } = self.judge;
+        let settings = settings(study)?;
         let plain = open_loop(study, settings, plant)?;
         let rows = (plain.until - plain.start) / plain.output_step;
         Ok(Simulation {
-            observer: Some(systems::observer(plant, &self.observer)?),
-            inputs: systems::inputs(study, plant, settings, &self.observer)?,
+            observer: Some(systems::observer(plant, &self.judge.observer)?),
+            inputs: systems::inputs(study, plant, settings, &self.judge.observer)?,
             noise: Noise::default(),
             method: thrifty(plain.method, rows),
             ..plain
@@ -120,10 +122,12 @@ impl Trial<'_> {
     /// The exact run with the stated disturbance on the plant's inputs; what the observer reads
     /// of them stays as it was.
     fn disturbed(&self, run: Simulation) -> Result<Simulation, Error> {
-        let (study, plant, settings) = (self.study, self.plant, settings(self.study)?);
+        let Judge { study, plant, .. } = self.judge;
+        let settings = settings(study)?;
         let graph = &plant.graph;
         let mut inputs = systems::input_expressions(study, plant, settings)?;
         let derivatives = self
+            .judge
             .observer
             .input_derivative_expressions(graph, &inputs)
             .map_err(Error::from_source)?;
@@ -156,79 +160,8 @@ impl Trial<'_> {
         match simulation.run_watched(watch) {
             Ok(run) => Ok(Ok(run)),
             Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
-            Err(error) => Err(interrupted(error.error, &self.study.file)),
+            Err(error) => Err(interrupted(error.error, &self.judge.study.file)),
         }
-    }
-
-    /// Scaled errors of the estimates, in the observer's order; an input is what the plant has
-    /// of it, disturbance included.
-    fn errors(&self, run: &Trajectory) -> Errors {
-        let error = |(place, estimate): (usize, &Estimate)| {
-            let column = systems::column_of(self.plant, &estimate.variable)?;
-            let (estimate, truth) = (run.column(Role::Estimate.at(place))?, run.column(column)?);
-            let scale = self.reference.scale(column);
-            let pairs = estimate.iter().zip(truth);
-            Some(pairs.map(|(hat, x)| (hat - x) / scale).collect())
-        };
-        let estimates = self.observer.estimates.iter().enumerate();
-        Errors {
-            time: run.times().to_vec(),
-            scaled: estimates.filter_map(error).collect(),
-        }
-    }
-
-    fn judge_exact(&self, row: &mut Row, exact: &Errors, run: &Trajectory) {
-        let Reference { starts, tail, .. } = self.reference;
-        let settling = exact.settling(starts, self.study.tune.tolerance);
-        row.set(measures::SETTLING_TIME, settling);
-        row.set(measures::ULTIMATE_BOUND, largest(&exact.from(*tail)));
-        row.set(measures::EXACT_ERROR, Some(exact.mean()));
-        let Some((at, quantity, size)) = exact.peak() else {
-            return;
-        };
-        row.set(measures::PEAK_ERROR, Some(size));
-        let estimate = self.observer.estimates.get(quantity);
-        let course = run.column(Role::Estimate.at(quantity));
-        row.peak = estimate.and_then(|estimate| {
-            Some(Peak {
-                name: estimate.variable.name.clone(),
-                estimate: *course?.get(at)?,
-                time: *run.times().get(at)?,
-            })
-        });
-    }
-
-    fn judge_noisy(&self, row: &mut Row, exact: &Errors, noisy: &Errors, run: &Trajectory) {
-        let caused = noisy.minus(exact);
-        let level = self.noise_level(run);
-        let tail = caused.from(self.reference.tail);
-        let gain = (level > 0.0).then(|| tail.worst_rms() / level);
-        row.set(measures::NOISE_GAIN, gain);
-        row.set(measures::NOISE_ERROR, Some(caused.mean()));
-        row.set(measures::TOTAL_ERROR, Some(noisy.mean()));
-    }
-
-    /// The root mean square of the scaled noise of the measured outputs, as drawn, in the tail.
-    fn noise_level(&self, run: &Trajectory) -> f64 {
-        let drawn = |signal: &Signal| {
-            let place = systems::output_of(self.plant, signal)?;
-            let (exact, measured) = (Role::Output.at(place), Role::Measured.at(place));
-            let scale = self.reference.scale(exact);
-            let pairs = run.column(exact)?.iter().zip(run.column(measured)?);
-            Some(pairs.map(|(y, m)| (m - y) / scale).collect::<Vec<f64>>())
-        };
-        let measured = self.observer.measured.iter();
-        let noise = Errors {
-            time: run.times().to_vec(),
-            scaled: measured.filter_map(drawn).collect(),
-        };
-        let squares: Vec<f64> = noise
-            .from(self.reference.tail)
-            .scaled
-            .iter()
-            .map(|e| rms(e))
-            .collect();
-        rms(&squares)
     }
 
     /// The longest stable step over the step of the sensor.
@@ -238,10 +171,10 @@ impl Trial<'_> {
         let mut u = vec![0.0; simulation.inputs.outputs().len()];
         let names = observer.signals().to_vec();
         // the first signals of an observer are its measured outputs
-        let measured = self.observer.measured.iter();
+        let measured = self.judge.observer.measured.iter();
         let outputs: Vec<Option<&[f64]>> = measured
             .map(|signal| {
-                let place = systems::output_of(self.plant, signal)?;
+                let place = systems::output_of(self.judge.plant, signal)?;
                 run.column(Role::Output.at(place))
             })
             .collect();
@@ -251,7 +184,9 @@ impl Trial<'_> {
         let step = longest_step(observer, run.len(), &mut |row, x, signals| {
             let t = *run.times().get(row)?;
             for (i, x) in x.iter_mut().enumerate() {
-                *x = *run.column(monitor_column(&self.observer, i))?.get(row)?;
+                *x = *run
+                    .column(monitor_column(&self.judge.observer, i))?
+                    .get(row)?;
             }
             inputs.enter(t);
             inputs.outputs(t, &[], &mut u);
@@ -263,7 +198,7 @@ impl Trial<'_> {
             }
             Some(t)
         })?;
-        Some(step / self.reference.sample_step)
+        Some(step / self.judge.reference.sample_step)
     }
 }
 
@@ -271,10 +206,6 @@ impl Trial<'_> {
 fn disturbed(name: &str) -> String {
     // no name in a model's text has a blank, unless it is in quotes
     format!("{name} disturbed")
-}
-
-fn largest(errors: &Errors) -> Option<f64> {
-    errors.worst().into_iter().max_by(f64::total_cmp)
 }
 
 /// The method with fewer steps than it would take: an estimate on its way to infinity is then

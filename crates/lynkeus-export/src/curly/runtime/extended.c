@@ -1,13 +1,13 @@
 /* The readings one after the other, all with the slopes and predictions of x before. 0 where the
    sensors' model has no value. */
-static int correct(STATE *s, double t)
+static truth correct(STATE *s, double t)
 {
     real h[SENSORS];
     real c[SENSORS * STATES];
     real before[STATES];
     real projected[STATES];
     real gain[STATES];
-    int believed[SENSORS];
+    truth believed[SENSORS];
     for (int i = 0; i < SENSORS * STATES; i++) {
         c[i] = R(0.0);
     }

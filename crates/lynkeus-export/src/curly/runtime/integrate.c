@@ -1,6 +1,6 @@
 /* Takes z along its field in equal steps of the classical Runge-Kutta method. 0 where a value is
    not finite: z is then of no use. */
-static int integrate(field f, double from, double to, int steps, const real *w, real *z)
+static truth integrate(field f, double from, double to, int steps, const real *w, real *z)
 {
     real first[DIMENSION];
     real middle[DIMENSION];

@@ -1,5 +1,5 @@
 /* Whether a reading corrects the estimate; variance is that of its innovation. */
-static int judge(STATE *s, int i, real reading, real predicted, real variance)
+static truth judge(STATE *s, int i, real reading, real predicted, real variance)
 {
     (void)predicted;
     if (!isfinite(reading)) {
@@ -13,7 +13,7 @@ static int judge(STATE *s, int i, real reading, real predicted, real variance)
 //? gate
     /* a gate must not lock the filter out for ever: a sensor that moves is believed in the end */
     const real spread = sqrt(variance > R(0.0) ? variance : R(0.0));
-    const int is_heard = s->rejected[i] >= 10 && s->moved[i] >= 5;
+    const truth is_heard = s->rejected[i] >= 10 && s->moved[i] >= 5;
     if (!is_heard && fabs(reading - predicted) > GATE * spread) {
         s->became[i] = REJECTED;
     }

@@ -300,7 +300,7 @@ static void project(const real *root, const real *c, int i, real *projected)
 //= take_reading
 /* Carlson's update by one reading y = c x + noise: the gain, and the root of what is left of P.
    projected is S'c. 0 where neither the reading nor the estimate has any variance. */
-static int take_reading(real *root, const real *projected, real variance_of_noise, real *gain)
+static truth take_reading(real *root, const real *projected, real variance_of_noise, real *gain)
 {
     real left[STATES];
     real taken[STATES];

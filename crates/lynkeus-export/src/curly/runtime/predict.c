@@ -1,6 +1,6 @@
 /* x and the root of P to another time: P = Phi P Phi' + W. 0, and nothing changed, where the flow
    has no value. */
-static int predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
 {
     real z[DIMENSION];
     real rows[CARRIED * STATES];

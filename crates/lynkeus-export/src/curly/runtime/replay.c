@@ -55,17 +55,19 @@ static int column(const char *name, int count)
     return -1;
 }
 
-static double number(int place, int count)
+/* A cell as a number, NAN where it is empty. 0 where it is something else. */
+static int number(int place, int count, double *value)
 {
     char *end = NULL;
-    double value = (double)NAN;
-    if (place < count && cells[place][0] != '\0') {
-        value = strtod(cells[place], &end);
-        if (end == cells[place]) {
-            value = (double)NAN;
-        }
+    *value = (double)NAN;
+    if (place >= count || cells[place][0] == '\0') {
+        return 1;
     }
-    return value;
+    *value = strtod(cells[place], &end);
+    while (*end == ' ') {
+        end++;
+    }
+    return end != cells[place] && *end == '\0';
 }
 
 int main(void)
@@ -76,6 +78,7 @@ int main(void)
     @REAL@ estimates[@CAPITALS@_ESTIMATES];
     const char *time_name = "t";
     int time = -1;
+    int wrong = -1;
     int count = 0;
     long row = 1;
 
@@ -116,9 +119,17 @@ int main(void)
         if (count == 1 && cells[0][0] == '\0') {
             continue;
         }
-        t = number(time, count);
+        wrong = number(time, count, &t) ? -1 : time;
         for (int i = 0; i < @CAPITALS@_SIGNALS; i++) {
-            signals[i] = (@REAL@)number(places[i], count);
+            double value = (double)NAN;
+            if (!number(places[i], count, &value) && wrong < 0) {
+                wrong = places[i];
+            }
+            signals[i] = (@REAL@)value;
+        }
+        if (wrong >= 0) {
+            (void)fprintf(stderr, "row %ld: expected a number, found %s\n", row, cells[wrong]);
+            return 2;
         }
         code = @NAME@_push(&state, t, signals, estimates);
         if (code != 0) {

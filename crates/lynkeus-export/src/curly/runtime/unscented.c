@@ -70,7 +70,7 @@ static void root_of_points(const real *points, const real *extra, int count, rea
 }
 
 /* Each point through the flow. 0, and nothing changed, where the flow has no value. */
-static int predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
+static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
 {
     real points[POINTS * STATES];
     real point[STATES];
@@ -117,7 +117,7 @@ static void substitute(const real *lower, int n, real *b)
 
 /* Points drawn again; the gain over the readings that are believed. 0 where the sensors' model has
    no value. */
-static int correct(STATE *s, double t)
+static truth correct(STATE *s, double t)
 {
     real points[POINTS * STATES];
     real point[STATES];

@@ -100,7 +100,7 @@ async function shot(name, width, scheme, height = 900) {
 // The last series of every chart is the estimate.
 const CURVES = "charts.map(({ plot }) => Array.from(plot.data[plot.data.length - 1]))";
 // Whether the canvas of every chart has points of the estimate's colour.
-const PAINTED = `charts.map(({ plot }) => {
+const paintedOf = (plots) => `${plots}.map((plot) => {
     const { width, height } = plot.ctx.canvas;
     const pixels = plot.ctx.getImageData(0, 0, width, height).data;
     const wanted = [1, 3, 5].map((k) => parseInt(color("estimate").slice(k, k + 2), 16));
@@ -110,6 +110,9 @@ const PAINTED = `charts.map(({ plot }) => {
     }
     return count;
 })`;
+// Rows of the trade-off's table that are the slider's.
+const ROW = `[...document.querySelectorAll("#tradeoff .wide tbody tr")].flatMap((row, k) => (row.classList.contains("present") ? [k] : []))`;
+const PICTURE = "compromises[0]?.ctx.canvas.toDataURL()";
 
 try {
     const { targetInfos } = await call("Target.getTargets");
@@ -122,7 +125,9 @@ try {
     await call("Page.navigate", { url: pathToFileURL(resolve(page)).href });
     await ready();
     seen.title = await value("document.title");
-    seen.painted = await value(PAINTED);
+    seen.painted = await value(paintedOf("charts.map(({ plot }) => plot)"));
+    seen.compromise = await value(paintedOf("compromises"));
+    seen.row = { first: await value(ROW), picture: await value(PICTURE) };
     seen.names = await value("charts.map(({ quantity }) => quantity.name)");
     seen.first = await value(CURVES);
     seen.last = await value("charts.map(({ plot }) => plot.series.findLast((series) => series.show).label)");
@@ -132,6 +137,7 @@ try {
     if (await value(`document.getElementById("knob") !== null`)) {
         await move("knob", 0);
         seen.slow = await value(CURVES);
+        Object.assign(seen.row, { slow: await value(ROW), slow_picture: await value(PICTURE) });
         await shot("moved", 1280, "dark");
         await move("knob", await value("data.knob.own"));
     }

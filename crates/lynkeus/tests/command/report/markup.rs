@@ -155,3 +155,25 @@ fn names_do_not_break_a_page() {
     );
     sound(&seen);
 }
+
+/// A page goes to others: it names files, no folder of this machine.
+#[test]
+fn no_folder_is_told() {
+    let folder = Folder::new();
+    let place = folder.path.path().to_str().unwrap().to_owned();
+    let text = folder.read("two_tanks.mo");
+    let unread = "  parameter Real unread = 1;\n  input";
+    folder.write("two_tanks.mo", &text.replacen("  input", unread, 1));
+    let short: Vec<String> = folder
+        .read("log.csv")
+        .lines()
+        .take(30)
+        .map(str::to_owned)
+        .collect();
+    folder.write("log.csv", &(short.join("\n") + "\n"));
+    let [study, log] = ["study.toml", "log.csv"].map(|file| format!("{place}/{file}"));
+    let told = page(&folder, &[&study, &log]);
+    assert!(told.contains("lynkeus tune study.toml --plot"));
+    assert!(told.contains("It cannot be told: "));
+    assert!(!told.contains(&place));
+}

@@ -3,6 +3,7 @@
 
 mod browser;
 mod markup;
+mod tradeoff;
 
 use std::process::Command;
 
@@ -299,5 +300,41 @@ fn a_page_whose_steps_do_not_do_says_so() {
     assert!(data(&page)["knob"].is_null());
     if let Some(seen) = browser::browsed(&folder) {
         browser::sound(&seen);
+    }
+}
+
+/// The page's observer has the steps that are asked for.
+#[test]
+fn another_step_is_taken_as_by_export() {
+    let folder = example("two-tanks", "study.toml");
+    let data = data(&page(&folder, &["study.toml", "log.csv", "--step", "0.5"]));
+    let own = data["knob"]["own"].as_u64().unwrap() as usize;
+    assert_eq!(
+        data["knob"]["positions"][own]["steps"],
+        "steps of 0.5 at most"
+    );
+    let study = stepped(&folder.read("study.toml"), "steps of 0.5 at most", "");
+    let expected = estimated(&folder, &study);
+    for quantity in data["quantities"].as_array().unwrap() {
+        let header = quantity["header"].as_str().unwrap();
+        let place = expected.0.iter().position(|h| h == header).unwrap();
+        assert!(is(&quantity["estimate"], &expected, place), "{header}");
+    }
+    for command in [
+        &["report", "study.toml", "-o", "r.html", "--step", "0"][..],
+        &[
+            "export",
+            "study.toml",
+            "--to",
+            "html",
+            "-o",
+            "page",
+            "--step=-1",
+        ],
+    ] {
+        let ended = folder.run(command);
+        assert_eq!(ended.code, 2, "{}", ended.err);
+        let told = "--step: expected a finite number above 0";
+        assert!(ended.err.contains(told), "{}", ended.err);
     }
 }

@@ -1,10 +1,12 @@
 //! JavaScript: a module without dependencies, for pages and Node.
 
+mod print;
+
+use self::print::printed;
 use super::device::Device;
 use super::function::{Entry, comment};
-use super::language::Language;
+use super::language::{FUNCTIONS, Language};
 use super::machine::{Field, Machine};
-use super::template::exchanged;
 use crate::Refusal;
 
 /// What the library of the draft is in JavaScript, where that has it.
@@ -72,21 +74,22 @@ fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
         .sizes
         .iter()
         .map(|(name, size)| format!("const {name} = {size};\n"));
-    let library = machine.library().into_iter().map(|(name, text)| {
+    let mut library = String::new();
+    for (name, text) in machine.library() {
         let own = OWN.iter().find(|own| own.0 == name);
-        match own {
+        library += &match own {
             Some((_, text)) => format!("{text}\n\n"),
-            None => format!("{}\n", numbered(&Language::JavaScript.render(text))),
-        }
-    });
-    let source = Language::JavaScript.render(&format!("{}\n{}", machine.tables, machine.source));
+            None => format!("{}\n", printed(text, word)?),
+        };
+    }
+    let source = printed(&format!("{}\n{}", machine.tables, machine.source), word)?;
     Ok(format!(
         "{about}\n{export}const signals = {};\n{export}const estimates = {};\n\n{}\n{}{}\n{export}{}\n{export}{PUSH}",
         names(device.signals),
         names(device.estimates),
         sizes.collect::<String>(),
-        library.collect::<String>(),
-        numbered(&source),
+        library,
+        source,
         init(&machine.fields),
     ))
 }
@@ -102,10 +105,21 @@ const PUSH: &str = "function push(s, t, signals, estimates)
 }
 ";
 
-fn numbered(text: &str) -> String {
-    exchanged(text, |word| {
-        let found = WORDS.iter().find(|known| known.0 == word);
-        found.map(|(_, number)| number.to_string())
+/// What a name of the draft is called.
+fn word(name: &str) -> Option<String> {
+    let number = WORDS.iter().find(|known| known.0 == name);
+    if let Some((_, number)) = number {
+        return Some(number.to_string());
+    }
+    Some(match name {
+        "EPSILON" | "SMALLEST" | "RANK" => Language::C.constant(name)?.to_owned(),
+        "isfinite" => "Number.isFinite".to_owned(),
+        "isnan" => "Number.isNaN".to_owned(),
+        "INFINITY" => "Infinity".to_owned(),
+        "NAN" => "NaN".to_owned(),
+        "fabs" => "Math.abs".to_owned(),
+        function if FUNCTIONS.contains(&function) => format!("Math.{function}"),
+        _ => return None,
     })
 }
 

@@ -1,0 +1,223 @@
+//! How soon an estimate is right against how much noise it passes on, over the positions of the slider.
+
+use std::ops::ControlFlow;
+
+use lynkeus_observers::Design;
+use serde_json::{Map, Value, json};
+
+use super::html::{Cell, Html};
+use super::positions::Positions;
+use super::sections::words;
+use crate::Error;
+use crate::prepare::Prepared;
+use crate::tune::slider::{self, Ground};
+use crate::tune::{Axis, Row, Sweep, axis, brief, shortened};
+
+/// What is drawn, in simulation and on a log.
+const DRAWN: &[&str] = &[
+    "mean_error",
+    "mean_error_exact",
+    "mean_error_noise",
+    "held_out_error",
+    "innovation",
+];
+
+/// The positions of the slider, judged.
+#[derive(Debug)]
+pub(super) struct Tradeoff {
+    pub positions: Positions,
+    /// a row for each of them, or why there are none
+    sweep: Result<Sweep, Error>,
+    is_filter: bool,
+    /// samples that are judged, where the log has more
+    first: Option<usize>,
+}
+
+impl Tradeoff {
+    /// Judges every position as `tune` judges values.
+    ///
+    /// # Errors
+    /// The user ended it.
+    pub fn new(
+        prepared: &Prepared<'_>,
+        design: &Design,
+        positions: Positions,
+        ground: Ground<'_>,
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Self, Error> {
+        let mut is_ended = false;
+        let watch = &mut |done| {
+            let told = watch(done);
+            is_ended |= told.is_break();
+            told
+        };
+        let (axis, grid) = (positions.axis.clone(), positions.grid());
+        let sweep = slider::at(prepared, design, axis, &grid, ground, watch);
+        Ok(Self {
+            sweep: match sweep {
+                Err(error) if is_ended => return Err(error),
+                sweep => sweep,
+            },
+            positions,
+            is_filter: design.observer.filter.is_some(),
+            first: match ground {
+                Ground::Log(table) => Some(slider::ROWS).filter(|most| table.rows() > *most),
+                Ground::Simulation { .. } => None,
+            },
+        })
+    }
+
+    /// For the pictures; none where no position has a figure.
+    pub fn json(&self) -> Option<Value> {
+        let sweep = self.sweep.as_ref().ok()?;
+        sweep.knee?;
+        let measures = sweep.measures.iter().enumerate();
+        let drawn = measures.filter(|(_, m)| DRAWN.contains(&m.name));
+        let figures = drawn.filter(|(place, _)| has(sweep, *place));
+        let figures: Map<String, Value> = figures
+            .map(|(place, measure)| {
+                let values = sweep.rows.iter().map(|row| json!(row.figure(place)));
+                (measure.name.to_owned(), values.collect())
+            })
+            .collect();
+        Some(json!({
+            "label": swept(sweep),
+            "values": sweep.rows.iter().map(|row| row.values.first()).collect::<Vec<_>>(),
+            "own": self.own(),
+            "knee": sweep.knee,
+            "good": sweep.good().map(|good| [*good.start(), *good.end()]),
+            "figures": figures,
+        }))
+    }
+
+    /// The row of the study's own position.
+    fn own(&self) -> Option<usize> {
+        self.positions.all.iter().position(|p| p.factor == 1.0)
+    }
+
+    pub fn tell(&self, html: &mut Html) {
+        html.element("h2", "The trade-off");
+        let sweep = match &self.sweep {
+            Ok(sweep) => sweep,
+            Err(error) => {
+                return html.element("p", &format!("It cannot be told: {}", words(error)));
+            }
+        };
+        if let Some(knee) = sweep.chosen() {
+            html.element("p", &self.how_to_read(sweep));
+            html.element("p", &best(sweep, knee));
+            html.raw("<div id=\"compromise\"></div>");
+        }
+        self.table(html, sweep);
+        html.element("p class=\"hint\"", self.definitions(sweep));
+        let first = self
+            .first
+            .map(|first| format!("judged on the first {first} samples"));
+        let beyond = sweep.at_an_end().map(|_| {
+            "the knee is at an end of the slider: the best value may lie beyond".to_owned()
+        });
+        let notes: Vec<&String> = sweep.notes.iter().chain(&first).chain(&beyond).collect();
+        if !notes.is_empty() {
+            html.list(notes);
+        }
+    }
+
+    fn how_to_read(&self, sweep: &Sweep) -> String {
+        let faster = match self.is_filter {
+            true => "With more process noise a filter trusts its readings more: it",
+            false => "A faster observer",
+        };
+        let read = match sweep.measures.first().map(|m| m.name) {
+            Some("mean_error") => {
+                "Each point is a position of the slider: the further down, the nearer to the truth it would be without noise; the further left, the less noise it passes on. At the knee the error that is left with both is least."
+            }
+            _ => {
+                "A log has no truth: each position is judged by how well it foretells samples that it is not shown. At the knee that error is least."
+            }
+        };
+        format!("{faster} follows sooner and passes on more noise. {read}")
+    }
+
+    fn definitions(&self, sweep: &Sweep) -> &'static str {
+        match (sweep.measures.first().map(|m| m.name), self.is_filter) {
+            (Some("mean_error"), false) => {
+                "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, in the study's simulation with noise, without it, and their difference: the figures of lynkeus tune."
+            }
+            (Some("mean_error"), true) => {
+                "Errors are mean magnitudes over quantities and time, as shares of each quantity's range, on samples of the study's simulation with noise, without it, and their difference: the figures that lynkeus tune has for observers."
+            }
+            (_, false) => {
+                "Errors are root mean squares, as shares of each reading's range: the figures of lynkeus tune --log."
+            }
+            (_, true) => {
+                "Errors are root mean squares, as shares of each reading's range, as lynkeus tune --log has them for observers."
+            }
+        }
+    }
+
+    /// A row for every position.
+    fn table(&self, html: &mut Html, sweep: &Sweep) {
+        let places: Vec<usize> = (0..sweep.measures.len())
+            .filter(|place| has(sweep, *place))
+            .collect();
+        let titles = places.iter().filter_map(|place| {
+            let measure = sweep.measures.get(*place)?;
+            let unit = sweep.time_unit.as_ref().filter(|_| measure.is_time);
+            Some(match unit {
+                Some(unit) => format!("{} ({unit})", measure.title),
+                None => measure.title.to_owned(),
+            })
+        });
+        let mut head = vec![swept(sweep)];
+        head.extend(titles);
+        head.push(String::new());
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        let rows = sweep.rows.iter().enumerate().map(|(place, row)| {
+            let values = row.values.iter().map(|x| axis::shown(*x));
+            let figures = places.iter().map(|place| row.figure(*place));
+            let figures = figures.map(|x| x.map_or("\u{2013}".to_owned(), brief));
+            let mut cells: Vec<Cell> = values.chain(figures).map(Cell::Number).collect();
+            cells.push(Cell::from(self.remark(sweep, place, row)));
+            cells
+        });
+        html.table(&head, rows.collect());
+    }
+
+    fn remark(&self, sweep: &Sweep, place: usize, row: &Row) -> String {
+        let study = (self.own() == Some(place)).then(|| "the study".to_owned());
+        let knee = (sweep.knee == Some(place)).then(|| "the knee".to_owned());
+        let words = [study, knee, row.failure.as_deref().map(shortened)];
+        words.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Whether any row has this figure.
+fn has(sweep: &Sweep, measure: usize) -> bool {
+    sweep.rows.iter().any(|row| row.figure(measure).is_some())
+}
+
+/// What the values are of.
+fn swept(sweep: &Sweep) -> String {
+    let label = sweep.axes.first().map(Axis::label).unwrap_or_default();
+    label.replace("theta", "\u{3b8}")
+}
+
+/// Where the knee is, and what is nearly as good.
+fn best(sweep: &Sweep, knee: &Row) -> String {
+    let is_factor = sweep.axes.first().is_some_and(|axis| axis.is_factor);
+    let sign = if is_factor { "" } else { "= " };
+    let at = knee.values.first().copied().map(axis::shown);
+    let title = sweep.measures.first().map_or("", |measure| measure.title);
+    let least = knee.figure(0).map_or(String::new(), brief);
+    let good = sweep.good().filter(|good| good.start() < good.end());
+    let good = good.map(|good| {
+        let (low, high) = (axis::shown(*good.start()), axis::shown(*good.end()));
+        format!("; from {low} to {high} it is within 10 % of that")
+    });
+    format!(
+        "The knee is at {} {sign}{}: {title} {least}{}.",
+        swept(sweep),
+        at.unwrap_or_default(),
+        good.unwrap_or_default()
+    )
+}
