@@ -1,9 +1,10 @@
 //! Plants and observers in continuous time for simulators.
 
-use lynkeus_run::{Method, Step, step_of};
+use lynkeus_run::{Method, Step, System, step_of};
 use lynkeus_structure::short;
 
-use crate::export::{Export, ExportOptions, Target, designed, origin, rounded, sound, steps};
+use crate::export::{Export, ExportOptions, Target, designed, origin, steps};
+use crate::fixed_steps::{bends, rounded, sound};
 use crate::fmu::equations::Equations;
 use crate::prepare::{self, Prepared};
 use crate::study::{self, Rk4Step};
@@ -79,10 +80,11 @@ struct Component<'a> {
 
 impl Component<'_> {
     fn written(&self, version: FmiVersion, options: &ExportOptions) -> Result<Export, Error> {
-        let mut notes = vec![];
+        let system = self.equations.system()?;
+        let mut notes: Vec<String> = bends(&system).into_iter().collect();
         let method = match sound(options.step)? {
             Some(step) => Method::Rk4(Step::AtMost(step)),
-            None => self.stepped(&mut notes)?,
+            None => self.stepped(&system, &mut notes)?,
         };
         let step = steps(method).unwrap_or_default();
         let mut about = vec![
@@ -94,7 +96,7 @@ impl Component<'_> {
         about.extend(self.about.iter().cloned());
         let archive = self
             .equations
-            .archive(method, &about, version, &mut notes)?;
+            .archive(&system, method, &about, version, &mut notes)?;
         Ok(Export {
             files: vec![archive],
             notes,
@@ -102,11 +104,10 @@ impl Component<'_> {
     }
 
     /// Fixed steps: those of the study, or such as the fastest mode needs.
-    fn stepped(&self, notes: &mut Vec<String>) -> Result<Method, Error> {
+    fn stepped(&self, system: &System, notes: &mut Vec<String>) -> Result<Method, Error> {
         if let Some(settings @ study::Method::Rk4(Rk4Step::Length(_))) = self.settings {
             return Ok(systems::method(settings));
         }
-        let system = self.equations.system()?;
         let mut evaluation = system.evaluation();
         let signals = evaluation.signals_mut().iter_mut();
         for (signal, value) in signals.zip(self.equations.typical_inputs()) {

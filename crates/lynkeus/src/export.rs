@@ -14,6 +14,7 @@ use lynkeus_structure::short;
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
 use crate::estimate::at_readings;
+use crate::fixed_steps::{bends, rounded, sound};
 use crate::headers::Headers;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
@@ -125,12 +126,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     };
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
-    if made.flow().has_instants() {
-        notes.push(
-            "the model bends with time alone (max, min, abs of time): `estimate` stops at these instants, here a step goes across them"
-                .to_owned(),
-        );
-    }
+    notes.extend(bends(made.flow()));
     if is_tunable {
         notes.push(tunable::note(&design, &made));
     }
@@ -258,38 +254,11 @@ pub(crate) fn stepped(
     Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
 }
 
-/// A step that is asked for.
-///
-/// # Errors
-/// It is none.
-pub(crate) fn sound(step: Option<f64>) -> Result<Option<f64>, Error> {
-    match step {
-        Some(step) if !(step > 0.0 && step.is_finite()) => Err(Error::input(format!(
-            "--step: expected a finite number above 0, found {step}"
-        ))),
-        step => Ok(step),
-    }
-}
-
 /// A value that an input may have.
 pub(crate) fn typical(input: &Variable) -> f64 {
     let middle = 0.5 * (input.min + input.max);
     let middle = if middle.is_finite() { middle } else { 0.0 };
     input.start.or(input.nominal).unwrap_or(middle)
-}
-
-/// The next shorter step of one digit: 1, 2 or 5.
-pub(crate) fn rounded(step: f64) -> f64 {
-    let unit = 10.0_f64.powf(step.log10().floor());
-    let digit = match step / unit {
-        d if d >= 5.0 => 5.0,
-        d if d >= 2.0 => 2.0,
-        _ => 1.0,
-    };
-    // the nearest number with these digits
-    format!("{digit}e{}", step.log10().floor())
-        .parse()
-        .unwrap_or(digit * unit)
 }
 
 /// What the code says of names.

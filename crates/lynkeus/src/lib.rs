@@ -78,6 +78,7 @@ mod export;
 mod figure;
 mod files;
 mod filter;
+mod fixed_steps;
 mod fmu;
 mod frozen;
 mod headers;

@@ -191,18 +191,19 @@ impl<'a> Equations<'a> {
         self.inputs.iter().map(|(input, _)| input.start)
     }
 
-    /// The archive: model exchange, and co-simulation by a method with fixed steps.
+    /// The archive of their [system](Self::system): model exchange, and co-simulation by a method with
+    /// fixed steps.
     ///
     /// # Errors
     /// What cannot run elsewhere.
     pub fn archive(
         &self,
+        system: &System,
         method: Method,
         about: &[String],
         version: Version,
         notes: &mut Vec<String>,
     ) -> Result<Artifact, Error> {
-        let system = self.system()?;
         let quantities = |of: &[(Quantity, Node)]| -> Vec<Quantity> {
             of.iter().map(|(quantity, _)| quantity.clone()).collect()
         };
@@ -213,7 +214,7 @@ impl<'a> Equations<'a> {
             ode: &Ode {
                 name: &self.name,
                 title: &self.title,
-                system: &system,
+                system,
                 method,
                 inputs: &inputs,
                 states: &states,

@@ -23,7 +23,8 @@ use crate::export::file_name;
 use crate::prepare::Prepared;
 use crate::tune::slider::Ground;
 use crate::{
-    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, prepare, visible,
+    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, fixed_steps,
+    prepare, visible,
 };
 use html::Html;
 use knob::Knob;
@@ -66,7 +67,7 @@ pub fn report(
     options: &ReportOptions,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Page, Error> {
-    let step = export::sound(options.step)?;
+    let step = fixed_steps::sound(options.step)?;
     let plant = prepare::plant(study)?;
     let mut notes = vec![];
     let causal = export::causal(study, &mut notes);
