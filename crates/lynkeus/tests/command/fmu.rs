@@ -95,6 +95,11 @@ fn an_archive_says_what_is_in_it() {
             ("lower_sd", "output", "relativeQuantity=\"true\""),
             ("upper_start", "parameter", "start=\"3.99\""),
             ("lower_start", "parameter", "start=\"5.2\""),
+            (
+                "process_noise_scale",
+                "parameter",
+                "variability=\"tunable\"",
+            ),
         ];
         assert_eq!(variables.len(), expected.len(), "{description}");
         for ((name, told), (wanted, causality, part)) in variables.iter().zip(expected) {
