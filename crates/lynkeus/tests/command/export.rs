@@ -1,5 +1,7 @@
 //! `export --to c`: what a C compiler makes of it gives what `estimate` gives.
 
+mod corners;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -103,11 +105,6 @@ fn filter(random: &mut Normal, folder: &Folder) {
         0 => format!("{:.3}", number(random, 0.01, 0.3)),
         1 => "\"5%\"".to_owned(),
         _ => "{ uniform = 0.2 }".to_owned(),
-    };
-    let noise = if noise.starts_with('{') {
-        "0.1".to_owned()
-    } else {
-        noise
     };
     let mut study = format!(
         "plant = \"m.mo\"\n[sensors]\nmeasured = [\"y\"]\nunknown = {unknown:?}\nnoise = {{ y = {noise} }}\n"
