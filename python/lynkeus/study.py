@@ -353,8 +353,8 @@ class Study:
         memory_limit: float = MEMORY,
     ) -> Export:
         """The estimator for other machines, as files in a folder that is new or empty (``force``: that
-        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"fmu"`` (``fmi`` its version) or
-        ``"html"``; ``step`` is the longest step of the integration, instead of the study's."""
+        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"rust"``, ``"fmu"`` (``fmi`` its
+        version) or ``"html"``; ``step`` is the longest step of the integration, instead of the study's."""
         files, notes = self._core.export(to, precision, fmi, step, time_limit, memory_limit)
         return write(Path(folder), files, notes, force=force)
 

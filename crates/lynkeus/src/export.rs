@@ -5,7 +5,7 @@ use std::path::Path;
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::fmu::Version;
-use lynkeus_export::curly::{Device, Entry, FirstReading, javascript};
+use lynkeus_export::curly::{Device, Entry, FirstReading, javascript, rust};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
@@ -27,6 +27,8 @@ pub enum Target {
     C,
     /// a JavaScript module
     JavaScript,
+    /// a crate without the standard library, with an example that replays a log
+    Rust,
     /// a functional mock-up unit for co-simulation: the same C in an archive with a description and, where
     /// a C compiler is at hand, a library for this machine; a note says where there is none
     Fmu(Version),
@@ -40,7 +42,7 @@ pub enum Target {
 pub struct ExportOptions {
     /// the language
     pub to: Target,
-    /// the type of numbers, in C
+    /// the type of numbers, in C and Rust
     pub precision: Precision,
     /// longest step of the integration, in the unit of time, instead of the study's
     pub step: Option<f64>,
@@ -96,6 +98,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let files = printed(&prepared, &design, &made, &about, |device| {
         let files = match options.to {
             Target::C => c::files(device, options.precision)?,
+            Target::Rust => rust::files(device, options.precision)?,
             Target::Fmu(version) => {
                 let of = fmu::Made {
                     device,

@@ -1,9 +1,9 @@
-//! Estimators as source text for other machines: C and JavaScript.
+//! Estimators as source text for other machines: C, JavaScript and Rust.
 //!
 //! Everything is drafted once, in C whose type of numbers is called `real`: the functions of the
 //! graph, what is done with them from `runtime/*.c`, of which only
 //! what is called is taken. C exchanges words of the draft; every other language prints its tree (`syntax`).
-//! A frame ([`c`], [`javascript`]) makes files of it.
+//! A frame ([`c`], [`javascript`], [`rust`]) makes files of it.
 
 pub mod c;
 mod description;
@@ -17,6 +17,7 @@ mod language;
 mod linear;
 mod machine;
 mod observer;
+pub mod rust;
 mod syntax;
 mod tables;
 mod template;
