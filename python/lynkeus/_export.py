@@ -30,9 +30,10 @@ def write(
             place=str(folder),
         )
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, content in files:
-            (folder / name).write_bytes(content)
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
     except OSError as error:
         raise InputError(f"cannot be written: {error}", place=str(folder)) from error
     return Export(tuple(folder / name for name, _ in files), tuple(notes))

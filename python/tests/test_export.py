@@ -26,8 +26,15 @@ def test_a_step_that_was_chosen_is_told(tmp_path: Path) -> None:
     assert any("the fastest mode" in note for note in made.notes)
 
 
+def test_a_crate_has_folders(tmp_path: Path) -> None:
+    made = tank().export(tmp_path, to="rust", precision="f32")
+    names = [file.relative_to(tmp_path).as_posix() for file in made.files]
+    assert names == ["Cargo.toml", "src/lib.rs", "examples/replay.rs"]
+    assert b"signals: &[f32; SIGNALS]" in made.files[1].read_bytes()
+
+
 def test_what_is_not_known_is_refused(tmp_path: Path) -> None:
-    for wrong in ({"to": "rust"}, {"precision": "f16"}, {"to": "fmu", "fmi": "1"}):
+    for wrong in ({"to": "cobol"}, {"precision": "f16"}, {"to": "fmu", "fmi": "1"}):
         with pytest.raises(ValueError, match="expected"):
             tank().export(tmp_path, **wrong)
     assert not list(tmp_path.iterdir())

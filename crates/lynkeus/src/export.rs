@@ -5,7 +5,7 @@ use std::path::Path;
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::fmu::Version;
-use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript};
+use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step, needed_step};
@@ -30,6 +30,8 @@ pub enum Target {
     C,
     /// a JavaScript module
     JavaScript,
+    /// a crate without the standard library, with an example that replays a log
+    Rust,
     /// a functional mock-up unit: C in an archive with a description and, where a C compiler is at hand, a
     /// library for this machine; a note says where there is none
     Fmu(Version),
@@ -56,7 +58,7 @@ pub struct ExportOptions {
     pub to: Target,
     /// what is exported; by default the estimator of a study, the plant of a bare model
     pub subject: Option<Subject>,
-    /// the type of numbers, in C
+    /// the type of numbers, in C and Rust
     pub precision: Precision,
     /// longest step of the integration, in the unit of time, instead of the study's
     pub step: Option<f64>,
@@ -134,6 +136,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let files = printed(&prepared, &design, &made, &about, |device| {
         let files = match options.to {
             Target::C => c::files(device, options.precision)?,
+            Target::Rust => rust::files(device, options.precision)?,
             Target::Fmu(version) => {
                 let of = fmu::Made {
                     device,

@@ -1,10 +1,10 @@
-//! Estimators as source text for other machines: C and JavaScript.
+//! Estimators as source text for other machines: C, JavaScript and Rust.
 //!
 //! Everything is drafted once, in C whose type of numbers is called `real`: the functions of the
 //! graph, what is done with them from `runtime/*.c`, of which only
 //! what is called is taken. C exchanges words of the draft; every other language prints its tree (`syntax`).
-//! A frame ([`c`], [`javascript`]) makes files of it. Equations alone ([`Ode`]), of a plant or of an
-//! observer, are drafted likewise and become an [`Exchange`].
+//! A frame ([`c`], [`javascript`], [`rust`]) makes files of it. Equations alone ([`Ode`]), of a plant or
+//! of an observer, are drafted likewise and become an [`Exchange`].
 
 pub mod c;
 mod description;
@@ -20,6 +20,7 @@ mod linear;
 mod machine;
 mod observer;
 mod ode;
+pub mod rust;
 mod syntax;
 mod tables;
 mod template;

@@ -17,6 +17,8 @@ pub(super) enum Target {
     C,
     /// A JavaScript module, for pages and Node
     Js,
+    /// A Rust crate without the standard library, with an example that replays a log
+    Rust,
     /// The page of `lynkeus report`, on the study's simulation
     Html,
     /// An archive for tools of simulation: the estimator for FMI co-simulation; a plant or an observer in continuous time for model exchange, too
@@ -118,10 +120,13 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
     let failed = |e: std::io::Error| {
         Error::input(format!("the folder cannot be made: {e}")).at(folder.display())
     };
-    std::fs::create_dir_all(folder).map_err(failed)?;
     let mut results = Results::default();
     for file in &made.files {
-        results.put(&folder.join(&file.name), file.bytes.as_slice())?;
+        let path = folder.join(&file.name);
+        if let Some(inner) = path.parent() {
+            std::fs::create_dir_all(inner).map_err(failed)?;
+        }
+        results.put(&path, file.bytes.as_slice())?;
     }
     results.keep()?;
     if !options.quiet {
@@ -137,6 +142,7 @@ impl Options {
         match (self.to, self.fmi) {
             (Target::C, _) => lynkeus::Target::C,
             (Target::Js, _) => lynkeus::Target::JavaScript,
+            (Target::Rust, _) => lynkeus::Target::Rust,
             (Target::Html, _) => lynkeus::Target::Html,
             (Target::Fmu, Fmi::Two) => lynkeus::Target::Fmu(FmiVersion::Two),
             (Target::Fmu, Fmi::Three) => lynkeus::Target::Fmu(FmiVersion::Three),

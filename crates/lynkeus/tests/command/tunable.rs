@@ -296,11 +296,11 @@ fn javascript_has_it_too() {
     let made = folder.run(&["export", "s.toml", "--to", "js", "-o", "js", "--tunable"]);
     assert_eq!(made.code, 0, "{}", made.err);
     let expected_own = estimated(folder.path.path()).unwrap();
-    let own = crate::export::replayed_by(&folder, "");
+    let own = crate::export::javascript::replayed_by(&folder, "");
     assert!(difference(&expected_own, &own, "own") <= 1e-12);
     folder.write("s.toml", &other);
     let expected: Run = estimated(folder.path.path()).unwrap();
-    let found = crate::export::replayed_by(&folder, "state.tuning.set([4.5, 4]);");
+    let found = crate::export::javascript::replayed_by(&folder, "state.tuning.set([4.5, 4]);");
     let off = difference(&expected, &found, "changed");
     assert!(off <= 1e-12, "{off:e}");
 }

@@ -8,8 +8,10 @@
 mod expression;
 mod lexer;
 mod parser;
+mod scope;
 
 pub(super) use parser::parsed;
+pub(super) use scope::{Program, Range, Scope, Shape, any, reads_state, values, visit};
 
 /// What a name holds, one or an array of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 use super::*;
 use crate::curly::template::{chosen, parts};
 
-const RUNTIME: [(&str, &str); 12] = [
+const RUNTIME: [(&str, &str); 13] = [
     ("extended", include_str!("../../runtime/extended.c")),
     ("filter", include_str!("../../runtime/filter.c")),
     ("integrate", include_str!("../../runtime/integrate.c")),
@@ -13,6 +13,7 @@ const RUNTIME: [(&str, &str); 12] = [
     ("sampled", include_str!("../../runtime/sampled.c")),
     ("spread", include_str!("../../runtime/spread.c")),
     ("steps", include_str!("../../runtime/steps.c")),
+    ("tuned", include_str!("../../runtime/tuned.c")),
     ("unscented", include_str!("../../runtime/unscented.c")),
 ];
 

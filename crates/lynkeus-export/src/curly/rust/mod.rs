@@ -1,0 +1,333 @@
+//! Rust without its standard library: a crate, with an example that replays a log.
+
+mod names;
+mod print;
+mod value;
+
+use self::print::printed;
+use super::c::{self, File, Precision, READINGS, prefix};
+use super::device::Device;
+use super::function::Entry;
+use super::machine::{Field, Kind, Machine};
+use super::template::mentions;
+use crate::Refusal;
+
+const REPLAY: &str = include_str!("../runtime/replay.rs");
+
+/// What of the library is not drafted: with numbers that may be negative, and parts of numbers.
+const OWN: [(&str, &str); 2] = [
+    (
+        "integer_power",
+        "/// An integer power, as it is computed everywhere else: by squares.
+fn integer_power(a: REAL, exponent: i32) -> REAL {
+    let mut power = 1.0;
+    let mut factor = a;
+    let mut rest = exponent.unsigned_abs();
+    while rest > 0 {
+        if rest % 2 == 1 {
+            power *= factor;
+        }
+        factor *= factor;
+        rest /= 2;
+    }
+    if exponent < 0 { 1.0 / power } else { power }
+}",
+    ),
+    (
+        "power_of_two",
+        "/// The power of two of a number.
+fn power_of_two(a: REAL) -> REAL {
+    libm::ldexpSUFFIX(1.0, libm::frexpSUFFIX(a).1 - 1)
+}",
+    ),
+];
+
+/// The files of a device: `Cargo.toml`, `src/lib.rs`, `examples/replay.rs`.
+///
+/// # Errors
+/// What cannot run there, or cannot be written.
+pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+    let name = format!("{}_estimator", prefix(device.name));
+    let frame = Frame {
+        device,
+        machine: &Machine::of(device)?,
+        precision,
+    };
+    let manifest = format!(
+        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\
+         rust-version = \"1.85\"\npublish = false\n\n[dependencies]\nlibm = \"0.2.16\"\n"
+    );
+    let cast = match precision {
+        Precision::F64 => "",
+        Precision::F32 => " as f32",
+    };
+    let replay = REPLAY.replace("@CRATE@", &name).replace("@AS_REAL@", cast);
+    let file = |name: &str, text: String| File {
+        name: name.to_owned(),
+        text,
+    };
+    Ok(vec![
+        file("Cargo.toml", manifest),
+        file("src/lib.rs", frame.library()?),
+        file("examples/replay.rs", replay),
+    ])
+}
+
+struct Frame<'a> {
+    device: &'a Device<'a>,
+    machine: &'a Machine,
+    precision: Precision,
+}
+
+impl Frame<'_> {
+    fn real(&self) -> &'static str {
+        match self.precision {
+            Precision::F64 => "f64",
+            Precision::F32 => "f32",
+        }
+    }
+
+    fn library(&self) -> Result<String, Refusal> {
+        let (draft, own) = self.draft();
+        let body = printed(&draft, &self.machine.fields, self.precision)?;
+        let about = self.device.about.iter();
+        let about = about.map(|line| format!("// {}", plain(line)).trim_end().to_owned() + "\n");
+        let real = self.real();
+        Ok(format!(
+            "//! An estimator for `{title}`: [`State::push`] takes a sample.\n\n{about}\n\
+             #![no_std]\n#![forbid(unsafe_code)]\n\
+             // names are the model's, operations in the order in which they were differentiated\n\
+             #![allow(non_snake_case)]\n\
+             #![allow(clippy::style, clippy::complexity, clippy::manual_memcpy)]\n\
+             // x == x asks whether x is a number, and where a size is 0 its loop is empty\n\
+             #![allow(clippy::approx_constant, clippy::eq_op, clippy::reversed_empty_ranges)]\n\n\
+             {lists}{sizes}\n{codes}\n{readings}{state}\n\
+             impl State {{\n{new}\n\
+             \x20   /// Goes to time `t` and takes the signals there; NaN: a sensor did not report, an input stays.\n\
+             \x20   /// The first sample only updates the start.\n    ///\n\
+             \x20   /// # Errors\n    /// [`Refused`]; the state and the estimates are then what they were.\n\
+             \x20   pub fn push(\n        &mut self,\n        t: f64,\n        signals: &[{real}; SIGNALS],\n\
+             \x20       estimates: &mut [{real}; ESTIMATES],\n    ) -> Result<(), Refused> {{\n\
+             \x20       let before = self.clone();\n\
+             \x20       let refused = Refused::of(take(self, t, signals, estimates));\n\
+             \x20       match refused {{\n            None => Ok(()),\n            Some(refused) => {{\n\
+             \x20               *self = before;\n                Err(refused)\n            }}\n        }}\n    }}\n}}\n\n\
+             impl Default for State {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}\n\n\
+             // places are counted up to a million\nconst _: () = assert!(usize::BITS >= 32);\n\n\
+             {own}{body}",
+            title = plain(self.device.name).replace('`', "'"),
+            about = about.collect::<String>(),
+            lists = self.lists(),
+            sizes = self.sizes(&draft),
+            codes = codes(self.device),
+            readings = self.readings(),
+            state = self.state(),
+            new = self.new_state(),
+        ))
+    }
+
+    /// What is printed, and what is not drafted.
+    fn draft(&self) -> (String, String) {
+        let mut draft = match self.machine.tables.is_empty() {
+            true => String::new(),
+            false => format!("{}\n", self.machine.tables),
+        };
+        let mut others = String::new();
+        let suffix = match self.precision {
+            Precision::F64 => "",
+            Precision::F32 => "f",
+        };
+        for (name, text) in self.machine.library() {
+            match OWN.iter().find(|own| own.0 == name) {
+                Some((_, own)) => {
+                    let own = own.replace("REAL", self.real()).replace("SUFFIX", suffix);
+                    others += &format!("{own}\n\n");
+                }
+                None => draft += &format!("{text}\n\n"),
+            }
+        }
+        draft += &self.machine.source;
+        (draft, others)
+    }
+
+    fn lists(&self) -> String {
+        let list = |name: &str, count: &str, about: &str, entries: &[Entry]| {
+            let each = entries.iter().map(|entry| {
+                let about = match entry.about.is_empty() {
+                    true => String::new(),
+                    false => format!(" // {}", plain(&entry.about)),
+                };
+                format!("    {:?},{about}\n", entry.name)
+            });
+            format!(
+                "/// How many there are of [`{name}`].\npub const {count}: usize = {};\n\
+                 /// {about}\npub const {name}: [&str; {count}] = [\n{}];\n\n",
+                entries.len(),
+                each.collect::<String>()
+            )
+        };
+        let signals = "What is given: measured outputs, then known inputs.";
+        let estimates =
+            "What is returned: estimates, their standard deviations where there are any, monitors.";
+        let tunables = "What may be changed while it runs, in the order of [`State::tuning`].";
+        let entries: Vec<Entry> = self
+            .device
+            .tunables
+            .iter()
+            .map(|t| t.entry.clone())
+            .collect();
+        let mut lists = list("SIGNAL_NAMES", "SIGNALS", signals, self.device.signals);
+        lists += &list(
+            "ESTIMATE_NAMES",
+            "ESTIMATES",
+            estimates,
+            self.device.estimates,
+        );
+        if !entries.is_empty() {
+            lists += &list("TUNABLE_NAMES", "TUNABLES", tunables, &entries);
+        }
+        lists
+    }
+
+    /// Those that are used; how long the lists are, is known already.
+    fn sizes(&self, draft: &str) -> String {
+        let sizes = self.machine.sizes.iter();
+        let used = sizes.filter(|size| {
+            !["SIGNALS", "TUNABLES"].contains(&size.0.as_str()) && mentions(draft, &size.0)
+        });
+        let lines = used.map(|(name, size)| format!("const {name}: usize = {size};\n"));
+        lines.collect()
+    }
+
+    fn readings(&self) -> String {
+        let has_readings = self.machine.fields.iter().any(|f| f.name == "became");
+        let each = READINGS.iter().enumerate().filter(|_| has_readings);
+        let each = each.map(|(k, (word, about))| {
+            format!("/// What became of a reading: {about}.\npub const {word}: usize = {k};\n")
+        });
+        match each.collect::<String>() {
+            none if none.is_empty() => none,
+            readings => readings + "\n",
+        }
+    }
+
+    fn kind(&self, kind: Kind) -> &'static str {
+        match kind {
+            Kind::Real => self.real(),
+            Kind::Double => "f64",
+            Kind::Int => "usize",
+            Kind::Truth => "bool",
+        }
+    }
+
+    fn state(&self) -> String {
+        let fields = self.machine.fields.iter().map(|field| {
+            let kind = self.kind(field.kind);
+            let kind = match field.count {
+                None => kind.to_owned(),
+                Some(count) => format!("[{kind}; {count}]"),
+            };
+            let about = match field.about.is_empty() {
+                true => String::new(),
+                false => format!("    /// {}\n", documented(&plain(&field.about))),
+            };
+            format!("{about}    pub {}: {kind},\n", field.name)
+        });
+        format!(
+            "/// All there is to an estimator under way: a clone is a snapshot.\n\
+             #[derive(Clone, Debug, PartialEq)]\npub struct State {{\n{}}}\n",
+            fields.collect::<String>()
+        )
+    }
+
+    fn new_state(&self) -> String {
+        let fields = self.machine.fields.iter();
+        let fields =
+            fields.map(|field| format!("            {}: {},\n", field.name, self.start(field)));
+        format!(
+            "    /// Before the first sample.\n    #[must_use]\n    pub const fn new() -> Self {{\n        Self {{\n{}        }}\n    }}\n",
+            fields.collect::<String>()
+        )
+    }
+
+    /// A field at the start.
+    fn start(&self, field: &Field) -> String {
+        let value = |value: f64| match (field.kind, self.precision) {
+            (Kind::Int, _) => format!("{}", value as i64),
+            (Kind::Truth, _) => format!("{}", value != 0.0),
+            (Kind::Real, Precision::F32) => match value as f32 {
+                v if v.is_finite() => format!("{v:?}"),
+                v if v > 0.0 => "f32::INFINITY".to_owned(),
+                _ => "f32::NEG_INFINITY".to_owned(),
+            },
+            _ => format!("{value:?}"),
+        };
+        let Some(count) = field.count else {
+            return value(field.start.first().copied().unwrap_or_default());
+        };
+        let is_same = field
+            .start
+            .windows(2)
+            .all(|pair| pair[0].to_bits() == pair[1].to_bits());
+        if let (Some(&first), true) = (field.start.first(), is_same) {
+            return format!("[{}; {count}]", value(first));
+        }
+        let texts: Vec<String> = field.start.iter().map(|v| value(*v)).collect();
+        let rows: Vec<String> = texts.chunks(8).map(|row| row.join(", ")).collect();
+        format!("[{}]", rows.join(",\n                "))
+    }
+}
+
+/// The codes, and what they are for people.
+fn codes(device: &Device<'_>) -> String {
+    let all = || c::codes(device).enumerate();
+    let constants = all().map(|(k, (code, _))| format!("const {code}: usize = {};\n", k + 1));
+    let variants =
+        all().map(|(_, (code, about))| format!("    /// {about}\n    {},\n", camel(code)));
+    let known =
+        all().map(|(_, (code, _))| format!("            {code} => Self::{},\n", camel(code)));
+    let words = all()
+        .map(|(_, (code, about))| format!("            Self::{} => {about:?},\n", camel(code)));
+    format!(
+        "{}\n/// Why a sample was refused; nothing has changed then.\n\
+         #[derive(Clone, Copy, Debug, PartialEq, Eq)]\npub enum Refused {{\n{}}}\n\n\
+         impl Refused {{\n    fn of(code: usize) -> Option<Self> {{\n        Some(match code {{\n{}            _ => return None,\n        }})\n    }}\n}}\n\n\
+         impl core::fmt::Display for Refused {{\n    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {{\n\
+         \x20       f.write_str(match self {{\n{}        }})\n    }}\n}}\n\n\
+         impl core::error::Error for Refused {{}}\n",
+        constants.collect::<String>(),
+        variants.collect::<String>(),
+        known.collect::<String>(),
+        words.collect::<String>(),
+    )
+}
+
+/// `NOT_FINITE` as `NotFinite`.
+fn camel(word: &str) -> String {
+    let parts = word.split('_').map(|part| {
+        let (first, rest) = part.split_at(part.len().min(1));
+        format!("{first}{}", rest.to_ascii_lowercase())
+    });
+    parts.collect()
+}
+
+/// Words in a comment of one line.
+fn plain(words: &str) -> String {
+    let words = words.chars();
+    let words = words.map(|c| match c {
+        // these turn the direction of what follows, which the compiler refuses
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => ' ',
+        c if c.is_control() => ' ',
+        c => c,
+    });
+    words.collect()
+}
+
+/// Words in documentation, where brackets would be links and angles elements.
+fn documented(words: &str) -> String {
+    let words = words.chars().map(|c| match c {
+        '[' | ']' | '<' | '>' | '`' | '*' | '_' | '\\' => format!("\\{c}"),
+        c => c.to_string(),
+    });
+    words.collect()
+}
