@@ -1,6 +1,6 @@
 //! What an archive says of itself: `modelDescription.xml` and `buildDescription.xml`.
 
-use super::fmu::{Base, Component, Quantity, Unit, Version};
+use super::fmu::{Base, Component, Experiment, Quantity, Unit, Version};
 
 /// The place of a variable in the model, from which its value reference follows.
 pub(super) struct Variable<'q> {
@@ -33,6 +33,7 @@ pub(super) struct Description<'a> {
     /// what the component is, in words
     pub title: &'a str,
     pub units: &'a [Unit],
+    pub experiment: Option<Experiment>,
     /// in the order of their value references
     pub variables: &'a [Variable<'a>],
     /// the elements of the interfaces that are offered
@@ -49,6 +50,7 @@ pub(super) fn description(component: &Component<'_>, version: Version, token: &s
         model: component.device.name,
         title: &component.title(),
         units: component.units,
+        experiment: component.experiment,
         variables: &variables,
         interface: interface(component, version),
         structure: structure(&variables, version),
@@ -76,6 +78,7 @@ impl Description<'_> {
             Version::Two => ("2.0", "guid"),
             Version::Three => ("3.0", "instantiationToken"),
         };
+        let experiment = self.experiment.map(experiment).unwrap_or_default();
         let variables = self.variables.iter().enumerate();
         let written: String = match version {
             Version::Two => variables.map(scalar).collect(),
@@ -85,7 +88,7 @@ impl Description<'_> {
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
              description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
-             {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n\
+             {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n{experiment}\
              \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
              \x20 <ModelStructure>\n{}  </ModelStructure>\n\
              </fmiModelDescription>\n",
@@ -96,6 +99,14 @@ impl Description<'_> {
             self.structure,
         )
     }
+}
+
+fn experiment(experiment: Experiment) -> String {
+    let Experiment { start, stop, step } = experiment;
+    let [start, stop, step] = [start, stop, step].map(number);
+    format!(
+        "  <DefaultExperiment startTime=\"{start}\" stopTime=\"{stop}\" stepSize=\"{step}\"/>\n"
+    )
 }
 
 fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<'q>> {
@@ -120,7 +131,7 @@ fn interface(component: &Component<'_>, version: Version) -> String {
     match version {
         Version::Two => format!(
             "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
-             canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\">\n\
+             canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\">\n\
              \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
              \x20 </CoSimulation>\n",
             version.wrapper()

@@ -2,7 +2,7 @@
 
 use super::c::{File, prefix};
 use super::description::{Description, Role, Variable, page, time};
-use super::fmu::{Archive, EXCHANGE, Quantity, Unit, Version, reasons};
+use super::fmu::{Archive, EXCHANGE, Experiment, Quantity, Unit, Version, reasons};
 use super::ode::{CODES, Ode, Sources, sources};
 use crate::Refusal;
 
@@ -17,6 +17,8 @@ pub struct Exchange<'a> {
     pub units: &'a [Unit],
     /// what time is counted in, in words
     pub time: &'a str,
+    /// what a tool starts from, where the study says
+    pub experiment: Option<Experiment>,
 }
 
 impl Exchange<'_> {
@@ -73,6 +75,7 @@ impl Exchange<'_> {
             model: ode.name,
             title: ode.title,
             units: self.units,
+            experiment: self.experiment,
             variables: &variables,
             interface: interface(&self.identifier(), version),
             structure: structure.text(version),
@@ -112,7 +115,7 @@ fn interface(name: &str, version: Version) -> String {
         Version::Two => {
             let of = |kind: &str, more: &str| {
                 format!(
-                    "  <{kind} modelIdentifier=\"{name}\" {more} canGetAndSetFMUstate=\"true\" \
+                    "  <{kind} modelIdentifier=\"{name}\" {more} canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" \
                      canSerializeFMUstate=\"true\" providesDirectionalDerivative=\"true\">\n\
                      \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
                      \x20 </{kind}>\n",

@@ -49,6 +49,17 @@ pub struct Base {
     pub offset: f64,
 }
 
+/// A run that a tool may propose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Experiment {
+    /// its first instant
+    pub start: f64,
+    /// its last
+    pub stop: f64,
+    /// from one communication point to the next
+    pub step: f64,
+}
+
 /// What the description says of a variable.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Quantity {
@@ -85,6 +96,8 @@ pub struct Component<'a> {
     pub units: &'a [Unit],
     /// what time is counted in, in words
     pub time: &'a str,
+    /// what a tool starts from, where the study says
+    pub experiment: Option<Experiment>,
 }
 
 impl Component<'_> {

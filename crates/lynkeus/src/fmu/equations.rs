@@ -9,8 +9,9 @@ use lynkeus_model::{BaseUnit, Plant, Variable};
 use lynkeus_observers::Observer;
 use lynkeus_run::{Method, System};
 
-use super::{free, packed, quantity, time, units};
+use super::{experiment, free, packed, quantity, time, units};
 use crate::export::{Artifact, typical};
+use crate::study::SimulateSettings;
 use crate::systems::{hat, starts};
 use crate::{Error, Study};
 
@@ -223,6 +224,7 @@ impl<'a> Equations<'a> {
             },
             units: &units(inputs.iter().chain(&outputs).chain(own)),
             time: &time(self.study),
+            experiment: experiment(self.study, SimulateSettings::row_step),
         };
         let files = exchange
             .files(version)

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{File, Precision};
-use lynkeus_export::curly::fmu::{self, Base, Component, Quantity, Unit, Version};
+use lynkeus_export::curly::fmu::{self, Base, Component, Experiment, Quantity, Unit, Version};
 use lynkeus_export::curly::{Device, Entry};
 use lynkeus_model::{BaseUnit, Variable};
 use lynkeus_observers::Design;
@@ -18,6 +18,7 @@ use lynkeus_run::Blueprint;
 use crate::Study;
 use crate::export::{Artifact, typical};
 use crate::prepare::Prepared;
+use crate::study::SimulateSettings;
 
 /// A study's estimator, ready to be written.
 pub(crate) struct Made<'a> {
@@ -105,12 +106,17 @@ impl Described {
         let estimates = estimates(made);
         let mut taken: BTreeSet<String> = ["time".to_owned()].into();
         taken.extend(signals.iter().chain(&estimates).map(|q| q.name.clone()));
-        let starts = starts(made).into_iter().map(|(state, start)| {
+        let starts = starts(made).into_iter().map(|start| {
+            let Start { state, value, .. } = start;
             let name = free(&mut taken, format!("{state}_start"));
             let told = known(&state);
+            let reading = match start.is_at_reading {
+                true => ", unless its sensor reports at the first sample",
+                false => "",
+            };
             Quantity {
-                description: format!("where the estimator begins with {state}"),
-                ..quantity(name, told, start)
+                description: format!("where the estimator begins with {state}{reading}"),
+                ..quantity(name, told, value)
             }
         });
         let starts: Vec<Quantity> = starts.collect();
@@ -145,6 +151,7 @@ impl Described {
             tunables: &self.tunables,
             units: &self.units,
             time: &self.time,
+            experiment: experiment(made.prepared.study(), sampled),
         }
     }
 }
@@ -172,8 +179,16 @@ fn estimates(made: &Made<'_>) -> Vec<Quantity> {
     made.device.estimates.iter().enumerate().map(each).collect()
 }
 
-/// States and where they start; what is held of the measurements is none.
-fn starts(made: &Made<'_>) -> Vec<(String, f64)> {
+/// Where a state starts.
+struct Start {
+    state: String,
+    value: f64,
+    /// its sensor's first reading counts instead
+    is_at_reading: bool,
+}
+
+/// Where the states start; what is held of the measurements is none.
+fn starts(made: &Made<'_>) -> Vec<Start> {
     let (names, values, own) = match made.device.blueprint {
         Blueprint::Sampled { observer, .. } => {
             let states = observer.system.states();
@@ -184,8 +199,14 @@ fn starts(made: &Made<'_>) -> Vec<(String, f64)> {
             (model.states(), model.flow().start(), model.states().len())
         }
     };
-    let pairs = names.iter().cloned().zip(values.iter().copied());
-    pairs.take(own).collect()
+    let first = made.device.first_readings;
+    let pairs = names.iter().zip(values).take(own).enumerate();
+    let start = |(place, (state, value)): (usize, (&String, &f64))| Start {
+        state: state.clone(),
+        value: *value,
+        is_at_reading: first.iter().any(|first| first.state == place),
+    };
+    pairs.map(start).collect()
 }
 
 fn quantity(name: String, variable: Option<&Variable>, start: f64) -> Quantity {
@@ -208,6 +229,22 @@ fn free(taken: &mut BTreeSet<String>, mut name: String) -> String {
         name.push('_');
     }
     name
+}
+
+/// The study's simulation as a run that a tool proposes, a communication point every `step`.
+fn experiment(study: &Study, step: impl Fn(&SimulateSettings) -> f64) -> Option<Experiment> {
+    let simulated = study.simulate.as_ref()?;
+    let step = step(simulated);
+    (step > 0.0 && simulated.until > simulated.start).then_some(Experiment {
+        start: simulated.start,
+        stop: simulated.until,
+        step,
+    })
+}
+
+/// From one sample to the next.
+fn sampled(settings: &SimulateSettings) -> f64 {
+    settings.sample_step.unwrap_or_else(|| settings.row_step())
 }
 
 /// What time is counted in, in words.

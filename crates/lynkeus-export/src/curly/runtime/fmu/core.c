@@ -73,7 +73,8 @@ static int settle(course *c)
     return code;
 }
 
-/* Takes the sample of the communication point, and goes to the next. */
+/* Takes the sample of the communication point, and goes to the next, of which the estimates then
+   are a prediction. */
 static int step(course *c, double from, double to)
 {
     const course before = *c;
@@ -101,7 +102,12 @@ static int step(course *c, double from, double to)
     c->time = to;
     c->is_given = 0;
     c->is_settled = 0;
-    return 0;
+    /* the way to the next point belongs to this step: where there is none, nothing has changed */
+    code = settle(c);
+    if (code != 0) {
+        *c = before;
+    }
+    return code;
 }
 
 static int read_value(course *c, uint32_t reference, double *value)

@@ -18,6 +18,7 @@ typedef struct {
 typedef struct {
     course at;
     const callbacks *calls;
+    char *name; /* of the instance */
 } component;
 
 static fmi2Status told(component *m, int code)
@@ -33,7 +34,7 @@ static fmi2Status told(component *m, int code)
         return fmi2OK;
     }
     if (m->calls != NULL && m->calls->log != NULL) {
-        m->calls->log(m->calls->environment, "@NAME@", status, "logStatusError", "%s", reason(code));
+        m->calls->log(m->calls->environment, m->name, status, "logStatusError", "%s", reason(code));
     }
     return status;
 }
@@ -59,7 +60,8 @@ API void *fmi2Instantiate(
     fmi2Boolean visible, fmi2Boolean logging)
 {
     component *m = NULL;
-    (void)name, (void)resources, (void)visible, (void)logging;
+    const size_t length = name == NULL ? 0 : strlen(name);
+    (void)resources, (void)visible, (void)logging;
 //? exchange
     const int is_offered = type == fmi2CoSimulation || type == fmi2ModelExchange;
     const char *const expected = "expected the GUID of this FMU";
@@ -70,12 +72,15 @@ API void *fmi2Instantiate(
 //?
     if (!is_offered || !is_ours(given)) {
         if (calls != NULL && calls->log != NULL) {
-            calls->log(calls->environment, "@NAME@", fmi2Error, "logStatusError", "%s", expected);
+            calls->log(calls->environment, name, fmi2Error, "logStatusError", "%s", expected);
         }
         return NULL;
     }
-    m = calloc(1, sizeof *m);
+    m = calloc(1, sizeof *m + length + 1);
     if (m != NULL) {
+        /* behind the component, and zero at its end */
+        m->name = (char *)(m + 1);
+        memcpy(m->name, length == 0 ? "" : name, length);
         m->calls = calls;
         begin(&m->at);
     }
@@ -162,27 +167,18 @@ API fmi2Status fmi2FreeFMUstate(void *instance, void **kept)
 API fmi2Status fmi2SerializedFMUstateSize(void *instance, void *kept, size_t *size)
 {
     (void)instance, (void)kept;
-    *size = sizeof(course);
+    *size = BYTES;
     return fmi2OK;
 }
 
 API fmi2Status fmi2SerializeFMUstate(void *instance, void *kept, char *bytes, size_t size)
 {
-    if (size != sizeof(course)) {
-        return told(instance, NO_VALUE);
-    }
-    memcpy(bytes, kept, size);
-    return fmi2OK;
+    return told(instance, written(kept, bytes, size));
 }
 
 API fmi2Status fmi2DeSerializeFMUstate(void *instance, const char *bytes, size_t size, void **kept)
 {
-    course saved;
-    if (size != sizeof saved) {
-        return told(instance, NO_VALUE);
-    }
-    memcpy(&saved, bytes, size);
-    return told(instance, keep(&saved, kept));
+    return told(instance, taken(bytes, size, kept));
 }
 
 API fmi2Status fmi2GetRealStatus(void *instance, fmi2StatusKind kind, double *value)
@@ -210,7 +206,13 @@ API fmi2Status fmi2GetBooleanStatus(void *instance, fmi2StatusKind kind, fmi2Boo
     }
 
 MODE(EnterInitializationMode)
-MODE(Terminate)
+
+API fmi2Status fmi2Terminate(void *instance)
+{
+    component *m = instance;
+    m->at.is_running = 0;
+    return fmi2OK;
+}
 
 /* What this FMU has not, but must answer. */
 static fmi2Status absent(void *instance, size_t count)

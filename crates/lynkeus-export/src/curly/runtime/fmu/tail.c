@@ -11,6 +11,29 @@ static int keep(const course *c, void **kept)
     return 0;
 }
 
+/* A state as bytes, behind the token of the FMU that it is of. */
+enum { TOKEN = sizeof token - 1, BYTES = TOKEN + sizeof(course) };
+
+static int written(const course *c, void *bytes, size_t size)
+{
+    if (size != BYTES) {
+        return NO_VALUE;
+    }
+    memcpy(bytes, token, TOKEN);
+    memcpy((char *)bytes + TOKEN, c, sizeof *c);
+    return 0;
+}
+
+static int taken(const void *bytes, size_t size, void **kept)
+{
+    course saved;
+    if (size != BYTES || memcmp(bytes, token, TOKEN) != 0) {
+        return NOT_OURS;
+    }
+    memcpy(&saved, (const char *)bytes + TOKEN, sizeof saved);
+    return keep(&saved, kept);
+}
+
 static int is_ours(const char *given)
 {
     return given != NULL && strcmp(given, token) == 0;
@@ -23,6 +46,8 @@ static const char *reason(int code)
         return "there is no variable of this type with such a value reference";
     case NOT_SETTABLE:
         return "only inputs and start values can be set";
+    case NOT_OURS:
+        return "these bytes are no state of this FMU";
     case NOT_POSITIVE:
         return "expected a finite number above 0";
     case NOT_NOW:
