@@ -81,6 +81,31 @@ fn a_linear_error_that_grows_is_refuted_without_a_time() {
     assert_eq!(verdict, Standing::Refuted);
 }
 
+/// A is u − K. Inside the box e(t) = e(0)·(x(t) + shift)/(x(0) + shift)·exp(−Kt), which decays as
+/// long as x stays between the bounds of the box, and with u at its worst x leaves it; where x can
+/// rest with that u, the error grows.
+#[test]
+fn a_worst_input_refutes_only_where_the_plant_can_stay() {
+    for (slope, shift, K, expected) in [
+        ("u", "10", 0.05, Standing::Undecided),
+        ("u", "10", 0.1, Standing::Undecided),
+        ("sin(u)", "1.5", 0.05, Standing::Undecided),
+        // rests at x = 0 with every input
+        ("u", "0", 0.05, Standing::Refuted),
+    ] {
+        let text = format!(
+            "model P input Real u(min = -1, max = 1); Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = {slope}*(x + {shift}); end P;"
+        );
+        let verdict = certified(&text, &[K], |pair, certificate| {
+            if certificate.verdict() == Standing::Refuted {
+                judge::witness(pair, certificate, &Sides::new(certificate, 1));
+            }
+        });
+        assert_eq!(verdict, expected, "{slope} {shift} {K}");
+    }
+}
+
 /// The largest eigenvalue of the error's Jacobian is about b² − 1 where b is large: that
 /// refutes where the plant can rest there, at b = √3, and nothing where it only passes.
 #[test]
