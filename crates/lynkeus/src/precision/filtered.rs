@@ -104,6 +104,7 @@ fn study(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) 
         },
         clamp: false,
         values: BTreeMap::from([("initial_variance".to_owned(), Value::Table(variances))]),
+        ..Tuning::default()
     };
     let sensors = setup.experiment.sensors.iter().take(setup.measured);
     own.sensors.noise = sensors

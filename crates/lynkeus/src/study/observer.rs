@@ -81,7 +81,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
             clamp: section
                 .optional("clamp", Entry::boolean)?
                 .unwrap_or_default(),
-            values: BTreeMap::new(),
+            ..Tuning::default()
         },
         places: BTreeMap::new(),
         family,
