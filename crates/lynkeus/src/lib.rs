@@ -101,6 +101,7 @@ mod replay;
 #[cfg(feature = "tune")]
 mod report;
 mod sampled;
+mod saturated;
 pub mod series;
 mod simulate;
 mod spread;

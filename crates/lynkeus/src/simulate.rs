@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Design;
+use lynkeus_run::filter::Limits;
 use lynkeus_run::{Level, Role, Simulation};
 
 use crate::course::{Course, Samples};
@@ -275,7 +276,27 @@ fn noise(
         sample_step: settings.sample_step,
         levels,
         process: process(study, plant),
+        limits: limits(study, plant)?,
     })
+}
+
+/// The ranges that sensors can show, by output.
+fn limits(study: &Study, plant: &Plant) -> Result<BTreeMap<String, Limits>, Error> {
+    let mut found = BTreeMap::new();
+    for (name, low, high) in &study.sensors.limits {
+        let outputs = || plant.outputs.iter().map(|o| o.name.as_str());
+        if !outputs().any(|output| output == name.text) {
+            let message = format!(
+                "limits: the plant '{}' has no output named \"{name}\"",
+                plant.name
+            );
+            let hint = crate::near::suggest(&name.text, outputs());
+            return Err(name.blame(Error::input(message).hint(hint)));
+        }
+        let (low, high) = (*low, *high);
+        found.insert(name.text.clone(), Limits { low, high });
+    }
+    Ok(found)
 }
 
 /// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.

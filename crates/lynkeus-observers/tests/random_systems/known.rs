@@ -1,6 +1,7 @@
 //! Small systems that once were judged wrongly, or well might be.
 
-use lynkeus_observers::{Certificate, Claim as Sought};
+use lynkeus_expr::Interval;
+use lynkeus_observers::{Assumptions, Certificate, Claim as Sought};
 use lynkeus_structure::Standing;
 use nalgebra::DMatrix;
 
@@ -166,6 +167,45 @@ fn jumps_are_never_proved() {
         );
         let verdict = certified(&text, &[1.0], |_, _| ());
         assert_ne!(verdict, Standing::Proved, "{jump}");
+    }
+}
+
+/// Beyond an end of its sensor's range y no longer corrects: e = −K·0 there, and neither a decay nor a
+/// growth of the observer that reads all of y says anything.
+#[test]
+fn a_sensor_that_may_be_at_an_end_leaves_everything_undecided() {
+    for (slope, K) in [("-1", 1.0), ("1", 0.5), ("1", 3.0)] {
+        let text = format!(
+            "model P Real x(min = -1, max = 1); output Real y = 2*x + 1; equation der(x) = ({slope})*x; end P;"
+        );
+        let plant = pair::plant(&text);
+        let extended = pair::extended(&plant);
+        let observer = pair::observer(&extended, &DMatrix::from_element(1, 1, K / 2.0));
+        let verdict = |limits: Option<Interval>, noise: f64| {
+            let assumptions = Assumptions::new(&extended, extended.region())
+                .unwrap()
+                .with_noise(vec![noise])
+                .with_limits(&extended, &[limits])
+                .unwrap();
+            lynkeus_observers::certify(&extended, &observer, &assumptions, Sought::Fastest)
+                .unwrap()
+                .verdict()
+        };
+        let free = verdict(None, 0.0);
+        assert_ne!(free, Standing::Undecided, "{slope} {K}");
+        let range = |low, high| Some(Interval::new(low, high).unwrap());
+        // y is in [−1, 3]
+        assert_eq!(verdict(range(-1.0, 3.0), 0.0), free);
+        assert_eq!(verdict(range(-1.2, 3.2), 0.1), free);
+        for (limits, noise) in [
+            (range(-1.0, 2.9), 0.0),
+            (range(-0.9, 3.0), 0.0),
+            (range(-1.2, 3.2), 0.3),
+            (range(-1.2, 3.2), f64::INFINITY),
+            (range(4.0, 5.0), 0.0),
+        ] {
+            assert_eq!(verdict(limits, noise), Standing::Undecided, "{limits:?}");
+        }
     }
 }
 

@@ -5,9 +5,7 @@ use std::ops::ControlFlow;
 use lynkeus_expr::Node;
 use lynkeus_model::Plant;
 use lynkeus_observers::{Design, Estimate, Observer, Signal};
-use lynkeus_run::{
-    Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
-};
+use lynkeus_run::{Dynamics, Error as RunError, Method, Role, Simulation, Tolerances, Trajectory};
 
 use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
@@ -111,7 +109,7 @@ impl Trial<'_> {
         Ok(Simulation {
             observer: Some(systems::observer(plant, &self.observer)?),
             inputs: systems::inputs(study, plant, settings, &self.observer)?,
-            noise: Noise::default(),
+            noise: self.reference.exact(),
             method: thrifty(plain.method, rows),
             ..plain
         })
@@ -143,7 +141,7 @@ impl Trial<'_> {
         Ok(Simulation {
             plant: systems::plant_reading(plant, settings, &signals)?,
             inputs: systems::of_time(plant, &inputs)?,
-            noise: Noise::default(),
+            noise: self.reference.exact(),
             ..run
         })
     }
