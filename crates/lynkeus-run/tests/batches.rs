@@ -81,8 +81,8 @@ fn members(seeds: impl Iterator<Item = u64>) -> Vec<Member> {
 
 /// The sensor ends within what the position spans.
 const SHOWN: Limits = Limits {
-    low: -0.2,
-    high: 0.3,
+    low: 0.75,
+    high: 1.2,
 };
 
 const COLUMNS: [Column; 6] = [
