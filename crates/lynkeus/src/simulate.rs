@@ -228,6 +228,14 @@ pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
     })
 }
 
+/// The time between two samples of the simulation where the study says that it is sampled: its
+/// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
+pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
+    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let drawn = is_noisy.then(|| settings.row_step());
+    settings.sample_step.or(drawn)
+}
+
 /// The study's plant under its inputs and with its noise, without an observer.
 pub(crate) fn open_loop(
     study: &Study,

@@ -88,6 +88,11 @@ pub(crate) fn page(
     };
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.notes);
+    let mut certified = certify(study);
+    if let Ok(certified) = &mut certified {
+        // of the samples that the page shows
+        certified.sampling = outcome.intervals;
+    }
     let told = Told {
         study,
         plant: &plant,
@@ -97,7 +102,7 @@ pub(crate) fn page(
             None => "a simulation of the study".to_owned(),
         },
         checked: check(study, &CheckOptions::default()),
-        certified: certify(study),
+        certified,
         data: data::json(&prepared, &outcome, &samples, &moving),
         outcome,
         moving,

@@ -39,12 +39,11 @@ pub(super) fn simulated(
     let settings = simulate::settings(study).map_err(|error| {
         error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
     })?;
-    let first = settings.sample_step.unwrap_or(settings.row_step());
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
-    if is_noisy || settings.sample_step.is_some() {
-        return simulate::recorded(study, plant, first);
+    if let Some(step) = simulate::sampled_every(study, settings) {
+        return simulate::recorded(study, plant, step);
     }
     let since = Instant::now();
+    let first = settings.row_step();
     let mut step = first;
     let mut coarse: Option<Vec<Accuracy>> = None;
     loop {

@@ -27,6 +27,7 @@ mod refused;
 mod report;
 mod results;
 mod runs;
+mod samples;
 mod story;
 mod tables;
 mod tune;
