@@ -1,11 +1,11 @@
 //! What can be guaranteed about an observer, and why.
 
-use lynkeus_expr::{MissingInput, Spent};
-use lynkeus_structure::{Dimension, Extended, Region, Side, Standing};
+use lynkeus_expr::{Interval, MissingInput, Spent};
+use lynkeus_structure::{Dimension, Extended, Measurement, Region, Side, Standing, range, short};
 use nalgebra::DMatrix;
 
 use crate::Check;
-use crate::statement::{Statement, standing, sufficient, undecided};
+use crate::statement::{Statement, proved, standing, sufficient, undecided};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -21,6 +21,8 @@ pub struct Assumptions {
     pub input_derivatives: Vec<Vec<f64>>,
     /// f and h have values on that box and do not jump
     regularity: Check,
+    /// no reading is beyond what its sensor can show; none where every sensor shows everything
+    within_limits: Option<Check>,
     /// of the extended states, then of the measured outputs
     names: Vec<String>,
 }
@@ -37,6 +39,7 @@ impl Assumptions {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
             input_derivatives: vec![],
+            within_limits: None,
             names: extended
                 .states
                 .iter()
@@ -81,6 +84,71 @@ impl Assumptions {
     pub fn with_noise(mut self, noise: Vec<f64>) -> Self {
         self.noise = noise;
         self
+    }
+
+    /// With the ranges that the sensors can show, one per measured output. A reading is h on the box
+    /// and its measurement error, whose bounds are given before.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an output reads what has no range.
+    pub fn with_limits(
+        mut self,
+        extended: &Extended<'_>,
+        limits: &[Option<Interval>],
+    ) -> Result<Self, MissingInput> {
+        let mut beyond = vec![];
+        for (j, output) in extended.outputs.iter().enumerate() {
+            let Some(limits) = limits.get(j).copied().flatten() else {
+                continue;
+            };
+            let reading = self.reading(extended, j, output)?;
+            let is_shown = reading.is_defined() && reading.is_subset(limits);
+            self.within_limits.get_or_insert_with(|| {
+                proved(
+                    Statement::ReadingsAreShown,
+                    "h on the box, with the measurement errors",
+                )
+            });
+            if !is_shown {
+                beyond.push(format!(
+                    "{} lies in [{}, {}] and its sensor shows [{}, {}]",
+                    output.variable.name,
+                    short(reading.lo()),
+                    short(reading.hi()),
+                    short(limits.lo()),
+                    short(limits.hi()),
+                ));
+            }
+        }
+        if !beyond.is_empty() {
+            let detail = format!(
+                "{}: at an end of the range a reading is no value of h; narrow the box, or take family = \"ekf\", which counts it as a bound",
+                beyond.join("; ")
+            );
+            self.within_limits = Some(undecided(Statement::ReadingsAreShown, detail));
+        }
+        Ok(self)
+    }
+
+    fn reading(
+        &self,
+        extended: &Extended<'_>,
+        j: usize,
+        output: &Measurement,
+    ) -> Result<Interval, MissingInput> {
+        let values = range(extended.graph(), output.variable.node, &self.region)?.enclosure;
+        Ok(match self.noise.get(j).copied().unwrap_or(0.0) {
+            0.0 => values,
+            error => values.inflate(error),
+        })
+    }
+
+    /// Whether a sensor may be at an end of its range: then the observer is not the system that is
+    /// certified.
+    pub(crate) fn may_saturate(&self) -> bool {
+        self.within_limits
+            .as_ref()
+            .is_some_and(|check| !check.is_proved())
     }
 
     /// With bounds of |u'|, |u''|, … per known input, as many as are known.
@@ -175,6 +243,7 @@ impl Certificate {
             max: d.max,
         };
         let first = std::iter::once(assumptions.regularity.clone()).chain(assumptions.what_acts());
+        let first = first.chain(assumptions.within_limits.clone());
         let hypotheses: Vec<Check> = first.chain(hypotheses).collect();
         Self {
             basis: basis.into(),

@@ -102,6 +102,9 @@ pub struct Tuning {
     pub tunable: bool,
     /// the family's own keys
     pub values: BTreeMap<String, Value>,
+    /// standard deviations of the measurement errors that are declared, by output: what gains weigh
+    /// that are chosen by the noise they let through
+    pub noise: BTreeMap<String, f64>,
 }
 
 impl Tuning {

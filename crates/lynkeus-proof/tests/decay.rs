@@ -48,6 +48,7 @@ fn request(rate: f64, aim: Aim) -> Request {
     Request {
         rate,
         measured: vec![0, TRAYS - 1],
+        slopes: vec![1.0, 1.0],
         noise: vec![1.0, 1.0],
         scale: vec![1.0; TRAYS + 1],
         aim,
@@ -116,6 +117,36 @@ fn a_limit_below_what_is_possible_says_what_is() {
     match decay::design(&[column(4.69, 5.94)], &request) {
         Err(NoGain::Limit(found)) => assert!(found > 0.5 && found < 20.0, "{found}"),
         other => panic!("{other:?}"),
+    }
+}
+
+/// In other units of the outputs the same gains, each entry divided by its unit: the limit and the
+/// smallest largest entry are those of the outputs' own errors.
+#[test]
+fn a_limit_is_one_of_the_outputs_errors() {
+    let models = [column(4.69, 5.94)];
+    let least = |slopes: [f64; 2], limit| {
+        let request = Request {
+            slopes: slopes.to_vec(),
+            limit,
+            ..request(0.1, Aim::Gain)
+        };
+        let found = decay::design(&models, &request)?;
+        Ok(request.largest(&found.K))
+    };
+    let plain = least([1.0, 1.0], None).unwrap();
+    for c in [0.01, 100.0] {
+        let other = least([c, c], None).unwrap();
+        assert!(
+            (other * c / plain - 1.0).abs() < 0.05,
+            "{c} {other} {plain}"
+        );
+        // what a limit forbids, and what it allows
+        assert!(matches!(
+            least([c, c], Some(0.3 * plain / c)),
+            Err(NoGain::Limit(_))
+        ));
+        assert!(least([c, c], Some(1.5 * plain / c)).unwrap() <= 1.5 * plain / c);
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
 
 use crate::closed_loop::Source;
+use crate::filter::Limits;
 use crate::noise::{Disturbed, Sensors};
 use crate::routine::Routine;
 use crate::{Error, System};
@@ -114,10 +115,17 @@ impl<'g> Symbols<'g> {
 
     /// What a sensor shows.
     fn measured(&self, parts: &Parts<'_>, y: &[Expr<'g>], i: usize) -> Expr<'g> {
-        match parts.sensors.disturbed(i) {
+        let disturbed = match parts.sensors.disturbed(i) {
             Disturbed::Not => y[i],
             Disturbed::Added => y[i] + self.noise[i],
             Disturbed::Multiplied => y[i] * self.noise[i],
+        };
+        match parts.sensors.limits(i) {
+            None => disturbed,
+            Some(Limits { low, high }) => {
+                let capped = disturbed.min(self.graph.constant(high));
+                capped.max(self.graph.constant(low))
+            }
         }
     }
 

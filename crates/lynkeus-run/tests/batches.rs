@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use lynkeus_expr::{Expr, Graph};
+use lynkeus_run::filter::Limits;
 use lynkeus_run::{
     Backend, Batch, Column, Error, Level, Member, Method, Noise, Role, Simulation, Step, System,
 };
@@ -48,6 +49,7 @@ fn simulation(bend: Bend) -> Simulation {
             sample_step: Some(0.07),
             levels: BTreeMap::from([("y".to_string(), Level::Absolute(0.1))]),
             process: BTreeMap::from([("v".to_string(), 0.01)]),
+            limits: BTreeMap::from([("y".to_string(), SHOWN)]),
             ..Noise::default()
         },
         record_outputs: true,
@@ -76,6 +78,12 @@ fn members(seeds: impl Iterator<Item = u64>) -> Vec<Member> {
     };
     seeds.map(member).collect()
 }
+
+/// The sensor ends within what the position spans.
+const SHOWN: Limits = Limits {
+    low: 0.75,
+    high: 1.2,
+};
 
 const COLUMNS: [Column; 6] = [
     Role::State.at(0),
@@ -125,6 +133,14 @@ fn without_elementary_functions_a_run_is_that_of_a_simulation_to_the_bit() {
     for (member, found) in members.iter().zip(&found) {
         assert_eq!(*found, alone(&simulation, member), "seed {}", member.seed);
     }
+    // readings at either end of the sensor's range and between, of outputs beyond it
+    let rows = found.iter().flat_map(|run| run.chunks_exact(COLUMNS.len()));
+    let pairs: Vec<(f64, f64)> = rows.map(|row| (row[3], row[4])).collect();
+    let shown = |of: fn(f64) -> bool| pairs.iter().filter(|(_, y)| of(*y)).count();
+    assert!(shown(|y| y == SHOWN.low) > 50 && shown(|y| y == SHOWN.high) > 50);
+    assert!(shown(|y| SHOWN.low < y && y < SHOWN.high) > 50);
+    assert_eq!(shown(|y| y < SHOWN.low || y > SHOWN.high), 0);
+    assert!(pairs.iter().any(|(h, _)| *h > SHOWN.high + 0.1));
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! What can be guaranteed about a study's observer.
 
 use std::fmt;
+use std::ops::ControlFlow;
 
 use lynkeus_observers::{Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{Extended, Standing};
 
+use crate::interval::{self, Intervals};
 use crate::prepare::Prepared;
-use crate::{Correction, Error, Study, correction, prepare, words};
+use crate::{Correction, Error, Study, correction, prepare, simulate, words};
 
 mod assumptions;
 mod json;
@@ -33,6 +35,9 @@ pub struct CertifyReport {
     pub assumed: Vec<String>,
     /// where the study itself is not in the box of the proof
     pub strays: Strays,
+    /// the study's samples against what the observer stands: every proof is for sensors that are
+    /// read continuously. None where the study has no samples, or no limit is known
+    pub sampling: Option<Intervals>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -119,9 +124,16 @@ impl<'a> Task<'a> {
         };
         let correction =
             correction::of(self.study, self.prepared.plant(), place, &design.observer)?;
+        let run = self.study.simulate.as_ref();
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let run = run.map(|_| simulate::simulated(&self.prepared, go_on));
+        let seen = run.as_ref().and_then(|run| run.as_ref().ok());
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
-            strays: Strays::of(&self.prepared, place, &design),
+            strays: Strays::of(&self.prepared, run.as_ref(), place, &design),
+            sampling: seen.and_then(|run| {
+                interval::simulated(&self.prepared, &design, &run.time, &run.quantities)
+            }),
             design,
             certificate,
             theorem,

@@ -22,6 +22,10 @@ use crate::study::BetweenSamples;
 use crate::systems::hat;
 use crate::{Error, Study, continuous, design, fmu, tunable};
 
+/// How many of the steps that the fastest mode needs (|λ|h ≤ ½) are one with which the classical method
+/// is stable for no mode that decays: all of its region left of the axis has |λ|h < 2.97.
+const LONGEST: f64 = 5.94;
+
 /// The language of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Target {
@@ -132,7 +136,9 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     if is_tunable {
         notes.push(tunable::note(&design, &made));
     }
-    let about = about(study, &made);
+    let hasty = hasty(&prepared, &made);
+    notes.extend(hasty.clone());
+    let about = about(study, &made, hasty);
     let files = printed(&prepared, &design, &made, &about, |device| {
         let files = match options.to {
             Target::C => c::files(device, options.precision)?,
@@ -237,9 +243,7 @@ pub(crate) fn stepped(
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
         return Ok(made);
     }
-    let known = prepared.plant().inputs.iter();
-    let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
-    let Some(needed) = needed_step(&made, &known) else {
+    let Some(needed) = needed(prepared, &made) else {
         let message = "the step cannot be chosen: the equations have no slopes at the start";
         return Err(Error::input(message)
             .at(&prepared.study().file)
@@ -345,14 +349,40 @@ fn entry(variable: &Variable) -> Entry {
     }
 }
 
-/// What stands at the head of the files: where they come from, and what is guaranteed.
-fn about(study: &Study, made: &Blueprint) -> Vec<String> {
+/// Where fixed steps are so long that the method itself grows, if it is seen to.
+fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String> {
+    let Method::Rk4(Step::AtMost(step)) = made.method() else {
+        return None;
+    };
+    let longest = LONGEST * needed(prepared, made)?;
+    (step > longest).then(|| {
+        format!(
+            "not for these steps: they are {} at most, and beyond about {} the fastest mode at the start makes the method itself grow",
+            short(step),
+            short(longest)
+        )
+    })
+}
+
+/// The step that the fastest mode at the start needs.
+fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<f64> {
+    let known = prepared.plant().inputs.iter();
+    let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
+    needed_step(made, &known)
+}
+
+/// What stands at the head of the files: where they come from, what is guaranteed, and `hasty`,
+/// for which steps it is not.
+fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> {
     let step = steps(made.method()).unwrap_or_default();
     let mut lines = vec![
         origin(study),
         format!("Classical Runge-Kutta method, {step}; signals are held between samples."),
     ];
-    lines.extend(designed(study));
+    let told = designed(study);
+    let hasty = hasty.filter(|_| !told.is_empty());
+    lines.extend(told);
+    lines.extend(hasty);
     lines
 }
 

@@ -195,7 +195,7 @@ fn bounds(state: &Variable) -> Bounds {
 }
 
 /// `limits` of `[sensors]`, by measured output.
-fn limits(study: &Study, extended: &Extended<'_>) -> Result<Vec<Option<Limits>>, Error> {
+pub(crate) fn limits(study: &Study, extended: &Extended<'_>) -> Result<Vec<Option<Limits>>, Error> {
     let mut found = vec![None; extended.outputs.len()];
     for (name, low, high) in &study.sensors.limits {
         let place = output(extended, name, "limits")?;

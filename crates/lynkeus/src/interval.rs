@@ -2,24 +2,24 @@
 
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_gain::sampling;
-use lynkeus_observers::{Design, Sampled};
-use lynkeus_structure::figures;
+use lynkeus_observers::{Design, Observer, Sampled};
+use lynkeus_structure::{Extended, figures};
 use serde_json::{Value, json};
 
-use crate::Series;
 use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::series::{Sorted, points, steps};
 use crate::study::BetweenSamples;
+use crate::{Quantity, Series, simulate};
 
 /// Rows of the log at which the error is linearised.
 const PLACES: usize = 12;
 
-/// The sampling interval of a log, and estimates of the largest that the observer stands: from
-/// its linearised error along the estimate, no proof.
+/// The sampling interval of a log or of a simulation, and estimates of the largest that the observer
+/// stands: from its linearised error along the estimate, no proof.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intervals {
-    /// the median time between two readings of the log
+    /// the median time between two readings of the log; of a simulation the time between two samples
     pub log: f64,
     /// with `between_samples = "predict"`: beyond it errors grow from sample to sample
     pub predict: f64,
@@ -29,75 +29,119 @@ pub struct Intervals {
     between: BetweenSamples,
 }
 
-/// The smallest limits along a run; none for filters, whose gains know the interval, for
-/// observers with further states, and where errors do not shrink.
+/// The interval of a log against the limits along the run.
 pub(crate) fn intervals(
     prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples,
     course: &Course,
 ) -> Option<Intervals> {
-    let extended = prepared.extended();
-    let observer = &design.observer;
-    let is_estimate = observer
-        .states
-        .iter()
-        .map(|(signal, _)| signal.symbol)
-        .eq(observer.estimates.iter().map(|e| e.node));
-    if observer.filter.is_some() || !is_estimate || !observer.input_derivatives.is_empty() {
-        return None;
-    }
-    let Sampled {
-        observer: sampled,
-        outputs,
-    } = observer.sampled(extended).ok()?;
-    let states: Vec<Node> = sampled.states.iter().map(|(s, _)| s.symbol).collect();
-    let graph = extended.graph();
-    let slopes = jacobian::forward(graph, &sampled.derivatives, &states);
-    let views = jacobian::forward(graph, &outputs, &states[..observer.states.len()]);
-    let entries = slopes.entries.iter().chain(&views.entries);
-    let nodes: Vec<Node> = entries.map(|entry| entry.2).collect();
-    let inputs = sampled.inputs.iter().map(|s| s.symbol);
-    let symbols = std::iter::once(sampled.time).chain(states.iter().copied());
-    let symbols: Vec<Node> = symbols.chain(inputs).collect();
-    let slope_values = Tape::new(graph, &symbols, &nodes).ok()?;
-    let expected = Tape::new(graph, &symbols, &outputs).ok()?;
-    let sensors = outputs.len();
-    let rows = course.estimates.first()?.len();
-    let value = |column: &Series, row| column.get(row).unwrap_or(f64::NAN);
-    let stride = rows.div_ceil(PLACES).max(1);
-    let at = |row: usize| {
-        let mut values = vec![value(&samples.time, row)];
-        values.extend(course.estimates.iter().map(|column| value(column, row)));
-        let first = values.len();
-        values.extend(std::iter::repeat_n(0.0, sensors));
-        values.extend(samples.inputs.iter().map(|u| value(u, row)));
-        // every measurement follows the model
-        values.extend(std::iter::repeat_n(1.0, sensors));
-        let mut y = vec![0.0; sensors];
-        expected.evaluator().eval(&values, &mut y);
-        values[first..first + sensors].copy_from_slice(&y);
-        let mut entries = vec![0.0; nodes.len()];
-        slope_values.evaluator().eval(&values, &mut entries);
-        let mut M = vec![vec![0.0; states.len()]; states.len()];
-        for (&(i, j, _), value) in slopes.entries.iter().zip(&entries) {
-            M[i][j] += value;
-        }
-        let mut C = vec![vec![0.0; states.len() - sensors]; sensors];
-        let rest = entries.iter().skip(slopes.entries.len());
-        for (&(i, j, _), value) in views.entries.iter().zip(rest) {
-            C[i][j] += value;
-        }
-        sampling::limits(&M, &C)
+    let path = Path {
+        time: &samples.time,
+        estimates: course.estimates.iter().collect(),
+        inputs: samples.inputs.iter().collect(),
     };
-    let found: Vec<sampling::Limits> = (0..rows).step_by(stride).filter_map(at).collect();
-    let smallest = |of: fn(&sampling::Limits) -> f64| found.iter().map(of).reduce(f64::min);
-    Some(Intervals {
-        log: median_interval(samples)?,
-        predict: smallest(|l| l.predict)?,
-        hold: smallest(|l| l.hold)?,
-        between: prepared.study().estimate.between_samples,
-    })
+    let limits = path.limits(prepared.extended(), &design.observer)?;
+    let log = median_interval(samples)?;
+    Some(Intervals::new(log, limits, prepared))
+}
+
+/// The interval of the study's simulation, where it is sampled, against the limits along its run,
+/// of which these are the times and quantities.
+pub(crate) fn simulated(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    time: &Series,
+    quantities: &[Quantity],
+) -> Option<Intervals> {
+    let study = prepared.study();
+    let step = simulate::sampled_every(study, study.simulate.as_ref()?)?;
+    let of = |name: &str| quantities.iter().find(|q| q.name == name);
+    let observer = &design.observer;
+    let estimates = observer.estimates.iter();
+    let inputs = observer.inputs.iter();
+    let path = Path {
+        time,
+        estimates: estimates
+            .map(|e| of(&e.variable.name)?.estimate.as_ref())
+            .collect::<Option<_>>()?,
+        inputs: inputs
+            .map(|u| of(&u.name)?.truth.as_ref())
+            .collect::<Option<_>>()?,
+    };
+    let limits = path.limits(prepared.extended(), observer)?;
+    Some(Intervals::new(step, limits, prepared))
+}
+
+/// A run of an observer: what it estimates and its inputs, row by row.
+struct Path<'s> {
+    time: &'s Series,
+    estimates: Vec<&'s Series>,
+    inputs: Vec<&'s Series>,
+}
+
+impl Path<'_> {
+    /// The smallest limits along the run; none for filters, whose gains know the interval, for
+    /// observers with further states, and where errors do not shrink.
+    fn limits(&self, extended: &Extended<'_>, observer: &Observer) -> Option<sampling::Limits> {
+        let is_estimate = observer
+            .states
+            .iter()
+            .map(|(signal, _)| signal.symbol)
+            .eq(observer.estimates.iter().map(|e| e.node));
+        if observer.filter.is_some() || !is_estimate || !observer.input_derivatives.is_empty() {
+            return None;
+        }
+        let Sampled {
+            observer: sampled,
+            outputs,
+        } = observer.sampled(extended).ok()?;
+        let states: Vec<Node> = sampled.states.iter().map(|(s, _)| s.symbol).collect();
+        let graph = extended.graph();
+        let slopes = jacobian::forward(graph, &sampled.derivatives, &states);
+        let views = jacobian::forward(graph, &outputs, &states[..observer.states.len()]);
+        let entries = slopes.entries.iter().chain(&views.entries);
+        let nodes: Vec<Node> = entries.map(|entry| entry.2).collect();
+        let inputs = sampled.inputs.iter().map(|s| s.symbol);
+        let symbols = std::iter::once(sampled.time).chain(states.iter().copied());
+        let symbols: Vec<Node> = symbols.chain(inputs).collect();
+        let slope_values = Tape::new(graph, &symbols, &nodes).ok()?;
+        let expected = Tape::new(graph, &symbols, &outputs).ok()?;
+        let sensors = outputs.len();
+        let rows = self.estimates.first()?.len();
+        let value = |column: &Series, row| column.get(row).unwrap_or(f64::NAN);
+        let stride = rows.div_ceil(PLACES).max(1);
+        let at = |row: usize| {
+            let mut values = vec![value(self.time, row)];
+            values.extend(self.estimates.iter().map(|column| value(column, row)));
+            let first = values.len();
+            values.extend(std::iter::repeat_n(0.0, sensors));
+            values.extend(self.inputs.iter().map(|u| value(u, row)));
+            // every measurement follows the model
+            values.extend(std::iter::repeat_n(1.0, sensors));
+            let mut y = vec![0.0; sensors];
+            expected.evaluator().eval(&values, &mut y);
+            values[first..first + sensors].copy_from_slice(&y);
+            let mut entries = vec![0.0; nodes.len()];
+            slope_values.evaluator().eval(&values, &mut entries);
+            let mut M = vec![vec![0.0; states.len()]; states.len()];
+            for (&(i, j, _), value) in slopes.entries.iter().zip(&entries) {
+                M[i][j] += value;
+            }
+            let mut C = vec![vec![0.0; states.len() - sensors]; sensors];
+            let rest = entries.iter().skip(slopes.entries.len());
+            for (&(i, j, _), value) in views.entries.iter().zip(rest) {
+                C[i][j] += value;
+            }
+            sampling::limits(&M, &C)
+        };
+        let found: Vec<sampling::Limits> = (0..rows).step_by(stride).filter_map(at).collect();
+        let smallest = |of: fn(&sampling::Limits) -> f64| found.iter().map(of).reduce(f64::min);
+        Some(sampling::Limits {
+            predict: smallest(|l| l.predict)?,
+            hold: smallest(|l| l.hold)?,
+        })
+    }
 }
 
 /// The median time from one reading of a sensor to its next, of the slowest sensor.
@@ -110,6 +154,41 @@ fn median_interval(samples: &Samples) -> Option<f64> {
 }
 
 impl Intervals {
+    fn new(log: f64, limits: sampling::Limits, prepared: &Prepared<'_>) -> Self {
+        Self {
+            log,
+            predict: limits.predict,
+            hold: limits.hold,
+            between: prepared.study().estimate.between_samples,
+        }
+    }
+
+    /// Whether the readings are further apart than the observer stands. Readings that are
+    /// interpolated show what comes, and no limit is known for them.
+    #[must_use]
+    pub fn is_beyond(&self) -> bool {
+        match self.between {
+            BetweenSamples::Predict => self.log >= self.predict,
+            BetweenSamples::Hold => self.log > self.hold,
+            BetweenSamples::Linear => false,
+        }
+    }
+
+    /// Beside the limit in a few words, where the readings are beyond it.
+    pub(crate) fn beyond(&self) -> Option<String> {
+        let (limit, how) = match self.between {
+            BetweenSamples::Predict => (self.predict, "predicted"),
+            _ => (self.hold, "held"),
+        };
+        self.is_beyond().then(|| {
+            format!(
+                "the samples are {} apart, and {how} between them this observer stands about {} (an estimate, no proof)",
+                figures(self.log, 2),
+                figures(limit, 2)
+            )
+        })
+    }
+
     /// For machines; a limit that was not found is null.
     #[must_use]
     pub fn to_json(&self) -> Value {
@@ -126,10 +205,11 @@ impl Intervals {
         let (predict, hold) = (figures(self.predict, 2), figures(self.hold, 2));
         let is_for_predict = self.log < self.predict;
         match self.between {
-            BetweenSamples::Predict if !is_for_predict => Some(format!(
+            _ if !self.is_beyond() => None,
+            BetweenSamples::Predict => Some(format!(
                 "the log's readings are {log} apart, and this observer stands about {predict} with between_samples = \"predict\" (an estimate from its linearised error, no proof): a smaller theta, or family = \"ekf\""
             )),
-            BetweenSamples::Hold if self.log > self.hold => {
+            _ => {
                 let remedy = match is_for_predict {
                     true => {
                         format!("between_samples = \"predict\", which stands about {predict}, ")
@@ -140,7 +220,6 @@ impl Intervals {
                     "the log's readings are {log} apart, and beyond about {hold} this observer follows the steps that holding them makes (an estimate from its linearised error, no proof): {remedy}a smaller theta, or family = \"ekf\""
                 ))
             }
-            _ => None,
         }
     }
 }

@@ -104,6 +104,7 @@ mod replay;
 mod report;
 mod runner;
 mod sampled;
+mod saturated;
 pub mod series;
 mod simulate;
 mod spread;

@@ -19,7 +19,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::systems::hat;
-use crate::{Error, Quantity, Series, Study, columns, expected};
+use crate::{Error, Quantity, Series, Study, columns, expected, saturated};
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]
@@ -195,6 +195,7 @@ impl Raw<'_> {
         notes.append(&mut course.notes);
         notes.extend(frozen.iter().map(Frozen::words));
         notes.extend(intervals.as_ref().and_then(Intervals::words));
+        notes.extend(saturated::told(prepared, &design, &measurements)?);
         let innovations = innovations(&design, &course, &mut notes);
         let plant = prepared.plant();
         let mut headers = Headers::beside(plant);

@@ -10,7 +10,7 @@ use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, rang
 
 use crate::choice::{Choice, choose};
 use crate::study::Name;
-use crate::{Error, Study, calibrate, systems};
+use crate::{Error, Study, calibrate, filter, systems};
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -231,10 +231,14 @@ impl<'a> Prepared<'a> {
         let Some(chosen) = examinations.iter().find(|e| e.family == choice.family) else {
             return Err(none_fits(self.study, examinations));
         };
-        let tuned = choice.completed(tuning);
+        let mut tuned = choice.completed(tuning);
         // a certified gain holds for the known inputs as the study simulates them
         let simulated = match is_certified_gain(tuning) {
-            true => Some(self.narrowed(&self.simulated_inputs()?)?),
+            true => {
+                let place = self.narrowed(&self.simulated_inputs()?)?;
+                tuned.noise = filter::noise::deviations(self.study, &place)?;
+                Some(place)
+            }
             false => None,
         };
         let place = simulated.as_ref().unwrap_or(&self.extended);

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
+use lynkeus_run::filter::Limits;
 use lynkeus_run::{Level, Role, Simulation};
 
 use crate::course::{Course, Samples};
@@ -271,6 +272,14 @@ pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
     })
 }
 
+/// The time between two samples of the simulation where the study says that it is sampled: its
+/// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
+pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
+    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let drawn = is_noisy.then(|| settings.row_step());
+    settings.sample_step.or(drawn)
+}
+
 /// The study's plant under its inputs and with its noise, without an observer.
 pub(crate) fn open_loop(
     study: &Study,
@@ -319,7 +328,27 @@ fn noise(
         sample_step: settings.sample_step,
         levels,
         process: process(study, plant),
+        limits: limits(study, plant)?,
     })
+}
+
+/// The ranges that sensors can show, by output.
+fn limits(study: &Study, plant: &Plant) -> Result<BTreeMap<String, Limits>, Error> {
+    let mut found = BTreeMap::new();
+    for (name, low, high) in &study.sensors.limits {
+        let outputs = || plant.outputs.iter().map(|o| o.name.as_str());
+        if !outputs().any(|output| output == name.text) {
+            let message = format!(
+                "limits: the plant '{}' has no output named \"{name}\"",
+                plant.name
+            );
+            let hint = crate::near::suggest(&name.text, outputs());
+            return Err(name.blame(Error::input(message).hint(hint)));
+        }
+        let (low, high) = (*low, *high);
+        found.insert(name.text.clone(), Limits { low, high });
+    }
+    Ok(found)
 }
 
 /// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.

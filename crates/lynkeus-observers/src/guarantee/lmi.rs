@@ -3,8 +3,11 @@
 //! x̂' = f(x̂, u) − K (Cx̂ − y) with a full K: every output corrects every state. The
 //! form of the equations does not matter, only the slopes of their nonlinear terms.
 
+use std::collections::BTreeMap;
+
+use lynkeus_expr::MissingInput;
 use lynkeus_proof::decay::{self, Aim, Gain, NoGain, Request};
-use lynkeus_structure::Extended;
+use lynkeus_structure::{Extended, Measurement, range};
 
 use super::blocking;
 use super::error_system::ErrorSystem;
@@ -33,7 +36,7 @@ const LIMIT: KeySpec = KeySpec {
     kind: "number > 0",
     shape: Shape::Positive,
     default: "none",
-    meaning: "the largest entry of the gain, with `\"lmi\"`",
+    meaning: "the largest entry of the gain K on ŷ − y, with `\"lmi\"`",
 };
 
 const MINIMISE: KeySpec = KeySpec {
@@ -48,11 +51,13 @@ const MINIMISE: KeySpec = KeySpec {
 pub(crate) const KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];
 
 /// The gain that the study asks for.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Lmi {
     rate: Option<f64>,
     limit: Option<f64>,
     aim: Aim,
+    /// declared standard deviations, by output
+    noise: BTreeMap<String, f64>,
 }
 
 impl Lmi {
@@ -75,6 +80,7 @@ impl Lmi {
                 rate: tuning.positive(RATE.name)?,
                 limit: tuning.positive(LIMIT.name)?,
                 aim: aim(tuning)?,
+                noise: tuning.noise.clone(),
             })),
         }
     }
@@ -90,7 +96,7 @@ pub(crate) fn design(
 ) -> Result<Design, DesignError> {
     prolongation::refuse(common, "gain = \"lmi\"")?;
     let copy = Copy::new(extended, common);
-    let measured = measured(extended, &copy)?;
+    let Shown { measured, slopes } = shown(extended, &copy)?;
     let system = ErrorSystem::open_loop(extended, &extended.region())?;
     if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
         let cure = match open.is_empty() {
@@ -107,8 +113,9 @@ pub(crate) fn design(
     }
     let request = Request {
         rate: asked.rate.unwrap_or(0.0),
-        noise: vec![1.0; measured.len()],
+        noise: weights(extended, &asked.noise),
         measured,
+        slopes,
         scale: system.scale.clone(),
         aim: asked.aim,
         limit: asked.limit,
@@ -126,17 +133,61 @@ pub(crate) fn design(
     assemble(extended, &copy, family, examination, &request, &gain)
 }
 
-fn measured(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Vec<usize>, TuningError> {
-    let shown = |i: usize| {
-        copy.measured_state(i)
-            .map(|(state, _)| state)
-            .ok_or_else(|| {
-                let name = &extended.outputs[i].variable.name;
-                let expected = "outputs that each show one state (y = c·x + d)";
-                TuningError::new("gain", expected, format!("the output {name}"))
-            })
+/// What the outputs show, one entry each.
+struct Shown {
+    /// the state
+    measured: Vec<usize>,
+    /// |c| of y = c·x + d; the smallest on the box where it varies
+    slopes: Vec<f64>,
+}
+
+fn shown(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Shown, DesignError> {
+    let (mut measured, mut slopes) = (vec![], vec![]);
+    for (i, output) in extended.outputs.iter().enumerate() {
+        let wrong = |expected: &str| {
+            let name = &output.variable.name;
+            TuningError::new("gain", expected, format!("the output {name}"))
+        };
+        let Some((state, _)) = copy.measured_state(i) else {
+            return Err(wrong("outputs that each show one state (y = c·x + d)").into());
+        };
+        let c = slope(extended, i)?;
+        if c <= 0.0 || !c.is_finite() {
+            return Err(wrong("outputs y = c·x + d with a c that is 0 nowhere on the box").into());
+        }
+        measured.push(state);
+        slopes.push(c);
+    }
+    Ok(Shown { measured, slopes })
+}
+
+/// The smallest |c| on the box of an output y = c·x + d; 0 where it is none.
+fn slope(extended: &Extended<'_>, output: usize) -> Result<f64, MissingInput> {
+    let Some((_, slope, _)) = extended.outputs[output].state else {
+        return Ok(0.0);
     };
-    (0..extended.outputs.len()).map(shown).collect()
+    let graph = extended.graph();
+    match graph.constant_value(slope) {
+        Some(c) => Ok(c.abs()),
+        None => Ok(range(graph, slope, &extended.region())?
+            .enclosure
+            .mignitude()),
+    }
+}
+
+/// Sizes of the measurement errors, one per output: as declared, and all the same where none is.
+fn weights(extended: &Extended<'_>, declared: &BTreeMap<String, f64>) -> Vec<f64> {
+    let of = |output: &Measurement| declared.get(&output.variable.name).copied();
+    let sizes: Vec<f64> = extended
+        .outputs
+        .iter()
+        .map(|o| of(o).unwrap_or(0.0))
+        .collect();
+    let counts = sizes.iter().all(|size| size.is_finite()) && sizes.iter().any(|size| *size > 0.0);
+    match counts {
+        true => sizes,
+        false => vec![1.0; sizes.len()],
+    }
 }
 
 fn aim(tuning: &Tuning) -> Result<Aim, TuningError> {
@@ -244,7 +295,10 @@ fn assemble(
     let slopes = gain.proof.multipliers.first().map_or(0, |t| t.len());
     let parameters = vec![
         ("rate".to_owned(), format!("{}", request.rate)),
-        ("largest gain".to_owned(), format!("{:.6}", gain.K.amax())),
+        (
+            "largest gain".to_owned(),
+            format!("{:.6}", request.largest(&gain.K)),
+        ),
         ("slopes".to_owned(), format!("{slopes}")),
     ];
     Ok(Design {

@@ -84,6 +84,9 @@ fn certified(
         Err(reason) => return Ok(not_covered(assumptions, reason)),
     };
     let mut hypotheses = vec![system.bounded()];
+    if assumptions.may_saturate() {
+        return Ok(Certificate::new(BASIS, assumptions, hypotheses));
+    }
     let sample = refute::worst(extended.graph(), &system);
     // where it ends, what is proved by then still has to be told
     let search = extended.graph().budget().part(SEARCH);

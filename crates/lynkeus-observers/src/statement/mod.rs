@@ -20,6 +20,8 @@ pub enum Statement {
     PlantIsRegular,
     /// what a certificate counts has bounds: asked where anything acts
     WhatActs,
+    /// no reading is beyond what its sensor can show
+    ReadingsAreShown,
     /// the work came to its end: asked where a limit ended it
     Finished,
     /// a partial derivative along a chain keeps its sign
@@ -150,6 +152,7 @@ impl fmt::Display for Statement {
                 f.write_str("f and h have values on the whole box and do not jump")
             }
             Self::WhatActs => f.write_str("disturbances and measurement errors are bounded"),
+            Self::ReadingsAreShown => f.write_str("no reading is beyond its sensor's range"),
             Self::Finished => f.write_str("everything was examined"),
             Self::PartialKeepsSign { of, by } => write!(f, "∂f({of})/∂{by} keeps its sign"),
             Self::OutputKeepsSign { output, state } => {

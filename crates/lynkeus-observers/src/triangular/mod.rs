@@ -64,7 +64,7 @@ impl Stages for Triangular {
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
-        if let Some(lmi) = settings.lmi {
+        if let Some(lmi) = settings.lmi.clone() {
             let examination = found.examination;
             return guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination);
         }

@@ -1,8 +1,8 @@
 //! Gains that come with a promise: `gain = "lmi"` on random chains.
 
 use lynkeus_observers::{
-    Claim as Sought, Design, DesignError, Family, Tuning, Value, block_triangular::BlockTriangular,
-    triangular::Triangular,
+    Claim as Sought, Correction, Design, DesignError, Family, Observer, Tuning, Value,
+    block_triangular::BlockTriangular, triangular::Triangular,
 };
 use lynkeus_structure::{Extended, Standing};
 
@@ -42,7 +42,8 @@ pub fn chain(numbers: &mut Numbers) -> Random {
         let b = numbers.signed(0.05, 0.8);
         equations.push(format!("({a:.4})*({link}) + ({b:.4})*({term})"));
     }
-    let outputs = vec![["x1", "2*x1 + 1", "-0.5*x1"][numbers.below(3)].to_owned()];
+    let outputs =
+        vec![["x1", "2*x1 + 1", "-0.5*x1", "100*x1", "0.01*x1 + 0.5"][numbers.below(5)].to_owned()];
     Random {
         states,
         inputs,
@@ -73,7 +74,8 @@ fn kept(seed: u64) -> bool {
     ));
     let plant = pair::plant(&random.text());
     let extended = pair::extended(&plant);
-    let design = match design(&extended, &tuning, numbers.below(2)) {
+    let family = numbers.below(2);
+    let design = match design(&extended, &tuning, family) {
         Ok(design) => design,
         Err(DesignError::NoGain { .. }) => return false,
         Err(other) => panic!("{other}"),
@@ -96,12 +98,73 @@ fn kept(seed: u64) -> bool {
     judge::secants(&mut pair, &claim, &sides, &mut numbers);
     judge::points(&mut pair, &claim, &sides, &mut numbers);
     simulate::decay(&mut pair, &claim, &sides, &mut numbers);
+    limited(&extended, tuning, largest(&extended, observer), family);
     drop(context);
     true
+}
+
+/// The largest |∂F/∂y|, by the observer's own equations.
+fn largest(extended: &Extended<'_>, observer: &Observer) -> f64 {
+    match Correction::of(extended, observer).unwrap() {
+        Correction::Gain(K) => K.amax(),
+        Correction::Varying(other) => panic!("{other:?}"),
+    }
+}
+
+/// A limit below what a gain without one has is kept, or nothing is designed.
+fn limited(extended: &Extended<'_>, mut tuning: Tuning, free: f64, family: usize) {
+    for share in [0.9, 0.3] {
+        let limit = Value::Number(share * free);
+        tuning.values.insert("gain_limit".into(), limit);
+        match design(extended, &tuning, family) {
+            Ok(found) => {
+                let entry = largest(extended, &found.observer);
+                assert!(
+                    entry <= share * free * (1.0 + 1e-12),
+                    "{entry} of {free}, {share}"
+                );
+            }
+            Err(DesignError::NoGain { .. }) => {}
+            Err(other) => panic!("{other}"),
+        }
+    }
 }
 
 #[test]
 fn every_designed_gain_is_proved_at_the_rate_asked_for() {
     let designed = (1..=CHAINS).filter(|&seed| kept(seed)).count();
     assert!(4 * designed >= 3 * CHAINS as usize, "{designed}");
+}
+
+/// Two sensors of what either alone would show: the gain is taken from the one that is declared to
+/// be exact, and in another unit of the second sensor it is the same gain.
+#[test]
+fn declared_noise_weighs_the_outputs_in_their_own_units() {
+    let columns = |c: f64, noise: [f64; 2]| {
+        let text = format!(
+            "model P Real x(min = -2, max = 2); Real z(min = -2, max = 2); Real w(min = -2, max = 2);
+             output Real y = x; output Real q = {c}*w; equation der(x) = z - x + 0.5*w;
+             der(z) = -0.2*x - z + 0.2*sin(x) + w; der(w) = -w + 0.8*x + 0.3*z; end P;"
+        );
+        let plant = pair::plant(&text);
+        let extended = pair::extended(&plant);
+        let mut tuning = Tuning::from([("rate", 1.5)]);
+        tuning
+            .values
+            .insert("gain".into(), Value::Text("lmi".into()));
+        let named = ["y", "q"].map(str::to_owned).into_iter().zip(noise);
+        tuning.noise = named.collect();
+        let found = Triangular.design(&extended, &tuning).unwrap();
+        match Correction::of(&extended, &found.observer).unwrap() {
+            Correction::Gain(K) => [K.column(0).amax(), K.column(1).amax()],
+            Correction::Varying(other) => panic!("{other:?}"),
+        }
+    };
+    let [y, q] = columns(1.0, [1.0, 0.01]);
+    assert!(y < 0.01 * q, "{y} {q}");
+    let [first, second] = columns(1.0, [0.01, 1.0]);
+    assert!(second < 0.01 * first, "{first} {second}");
+    let [same, other] = columns(100.0, [1.0, 1.0]);
+    assert!((same / y - 1.0).abs() < 0.02, "{same} {y}");
+    assert!((100.0 * other / q - 1.0).abs() < 0.02, "{other} {q}");
 }

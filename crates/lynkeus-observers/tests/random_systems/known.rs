@@ -1,6 +1,7 @@
 //! Small systems that once were judged wrongly, or well might be.
 
-use lynkeus_observers::{Certificate, Claim as Sought};
+use lynkeus_expr::Interval;
+use lynkeus_observers::{Assumptions, Certificate, Claim as Sought};
 use lynkeus_structure::Standing;
 use nalgebra::DMatrix;
 
@@ -81,6 +82,31 @@ fn a_linear_error_that_grows_is_refuted_without_a_time() {
     assert_eq!(verdict, Standing::Refuted);
 }
 
+/// A is u − K. Inside the box e(t) = e(0)·(x(t) + shift)/(x(0) + shift)·exp(−Kt), which decays as
+/// long as x stays between the bounds of the box, and with u at its worst x leaves it; where x can
+/// rest with that u, the error grows.
+#[test]
+fn a_worst_input_refutes_only_where_the_plant_can_stay() {
+    for (slope, shift, K, expected) in [
+        ("u", "10", 0.05, Standing::Undecided),
+        ("u", "10", 0.1, Standing::Undecided),
+        ("sin(u)", "1.5", 0.05, Standing::Undecided),
+        // rests at x = 0 with every input
+        ("u", "0", 0.05, Standing::Refuted),
+    ] {
+        let text = format!(
+            "model P input Real u(min = -1, max = 1); Real x(min = -1, max = 1); output Real y = x;
+             equation der(x) = {slope}*(x + {shift}); end P;"
+        );
+        let verdict = certified(&text, &[K], |pair, certificate| {
+            if certificate.verdict() == Standing::Refuted {
+                judge::witness(pair, certificate, &Sides::new(certificate, 1));
+            }
+        });
+        assert_eq!(verdict, expected, "{slope} {shift} {K}");
+    }
+}
+
 /// The largest eigenvalue of the error's Jacobian is about b² − 1 where b is large: that
 /// refutes where the plant can rest there, at b = √3, and nothing where it only passes.
 #[test]
@@ -141,6 +167,45 @@ fn jumps_are_never_proved() {
         );
         let verdict = certified(&text, &[1.0], |_, _| ());
         assert_ne!(verdict, Standing::Proved, "{jump}");
+    }
+}
+
+/// Beyond an end of its sensor's range y no longer corrects: e = −K·0 there, and neither a decay nor a
+/// growth of the observer that reads all of y says anything.
+#[test]
+fn a_sensor_that_may_be_at_an_end_leaves_everything_undecided() {
+    for (slope, K) in [("-1", 1.0), ("1", 0.5), ("1", 3.0)] {
+        let text = format!(
+            "model P Real x(min = -1, max = 1); output Real y = 2*x + 1; equation der(x) = ({slope})*x; end P;"
+        );
+        let plant = pair::plant(&text);
+        let extended = pair::extended(&plant);
+        let observer = pair::observer(&extended, &DMatrix::from_element(1, 1, K / 2.0));
+        let verdict = |limits: Option<Interval>, noise: f64| {
+            let assumptions = Assumptions::new(&extended, extended.region())
+                .unwrap()
+                .with_noise(vec![noise])
+                .with_limits(&extended, &[limits])
+                .unwrap();
+            lynkeus_observers::certify(&extended, &observer, &assumptions, Sought::Fastest)
+                .unwrap()
+                .verdict()
+        };
+        let free = verdict(None, 0.0);
+        assert_ne!(free, Standing::Undecided, "{slope} {K}");
+        let range = |low, high| Some(Interval::new(low, high).unwrap());
+        // y is in [−1, 3]
+        assert_eq!(verdict(range(-1.0, 3.0), 0.0), free);
+        assert_eq!(verdict(range(-1.2, 3.2), 0.1), free);
+        for (limits, noise) in [
+            (range(-1.0, 2.9), 0.0),
+            (range(-0.9, 3.0), 0.0),
+            (range(-1.2, 3.2), 0.3),
+            (range(-1.2, 3.2), f64::INFINITY),
+            (range(4.0, 5.0), 0.0),
+        ] {
+            assert_eq!(verdict(limits, noise), Standing::Undecided, "{limits:?}");
+        }
     }
 }
 

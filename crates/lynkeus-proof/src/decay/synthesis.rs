@@ -40,22 +40,34 @@ pub struct Request {
     pub rate: f64,
     /// per output: the state it shows
     pub measured: Vec<usize>,
-    /// per output: the size of its measurement error, for [`Aim::Noise`]
+    /// per output: |c| > 0 of y = c·x + d, x being the state that it shows
+    pub slopes: Vec<f64>,
+    /// per output: the size of its measurement error, in its own unit, for [`Aim::Noise`]
     pub noise: Vec<f64>,
     /// per state: the size that counts as one
     pub scale: Vec<f64>,
     /// what to make small
     pub aim: Aim,
-    /// largest entry allowed
+    /// largest entry allowed, of a gain on the errors of the outputs
     pub limit: Option<f64>,
     /// when to end the search
     pub budget: Budget,
 }
 
+impl Request {
+    /// The largest entry that a gain on the errors of the states has on those of the outputs.
+    #[must_use]
+    pub fn largest(&self, K: &DMatrix<f64>) -> f64 {
+        let columns = K.column_iter().zip(&self.slopes);
+        columns.map(|(k, c)| k.amax() / c).fold(0.0, f64::max)
+    }
+}
+
 /// A gain with the proof of its decay.
 #[derive(Clone, Debug)]
 pub struct Gain {
-    /// K, one row per state, one column per output
+    /// K on the errors of the states that the outputs show: one row per state, one column per
+    /// output
     pub K: DMatrix<f64>,
     /// the proof, accepted by [`super::holds`] for the models corrected by K
     pub proof: Proof,
@@ -70,7 +82,7 @@ pub enum NoGain {
     /// no gain reaches the rate by a proof of this form
     #[error("no gain is proved to reach the rate: {0}")]
     Rate(Failure),
-    /// gains reach the rate, but with larger entries than allowed
+    /// gains reach the rate, but with larger entries on the outputs' errors than allowed
     #[error("the smallest largest entry found is {0:.4}")]
     Limit(f64),
     /// the interval check rejected the solver's answer
@@ -94,12 +106,15 @@ pub fn design(models: &[ErrorModel], request: &Request) -> Result<Gain, NoGain> 
         Failure::Spent(spent) => NoGain::Spent(spent),
         other => NoGain::Rate(other),
     })?;
-    let over = |K: &DMatrix<f64>| request.limit.is_some_and(|limit| K.amax() > limit);
+    let over = |K: &DMatrix<f64>| {
+        let limit = request.limit;
+        limit.is_some_and(|limit| request.largest(K) > limit)
+    };
     if request.aim == Aim::Gain || over(&K) {
         K = scaled.alternated(K);
     }
     if over(&K) {
-        return Err(NoGain::Limit(K.amax()));
+        return Err(NoGain::Limit(request.largest(&K)));
     }
     let corrected: Vec<ErrorModel> = models
         .iter()
@@ -246,7 +261,10 @@ impl<'a> Scaled<'a> {
     /// Squares of the outputs' errors in scaled units, the largest as one.
     fn weights(&self) -> DMatrix<f64> {
         let states = &self.scale.states;
-        let relative = |(j, noise): (usize, &f64)| noise / states[self.request.measured[j]];
+        let Request {
+            measured, slopes, ..
+        } = self.request;
+        let relative = |(j, noise): (usize, &f64)| noise / (slopes[j] * states[measured[j]]);
         let sizes: Vec<f64> = self
             .request
             .noise
@@ -264,12 +282,13 @@ impl<'a> Scaled<'a> {
 
     /// Smaller largest entries: P for K, then K for that P, while it helps.
     fn alternated(&self, start: DMatrix<f64>) -> DMatrix<f64> {
+        let largest = |K: &DMatrix<f64>| self.request.largest(K);
         let mut best = start;
         for _ in 0..ROUNDS {
             let Some(P) = self.central(&best) else { break };
             let Some(K) = self.smallest(&P) else { break };
-            let gained = K.amax() < best.amax() * (1.0 - PROGRESS);
-            if K.amax() < best.amax() && self.central(&K).is_some() {
+            let gained = largest(&K) < largest(&best) * (1.0 - PROGRESS);
+            if largest(&K) < largest(&best) && self.central(&K).is_some() {
                 best = K;
             }
             if !gained {
@@ -301,7 +320,8 @@ impl<'a> Scaled<'a> {
         let g = problem.matrix(1, 1);
         for i in 0..n {
             for j in 0..p {
-                let entry = K.at_entry(i, j).scaled(self.unit(i, j));
+                let entry = self.unit(i, j) / self.request.slopes[j];
+                let entry = K.at_entry(i, j).scaled(entry);
                 problem.positive(g.minus(&entry));
                 problem.positive(g.plus(&entry));
             }
@@ -316,84 +336,4 @@ impl<'a> Scaled<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::decay::Sector;
-    use lynkeus_expr::Interval;
-
-    /// x_i' = x_{i+1} − 2x_i + θ_i x_i, the last state without a next one.
-    fn chain(n: usize) -> ErrorModel {
-        let mut constant = vec![vec![Interval::ZERO; n]; n];
-        for (i, row) in constant.iter_mut().enumerate() {
-            row[i] = Interval::point(-2.0);
-            if i + 1 < n {
-                row[i + 1] = Interval::ONE;
-            }
-        }
-        let sector = |column: usize| {
-            let mut direction = vec![Interval::ZERO; n];
-            direction[column] = Interval::ONE;
-            Sector {
-                column,
-                direction,
-                range: Interval::new(-0.2, 0.2).unwrap(),
-            }
-        };
-        ErrorModel {
-            constant,
-            sectors: (0..n).map(sector).collect(),
-        }
-    }
-
-    /// What is found with few unknowns is a point of the problem with all of them.
-    #[test]
-    fn a_near_point_is_one_of_the_full_problem() {
-        let n = 12;
-        let models = [chain(n)];
-        let request = Request {
-            rate: 0.3,
-            measured: vec![0],
-            noise: vec![1.0],
-            scale: vec![1.0; n],
-            aim: Aim::Noise,
-            limit: None,
-            budget: Budget::default(),
-        };
-        let scaled = Scaled::new(&models, &request);
-        let near = scaled.inequalities(Extent::Near);
-        let full = scaled.inequalities(Extent::Full);
-        let found = near.normalised().unwrap();
-        let same = full.like(&near, &found);
-        assert_eq!(found.value(&near.P), same.value(&full.P));
-        assert_eq!(same.value(&full.P)[(0, n - 1)], 0.0);
-        assert_eq!(found.value(&near.Y), same.value(&full.Y));
-        let mut problem = full.problem.clone();
-        problem.minimise(&full.P.trace());
-        assert!(problem.solve_from(&same).is_ok());
-        assert!(near.bounded(WIDEST).has_inside().is_ok());
-    }
-
-    /// No gain on state 0 moves what it does not see.
-    #[test]
-    fn what_is_out_of_reach_is_seen_without_a_point() {
-        let mut model = chain(12);
-        model.constant[5][6] = Interval::ZERO;
-        model.constant[11][11] = Interval::point(1.0);
-        let mut request = Request {
-            rate: 0.3,
-            measured: vec![0],
-            noise: vec![1.0],
-            scale: vec![1.0; 12],
-            aim: Aim::Noise,
-            limit: None,
-            budget: Budget::default(),
-        };
-        assert!(!is_reachable(std::slice::from_ref(&model), &request, false));
-        let scaled = Scaled::new(std::slice::from_ref(&model), &request);
-        let full = scaled.inequalities(Extent::Full).bounded(WIDEST);
-        assert_eq!(full.has_inside(), Err(Failure::Infeasible));
-        model.constant[11][11] = Interval::point(-1.0);
-        request.rate = 0.1;
-        assert!(is_reachable(&[model], &request, true));
-    }
-}
+mod tests;

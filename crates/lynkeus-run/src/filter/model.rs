@@ -1,6 +1,6 @@
 //! A plant with its sensors and noises, compiled for filters.
 
-use lynkeus_expr::{Graph, Node, jacobian};
+use lynkeus_expr::{Binary, Graph, Node, jacobian, real};
 
 use super::Bounds;
 use crate::{Error, Level, System};
@@ -58,6 +58,21 @@ pub struct Limits {
     pub low: f64,
     /// its upper end
     pub high: f64,
+}
+
+impl Limits {
+    /// What the sensor shows of a value.
+    #[must_use]
+    pub fn shown(self, value: f64) -> f64 {
+        let capped = real::binary(Binary::Min, value, self.high);
+        real::binary(Binary::Max, capped, self.low)
+    }
+
+    /// Whether a reading only says "at most" or "at least".
+    #[must_use]
+    pub fn ends(self, reading: f64) -> bool {
+        reading <= self.low || reading >= self.high
+    }
 }
 
 /// A [`FilterPlant`], compiled: cheap to clone, independent of its graph.

@@ -6,7 +6,7 @@ use lynkeus_observers::Assumptions;
 use lynkeus_structure::{Dimension, Extended, Matrix, Region, range};
 
 use crate::study::{Name, Noise};
-use crate::{Error, Study};
+use crate::{Error, Study, filter};
 
 /// Gaussian measurement errors are taken to stay within this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
@@ -17,10 +17,15 @@ pub(super) fn of(study: &Study, extended: &Extended<'_>) -> Result<Assumptions, 
     let drift = drift(study, plant, extended, &region)?;
     let noise = noise(study, plant, extended, &region)?;
     let assumptions = Assumptions::new(extended, region).map_err(Error::from_source)?;
-    Ok(assumptions
+    let limits = filter::limits(study, extended)?.into_iter();
+    let limits = limits.map(|limits| Interval::new(limits?.low, limits?.high).ok());
+    let limits: Vec<Option<Interval>> = limits.collect();
+    assumptions
         .with_drift(drift)
         .with_noise(noise)
-        .with_input_derivatives(input_derivatives(study, extended)?))
+        .with_input_derivatives(input_derivatives(study, extended)?)
+        .with_limits(extended, &limits)
+        .map_err(Error::from_source)
 }
 
 /// Per known input: the bounds of its derivatives that the study gives.

@@ -6,6 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::CertifyReport;
 use crate::check::point;
+use crate::interval::Intervals;
 
 /// `{verdict, rate, ultimate_bound, box, hypotheses, …}`; the hypotheses are those of
 /// the inequality, then those of the theorem.
@@ -26,6 +27,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     object["verdict"] = json!(report.verdict().word());
     object["hypotheses"] = json!(hypotheses);
     object["outside_box"] = report.strays.to_json();
+    object["sampling"] = json!(report.sampling.map(sampling));
     let notes = report.theorem.iter().flat_map(|t| &t.notes);
     let strays = report.strays.words(false);
     let strays = strays.map(|words| format!("the certificate is for the box only, and {words}"));
@@ -67,6 +69,13 @@ fn summary(certificate: &Certificate) -> Value {
         "box": sides.collect::<Map<_, _>>(),
         "constants": constants.collect::<Vec<_>>(),
     })
+}
+
+/// The study's samples against what the observer stands.
+fn sampling(intervals: Intervals) -> Value {
+    let mut entry = intervals.to_json();
+    entry["beyond"] = json!(intervals.is_beyond());
+    entry
 }
 
 fn hypothesis(check: &Check) -> Value {

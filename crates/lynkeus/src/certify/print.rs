@@ -6,6 +6,7 @@ use lynkeus_observers::Certificate;
 use lynkeus_structure::Standing;
 
 use super::CertifyReport;
+use crate::interval::Intervals;
 use crate::words::{conditions, number, side};
 
 pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
@@ -72,26 +73,40 @@ pub(super) fn conclusion(report: &CertifyReport) -> String {
     match (report.verdict(), best.rate) {
         (Standing::Proved, Some(rate)) => {
             format!(
-                "proved: the error decays at {} or faster{}{}",
+                "{}: with sensors read continuously, the error decays at {} or faster{}{}",
+                proved(report),
                 number(rate),
                 left(report, best),
-                inside_only(report)
+                but(report)
             )
         }
         (Standing::Proved, None) => {
-            format!("proved: the error decays{}", inside_only(report))
+            format!(
+                "{}: with sensors read continuously, the error decays{}",
+                proved(report),
+                but(report)
+            )
         }
         (Standing::Refuted, _) => "refuted: an error grows, however small it is".to_owned(),
         (Standing::Undecided, _) => "undecided: neither a proof nor a counterexample".to_owned(),
     }
 }
 
-/// What a proof is worth for a study that is not in its box.
-fn inside_only(report: &CertifyReport) -> String {
-    match report.strays.words(report.is_theorem(report.best())) {
-        Some(words) => format!("; but only inside the box, and {words}"),
-        None => String::new(),
+/// The verdict of a proof: never "proved" alone where the study's samples are too far apart.
+fn proved(report: &CertifyReport) -> &'static str {
+    match report.sampling.as_ref().is_some_and(Intervals::is_beyond) {
+        true => "proved, but not for these samples",
+        false => "proved",
     }
+}
+
+/// What a proof is worth for a study that is not in its box, or whose samples are too far apart.
+fn but(report: &CertifyReport) -> String {
+    let samples = report.sampling.as_ref().and_then(Intervals::beyond);
+    let samples = samples.map(|words| format!("; {words}"));
+    let strays = report.strays.words(report.is_theorem(report.best()));
+    let strays = strays.map(|words| format!("; but only inside the box, and {words}"));
+    samples.into_iter().chain(strays).collect()
 }
 
 /// Bounds named in the first line.

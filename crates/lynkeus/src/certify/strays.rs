@@ -1,7 +1,5 @@
 //! Where a study is not in the box for which its observer is certified.
 
-use std::ops::ControlFlow;
-
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_structure::Extended;
@@ -9,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
-use crate::{Quantity, Series, simulate};
+use crate::{Error, Outcome, Quantity, Series};
 
 /// Where the study's own plant and estimate are outside of the box.
 #[derive(Clone, Debug, Default)]
@@ -27,25 +25,28 @@ pub struct Strays {
 }
 
 impl Strays {
-    /// Runs the study, where it has a `[simulate]`, and looks where that leaves the box.
-    pub(super) fn of(prepared: &Prepared<'_>, place: &Extended<'_>, design: &Design) -> Self {
-        let found = Self::looked(prepared, place, design);
+    /// Looks where the study's run, if it has a `[simulate]`, leaves the box.
+    pub(super) fn of(
+        prepared: &Prepared<'_>,
+        run: Option<&Result<Outcome, Error>>,
+        place: &Extended<'_>,
+        design: &Design,
+    ) -> Self {
+        let found = Self::looked(run, place, design);
         Self {
             prolonged: prepared.study().observer.tuning.flag("prolong") == Ok(true),
             ..found
         }
     }
 
-    fn looked(prepared: &Prepared<'_>, place: &Extended<'_>, design: &Design) -> Self {
-        if prepared.study().simulate.is_none() {
-            return Self::at_start(place, design);
-        }
-        match simulate::simulated(prepared, &mut |_| ControlFlow::Continue(())) {
-            Ok(run) => Self {
+    fn looked(run: Option<&Result<Outcome, Error>>, place: &Extended<'_>, design: &Design) -> Self {
+        match run {
+            None => Self::at_start(place, design),
+            Some(Ok(run)) => Self {
                 simulated: true,
                 ..Self::along(&run.time, &run.quantities, place)
             },
-            Err(error) => Self {
+            Some(Err(error)) => Self {
                 failure: Some(error.to_string()),
                 ..Self::at_start(place, design)
             },

@@ -57,17 +57,15 @@ pub(super) fn simulated(
     watch: Watch<'_>,
 ) -> Result<(Vec<Compared>, Interval), Error> {
     let settings = simulate::settings(study)?;
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
     let interval = |step, resolution| Interval {
         step,
         resolution,
         unit: study.time_unit.clone(),
     };
-    let first = settings.sample_step.unwrap_or(settings.row_step());
-    if is_noisy || settings.sample_step.is_some() {
-        let table = simulate::recorded(study, plant, first)?;
+    if let Some(step) = simulate::sampled_every(study, settings) {
+        let table = simulate::recorded(study, plant, step)?;
         let rows = run_all(study, plant, families, &table, watch)?;
-        return Ok((rows, interval(first, Resolution::Study)));
+        return Ok((rows, interval(step, Resolution::Study)));
     }
     let mut continuous = study.clone();
     continuous.estimate.between_samples = BetweenSamples::Linear;

@@ -1,8 +1,10 @@
 //! The noises of a filter: as the study declares them, else from the log and the ranges.
 
+use std::collections::BTreeMap;
+
 use lynkeus_model::Variable;
 use lynkeus_run::Level;
-use lynkeus_structure::{Extended, short};
+use lynkeus_structure::{Extended, range, short};
 
 use crate::course::Samples;
 use crate::series::{Sorted, steps};
@@ -37,6 +39,31 @@ pub(crate) fn levels(
         });
     }
     Ok(levels)
+}
+
+/// The declared noise as standard deviations, by output; that of a share is one of the largest value
+/// on the box, which may be infinite.
+pub(crate) fn deviations(
+    study: &Study,
+    extended: &Extended<'_>,
+) -> Result<BTreeMap<String, f64>, Error> {
+    let mut found = BTreeMap::new();
+    for (name, noise) in &study.sensors.noise {
+        let mut outputs = extended.outputs.iter();
+        let Some(output) = outputs.find(|o| o.variable.name == name.text) else {
+            continue;
+        };
+        let deviation = match *noise {
+            Noise::Absolute(deviation) => deviation,
+            Noise::Uniform(bound) => bound / 3.0_f64.sqrt(),
+            Noise::Relative(share) => {
+                let values = range(extended.graph(), output.variable.node, &extended.region());
+                share * values.map_err(Error::from_source)?.enclosure.magnitude()
+            }
+        };
+        found.insert(name.text.clone(), deviation);
+    }
+    Ok(found)
 }
 
 /// Readings that do not scatter: a thousandth of their range, or of their size.

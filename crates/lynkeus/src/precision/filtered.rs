@@ -105,6 +105,7 @@ fn study(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) 
         clamp: false,
         tunable: false,
         values: BTreeMap::from([("initial_variance".to_owned(), Value::Table(variances))]),
+        ..Tuning::default()
     };
     let sensors = setup.experiment.sensors.iter().take(setup.measured);
     own.sensors.noise = sensors

@@ -104,6 +104,11 @@ pub fn report(
     };
     let samples = Log::read(&prepared, table)?.samples;
     notes.extend_from_slice(&outcome.notes);
+    let mut certified = certify(study);
+    if let Ok(certified) = &mut certified {
+        // of the samples that the page shows
+        certified.sampling = outcome.intervals;
+    }
     let told = Told {
         study,
         plant: &plant,
@@ -113,7 +118,7 @@ pub fn report(
             None => "a simulation of the study".to_owned(),
         },
         checked: checked(study),
-        certified: certify(study),
+        certified,
         data: data::json(&prepared, &outcome, &samples, &moving, tradeoff.as_ref()),
         tradeoff,
         outcome,

@@ -46,13 +46,12 @@ pub(super) fn simulated(
     let settings = simulate::settings(study).map_err(|error| {
         error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
     })?;
-    let first = settings.sample_step.unwrap_or(settings.row_step());
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
-    if is_noisy || settings.sample_step.is_some() {
-        let table = simulate::recorded(study, plant, first)?;
-        return Ok(Simulated { table, step: first });
+    if let Some(step) = simulate::sampled_every(study, settings) {
+        let table = simulate::recorded(study, plant, step)?;
+        return Ok(Simulated { table, step });
     }
     let since = Instant::now();
+    let first = settings.row_step();
     let mut step = first;
     let mut coarse: Option<Vec<Accuracy>> = None;
     loop {

@@ -74,9 +74,8 @@ impl Told<'_> {
         let (word, rest) = verdict.split_once(": ").unwrap_or(("", &verdict));
         let rest = super::html::escaped(rest);
         let word = match word {
-            "proved" => badge("proved"),
-            "refuted" => badge("refuted"),
-            _ => badge("undecided"),
+            "" => badge("undecided"),
+            word => badge(word),
         };
         html.raw(&format!("<p>Convergence: {word} {rest}</p>"));
     }

@@ -127,7 +127,7 @@ pub(super) const SENSORS: [KeySpec; 5] = [
         kind: "table: output = `[lowest, highest]`",
         shape: Shape::Table(&Shape::List(&Shape::Number)),
         default: "none",
-        meaning: "the range that a sensor can show: a reading at an end only says \"at most\" or \"at least\", and corrects a filter only where it expects less than that",
+        meaning: "the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": it corrects a filter only where that expects less; the other families take it as it stands, and a note says how often",
     },
     KeySpec {
         name: "measured",

@@ -86,8 +86,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<ObserverSettings, Error> {
             clamp: section
                 .optional("clamp", Entry::boolean)?
                 .unwrap_or_default(),
-            tunable: false,
-            values: BTreeMap::new(),
+            ..Tuning::default()
         },
         places: BTreeMap::new(),
         family,

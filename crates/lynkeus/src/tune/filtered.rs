@@ -56,7 +56,7 @@ impl Simulated {
             })
         };
         Ok(Self {
-            exact: sampled(Noise::default())?,
+            exact: sampled(reference.exact())?,
             noisy: sampled(reference.noise.clone())?,
             reference,
         })

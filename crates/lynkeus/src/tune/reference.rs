@@ -70,6 +70,14 @@ impl Reference {
         })
     }
 
+    /// Sensors without noise, which still show no more than their ranges.
+    pub fn exact(&self) -> Noise {
+        Noise {
+            limits: self.noise.limits.clone(),
+            ..Noise::default()
+        }
+    }
+
     /// What an error of 1 is, of what a column of a run of the plant holds.
     pub fn scale(&self, column: Column) -> f64 {
         let scales = match column.role {

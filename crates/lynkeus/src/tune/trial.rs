@@ -4,9 +4,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_expr::Node;
 use lynkeus_observers::Design;
-use lynkeus_run::{
-    Dynamics, Error as RunError, Method, Noise, Role, Simulation, Tolerances, Trajectory,
-};
+use lynkeus_run::{Dynamics, Error as RunError, Method, Role, Simulation, Tolerances, Trajectory};
 
 use super::errors::run_away;
 use super::judge::Judge;
@@ -113,7 +111,7 @@ impl Trial<'_> {
         Ok(Simulation {
             observer: Some(systems::observer(plant, &self.judge.observer)?),
             inputs: systems::inputs(study, plant, settings, &self.judge.observer)?,
-            noise: Noise::default(),
+            noise: self.judge.reference.exact(),
             method: thrifty(plain.method, rows),
             ..plain
         })
@@ -147,7 +145,7 @@ impl Trial<'_> {
         Ok(Simulation {
             plant: systems::plant_reading(plant, settings, &signals)?,
             inputs: systems::of_time(plant, &inputs)?,
-            noise: Noise::default(),
+            noise: self.judge.reference.exact(),
             ..run
         })
     }

@@ -28,6 +28,7 @@ mod refused;
 mod report;
 mod results;
 mod runs;
+mod samples;
 mod story;
 mod tables;
 mod tunable;
