@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use lynkeus_model::Plant;
 use lynkeus_observers::Design;
 
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, is_certified_gain};
 use crate::simulate::{self, Rig};
 use crate::study::SimulateSettings;
 use crate::{Error, Outcome, Study, Table, choice, estimate, prepare};
@@ -33,8 +33,8 @@ impl Runner {
     }
 
     /// Whether the plant and the observer of its study are those of another: the two may differ in seed,
-    /// `initial` and `spread` of `[simulate]`, in `noise` of `[sensors]`, and in what is done with
-    /// results.
+    /// `initial` and `spread` of `[simulate]`, in `noise` of `[sensors]` unless the gain is chosen by
+    /// it, and in what is done with results.
     #[must_use]
     pub fn serves(&self, other: &Study) -> bool {
         let own = &self.study;
@@ -48,6 +48,8 @@ impl Runner {
             && (&sensors.disturbances, &sensors.limits) == (&others.disturbances, &others.limits)
             && own.process_noise == other.process_noise
             && own.observer.is_like(&other.observer)
+            // a certified gain is chosen by the noise that it lets through
+            && (sensors.noise == others.noise || !is_certified_gain(&own.observer.tuning))
             && (&own.narrower, &own.certify) == (&other.narrower, &other.certify)
             && own.estimate == other.estimate
             && own.simulate.as_ref().map(undrawn) == other.simulate.as_ref().map(undrawn)
@@ -278,6 +280,9 @@ mod tests {
         let same = |other: &Study| Arc::ptr_eq(&first, &runners.of(other));
         assert!(same(&tank("theta = 1.0", 0.01, "seed = 7")));
         assert!(!same(&tank("theta = 2.0", 0.05, "")));
+        let certified = "family = \"triangular\", gain = \"lmi\"";
+        let certified = [0.05, 0.01].map(|noise| tank(certified, noise, ""));
+        assert!(!Runner::new(certified[0].clone()).serves(&certified[1]));
         assert!(!same(&tank("theta = 1.0", 0.05, "start = 1")));
         let with = |change: fn(&mut Study)| {
             let mut other = study.clone();
