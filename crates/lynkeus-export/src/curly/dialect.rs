@@ -159,6 +159,45 @@ const SIZES: &[&str] = &[
     "WIDTH_INSIDE",
 ];
 
+/// What math.h defines in capitals, here or there.
+const MACROS: &[&str] = &[
+    "DOMAIN",
+    "FP_FAST_FMA",
+    "FP_FAST_FMAF",
+    "FP_ILOGB0",
+    "FP_ILOGBNAN",
+    "FP_INFINITE",
+    "FP_NAN",
+    "FP_NORMAL",
+    "FP_SUBNORMAL",
+    "FP_ZERO",
+    "HUGE",
+    "HUGE_VAL",
+    "HUGE_VALF",
+    "HUGE_VALL",
+    "MATH_ERREXCEPT",
+    "MATH_ERRNO",
+    "MAXFLOAT",
+    "M_1_PI",
+    "M_2_PI",
+    "M_2_SQRTPI",
+    "M_E",
+    "M_LN10",
+    "M_LN2",
+    "M_LOG10E",
+    "M_LOG2E",
+    "M_PI",
+    "M_PI_2",
+    "M_PI_4",
+    "M_SQRT1_2",
+    "M_SQRT2",
+    "OVERFLOW",
+    "PLOSS",
+    "SING",
+    "TLOSS",
+    "UNDERFLOW",
+];
+
 impl Dialect for Draft {
     fn name(&self) -> &'static str {
         "C"
@@ -166,14 +205,12 @@ impl Dialect for Draft {
 
     fn is_reserved(&self, word: &str) -> bool {
         let is_listed = |word: &str| RESERVED.contains(&word) || FUNCTIONS.contains(&word);
-        // math.h defines constants in capitals; each of its functions has a sibling for `float`
+        // each function of math.h has a sibling for `float`
         is_listed(word)
             || word.strip_suffix('f').is_some_and(is_listed)
             || SIZES.contains(&word)
+            || MACROS.contains(&word)
             || word.ends_with("_matrix")
-            || ["M_", "FP_", "HUGE_", "MATH_"]
-                .iter()
-                .any(|head| word.starts_with(head))
     }
 
     fn number(&self, value: f64) -> Text {
