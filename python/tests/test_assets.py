@@ -32,15 +32,19 @@ STUDIES: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", STUDIES)
 def test_an_asset_gives_what_its_log_gives(name: str) -> None:
     study, data = tank(**STUDIES[name]), log()
-    try:
-        run = study.estimate(data)
-    except lynkeus.LynkeusError as error:
-        assert at_rest(study, data)["error"].to_pylist() == [str(error)]
-        return
-    found = at_rest(study, data)
+    run, found = study.estimate(data), at_rest(study, data)
+    assert found["error"].to_pylist() == [None] * len(run)
     assert found.column_names == ["asset", "t", "level_hat", "inflow_hat", "credible", "error"]
     for column in ("t", "level_hat", "inflow_hat"):
         np.testing.assert_array_equal(found[column], run[column])
+
+
+def test_an_asset_whose_log_is_refused_tells_why() -> None:
+    for y in (["a"] * 50, [None] * 50):
+        data = {**log(), "y": y}
+        with pytest.raises(lynkeus.LynkeusError) as error:
+            tank().estimate(pyarrow.table(data))
+        assert at_rest(tank(), data)["error"].to_pylist() == [str(error.value)]
 
 
 def test_columns_have_the_names_of_the_study() -> None:

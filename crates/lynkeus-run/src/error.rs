@@ -152,6 +152,26 @@ pub enum Error {
         time: f64,
     },
 
+    /// A sample from before where an estimator is.
+    #[error(
+        "the time {time} is before {reached}, where the estimator is: expected samples in the order of their times"
+    )]
+    TimeBefore {
+        /// time of the last sample or prediction
+        reached: f64,
+        /// time of this sample
+        time: f64,
+    },
+
+    /// A time of a sample, or an input of the first one, that is no finite number.
+    #[error("{signal}: expected a finite number, found {value}")]
+    NoNumber {
+        /// `t`, or the name of the input
+        signal: String,
+        /// what was given
+        value: f64,
+    },
+
     /// A cell that is no finite number.
     #[error("data row {row}, column '{column}': expected a finite number, found {value}")]
     NotANumber {

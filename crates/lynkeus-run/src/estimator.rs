@@ -47,7 +47,7 @@ impl Default for EstimatorSettings {
 /// that this sensor did not report, of an input that is not finite the last value holds. An
 /// observer made of a [`System`] alone knows of no sensors: all its signals are inputs.
 ///
-/// A call that fails changes nothing but the count of the samples: the estimator stays at the
+/// A call that fails changes nothing: the estimator stays at the
 /// last good sample and the next call goes on from there. With [`Step::Substeps`] or
 /// [`Step::AtMost`] neither a system nor a sampled observer nor the extended filter of up to eight
 /// states without history allocates once its equations have become machine code.
@@ -169,7 +169,7 @@ impl Estimator {
     /// what follows from the samples before.
     ///
     /// # Errors
-    /// [`Error::Setting`] before the first sample, [`Error::TimeOrder`], [`Error::NotANumber`];
+    /// [`Error::Setting`] before the first sample, [`Error::TimeBefore`], [`Error::NoNumber`];
     /// [`Error::Diverged`], [`Error::NotFinite`] and the errors of the integration.
     pub fn predict(&mut self, t: f64) -> Result<&[f64], Error> {
         self.save();
@@ -193,8 +193,8 @@ impl Estimator {
     /// the same as [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors
-    /// [`Error::Setting`] for a wrong number of signals, [`Error::TimeOrder`],
-    /// [`Error::NotANumber`] for a time or the first value of an input; [`Error::Diverged`],
+    /// [`Error::Setting`] for a wrong number of signals, [`Error::TimeBefore`],
+    /// [`Error::NoNumber`] for a time or the first value of an input; [`Error::Diverged`],
     /// [`Error::NotFinite`] and the errors of the integration.
     pub fn push(&mut self, t: f64, signals: &[f64]) -> Result<&[f64], Error> {
         self.save();
@@ -324,12 +324,10 @@ impl Estimator {
     /// The observer to the sample that was taken in; back to what was saved where that fails.
     fn settle(&mut self, before: Option<f64>, has_signals: bool) -> Result<&[f64], Error> {
         if let Err(error) = self.go(before, has_signals) {
-            let offered = self.intake.offered();
             let image = std::mem::take(&mut self.image);
             // the same walk over what it made
             let _ = snapshot::load(self, &image);
             self.image = image;
-            self.intake.set_offered(offered);
             return Err(error);
         }
         if let Core::Filter(filter) = &mut self.core

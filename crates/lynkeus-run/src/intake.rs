@@ -22,8 +22,6 @@ pub(crate) struct Intake {
     names: Vec<String>,
     sensors: usize,
     time: Option<f64>,
-    /// samples offered, refused ones included
-    offered: usize,
     values: Vec<f64>,
     held: usize,
 }
@@ -35,7 +33,6 @@ impl Intake {
             names,
             sensors,
             time: None,
-            offered: 0,
             held: 0,
         }
     }
@@ -52,15 +49,6 @@ impl Intake {
         self.time
     }
 
-    pub fn offered(&self) -> usize {
-        self.offered
-    }
-
-    /// Counts samples that came to nothing, too.
-    pub fn set_offered(&mut self, offered: usize) {
-        self.offered = offered;
-    }
-
     /// The sample taken last.
     pub fn sample(&self) -> Sample<'_> {
         let (readings, inputs) = self.values.split_at(self.sensors);
@@ -75,10 +63,9 @@ impl Intake {
     /// Takes a sample, or nothing where one is refused.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a wrong number of signals, [`Error::NotANumber`] for a time or the
-    /// first value of an input, [`Error::TimeOrder`].
+    /// [`Error::Setting`] for a wrong number of signals, [`Error::NoNumber`] for a time or the
+    /// first value of an input, [`Error::TimeBefore`].
     pub fn take(&mut self, t: f64, signals: &[f64]) -> Result<(), Error> {
-        self.offered += 1;
         if signals.len() != self.names.len() {
             let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
             return Err(Error::setting("number of signals", expected, signals.len()));
@@ -87,7 +74,7 @@ impl Intake {
         let inputs = self.sensors..self.names.len();
         let missing = |i: &usize| !signals[*i].is_finite();
         if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
-            return Err(self.not_a_number(&self.names[i], signals[i]));
+            return Err(no_number(&self.names[i], signals[i]));
         }
         self.values[..self.sensors].copy_from_slice(&signals[..self.sensors]);
         self.held = inputs.clone().filter(missing).count();
@@ -122,31 +109,25 @@ impl Intake {
 
     fn check_time(&self, t: f64) -> Result<(), Error> {
         if !t.is_finite() {
-            return Err(self.not_a_number("t", t));
+            return Err(no_number("t", t));
         }
         match self.time {
-            Some(previous) if t < previous => Err(Error::TimeOrder {
-                row: self.offered,
-                previous,
-                time: t,
-            }),
+            Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
             _ => Ok(()),
         }
     }
+}
 
-    fn not_a_number(&self, column: &str, value: f64) -> Error {
-        Error::NotANumber {
-            row: self.offered,
-            column: column.to_owned(),
-            value,
-        }
+fn no_number(signal: &str, value: f64) -> Error {
+    Error::NoNumber {
+        signal: signal.to_owned(),
+        value,
     }
 }
 
 impl Persist for Intake {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.optional(&mut self.time, Walk::number)?;
-        walk.count(&mut self.offered)?;
         walk.numbers(&mut self.values)?;
         walk.count(&mut self.held)
     }

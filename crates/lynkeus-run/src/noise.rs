@@ -1,5 +1,6 @@
 //! Measurement noise that can be repeated.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use rand_chacha::ChaCha8Rng;
@@ -174,7 +175,7 @@ impl Sensors {
                 let expected = format!("one of the outputs: {}", outputs.join(", "));
                 return Err(Error::setting("limits of", expected, format!("'{name}'")));
             }
-            if !(low < high) {
+            if low.partial_cmp(high) != Some(Ordering::Less) {
                 let what = format!("limits of '{name}'");
                 let found = format!("[{low}, {high}]");
                 return Err(Error::setting(

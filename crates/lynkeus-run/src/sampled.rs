@@ -348,7 +348,7 @@ mod tests {
         }
         assert!(matches!(
             estimator.push(2.9, &[1.0]),
-            Err(Error::TimeOrder { .. })
+            Err(Error::TimeBefore { .. })
         ));
         assert!(matches!(
             estimator.push(4.0, &[]),

@@ -196,3 +196,34 @@ fn filters_of_every_size_go_on() {
         }
     }
 }
+
+/// Words of live use, and nothing that is different after it.
+#[test]
+fn a_call_that_is_refused_changes_nothing() {
+    for kind in [
+        FilterKind::Extended,
+        FilterKind::Unscented(SigmaPoints::default()),
+    ] {
+        let mut filter = chain(3, kind, Method::Rk4(Step::Auto));
+        filter.push(1.0, &[0.3, 0.5]).unwrap();
+        filter.push(2.0, &[0.4, 0.5]).unwrap();
+        let before = filter.snapshot();
+        let refusals = [
+            filter.push(0.5, &[0.3, 0.5]).map(drop),
+            filter.push(f64::NAN, &[0.3, 0.5]).map(drop),
+            filter.push(3.0, &[]).map(drop),
+            filter.predict(1.5).map(drop),
+        ];
+        let words: Vec<String> = refusals.map(|r| r.unwrap_err().to_string()).into();
+        assert_eq!(
+            words[0],
+            "the time 0.5 is before 2, where the estimator is: expected samples in the order of their times"
+        );
+        assert_eq!(words[1], "t: expected a finite number, found NaN");
+        assert!(
+            words.iter().all(|words| !words.contains("row")),
+            "{words:?}"
+        );
+        assert_eq!(filter.snapshot(), before);
+    }
+}

@@ -191,11 +191,14 @@ fn what_cannot_be_is_refused() {
     filter.push(1.0, &[0.0]).unwrap();
     assert!(matches!(
         filter.push(0.5, &[0.0]),
-        Err(Error::TimeOrder { row: 2, .. })
+        Err(Error::TimeBefore {
+            reached: 1.0,
+            time: 0.5
+        })
     ));
     assert!(matches!(
         filter.push(f64::NAN, &[0.0]),
-        Err(Error::NotANumber { .. })
+        Err(Error::NoNumber { .. })
     ));
     assert!(matches!(filter.push(2.0, &[]), Err(Error::Setting { .. })));
     assert!(matches!(
