@@ -7,22 +7,17 @@
 
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use super::{Fate, Ground, Hidden, Told};
-use crate::{Coordinate, Region};
+use super::modes::Modes;
+use super::subspace::{image, null_space, reached};
+use super::{Fate, Hidden, Told, clock};
+use crate::{Coordinate, Dimension, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
 /// What counts as zero beside one.
 const ZERO: f64 = 1e-8;
-/// Real parts within this share of the largest entry count as none: multiple eigenvalues on the
-/// imaginary axis are computed with a few digits only.
-const AXIS: f64 = 1e-5;
-/// The rounding of entries that computed eigenvalues stand for.
-const EIGENVALUES: f64 = 10.0 * f64::EPSILON;
-/// Entries within this share of those of the plant may be rounding alone.
-const ROUNDING: f64 = 1e-8;
 
 /// What the linearisation shows.
 #[derive(Debug)]
@@ -51,6 +46,11 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
     let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
     let tape = Tape::new(extended.graph(), &region.symbols(), &nodes)?;
     let mut evaluator = tape.evaluator();
+    let timed = clock::timed(hidden, &slopes);
+    let is_asked = |i: usize| hidden.told[i] == Told::Hidden;
+    if (0..timed.len()).all(|i| timed[i] || !is_asked(i)) {
+        return Ok(None);
+    }
     for point in points(hidden, &region) {
         let mut values = vec![0.0; nodes.len()];
         evaluator.eval(&point, &mut values);
@@ -62,9 +62,16 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             .iter()
             .all(|x| x.is_finite())
             .then(|| Linear::new(hidden, &J).fates(hidden));
-        if let Some(of) = found.flatten() {
-            let names = region.dimensions.iter().zip(&point);
-            let named = names.filter(|(d, _)| d.name != "time");
+        if let Some(mut of) = found.flatten() {
+            for (fate, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
+                *fate = Fate::Undecided;
+            }
+            let sides = || region.dimensions.iter().zip(&point);
+            let is_time = |d: &Dimension| d.symbol == extended.plant.time;
+            let is_read = clock::is_read(extended, &nodes);
+            // first, as long points are told in part
+            let time = sides().filter(|(d, _)| is_read && is_time(d));
+            let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
             let point = named.map(|(d, &x)| (d.name.clone(), x).into()).collect();
             return Ok(Some(Local { of, point }));
         }
@@ -158,12 +165,12 @@ impl Linear {
         let mut V = DMatrix::identity(n, n);
         loop {
             // (Fx + Gv) has no part across V
-            let across = null_space(&V.transpose())?;
+            let across = null_space(&V.transpose(), ZERO)?;
             let stays = equilibrated(&(across.transpose() * &flow), ZERO * flow.amax());
-            let pairs = null_space(&stacked(&stays, &seen))?;
+            let pairs = null_space(&stacked(&stays, &seen), ZERO)?;
             // of columns of length one: where no state moves, rounding moves none
             let pairs = pairs.map(|x| if x.abs() > ZERO { x } else { 0.0 });
-            let next = image(&pairs.rows(0, n).into_owned())?;
+            let next = image(&pairs.rows(0, n).into_owned(), ZERO)?;
             // it never grows, but by rounding
             if next.ncols() >= V.ncols() {
                 return Some(Traceless { pairs, V });
@@ -186,13 +193,14 @@ impl Linear {
         );
         let solver = spectrum::singular(x.clone(), true, true)?;
         let K = &v * solver.solve(&V, ZERO).ok()?;
-        let free = &v * null_space(&x)?;
+        let free = &v * null_space(&x, ZERO)?;
         let A = V.transpose() * (&self.F * &V + &self.G * &K);
-        let R = reached(&A, &(V.transpose() * &self.G * &free))?;
-        let S = null_space(&R.transpose())?;
-        let quotient = S.transpose() * &A * &S;
-        let gross = self.F.amax() + (&self.G * &K).amax();
-        let scale = A.amax().max(ROUNDING * gross);
+        let R = reached(&A, &(V.transpose() * &self.G * &free), ZERO)?;
+        let S = null_space(&R.transpose(), ZERO)?;
+        let modes = Modes {
+            A: S.transpose() * &A * &S,
+            gross: self.F.norm() + (&self.G * &K).norm(),
+        };
         let of = (0..hidden.told.len()).map(|i| {
             let (row, alone) = match i < n {
                 true => (V.row(i).into_owned(), 0.0),
@@ -206,7 +214,7 @@ impl Linear {
                 return Some(None);
             }
             let row = DMatrix::from_fn(1, row.ncols(), |_, j| row[j]);
-            fate(&quotient, row, scale).map(Some)
+            modes.fate(&row).map(Some)
         });
         let of: Vec<Option<Fate>> = of.collect::<Option<_>>()?;
         let agrees = of.iter().zip(&hidden.told).all(|(fate, told)| match told {
@@ -222,39 +230,6 @@ impl Linear {
                 .collect()
         })
     }
-}
-
-/// The slowest mode of x' = Ax that shows in a row, undecided where rounding may carry it across
-/// the imaginary axis; none where its eigenvalues are not found.
-fn fate(A: &DMatrix<f64>, row: DMatrix<f64>, scale: f64) -> Option<Fate> {
-    let shown = reached(&A.transpose(), &row.transpose())?;
-    let modes = spectrum::eigenvalues(shown.transpose() * A * &shown)?;
-    let slowest = modes.iter().max_by(|a, b| a.re.total_cmp(&b.re))?;
-    let blur = AXIS.max(blur(&modes, *slowest, scale)) * scale;
-    Some(match slowest.re {
-        x if x < -blur => Fate::Decays {
-            rate: -x,
-            ground: Ground::Point,
-        },
-        x if x > blur => Fate::Grows { rate: x },
-        x if x.abs() <= AXIS * scale => Fate::Stays,
-        _ => Fate::Undecided,
-    })
-}
-
-/// How far a mode may be from where it is computed, in units of `scale`: a k-fold one, which
-/// rounding spreads over a circle, by the k-th root of the rounding.
-fn blur(modes: &DVector<Complex<f64>>, mode: Complex<f64>, scale: f64) -> f64 {
-    let radius = |k: usize| EIGENVALUES.powf(1.0 / k as f64);
-    let near = |k: usize| {
-        let across = 2.0 * radius(k) * scale;
-        modes
-            .iter()
-            .filter(|λ| (**λ - mode).norm() <= across)
-            .count()
-    };
-    let folds = (1..=modes.len()).rev().find(|&k| near(k) >= k);
-    folds.map_or(0.0, radius)
 }
 
 /// Rows of length one, those up to `least` left out.
@@ -274,126 +249,4 @@ fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
         None => above[(i, j)],
         Some(i) => below[(i, j)],
     })
-}
-
-/// An orthonormal basis of the null space; a matrix without rows has all of it. None where no
-/// decomposition is found, as here below.
-fn null_space(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = a.ncols();
-    if n == 0 {
-        return Some(DMatrix::zeros(0, 0));
-    }
-    // rows of zeros, so that every direction is listed
-    let square = DMatrix::from_fn(a.nrows().max(n), n, |i, j| {
-        if i < a.nrows() { a[(i, j)] } else { 0.0 }
-    });
-    let svd = spectrum::singular(square, false, true)?;
-    let right = svd.v_t.as_ref()?;
-    let unseen: Vec<usize> = (0..n)
-        .filter(|&k| {
-            svd.singular_values[k] <= ZERO * svd.singular_values.max().max(f64::MIN_POSITIVE)
-        })
-        .collect();
-    Some(DMatrix::from_fn(n, unseen.len(), |i, k| {
-        right[(unseen[k], i)]
-    }))
-}
-
-/// An orthonormal basis of the space that the columns span.
-fn image(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let across = null_space(&a.transpose())?;
-    null_space(&across.transpose())
-}
-
-/// An orthonormal basis of the smallest A-invariant space that holds the columns of B.
-fn reached(A: &DMatrix<f64>, B: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = A.nrows();
-    let scale = A.amax().max(f64::MIN_POSITIVE);
-    let columns: Vec<_> = B
-        .column_iter()
-        .filter(|c| c.norm() > ZERO)
-        .map(|c| c.normalize())
-        .collect();
-    let mut space = image(&DMatrix::from_fn(n, columns.len(), |i, k| columns[k][i]))?;
-    loop {
-        let moved = A * &space / scale;
-        let both = DMatrix::from_fn(n, 2 * space.ncols(), |i, k| {
-            match k.checked_sub(space.ncols()) {
-                None => space[(i, k)],
-                Some(k) => moved[(i, k)],
-            }
-        });
-        let next = image(&both)?;
-        // it never shrinks, but by rounding
-        if next.ncols() <= space.ncols() {
-            return Some(space);
-        }
-        space = next;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The fate of what `row` shows of x' = Ax, in coordinates that leave no entry of A as it is.
-    fn mirrored(A: &DMatrix<f64>, row: &[f64]) -> Fate {
-        let n = A.nrows();
-        let v = DMatrix::from_fn(n, 1, |i, _| 1.0 + (i as f64).sin());
-        let Q = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared());
-        let row = DMatrix::from_row_slice(1, n, row) * &Q;
-        fate(&(&Q * A * &Q), row, 1.0).unwrap()
-    }
-
-    fn first(n: usize) -> Vec<f64> {
-        (0..n).map(|i| f64::from(u8::from(i == 0))).collect()
-    }
-
-    /// x_i' = x_{i+1} + r x_i
-    fn chain(n: usize, r: f64) -> DMatrix<f64> {
-        DMatrix::from_fn(n, n, |i, j| match j.checked_sub(i) {
-            Some(0) => r,
-            Some(1) => 1.0,
-            _ => 0.0,
-        })
-    }
-
-    /// An n-fold mode is computed with an error of the n-th root of the rounding: of ten states,
-    /// 0.03.
-    #[test]
-    fn a_multiple_mode_near_the_axis_is_undecided() {
-        for r in [-0.01, 0.01, -1e-4] {
-            let fate = mirrored(&chain(10, r), &first(10));
-            assert!(matches!(fate, Fate::Undecided), "{fate:?}");
-        }
-        let fate = mirrored(&chain(10, -0.5), &first(10));
-        assert!(
-            matches!(fate, Fate::Decays { rate, .. } if rate > 0.3),
-            "{fate:?}"
-        );
-        let fate = mirrored(&chain(10, 0.5), &first(10));
-        assert!(matches!(fate, Fate::Grows { .. }), "{fate:?}");
-    }
-
-    /// Ten modes that are apart are computed to all digits, however slow the slowest is.
-    #[test]
-    fn modes_that_are_apart_are_decided() {
-        for slowest in [-1e-3, 1e-3] {
-            let mut A = chain(10, 0.0);
-            for i in 0..10 {
-                A[(i, i)] = if i == 6 {
-                    slowest
-                } else {
-                    -0.2 - 0.3 * i as f64
-                };
-            }
-            let fate = mirrored(&A, &first(10));
-            let found = match fate {
-                Fate::Decays { rate, .. } => -rate,
-                Fate::Grows { rate } => rate,
-                other => panic!("{other:?}"),
-            };
-            assert!((found - slowest).abs() < 1e-9, "{found}");
-        }
-    }
 }

@@ -13,9 +13,12 @@
 //! `at_a_point` finds the modes of the linearisation, which hold near that point only.
 
 mod at_a_point;
+mod clock;
 mod constraints;
 mod linearised;
+mod modes;
 mod on_the_box;
+mod subspace;
 
 use lynkeus_expr::MissingInput;
 

@@ -29,6 +29,11 @@ fn case(equations: &str, hidden: &'static [&'static str], directions: usize) -> 
 
 impl Case {
     fn fate(&self, name: &str) -> Option<Fate> {
+        self.fates(name).1
+    }
+
+    /// The names of the point, and the fate.
+    fn fates(&self, name: &str) -> (Vec<String>, Option<Fate>) {
         let plant = Plant::from_modelica(&self.text, "p.mo", &LoadOptions::default()).unwrap();
         let sensors = Sensors {
             unknown: self.unknown.clone(),
@@ -48,7 +53,9 @@ impl Case {
             directions: self.directions,
             extended: &extended,
         };
-        question.fates().unwrap().of[extended.state_index(name).unwrap()]
+        let found = question.fates().unwrap();
+        let point = found.point.into_iter().map(|c| c.name).collect();
+        (point, found.of[extended.state_index(name).unwrap()])
     }
 
     fn known(mut self) -> Self {
@@ -146,16 +153,17 @@ fn what_scales_together_stays() {
     assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
 }
 
-/// Two integrators in a row: a double eigenvalue at zero.
+/// Two integrators in a row: a double eigenvalue at zero. The error grows with time itself, so that it neither
+/// decays nor stays.
 #[test]
-fn a_double_integrator_is_not_taken_for_slow_decay() {
+fn a_double_integrator_neither_decays_nor_stays() {
     let found = case(
         "der(a) = -a; der(b) = 3*c - 7*b; der(c) = 7*c - 49/3*b;",
         &["b", "c"],
         2,
     )
     .known();
-    assert_eq!(found.fate("b"), Some(Fate::Stays));
+    assert_eq!(found.fate("b"), Some(Fate::Undecided));
 }
 
 /// The unknown input stands in the equation of a known state: w = −b there, so that b' = −3b.
@@ -243,4 +251,65 @@ fn two_unknown_inputs_in_one_equation_move_each_other() {
         unknown: vec!["w0".to_owned(), "w1".to_owned()],
     };
     assert_eq!(alone.fate("w0"), Some(Fate::Moved));
+}
+
+/// Beside a rate of 10⁶ one of 1.06 is no rounding: ∂(c + 0.3c²)/∂c at c = 0.1.
+#[test]
+fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
+    let hidden = &["b", "c"];
+    let of = |equations: &str, name: &str| case(equations, hidden, 2).known().fate(name);
+    for name in ["b", "c"] {
+        let growing = "der(a) = -a; der(b) = -1e6*b + c; der(c) = c + 0.3*c^2 + b;";
+        let fate = of(growing, name);
+        assert!(
+            matches!(fate, Some(Fate::Grows { rate }) if (rate - 1.060001).abs() < 1e-6),
+            "{name}: {fate:?}"
+        );
+        // 2·0.3·0.1 − 1
+        let decaying =
+            "der(a) = -a; der(b) = -1e6*b + c; der(c) = -c + 0.3*c^2 - 3*c^3 + b + 1.5*c*b;";
+        let fate = of(decaying, name);
+        let at_the_point = |rate: f64| (rate - (1.03 - 0.75)).abs() < 1e-5;
+        assert!(
+            matches!(fate, Some(Fate::Decays { rate, .. }) if at_the_point(rate)),
+            "{name}: {fate:?}"
+        );
+    }
+    // hardly damped: a slope of −0.1·b² at b = 0.5, half of it in the real part, beside 10⁴ turns
+    let ringing = "der(a) = -a; der(b) = 1e4*c - 0.1*b^3/3; der(c) = -1e4*b;";
+    assert!((rate(of(ringing, "c"), Ground::Point) - 0.0125).abs() < 1e-6);
+    // a coupling of 10⁻⁹ beside the rate still carries what grows
+    let weak = of("der(a) = -a; der(b) = -1e6*b + 1e-3*c; der(c) = c;", "b");
+    assert!(
+        !matches!(weak, Some(Fate::Decays { .. } | Fate::Stays)),
+        "{weak:?}"
+    );
+}
+
+/// Of an error in b' = −b·e^−t the share e^−1 stays for ever.
+#[test]
+fn what_reads_the_time_is_not_told_of_one_instant() {
+    let of = |equations: &str, name: &str| case(equations, &["b", "c"], 2).known().fates(name);
+    let fading = "der(a) = -a; der(b) = -b*exp(-time); der(c) = -c^3;";
+    assert_eq!(of(fading, "b").1, Some(Fate::Undecided));
+    // beside it
+    let (point, fate) = of(fading, "c");
+    assert!((rate(fate, Ground::Point) - 0.03).abs() < 1e-9);
+    assert_eq!(point[0], "time", "{point:?}");
+    // behind it
+    let behind = "der(a) = -a; der(b) = -b/(1 + time); der(c) = -c^3 + b;";
+    assert_eq!(of(behind, "c").1, Some(Fate::Undecided));
+    // coupled by what is seen, in an equation or in an output
+    let seen = "der(a) = b + c; der(b) = -b*exp(-time) - b^3; der(c) = -c^3;";
+    let mut sum = case(seen, &["b", "c"], 1).known();
+    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
+    sum.text = sum.text.replace("y = a;", "y = a; output Real z = b + c;");
+    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
+    // proved for every instant
+    let proved = "der(a) = -a; der(b) = -b*(2 + sin(time)); der(c) = -c^3;";
+    assert!((rate(of(proved, "b").1, Ground::Box) - 1.0).abs() < 1e-9);
+    let steady = "der(a) = -a; der(b) = -b^3; der(c) = -c^3 + sin(time);";
+    let (point, fate) = of(steady, "c");
+    assert!((rate(fate, Ground::Point) - 0.03).abs() < 1e-9);
+    assert!(!point.contains(&"time".to_owned()), "{point:?}");
 }

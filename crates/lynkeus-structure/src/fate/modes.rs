@@ -1,0 +1,241 @@
+//! The slowest mode of a linear motion, as far as rounding leaves it certain.
+
+use lynkeus_proof::spectrum;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::subspace::reached;
+use super::{Fate, Ground};
+
+/// What counts as zero beside one.
+const ZERO: f64 = 1e-8;
+/// The same where nothing but rounding is left out.
+const ROUNDED: f64 = 1e-13;
+/// Real parts further from zero than this share of what is rounded need no condition number.
+const AXIS: f64 = 1e-5;
+/// The rounding of entries that computed eigenvalues stand for.
+const EIGENVALUES: f64 = 10.0 * f64::EPSILON;
+
+/// Steps of inverse iteration; the first finds the digits there are.
+const ITERATIONS: usize = 3;
+/// What is left of an eigenvector that was found, in units of rounding.
+const FOUND: f64 = 1e3;
+
+/// x' = Ax
+pub(super) struct Modes {
+    pub A: DMatrix<f64>,
+    /// the size of the numbers that A was made of: its rounding is a share of this
+    pub gross: f64,
+}
+
+/// How far from where it is computed an eigenvalue may be.
+#[derive(Clone, Copy)]
+struct Doubt {
+    width: f64,
+    /// it stands alone, so that what does not move there stays as it is; a multiple one may
+    /// make errors grow with a power of time
+    is_simple: bool,
+}
+
+impl Modes {
+    /// The slowest mode that shows in a row, undecided where rounding may carry it across the
+    /// imaginary axis, or where it rests on how small a coupling counts as none; none where its
+    /// eigenvalues are not found.
+    pub fn fate(&self, row: &DMatrix<f64>) -> Option<Fate> {
+        let coarse = self.shown(row, ZERO)?;
+        if coarse.A.nrows() == self.A.nrows() {
+            return coarse.slowest();
+        }
+        let fine = self.shown(row, ROUNDED)?;
+        if coarse.A.nrows() == fine.A.nrows() {
+            return coarse.slowest();
+        }
+        let (coarse, fine) = (coarse.slowest()?, fine.slowest()?);
+        let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&fine);
+        Some(if agree { fine } else { Fate::Undecided })
+    }
+
+    /// What shows in a row. In it every eigenvalue has one eigenvector.
+    fn shown(&self, row: &DMatrix<f64>, zero: f64) -> Option<Self> {
+        let basis = reached(&self.A.transpose(), &row.transpose(), zero)?;
+        Some(Self {
+            A: basis.transpose() * &self.A * &basis,
+            gross: self.gross,
+        })
+    }
+
+    fn slowest(&self) -> Option<Fate> {
+        let modes = spectrum::eigenvalues(self.A.clone())?;
+        let slowest = modes.iter().map(|λ| λ.re).reduce(f64::max)?;
+        let doubts = (0..modes.len()).map(|k| self.doubt(&modes, k));
+        let doubts: Vec<Doubt> = doubts.collect();
+        let all = || modes.iter().map(|λ| λ.re).zip(&doubts);
+        let growing = all().filter(|(re, doubt)| *re > doubt.width);
+        if let Some(rate) = growing.map(|(re, _)| re).reduce(f64::max) {
+            return Some(Fate::Grows { rate });
+        }
+        let mut slow = all().filter(|(re, doubt)| *re >= -doubt.width).peekable();
+        if slow.peek().is_none() {
+            return Some(Fate::Decays {
+                rate: -slowest,
+                ground: Ground::Point,
+            });
+        }
+        Some(match slow.all(|(_, doubt)| doubt.is_simple) {
+            true => Fate::Stays,
+            false => Fate::Undecided,
+        })
+    }
+
+    /// The size of what is rounded.
+    fn scale(&self) -> f64 {
+        self.gross.max(self.A.norm())
+    }
+
+    fn doubt(&self, modes: &DVector<Complex<f64>>, k: usize) -> Doubt {
+        let mode = modes[k];
+        let spread = blur(modes, mode, self.scale());
+        let broad = AXIS.max(spread) * self.scale();
+        if mode.re.abs() > broad {
+            return Doubt {
+                width: broad,
+                is_simple: false,
+            };
+        }
+        let others = (0..modes.len()).filter(|&i| i != k);
+        let gap = others
+            .map(|i| (modes[i] - mode).norm())
+            .fold(f64::INFINITY, f64::min);
+        let width = self.condition(mode) * EIGENVALUES * self.scale();
+        // to first order, which counts where the next mode is far beyond
+        match 4.0 * width < gap {
+            true => Doubt {
+                width,
+                is_simple: true,
+            },
+            false => Doubt {
+                width: spread.max(radius(2)) * self.scale(),
+                is_simple: false,
+            },
+        }
+    }
+
+    /// How far a simple eigenvalue moves per unit of change in A: 1/|uᴴv| of its left and right
+    /// eigenvectors of length one (Golub and Van Loan, section 7.2.2). Infinite where inverse
+    /// iteration does not find them.
+    fn condition(&self, mode: Complex<f64>) -> f64 {
+        let n = self.A.nrows();
+        if n == 1 {
+            return 1.0;
+        }
+        let A = self.A.map(|x| Complex::new(x, 0.0));
+        // beside the mode, so that no pivot is zero
+        let shift = mode + EIGENVALUES * self.scale();
+        let shifted = A - DMatrix::identity(n, n) * shift;
+        let (right, left) = (self.null(&shifted), self.null(&shifted.adjoint()));
+        match (left, right) {
+            (Some(u), Some(v)) => 1.0 / u.dotc(&v).norm(),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The vector of length one that a matrix sends to nearly nothing.
+    fn null(&self, matrix: &DMatrix<Complex<f64>>) -> Option<DVector<Complex<f64>>> {
+        let solver = matrix.clone().lu();
+        let mut v = DVector::from_fn(matrix.nrows(), |i, _| {
+            Complex::new(1.0 + (i as f64).sin(), 0.0)
+        });
+        for _ in 0..ITERATIONS {
+            v = solver.solve(&v)?;
+            v /= Complex::new(v.norm(), 0.0);
+        }
+        let rest = (matrix * &v).norm();
+        (rest <= FOUND * EIGENVALUES * self.scale()).then_some(v)
+    }
+}
+
+/// How far rounding spreads a k-fold mode, in units of what is rounded.
+fn radius(k: usize) -> f64 {
+    EIGENVALUES.powf(1.0 / k as f64)
+}
+
+/// How far a mode may be from where it is computed, in units of `scale`: a k-fold one, which
+/// rounding spreads over a circle, by the k-th root of the rounding.
+fn blur(modes: &DVector<Complex<f64>>, mode: Complex<f64>, scale: f64) -> f64 {
+    let near = |k: usize| {
+        let across = 2.0 * radius(k) * scale;
+        modes
+            .iter()
+            .filter(|λ| (**λ - mode).norm() <= across)
+            .count()
+    };
+    let folds = (1..=modes.len()).rev().find(|&k| near(k) >= k);
+    folds.map_or(0.0, radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fate of what `row` shows of x' = Ax, in coordinates that leave no entry of A as it is.
+    fn mirrored(A: &DMatrix<f64>, row: &[f64]) -> Fate {
+        let n = A.nrows();
+        let v = DMatrix::from_fn(n, 1, |i, _| 1.0 + (i as f64).sin());
+        let Q = DMatrix::identity(n, n) - &v * v.transpose() * (2.0 / v.norm_squared());
+        let row = DMatrix::from_row_slice(1, n, row) * &Q;
+        let A = &Q * A * &Q;
+        let modes = Modes { gross: A.norm(), A };
+        modes.fate(&row).unwrap()
+    }
+
+    fn first(n: usize) -> Vec<f64> {
+        (0..n).map(|i| f64::from(u8::from(i == 0))).collect()
+    }
+
+    /// x_i' = x_{i+1} + r x_i
+    fn chain(n: usize, r: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(n, n, |i, j| match j.checked_sub(i) {
+            Some(0) => r,
+            Some(1) => 1.0,
+            _ => 0.0,
+        })
+    }
+
+    /// An n-fold mode is computed with an error of the n-th root of the rounding: of ten states,
+    /// 0.03.
+    #[test]
+    fn a_multiple_mode_near_the_axis_is_undecided() {
+        for r in [-0.01, 0.01, -1e-4] {
+            let fate = mirrored(&chain(10, r), &first(10));
+            assert!(matches!(fate, Fate::Undecided), "{fate:?}");
+        }
+        let fate = mirrored(&chain(10, -0.5), &first(10));
+        assert!(
+            matches!(fate, Fate::Decays { rate, .. } if rate > 0.3),
+            "{fate:?}"
+        );
+        let fate = mirrored(&chain(10, 0.5), &first(10));
+        assert!(matches!(fate, Fate::Grows { .. }), "{fate:?}");
+    }
+
+    /// Ten modes that are apart are computed to all digits, however slow the slowest is.
+    #[test]
+    fn modes_that_are_apart_are_decided() {
+        for slowest in [-1e-3, 1e-3] {
+            let mut A = chain(10, 0.0);
+            for i in 0..10 {
+                A[(i, i)] = if i == 6 {
+                    slowest
+                } else {
+                    -0.2 - 0.3 * i as f64
+                };
+            }
+            let fate = mirrored(&A, &first(10));
+            let found = match fate {
+                Fate::Decays { rate, .. } => -rate,
+                Fate::Grows { rate } => rate,
+                other => panic!("{other:?}"),
+            };
+            assert!((found - slowest).abs() < 1e-9, "{found}");
+        }
+    }
+}
