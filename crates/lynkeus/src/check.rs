@@ -4,6 +4,7 @@ mod json;
 mod knowledge;
 mod next;
 mod observability;
+mod sorted;
 mod uniform;
 
 use std::fmt;
@@ -22,6 +23,7 @@ use crate::{Error, Study, calibrate, prepare};
 pub(crate) use json::point;
 pub use knowledge::{Assumption, Knowledge, Known};
 pub use next::Next;
+use sorted::Sorted;
 pub use uniform::Uniform;
 
 /// What to ask beside "which states, by which observer".
@@ -163,7 +165,7 @@ fn knowledge(
     prepared: &Prepared<'_>,
     symbolic: &Plant,
     options: &CheckOptions,
-    report: &Report,
+    report: &mut Report,
     time: Budget,
 ) -> Result<Vec<Knowledge>, Error> {
     let study = prepared.study();
@@ -190,15 +192,20 @@ fn knowledge(
             uniform: report.uniform.as_ref().map(Uniform::examined),
             determined: &determined(extended)?,
         };
-        let of = |(assumption, answer): &(Assumption, Answer)| {
+        let of = |(assumption, answer): &mut (Assumption, Answer)| {
+            found.settle(extended, *assumption, answer);
             Knowledge::new(extended, *assumption, answer, &found)
         };
-        asked.iter().map(of).collect()
+        asked.iter_mut().map(of).collect()
     };
-    match graph.budgeted(prepare::share(&study.budget, UNIFORMITY), work) {
-        Ok(known) => known.map_err(Error::from_source),
-        Err(_) => Ok(vec![]),
+    let known = match graph.budgeted(prepare::share(&study.budget, UNIFORMITY), work) {
+        Ok(known) => known.map_err(Error::from_source)?,
+        Err(_) => return Ok(vec![]),
+    };
+    if let Some((_, settled)) = asked.into_iter().next() {
+        report.answer = settled;
     }
+    Ok(known)
 }
 
 impl Report {
@@ -331,7 +338,12 @@ impl Report {
             return writeln!(f, "{}", self.none());
         };
         let lists = |names: &[&str]| observability::listed(names);
-        let [seen, follows, hidden] = self.sorted();
+        let Sorted {
+            seen,
+            follows,
+            hidden,
+            open,
+        } = self.sorted();
         if !seen.is_empty() {
             writeln!(f, "can be estimated: {} (by {family})", lists(&seen))?;
         }
@@ -344,10 +356,8 @@ impl Report {
         }
         // under another assumption more may be known
         let more = self.knowledge.get(1).map(Knowledge::sorted);
-        let (wandering, hidden): (Vec<&str>, Vec<&str>) = hidden.iter().partition(|name| {
-            more.as_ref()
-                .is_some_and(|[seen, follows, _]| seen.contains(name) || follows.contains(name))
-        });
+        let is_more = |name: &&str| more.as_ref().is_some_and(|more| more.is_estimated(name));
+        let (wandering, hidden): (Vec<&str>, Vec<&str>) = hidden.into_iter().partition(is_more);
         if !wandering.is_empty() {
             let (unknown, names) = (self.unknown.join(", "), lists(&wandering));
             writeln!(f, "only if {unknown} hardly moves: {names} (by {family})")?;
@@ -359,22 +369,25 @@ impl Report {
                 "not from the outputs: {names}; what {family} gives for them follows from the model alone"
             )?;
         }
+        if !open.is_empty() {
+            let names = lists(&open);
+            writeln!(
+                f,
+                "whether the outputs tell {names} is not decided; {family} gives an estimate all the same"
+            )?;
+        }
         match &self.choice {
             Some(choice) => write!(f, "{choice}"),
             None => Ok(()),
         }
     }
 
-    /// What is known, known in the end, and not known, whatever unknown inputs do.
-    fn sorted(&self) -> [Vec<&str>; 3] {
+    /// What is known, known in the end, not known, and not decided, whatever unknown inputs do.
+    fn sorted(&self) -> Sorted<'_> {
         if let Some(knowledge) = self.knowledge.first() {
             return knowledge.sorted();
         }
-        let of = |hidden: bool| -> Vec<&str> {
-            let quantities = self.answer.quantities.iter();
-            let kept = quantities.filter(|(q, _)| (q.verdict == Verdict::Unobservable) == hidden);
-            kept.map(|(asked, _)| asked.name.as_str()).collect()
-        };
-        [of(false), vec![], of(true)]
+        let quantities = self.answer.quantities.iter();
+        Sorted::of_verdicts(quantities.map(|(asked, _)| (asked.name.as_str(), asked.verdict)))
     }
 }

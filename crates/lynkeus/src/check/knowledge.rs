@@ -9,6 +9,7 @@ use lynkeus_structure::{self as structure, Coordinate, Extended, Uniformity};
 use serde_json::{Map, Value, json};
 
 use super::observability::listed;
+use super::sorted::Sorted;
 use crate::words::number;
 
 /// What can be known of one quantity.
@@ -118,16 +119,11 @@ impl Knowledge {
         })
     }
 
-    /// Names of what is known, of what follows in the end, and of what is not known.
-    pub(super) fn sorted(&self) -> [Vec<&str>; 3] {
-        let of = |class: usize| {
-            let kept = self
-                .quantities
-                .iter()
-                .filter(move |(_, known)| known.class() == class);
-            kept.map(|(name, _)| name.as_str()).collect()
-        };
-        [of(0), of(1), of(2)]
+    /// Names of what is known, of what follows in the end, of what is not known, and of what is
+    /// not decided.
+    pub(super) fn sorted(&self) -> Sorted<'_> {
+        let quantities = self.quantities.iter();
+        Sorted::of_knowledge(quantities.map(|(name, known)| (name.as_str(), known)))
     }
 
     /// The assumption in words.
@@ -168,17 +164,40 @@ impl Knowledge {
 }
 
 impl Found<'_> {
+    /// What is proved on the box settles what `answer` left undecided: a map that is
+    /// regular everywhere, or an elimination, shows the quantity near every point.
+    pub(super) fn settle(
+        &self,
+        extended: &Extended<'_>,
+        assumption: Assumption,
+        answer: &mut Answer,
+    ) {
+        for (asked, _) in &mut answer.quantities {
+            let place = extended.state_index(&asked.name);
+            let is_proved = place.is_some_and(|place| {
+                self.determined.get(place) == Some(&true) || self.is_regular(assumption)
+            });
+            if asked.verdict == Verdict::Undecided && is_proved {
+                asked.verdict = Verdict::Observable;
+            }
+        }
+    }
+
+    /// Whether the map from states to outputs is proved to be regular on the box, where the
+    /// unknown inputs are as `assumption` says: it was examined with inputs that stay constant,
+    /// known ones and unknown ones.
+    fn is_regular(&self, assumption: Assumption) -> bool {
+        let is_proved = |u: &Uniformity| u.regular.verdict == structure::Verdict::Proved;
+        assumption != Assumption::Arbitrary && self.uniform.is_some_and(is_proved)
+    }
+
     /// Of a quantity that is observable at generic points.
     fn seen(&self, extended: &Extended<'_>, place: usize, assumption: Assumption) -> Known {
         let name = &extended.states[place].name;
-        let is_regular = self
-            .uniform
-            .is_some_and(|u| u.regular.verdict == structure::Verdict::Proved);
         if self.determined.get(place) == Some(&true) {
             return Known::Everywhere;
         }
-        // the box was examined with inputs that stay constant, known ones and unknown ones
-        if is_regular && assumption != Assumption::Arbitrary {
+        if self.is_regular(assumption) {
             return match extended.inputs.is_empty() {
                 true => Known::Everywhere,
                 false => Known::WhileConstant,
@@ -197,18 +216,6 @@ impl Found<'_> {
 }
 
 impl Known {
-    /// 0: known; 1: known in the end; 2: not known.
-    fn class(&self) -> usize {
-        match self {
-            Known::Everywhere
-            | Known::WhileConstant
-            | Known::AlmostEverywhere
-            | Known::WhileExcited { .. } => 0,
-            Known::Hidden(Fate::Decays { .. }) => 1,
-            Known::Hidden(_) | Known::Undecided => 2,
-        }
-    }
-
     fn word(&self) -> &'static str {
         match self {
             Known::Everywhere => "everywhere",

@@ -121,7 +121,8 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
         writeln!(f, "about {}: {}", asked.name, asked.verdict.word())?;
     }
     hint(f, report)?;
-    if answer.is_complete() && !report.parameters {
+    let is_open = |asked: &lynkeus_observability::Asked| asked.verdict == Verdict::Undecided;
+    if answer.is_complete() && !report.parameters && !answer.about.iter().any(is_open) {
         return Ok(());
     }
     // how it was decided matters once something is not as hoped

@@ -277,3 +277,57 @@ fn missing_ranges_are_asked_for() {
         assert!(!text.contains("e307") && !text.contains("e308"), "{text}");
     }
 }
+
+/// What `check` says of a loop, a + a³/2 = z, with that equation of x.
+fn with_a_loop(x: &str) -> Folder {
+    let folder = Folder::empty();
+    let text = format!(
+        "model M
+  Real x(start = 1, min = -4, max = 4); Real z(start = 0.5, min = -4, max = 4); Real a(start = 0, min = -10, max = 10);
+  output Real y = x;
+equation
+  a + 0.5*a^3 = z; der(x) = {x}; der(z) = -z;
+end M;"
+    );
+    folder.write("models.mo", &text);
+    folder
+}
+
+/// No series is made of a loop; that the map (y, y') is regular on the box is proved all the same.
+#[test]
+fn what_is_proved_on_the_box_is_not_undecided() {
+    let (code, text, complaint) = check(&with_a_loop("a - x"), &[]);
+    assert_eq!(code, 0, "{complaint}");
+    for line in [
+        "states observable: x, z\n",
+        "  x, z: known everywhere (proved on the box)\n",
+        "can be estimated: x, z (by triangular)\n",
+    ] {
+        assert!(text.contains(line), "{line:?} is missing:\n{text}");
+    }
+    assert!(!text.contains("not from the outputs"), "{text}");
+}
+
+/// At z = 0 nothing of z shows, so that the box proves nothing of it; x is measured.
+#[test]
+fn what_is_not_decided_is_not_called_hidden() {
+    let folder = with_a_loop("a^2 - x");
+    let (_, text, _) = check(&folder, &[]);
+    for line in [
+        "states observable: x\n",
+        "states undecided: z\n",
+        "  x: known everywhere (proved on the box)\n",
+        "  z: undecided\n",
+        "can be estimated: x (by ekf)\n",
+        "whether the outputs tell z is not decided; ekf gives an estimate all the same\n",
+    ] {
+        assert!(text.contains(line), "{line:?} is missing:\n{text}");
+    }
+    assert!(!text.contains("not from the outputs"), "{text}");
+    let (_, text, _) = check(&folder, &["--json"]);
+    let report: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(
+        report["visible"],
+        serde_json::json!({ "x": true, "z": false })
+    );
+}
