@@ -50,6 +50,11 @@ pub trait Family: Sync {
     }
     /// Whether it is a filter: it takes any plant, and no theorem stands behind it.
     fn is_filter(&self) -> bool;
+    /// Whether every key has a value that can be used; a required one may be absent.
+    ///
+    /// # Errors
+    /// The first key that cannot be used.
+    fn verify(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<(), TuningError>;
     /// Does the plant have the form, and do the conditions hold on the box?
     ///
     /// # Errors

@@ -10,7 +10,8 @@ use crate::{
 };
 
 /// A key whose wrong value is told by the stage that needs it: another family may own a key
-/// of that name with another shape, and `auto` examines a plant for both.
+/// of that name with another shape, and `auto` examines a plant for both. Where the study names
+/// the family, [`Family::verify`] tells it at once.
 pub(crate) type Late<T> = Result<T, TuningError>;
 
 /// A form with what is known of its conditions.
@@ -53,6 +54,14 @@ pub trait Stages: Sync {
 
     /// The settings of a study.
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self::Settings, TuningError>;
+
+    /// The keys whose wrong values `read` leaves to later stages.
+    ///
+    /// # Errors
+    /// The first wrong value.
+    fn late(_settings: &Self::Settings) -> Result<(), TuningError> {
+        Ok(())
+    }
 
     /// The form with its conditions on `region`.
     fn form<'e, 'p>(
@@ -101,6 +110,10 @@ impl<S: Stages> Family for S {
 
     fn keys(&self) -> Vec<&'static KeySpec> {
         S::KEYS.iter().copied().flatten().collect()
+    }
+
+    fn verify(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<(), TuningError> {
+        S::late(&S::read(extended, tuning)?)
     }
 
     fn examine(

@@ -64,8 +64,15 @@ enum Trial {
 /// # Errors
 /// Keys of `[observer]` that cannot be used.
 pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
-    let examinations = prepared.examinations()?;
     let study = prepared.study();
+    // of several families one may own a key in another shape
+    if study.observer.family.is_some() {
+        for family in study.observer.families() {
+            let verified = family.verify(prepared.extended(), &study.observer.tuning);
+            verified.map_err(|error| prepared.refusal(error.into()))?;
+        }
+    }
+    let examinations = prepared.examinations()?;
     let with = |fit: Standing| {
         let kept = examinations.iter().filter(|e| e.spent().is_none());
         kept.filter(move |e| e.fit() == fit)

@@ -62,6 +62,10 @@ impl Stages for BlockTriangular {
         Settings::read(extended, tuning)
     }
 
+    fn late(settings: &Settings) -> Result<(), TuningError> {
+        settings.late()
+    }
+
     fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
         match settings.impossible() {
             true => {

@@ -118,6 +118,13 @@ impl Settings {
         })
     }
 
+    /// The first of the keys left for later that has a wrong value.
+    pub fn late(&self) -> Result<(), TuningError> {
+        self.θ.as_ref().map_err(TuningError::clone)?;
+        self.lmi.as_ref().map_err(TuningError::clone)?;
+        Ok(())
+    }
+
     /// θ, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let missing = || TuningError::absent(THETA.name, "a positive number per chain");

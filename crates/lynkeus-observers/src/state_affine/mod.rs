@@ -64,6 +64,10 @@ impl Stages for StateAffine {
         Settings::read(extended, tuning)
     }
 
+    fn late(settings: &Settings) -> Result<(), TuningError> {
+        settings.late()
+    }
+
     fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<Superdiagonal> {
         form(extended, region)
     }

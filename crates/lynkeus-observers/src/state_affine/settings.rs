@@ -53,6 +53,14 @@ impl Settings {
         })
     }
 
+    /// The first of the keys left for later that has a wrong value.
+    pub fn late(&self) -> Result<(), TuningError> {
+        self.θ.as_ref().map_err(TuningError::clone)?;
+        self.S0.as_ref().map_err(TuningError::clone)?;
+        self.alarm.as_ref().map_err(TuningError::clone)?;
+        Ok(())
+    }
+
     /// The numbers of (7)–(8) with the states in this order.
     pub(super) fn numbers(&self, order: &[usize]) -> Result<Numbers, TuningError> {
         let expected = "a positive number (the gain of block k grows like theta^k)";

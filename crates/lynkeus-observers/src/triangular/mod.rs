@@ -54,6 +54,10 @@ impl Stages for Triangular {
         Settings::read(extended, tuning)
     }
 
+    fn late(settings: &Settings) -> Result<(), TuningError> {
+        settings.late()
+    }
+
     fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
         form::form(extended, settings, region)
     }

@@ -134,6 +134,12 @@ impl Settings {
         })
     }
 
+    /// The first of the keys left for later that has a wrong value.
+    pub fn late(&self) -> Result<(), TuningError> {
+        self.θ.as_ref().map_err(TuningError::clone)?;
+        Ok(())
+    }
+
     /// θ, which has no default.
     pub fn θ(&self) -> Result<Vec<f64>, TuningError> {
         let expected = "a positive number (the gain grows like theta^n)";

@@ -54,6 +54,10 @@ impl Stages for UnknownInput {
         Settings::read(extended, tuning)
     }
 
+    fn late(settings: &Settings) -> Result<(), TuningError> {
+        settings.late()
+    }
+
     fn form<'e, 'p>(
         extended: &'e Extended<'p>,
         settings: &Settings,

@@ -50,6 +50,12 @@ impl Settings {
             partition: partition(tuning, extended)?,
         })
     }
+
+    /// The first of the keys left for later that has a wrong value.
+    pub fn late(&self) -> Result<(), TuningError> {
+        self.thetas.as_ref().map_err(TuningError::clone)?;
+        Ok(())
+    }
 }
 
 fn thetas(tuning: &Tuning) -> Result<Option<Thetas>, TuningError> {

@@ -16,7 +16,7 @@ const REFERENCES: [(&str, &str); 6] = [
 ];
 
 /// A study with its plant, alone in a folder.
-fn copied(study: &str) -> (Folder, String) {
+pub(super) fn copied(study: &str) -> (Folder, String) {
     let folder = Folder::empty();
     let source = examples().join(study);
     for entry in std::fs::read_dir(source.parent().unwrap()).unwrap() {

@@ -1,6 +1,7 @@
 //! Noises that cannot be, damaged logs, a full disk: one clear line each, and no result.
 
 use super::Folder;
+use super::families::copied;
 
 const PLANT: &str = "model M input Real u(min = -1, max = 1);
   Real x(start = 0.5, min = -5, max = 5); Real v(start = 0, min = -5, max = 5);
@@ -149,4 +150,40 @@ fn a_device_that_is_full() {
         assert_eq!(errors.len(), 1, "{}", ended.err);
         assert!(errors[0].starts_with(words), "{}", ended.err);
     }
+}
+
+/// What stands after `theta =` cannot be used: `check` says so of a family that is named, as `design` does.
+#[test]
+fn a_wrong_theta_of_a_named_family_is_refused_by_check() {
+    for (study, given, wrong) in [
+        ("two-tanks/study.toml", "theta = 0.03", "[0.03, 0.05]"),
+        ("lee/study.toml", "theta = [3, 9]", "[3, 3, 3, 3, 3, 3, 3]"),
+        ("ltaief/study.toml", "theta = 10", "[10]"),
+        ("farza/study.toml", "theta = [60, 15]", "60"),
+    ] {
+        let (folder, file) = copied(study);
+        let right = folder.read(&file);
+        assert!(right.contains(given), "{study}: {right}");
+        assert_eq!(folder.run(&["check", &file]).code, 0, "{study}");
+        for found in ["true", "\"abc\"", "-1", "0", "{ a = 1 }", wrong] {
+            folder.write(
+                &file,
+                &right.replacen(given, &format!("theta = {found}"), 1),
+            );
+            let [check, design] = ["check", "design"].map(|verb| folder.run(&[verb, &file]));
+            assert_eq!(check.code, 2, "{study}, {found}: {}", check.out);
+            assert!(
+                check.err.contains("`theta` of [observer]: expected"),
+                "{}",
+                check.err
+            );
+            assert_eq!(check.err, design.err, "{study}, {found}");
+        }
+    }
+    // S(0) and the alarm of another family are read as late
+    let (folder, file) = copied("ltaief/study.toml");
+    folder.change(&file, "S0 = 1", "S0 = [[1, 0], [0, 1]]\nalarm = -1");
+    let check = folder.run(&["check", &file]);
+    assert_eq!(check.code, 2, "{}", check.out);
+    assert!(check.err.contains("`S0` of [observer]"), "{}", check.err);
 }
