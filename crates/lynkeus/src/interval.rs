@@ -131,9 +131,13 @@ impl Intervals {
             )),
             BetweenSamples::Hold if self.log > self.hold => {
                 let remedy = match is_for_predict {
-                    true => {
-                        format!("between_samples = \"predict\", which stands about {predict}, ")
-                    }
+                    true => format!(
+                        "between_samples = \"predict\", which stands {}, ",
+                        match self.predict.is_finite() {
+                            true => format!("about {predict}"),
+                            false => "any interval".to_owned(),
+                        }
+                    ),
                     false => String::new(),
                 };
                 Some(format!(
@@ -142,5 +146,33 @@ impl Intervals {
             }
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(log: f64, predict: f64, hold: f64) -> String {
+        let between = BetweenSamples::Hold;
+        let found = Intervals {
+            log,
+            predict,
+            hold,
+            between,
+        };
+        found.words().unwrap_or_default()
+    }
+
+    #[test]
+    fn a_limit_that_there_is_not_is_any_interval() {
+        let endless = words(1.0, f64::INFINITY, 0.1);
+        assert!(
+            endless.contains("\"predict\", which stands any interval, a smaller theta"),
+            "{endless}"
+        );
+        assert!(words(1.0, 3.5, 0.1).contains("which stands about 3.5, "));
+        assert!(!words(1.0, 0.5, 0.1).contains("\"predict\""));
+        assert_eq!(words(0.05, f64::INFINITY, 0.1), "");
     }
 }
