@@ -27,7 +27,7 @@ def log_of(data: Any) -> _lynkeus.Log:
     if isinstance(data, Mapping):
         return _gathered(_items(data))
     if isinstance(data, np.ndarray):
-        return _gathered(_fields(data))
+        return _gathered(fields(data))
     pandas = sys.modules.get("pandas")
     if pandas is not None and isinstance(data, pandas.DataFrame):
         return _gathered(frame(data))
@@ -68,7 +68,8 @@ def _items(data: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:
         yield name, lambda name=name: data[name]
 
 
-def _fields(data: np.ndarray[Any, Any]) -> Iterator[tuple[Any, Any]]:
+def fields(data: np.ndarray[Any, Any]) -> Iterator[tuple[Any, Any]]:
+    """Columns of a structured array."""
     if data.dtype.names is None or data.ndim != 1:
         raise InputError(
             "the log: expected named columns, found an array "
