@@ -58,6 +58,12 @@ def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> 
 def sweep(study: Study, changes: Iterable[Mapping[str, Any]], log: Any, options: Options) -> list[Any]:
     """See :meth:`Study.sweep`."""
     asked = list(changes)
+    for place, change in enumerate(asked):
+        if not isinstance(change, Mapping):
+            raise InputError(
+                f"change {place}: expected a dictionary as of replace, {{\"observer\": {{\"theta\": 2.0}}}}, "
+                f"found {type(change).__name__}"
+            )
     recorded = None if log is None else log_of(log)
     base = Base(study._core)
 

@@ -23,7 +23,9 @@ def write(
     folder: Path, files: Sequence[tuple[str, bytes]], notes: Sequence[str], *, force: bool
 ) -> Export:
     """Everything is there before the first file is written."""
-    if not force and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and not folder.is_dir():
+        raise InputError("expected a folder, or a name for one, found a file", place=str(folder))
+    if not force and folder.exists() and any(folder.iterdir()):
         raise InputError(
             "expected an empty folder or none, found one with files: name another, or replace what has "
             "the same names with force=True",

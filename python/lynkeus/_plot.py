@@ -77,6 +77,14 @@ def captions(svg: str | None, known: Iterable[str], time: str) -> Captions:
     return found
 
 
+def asked(names: Sequence[str] | None) -> Sequence[str] | None:
+    """The names to draw; a single one counts as a list of one."""
+    found = [names] if isinstance(names, str) else names
+    if found is not None and not len(found):
+        raise InputError("names: expected at least one quantity or column, found none")
+    return found
+
+
 def of_run(run: Run, names: Sequence[str] | None, truth: Mapping[str, Column]) -> tuple[list[Panel], str]:
     """The panels of a run, those of its study's ``[plot] show`` where ``names`` says nothing, and the
     label of the time axis."""

@@ -18,8 +18,21 @@ def key(name: str) -> str:
 
 
 def text(value: str) -> str:
+    valid(value)
     quoted = value.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04X}" for c in quoted) + '"'
+
+
+def valid(value: str) -> str:
+    """A text as it is, unless it is none for any other program."""
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        raise InputError(
+            f"expected a text in Unicode, found half of a character (a lone surrogate) at place {error.start} "
+            f"of {value[max(0, error.start - 20) : error.start + 20]!r}"
+        ) from None
+    return value
 
 
 def number(value: SupportsFloat) -> str:
@@ -55,6 +68,13 @@ def inline(value: Any, where: str) -> str:
 
 def document(study: Mapping[str, Any]) -> str:
     """A study's text: keys first, then sections; what is ``None`` is left out."""
+    try:
+        return _document(study)
+    except RecursionError:
+        raise InputError("the study: a value contains itself, or lists in lists have no end") from None
+
+
+def _document(study: Mapping[str, Any]) -> str:
     given = {k: v for k, v in study.items() if v is not None}
     plain = {k: v for k, v in given.items() if not isinstance(v, Mapping)}
     lines = [f"{key(k)} = {inline(v, k)}" for k, v in plain.items()]

@@ -10,7 +10,7 @@ from typing import Any
 from . import _from_function, _lynkeus
 from ._columns import why
 from ._flatten import flattened, is_read
-from ._toml import key, number
+from ._toml import key, number, valid
 from .errors import InputError
 from .systems import Functions
 
@@ -23,7 +23,7 @@ class Model:
     """
 
     def __init__(self, text: str, name: str = "model.mo", choose: str | None = None) -> None:
-        self.text = text
+        self.text = valid(text)
         self.name = name
         self.choose = choose
 

@@ -221,7 +221,7 @@ class Run(Table):
         a band of two standard deviations where the run has them. Into ``ax``, one for all or one for
         each, or into a new figure; these axes are returned. ``truth`` is a log with true values in
         columns by the quantities' names, one for each row of the run."""
-        panels, time = self._panels(names, {} if truth is None else self._truth(truth))
+        panels, time = self._panels(_plot.asked(names), {} if truth is None else self._truth(truth))
         return _plot.draw(panels, self.t, time, ax)
 
     def _panels(self, names: Sequence[str] | None, truth: dict[str, Column]) -> tuple[list[_plot.Panel], str]:

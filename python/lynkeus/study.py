@@ -16,7 +16,7 @@ from ._export import Export, write
 from ._logs import log_of
 from ._lynkeus import MEMORY
 from ._progress import Progress, told
-from ._toml import document
+from ._toml import document, valid
 from .errors import InputError, NotCredible
 from .systems import Functions, Observer
 from .model import Model
@@ -124,7 +124,7 @@ class Study:
     @classmethod
     def parse(cls, text: str, model: Model, file: str = "study") -> Study:
         """A study's text in TOML with its model; ``file`` is what messages call it."""
-        return cls._of(_lynkeus.Study.parse(text, file, (model.name, model.text), model.choose))
+        return cls._of(_lynkeus.Study.parse(valid(text), file, (model.name, model.text), model.choose))
 
     @property
     def text(self) -> str:
@@ -159,14 +159,15 @@ class Study:
         self,
         *,
         parameters: bool = False,
-        about: Sequence[str] = (),
+        about: str | Sequence[str] = (),
         time_limit: float | None = None,
         memory_limit: float = MEMORY,
     ) -> Check:
         """Which states, unknown inputs and (with ``parameters``) parameters can be known, and which
-        observers fit; ``about``: expressions to decide on. ``time_limit`` in seconds and ``memory_limit`` in
+        observers fit; ``about``: an expression, or several, to decide on. ``time_limit`` in seconds and ``memory_limit`` in
         MiB, as everywhere: what a call may take until it ends with what is done by then."""
-        return Check(self._core.check(parameters, list(about), time_limit, memory_limit))
+        asked = [valid(x) for x in ([about] if isinstance(about, str) else about)]
+        return Check(self._core.check(parameters, asked, time_limit, memory_limit))
 
     def design(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
         """The observer, with its gains and certificate."""
@@ -210,6 +211,8 @@ class Study:
         memory_limit: float = MEMORY,
     ) -> Simulation | MonteCarlo:
         """The plant with its observer; ``runs``: so many of them with other noise and starts."""
+        if runs is not None and runs < 1:
+            raise InputError(f"runs: expected at least 1, found {runs}")
         with told(progress, "simulating") as tell:
             if runs is None:
                 return _judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))

@@ -62,15 +62,15 @@ class Functions:
 
     def f(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
         """x', shape (n,)."""
-        return self._core.f(t, _vector(x), _vector(u))
+        return self._core.f(t, _vector("x", x), _vector("u", u))
 
     def h(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> Column:
         """y, shape (p,)."""
-        return self._core.h(t, _vector(x), _vector(u))
+        return self._core.h(t, _vector("x", x), _vector("u", u))
 
     def jacobian_x(self, t: float, x: ArrayLike, u: ArrayLike = ()) -> NDArray[np.float64]:
         """∂f/∂x, shape (n, n), from the derivatives of the equations."""
-        return self._core.jacobian_x(t, _vector(x), _vector(u))
+        return self._core.jacobian_x(t, _vector("x", x), _vector("u", u))
 
     def source(self, language: str = "python") -> str:
         """A module with ``f(xp, t, x, u)`` and ``h(xp, t, x, u)``: in ``"python"`` ``xp`` is ``numpy``
@@ -214,8 +214,16 @@ class Driven:
         return self.system.h(t, x, self.u(t))
 
 
-def _vector(values: ArrayLike) -> Column:
-    return np.asarray(values, dtype=float).reshape(-1)
+def _vector(name: str, values: ArrayLike) -> Column:
+    try:
+        given = np.asarray(values)
+        # NumPy would make NaN of None, and numbers of texts
+        if given.dtype.kind in "fiub" or (given.dtype.kind == "O" and not any(x is None for x in given.flat)):
+            return given.astype(float, copy=False).reshape(-1)
+        found = "None" if given.dtype.kind == "O" else str(given.dtype)
+    except (TypeError, ValueError) as error:
+        found = str(error)
+    raise InputError(f"{name}: expected numbers, found {found}")
 
 
 def _course(value: Input) -> Callable[[float], float]:

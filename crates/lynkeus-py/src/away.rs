@@ -11,7 +11,7 @@ use std::time::Duration;
 use cap::Cap;
 use lynkeus::Error;
 use lynkeus::expr::{Budget, Memory};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::errors::exception;
@@ -60,10 +60,13 @@ impl<'py> Terms<'py> {
 
     /// From now on; what others have in memory by now does not count.
     fn budget(&self) -> PyResult<Budget> {
-        let time = self.time_limit.map(|seconds| {
-            let limit = Duration::try_from_secs_f64(seconds);
-            limit.map_err(|_| refused("time_limit: expected seconds >= 0", seconds))
-        });
+        let time = match self.time_limit {
+            Some(seconds) if seconds.is_nan() || seconds < 0.0 => {
+                return Err(refused("time_limit: expected seconds >= 0", seconds));
+            }
+            // a limit beyond all time is none
+            seconds => seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
+        };
         if self.memory_limit.is_nan() || self.memory_limit < 0.0 {
             let expected = "memory_limit: expected MiB >= 0";
             return Err(refused(expected, self.memory_limit));
@@ -74,7 +77,7 @@ impl<'py> Terms<'py> {
             used: || ALLOCATOR.allocated(),
             before: ALLOCATOR.allocated(),
         };
-        Ok(Budget::new(time.transpose()?, Some(memory)))
+        Ok(Budget::new(time, Some(memory)))
     }
 
     /// Whether Ctrl-C was pressed, and tells the progress.
@@ -88,7 +91,7 @@ impl<'py> Terms<'py> {
 }
 
 fn refused(expected: &str, found: f64) -> PyErr {
-    PyValueError::new_err(format!("{expected}, found {found}"))
+    exception(&Error::input(format!("{expected}, found {found}")))
 }
 
 /// What work is told its progress by.

@@ -11,7 +11,6 @@ use lynkeus::study::SimulateSettings;
 use lynkeus_export::python::{Function, Namespace, Vector, module};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::away::{Terms, away};
@@ -328,9 +327,9 @@ impl Functions {
             "python" => Namespace::Numpy,
             "casadi" => Namespace::Casadi,
             other => {
-                return Err(PyValueError::new_err(format!(
+                return Err(exception(&Error::input(format!(
                     "language: expected \"python\" (over NumPy or JAX) or \"casadi\", found \"{other}\""
-                )));
+                ))));
             }
         };
         let functions = [("f", &self.f), ("h", &self.h)];

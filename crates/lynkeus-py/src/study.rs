@@ -6,7 +6,6 @@ use lynkeus::precision::{self, Candidates};
 use lynkeus::prepare::Prepared;
 use lynkeus::study::Whole;
 use lynkeus::{CheckOptions, Error, ExportOptions, FmiVersion, Precision, Target};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
@@ -144,11 +143,7 @@ impl Study {
             None => None,
             Some("outputs") => Some(Candidates::Outputs),
             Some("all") => Some(Candidates::All),
-            Some(other) => {
-                return Err(PyValueError::new_err(format!(
-                    "sensors: expected \"outputs\" or \"all\", found \"{other}\""
-                )));
-            }
+            Some(other) => return Err(unknown("sensors", "\"outputs\" or \"all\"", other)),
         };
         let options = precision::Options { horizon, sensors };
         let terms = Terms::new(None, time_limit, memory_limit);
@@ -352,7 +347,7 @@ fn target(to: &str, fmi: &str) -> PyResult<Target> {
 }
 
 fn unknown(argument: &str, expected: &str, found: &str) -> PyErr {
-    PyValueError::new_err(format!(
+    exception(&Error::input(format!(
         "{argument}: expected {expected}, found \"{found}\""
-    ))
+    )))
 }
