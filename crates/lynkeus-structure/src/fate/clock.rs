@@ -21,20 +21,17 @@ pub(super) fn timed(hidden: &Hidden<'_, '_>, slopes: &jacobian::Jacobian) -> Vec
     let entries: Vec<(usize, usize, bool)> = entries
         .map(|(i, j, slope)| (*i, *j, is_read(hidden.extended, &[*slope])))
         .collect();
-    // what the outputs and the equations of what is known say couples all that is hidden, as do
-    // unknown inputs
-    let is_coupling = |i: usize| !is_free(i) || hidden.is_signal(i);
-    if entries.iter().any(|&(i, _, timed)| timed && is_coupling(i)) {
-        return vec![true; count];
-    }
     let is_driven = (0..count).any(|i| is_free(i) && hidden.is_signal(i));
     let mut timed = vec![false; count];
     loop {
+        let is_new = |i: usize| !is_free(i) || !timed[i];
         let next = entries
             .iter()
-            .find(|&&(i, j, own)| !timed[i] && (own || timed[j]));
+            .find(|&&(i, j, own)| is_new(i) && (own || timed[j]));
         match next {
-            Some(_) if is_driven => return vec![true; count],
+            // what the outputs and the equations of what is known say couples all that is
+            // hidden, as do unknown inputs
+            Some(&(i, ..)) if is_driven || !is_free(i) => return vec![true; count],
             Some(&(i, ..)) => timed[i] = true,
             None => return timed,
         }

@@ -299,6 +299,12 @@ fn what_reads_the_time_is_not_told_of_one_instant() {
     // behind it
     let behind = "der(a) = -a; der(b) = -b/(1 + time); der(c) = -c^3 + b;";
     assert_eq!(of(behind, "c").1, Some(Fate::Undecided));
+    // coupled by what is seen, in an equation or in an output
+    let seen = "der(a) = b + c; der(b) = -b*exp(-time) - b^3; der(c) = -c^3;";
+    let mut sum = case(seen, &["b", "c"], 1).known();
+    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
+    sum.text = sum.text.replace("y = a;", "y = a; output Real z = b + c;");
+    assert_eq!(sum.fate("c"), Some(Fate::Undecided));
     // proved for every instant
     let proved = "der(a) = -a; der(b) = -b*(2 + sin(time)); der(c) = -c^3;";
     assert!((rate(of(proved, "b").1, Ground::Box) - 1.0).abs() < 1e-9);
