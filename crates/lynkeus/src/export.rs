@@ -107,6 +107,11 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
+    let has_float = matches!(options.to, Target::C | Target::Rust | Target::Fmu(_));
+    if options.precision == Precision::F32 && !has_float {
+        let message = "--precision f32: expected f64, the numbers of JavaScript";
+        return Err(Error::input(message));
+    }
     match options.subject {
         None if study.is_bare() => return continuous::plant(study, options),
         Some(Subject::Plant) => return continuous::plant(study, options),
@@ -140,6 +145,9 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     notes.extend(hasty.clone());
     let about = about(study, &made, hasty);
     let files = printed(&prepared, &design, &made, &about, |device| {
+        if options.precision == Precision::F32 {
+            notes.extend(beyond_float(&c::lost_in_float(device)?));
+        }
         let files = match options.to {
             Target::C => c::files(device, options.precision)?,
             Target::Rust => rust::files(device, options.precision)?,
@@ -369,6 +377,18 @@ fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<f64> {
     let known = prepared.plant().inputs.iter();
     let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
     needed_step(made, &known)
+}
+
+/// What `float` cannot hold, in words.
+fn beyond_float(lost: &[String]) -> Option<String> {
+    let (first, rest) = lost.split_first()?;
+    let more = match rest.len() {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    Some(format!(
+        "`float` makes 0 or an infinity of {first}{more}: estimates that need them are off; take f64, or other units in the model"
+    ))
 }
 
 /// What stands at the head of the files: where they come from, what is guaranteed, and `hasty`,

@@ -2,7 +2,7 @@
 
 use super::device::{Device, Tunable};
 use super::function::{Entry, comment};
-use super::language::Language;
+use super::language::{self, Language};
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
 use super::template::{chosen, exchanged};
@@ -109,6 +109,18 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
         file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
         file("CMakeLists.txt".into(), named(CMAKE)),
     ])
+}
+
+/// Numbers of a device that `float` makes 0 or infinite.
+///
+/// # Errors
+/// As [`files`].
+pub fn lost_in_float(device: &Device<'_>) -> Result<Vec<String>, Refusal> {
+    let machine = Machine::of(device)?;
+    let starts = machine.fields.iter().flat_map(|field| &field.start);
+    let starts: String = starts.map(|value| number(value.abs()) + "\n").collect();
+    let lost = language::lost_in_float(&(machine.tables + &machine.source + &starts));
+    Ok(lost.into_iter().collect())
 }
 
 /// Files that are there already: the bench, the answers of FMUs, the headers of C99 and of what

@@ -1,5 +1,8 @@
 //! What the draft becomes in C.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
 use super::template::{chosen, exchanged, outside_comments};
 
 /// A kind of C.
@@ -95,6 +98,22 @@ fn literals(text: &str, write: impl Fn(&str) -> String) -> String {
     result + rest
 }
 
+/// Numbers of a draft that `float` has not: it makes 0 or an infinity of them.
+pub(super) fn lost_in_float(draft: &str) -> BTreeSet<String> {
+    let lost = RefCell::new(BTreeSet::new());
+    outside_comments(draft, |code| {
+        literals(code, |number| {
+            let value = number.parse::<f64>().unwrap_or_default();
+            let is_held = value == 0.0 || ((value as f32) != 0.0 && (value as f32).is_finite());
+            if !is_held {
+                lost.borrow_mut().insert(number.to_owned());
+            }
+            String::new()
+        })
+    });
+    lost.into_inner()
+}
+
 /// A literal of type `float`.
 fn single(number: &str) -> String {
     match number.parse::<f64>() {
@@ -132,6 +151,13 @@ mod tests {
             Language::SingleC.render(draft),
             "    const float a = (b ? NAN : -INFINITY);\n    const float h = 1.0f;\n"
         );
+    }
+
+    #[test]
+    fn numbers_that_float_has_not_are_found() {
+        let draft = "/* R(1e300) */ a = R(1e-46) + R(0.1) - R(1e39) + R(0.0) + R(1e-44);";
+        let lost: Vec<String> = lost_in_float(draft).into_iter().collect();
+        assert_eq!(lost, ["1e-46", "1e39"]);
     }
 
     #[test]

@@ -85,7 +85,7 @@ pub(super) struct Options {
     /// Longest step of the integration, in the unit of time, instead of the study's
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
-    /// With --to c or js: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
+    /// With --to c, js or rust: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
     /// anyway
     #[arg(long)]
     tunable: bool,
@@ -112,6 +112,7 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
         step: options.step,
         tunable: options.tunable,
     };
+    options.sound()?;
     let folder = &options.output;
     if !options.force {
         must_be_empty(folder)?;
@@ -138,6 +139,15 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
 }
 
 impl Options {
+    /// Nothing is given that would say nothing.
+    fn sound(&self) -> Result<(), Error> {
+        let is_fmu = matches!(self.to, Target::Fmu);
+        match self.fmi {
+            Fmi::Two if !is_fmu => Err(Error::input("--fmi 2: expected --to fmu with it")),
+            _ => Ok(()),
+        }
+    }
+
     fn target(&self) -> lynkeus::Target {
         match (self.to, self.fmi) {
             (Target::C, _) => lynkeus::Target::C,

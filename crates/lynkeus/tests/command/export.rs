@@ -185,8 +185,12 @@ pub(super) fn estimated(folder: &Path) -> Result<Run, lynkeus::Error> {
 }
 
 pub(super) fn compiled(folder: &Path, options: &[&str]) {
+    compiled_by("gcc", folder, options);
+}
+
+fn compiled_by(compiler: &str, folder: &Path, options: &[&str]) {
     let code = folder.join("c");
-    let mut compiler = Command::new("gcc");
+    let mut compiler = Command::new(compiler);
     compiler.args([
         "-std=c99",
         "-O2",
@@ -289,6 +293,7 @@ fn c_and_others_give_what_estimate_gives() {
         return skipped("gcc is not there");
     }
     let has_node = has("node");
+    let has_clang = has("clang");
     if !has_node {
         skipped("node is not there");
     }
@@ -308,11 +313,11 @@ fn c_and_others_give_what_estimate_gives() {
             assert!(expected.is_err(), "seed {seed}: {}", made.err);
             continue;
         }
-        let checked: &[&str] = match seed % 4 {
-            1 | 2 => &["-fsanitize=address,undefined"],
-            _ => &[],
-        };
-        compiled(path, checked);
+        match seed % 4 {
+            1 | 2 => compiled(path, &["-fsanitize=address,undefined"]),
+            3 if has_clang => compiled_by("clang", path, &[]),
+            _ => compiled(path, &[]),
+        }
         let study = folder.read("s.toml");
         let expected = expected.unwrap();
         let off = difference(&expected, &replayed(path, &[]), &study);
