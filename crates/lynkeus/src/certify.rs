@@ -16,6 +16,7 @@ mod print;
 mod strays;
 
 pub(crate) use json::certificate as certificate_json;
+pub(crate) use print::region;
 pub use strays::Strays;
 
 /// The answer of `lynkeus certify`.

@@ -13,6 +13,7 @@ use lynkeus_structure::short;
 
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
+use crate::certify::region;
 use crate::estimate::at_readings;
 use crate::fixed_steps::{bends, rounded, sound};
 use crate::headers::Headers;
@@ -399,9 +400,7 @@ fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> 
         origin(study),
         format!("Classical Runge-Kutta method, {step}; signals are held between samples."),
     ];
-    let told = designed(study);
-    let hasty = hasty.filter(|_| !told.is_empty());
-    lines.extend(told);
+    lines.extend(designed(study));
     lines.extend(hasty);
     lines
 }
@@ -418,10 +417,15 @@ pub(crate) fn origin(study: &Study) -> String {
 
 /// The design and what is guaranteed, after an empty line.
 pub(crate) fn designed(study: &Study) -> Vec<String> {
-    let report = design(study).map(|report| report.to_string());
-    let lines = report.iter().flat_map(|text| text.lines());
-    let empty = report.is_ok().then(String::new);
-    empty.into_iter().chain(lines.map(str::to_owned)).collect()
+    let mut lines = vec![String::new()];
+    match design(study) {
+        Ok(report) => {
+            lines.extend(report.to_string().lines().map(str::to_owned));
+            lines.push(region(&report.certified));
+        }
+        Err(error) => lines.push(format!("What is guaranteed is not known: {error}")),
+    }
+    lines
 }
 
 /// A file without its folder.

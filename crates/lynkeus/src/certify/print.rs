@@ -9,6 +9,13 @@ use super::CertifyReport;
 use crate::interval::Intervals;
 use crate::words::{conditions, number, side};
 
+/// Where it is guaranteed.
+pub(crate) fn region(report: &CertifyReport) -> String {
+    let sides = report.best().region.iter();
+    let sides: Vec<String> = sides.map(|s| side(&s.name, s.min, s.max)).collect();
+    format!("box: {}", abbreviated(&sides))
+}
+
 pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
     let observer = &report.design.observer;
     writeln!(
@@ -18,13 +25,7 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         observer.family,
         conclusion(report)
     )?;
-    let sides: Vec<String> = report
-        .best()
-        .region
-        .iter()
-        .map(|s| side(&s.name, s.min, s.max))
-        .collect();
-    writeln!(f, "box: {}", abbreviated(&sides))?;
+    writeln!(f, "{}", region(report))?;
     writeln!(f)?;
     certificate(f, report, &report.certificate)?;
     if let Some(theorem) = &report.theorem {

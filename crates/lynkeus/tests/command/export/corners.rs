@@ -244,3 +244,16 @@ fn the_bench_takes_whole_cells_only() {
         );
     }
 }
+
+#[test]
+fn the_head_says_what_is_guaranteed_and_where() {
+    let folder = Folder::empty();
+    folder.write("m.mo", "model Pair Real x(start = 1, min = -2, max = 2); Real v(start = 0, min = -3, max = 3); output Real y = x; equation der(x) = v; der(v) = -x - v; end Pair;");
+    folder.write("s.toml", "plant = \"m.mo\"\nobserver = { family = \"triangular\", theta = 3 }\nestimate = { method = \"rk4\", step = 0.01 }\n");
+    let made = folder.run(&["export", "s.toml", "--to", "c", "-o", "c"]);
+    assert_eq!(made.code, 0, "{}", made.err);
+    let header = folder.read("c/pair.h");
+    for told in ["proved", "box: x in [-2, 2], v in [-3, 3]"] {
+        assert!(header.contains(told), "{told}: {header}");
+    }
+}
