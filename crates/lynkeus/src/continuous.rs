@@ -3,8 +3,8 @@
 use lynkeus_run::{Method, Step, System, step_of};
 use lynkeus_structure::short;
 
-use crate::export::{Export, ExportOptions, Target, designed, origin, steps};
-use crate::fixed_steps::{bends, rounded, sound};
+use crate::export::{Export, ExportOptions, Target, designed, origin};
+use crate::fixed_steps::{bends, rounded, sound, steps};
 use crate::fmu::equations::Equations;
 use crate::prepare::{self, Prepared};
 use crate::study::{self, Rk4Step};

@@ -1,31 +1,28 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
-use std::path::Path;
-
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::fmu::Version;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, Method, Step, needed_step};
-use lynkeus_structure::short;
+use lynkeus_run::Blueprint;
 
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
-use crate::certify::region;
 use crate::estimate::at_readings;
-use crate::fixed_steps::{bends, rounded, sound};
+use crate::fixed_steps::{bends, hasty, stepped};
 use crate::headers::Headers;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
 use crate::study::BetweenSamples;
 use crate::systems::hat;
-use crate::{Error, Study, continuous, design, fmu, tunable};
+use crate::{Error, Study, continuous, fmu, tunable};
 
-/// How many of the steps that the fastest mode needs (|λ|h ≤ ½) are one with which the classical method
-/// is stable for no mode that decays: all of its region left of the axis has |λ|h < 2.97.
-const LONGEST: f64 = 5.94;
+mod head;
+
+use head::{about, beyond_float};
+pub(crate) use head::{designed, file_name, origin};
 
 /// The language of an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -239,44 +236,6 @@ pub(crate) fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
     study
 }
 
-/// With fixed steps: those asked for, those of the study, or such as the fastest mode needs.
-pub(crate) fn stepped(
-    prepared: &Prepared<'_>,
-    made: Blueprint,
-    step: Option<f64>,
-    notes: &mut Vec<String>,
-) -> Result<Blueprint, Error> {
-    if let Some(step) = sound(step)? {
-        return Ok(made.with_method(Method::Rk4(Step::AtMost(step))));
-    }
-    if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
-        return Ok(made);
-    }
-    let Some(needed) = needed(prepared, &made) else {
-        let message = "the step cannot be chosen: the equations have no slopes at the start";
-        return Err(Error::input(message)
-            .at(&prepared.study().file)
-            .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
-    };
-    if needed.is_infinite() {
-        notes.push("one step from each sample to the next: at the start nothing moves by itself; --step takes a longest step".to_owned());
-        return Ok(made.with_method(Method::Rk4(Step::Substeps(1))));
-    }
-    let step = rounded(needed);
-    notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; --step takes another",
-        short(step)
-    ));
-    Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
-}
-
-/// A value that an input may have.
-pub(crate) fn typical(input: &Variable) -> f64 {
-    let middle = 0.5 * (input.min + input.max);
-    let middle = if middle.is_finite() { middle } else { 0.0 };
-    input.start.or(input.nominal).unwrap_or(middle)
-}
-
 /// What the code says of names.
 struct Told {
     signals: Vec<Entry>,
@@ -355,90 +314,5 @@ fn entry(variable: &Variable) -> Entry {
     Entry {
         name: variable.name.clone(),
         about: words.into_iter().flatten().collect::<Vec<_>>().join(" "),
-    }
-}
-
-/// Where fixed steps are so long that the method itself grows, if it is seen to.
-fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String> {
-    let Method::Rk4(Step::AtMost(step)) = made.method() else {
-        return None;
-    };
-    let longest = LONGEST * needed(prepared, made)?;
-    (step > longest).then(|| {
-        format!(
-            "not for these steps: they are {} at most, and beyond about {} the fastest mode at the start makes the method itself grow",
-            short(step),
-            short(longest)
-        )
-    })
-}
-
-/// The step that the fastest mode at the start needs.
-fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<f64> {
-    let known = prepared.plant().inputs.iter();
-    let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
-    needed_step(made, &known)
-}
-
-/// What `float` cannot hold, in words.
-fn beyond_float(lost: &[String]) -> Option<String> {
-    let (first, rest) = lost.split_first()?;
-    let more = match rest.len() {
-        0 => String::new(),
-        n => format!(" and {n} more"),
-    };
-    Some(format!(
-        "`float` makes 0 or an infinity of {first}{more}: estimates that need them are off; take f64, or other units in the model"
-    ))
-}
-
-/// What stands at the head of the files: where they come from, what is guaranteed, and `hasty`,
-/// for which steps it is not.
-fn about(study: &Study, made: &Blueprint, hasty: Option<String>) -> Vec<String> {
-    let step = steps(made.method()).unwrap_or_default();
-    let mut lines = vec![
-        origin(study),
-        format!("Classical Runge-Kutta method, {step}; signals are held between samples."),
-    ];
-    lines.extend(designed(study));
-    lines.extend(hasty);
-    lines
-}
-
-/// Where a text comes from.
-pub(crate) fn origin(study: &Study) -> String {
-    let source = if study.is_bare() { "model" } else { "study" };
-    format!(
-        "Generated by lynkeus {} from {}: change the {source}, not this file.",
-        env!("CARGO_PKG_VERSION"),
-        file_name(&study.file)
-    )
-}
-
-/// The design and what is guaranteed, after an empty line.
-pub(crate) fn designed(study: &Study) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    match design(study) {
-        Ok(report) => {
-            lines.extend(report.to_string().lines().map(str::to_owned));
-            lines.push(region(&report.certified));
-        }
-        Err(error) => lines.push(format!("What is guaranteed is not known: {error}")),
-    }
-    lines
-}
-
-/// A file without its folder.
-pub(crate) fn file_name(path: &str) -> String {
-    let file = Path::new(path).file_name();
-    file.map_or_else(|| path.to_owned(), |f| f.display().to_string())
-}
-
-/// Fixed steps in words.
-pub(crate) fn steps(method: Method) -> Option<String> {
-    match method {
-        Method::Rk4(Step::AtMost(h)) => Some(format!("steps of {h:?} at most")),
-        Method::Rk4(Step::Substeps(n)) => Some(format!("{n} steps from sample to sample")),
-        _ => None,
     }
 }

@@ -10,7 +10,8 @@ use lynkeus_observers::Observer;
 use lynkeus_run::{Method, System};
 
 use super::{experiment, free, packed, quantity, time, units};
-use crate::export::{Artifact, typical};
+use crate::export::Artifact;
+use crate::fixed_steps::typical;
 use crate::study::SimulateSettings;
 use crate::systems::{hat, starts};
 use crate::{Error, Study};

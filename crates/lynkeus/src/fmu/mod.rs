@@ -16,7 +16,8 @@ use lynkeus_observers::Design;
 use lynkeus_run::Blueprint;
 
 use crate::Study;
-use crate::export::{Artifact, typical};
+use crate::export::Artifact;
+use crate::fixed_steps::typical;
 use crate::prepare::Prepared;
 use crate::study::SimulateSettings;
 

@@ -5,7 +5,8 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, Method, Step};
 
 use super::positions::{Position, Positions};
-use crate::export::{printed, stepped, steps};
+use crate::export::printed;
+use crate::fixed_steps::{stepped, steps};
 use crate::live::blueprint;
 use crate::prepare::Prepared;
 use crate::study::{self, Rk4Step};
