@@ -58,8 +58,12 @@ fn version(study: &Study, options: &ExportOptions) -> Result<FmiVersion, Error> 
             "in continuous time a plant or an observer goes to simulators: expected --to fmu";
         return Err(Error::input(message)
             .at(&study.file)
-            .hint("the estimator of a study is exported to C and JavaScript"));
+            .hint("the estimator of a study is exported to C, JavaScript and Rust"));
     };
+    if options.tunable {
+        let message = "what is tunable: expected an estimator, found a system in continuous time";
+        return Err(Error::input(message));
+    }
     match options.precision {
         Precision::F64 => Ok(version),
         Precision::F32 => Err(Error::input(

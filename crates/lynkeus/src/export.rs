@@ -119,7 +119,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     #[cfg(feature = "tune")]
     if options.to == Target::Html {
         if options.tunable {
-            let message = "what is tunable: expected C, JavaScript or an FMU, found a page, whose slider moves it";
+            let message = "what is tunable: expected C, JavaScript, Rust or an FMU, found a page, whose slider moves it";
             return Err(Error::input(message));
         }
         return page(study, options.step);

@@ -55,7 +55,13 @@ pub(crate) fn simulated(
     quantities: &[Quantity],
 ) -> Option<Intervals> {
     let study = prepared.study();
-    let step = simulate::sampled_every(study, study.simulate.as_ref()?)?;
+    let noisy = study
+        .sensors
+        .noise
+        .iter()
+        .any(|(_, noise)| noise.size() > 0.0);
+    let settings = study.simulate.as_ref().filter(|_| noisy)?;
+    let step = simulate::sampled_every(study, settings)?;
     let of = |name: &str| quantities.iter().find(|q| q.name == name);
     let observer = &design.observer;
     let estimates = observer.estimates.iter();

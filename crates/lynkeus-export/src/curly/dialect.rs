@@ -155,6 +155,10 @@ const SIZES: &[&str] = &[
     "TAKEN",
     "TIME",
     "TOLD",
+    "TUNABLES",
+    "TUNABLE_NAMES",
+    "TUNED",
+    "TUNING",
     "WIDTH",
     "WIDTH_INSIDE",
 ];

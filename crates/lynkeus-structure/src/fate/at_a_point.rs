@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 use super::modes::Modes;
 use super::subspace::{image, null_space, reached};
-use super::{Fate, Hidden, Told, clock};
+use super::{Fate, Hidden, Told, clock, coupled};
 use crate::{Coordinate, Dimension, Region};
 
 /// States beyond which no modes are looked for.
@@ -66,6 +66,7 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             for (fate, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
                 *fate = Fate::Undecided;
             }
+            coupled::weaken(hidden, &slopes, &mut of);
             let sides = || region.dimensions.iter().zip(&point);
             let is_time = |d: &Dimension| d.symbol == extended.plant.time;
             let is_read = clock::is_read(extended, &nodes);

@@ -15,6 +15,7 @@
 mod at_a_point;
 mod clock;
 mod constraints;
+mod coupled;
 mod linearised;
 mod modes;
 mod on_the_box;

@@ -105,12 +105,14 @@ impl Modes {
         let gap = others
             .map(|i| (modes[i] - mode).norm())
             .fold(f64::INFINITY, f64::min);
-        let width = self.condition(mode) * EIGENVALUES * self.scale();
+        let condition = self.condition(mode);
+        let width = condition * EIGENVALUES * self.scale();
         // to first order, which counts where the next mode is far beyond
         match 4.0 * width < gap {
             true => Doubt {
                 width,
-                is_simple: true,
+                // of its own block's numbers, too: a fast part elsewhere makes nothing stay
+                is_simple: mode.re.abs() <= condition * EIGENVALUES * self.A.norm(),
             },
             false => Doubt {
                 width: spread.max(radius(2)) * self.scale(),

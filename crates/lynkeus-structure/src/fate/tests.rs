@@ -313,3 +313,29 @@ fn what_reads_the_time_is_not_told_of_one_instant() {
     assert!((rate(fate, Ground::Point) - 0.03).abs() < 1e-9);
     assert!(!point.contains(&"time".to_owned()), "{point:?}");
 }
+
+/// However weakly it reads them, what reads what grows, or an unknown input, is not said to decay; nor is what a
+/// fast part elsewhere dwarfs said to stay.
+#[test]
+fn small_couplings_and_slow_modes_are_not_rounded_away() {
+    let behind = case(
+        "der(a) = -a; der(b) = -1e6*b + 1e-8*c; der(c) = c + 0.1*c^2;",
+        &["b", "c"],
+        2,
+    )
+    .known();
+    assert_eq!(behind.fate("b"), Some(Fate::Undecided));
+    let driven = case(
+        "der(a) = -a; der(b) = -b/3600 + w/1e9; der(c) = -c;",
+        &["b", "c", "w"],
+        3,
+    );
+    let fate = driven.fate("b");
+    assert!(!matches!(fate, Some(Fate::Decays { .. })), "{fate:?}");
+    for rate in ["1e-3", "-1e-3"] {
+        let slow = format!("der(a) = -1e12*a; der(b) = {rate}*b + 0.001*b^3; der(c) = -c;");
+        let slow = case(&slow, &["b", "c"], 2);
+        let fate = slow.known().fate("b");
+        assert_ne!(fate, Some(Fate::Stays), "{rate}");
+    }
+}

@@ -100,7 +100,13 @@ const PUSH: &str = "function push(s, t, signals, estimates)
     const before = structuredClone(s);
     const code = take(s, t, signals, estimates);
     if (code !== 0) {
-        Object.assign(s, before);
+        for (const name of Object.keys(before)) {
+            if (ArrayBuffer.isView(s[name])) {
+                s[name].set(before[name]);
+            } else {
+                s[name] = before[name];
+            }
+        }
     }
     return code;
 }

@@ -1,12 +1,14 @@
 /* A sample, whatever it leaves behind. */
 static int take(STATE *s, double t, const real *signals, real *estimates)
 {
+//? !tunable
     int code = 0;
+//?
     if (!isfinite(t) || (s->started && t < s->time)) {
         return TIME;
     }
 //? tunable
-    code = tuned(s);
+    int code = tuned(s);
     if (code != 0) {
         return code;
     }

@@ -86,7 +86,7 @@ static int changed(@NAME@_state *s, const char *argument)
         if (length == (size_t)(value - argument) && strncmp(argument, @NAME@_tunable_names[i], length) == 0) {
             char *end = NULL;
             s->tuning[i] = (@REAL@)strtod(value + 1, &end);
-            return end != value + 1;
+            return end != value + 1 && *end == '\0';
         }
     }
     return 0;

@@ -25,9 +25,12 @@ fn cells(line: &str) -> Vec<String> {
     cells.iter().map(|cell| cell.trim().to_owned()).collect()
 }
 
-fn number(cells: &[String], place: usize) -> f64 {
-    let cell = cells.get(place).and_then(|cell| cell.parse().ok());
-    cell.unwrap_or(f64::NAN)
+/// A cell as a number, NaN where it is empty.
+fn number(cells: &[String], place: usize) -> Result<f64, String> {
+    match cells.get(place).map_or("", String::as_str) {
+        "" => Ok(f64::NAN),
+        cell => cell.parse().map_err(|_| format!("expected a number, found {cell}")),
+    }
 }
 
 fn replayed() -> Result<(), String> {
@@ -57,8 +60,12 @@ fn replayed() -> Result<(), String> {
             continue;
         }
         let cells = cells(&line);
-        let t = number(&cells, time);
-        let signals = places.map(|place| number(&cells, place)@AS_REAL@);
+        let at_row = |error: String| format!("row {}: {error}", row + 2);
+        let t = number(&cells, time).map_err(at_row)?;
+        let mut signals = [0.0; SIGNALS];
+        for (signal, place) in signals.iter_mut().zip(places) {
+            *signal = number(&cells, place).map_err(at_row)?@AS_REAL@;
+        }
         let taken = state.push(t, &signals, &mut estimates);
         taken.map_err(|refused| format!("row {}, t = {t}: {refused}", row + 2))?;
         let texts = estimates.map(|estimate| estimate.to_string());

@@ -173,7 +173,7 @@ fn bends_with_time_are_told() {
 /// descriptions that speak of functions.
 #[test]
 fn names_of_files_and_functions_build() {
-    let study = "plant = \"m.mo\"\nsensors = { noise = { y = 0.1 } }\nprocess_noise = { sinf = 0.01, M_PI = 0.01, HUGE_VAL = 0.01, unix = 0.01, Math = 0.01 }\nobserver = { family = \"ekf\" }\nestimate = { method = \"rk4\", step = 0.1 }\n";
+    let study = "plant = \"m.mo\"\nsensors = { noise = { y = 0.1 } }\nprocess_noise = { sinf = 0.01, M_PI = 0.01, HUGE_VAL = 0.01, unix = 0.01, Math = 0.01, TUNING = 0.01 }\nobserver = { family = \"ekf\" }\nestimate = { method = \"rk4\", step = 0.1 }\n";
     for name in ["M", "Replay", "Math", "Install", "Fmi3"] {
         let folder = Folder::empty();
         folder.write(
@@ -181,11 +181,11 @@ fn names_of_files_and_functions_build() {
             &format!(
                 "model {name}
   Real sinf(start = 1) \"the larger sign of real power R(T), NAN at TIME\";
-  Real M_PI(start = 1); Real HUGE_VAL(start = 0); Real unix(start = 0); Real Math(start = 0);
-  output Real y = sinf + M_PI;
+  Real M_PI(start = 1); Real HUGE_VAL(start = 0); Real unix(start = 0); Real Math(start = 0); Real TUNING(start = 0.1);
+  output Real y = sinf + M_PI + 0.1*TUNING;
 equation
   der(sinf) = -sin(sinf) + HUGE_VAL; der(M_PI) = -M_PI + unix; der(HUGE_VAL) = -HUGE_VAL + Math;
-  der(unix) = -unix; der(Math) = -Math^3;
+  der(unix) = -unix; der(TUNING) = -2*TUNING; der(Math) = -Math^3;
 end {name};"
             ),
         );
