@@ -358,7 +358,7 @@ class Study:
         memory_limit: float = MEMORY,
     ) -> Export:
         """The estimator for other machines, as files in a folder that is new or empty (``force``: that
-        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"rust"``, ``"fmu"`` (``fmi`` its version)
+        may hold other files): ``to`` is ``"c"``, ``"js"``, ``"rust"``, ``"st"``, ``"fmu"`` (``fmi`` its version)
         or ``"html"``; ``step`` is the longest step of the integration, instead of the study's; with
         ``tunable`` θ, or what stands for it, may be changed while the estimator runs (an FMU has it
         anyway). With ``to="fmu"`` the ``system`` is ``"estimator"``, or in continuous time ``"plant"`` or

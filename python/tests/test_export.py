@@ -33,6 +33,12 @@ def test_a_crate_has_folders(tmp_path: Path) -> None:
     assert b"signals: &[f32; SIGNALS]" in made.files[1].read_bytes()
 
 
+def test_a_controller_gets_a_function_block(tmp_path: Path) -> None:
+    made = tank().export(tmp_path, to="st")
+    assert [file.name for file in made.files] == ["tank.st", "example.st"]
+    assert b"\nFUNCTION_BLOCK tank\n" in made.files[0].read_bytes()
+
+
 def test_what_is_not_known_is_refused(tmp_path: Path) -> None:
     for wrong in ({"to": "cobol"}, {"precision": "f16"}, {"to": "fmu", "fmi": "1"}):
         with pytest.raises(ValueError, match="expected"):

@@ -373,13 +373,14 @@ fn target(to: &str, fmi: &str) -> PyResult<Target> {
     Ok(match (to, fmi) {
         ("c", _) => Target::C,
         ("js", _) => Target::JavaScript,
+        ("st", _) => Target::StructuredText,
         ("rust", _) => Target::Rust,
         ("html", _) => Target::Html,
         ("fmu", "3") => Target::Fmu(FmiVersion::Three),
         ("fmu", "2") => Target::Fmu(FmiVersion::Two),
         ("fmu", other) => return Err(unknown("fmi", "\"3\" or \"2\"", other)),
         (other, _) => {
-            let expected = "\"c\", \"js\", \"rust\", \"fmu\" or \"html\"";
+            let expected = "\"c\", \"js\", \"rust\", \"st\", \"fmu\" or \"html\"";
             return Err(unknown("to", expected, other));
         }
     })

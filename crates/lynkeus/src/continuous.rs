@@ -56,9 +56,9 @@ fn version(study: &Study, options: &ExportOptions) -> Result<FmiVersion, Error> 
     let Target::Fmu(version) = options.to else {
         let message =
             "in continuous time a plant or an observer goes to simulators: expected --to fmu";
-        return Err(Error::input(message)
-            .at(&study.file)
-            .hint("the estimator of a study is exported to C, JavaScript and Rust"));
+        return Err(Error::input(message).at(&study.file).hint(
+            "the estimator of a study is exported to C, JavaScript, Rust and Structured Text",
+        ));
     };
     if options.tunable {
         let message = "what is tunable: expected an estimator, found a system in continuous time";

@@ -3,7 +3,7 @@
 use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{self, File, Precision};
 use lynkeus_export::curly::fmu::Version;
-use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust};
+use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust, structured};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
 use lynkeus_run::Blueprint;
@@ -34,6 +34,8 @@ pub enum Target {
     JavaScript,
     /// a crate without the standard library, with an example that replays a log
     Rust,
+    /// Structured Text of IEC 61131-3: a function block with its functions, and a program that calls it
+    StructuredText,
     /// a functional mock-up unit: C in an archive with a description and, where a C compiler is at hand, a
     /// library for this machine; a note says where there is none
     Fmu(Version),
@@ -105,7 +107,10 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
-    let has_float = matches!(options.to, Target::C | Target::Rust | Target::Fmu(_));
+    let has_float = matches!(
+        options.to,
+        Target::C | Target::Rust | Target::StructuredText | Target::Fmu(_)
+    );
     if options.precision == Precision::F32 && !has_float {
         let message = "--precision f32: expected f64, the numbers of JavaScript";
         return Err(Error::input(message));
@@ -119,7 +124,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     #[cfg(feature = "tune")]
     if options.to == Target::Html {
         if options.tunable {
-            let message = "what is tunable: expected C, JavaScript, Rust or an FMU, found a page, whose slider moves it";
+            let message = "what is tunable: expected C, JavaScript, Rust, Structured Text or an FMU, found a page, whose slider moves it";
             return Err(Error::input(message));
         }
         return page(study, options.step);
@@ -149,6 +154,7 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         let files = match options.to {
             Target::C => c::files(device, options.precision)?,
             Target::Rust => rust::files(device, options.precision)?,
+            Target::StructuredText => structured::files(device, options.precision)?,
             Target::Fmu(version) => {
                 let of = fmu::Made {
                     device,

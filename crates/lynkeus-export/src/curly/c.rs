@@ -31,7 +31,7 @@ pub struct File {
 }
 
 /// What `push` can say, from 1 on.
-const CODES: [(&str, &str); 5] = [
+pub(super) const CODES: [(&str, &str); 5] = [
     (
         "TIME",
         "the time is no number, or before that of the last sample",
@@ -46,7 +46,7 @@ const CODES: [(&str, &str); 5] = [
 ];
 
 /// What it says of numbers that may be changed, after the other codes.
-const TUNING: (&str, &str) = (
+pub(super) const TUNING: (&str, &str) = (
     "TUNING",
     "a number that may be changed is not finite and above 0",
 );

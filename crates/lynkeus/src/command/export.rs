@@ -19,6 +19,8 @@ pub(super) enum Target {
     Js,
     /// A Rust crate without the standard library, with an example that replays a log
     Rust,
+    /// Structured Text of IEC 61131-3: a function block for programmable controllers
+    St,
     /// The page of `lynkeus report`, on the study's simulation
     Html,
     /// An archive for tools of simulation: the estimator for FMI co-simulation; a plant or an observer in continuous time for model exchange, too
@@ -85,7 +87,7 @@ pub(super) struct Options {
     /// Longest step of the integration, in the unit of time, instead of the study's
     #[arg(long, value_name = "STEP")]
     step: Option<f64>,
-    /// With --to c, js or rust: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
+    /// With --to c, js, rust or st: θ, or what stands for it, may be changed while the estimator runs; an FMU has it
     /// anyway
     #[arg(long)]
     tunable: bool,
@@ -153,6 +155,7 @@ impl Options {
             (Target::C, _) => lynkeus::Target::C,
             (Target::Js, _) => lynkeus::Target::JavaScript,
             (Target::Rust, _) => lynkeus::Target::Rust,
+            (Target::St, _) => lynkeus::Target::StructuredText,
             (Target::Html, _) => lynkeus::Target::Html,
             (Target::Fmu, Fmi::Two) => lynkeus::Target::Fmu(FmiVersion::Two),
             (Target::Fmu, Fmi::Three) => lynkeus::Target::Fmu(FmiVersion::Three),

@@ -4,6 +4,7 @@ mod corners;
 pub(super) mod javascript;
 mod names;
 mod rust;
+mod structured;
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -330,6 +331,7 @@ fn c_and_others_give_what_estimate_gives() {
         if has_node {
             javascript::check(&looked);
         }
+        structured::check(&looked);
         kept.push(looked);
     }
     let looked_at = kept.len() as u64;

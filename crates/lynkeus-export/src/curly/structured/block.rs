@@ -1,0 +1,207 @@
+//! The function block: what a controller's program sees of an estimator.
+
+use super::names::Identifiers;
+use super::print::{Printer, comment, section};
+use super::{Frame, about, number};
+use crate::curly::c::{READINGS, codes};
+use crate::curly::function::Entry;
+use crate::curly::syntax::Type;
+
+/// The block, with its variables named.
+pub(super) struct Block<'a> {
+    frame: &'a Frame<'a>,
+    /// measured outputs and known inputs, with what says whether there is one
+    signals: Vec<Signal>,
+    tunables: Vec<String>,
+    estimates: Vec<String>,
+    /// what became of readings
+    readings: Vec<String>,
+    /// types of the arrays that are handed over
+    signals_type: String,
+    estimates_type: String,
+}
+
+struct Signal {
+    name: String,
+    is_valid: String,
+}
+
+/// Names that are not the model's.
+const OWN: [&str; 8] = [
+    "t",
+    "restart",
+    "code",
+    "s",
+    "begun",
+    "before",
+    "signals",
+    "estimates",
+];
+
+impl<'a> Block<'a> {
+    pub fn of(frame: &'a Frame<'a>, printer: &mut Printer<'_>) -> Self {
+        let device = frame.device;
+        let taken = OWN.iter().map(|name| (*name).to_owned());
+        let mut names = Identifiers::without(taken.chain([frame.prefix.to_owned()]));
+        let signals = device.signals.iter().map(|signal| {
+            let name = names.of(&signal.name);
+            let is_valid = names.of(&format!("{name}_valid"));
+            Signal { name, is_valid }
+        });
+        let signals = signals.collect();
+        let mut of = |entries: &[Entry]| -> Vec<String> {
+            entries.iter().map(|entry| names.of(&entry.name)).collect()
+        };
+        let tunables: Vec<Entry> = device.tunables.iter().map(|t| t.entry.clone()).collect();
+        let has_readings = frame.machine.fields.iter().any(|f| f.name == "became");
+        let sensors = if has_readings { device.sensors() } else { 0 };
+        let readings = device.signals[..sensors].iter();
+        let readings: Vec<Entry> = readings
+            .map(|signal| Entry::named(format!("{}_reading", signal.name)))
+            .collect();
+        Self {
+            frame,
+            signals,
+            tunables: of(&tunables),
+            estimates: of(device.estimates),
+            readings: of(&readings),
+            signals_type: printer.array(Type::Real, device.signals.len()),
+            estimates_type: printer.array(Type::Real, device.estimates.len()),
+        }
+    }
+
+    /// Its text; `take` is the function that takes a sample.
+    pub fn text(&self, take: &str) -> String {
+        let codes = codes(self.frame.device).enumerate();
+        let codes = codes.map(|(k, (_, about))| format!("{}: {about}", k + 1));
+        let codes: Vec<String> = codes.collect();
+        format!(
+            "(* Takes a sample at each call. Where it is refused, nothing changes but code:\n   {}. *)\n\
+             FUNCTION_BLOCK {}\n{}{}{}{}END_FUNCTION_BLOCK\n",
+            codes.join(";\n   "),
+            self.frame.prefix,
+            section("VAR_INPUT", &self.inputs()),
+            section("VAR_OUTPUT", &self.outputs()),
+            section("VAR", &self.variables()),
+            self.body(take),
+        )
+    }
+
+    fn inputs(&self) -> Vec<String> {
+        let (device, real) = (self.frame.device, self.frame.real);
+        let mut lines =
+            vec!["t : LREAL; (* the time of the sample, in the unit of the study *)".to_owned()];
+        let sensors = device.sensors();
+        for (place, (signal, entry)) in self.signals.iter().zip(device.signals).enumerate() {
+            let Signal { name, is_valid } = signal;
+            let words = match place < sensors {
+                true => "FALSE: the sensor did not report",
+                false => "FALSE: it stays what it was",
+            };
+            lines.push(format!("{name} : {real};{}", told(name, entry)));
+            lines.push(format!("{is_valid} : BOOL := TRUE; (* {words} *)"));
+        }
+        for (name, tunable) in self.tunables.iter().zip(device.tunables) {
+            let (start, words) = (number(tunable.start), told(name, &tunable.entry));
+            lines.push(format!("{name} : {real} := {start};{words}"));
+        }
+        lines.push("restart : BOOL; (* TRUE: from the start, before the sample *)".to_owned());
+        lines
+    }
+
+    fn outputs(&self) -> Vec<String> {
+        let real = self.frame.real;
+        let estimates = self.estimates.iter().zip(self.frame.device.estimates);
+        let estimates =
+            estimates.map(|(name, entry)| format!("{name} : {real};{}", told(name, entry)));
+        let meanings = READINGS.iter().enumerate();
+        let meanings = meanings.map(|(k, (_, about))| format!("{k}: {about}"));
+        let meanings = meanings.collect::<Vec<_>>().join("; ");
+        let readings = self.readings.iter();
+        let readings = readings.map(|name| format!("{name} : DINT; (* {meanings} *)"));
+        let code = "code : DINT; (* 0, or why the sample was refused *)".to_owned();
+        estimates.chain(readings).chain([code]).collect()
+    }
+
+    fn variables(&self) -> Vec<String> {
+        let state = format!("{}_state", self.frame.prefix);
+        vec![
+            format!("s : {state};"),
+            format!("before : {state};"),
+            "begun : BOOL; (* whether s is a state *)".to_owned(),
+            format!("signals : {};", self.signals_type),
+            format!("estimates : {};", self.estimates_type),
+        ]
+    }
+
+    fn body(&self, take: &str) -> String {
+        let mut lines = vec![
+            "IF restart OR NOT begun THEN".to_owned(),
+            format!("    begun := {}_init(s := s);", self.frame.prefix),
+            "END_IF;".to_owned(),
+            "before := s;".to_owned(),
+        ];
+        for (place, Signal { name, is_valid }) in self.signals.iter().enumerate() {
+            lines.push(format!("signals[{place}] := {name};"));
+            lines.push(format!("IF NOT {is_valid} THEN"));
+            let undefined = format!("{}_undefined(a := 0.0)", self.frame.prefix);
+            lines.push(format!("    signals[{place}] := {undefined};"));
+            lines.push("END_IF;".to_owned());
+        }
+        for (place, name) in self.tunables.iter().enumerate() {
+            lines.push(format!("s.tuning[{place}] := {name};"));
+        }
+        lines.push(format!(
+            "code := {take}(s := s, signals := signals, estimates := estimates, t := t);"
+        ));
+        lines.push("IF code <> 0 THEN".to_owned());
+        lines.push("    s := before;".to_owned());
+        lines.push("ELSE".to_owned());
+        for (place, name) in self.estimates.iter().enumerate() {
+            lines.push(format!("    {name} := estimates[{place}];"));
+        }
+        for (place, name) in self.readings.iter().enumerate() {
+            lines.push(format!("    {name} := s.became[{place}];"));
+        }
+        lines.push("END_IF;".to_owned());
+        lines.iter().map(|line| format!("    {line}\n")).collect()
+    }
+
+    /// A program that calls it.
+    pub fn example(&self) -> String {
+        let Frame { prefix, real, .. } = self.frame;
+        let signals = self.signals.iter();
+        let declared = signals.clone().map(|s| format!("{} : {real};", s.name));
+        let given = signals.map(|s| format!("{0} := {0}", s.name));
+        let given: Vec<String> = std::iter::once("t := t".to_owned()).chain(given).collect();
+        let mut names = Identifiers::without(self.signals.iter().map(|s| s.name.clone()));
+        let (estimator, cycle) = (names.of("estimator"), names.of("cycle"));
+        let variables: Vec<String> = [
+            format!("{estimator} : {prefix};"),
+            "t : LREAL;".to_owned(),
+            format!("{cycle} : LREAL := 0.1;"),
+        ]
+        .into_iter()
+        .chain(declared)
+        .collect();
+        let first = self.estimates.first().map_or("code", String::as_str);
+        format!(
+            "{}PROGRAM {prefix}_example\n{}    (* read the sensors and inputs here *)\n    \
+             {estimator}({});\n    (* use {estimator}.{first} here, where {estimator}.code is 0 *)\n    \
+             t := t + {cycle};\nEND_PROGRAM\n",
+            comment(
+                "Calls the estimator once in each cycle: `cycle` is the interval of the task, in the unit of time of the study."
+            ),
+            section("VAR", &variables),
+            given.join(", "),
+        )
+    }
+}
+
+/// What is said of a variable: what the model calls it, where that is no name here, and what it is.
+fn told(name: &str, entry: &Entry) -> String {
+    match name == entry.name {
+        true => about(&entry.about),
+        false => about(&format!("{} {}", entry.name, entry.about)),
+    }
+}

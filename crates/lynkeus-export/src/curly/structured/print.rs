@@ -1,0 +1,290 @@
+//! A draft as functions of IEC 61131-3: one for each size of arrays, as an array has one size there.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::names::Identifiers;
+use super::routine::{Instance, Routine};
+use crate::Refusal;
+use crate::curly::c::Precision;
+use crate::curly::machine::Field;
+use crate::curly::syntax::{Declaration, Expr, Function, Item, Program, Type, Value};
+
+/// Writes one function after the other, those that are called first.
+pub(super) struct Printer<'p> {
+    pub program: &'p Program<'p>,
+    pub fields: &'p [Field],
+    pub sizes: &'p [(String, usize)],
+    pub precision: Precision,
+    /// before the names of functions and types, which all programs of a controller share
+    pub prefix: &'p str,
+    pub tables: HashMap<&'p str, &'p [Expr]>,
+    kinds: HashMap<&'p str, Type>,
+    functions: HashMap<&'p str, Documented<'p>>,
+    made: Vec<(Instance, Made)>,
+    /// the function under way
+    pub here: Routine,
+    /// functions of the library that are called
+    pub own: BTreeSet<&'static str>,
+    /// sizes of arrays, each a type: by that of their entries
+    pub arrays: BTreeSet<(&'static str, usize)>,
+    /// the functions
+    pub text: String,
+}
+
+/// A function with the comment before it.
+#[derive(Clone, Copy)]
+struct Documented<'p> {
+    function: &'p Function,
+    about: &'p str,
+}
+
+/// What a function is called, and what its parameters are.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Made {
+    pub name: String,
+    /// without functions
+    pub parameters: Vec<String>,
+}
+
+impl<'p> Printer<'p> {
+    pub fn new(
+        items: &'p [Item],
+        program: &'p Program<'p>,
+        (fields, sizes): (&'p [Field], &'p [(String, usize)]),
+        (precision, prefix): (Precision, &'p str),
+    ) -> Self {
+        let mut printer = Self {
+            program,
+            fields,
+            sizes,
+            precision,
+            prefix,
+            tables: HashMap::new(),
+            kinds: HashMap::new(),
+            functions: HashMap::new(),
+            made: vec![],
+            here: Routine::none(),
+            own: BTreeSet::new(),
+            arrays: BTreeSet::new(),
+            text: String::new(),
+        };
+        let mut about = "";
+        for item in items {
+            match item {
+                Item::Comment(words) => about = words,
+                Item::Table(Declaration {
+                    name,
+                    kind,
+                    value: Value::List(list),
+                    ..
+                }) => {
+                    printer.tables.insert(name, list);
+                    printer.kinds.insert(name, *kind);
+                }
+                Item::Function(function) => {
+                    let documented = Documented { function, about };
+                    printer.functions.insert(&function.name, documented);
+                    about = "";
+                }
+                _ => about = "",
+            }
+        }
+        printer
+    }
+
+    pub fn kind(&self, kind: Type) -> &'static str {
+        match kind {
+            Type::Real if self.precision == Precision::F32 => "REAL",
+            Type::Real | Type::Double => "LREAL",
+            Type::Int => "DINT",
+            _ => "BOOL",
+        }
+    }
+
+    pub fn kind_of(&self, value: &Expr) -> Type {
+        self.program.kind(value, &self.here.scope)
+    }
+
+    /// The type of an array.
+    pub fn array(&mut self, kind: Type, size: usize) -> String {
+        let kind = self.kind(kind);
+        let size = size.max(1);
+        self.arrays.insert((kind, size));
+        array_type(self.prefix, kind, size)
+    }
+
+    /// A table is declared where it is read: functions see nothing else.
+    pub fn table(&mut self, name: &str) -> Result<String, Refusal> {
+        let (Some(list), Some(kind)) = (self.tables.get(name), self.kinds.get(name)) else {
+            return Err(lacks(name));
+        };
+        let (list, kind) = (*list, *kind);
+        let mut texts = vec![];
+        for value in list {
+            texts.push(self.bounded(value, kind)?);
+        }
+        let (kind, last) = (self.kind(kind), list.len().saturating_sub(1));
+        let texts = texts.join(", ");
+        Ok(self.here.once(name, |own| {
+            format!("{own} : ARRAY [0..{last}] OF {kind} := [{texts}];")
+        }))
+    }
+
+    /// A number of a table, where an end that is nowhere is the last number there is.
+    fn bounded(&mut self, value: &'p Expr, kind: Type) -> Result<String, Refusal> {
+        const LAST: &str = "3.4E38";
+        match value {
+            Expr::Name(name) if name == "INFINITY" => Ok(LAST.to_owned()),
+            Expr::Prefix("-", inner) if **inner == Expr::Name("INFINITY".to_owned()) => {
+                Ok(format!("-{LAST}"))
+            }
+            value => self.value(value, kind),
+        }
+    }
+
+    /// A function for arrays of some sizes, written where it is not yet.
+    pub fn instance(&mut self, instance: Instance) -> Result<Made, Refusal> {
+        if let Some((_, made)) = self.made.iter().find(|made| made.0 == instance) {
+            return Ok(made.clone());
+        }
+        let documented = self.functions.get(instance.function.as_str());
+        let Documented { function, about } =
+            *documented.ok_or_else(|| lacks(&instance.function))?;
+        let others = self.made.iter();
+        let others = others.filter(|made| made.0.function == instance.function);
+        let name = match others.count() {
+            0 => format!("{}_{}", self.prefix, function.name),
+            n => format!("{}_{}_{}", self.prefix, function.name, n + 1),
+        };
+        let routine = Routine::new(function, name.clone(), self.identifiers());
+        let outside = std::mem::replace(&mut self.here, routine);
+        let made = self.written(function, about, &instance)?;
+        self.here = outside;
+        self.made.push((instance, made.clone()));
+        Ok(made)
+    }
+
+    /// Without the names of functions and types.
+    fn identifiers(&self) -> Identifiers {
+        let functions = self.functions.keys().copied();
+        let all = functions
+            .chain(super::OWN)
+            .chain(["init", "state", "example"]);
+        let taken = all.map(|name| format!("{}_{name}", self.prefix));
+        Identifiers::without(taken.chain([self.prefix.to_owned()]))
+    }
+
+    fn written(
+        &mut self,
+        function: &'p Function,
+        about: &str,
+        instance: &Instance,
+    ) -> Result<Made, Refusal> {
+        let mut sizes = instance.sizes.iter();
+        let mut fields = instance.fields.iter();
+        let (mut shared, mut given) = (vec![], vec![]);
+        let mut parameters = vec![];
+        for parameter in &function.parameters {
+            let name = self.here.called(&parameter.name);
+            match (parameter.kind, parameter.is_pointer) {
+                (Type::Field, _) => {
+                    let field = fields.next().ok_or_else(|| lacks("a function"))?;
+                    let fields = &mut self.here.fields;
+                    fields.insert(parameter.name.clone(), field.clone());
+                    continue;
+                }
+                (Type::State, _) => shared.push(format!("{name} : {}_state;", self.prefix)),
+                (kind, true) => {
+                    let size = *sizes.next().ok_or_else(|| lacks("an array"))?;
+                    self.here.sizes.insert(parameter.name.clone(), size);
+                    shared.push(format!("{name} : {};", self.array(kind, size)));
+                }
+                (kind, false) => given.push(format!("{name} : {};", self.kind(kind))),
+            }
+            parameters.push(name);
+        }
+        self.block(&function.body)?;
+        if function.kind == Type::Void {
+            let done = format!("{} := TRUE;", self.here.name);
+            self.here.line(done);
+        }
+        let name = self.here.name.clone();
+        self.text += &format!(
+            "{}FUNCTION {name} : {}\n{}{}{}{}END_FUNCTION\n\n",
+            comment(about),
+            self.kind(function.kind),
+            section("VAR_IN_OUT", &shared),
+            section("VAR_INPUT", &given),
+            section("VAR", &self.here.locals),
+            self.here.text()
+        );
+        Ok(Made { name, parameters })
+    }
+
+    /// Declares a variable of the function.
+    pub fn declare(&mut self, declaration: &'p Declaration) -> Result<(), Refusal> {
+        let name = self.here.called(&declaration.name);
+        let kind = match &declaration.size {
+            None => self.kind(declaration.kind).to_owned(),
+            Some(size) => {
+                let size = self.constant(size).and_then(|size| size.try_into().ok());
+                let size: usize = size.ok_or_else(|| lacks("an array of unknown size"))?;
+                let known = self.here.sizes.insert(declaration.name.clone(), size);
+                if known.is_some_and(|known| known != size) {
+                    return Err(lacks("two arrays of one name"));
+                }
+                self.array(declaration.kind, size)
+            }
+        };
+        let declared = format!("{name} : {kind};");
+        if !self.here.locals.contains(&declared) {
+            self.here.locals.push(declared);
+        }
+        Ok(())
+    }
+}
+
+/// What the type of an array is called.
+pub(super) fn array_type(prefix: &str, kind: &str, size: usize) -> String {
+    let word = match kind {
+        "DINT" => "counts",
+        "BOOL" => "flags",
+        _ => "reals",
+    };
+    format!("{prefix}_{word}_{size}")
+}
+
+/// A section of declarations, where there are any.
+pub(super) fn section(word: &str, declarations: &[String]) -> String {
+    if declarations.is_empty() {
+        return String::new();
+    }
+    let lines = declarations.iter();
+    let lines: String = lines.map(|line| format!("        {line}\n")).collect();
+    format!("    {word}\n{lines}    END_VAR\n")
+}
+
+/// A comment of C, or words, as lines of comments.
+pub(super) fn comment(words: &str) -> String {
+    let words = words.trim_start_matches("/*").trim_end_matches("*/");
+    let lines = words.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines
+        .map(|line| format!("(* {} *)\n", plain(line)))
+        .collect()
+}
+
+/// Words in a comment, whatever they hold.
+pub(super) fn plain(words: &str) -> String {
+    let words = words.chars();
+    let words = words.map(|c| if c.is_control() { ' ' } else { c });
+    let words: String = words.collect();
+    // a $ or a quote means nothing in a comment, its ends do
+    words.replace("*)", "* )").replace("(*", "( *")
+}
+
+pub(super) fn lacks(operation: &str) -> Refusal {
+    Refusal::Lacks {
+        language: "Structured Text",
+        operation: operation.to_owned(),
+    }
+}
