@@ -223,6 +223,35 @@ def test_directional_derivatives_are_those_of_the_plant(
     check_derivatives(export(command, tmp_path, ROOT / name, "--fmi", str(version)))
 
 
+VAT = """
+model Vat
+  input Real feed(start = 1);
+  output Real level(start = 0, min = 0);
+  Real dye(start = 2);
+equation
+  der(level) = feed - sqrt(level);
+  der(dye) = feed*(3 - dye) - sqrt(level)*dye;
+end Vat;
+"""
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_of_an_empty_tank_all_columns_but_the_level_s_can_be_had(
+    command: Path, tmp_path: Path, version: int
+) -> None:
+    (tmp_path / "vat.mo").write_text(VAT)
+    equations = Equations(export(command, tmp_path, tmp_path / "vat.mo", "--fmi", str(version)))
+    unknowns = ["der(level)", "der(dye)"]
+    equations.at(0.0, np.array([0.0, 2.0]), np.array([1.0]))
+    for known, slopes in (("feed", [1, 1]), ("dye", [0, -1]), ("time", [0, 0])):
+        assert list(equations.along(unknowns, [known], np.ones(1))) == slopes
+    knowns = ["level", "dye", "feed"]
+    assert list(equations.along(unknowns, knowns, np.array([0.0, 2.0, 0.5]))) == [0.5, -1.5]
+    with pytest.raises(Exception, match="DirectionalDerivative"):
+        equations.along(unknowns, knowns, np.ones(3))
+    equations.close()
+
+
 OBSERVERS: dict[str, dict[str, str]] = {
     "two-tanks/study.toml": {"pump": "3 + sin(time/50)"},
     "lee/study.toml": {"u": "2*sin(3*time)"},

@@ -1,7 +1,7 @@
 //! Equations as functional mock-up units: model exchange and co-simulation in one archive.
 
 use super::c::{File, prefix};
-use super::description::{Description, Role, Variable, page, time};
+use super::description::{Description, Role, Variable, page};
 use super::fmu::{Archive, EXCHANGE, Experiment, Quantity, Unit, Version, reasons};
 use super::ode::{CODES, Ode, Sources, sources};
 use crate::Refusal;
@@ -15,8 +15,8 @@ pub struct Exchange<'a> {
     pub ode: &'a Ode<'a>,
     /// every unit that a quantity names, once
     pub units: &'a [Unit],
-    /// what time is counted in, in words
-    pub time: &'a str,
+    /// the independent variable
+    pub time: &'a Quantity,
     /// what a tool starts from, where the study says
     pub experiment: Option<Experiment>,
 }
@@ -58,9 +58,8 @@ impl Exchange<'_> {
 
     fn description(&self, structure: &Structure<'_>, version: Version, token: &str) -> String {
         let ode = self.ode;
-        let time = time(self.time);
         let variable = |quantity, role| Variable { quantity, role };
-        let mut variables = vec![variable(&time, Role::Time)];
+        let mut variables = vec![variable(self.time, Role::Time)];
         variables.extend(ode.inputs.iter().map(|q| variable(q, Role::Input)));
         variables.extend(ode.states.iter().map(|state| {
             let is_output = state.is_output;
@@ -76,6 +75,7 @@ impl Exchange<'_> {
             title: ode.title,
             units: self.units,
             experiment: self.experiment,
+            categories: &["logStatusError", "logStatusDiscard"],
             variables: &variables,
             interface: interface(&self.identifier(), version),
             structure: structure.text(version),

@@ -67,6 +67,7 @@ fn a_plant_says_what_it_is() {
         ("y", "causality=\"output\" variability=\"continuous\"/>"),
     ];
     let (description, notes) = export(&folder, "vat.mo", "vat_plant", &[]);
+    assert!(description.contains("<Category name=\"logStatusDiscard\"/>"));
     assert!(notes.contains("in co-simulation steps of"), "{notes}");
     let found = variables(&description);
     assert_eq!(found.len(), three.len(), "{description}");
@@ -117,6 +118,8 @@ fn a_study_gives_its_plant_starts_parameters_and_unit_of_time() {
     };
     let (plant, observer) = (of("plant"), of("observer"));
     for part in [
+        "<Unit name=\"s\">",
+        "causality=\"independent\" variability=\"continuous\" unit=\"s\"/>",
         "name=\"upper\"",
         "start=\"6.0\"",
         "unit=\"V/s\"",
@@ -238,6 +241,60 @@ fn columns(folder: &Path, name: &str, sizes: (usize, usize, usize), point: &[f64
     let ran = Command::new(folder.join("bench")).output().unwrap();
     let told = String::from_utf8(ran.stdout).unwrap();
     told.lines().map(|line| line.parse().unwrap()).collect()
+}
+
+/// An empty vat: the slope of √h is infinite.
+#[test]
+fn a_direction_in_which_the_level_stays_asks_nothing_of_the_root() {
+    if !has("cc") {
+        return skipped("there is no C compiler");
+    }
+    let folder = Folder::empty();
+    folder.write("vat.mo", VAT);
+    export(&folder, "vat.mo", "vat_plant", &[]);
+    // by time, h, v, q: der(h) = q - √h, der(v) = -3, y = v·t, at t = 2, h = 0, v = 5, q = 1
+    let found = columns(
+        folder.path.path(),
+        "vat_plant",
+        (2, 1, 1),
+        &[2.0, 0.0, 5.0, 1.0],
+    );
+    let level = [f64::NEG_INFINITY, 0.0, 0.0];
+    assert_eq!(
+        found,
+        [[0.0, 0.0, 5.0], level, [0.0, 0.0, 2.0], [1.0, 0.0, 0.0]].concat()
+    );
+}
+
+/// Steps for the level a hundredth off, not for the root's infinite slope at 0.
+#[test]
+fn steps_at_a_roots_zero_are_no_shorter_than_a_hundredth_off() {
+    let folder = Folder::empty();
+    folder.write(
+        "empty.mo",
+        &VAT.replace("start = 2, min = 0,", "start = 0, min = 0,"),
+    );
+    // of size 2: the secant √0.02/0.02 is 7.07, half of its inverse 0.0707
+    let (_, notes) = export(&folder, "empty.mo", "vat_plant", &[]);
+    assert!(
+        notes.contains("in co-simulation steps of 0.05 at most"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("at the start a slope is infinite"),
+        "{notes}"
+    );
+    folder.write(
+        "empty.toml",
+        "plant = \"empty.mo\"\n[sensors]\nmeasured = [\"h\"]\nnoise = { h = 0.1 }\n[process_noise]\nh = 1e-3\n[observer]\nfamily = \"ekf\"\ninitial = { h = 0 }\n",
+    );
+    let made = folder.run(&["export", "empty.toml", "--to", "c", "-o", "c"]);
+    assert_eq!(made.code, 0, "{}", made.err);
+    assert!(
+        made.err.contains("note: steps of 0.05 at most"),
+        "{}",
+        made.err
+    );
 }
 
 #[test]

@@ -22,12 +22,13 @@ typedef struct {
     double derivatives[STATES];
     double outputs[OUTPUTS + 1];
     int is_settled; /* whether derivatives and outputs are those of the values above */
-    int is_running; /* whether initialization is over */
+    int mode;       /* one of the modes above */
 } course;
 
 static void begin(course *c)
 {
     memset(c, 0, sizeof *c);
+    c->mode = INSTANTIATED;
     @NAME@_init(c->states);
     for (int i = 0; i < INPUTS; i++) {
         c->inputs[i] = first_inputs[i];
@@ -46,11 +47,7 @@ static void settle(course *c)
 /* Goes on under the inputs as they are. */
 static int step(course *c, double from, double to)
 {
-    int code = 0;
-    if (!c->is_running) {
-        return NOT_NOW;
-    }
-    code = @NAME@_advance(from, to, c->inputs, c->states);
+    const int code = @NAME@_advance(from, to, c->inputs, c->states);
     if (code == 0) {
         c->time = to;
         c->is_settled = 0;
@@ -89,7 +86,7 @@ static int write_value(course *c, uint32_t reference, double value)
     }
     if (reference < FIRST_STATE) {
         c->inputs[reference - FIRST_INPUT] = value;
-    } else if (c->is_running) {
+    } else if ((c->mode & BEFORE) == 0) {
         return NOT_NOW;
     } else {
         c->states[reference - FIRST_STATE] = value;
