@@ -1,5 +1,6 @@
 //! Plants and observers in continuous time for simulators.
 
+use lynkeus_model::Plant;
 use lynkeus_run::{Method, Step, System, step_of};
 
 use crate::export::{Export, ExportOptions, Target, designed, origin};
@@ -9,17 +10,42 @@ use crate::prepare::{self, Prepared};
 use crate::study::{self, Rk4Step};
 use crate::{Error, FmiVersion, Precision, Study, systems};
 
-/// The plant of a study as a functional mock-up unit.
+/// The plant of a study as a functional mock-up unit, its parameters to be set where they can be symbols.
 ///
 /// # Errors
 /// Other languages, `float`, and what cannot run elsewhere.
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
-    let plant = prepare::plant(study)?;
+    let valued = prepare::plant(study)?;
+    if valued.parameters.is_empty() {
+        return plant_as(study, &valued, version, options);
+    }
+    let with_symbols = match Equations::of_plant(study, &valued)?.system()? {
+        // which is known of times alone where they are numbers
+        system if system.modes() > 0 || system.has_instants() => {
+            Err("what happens at times has to be known")
+        }
+        _ => prepare::symbolic_plant(study)
+            .and_then(|plant| plant_as(study, &plant, version, options))
+            .map_err(|_| "as symbols they make equations that cannot run elsewhere"),
+    };
+    with_symbols.or_else(|why| {
+        let mut made = plant_as(study, &valued, version, options)?;
+        made.notes.push(format!("parameters are numbers: {why}"));
+        Ok(made)
+    })
+}
+
+fn plant_as(
+    study: &Study,
+    plant: &Plant,
+    version: FmiVersion,
+    options: &ExportOptions,
+) -> Result<Export, Error> {
     let settings = study.simulate.as_ref();
     let component = Component {
         study,
-        equations: Equations::of_plant(study, &plant)?,
+        equations: Equations::of_plant(study, plant)?,
         settings: settings.map(|settings| &settings.method),
         section: settings.map(|_| "simulate"),
         about: vec![format!("The plant {}.", plant.name)],
@@ -117,7 +143,7 @@ impl Component<'_> {
         }
         let mut evaluation = system.evaluation();
         let signals = evaluation.signals_mut().iter_mut();
-        for (signal, value) in signals.zip(self.equations.typical_inputs()) {
+        for (signal, value) in signals.zip(self.equations.typical_signals()) {
             *signal = value;
         }
         let unsaid = Unsaid {

@@ -28,6 +28,8 @@ pub(crate) struct Equations<'a> {
     independent: Quantity,
     states: Vec<Equation>,
     inputs: Vec<Input>,
+    /// what stays but may be set
+    parameters: Vec<(Quantity, Node)>,
     /// but for states that are outputs
     outputs: Vec<(Quantity, Node)>,
     headers: Headers,
@@ -51,7 +53,7 @@ struct Equation {
 }
 
 impl<'a> Equations<'a> {
-    /// The plant with the starts of the study.
+    /// The plant with the starts of the study, and as parameters those that are symbols of its equations.
     ///
     /// # Errors
     /// A start of something that is no state.
@@ -60,6 +62,9 @@ impl<'a> Equations<'a> {
         let starts = starts(plant, given.unwrap_or_default())?;
         let mut made = Self::none(study, plant, plant.time, "plant");
         made.title = format!("The plant {}", plant.name);
+        for parameter in &plant.parameters {
+            made.headers.take(&parameter.variable.name);
+        }
         made.inputs.extend(plant.inputs.iter().map(|input| Input {
             quantity: ranged(input, unset(study, plant, input)),
             symbol: input.node,
@@ -74,6 +79,15 @@ impl<'a> Equations<'a> {
         let is_state = |name: &str| plant.states.iter().any(|state| state.name == name);
         let own = plant.outputs.iter().filter(|o| !is_state(&o.name));
         made.outputs.extend(own.map(|v| (ranged(v, 0.0), v.node)));
+        let told = plant.outputs.iter().map(|output| output.node);
+        let told: Vec<Node> = plant.derivatives.iter().copied().chain(told).collect();
+        let read = plant.graph.symbols_of(&told);
+        let parameters = plant.parameters.iter();
+        let parameters = parameters.filter(|p| read.contains(&p.variable.node));
+        made.parameters.extend(parameters.filter_map(|parameter| {
+            let variable = &parameter.variable;
+            Some((ranged(variable, parameter.value?), variable.node))
+        }));
         Ok(made)
     }
 
@@ -131,6 +145,7 @@ impl<'a> Equations<'a> {
             independent: time(study, &mut headers),
             states: vec![],
             inputs: vec![],
+            parameters: vec![],
             outputs: vec![],
             headers,
         }
@@ -203,7 +218,7 @@ impl<'a> Equations<'a> {
         }
     }
 
-    /// As a system whose signals are the inputs.
+    /// As a system whose signals are the inputs, then the parameters.
     ///
     /// # Errors
     /// Expressions that read what is neither state nor input.
@@ -217,22 +232,28 @@ impl<'a> Equations<'a> {
         let derivatives: Vec<Node> = self.states.iter().map(|e| e.derivative).collect();
         let inputs = self.inputs.iter();
         let inputs = inputs.map(|input| (input.quantity.name.clone(), input.symbol));
+        let parameters = self.parameters.iter();
+        let parameters = parameters.map(|(told, symbol)| (told.name.clone(), *symbol));
         let outputs = self.outputs.iter();
         let outputs = outputs.map(|(told, node)| (told.name.clone(), *node));
         System::new(
             self.graph,
             self.time,
             &states,
-            &inputs.collect::<Vec<_>>(),
+            &inputs.chain(parameters).collect::<Vec<_>>(),
             &derivatives,
             &outputs.collect::<Vec<_>>(),
         )
         .map_err(Error::from_source)
     }
 
-    /// Values that the inputs may have, in the order of the system's signals.
-    pub fn typical_inputs(&self) -> impl Iterator<Item = f64> + '_ {
-        self.inputs.iter().map(|input| input.typical)
+    /// Values that the system's signals may have, in their order.
+    pub fn typical_signals(&self) -> impl Iterator<Item = f64> + '_ {
+        let parameters = self.parameters.iter().map(|(told, _)| told.start);
+        self.inputs
+            .iter()
+            .map(|input| input.typical)
+            .chain(parameters)
     }
 
     /// How large the states are.
@@ -256,7 +277,10 @@ impl<'a> Equations<'a> {
         notes.extend(self.headers.notes.iter().cloned());
         let inputs = self.inputs.iter().map(|input| input.quantity.clone());
         let inputs: Vec<Quantity> = inputs.collect();
-        let outputs: Vec<Quantity> = self.outputs.iter().map(|(q, _)| q.clone()).collect();
+        let quantities = |of: &[(Quantity, Node)]| -> Vec<Quantity> {
+            of.iter().map(|(quantity, _)| quantity.clone()).collect()
+        };
+        let (parameters, outputs) = (quantities(&self.parameters), quantities(&self.outputs));
         let states: Vec<State> = self.states.iter().map(|e| e.state.clone()).collect();
         let own = states.iter().flat_map(|s| [&s.quantity, &s.derivative]);
         let exchange = Exchange {
@@ -266,6 +290,7 @@ impl<'a> Equations<'a> {
                 system,
                 method,
                 inputs: &inputs,
+                parameters: &parameters,
                 states: &states,
                 outputs: &outputs,
                 about,
@@ -274,6 +299,7 @@ impl<'a> Equations<'a> {
                 inputs
                     .iter()
                     .chain(&outputs)
+                    .chain(&parameters)
                     .chain(own)
                     .chain([&self.independent]),
             ),

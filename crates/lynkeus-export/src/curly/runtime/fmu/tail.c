@@ -45,7 +45,7 @@ static const char *reason(int code)
 @REASONS@    case NO_VALUE:
         return "there is no variable of this type with such a value reference";
     case NOT_SETTABLE:
-        return "only inputs and start values can be set";
+        return "only inputs, start values and parameters can be set";
     case NOT_OURS:
         return "these bytes are no state of this FMU";
     case NOT_POSITIVE:
