@@ -223,6 +223,76 @@ def test_directional_derivatives_are_those_of_the_plant(
     check_derivatives(export(command, tmp_path, ROOT / name, "--fmi", str(version)))
 
 
+VAT = """
+model Vat
+  input Real feed(start = 1);
+  output Real level(start = 0, min = 0);
+  Real dye(start = 2);
+equation
+  der(level) = feed - sqrt(level);
+  der(dye) = feed*(3 - dye) - sqrt(level)*dye;
+end Vat;
+"""
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_of_an_empty_tank_all_columns_but_the_level_s_can_be_had(
+    command: Path, tmp_path: Path, version: int
+) -> None:
+    (tmp_path / "vat.mo").write_text(VAT)
+    equations = Equations(export(command, tmp_path, tmp_path / "vat.mo", "--fmi", str(version)))
+    unknowns = ["der(level)", "der(dye)"]
+    equations.at(0.0, np.array([0.0, 2.0]), np.array([1.0]))
+    for known, slopes in (("feed", [1, 1]), ("dye", [0, -1]), ("time", [0, 0])):
+        assert list(equations.along(unknowns, [known], np.ones(1))) == slopes
+    knowns = ["level", "dye", "feed"]
+    assert list(equations.along(unknowns, knowns, np.array([0.0, 2.0, 0.5]))) == [0.5, -1.5]
+    with pytest.raises(Exception, match="DirectionalDerivative"):
+        equations.along(unknowns, knowns, np.ones(3))
+    equations.close()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_parameters_can_be_set(command: Path, tmp_path: Path, version: int) -> None:
+    """Before the start, against ``simulate`` with others; and on the way, from there on."""
+    study, values = ROOT / "examples/two-tanks/study.toml", {"k1": 0.05, "k3": 0.04}
+    length, changes = stairs(study)
+    given = "".join(f"{name} = {value}\n" for name, value in values.items())
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other/study.toml"
+    other.write_text(study.read_text() + "\n[parameters]\n" + given)
+    shutil.copy(study.parent / "two_tanks.mo", other.parent)
+    expected = simulated(command, tmp_path, other, changes)
+    options = ["--fmi", str(version), "--step", repr(length / 2000)]
+    file = export(command, tmp_path, study.parent / "two_tanks.mo", *options)
+    told = fmpy.read_model_description(str(file))
+    offered = {v.name: float(v.start) for v in told.modelVariables if v.causality == "parameter"}
+    assert offered == {"k1": 0.03951, "k2": 0.07283, "k3": 0.06651, "k4": 0.03037}
+    states = {v.derivative.name: expected[v.derivative.name] for v in told.modelVariables if v.derivative}
+    for kind in ("CoSimulation", "ModelExchange"):
+        result = fmpy.simulate_fmu(
+            str(file),
+            fmi_type=kind,
+            start_time=expected["t"][0],
+            stop_time=expected["t"][-1],
+            output_interval=length / 16,
+            input=signals(told, expected),
+            output=list(states),
+            start_values=values | {state: column[0] for state, column in states.items()},
+            relative_tolerance=1e-10,
+        )
+        for state, column in states.items():
+            found = [result[state][np.abs(result["time"] - t) < 1e-9 * length][0] for t in expected["t"]]
+            assert np.max(np.abs(found - column)) <= 1e-6 * np.max(np.abs(column)), (kind, state)
+    equations = Equations(file)
+    equations.at(0.0, np.array([4.0, 9.0]), np.array([2.0]))
+    assert equations.get(["der(upper)"])[0] == pytest.approx(-2 * 0.03951 + 2 * 0.03037, rel=1e-14)
+    equations.write([equations.places["k1"]], [0.5])
+    assert equations.get(["der(upper)"])[0] == pytest.approx(-2 * 0.5 + 2 * 0.03037, rel=1e-14)
+    assert equations.along(["der(upper)"], ["upper"], np.ones(1))[0] == pytest.approx(-0.125, rel=1e-14)
+    equations.close()
+
+
 OBSERVERS: dict[str, dict[str, str]] = {
     "two-tanks/study.toml": {"pump": "3 + sin(time/50)"},
     "lee/study.toml": {"u": "2*sin(3*time)"},

@@ -109,15 +109,16 @@ impl Code {
     }
 
     /// How the outputs change along a direction: the product of their Jacobian with it, by the rules
-    /// of differentiation. Its inputs are those of the code, then the direction, an entry for each.
-    /// The condition of a linear system counts as constant where it is not spelled out.
+    /// of differentiation. Its inputs are those of the code, then the direction, an entry for each of
+    /// the first `moving` of them; the others stay. The condition of a linear system counts as constant where it is not spelled out.
     #[must_use]
-    pub fn along(&self) -> Self {
+    pub fn along(&self, moving: usize) -> Self {
         let graph = self.graph.clone();
         let part = |i| graph.fresh(format!("direction {i}")).node();
-        let direction: Vec<Node> = (0..self.inputs.len()).map(part).collect();
+        let moving = &self.inputs[..moving.min(self.inputs.len())];
+        let direction: Vec<Node> = (0..moving.len()).map(part).collect();
         Self {
-            outputs: jacobian::along(&graph, &self.outputs, &self.inputs, &direction),
+            outputs: jacobian::along(&graph, &self.outputs, moving, &direction),
             inputs: [&self.inputs[..], &direction].concat(),
             graph,
         }

@@ -1,11 +1,14 @@
 //! Sparse symbolic Jacobians.
 
 mod implicit;
+mod still;
 
 use std::collections::{BTreeMap, HashMap};
 
-use crate::partials::{Variation, variation};
+use crate::partials::{Variation, is_steep, variation};
 use crate::{Binary, Graph, Node, Op, Unary};
+
+use still::Still;
 
 /// A sparse matrix of expressions ∂(outputs)/∂(inputs).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,7 +82,7 @@ pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
     let one = graph.constant(1.0).node();
     let seeds = inputs.iter().enumerate();
     let seeds = seeds.map(|(column, &input)| (input, Tangent::from([(column, one)])));
-    let tangents = accumulated(graph, outputs, seeds.collect());
+    let tangents = accumulated(graph, outputs, seeds.collect(), None);
     let entries = outputs.iter().enumerate().flat_map(|(row, output)| {
         let tangent = tangents.get(output).cloned().unwrap_or_default();
         tangent
@@ -95,20 +98,25 @@ pub fn forward(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
 
 /// The product of the Jacobian with a direction, one entry for each input, by forward
 /// accumulation: some operations for each of the graph's, however many inputs there are.
+/// An entry of the direction that is 0 says nothing, also where a slope is infinite: √x does not
+/// move at x = 0 along a direction in which x stays.
 pub fn along(graph: &Graph, outputs: &[Node], inputs: &[Node], direction: &[Node]) -> Vec<Node> {
     let seeds = inputs.iter().zip(direction);
     let seeds = seeds.map(|(&input, &part)| (input, Tangent::from([(0, part)])));
-    let tangents = accumulated(graph, outputs, seeds.collect());
+    let still = Still::of(graph, inputs, direction);
+    let tangents = accumulated(graph, outputs, seeds.collect(), Some(still));
     let of = |output| tangents.get(output)?.get(&0).copied();
     let zero = graph.constant(0.0).node();
     outputs.iter().map(|o| of(o).unwrap_or(zero)).collect()
 }
 
-/// The derivatives of every node that outputs need, from those of the inputs.
+/// The derivatives of every node that outputs need, from those of the inputs. Where it is known
+/// along which directions a node is still, slopes count along the others only.
 fn accumulated(
     graph: &Graph,
     outputs: &[Node],
     mut tangents: HashMap<Node, Tangent>,
+    mut still: Option<Still<'_>>,
 ) -> HashMap<Node, Tangent> {
     let build = Builder { graph };
     let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
@@ -122,8 +130,15 @@ fn accumulated(
             solved.insert(node, results);
             continue;
         }
-        let tangent = match variation(graph, node) {
-            Variation::Sum(terms) => sum_tangent(&build, &terms, &tangents),
+        let variation = variation(graph, node);
+        if let Some(still) = &mut still {
+            still.visit(node, &variation);
+        }
+        let tangent = match variation {
+            Variation::Sum(terms) => {
+                let guard = still.as_ref().filter(|_| is_steep(graph.op(node)));
+                sum_tangent(&build, &terms, &tangents, guard)
+            }
             Variation::Choice(c, a, b) => choice_tangent(&build, c, a, b, &tangents),
             Variation::Entry { system, entry } => solved[&system]
                 .iter()
@@ -141,11 +156,18 @@ fn sum_tangent(
     build: &Builder<'_>,
     terms: &[(Node, Node)],
     tangents: &HashMap<Node, Tangent>,
+    guard: Option<&Still<'_>>,
 ) -> Tangent {
     let mut sum = Tangent::new();
     for &(argument, slope) in terms {
         for (&column, &d) in tangents.get(&argument).into_iter().flatten() {
-            build.add_to(&mut sum, column, build.times(slope, d));
+            let product = build.times(slope, d);
+            let guard = guard.filter(|_| build.graph.constant_value(slope).is_none());
+            let is_still = guard.and_then(|still| still.condition(argument));
+            let term = is_still.map_or(product, |is_still| {
+                build.graph.select(is_still, build.zero(), product)
+            });
+            build.add_to(&mut sum, column, term);
         }
     }
     sum

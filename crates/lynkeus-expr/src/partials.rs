@@ -34,6 +34,16 @@ pub(crate) fn variation(graph: &Graph, node: Node) -> Variation {
     }
 }
 
+/// Whether a slope can be infinite, or have no value, where the arguments are finite.
+pub(crate) fn is_steep(op: Op) -> bool {
+    match op {
+        Op::Unary(op, _) => matches!(op, Unary::Sqrt | Unary::Ln | Unary::Asin | Unary::Acos),
+        Op::Powi(_, exponent) => exponent < 0,
+        Op::Binary(op, ..) => matches!(op, Binary::Div | Binary::Pow | Binary::Atan2),
+        _ => false,
+    }
+}
+
 /// df/da; none where it is zero almost everywhere.
 fn unary<'g>(op: Unary, a: Expr<'g>, f: Expr<'g>) -> Option<Expr<'g>> {
     Some(match op {

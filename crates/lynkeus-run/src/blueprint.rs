@@ -2,10 +2,10 @@
 
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
+use crate::spectral::fastest;
 use crate::system::Evaluation;
 use crate::{
     Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,
-    spectral_radius,
 };
 
 /// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
@@ -75,11 +75,25 @@ impl Blueprint {
     }
 }
 
+/// A step that a system needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeededStep {
+    /// the longest that is short enough; infinite where nothing moves
+    pub length: f64,
+    /// a slope at the start is infinite, as that of a root at 0: that over a hundredth of the states' sizes
+    /// counts instead
+    pub is_steep: bool,
+}
+
 /// The longest fixed step that is short enough for the fastest mode at the start (|λ|·h ≤ ½), for
-/// known inputs at these values, the others at 0; infinite where nothing moves, none where the
-/// equations have no slopes there.
+/// known inputs at these values, the others at 0; none where the equations have no slopes there.
+/// `sizes` of the states count where a slope is infinite.
 #[must_use]
-pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64> {
+pub fn needed_step(
+    blueprint: &Blueprint,
+    inputs: &[(&str, f64)],
+    sizes: &[f64],
+) -> Option<NeededStep> {
     let system = blueprint.flow();
     let tuned = match blueprint {
         Blueprint::Sampled { observer, .. } => observer.tuned.as_ref(),
@@ -95,14 +109,46 @@ pub fn needed_step(blueprint: &Blueprint, inputs: &[(&str, f64)]) -> Option<f64>
     for (signal, value) in signals.rev().zip(tuned.into_iter().rev()) {
         *signal = value;
     }
-    step_of(&mut evaluation, system.start())
+    step_of(&mut evaluation, system.start(), sizes)
 }
 
 /// The longest fixed step of a system under the signals that are set, as [`needed_step`] of an
 /// estimator.
 #[must_use]
-pub fn step_of(evaluation: &mut Evaluation, start: &[f64]) -> Option<f64> {
+pub fn step_of(evaluation: &mut Evaluation, start: &[f64], sizes: &[f64]) -> Option<NeededStep> {
     evaluation.enter(0.0);
-    let needed = AUTO_PRODUCT / spectral_radius(evaluation, 0.0, start);
-    (needed > 0.0).then_some(needed)
+    let seen = fastest(evaluation, 0.0, start, sizes);
+    let length = AUTO_PRODUCT / seen.radius;
+    (length > 0.0).then_some(NeededStep {
+        length,
+        is_steep: seen.is_steep,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lynkeus_expr::Graph;
+
+    /// x' = -√x: slope 1/(2√x), infinite at 0, where the secant over a hundredth of 4 has 5.
+    #[test]
+    fn an_infinite_slope_is_seen_by_a_secant() {
+        let g = Graph::new();
+        let (t, x) = (g.symbol("t").node(), g.symbol("x"));
+        let states = [("x".to_owned(), x.node(), 0.0)];
+        let system = System::new(&g, t, &states, &[], &[(-x.sqrt()).node()], &[]).unwrap();
+        let step = |start: f64, sizes: &[f64]| {
+            let found = step_of(&mut system.evaluation(), &[start], sizes).unwrap();
+            (found.length, found.is_steep)
+        };
+        assert_eq!(step(1.0, &[4.0]), (1.0, false));
+        let near = |(length, is_steep): (f64, bool), expected: f64| {
+            assert!(
+                is_steep && (length / expected - 1.0).abs() < 1e-12,
+                "{length}"
+            );
+        };
+        near(step(0.0, &[4.0]), 0.1);
+        near(step(0.0, &[]), 0.05);
+    }
 }

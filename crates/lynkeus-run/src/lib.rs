@@ -121,7 +121,7 @@ mod system;
 mod trajectory;
 
 pub use batch::{Batch, Ended, Member};
-pub use blueprint::{Blueprint, needed_step, step_of};
+pub use blueprint::{Blueprint, NeededStep, needed_step, step_of};
 pub use dynamics::{Dynamics, Function};
 pub use error::{Error, Interrupted};
 pub use estimate::{Estimates, Log, estimate, estimate_watched};

@@ -302,7 +302,7 @@ mod tests {
                 observer: Box::new(observer.clone()),
                 method: method(),
             };
-            crate::needed_step(&blueprint, &[]).unwrap()
+            crate::needed_step(&blueprint, &[], &[]).unwrap().length
         };
         assert!((step(&fixed) - step(&tuned)).abs() < 1e-12 * step(&fixed));
     }

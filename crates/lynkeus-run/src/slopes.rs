@@ -90,12 +90,20 @@ impl Slopes {
     /// differences. Not finite where f is not.
     pub(crate) fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
         if !(f.slopes(t, x, self) && self.are_finite()) {
-            self.differences(f, t, x);
+            let size = |k: usize| f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
+            self.differences(f, t, x, size);
         }
     }
 
-    /// One-sided differences, every entry: forward, or backward where f has no value ahead.
-    fn differences(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
+    /// One-sided differences over such a size of each state, every entry: forward, or backward where f
+    /// has no value ahead.
+    pub(crate) fn differences(
+        &mut self,
+        f: &mut impl Dynamics,
+        t: f64,
+        x: &[f64],
+        size: impl Fn(usize) -> f64,
+    ) {
         let n = x.len();
         // as many places as there are in all are all of them
         let places = match self.places.len() == n * n {
@@ -110,7 +118,7 @@ impl Slopes {
         let mut image = vec![0.0; n];
         let mut columns = DMatrix::zeros(n, n);
         for (k, mut column) in columns.column_iter_mut().enumerate() {
-            let size = f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
+            let size = size(k);
             for ahead in [size, -size] {
                 moved[k] = x[k] + ahead;
                 // the difference that the rounded sum really makes

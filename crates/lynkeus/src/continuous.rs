@@ -1,27 +1,53 @@
 //! Plants and observers in continuous time for simulators.
 
+use lynkeus_model::Plant;
 use lynkeus_run::{Method, Step, System, step_of};
-use lynkeus_structure::short;
 
 use crate::export::{Export, ExportOptions, Target, designed, origin};
-use crate::fixed_steps::{bends, rounded, sound, steps};
+use crate::fixed_steps::{Unsaid, bends, sound, steps};
 use crate::fmu::equations::Equations;
 use crate::prepare::{self, Prepared};
 use crate::study::{self, Rk4Step};
 use crate::{Error, FmiVersion, Precision, Study, systems};
 
-/// The plant of a study as a functional mock-up unit.
+/// The plant of a study as a functional mock-up unit, its parameters to be set where they can be symbols.
 ///
 /// # Errors
 /// Other languages, `float`, and what cannot run elsewhere.
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
-    let plant = prepare::plant(study)?;
+    let valued = prepare::plant(study)?;
+    if valued.parameters.is_empty() {
+        return plant_as(study, &valued, version, options);
+    }
+    let with_symbols = match Equations::of_plant(study, &valued)?.system()? {
+        // which is known of times alone where they are numbers
+        system if system.modes() > 0 || system.has_instants() => {
+            Err("what happens at times has to be known")
+        }
+        _ => prepare::symbolic_plant(study)
+            .and_then(|plant| plant_as(study, &plant, version, options))
+            .map_err(|_| "as symbols they make equations that cannot run elsewhere"),
+    };
+    with_symbols.or_else(|why| {
+        let mut made = plant_as(study, &valued, version, options)?;
+        made.notes.push(format!("parameters are numbers: {why}"));
+        Ok(made)
+    })
+}
+
+fn plant_as(
+    study: &Study,
+    plant: &Plant,
+    version: FmiVersion,
+    options: &ExportOptions,
+) -> Result<Export, Error> {
     let settings = study.simulate.as_ref();
     let component = Component {
         study,
-        equations: Equations::of_plant(study, &plant)?,
+        equations: Equations::of_plant(study, plant)?,
         settings: settings.map(|settings| &settings.method),
+        section: settings.map(|_| "simulate"),
         about: vec![format!("The plant {}.", plant.name)],
     };
     component.written(version, options)
@@ -46,6 +72,7 @@ pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export,
         study,
         equations: Equations::of_observer(study, &plant, &design.observer),
         settings: Some(&study.estimate.method),
+        section: Some("estimate"),
         about: std::iter::once(about).chain(designed(study)).collect(),
     };
     component.written(version, options)
@@ -78,6 +105,8 @@ struct Component<'a> {
     equations: Equations<'a>,
     /// how the study integrates them
     settings: Option<&'a study::Method>,
+    /// of the study, where it says so
+    section: Option<&'static str>,
     /// lines for people
     about: Vec<String>,
 }
@@ -114,25 +143,17 @@ impl Component<'_> {
         }
         let mut evaluation = system.evaluation();
         let signals = evaluation.signals_mut().iter_mut();
-        for (signal, value) in signals.zip(self.equations.typical_inputs()) {
+        for (signal, value) in signals.zip(self.equations.typical_signals()) {
             *signal = value;
         }
-        let Some(needed) = step_of(&mut evaluation, system.start()) else {
-            let message = "the step of co-simulation cannot be chosen: the equations have no slopes at the start";
-            return Err(Error::input(message)
-                .at(&self.study.file)
-                .hint("give --step"));
+        let unsaid = Unsaid {
+            study: self.study,
+            within: "in co-simulation ",
+            point: "communication point",
+            section: self.section,
         };
-        if needed.is_infinite() {
-            notes.push("one step from each communication point to the next: at the start nothing moves by itself; `export` takes a longest step as --step".to_owned());
-            return Ok(Method::Rk4(Step::Substeps(1)));
-        }
-        let step = rounded(needed);
-        let chosen = short(step);
-        notes.push(format!(
-            "in co-simulation steps of {chosen} at most, which the fastest mode at the start needs; `export` takes another as --step"
-        ));
-        Ok(Method::Rk4(Step::AtMost(step)))
+        let needed = step_of(&mut evaluation, system.start(), &self.equations.sizes());
+        unsaid.method(needed, notes)
     }
 }
 

@@ -147,7 +147,8 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let hasty = hasty(&prepared, &made);
     notes.extend(hasty.clone());
     let about = about(study, &made, hasty);
-    let files = printed(&prepared, &design, &made, &about, |device| {
+    let files = printed(&prepared, &design, &made, &about, |device, told| {
+        notes.extend(told);
         if options.precision == Precision::F32 {
             notes.extend(beyond_float(&c::lost_in_float(device)?));
         }
@@ -188,7 +189,7 @@ fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
     })
 }
 
-/// What `print` makes of an estimator, with `about` at its head.
+/// What `print` makes of an estimator, with `about` at its head, and of notes on names.
 ///
 /// # Errors
 /// What cannot run elsewhere.
@@ -197,7 +198,7 @@ pub(crate) fn printed<T>(
     design: &Design,
     made: &Blueprint,
     about: &[String],
-    print: impl FnOnce(&Device<'_>) -> Result<T, Refusal>,
+    print: impl FnOnce(&Device<'_>, Vec<String>) -> Result<T, Refusal>,
 ) -> Result<T, Error> {
     let told = Told::of(prepared, design, made);
     let first: Vec<FirstReading> = at_readings(prepared)
@@ -222,7 +223,8 @@ pub(crate) fn printed<T>(
         words: &told.words,
         about,
     };
-    print(&device).map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
+    print(&device, told.notes)
+        .map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
 }
 
 /// The study without what looks ahead, which a device cannot.
@@ -249,6 +251,7 @@ struct Told {
     monitors: usize,
     tunables: Vec<Tunable>,
     words: Vec<Entry>,
+    notes: Vec<String>,
 }
 
 impl Told {
@@ -266,25 +269,26 @@ impl Told {
         };
         let observer = &design.observer;
         let read = observer.measured.iter().chain(&observer.inputs);
-        let mut headers = Headers::beside(plant);
-        // as in the table of estimates
+        let mut headers = Headers::beside(plant).of_variables();
+        // as in the table of estimates, which has a column of time besides
         let _ = headers.time();
+        headers.notes.clear();
         let has_deviations = prepared.study().estimate.deviations;
         let mut deviations = vec![];
         let mut estimates = vec![];
         for estimate in &observer.estimates {
             let name = &estimate.variable.name;
             let about = known(name).about;
-            let header = headers.free(&hat(name), name);
+            let header = headers.free(&hat(name), &format!("the estimate of {name}"));
             estimates.push(Entry {
                 name: header,
                 about,
             });
             if has_deviations {
-                let header = headers.free(&format!("{name}_sd"), name);
+                let about = format!("standard deviation of {name}");
                 deviations.push(Entry {
-                    name: header,
-                    about: format!("standard deviation of {name}"),
+                    name: headers.free(&format!("{name}_sd"), &format!("the {about}")),
+                    about,
                 });
             }
         }
@@ -309,6 +313,7 @@ impl Told {
                 .collect(),
             tunables: tunable::printed(design, made),
             words,
+            notes: headers.notes,
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Fixed steps: those that are asked for, those that are needed, and what is told of them.
 
-use lynkeus_model::Variable;
-use lynkeus_run::{Blueprint, Method, Step, System, needed_step};
+use lynkeus_model::{Plant, Variable};
+use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, needed_step};
 use lynkeus_structure::short;
 
-use crate::Error;
 use crate::prepare::Prepared;
+use crate::{Error, Study, systems};
 
 /// How many of the steps that the fastest mode needs (|λ|h ≤ ½) are one with which the classical method
 /// is stable for no mode that decays: all of its region left of the axis has |λ|h < 2.97.
@@ -57,22 +57,69 @@ pub(crate) fn stepped(
     if let Method::Rk4(Step::AtMost(_) | Step::Substeps(_)) = made.method() {
         return Ok(made);
     }
-    let Some(needed) = needed(prepared, &made) else {
-        let message = "the step cannot be chosen: the equations have no slopes at the start";
-        return Err(Error::input(message)
-            .at(&prepared.study().file)
-            .hint("write method = \"rk4\" and step = … under [estimate], or give --step"));
+    let unsaid = Unsaid {
+        study: prepared.study(),
+        within: "",
+        point: "sample",
+        section: Some("estimate"),
     };
-    if needed.is_infinite() {
-        notes.push("one step from each sample to the next: at the start nothing moves by itself; --step takes a longest step".to_owned());
-        return Ok(made.with_method(Method::Rk4(Step::Substeps(1))));
+    let method = unsaid.method(needed(prepared, &made), notes)?;
+    Ok(made.with_method(method))
+}
+
+/// Fixed steps that neither the user nor the study gives.
+pub(crate) struct Unsaid<'a> {
+    pub study: &'a Study,
+    /// what they are for, or nothing
+    pub within: &'static str,
+    /// what they go between
+    pub point: &'static str,
+    /// where the study could give them
+    pub section: Option<&'static str>,
+}
+
+impl Unsaid<'_> {
+    /// Such as the fastest mode at the start needs, and told.
+    ///
+    /// # Errors
+    /// Nothing is needed that is known.
+    pub fn method(
+        &self,
+        needed: Option<NeededStep>,
+        notes: &mut Vec<String>,
+    ) -> Result<Method, Error> {
+        let Self { within, point, .. } = self;
+        let written = self.section.map(|section| {
+            format!("write method = \"rk4\" and step = … under [{section}], or give --step")
+        });
+        let Some(NeededStep { length, is_steep }) = needed else {
+            let message = format!(
+                "{within}the step cannot be chosen: the equations have no slopes at the start"
+            );
+            return Err(Error::input(message)
+                .at(&self.study.file)
+                .hint(written.unwrap_or_else(|| "give --step".to_owned())));
+        };
+        if length.is_infinite() {
+            notes.push(format!("{within}one step from each {point} to the next: at the start nothing moves by itself; --step takes a longest step"));
+            return Ok(Method::Rk4(Step::Substeps(1)));
+        }
+        let step = rounded(length);
+        let place = match is_steep {
+            true => {
+                "a hundredth of the ranges off the start needs (at the start a slope is infinite)"
+            }
+            false => "at the start needs",
+        };
+        let unsaid = self.section.map_or_else(String::new, |section| {
+            format!(": [{section}] has no method = \"rk4\" with `step`")
+        });
+        notes.push(format!(
+            "{within}steps of {} at most, which the fastest mode {place}{unsaid}; --step takes another",
+            short(step)
+        ));
+        Ok(Method::Rk4(Step::AtMost(step)))
     }
-    let step = rounded(needed);
-    notes.push(format!(
-        "steps of {} at most, which the fastest mode at the start needs: [estimate] has no method = \"rk4\" with `step`; --step takes another",
-        short(step)
-    ));
-    Ok(made.with_method(Method::Rk4(Step::AtMost(step))))
 }
 
 /// A value that an input may have.
@@ -82,12 +129,33 @@ pub(crate) fn typical(input: &Variable) -> f64 {
     input.start.or(input.nominal).unwrap_or(middle)
 }
 
+/// What an input is before anybody sets it: what the study has it at all the time, what the model starts it
+/// with, else 0, or what of its range is next to it.
+pub(crate) fn unset(study: &Study, plant: &Plant, input: &Variable) -> f64 {
+    let given = study.simulate.iter().flat_map(|s| &s.inputs);
+    let mut given = given.filter(|(name, _)| name.text == input.name);
+    let written = given.next().and_then(|(_, expression)| {
+        let node = systems::expression(plant, expression).ok()?;
+        plant.graph.constant_value(node)
+    });
+    let nearest = 0.0_f64.max(input.min).min(input.max);
+    written.or(input.start).unwrap_or(nearest)
+}
+
+/// How large a variable is: its range, its typical size, its start, else 1.
+pub(crate) fn size(variable: &Variable) -> f64 {
+    let width = Some(variable.max - variable.min);
+    let known = [width, variable.nominal, variable.start];
+    let mut sizes = known.into_iter().flatten().map(f64::abs);
+    sizes.find(|size| size.is_normal()).unwrap_or(1.0)
+}
+
 /// Where fixed steps are so long that the method itself grows, if it is seen to.
 pub(crate) fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String> {
     let Method::Rk4(Step::AtMost(step)) = made.method() else {
         return None;
     };
-    let longest = LONGEST * needed(prepared, made)?;
+    let longest = LONGEST * needed(prepared, made)?.length;
     (step > longest).then(|| {
         format!(
             "not for these steps: they are {} at most, and beyond about {} the fastest mode at the start makes the method itself grow",
@@ -98,10 +166,19 @@ pub(crate) fn hasty(prepared: &Prepared<'_>, made: &Blueprint) -> Option<String>
 }
 
 /// The step that the fastest mode at the start needs.
-fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<f64> {
-    let known = prepared.plant().inputs.iter();
+fn needed(prepared: &Prepared<'_>, made: &Blueprint) -> Option<NeededStep> {
+    let plant = prepared.plant();
+    let known = plant.inputs.iter();
     let known: Vec<(&str, f64)> = known.map(|i| (i.name.as_str(), typical(i))).collect();
-    needed_step(made, &known)
+    let sizes = made.flow().states().iter().map(|state| {
+        let mut all = plant
+            .states
+            .iter()
+            .chain(&plant.inputs)
+            .chain(&plant.outputs);
+        all.find(|v| v.name == *state).map_or(1.0, size)
+    });
+    needed_step(made, &known, &sizes.collect::<Vec<f64>>())
 }
 
 /// Fixed steps in words.

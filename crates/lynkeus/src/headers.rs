@@ -18,6 +18,8 @@ const OTHER_TIME: &str = "time";
 #[derive(Clone, Debug)]
 pub(crate) struct Headers {
     taken: HashSet<String>,
+    /// what has a name, in words
+    named: &'static str,
     /// what became of the headers that were taken, in words
     pub notes: Vec<String>,
 }
@@ -34,8 +36,20 @@ impl Headers {
     pub fn beside_names(names: impl IntoIterator<Item = String>) -> Self {
         Self {
             taken: names.into_iter().collect(),
+            named: "column",
             notes: vec![],
         }
+    }
+
+    /// The same for variables of a functional mock-up unit.
+    pub fn of_variables(mut self) -> Self {
+        self.named = "variable";
+        self
+    }
+
+    /// A name that has been given out elsewhere.
+    pub fn take(&mut self, name: &str) {
+        self.taken.insert(name.to_owned());
     }
 
     /// The header of time.
@@ -55,7 +69,8 @@ impl Headers {
         let header = header.unwrap_or_else(|| wanted.to_owned());
         if header != wanted {
             self.notes.push(format!(
-                "the column of {what} is called {header}: another one is called {wanted}"
+                "the {} of {what} is called {header}: another one is called {wanted}",
+                self.named
             ));
         }
         self.taken.insert(header.clone());

@@ -34,6 +34,8 @@ pub(super) struct Description<'a> {
     pub title: &'a str,
     pub units: &'a [Unit],
     pub experiment: Option<Experiment>,
+    /// of messages
+    pub categories: &'a [&'static str],
     /// in the order of their value references
     pub variables: &'a [Variable<'a>],
     /// the elements of the interfaces that are offered
@@ -44,27 +46,18 @@ pub(super) struct Description<'a> {
 
 /// `modelDescription.xml` of an estimator.
 pub(super) fn description(component: &Component<'_>, version: Version, token: &str) -> String {
-    let time = time(component.time);
-    let variables = variables(component, &time);
+    let variables = variables(component);
     Description {
         model: component.device.name,
         title: &component.title(),
         units: component.units,
         experiment: component.experiment,
+        categories: &["logStatusError"],
         variables: &variables,
         interface: interface(component, version),
         structure: structure(&variables, version),
     }
     .text(version, token)
-}
-
-/// The independent variable.
-pub(super) fn time(counted: &str) -> Quantity {
-    Quantity {
-        name: "time".into(),
-        description: counted.into(),
-        ..Quantity::default()
-    }
 }
 
 impl Description<'_> {
@@ -79,6 +72,10 @@ impl Description<'_> {
             Version::Three => ("3.0", "instantiationToken"),
         };
         let experiment = self.experiment.map(experiment).unwrap_or_default();
+        let categories = self.categories.iter();
+        let categories: String = categories
+            .map(|name| format!("    <Category name=\"{name}\"/>\n"))
+            .collect();
         let variables = self.variables.iter().enumerate();
         let written: String = match version {
             Version::Two => variables.map(scalar).collect(),
@@ -88,7 +85,7 @@ impl Description<'_> {
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
              <fmiModelDescription fmiVersion=\"{edition}\" modelName=\"{}\" {token_name}=\"{token}\" \
              description=\"{}\" generationTool=\"lynkeus {}\" variableNamingConvention=\"flat\">\n\
-             {}{units}  <LogCategories>\n    <Category name=\"logStatusError\"/>\n  </LogCategories>\n{experiment}\
+             {}{units}  <LogCategories>\n{categories}  </LogCategories>\n{experiment}\
              \x20 <ModelVariables>\n{written}  </ModelVariables>\n\
              \x20 <ModelStructure>\n{}  </ModelStructure>\n\
              </fmiModelDescription>\n",
@@ -109,14 +106,14 @@ fn experiment(experiment: Experiment) -> String {
     )
 }
 
-fn variables<'q>(component: &Component<'q>, time: &'q Quantity) -> Vec<Variable<'q>> {
+fn variables<'q>(component: &Component<'q>) -> Vec<Variable<'q>> {
     let of = |quantities: &'q [Quantity], role| {
         quantities
             .iter()
             .map(move |quantity| Variable { quantity, role })
     };
     let mut all = vec![Variable {
-        quantity: time,
+        quantity: component.time,
         role: Role::Time,
     }];
     all.extend(of(component.signals, Role::Signal));

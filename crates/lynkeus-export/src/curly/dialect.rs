@@ -142,6 +142,7 @@ const SIZES: &[&str] = &[
     "NOT_FINITE",
     "OUTPUTS",
     "OWN",
+    "PARAMETERS",
     "POINTS",
     "R",
     "RANK",

@@ -1,7 +1,7 @@
 //! Equations as functional mock-up units: model exchange and co-simulation in one archive.
 
 use super::c::{File, prefix};
-use super::description::{Description, Role, Variable, page, time};
+use super::description::{Description, Role, Variable, page};
 use super::fmu::{Archive, EXCHANGE, Experiment, Quantity, Unit, Version, reasons};
 use super::ode::{CODES, Ode, Sources, sources};
 use crate::Refusal;
@@ -15,8 +15,8 @@ pub struct Exchange<'a> {
     pub ode: &'a Ode<'a>,
     /// every unit that a quantity names, once
     pub units: &'a [Unit],
-    /// what time is counted in, in words
-    pub time: &'a str,
+    /// the independent variable
+    pub time: &'a Quantity,
     /// what a tool starts from, where the study says
     pub experiment: Option<Experiment>,
 }
@@ -43,6 +43,7 @@ impl Exchange<'_> {
         let structure = Structure {
             inputs: ode.inputs.len(),
             states: ode.states,
+            outputs: ode.outputs.len(),
             dependencies: &dependencies,
         };
         Ok(Archive {
@@ -58,9 +59,8 @@ impl Exchange<'_> {
 
     fn description(&self, structure: &Structure<'_>, version: Version, token: &str) -> String {
         let ode = self.ode;
-        let time = time(self.time);
         let variable = |quantity, role| Variable { quantity, role };
-        let mut variables = vec![variable(&time, Role::Time)];
+        let mut variables = vec![variable(self.time, Role::Time)];
         variables.extend(ode.inputs.iter().map(|q| variable(q, Role::Input)));
         variables.extend(ode.states.iter().map(|state| {
             let is_output = state.is_output;
@@ -71,11 +71,13 @@ impl Exchange<'_> {
             variable(&state.derivative, Role::Derivative { of })
         }));
         variables.extend(ode.outputs.iter().map(|q| variable(q, Role::Estimate)));
+        variables.extend(ode.parameters.iter().map(|q| variable(q, Role::Tunable)));
         Description {
             model: ode.name,
             title: ode.title,
             units: self.units,
             experiment: self.experiment,
+            categories: &["logStatusError", "logStatusDiscard"],
             variables: &variables,
             interface: interface(&self.identifier(), version),
             structure: structure.text(version),
@@ -93,14 +95,14 @@ impl Exchange<'_> {
                 texts.join(", ")
             }
         };
-        let inputs = ode.inputs.iter().map(|input| input.start);
+        let given = ode.inputs.iter().chain(ode.parameters).map(|q| q.start);
         let nominals = ode.states.iter().map(|state| &state.quantity);
         let nominals = nominals.map(|q: &Quantity| q.nominal.unwrap_or(1.0));
         let places = [
             ("@NAME@", name.clone()),
             ("@CAPITALS@", name.to_ascii_uppercase()),
             ("@TOKEN@", token.to_owned()),
-            ("@FIRST_INPUTS@", listed(inputs.collect())),
+            ("@FIRST_GIVEN@", listed(given.collect())),
             ("@NOMINALS@", listed(nominals.collect())),
             ("@REASONS@", reasons(CODES.into_iter())),
         ];
@@ -144,11 +146,12 @@ fn interface(name: &str, version: Version) -> String {
     }
 }
 
-/// What depends on what, by value references: time, inputs, states, derivatives, outputs.
+/// What depends on what, by value references: time, inputs, states, derivatives, outputs, parameters.
 struct Structure<'a> {
     inputs: usize,
     states: &'a [super::State],
-    /// by derivative, then by output: places in (t, x, u)
+    outputs: usize,
+    /// by derivative, then by output: places in (t, x, u, p)
     dependencies: &'a [Vec<usize>],
 }
 
@@ -158,35 +161,53 @@ struct Unknown {
     of: Vec<usize>,
 }
 
+/// When a variable is computed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// of everything that can be set
+    Initialization,
+    /// of what moves
+    Run,
+}
+
 impl Structure<'_> {
     /// The value reference of a state.
     fn state(&self, place: usize) -> usize {
         1 + self.inputs + place
     }
 
-    /// The value references of places in (t, x, u), in their order.
-    fn known(&self, places: &[usize]) -> Vec<usize> {
+    /// The value references of places in (t, x, u, p), in their order.
+    fn known(&self, places: &[usize], phase: Phase) -> Vec<usize> {
         let states = self.states.len();
+        let moving = states + self.inputs;
+        let first_parameter = self.state(2 * states + self.outputs);
         let reference = |&place: &usize| match place {
             0 => 0,
             place if place <= states => self.state(place - 1),
-            place => place - states,
+            place if place <= moving => place - states,
+            place => first_parameter + place - moving - 1,
         };
-        let mut known: Vec<usize> = places.iter().map(reference).collect();
+        let counts = |place: &&usize| phase == Phase::Initialization || **place <= moving;
+        let mut known: Vec<usize> = places.iter().filter(counts).map(reference).collect();
         known.sort_unstable();
         known
     }
 
+    /// The derivatives and the outputs that are no states.
+    fn computed(&self, phase: Phase) -> Vec<Unknown> {
+        let computed = self.dependencies.iter().enumerate();
+        let unknown = |(place, of): (usize, &Vec<usize>)| Unknown {
+            reference: self.state(self.states.len() + place),
+            of: self.known(of, phase),
+        };
+        computed.map(unknown).collect()
+    }
+
     fn text(&self, version: Version) -> String {
         let n = self.states.len();
-        let computed = self.dependencies.iter().enumerate();
-        let computed: Vec<Unknown> = computed
-            .map(|(place, of)| Unknown {
-                reference: self.state(n + place),
-                of: self.known(of),
-            })
-            .collect();
+        let computed = self.computed(Phase::Run);
         let (derivatives, outputs) = computed.split_at(n);
+        let initial = self.computed(Phase::Initialization);
         let shown = self.states.iter().enumerate().filter(|(_, s)| s.is_output);
         let shown: Vec<Unknown> = shown
             .map(|(place, _)| Unknown {
@@ -203,7 +224,7 @@ impl Structure<'_> {
                 let lists = [
                     ("Outputs", [&shown, outputs]),
                     ("Derivatives", [derivatives, &[]]),
-                    ("InitialUnknowns", [derivatives, outputs]),
+                    ("InitialUnknowns", [&initial, &[]]),
                 ];
                 let list = |(name, parts): (&str, [&[Unknown]; 2])| {
                     let unknowns: String = parts.iter().map(|p| all("Unknown", p)).collect();
@@ -218,8 +239,7 @@ impl Structure<'_> {
                 all("Output", &shown),
                 all("Output", outputs),
                 all("ContinuousStateDerivative", derivatives),
-                all("InitialUnknown", derivatives),
-                all("InitialUnknown", outputs),
+                all("InitialUnknown", &initial),
             ]
             .concat(),
         }

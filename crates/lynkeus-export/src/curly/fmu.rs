@@ -94,8 +94,8 @@ pub struct Component<'a> {
     pub tunables: &'a [Quantity],
     /// every unit that a quantity names, once
     pub units: &'a [Unit],
-    /// what time is counted in, in words
-    pub time: &'a str,
+    /// the independent variable
+    pub time: &'a Quantity,
     /// what a tool starts from, where the study says
     pub experiment: Option<Experiment>,
 }
@@ -193,6 +193,14 @@ impl Version {
         }
     }
 
+    /// How the standard's macros begin.
+    fn macros(self) -> &'static str {
+        match self {
+            Self::Two => "FMI2",
+            Self::Three => "FMI3",
+        }
+    }
+
     /// The functions of the standard around what they call, of which what `holds` names is chosen, with
     /// places filled.
     pub(super) fn wrapped(self, core: &str, holds: &[&str], places: &[(&str, String)]) -> String {
@@ -204,11 +212,10 @@ impl Version {
             Self::Three => vec![THREE, THREE_ABSENT],
         };
         let draft = [HEAD, core, TAIL, &edition.concat()].join("\n");
+        let draft = chosen(&draft, holds).replace("@FMI@", self.macros());
         places
             .iter()
-            .fold(chosen(&draft, holds), |text, (word, value)| {
-                text.replace(word, value)
-            })
+            .fold(draft, |text, (word, value)| text.replace(word, value))
     }
 }
 
@@ -228,17 +235,18 @@ fn wrapper(
     token: &str,
 ) -> String {
     let name = component.identifier();
+    let real = match precision {
+        Precision::F64 => "double",
+        Precision::F32 => "float",
+    };
     let starts = component.signals.iter().map(|signal| match signal.start {
         start if start.is_finite() => match precision {
             Precision::F64 => format!("{start:?}"),
             Precision::F32 => format!("{:?}f", start as f32),
         },
-        _ => "NAN".to_owned(),
+        // which is a `float` in C
+        _ => format!("({real})NAN"),
     });
-    let real = match precision {
-        Precision::F64 => "double",
-        Precision::F32 => "float",
-    };
     let title = format!(
         "/* {}: {name} as a functional mock-up unit. */\n",
         version.wrapper()

@@ -31,12 +31,14 @@ pub struct Ode<'a> {
     pub name: &'a str,
     /// what it is, in words
     pub title: &'a str,
-    /// the equations, of one state at least; its signals are the inputs
+    /// the equations, of one state at least; its signals are the inputs, then the parameters
     pub system: &'a System,
     /// fixed steps
     pub method: Method,
     /// the inputs, in the order of the system
     pub inputs: &'a [Quantity],
+    /// what stays but may be set, in the order of the system
+    pub parameters: &'a [Quantity],
     /// the states, in the order of the system
     pub states: &'a [State],
     /// the outputs, in the order of the system; states that are outputs are not among them
@@ -61,7 +63,7 @@ pub struct State {
 pub(super) struct Sources {
     /// `NAME.h` and `NAME.c`
     pub files: [File; 2],
-    /// by state, then by output: the places in (t, x, u) that it depends on
+    /// by state, then by output: the places in (t, x, u, p) that it depends on
     pub dependencies: Vec<Vec<usize>>,
 }
 
@@ -72,14 +74,15 @@ pub(super) struct Sources {
 pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
     let system = ode.system;
     refuse_jumps(system)?;
-    let (n, m) = (system.states().len(), system.signals().len());
+    let (n, m) = (system.states().len(), ode.inputs.len());
     let told = system.outputs().len();
     let mut machine = Machine::default();
     machine.size("STATES", n);
     machine.size("INPUTS", m);
+    machine.size("PARAMETERS", ode.parameters.len());
     let arguments = Arguments {
         x: ode.states.iter().map(|s| entry(&s.quantity)).collect(),
-        w: ode.inputs.iter().map(entry).collect(),
+        w: ode.inputs.iter().chain(ode.parameters).map(entry).collect(),
     };
     let (dx, y) = (Target::all("dx", n), Target::all("y", told));
     machine.flow(system, &arguments)?;
@@ -97,8 +100,8 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
     machine.add(&draft(
         "How both change along a direction, which is at the end of w: of time, x and the inputs.",
         "along",
-        &all.along(),
-        &arguments.with_direction(),
+        &all.along(1 + n + m),
+        &arguments.with_direction(m),
         &[dx, y],
     )?);
     machine.steps(ode.method)?;
@@ -111,11 +114,12 @@ pub(super) fn sources(ode: &Ode<'_>) -> Result<Sources, Refusal> {
 }
 
 impl Arguments {
-    /// The same, with how fast each changes behind the inputs.
-    fn with_direction(&self) -> Self {
+    /// The same, with how fast time, states and inputs change behind all that is given.
+    fn with_direction(&self, inputs: usize) -> Self {
         let part = |entry: &Entry| Entry::named(format!("d_{}", entry.name));
         let time = Entry::named("d_time");
-        let changes = std::iter::once(time).chain(self.x.iter().chain(&self.w).map(part));
+        let moving = self.x.iter().chain(self.w.iter().take(inputs));
+        let changes = std::iter::once(time).chain(moving.map(part));
         Self {
             x: self.x.clone(),
             w: self.w.iter().cloned().chain(changes).collect(),
@@ -144,6 +148,7 @@ fn header(ode: &Ode<'_>, arguments: &Arguments) -> File {
          #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
          /* States x:\n{states} */\n#define {capitals}_STATES {n}\n\n\
          /* Inputs u:\n{inputs} */\n#define {capitals}_INPUTS {m}\n\n\
+         /* Parameters, in u behind the inputs:\n{parameters} */\n#define {capitals}_PARAMETERS {q}\n\n\
          /* Outputs y:\n{told} */\n#define {capitals}_OUTPUTS {p}\n\n\
          /* Why a step was refused; nothing has changed then. */\n{codes}\n\
          /* The states at the start. */\nvoid {name}_init(double *x);\n\n\
@@ -157,7 +162,9 @@ fn header(ode: &Ode<'_>, arguments: &Arguments) -> File {
          #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
         title = title(&format!("{name}.h"), ode.about),
         states = listed(&arguments.x),
-        inputs = listed(&arguments.w),
+        inputs = listed(&arguments.w[..ode.inputs.len()]),
+        parameters = listed(&arguments.w[ode.inputs.len()..]),
+        q = ode.parameters.len(),
         told = listed(&outputs),
         n = ode.states.len(),
         m = ode.inputs.len(),

@@ -56,3 +56,61 @@ fn a_derivative_along_a_direction_is_the_jacobian_times_it() {
     }
     assert_eq!((found[3], found[4]), (0.0, -0.2));
 }
+
+/// Slopes that are infinite at 0, along directions that leave 0 alone, or leave the branch alone that
+/// is taken; and what has no derivative there is given none.
+#[test]
+fn what_a_direction_leaves_alone_has_no_say() {
+    let g = Graph::new();
+    let [a, b, c, u, v, w] = ["a", "b", "c", "u", "v", "w"].map(|name| g.symbol(name));
+    let inputs = [a, b, c].map(|e| e.node());
+    let direction = [u, v, w].map(|e| e.node());
+    let all = [inputs, direction].concat();
+    let at = |output: Node, at: [f64; 3], along_: [f64; 3]| {
+        let tape = Tape::new(&g, &all, &along(&g, &[output], &inputs, &direction)).unwrap();
+        let mut found = [0.0];
+        tape.evaluator().eval(&[at, along_].concat(), &mut found);
+        found[0]
+    };
+    let (first, second) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+    let (zero, sure) = ([0.0, 3.0, 0.0], [0.0, 3.0, 4.0]);
+    let drained = b * b - a.sqrt() + c;
+    assert_eq!(at(drained.node(), zero, second), 6.0);
+    assert_eq!(at(drained.node(), zero, first), f64::NEG_INFINITY);
+    assert_eq!(at(drained.node(), zero, [0.0, 0.5, 2.0]), 5.0);
+    // of two tanks on a level both have a say
+    let between = (a - c).sqrt() * b;
+    assert_eq!(at(between.node(), [0.0; 3], second), 0.0);
+    assert!(!at(between.node(), zero, first).is_finite());
+    assert!(!at(between.node(), zero, [0.0, 0.0, 1.0]).is_finite());
+    // the branch that is not taken has none
+    let limited = a.max(g.constant(0.0)).sqrt() + b;
+    assert_eq!(at(limited.node(), [-1.0, 3.0, 4.0], [1.0, 1.0, 0.0]), 1.0);
+    let chosen = g
+        .expr(g.select(b.less(c).node(), c.node(), a.node()))
+        .sqrt();
+    assert_eq!(at(chosen.node(), sure, first), 0.0);
+    assert_eq!(at(chosen.node(), sure, [1.0, 1.0, 1.0]), 0.25);
+    // neighbours of the root
+    for steep in [
+        a.ln().exp(),
+        (1.0 - a).asin(),
+        (1.0 - a).acos(),
+        a.pow(g.constant(0.3)),
+        a.powi(-2).atan(),
+        (c / a).atan(),
+        a.atan2(c - 4.0),
+    ] {
+        assert_eq!(at((steep + b).node(), sure, second), 1.0);
+        assert!(!at(steep.node(), sure, first).is_finite());
+    }
+    // and through a linear system
+    let solution = g.solve(
+        &[b, a.sqrt(), c, b].map(|e| e.node()),
+        &[inputs[1], inputs[2]],
+    );
+    assert_eq!(at(solution.x[0], [0.0, 3.0, 0.0], second), 0.0);
+    // x² is still at 0 to the first order only: its root has a corner
+    assert!(at(a.powi(2).sqrt().node(), zero, first).is_nan());
+    assert_eq!(at(a.powi(2).sqrt().node(), zero, second), 0.0);
+}

@@ -1,17 +1,17 @@
 //! Plants and observers in continuous time, x' = f(t, x, u), y = h(t, x, u), as functional mock-up units.
 
-use std::collections::BTreeSet;
-
 use lynkeus_export::curly::fmu::{Quantity, Version};
 use lynkeus_export::curly::{Exchange, Ode, State};
 use lynkeus_expr::{Graph, Node};
-use lynkeus_model::{BaseUnit, Plant, Variable};
+use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Observer;
 use lynkeus_run::{Method, System};
 
-use super::{experiment, free, packed, quantity, time, units};
+use super::rate::rate;
+use super::{experiment, packed, quantity, time, units};
 use crate::export::Artifact;
-use crate::fixed_steps::typical;
+use crate::fixed_steps::{size, typical, unset};
+use crate::headers::Headers;
 use crate::study::SimulateSettings;
 use crate::systems::{hat, starts};
 use crate::{Error, Study};
@@ -24,10 +24,23 @@ pub(crate) struct Equations<'a> {
     study: &'a Study,
     graph: &'a Graph,
     time: Node,
+    /// the same as a variable
+    independent: Quantity,
     states: Vec<Equation>,
-    inputs: Vec<(Quantity, Node)>,
+    inputs: Vec<Input>,
+    /// what stays but may be set
+    parameters: Vec<(Quantity, Node)>,
     /// but for states that are outputs
     outputs: Vec<(Quantity, Node)>,
+    headers: Headers,
+}
+
+#[derive(Debug)]
+struct Input {
+    quantity: Quantity,
+    symbol: Node,
+    /// a value that it may have
+    typical: f64,
 }
 
 #[derive(Debug)]
@@ -35,134 +48,177 @@ struct Equation {
     state: State,
     symbol: Node,
     derivative: Node,
+    /// how large the state is
+    size: f64,
 }
 
 impl<'a> Equations<'a> {
-    /// The plant with the starts of the study.
+    /// The plant with the starts of the study, and as parameters those that are symbols of its equations.
     ///
     /// # Errors
     /// A start of something that is no state.
     pub fn of_plant(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
         let given = study.simulate.as_ref().map(|s| &s.initial[..]);
         let starts = starts(plant, given.unwrap_or_default())?;
-        let mut names = Taken::new();
-        let inputs = plant.inputs.iter();
-        let inputs = inputs.map(|v| (names.take(ranged(v, typical(v))), v.node));
-        let inputs = inputs.collect();
+        let mut made = Self::none(study, plant, plant.time, "plant");
+        made.title = format!("The plant {}", plant.name);
+        for parameter in &plant.parameters {
+            made.headers.take(&parameter.variable.name);
+        }
+        made.inputs.extend(plant.inputs.iter().map(|input| Input {
+            quantity: ranged(input, unset(study, plant, input)),
+            symbol: input.node,
+            typical: typical(input),
+        }));
+        for ((state, start), derivative) in plant.states.iter().zip(starts).zip(&plant.derivatives)
+        {
+            let is_output = plant.outputs.iter().any(|o| o.name == state.name);
+            made.state(ranged(state, start), is_output, [state.node, *derivative]);
+            made.sized(state);
+        }
         let is_state = |name: &str| plant.states.iter().any(|state| state.name == name);
-        let states = plant.states.iter().zip(starts).zip(&plant.derivatives);
-        let states = states.map(|((state, start), derivative)| Equation {
-            state: State {
-                quantity: names.take(ranged(state, start)),
-                derivative: Quantity::default(),
-                is_output: plant.outputs.iter().any(|o| o.name == state.name),
-            },
-            symbol: state.node,
-            derivative: *derivative,
-        });
-        let states = states.collect();
         let own = plant.outputs.iter().filter(|o| !is_state(&o.name));
-        let outputs = own.map(|v| (names.take(ranged(v, 0.0)), v.node)).collect();
-        let made = Self {
-            name: format!("{}_plant", plant.name),
-            title: format!("The plant {}", plant.name),
-            study,
-            graph: &plant.graph,
-            time: plant.time,
-            states,
-            inputs,
-            outputs,
-        };
-        Ok(made.with_derivatives(names))
+        made.outputs.extend(own.map(|v| (ranged(v, 0.0), v.node)));
+        let told = plant.outputs.iter().map(|output| output.node);
+        let told: Vec<Node> = plant.derivatives.iter().copied().chain(told).collect();
+        let read = plant.graph.symbols_of(&told);
+        let parameters = plant.parameters.iter();
+        let parameters = parameters.filter(|p| read.contains(&p.variable.node));
+        made.parameters.extend(parameters.filter_map(|parameter| {
+            let variable = &parameter.variable;
+            Some((ranged(variable, parameter.value?), variable.node))
+        }));
+        Ok(made)
     }
 
     /// The observer as its family has it: measurements are inputs, given at any time.
     pub fn of_observer(study: &'a Study, plant: &'a Plant, observer: &Observer) -> Self {
-        let mut names = Taken::new();
-        let variables = plant.inputs.iter().chain(&plant.outputs);
-        let variables: Vec<&Variable> = variables.collect();
-        let read = observer.measured.iter().chain(&observer.inputs);
-        let read = read.map(|signal| {
-            let known = variables.iter().find(|v| v.name == signal.name);
-            let start = known.map_or(0.0, |v| typical(v));
-            let told = quantity(signal.name.clone(), known.copied(), start);
-            (names.take(told), signal.symbol)
+        let mut made = Self::none(study, plant, observer.time, "observer");
+        made.title = format!("Observer of {}", plant.name);
+        made.read(plant, observer);
+        // in the order of the table of estimates, which gives them the same names
+        let headers = &mut made.headers;
+        let hats = observer.estimates.iter().map(|estimate| {
+            let name = &estimate.variable.name;
+            headers.free(&hat(name), &format!("the estimate of {name}"))
         });
-        let mut inputs: Vec<(Quantity, Node)> = read.collect();
-        inputs.extend(observer.input_derivatives.iter().map(|derivative| {
-            let told = Quantity {
-                name: derivative.signal.name.clone(),
-                description: format!(
-                    "the derivative of order {} of {}",
-                    derivative.order, derivative.input
-                ),
-                ..Quantity::default()
-            };
-            (names.take(told), derivative.signal.symbol)
-        }));
-        let shown = |node: Node| observer.estimates.iter().find(|e| e.node == node);
-        let states = observer.states.iter().zip(&observer.derivatives);
-        let states = states.map(|((signal, start), derivative)| {
-            let estimate = shown(signal.symbol).map(|e| &e.variable);
-            let name = estimate.map_or_else(|| signal.name.clone(), |v| hat(&v.name));
-            Equation {
-                state: State {
-                    quantity: names.take(quantity(name, estimate, *start)),
-                    derivative: Quantity::default(),
-                    is_output: estimate.is_some(),
-                },
-                symbol: signal.symbol,
-                derivative: *derivative,
+        let hats: Vec<String> = hats.collect();
+        let estimates = || hats.iter().cloned().zip(&observer.estimates);
+        for ((signal, start), derivative) in observer.states.iter().zip(&observer.derivatives) {
+            let nodes = [signal.symbol, *derivative];
+            match estimates().find(|(_, e)| e.node == signal.symbol) {
+                Some((name, e)) => {
+                    made.state(quantity(name, Some(&e.variable), *start), true, nodes);
+                    made.sized(&e.variable);
+                }
+                None => {
+                    let what = format!("{}, a state of the observer,", signal.name);
+                    let name = made.headers.free(&signal.name, &what);
+                    made.state(quantity(name, None, *start), false, nodes);
+                }
             }
-        });
-        let states: Vec<Equation> = states.collect();
-        let is_state = |node: Node| states.iter().any(|s| s.symbol == node);
-        let own = observer.estimates.iter().filter(|e| !is_state(e.node));
-        let own = own.map(|e| {
-            let variable = &e.variable;
-            let told = quantity(hat(&variable.name), Some(variable), 0.0);
-            (names.take(told), e.node)
-        });
-        let mut outputs: Vec<(Quantity, Node)> = own.collect();
-        outputs.extend(observer.monitors.iter().map(|monitor| {
+        }
+        let is_state = |node: Node| observer.states.iter().any(|(s, _)| s.symbol == node);
+        let own = estimates().filter(|(_, e)| !is_state(e.node));
+        let own = own.map(|(name, e)| (quantity(name, Some(&e.variable), 0.0), e.node));
+        made.outputs.extend(own);
+        for monitor in &observer.monitors {
             let told = Quantity {
-                name: monitor.name.clone(),
+                name: made.headers.free(&monitor.name, &monitor.name),
                 description: format!("{}, where below {}", monitor.meaning, monitor.alarm_below),
                 ..Quantity::default()
             };
-            (names.take(told), monitor.node)
-        }));
-        let made = Self {
-            name: format!("{}_observer", plant.name),
-            title: format!("Observer of {}", plant.name),
+            made.outputs.push((told, monitor.node));
+        }
+        made
+    }
+
+    /// Without any variable but time.
+    fn none(study: &'a Study, plant: &'a Plant, symbol: Node, what: &str) -> Self {
+        let mut headers = Headers::beside(plant).of_variables();
+        Self {
+            name: format!("{}_{what}", plant.name),
+            title: String::new(),
             study,
             graph: &plant.graph,
-            time: observer.time,
-            states,
-            inputs,
-            outputs,
-        };
-        made.with_derivatives(names)
-    }
-
-    /// The derivatives of the states as variables.
-    fn with_derivatives(mut self, mut names: Taken) -> Self {
-        for Equation { state, .. } in &mut self.states {
-            let Quantity { name, unit, .. } = &state.quantity;
-            let told = Quantity {
-                name: format!("der({name})"),
-                unit: unit
-                    .as_deref()
-                    .zip(self.study.time_unit.as_deref())
-                    .and_then(|(unit, time)| rate(unit, time)),
-                ..Quantity::default()
-            };
-            state.derivative = names.take(told);
+            time: symbol,
+            independent: time(study, &mut headers),
+            states: vec![],
+            inputs: vec![],
+            parameters: vec![],
+            outputs: vec![],
+            headers,
         }
-        self
     }
 
-    /// As a system whose signals are the inputs.
+    /// What an observer reads: variables of the plant, and derivatives of its inputs.
+    fn read(&mut self, plant: &Plant, observer: &Observer) {
+        let known = |name: &str| {
+            let mut all = plant.inputs.iter().chain(&plant.outputs);
+            all.find(|v| v.name == name)
+        };
+        for signal in observer.measured.iter().chain(&observer.inputs) {
+            let variable = known(&signal.name);
+            let start = variable.map_or(0.0, |v| unset(self.study, plant, v));
+            self.inputs.push(Input {
+                quantity: quantity(signal.name.clone(), variable, start),
+                symbol: signal.symbol,
+                typical: variable.map_or(0.0, typical),
+            });
+        }
+        for derivative in &observer.input_derivatives {
+            let name = &derivative.signal.name;
+            let description = format!(
+                "the derivative of order {} of {}",
+                derivative.order, derivative.input
+            );
+            self.inputs.push(Input {
+                quantity: Quantity {
+                    name: self.headers.free(name, &description),
+                    description,
+                    ..Quantity::default()
+                },
+                symbol: derivative.signal.symbol,
+                typical: 0.0,
+            });
+        }
+    }
+
+    /// A state by its symbol, and its derivative.
+    fn state(&mut self, told: Quantity, is_output: bool, [symbol, derivative]: [Node; 2]) {
+        let Quantity { name, unit, .. } = &told;
+        let time = self.study.time_unit.as_deref();
+        let by_time = Quantity {
+            name: self.headers.free(
+                &format!("der({name})"),
+                &format!("the derivative of {name}"),
+            ),
+            unit: unit
+                .as_deref()
+                .zip(time)
+                .and_then(|(unit, time)| rate(unit, time)),
+            ..Quantity::default()
+        };
+        self.states.push(Equation {
+            state: State {
+                quantity: told,
+                derivative: by_time,
+                is_output,
+            },
+            symbol,
+            derivative,
+            size: 1.0,
+        });
+    }
+
+    /// The last state is as large as a variable.
+    fn sized(&mut self, variable: &Variable) {
+        if let Some(last) = self.states.last_mut() {
+            last.size = size(variable);
+        }
+    }
+
+    /// As a system whose signals are the inputs, then the parameters.
     ///
     /// # Errors
     /// Expressions that read what is neither state nor input.
@@ -174,23 +230,35 @@ impl<'a> Equations<'a> {
         });
         let states: Vec<(String, Node, f64)> = states.collect();
         let derivatives: Vec<Node> = self.states.iter().map(|e| e.derivative).collect();
-        let named = |of: &[(Quantity, Node)]| -> Vec<(String, Node)> {
-            of.iter().map(|(q, node)| (q.name.clone(), *node)).collect()
-        };
+        let inputs = self.inputs.iter();
+        let inputs = inputs.map(|input| (input.quantity.name.clone(), input.symbol));
+        let parameters = self.parameters.iter();
+        let parameters = parameters.map(|(told, symbol)| (told.name.clone(), *symbol));
+        let outputs = self.outputs.iter();
+        let outputs = outputs.map(|(told, node)| (told.name.clone(), *node));
         System::new(
             self.graph,
             self.time,
             &states,
-            &named(&self.inputs),
+            &inputs.chain(parameters).collect::<Vec<_>>(),
             &derivatives,
-            &named(&self.outputs),
+            &outputs.collect::<Vec<_>>(),
         )
         .map_err(Error::from_source)
     }
 
-    /// Values that the inputs may have, in the order of the system's signals.
-    pub fn typical_inputs(&self) -> impl Iterator<Item = f64> + '_ {
-        self.inputs.iter().map(|(input, _)| input.start)
+    /// Values that the system's signals may have, in their order.
+    pub fn typical_signals(&self) -> impl Iterator<Item = f64> + '_ {
+        let parameters = self.parameters.iter().map(|(told, _)| told.start);
+        self.inputs
+            .iter()
+            .map(|input| input.typical)
+            .chain(parameters)
+    }
+
+    /// How large the states are.
+    pub fn sizes(&self) -> Vec<f64> {
+        self.states.iter().map(|equation| equation.size).collect()
     }
 
     /// The archive of their [system](Self::system): model exchange, and co-simulation by a method with
@@ -206,10 +274,13 @@ impl<'a> Equations<'a> {
         version: Version,
         notes: &mut Vec<String>,
     ) -> Result<Artifact, Error> {
+        notes.extend(self.headers.notes.iter().cloned());
+        let inputs = self.inputs.iter().map(|input| input.quantity.clone());
+        let inputs: Vec<Quantity> = inputs.collect();
         let quantities = |of: &[(Quantity, Node)]| -> Vec<Quantity> {
             of.iter().map(|(quantity, _)| quantity.clone()).collect()
         };
-        let (inputs, outputs) = (quantities(&self.inputs), quantities(&self.outputs));
+        let (parameters, outputs) = (quantities(&self.parameters), quantities(&self.outputs));
         let states: Vec<State> = self.states.iter().map(|e| e.state.clone()).collect();
         let own = states.iter().flat_map(|s| [&s.quantity, &s.derivative]);
         let exchange = Exchange {
@@ -219,32 +290,26 @@ impl<'a> Equations<'a> {
                 system,
                 method,
                 inputs: &inputs,
+                parameters: &parameters,
                 states: &states,
                 outputs: &outputs,
                 about,
             },
-            units: &units(inputs.iter().chain(&outputs).chain(own)),
-            time: &time(self.study),
+            units: &units(
+                inputs
+                    .iter()
+                    .chain(&outputs)
+                    .chain(&parameters)
+                    .chain(own)
+                    .chain([&self.independent]),
+            ),
+            time: &self.independent,
             experiment: experiment(self.study, SimulateSettings::row_step),
         };
         let files = exchange
             .files(version)
             .map_err(|refusal| Error::refused(refusal.to_string()).at(&self.study.file))?;
         Ok(packed(&exchange.identifier(), files, version, notes))
-    }
-}
-
-/// Names that are given out, each once.
-struct Taken(BTreeSet<String>);
-
-impl Taken {
-    fn new() -> Self {
-        Self(["time".to_owned()].into())
-    }
-
-    fn take(&mut self, mut quantity: Quantity) -> Quantity {
-        quantity.name = free(&mut self.0, quantity.name);
-        quantity
     }
 }
 
@@ -262,35 +327,5 @@ fn ranged(variable: &Variable, start: f64) -> Quantity {
             .map(f64::abs)
             .filter(|size| size.is_normal()),
         ..quantity(variable.name.clone(), Some(variable), start)
-    }
-}
-
-/// A unit by a unit of time, as Modelica writes it; none where a part is not known.
-fn rate(unit: &str, time: &str) -> Option<String> {
-    let divided = match unit.split_once('/') {
-        Some((above, below)) => format!("{above}.{time}-1/{below}"),
-        None => format!("{unit}/{time}"),
-    };
-    let is_known = |text: &str| BaseUnit::of(text).is_some_and(|unit| unit.offset == 0.0);
-    (is_known(unit) && is_known(&divided)).then_some(divided)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_rate_is_a_unit_by_time() {
-        let found = |unit: &str| rate(unit, "min");
-        assert_eq!(found("m").as_deref(), Some("m/min"));
-        assert_eq!(found("kg.m2/s").as_deref(), Some("kg.m2.min-1/s"));
-        let (slow, fast) = (
-            BaseUnit::of("m/s").unwrap(),
-            BaseUnit::of("m.min-1/s").unwrap(),
-        );
-        assert_eq!(fast.powers[2], slow.powers[2] - 1);
-        assert!((fast.factor * 60.0 / slow.factor - 1.0).abs() < 1e-15);
-        // another zero, and a word that is no unit
-        assert_eq!((found("degC"), found("barrels")), (None, None));
     }
 }

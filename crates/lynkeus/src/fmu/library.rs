@@ -1,6 +1,7 @@
 //! The library of an archive, by the system's C compiler.
 
 use std::env::consts::{ARCH, DLL_EXTENSION, OS};
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -36,8 +37,29 @@ fn extension(system: &str) -> &'static str {
     }
 }
 
-/// The library of the sources among the files, or why there is none.
-pub(super) fn compile(name: &str, files: &[(String, Vec<u8>)]) -> Result<Vec<u8>, String> {
+/// What a compiler writes of what it refuses.
+const ERRORS: &str = "errors.txt";
+
+/// Why there is no library.
+#[derive(Debug, PartialEq)]
+pub(super) enum Missing {
+    /// no compiler, or none that can be run here
+    Compiler(String),
+    /// a compiler that does not take the sources: which, and its first lines
+    Refused { compiler: String, told: String },
+}
+
+impl From<String> for Missing {
+    fn from(why: String) -> Self {
+        Self::Compiler(why)
+    }
+}
+
+/// The library of the sources among the files.
+///
+/// # Errors
+/// Why there is none.
+pub(super) fn compile(name: &str, files: &[(String, Vec<u8>)]) -> Result<Vec<u8>, Missing> {
     let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
     let mut sources = vec![];
     for (path, content) in files {
@@ -53,15 +75,15 @@ pub(super) fn compile(name: &str, files: &[(String, Vec<u8>)]) -> Result<Vec<u8>
     let library = format!("{name}.{DLL_EXTENSION}");
     for compiler in COMPILERS {
         if let Some(started) = start(compiler, folder.path(), &library, &sources) {
-            finish(compiler, started?)?;
+            finish(compiler, started?, folder.path())?;
             return std::fs::read(folder.path().join(&library))
-                .map_err(|e| format!("{compiler} left no library: {e}"));
+                .map_err(|e| format!("{compiler} left no library: {e}").into());
         }
     }
-    Err(format!(
-        "no C compiler was found ({})",
-        COMPILERS.join(", ")
-    ))
+    let compilers = COMPILERS.join(", ");
+    Err(Missing::Compiler(format!(
+        "no C compiler was found ({compilers})"
+    )))
 }
 
 /// The compiler at work; none where there is no such compiler.
@@ -80,23 +102,28 @@ fn start(
     }
     command.args(["-o", library]).args(sources).arg("-lm");
     command.current_dir(folder).stdin(Stdio::null());
-    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    // a file, which is never full: nobody reads before the end
+    let errors = match File::create(folder.join(ERRORS)) {
+        Ok(file) => Stdio::from(file),
+        Err(e) => return Some(Err(format!("a temporary file cannot be written: {e}"))),
+    };
+    command.stdout(Stdio::null()).stderr(errors);
     match command.spawn() {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => None,
         started => Some(started.map_err(|e| format!("{compiler} cannot be started: {e}"))),
     }
 }
 
-fn finish(compiler: &str, mut child: Child) -> Result<(), String> {
+fn finish(compiler: &str, mut child: Child, folder: &Path) -> Result<(), Missing> {
     let began = Instant::now();
     let ended = loop {
         match child.try_wait() {
-            Err(e) => return Err(format!("{compiler} cannot be waited for: {e}")),
+            Err(e) => return Err(format!("{compiler} cannot be waited for: {e}").into()),
             Ok(Some(status)) => break status,
             Ok(None) if began.elapsed() > LONGEST => {
                 let _ = child.kill();
                 let _ = child.wait();
-                return Err(format!("{compiler} was not done after {LONGEST:?}"));
+                return Err(format!("{compiler} was not done after {LONGEST:?}").into());
             }
             Ok(None) => std::thread::sleep(Duration::from_millis(5)),
         }
@@ -105,11 +132,38 @@ fn finish(compiler: &str, mut child: Child) -> Result<(), String> {
         return Ok(());
     }
     let mut told = vec![];
-    if let Some(errors) = child.stderr.take() {
+    if let Ok(errors) = File::open(folder.join(ERRORS)) {
         // a few lines say why
         let _ = errors.take(4096).read_to_end(&mut told);
     }
-    let told = String::from_utf8_lossy(&told);
-    let first = told.lines().next().unwrap_or_default();
-    Err(format!("{compiler} ended with {ended}: {first}"))
+    Err(Missing::Refused {
+        compiler: format!("{compiler} ({ended})"),
+        told: first_errors(&String::from_utf8_lossy(&told)),
+    })
+}
+
+/// The lines that name errors, else the first ones: three at most.
+fn first_errors(told: &str) -> String {
+    let lines = || told.lines().map(str::trim).filter(|line| !line.is_empty());
+    let mut first: Vec<&str> = lines().filter(|l| l.contains("error")).take(3).collect();
+    if first.is_empty() {
+        first = lines().take(3).collect();
+    }
+    first.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_come_before_what_leads_to_them() {
+        let told = "a.c: In function 'f':\na.c:3:1: error: one\n   3 | x\na.c:4:1: error: two\n";
+        assert_eq!(
+            first_errors(told),
+            "a.c:3:1: error: one; a.c:4:1: error: two"
+        );
+        assert_eq!(first_errors("cc: out of disk\n\n"), "cc: out of disk");
+        assert_eq!(first_errors(""), "");
+    }
 }

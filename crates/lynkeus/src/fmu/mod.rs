@@ -4,6 +4,7 @@
 mod archive;
 pub(crate) mod equations;
 mod library;
+mod rate;
 
 use std::collections::BTreeSet;
 
@@ -17,9 +18,12 @@ use lynkeus_run::Blueprint;
 
 use crate::Study;
 use crate::export::Artifact;
-use crate::fixed_steps::typical;
+use crate::fixed_steps::unset;
+use crate::headers::Headers;
 use crate::prepare::Prepared;
 use crate::study::SimulateSettings;
+
+use library::Missing;
 
 /// A study's estimator, ready to be written.
 pub(crate) struct Made<'a> {
@@ -40,6 +44,7 @@ pub(crate) fn archive(
     notes: &mut Vec<String>,
 ) -> Result<Artifact, Refusal> {
     let described = Described::of(made);
+    notes.extend(described.notes.iter().cloned());
     let component = described.component(made);
     let files = fmu::files(&component, version, precision)?;
     Ok(packed(&component.identifier(), files, version, notes))
@@ -58,8 +63,11 @@ fn packed(
         .collect();
     match library::compile(identifier, &entries) {
         Ok(library) => entries.push((library::place(identifier, version), library)),
-        Err(why) => notes.push(format!(
+        Err(Missing::Compiler(why)) => notes.push(format!(
             "sources only, which not every tool takes: {why}. Where there is a C compiler, export again"
+        )),
+        Err(Missing::Refused { compiler, told }) => notes.push(format!(
+            "sources only, which not every tool takes: {compiler} does not compile them: {told}"
         )),
     }
     Artifact {
@@ -75,12 +83,15 @@ struct Described {
     starts: Vec<Quantity>,
     tunables: Vec<Quantity>,
     units: Vec<Unit>,
-    time: String,
+    time: Quantity,
+    /// on names that gave way
+    notes: Vec<String>,
 }
 
 impl Described {
     fn of(made: &Made<'_>) -> Self {
         let plant = made.prepared.plant();
+        let study = made.prepared.study();
         let known = |name: &str| -> Option<&Variable> {
             let all = plant.inputs.iter().chain(&plant.outputs);
             all.chain(&plant.states).find(|known| known.name == name)
@@ -99,17 +110,20 @@ impl Described {
                 let start = match (place < measured, input) {
                     // nothing is measured until it is given
                     (true, _) => f64::NAN,
-                    (false, input) => input.map_or(0.0, |input| typical(input)),
+                    (false, input) => input.map_or(0.0, |input| unset(study, plant, input)),
                 };
                 quantity(entry.name.clone(), variable, start)
             });
         let signals: Vec<Quantity> = signals.collect();
         let estimates = estimates(made);
-        let mut taken: BTreeSet<String> = ["time".to_owned()].into();
-        taken.extend(signals.iter().chain(&estimates).map(|q| q.name.clone()));
+        let mut headers = Headers::beside(plant).of_variables();
+        for own in signals.iter().chain(&estimates) {
+            headers.take(&own.name);
+        }
+        let time = time(study, &mut headers);
         let starts = starts(made).into_iter().map(|start| {
             let Start { state, value, .. } = start;
-            let name = free(&mut taken, format!("{state}_start"));
+            let name = headers.free(&format!("{state}_start"), &format!("the start of {state}"));
             let told = known(&state);
             let reading = match start.is_at_reading {
                 true => ", unless its sensor reports at the first sample",
@@ -122,7 +136,7 @@ impl Described {
         });
         let starts: Vec<Quantity> = starts.collect();
         let tunables = made.device.tunables.iter().map(|tunable| {
-            let name = free(&mut taken, tunable.entry.name.clone());
+            let name = headers.free(&tunable.entry.name, &tunable.entry.name);
             Quantity {
                 description: format!(
                     "{}; what is guaranteed holds for the value at the start only",
@@ -133,13 +147,15 @@ impl Described {
             }
         });
         let tunables = tunables.collect();
+        let with_units = signals.iter().chain(&estimates).chain(&starts);
         Self {
-            units: units(signals.iter().chain(&estimates).chain(&starts)),
+            units: units(with_units.chain([&time])),
             signals,
             estimates,
             starts,
             tunables,
-            time: time(made.prepared.study()),
+            time,
+            notes: headers.notes,
         }
     }
 
@@ -224,14 +240,6 @@ fn quantity(name: String, variable: Option<&Variable>, start: f64) -> Quantity {
     }
 }
 
-/// A name that no other variable has.
-fn free(taken: &mut BTreeSet<String>, mut name: String) -> String {
-    while !taken.insert(name.clone()) {
-        name.push('_');
-    }
-    name
-}
-
 /// The study's simulation as a run that a tool proposes, a communication point every `step`.
 fn experiment(study: &Study, step: impl Fn(&SimulateSettings) -> f64) -> Option<Experiment> {
     let simulated = study.simulate.as_ref()?;
@@ -248,12 +256,19 @@ fn sampled(settings: &SimulateSettings) -> f64 {
     settings.sample_step.unwrap_or_else(|| settings.row_step())
 }
 
-/// What time is counted in, in words.
-fn time(study: &Study) -> String {
-    study.time_unit.as_ref().map_or_else(
+/// The independent variable, in the study's unit of time.
+fn time(study: &Study, headers: &mut Headers) -> Quantity {
+    let unit = study.time_unit.as_ref().filter(|u| !u.trim().is_empty());
+    let description = unit.map_or_else(
         || "in the model's unit of time".to_owned(),
         |unit| format!("in {unit}"),
-    )
+    );
+    Quantity {
+        name: headers.free("time", "time"),
+        description,
+        unit: unit.cloned(),
+        ..Quantity::default()
+    }
 }
 
 /// Every unit that is named, once.

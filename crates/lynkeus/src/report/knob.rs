@@ -70,7 +70,9 @@ impl Fixed {
         let own = Variant {
             factor: 1.0,
             steps: steps(method).unwrap_or_default(),
-            text: printed(&asked, design, &made, &[], javascript::expression)?,
+            text: printed(&asked, design, &made, &[], |device, _| {
+                javascript::expression(device)
+            })?,
         };
         study.estimate.method = fixed(method).unwrap_or(study.estimate.method);
         Ok(Self {
@@ -126,7 +128,9 @@ fn variant(prepared: &Prepared<'_>, fixed: &Fixed, position: &Position) -> Resul
     Ok(Variant {
         factor: position.factor,
         steps: steps(made.method()).unwrap_or_default(),
-        text: printed(&prepared, &design, &made, &[], javascript::expression)?,
+        text: printed(&prepared, &design, &made, &[], |device, _| {
+            javascript::expression(device)
+        })?,
     })
 }
 

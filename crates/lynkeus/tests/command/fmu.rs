@@ -82,6 +82,10 @@ fn an_archive_says_what_is_in_it() {
     for (version, named) in [("3", "fmi3"), ("2", "fmi2")] {
         let files = export(&folder, "filter.toml", version, &["--fmi", version]);
         let description = text(&files, "modelDescription.xml");
+        assert!(
+            !description.contains("logStatusDiscard"),
+            "nothing is tried"
+        );
         assert!(description.contains(&format!("fmiVersion=\"{version}.0\"")));
         assert!(description.contains("<CoSimulation modelIdentifier=\"twotanks\""));
         let variables = variables(&description);
@@ -187,6 +191,7 @@ fn compiled(compiler: &str, folder: &Path, version: &str) {
         "-Wall",
         "-Wextra",
         "-Wpedantic",
+        "-Wdouble-promotion",
         "-Werror",
     ]);
     command.args(["-shared", "-fPIC", "-o", "made.so", "twotanks.c"]);
@@ -217,6 +222,52 @@ fn without_a_compiler_there_are_sources_and_a_word() {
     let files = unpacked(&archive);
     assert!(files.contains_key("sources/fmi3.c"));
     assert!(!files.keys().any(|name| name.starts_with("binaries/")));
+}
+
+/// A compiler that writes more than a pipe holds, and takes nothing.
+#[cfg(unix)]
+#[test]
+fn a_compiler_that_refuses_is_named_with_its_errors() {
+    use std::os::unix::fs::PermissionsExt;
+
+    let folder = Folder::new();
+    let path = folder.path.path();
+    folder.write(
+        "cc",
+        "#!/bin/sh\nk=0\nwhile [ $k -lt 3000 ]; do echo \"fmi3.c:$k:1: warning: so it goes on and on\" >&2; k=$((k + 1)); done\nexit 1\n",
+    );
+    let executable = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(path.join("cc"), executable).unwrap();
+    let exported = |to: &str| {
+        let output = Command::new(env!("CARGO_BIN_EXE_lynkeus"))
+            .args(["export", "study.toml", "--to", "fmu", "-o", to])
+            .current_dir(path)
+            .env("PATH", path)
+            .output();
+        let made = Ended::new(&output.unwrap());
+        assert_eq!(made.code, 0, "{}", made.err);
+        let archive = path.join(to).join("twotanks.fmu");
+        let files = unpacked(&std::fs::read(archive).unwrap());
+        assert!(files.contains_key("sources/fmi3.c"));
+        assert!(!files.keys().any(|name| name.starts_with("binaries/")));
+        made.err
+    };
+    let told = exported("first");
+    assert!(told.contains("sources only"), "{told}");
+    assert!(
+        told.contains("cc (exit status: 1) does not compile them: fmi3.c:0:1"),
+        "{told}"
+    );
+    folder.change("cc", "on and on", "error: no");
+    let told = exported("second");
+    assert!(
+        told.contains("does not compile them: fmi3.c:0:1: warning: so it goes error: no; "),
+        "{told}"
+    );
+    assert!(
+        !told.contains("no C compiler") && !told.contains("export again"),
+        "{told}"
+    );
 }
 
 #[test]

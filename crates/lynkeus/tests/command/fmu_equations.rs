@@ -1,18 +1,14 @@
 //! `export --to fmu` of plants and of observers in continuous time. How they run is looked at with FMPy, in
 //! `python/tests/test_fmu_equations.py`.
 
-use std::path::Path;
 use std::process::Command;
-
-use lynkeus::expr::{Node, Tape, jacobian};
-use lynkeus::model::{LoadOptions, Plant};
 
 use crate::export::has;
 use crate::fmu::{text, unpacked, variables};
-use crate::{Folder, examples, skipped};
+use crate::{Folder, skipped};
 
 /// A state that is an output, one with nothing known, and an output of its own.
-const VAT: &str = r#"
+pub(super) const VAT: &str = r#"
 model Vat
   input Real q(unit = "l/min", min = 0, max = 5, start = 1) "Feed <raw>";
   output Real h(unit = "m", start = 2, min = 0, nominal = -2) "Level";
@@ -25,7 +21,7 @@ equation
 end Vat;
 "#;
 
-fn export(folder: &Folder, source: &str, name: &str, more: &[&str]) -> (String, String) {
+pub(super) fn export(folder: &Folder, source: &str, name: &str, more: &[&str]) -> (String, String) {
     let to = format!("out{}", more.concat());
     let arguments = [&["export", source, "--to", "fmu", "-o", &to], more].concat();
     let made = folder.run(&arguments);
@@ -67,6 +63,7 @@ fn a_plant_says_what_it_is() {
         ("y", "causality=\"output\" variability=\"continuous\"/>"),
     ];
     let (description, notes) = export(&folder, "vat.mo", "vat_plant", &[]);
+    assert!(description.contains("<Category name=\"logStatusDiscard\"/>"));
     assert!(notes.contains("in co-simulation steps of"), "{notes}");
     let found = variables(&description);
     assert_eq!(found.len(), three.len(), "{description}");
@@ -117,6 +114,8 @@ fn a_study_gives_its_plant_starts_parameters_and_unit_of_time() {
     };
     let (plant, observer) = (of("plant"), of("observer"));
     for part in [
+        "<Unit name=\"s\">",
+        "causality=\"independent\" variability=\"continuous\" unit=\"s\"/>",
         "name=\"upper\"",
         "start=\"6.0\"",
         "unit=\"V/s\"",
@@ -131,6 +130,70 @@ fn a_study_gives_its_plant_starts_parameters_and_unit_of_time() {
     let inputs: Vec<&str> = inputs.map(|(name, _)| name.as_str()).collect();
     assert_eq!(inputs, ["level"], "the pump is estimated");
     assert!(observer.contains("name=\"pump_hat\""), "{observer}");
+}
+
+/// Two parameters that the equations read, one through another; one that is a start alone.
+#[test]
+fn parameters_of_the_equations_can_be_set() {
+    let folder = Folder::empty();
+    let model = VAT
+        .replace("= -3", "= last")
+        .replace("  input", "  parameter Real k(unit = \"m\", min = 0) = 3 \"Drain\";\n  parameter Real twice = 2*k;\n  parameter Real first = 7;\n  parameter Real last = -3;\n  input")
+        .replace("start = 7", "start = first")
+        .replace("sqrt(h)", "k*sqrt(h)")
+        .replace("v*time", "twice*v*time");
+    folder.write("vat.mo", &model);
+    let (description, notes) = export(&folder, "vat.mo", "vat_plant", &[]);
+    assert!(!notes.contains("parameters are numbers"), "{notes}");
+    let found = variables(&description);
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["time", "q", "h", "v", "der(h)", "der(v)", "y", "k", "last"]
+    );
+    let told =
+        "causality=\"parameter\" variability=\"tunable\" unit=\"m\" min=\"0.0\" start=\"3.0\"/>";
+    assert!(found[7].1.contains(told), "{}", found[7].1);
+    for part in [
+        "name=\"k\" description=\"Drain\"",
+        "<Output valueReference=\"6\" dependencies=\"0 3\"/>",
+        "<ContinuousStateDerivative valueReference=\"4\" dependencies=\"1 2\"/>",
+        "<InitialUnknown valueReference=\"4\" dependencies=\"1 2 7\"/>",
+        "<InitialUnknown valueReference=\"5\" dependencies=\"8\"/>",
+        "<InitialUnknown valueReference=\"6\" dependencies=\"0 3 7\"/>",
+    ] {
+        assert!(description.contains(part), "{part}: {description}");
+    }
+    // those of a study count; unknown ones are states
+    folder.write(
+        "vat.toml",
+        "plant = \"vat.mo\"\n[parameters]\nlast = -4\n[sensors]\nmeasured = [\"h\"]\nunknown = [\"k\"]\n",
+    );
+    let more = ["--system", "plant", "--fmi", "2"];
+    let (description, _) = export(&folder, "vat.toml", "vat_plant", &more);
+    let found = variables(&description);
+    let of = |name: &str| &found.iter().find(|(own, _)| own == name).unwrap().1;
+    assert!(
+        of("last").contains("<Real start=\"-4.0\"/>"),
+        "{}",
+        of("last")
+    );
+    assert!(of("k").contains("initial=\"exact\""), "{}", of("k"));
+    assert!(
+        description.contains("<Unknown index=\"7\" dependencies=\"10\"/>"),
+        "{description}"
+    );
+    // when a model bends is not looked for while it runs
+    folder.write(
+        "bent.mo",
+        &model.replace("twice*v*time", "twice*v*max(time, last)"),
+    );
+    let (description, notes) = export(&folder, "bent.mo", "vat_plant", &["--step", "0.1"]);
+    assert!(
+        notes.contains("parameters are numbers: what happens at times has to be known"),
+        "{notes}"
+    );
+    assert!(!description.contains("causality=\"parameter\""));
 }
 
 #[test]
@@ -219,84 +282,33 @@ fn compilers_take_equations_without_a_warning() {
     }
 }
 
-/// What `along` of the C gives for each input, state and time in turn.
-fn columns(folder: &Path, name: &str, sizes: (usize, usize, usize), point: &[f64]) -> Vec<f64> {
-    let (n, m, p) = sizes;
-    let numbers: Vec<String> = point.iter().map(|v| format!("{v:?}")).collect();
-    let bench = format!(
-        "#include \"{name}.h\"\n#include <stdio.h>\nint main(void)\n{{\n    const double at[] = {{{}}};\n    double dx[{n} + 1], y[{p} + 1];\n    for (int k = 0; k < 1 + {n} + {m}; k++) {{\n        double v[1 + {n} + {m}] = {{0.0}};\n        v[k] = 1.0;\n        {name}_along(at[0], at + 1, at + 1 + {n}, v, dx, y);\n        for (int i = 0; i < {n}; i++) {{ printf(\"%.17g\\n\", dx[i]); }}\n        for (int i = 0; i < {p}; i++) {{ printf(\"%.17g\\n\", y[i]); }}\n    }}\n    return 0;\n}}\n",
-        numbers.join(", ")
-    );
-    std::fs::write(folder.join("bench.c"), bench).unwrap();
-    let mut compiler = Command::new("cc");
-    compiler.args(["-std=c99", "-O1", "-o", "bench", "bench.c"]);
-    compiler
-        .arg(format!("{name}.c"))
-        .arg("-lm")
-        .current_dir(folder);
-    assert!(compiler.status().unwrap().success());
-    let ran = Command::new(folder.join("bench")).output().unwrap();
-    let told = String::from_utf8(ran.stdout).unwrap();
-    told.lines().map(|line| line.parse().unwrap()).collect()
-}
-
+/// Steps for the level a hundredth off, not for the root's infinite slope at 0.
 #[test]
-fn directional_derivatives_are_columns_of_the_jacobian() {
-    if !has("cc") {
-        return skipped("there is no C compiler");
-    }
-    for (example, file, name) in [
-        ("two-tanks", "two_tanks.mo", "twotanks"),
-        ("cstr", "cstr.mo", "cstr"),
-        ("quadrotor", "quadrotor.mo", "quadrotor"),
-        ("flattened", "bridge.mo", "electrical_bridge"),
-        (
-            "flattened",
-            "double_pendulum.mo",
-            "mechanics_doublependulum",
-        ),
-    ] {
-        let folder = Folder::empty();
-        folder.copy_models(example);
-        let name = format!("{name}_plant");
-        export(&folder, file, &name, &[]);
-        let path = examples().join(example).join(file);
-        let plant = Plant::load(&path, &LoadOptions::default()).unwrap();
-        let symbols: Vec<Node> = std::iter::once(plant.time)
-            .chain(plant.states.iter().chain(&plant.inputs).map(|v| v.node))
-            .collect();
-        let is_state = |name: &str| plant.states.iter().any(|state| state.name == name);
-        let own = plant.outputs.iter().filter(|o| !is_state(&o.name));
-        let own: Vec<Node> = own.map(|o| o.node).collect();
-        let outputs = [&plant.derivatives[..], &own].concat();
-        let slopes = jacobian::forward(&plant.graph, &outputs, &symbols);
-        let entries: Vec<Node> = slopes.entries.iter().map(|(.., node)| *node).collect();
-        let tape = Tape::new(&plant.graph, &symbols, &entries).unwrap();
-        let variables = plant.states.iter().chain(&plant.inputs);
-        let place = |(k, v): (usize, &lynkeus::model::Variable)| {
-            let middle = 0.5 * (v.min + v.max);
-            let start = v
-                .start
-                .unwrap_or(if middle.is_finite() { middle } else { 0.3 });
-            start + 0.01 * (k as f64 + 1.0)
-        };
-        let point: Vec<f64> = std::iter::once(0.4)
-            .chain(variables.enumerate().map(place))
-            .collect();
-        let mut values = vec![0.0; entries.len()];
-        tape.evaluator().eval(&point, &mut values);
-        let mut expected = vec![0.0; outputs.len() * symbols.len()];
-        for ((row, column, _), value) in slopes.entries.iter().zip(values) {
-            expected[column * outputs.len() + row] = value;
-        }
-        let sizes = (plant.states.len(), plant.inputs.len(), own.len());
-        let found = columns(folder.path.path(), &name, sizes, &point);
-        assert_eq!(found.len(), expected.len());
-        for (found, expected) in found.iter().zip(&expected) {
-            assert!(
-                (found - expected).abs() <= 1e-11 * expected.abs().max(1.0),
-                "{file}: {found} {expected}"
-            );
-        }
-    }
+fn steps_at_a_roots_zero_are_no_shorter_than_a_hundredth_off() {
+    let folder = Folder::empty();
+    folder.write(
+        "empty.mo",
+        &VAT.replace("start = 2, min = 0,", "start = 0, min = 0,"),
+    );
+    // of size 2: the secant √0.02/0.02 is 7.07, half of its inverse 0.0707
+    let (_, notes) = export(&folder, "empty.mo", "vat_plant", &[]);
+    assert!(
+        notes.contains("in co-simulation steps of 0.05 at most"),
+        "{notes}"
+    );
+    assert!(
+        notes.contains("at the start a slope is infinite"),
+        "{notes}"
+    );
+    folder.write(
+        "empty.toml",
+        "plant = \"empty.mo\"\n[sensors]\nmeasured = [\"h\"]\nnoise = { h = 0.1 }\n[process_noise]\nh = 1e-3\n[observer]\nfamily = \"ekf\"\ninitial = { h = 0 }\n",
+    );
+    let made = folder.run(&["export", "empty.toml", "--to", "c", "-o", "c"]);
+    assert_eq!(made.code, 0, "{}", made.err);
+    assert!(
+        made.err.contains("note: steps of 0.05 at most"),
+        "{}",
+        made.err
+    );
 }

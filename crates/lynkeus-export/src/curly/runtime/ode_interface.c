@@ -14,12 +14,13 @@ void @NAME@_outputs(double t, const double *x, const double *u, double *y)
 
 void @NAME@_along(double t, const double *x, const double *u, const double *v, double *dx, double *y)
 {
-    double w[2 * INPUTS + STATES + 1];
-    for (int i = 0; i < INPUTS; i++) {
+    enum { GIVEN = INPUTS + PARAMETERS, MOVING = 1 + STATES + INPUTS };
+    double w[GIVEN + MOVING];
+    for (int i = 0; i < GIVEN; i++) {
         w[i] = u[i];
     }
-    for (int i = 0; i < 1 + STATES + INPUTS; i++) {
-        w[INPUTS + i] = v[i];
+    for (int i = 0; i < MOVING; i++) {
+        w[GIVEN + i] = v[i];
     }
     along(t, x, w, dx, y);
 }

@@ -33,12 +33,13 @@ typedef struct {
     @REAL@ estimates[ESTIMATES];
     int is_given;              /* whether inputs have been given at this point */
     int is_settled;            /* whether `now` and `estimates` hold */
-    int is_running;            /* whether initialization is over */
+    int mode;                  /* one of the modes above */
 } course;
 
 static void begin(course *c)
 {
     memset(c, 0, sizeof *c);
+    c->mode = INSTANTIATED;
     @NAME@_init(&c->past);
     c->now = c->past;
     for (int i = 0; i < SIGNALS; i++) {
@@ -79,9 +80,6 @@ static int step(course *c, double from, double to)
 {
     const course before = *c;
     int code = 0;
-    if (!c->is_running) {
-        return NOT_NOW;
-    }
     /* inputs that are not given again have stayed */
     if (from < c->time || from > c->time || !c->is_given) {
         c->time = from;
@@ -152,7 +150,7 @@ static int write_value(course *c, uint32_t reference, double value)
     }
 //?
     if (reference >= FIRST_START) {
-        if (c->is_running) {
+        if ((c->mode & BEFORE) == 0) {
             return NOT_NOW;
         }
         c->starts[reference - FIRST_START] = value;

@@ -18,55 +18,86 @@ typedef struct {
 typedef struct {
     course at;
     const callbacks *calls;
-    char *name; /* of the instance */
+    char *name;     /* of the instance */
+//? exchange
+    int is_logging; /* tells what is no error, too */
+//?
 } component;
 
 static fmi2Status told(component *m, int code)
 {
-//? exchange
-    /* a shorter step may stay where the equations have values */
-    const fmi2Status status = code == @CAPITALS@_NOT_FINITE ? fmi2Discard : fmi2Error;
-//?
-//? !exchange
-    const fmi2Status status = fmi2Error;
-//?
+    fmi2Status status = fmi2Error;
+    const char *category = "logStatusError";
+    int is_told = m != NULL && m->calls != NULL && m->calls->log != NULL;
     if (code == 0) {
         return fmi2OK;
     }
-    if (m->calls != NULL && m->calls->log != NULL) {
-        m->calls->log(m->calls->environment, m->name, status, "logStatusError", "%s", reason(code));
+//? exchange
+    /* a shorter step may stay where the equations have values; this is told where it is asked for */
+    if (code == @CAPITALS@_NOT_FINITE) {
+        status = fmi2Discard;
+        category = "logStatusDiscard";
+        is_told = is_told && m->is_logging;
+    }
+//?
+    if (is_told) {
+        m->calls->log(m->calls->environment, m->name, status, category, "%s", reason(code));
     }
     return status;
 }
 
-API const char *fmi2GetTypesPlatform(void)
+/* The instance, which must be in one of these modes. */
+#define OPEN(MODES)                                 \
+    component *m = instance;                        \
+    if (m == NULL || (m->at.mode & (MODES)) == 0) { \
+        return told(m, NOT_NOW);                    \
+    }
+
+#define MODE(NAME, FROM, TO)                        \
+    API fmi2Status FULL(fmi2##NAME)(void *instance) \
+    {                                               \
+        OPEN(FROM)                                  \
+        m->at.mode = TO;                            \
+        return fmi2OK;                              \
+    }
+
+API const char *FULL(fmi2GetTypesPlatform)(void)
 {
     return "default";
 }
 
-API const char *fmi2GetVersion(void)
+API const char *FULL(fmi2GetVersion)(void)
 {
     return "2.0";
 }
 
-API fmi2Status fmi2SetDebugLogging(void *instance, fmi2Boolean on, size_t count, const fmi2String *categories)
+API fmi2Status FULL(fmi2SetDebugLogging)(void *instance, fmi2Boolean on, size_t count, const fmi2String *categories)
 {
-    (void)instance, (void)on, (void)count, (void)categories;
+    OPEN(ANY)
+//? exchange
+    if (has_discards(count, categories)) {
+        m->is_logging = on;
+    }
+//?
+//? !exchange
+    (void)on, (void)count, (void)categories;
+//?
     return fmi2OK;
 }
 
-API void *fmi2Instantiate(
+API void *FULL(fmi2Instantiate)(
     fmi2String name, fmi2Type type, fmi2String given, fmi2String resources, const callbacks *calls,
     fmi2Boolean visible, fmi2Boolean logging)
 {
     component *m = NULL;
     const size_t length = name == NULL ? 0 : strlen(name);
-    (void)resources, (void)visible, (void)logging;
+    (void)resources, (void)visible;
 //? exchange
     const int is_offered = type == fmi2CoSimulation || type == fmi2ModelExchange;
     const char *const expected = "expected the GUID of this FMU";
 //?
 //? !exchange
+    (void)logging;
     const int is_offered = type == fmi2CoSimulation;
     const char *const expected = "expected co-simulation, and the GUID of this FMU";
 //?
@@ -82,43 +113,43 @@ API void *fmi2Instantiate(
         m->name = (char *)(m + 1);
         memcpy(m->name, length == 0 ? "" : name, length);
         m->calls = calls;
+//? exchange
+        m->is_logging = logging;
+//?
         begin(&m->at);
     }
     return m;
 }
 
-API void fmi2FreeInstance(void *instance)
+API void FULL(fmi2FreeInstance)(void *instance)
 {
     free(instance);
 }
 
-API fmi2Status fmi2SetupExperiment(
+API fmi2Status FULL(fmi2SetupExperiment)(
     void *instance, fmi2Boolean has_tolerance, double tolerance, double start, fmi2Boolean has_stop, double stop)
 {
-    component *m = instance;
+    OPEN(INSTANTIATED)
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
     m->at.time = start;
     m->at.is_settled = 0;
     return fmi2OK;
 }
 
-API fmi2Status fmi2ExitInitializationMode(void *instance)
-{
-    component *m = instance;
-    m->at.is_running = 1;
-    return fmi2OK;
-}
+MODE(EnterInitializationMode, INSTANTIATED, INITIALIZATION)
+MODE(ExitInitializationMode, INITIALIZATION, RUNNING)
+MODE(Terminate, INITIALIZATION | RUNNING, TERMINATED)
 
-API fmi2Status fmi2Reset(void *instance)
+API fmi2Status FULL(fmi2Reset)(void *instance)
 {
-    component *m = instance;
+    OPEN(ANY)
     begin(&m->at);
     return fmi2OK;
 }
 
-API fmi2Status fmi2GetReal(void *instance, const unsigned *references, size_t count, double *values)
+API fmi2Status FULL(fmi2GetReal)(void *instance, const unsigned *references, size_t count, double *values)
 {
-    component *m = instance;
+    OPEN(ANY)
     int code = 0;
     for (size_t i = 0; i < count && code == 0; i++) {
         code = read_value(&m->at, references[i], &values[i]);
@@ -126,9 +157,9 @@ API fmi2Status fmi2GetReal(void *instance, const unsigned *references, size_t co
     return told(m, code);
 }
 
-API fmi2Status fmi2SetReal(void *instance, const unsigned *references, size_t count, const double *values)
+API fmi2Status FULL(fmi2SetReal)(void *instance, const unsigned *references, size_t count, const double *values)
 {
-    component *m = instance;
+    OPEN(BEFORE | RUNNING)
     int code = 0;
     for (size_t i = 0; i < count && code == 0; i++) {
         code = write_value(&m->at, references[i], values[i]);
@@ -136,27 +167,27 @@ API fmi2Status fmi2SetReal(void *instance, const unsigned *references, size_t co
     return told(m, code);
 }
 
-API fmi2Status fmi2DoStep(void *instance, double from, double length, fmi2Boolean is_past_fixed)
+API fmi2Status FULL(fmi2DoStep)(void *instance, double from, double length, fmi2Boolean is_past_fixed)
 {
-    component *m = instance;
+    OPEN(RUNNING)
     (void)is_past_fixed;
     return told(m, step(&m->at, from, from + length));
 }
 
-API fmi2Status fmi2GetFMUstate(void *instance, void **kept)
+API fmi2Status FULL(fmi2GetFMUstate)(void *instance, void **kept)
 {
-    component *m = instance;
+    OPEN(ANY)
     return told(m, keep(&m->at, kept));
 }
 
-API fmi2Status fmi2SetFMUstate(void *instance, void *kept)
+API fmi2Status FULL(fmi2SetFMUstate)(void *instance, void *kept)
 {
-    component *m = instance;
+    OPEN(ANY)
     memcpy(&m->at, kept, sizeof m->at);
     return fmi2OK;
 }
 
-API fmi2Status fmi2FreeFMUstate(void *instance, void **kept)
+API fmi2Status FULL(fmi2FreeFMUstate)(void *instance, void **kept)
 {
     (void)instance;
     free(*kept);
@@ -164,26 +195,26 @@ API fmi2Status fmi2FreeFMUstate(void *instance, void **kept)
     return fmi2OK;
 }
 
-API fmi2Status fmi2SerializedFMUstateSize(void *instance, void *kept, size_t *size)
+API fmi2Status FULL(fmi2SerializedFMUstateSize)(void *instance, void *kept, size_t *size)
 {
     (void)instance, (void)kept;
     *size = BYTES;
     return fmi2OK;
 }
 
-API fmi2Status fmi2SerializeFMUstate(void *instance, void *kept, char *bytes, size_t size)
+API fmi2Status FULL(fmi2SerializeFMUstate)(void *instance, void *kept, char *bytes, size_t size)
 {
     return told(instance, written(kept, bytes, size));
 }
 
-API fmi2Status fmi2DeSerializeFMUstate(void *instance, const char *bytes, size_t size, void **kept)
+API fmi2Status FULL(fmi2DeSerializeFMUstate)(void *instance, const char *bytes, size_t size, void **kept)
 {
     return told(instance, taken(bytes, size, kept));
 }
 
-API fmi2Status fmi2GetRealStatus(void *instance, fmi2StatusKind kind, double *value)
+API fmi2Status FULL(fmi2GetRealStatus)(void *instance, fmi2StatusKind kind, double *value)
 {
-    component *m = instance;
+    OPEN(ANY)
     if (kind != fmi2LastSuccessfulTime) {
         return fmi2Discard;
     }
@@ -191,27 +222,11 @@ API fmi2Status fmi2GetRealStatus(void *instance, fmi2StatusKind kind, double *va
     return fmi2OK;
 }
 
-API fmi2Status fmi2GetBooleanStatus(void *instance, fmi2StatusKind kind, fmi2Boolean *value)
+API fmi2Status FULL(fmi2GetBooleanStatus)(void *instance, fmi2StatusKind kind, fmi2Boolean *value)
 {
     (void)instance;
     *value = 0;
     return kind == fmi2Terminated ? fmi2OK : fmi2Discard;
-}
-
-#define MODE(NAME)                            \
-    API fmi2Status fmi2##NAME(void *instance) \
-    {                                         \
-        (void)instance;                       \
-        return fmi2OK;                        \
-    }
-
-MODE(EnterInitializationMode)
-
-API fmi2Status fmi2Terminate(void *instance)
-{
-    component *m = instance;
-    m->at.is_running = 0;
-    return fmi2OK;
 }
 
 /* What this FMU has not, but must answer. */
@@ -220,52 +235,52 @@ static fmi2Status absent(void *instance, size_t count)
     return told(instance, count == 0 ? 0 : NO_VALUE);
 }
 
-#define NO_VALUES(NAME, KIND)                                                                             \
-    API fmi2Status fmi2Get##NAME(void *instance, const unsigned *references, size_t count, KIND *values)  \
-    {                                                                                                     \
-        (void)references, (void)values;                                                                   \
-        return absent(instance, count);                                                                   \
-    }                                                                                                     \
-    API fmi2Status fmi2Set##NAME(                                                                         \
-        void *instance, const unsigned *references, size_t count, const KIND *values)                     \
-    {                                                                                                     \
-        (void)references, (void)values;                                                                   \
-        return absent(instance, count);                                                                   \
+#define NO_VALUES(NAME, KIND)                                                                                  \
+    API fmi2Status FULL(fmi2Get##NAME)(void *instance, const unsigned *references, size_t count, KIND *values) \
+    {                                                                                                          \
+        (void)references, (void)values;                                                                        \
+        return absent(instance, count);                                                                        \
+    }                                                                                                          \
+    API fmi2Status FULL(fmi2Set##NAME)(                                                                        \
+        void *instance, const unsigned *references, size_t count, const KIND *values)                          \
+    {                                                                                                          \
+        (void)references, (void)values;                                                                        \
+        return absent(instance, count);                                                                        \
     }
 
 NO_VALUES(Integer, int)
 NO_VALUES(Boolean, fmi2Boolean)
 NO_VALUES(String, fmi2String)
 
-#define NO_STATUS(NAME, KIND)                                                                   \
-    API fmi2Status fmi2Get##NAME##Status(void *instance, fmi2StatusKind kind, KIND *value)      \
-    {                                                                                           \
-        (void)instance, (void)kind, (void)value;                                                \
-        return fmi2Discard;                                                                     \
+#define NO_STATUS(NAME, KIND)                                                                    \
+    API fmi2Status FULL(fmi2Get##NAME##Status)(void *instance, fmi2StatusKind kind, KIND *value) \
+    {                                                                                            \
+        (void)instance, (void)kind, (void)value;                                                 \
+        return fmi2Discard;                                                                      \
     }
 
 NO_STATUS(Integer, int)
 NO_STATUS(String, fmi2String)
 
-API fmi2Status fmi2GetStatus(void *instance, fmi2StatusKind kind, fmi2Status *value)
+API fmi2Status FULL(fmi2GetStatus)(void *instance, fmi2StatusKind kind, fmi2Status *value)
 {
     (void)instance, (void)kind, (void)value;
     return fmi2Discard;
 }
 
-API fmi2Status fmi2CancelStep(void *instance)
+API fmi2Status FULL(fmi2CancelStep)(void *instance)
 {
     return told(instance, NOT_NOW);
 }
 
-API fmi2Status fmi2SetRealInputDerivatives(
+API fmi2Status FULL(fmi2SetRealInputDerivatives)(
     void *instance, const unsigned *references, size_t count, const int *orders, const double *values)
 {
     (void)references, (void)orders, (void)values;
     return absent(instance, count);
 }
 
-API fmi2Status fmi2GetRealOutputDerivatives(
+API fmi2Status FULL(fmi2GetRealOutputDerivatives)(
     void *instance, const unsigned *references, size_t count, const int *orders, double *values)
 {
     (void)references, (void)orders, (void)values;
@@ -273,7 +288,7 @@ API fmi2Status fmi2GetRealOutputDerivatives(
 }
 //? !exchange
 
-API fmi2Status fmi2GetDirectionalDerivative(
+API fmi2Status FULL(fmi2GetDirectionalDerivative)(
     void *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
     const double *seed, double *result)
 {

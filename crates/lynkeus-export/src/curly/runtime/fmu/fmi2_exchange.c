@@ -8,67 +8,68 @@ typedef struct {
     double next;
 } events;
 
-MODE(EnterEventMode)
-MODE(EnterContinuousTimeMode)
+MODE(EnterEventMode, RUNNING, RUNNING)
+MODE(EnterContinuousTimeMode, RUNNING, RUNNING)
 
 /* Outputs follow what is set at once: in event mode there is nothing to do. */
-API fmi2Status fmi2NewDiscreteStates(void *instance, events *found)
+API fmi2Status FULL(fmi2NewDiscreteStates)(void *instance, events *found)
 {
     const events none = {0, 0, 0, 0, 0, 0.0};
-    (void)instance;
+    OPEN(RUNNING)
     *found = none;
     return fmi2OK;
 }
 
-API fmi2Status fmi2CompletedIntegratorStep(
+API fmi2Status FULL(fmi2CompletedIntegratorStep)(
     void *instance, fmi2Boolean is_past_fixed, fmi2Boolean *has_event, fmi2Boolean *is_over)
 {
-    (void)instance, (void)is_past_fixed;
+    OPEN(RUNNING)
+    (void)is_past_fixed;
     *has_event = 0;
     *is_over = 0;
     return fmi2OK;
 }
 
-API fmi2Status fmi2SetTime(void *instance, double time)
+API fmi2Status FULL(fmi2SetTime)(void *instance, double time)
 {
-    component *m = instance;
+    OPEN(BEFORE | RUNNING)
     set_time(&m->at, time);
     return fmi2OK;
 }
 
-API fmi2Status fmi2SetContinuousStates(void *instance, const double *values, size_t count)
+API fmi2Status FULL(fmi2SetContinuousStates)(void *instance, const double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(RUNNING)
     return told(m, write_states(&m->at, values, count));
 }
 
-API fmi2Status fmi2GetContinuousStates(void *instance, double *values, size_t count)
+API fmi2Status FULL(fmi2GetContinuousStates)(void *instance, double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(SINCE)
     return told(m, read_states(&m->at, values, count));
 }
 
-API fmi2Status fmi2GetDerivatives(void *instance, double *values, size_t count)
+API fmi2Status FULL(fmi2GetDerivatives)(void *instance, double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(SINCE)
     return told(m, read_derivatives(&m->at, values, count));
 }
 
-API fmi2Status fmi2GetNominalsOfContinuousStates(void *instance, double *values, size_t count)
+API fmi2Status FULL(fmi2GetNominalsOfContinuousStates)(void *instance, double *values, size_t count)
 {
     return told(instance, read_nominals(values, count));
 }
 
-API fmi2Status fmi2GetEventIndicators(void *instance, double *values, size_t count)
+API fmi2Status FULL(fmi2GetEventIndicators)(void *instance, double *values, size_t count)
 {
     (void)values;
     return absent(instance, count);
 }
 
-API fmi2Status fmi2GetDirectionalDerivative(
+API fmi2Status FULL(fmi2GetDirectionalDerivative)(
     void *instance, const unsigned *unknowns, size_t unknown_count, const unsigned *knowns, size_t known_count,
     const double *seed, double *result)
 {
-    component *m = instance;
+    OPEN(SINCE)
     return told(m, directional(&m->at, unknowns, unknown_count, knowns, known_count, seed, result));
 }

@@ -8,40 +8,73 @@ typedef struct {
     course at;
     void *environment;
     logger log;
+//? exchange
+    bool is_logging; /* tells what is no error, too */
+//?
 } component;
 
 static fmi3Status told(component *m, int code)
 {
-//? exchange
-    /* a shorter step may stay where the equations have values */
-    const fmi3Status status = code == @CAPITALS@_NOT_FINITE ? fmi3Discard : fmi3Error;
-//?
-//? !exchange
-    const fmi3Status status = fmi3Error;
-//?
+    fmi3Status status = fmi3Error;
+    const char *category = "logStatusError";
+    int is_told = m != NULL && m->log != NULL;
     if (code == 0) {
         return fmi3OK;
     }
-    if (m->log != NULL) {
-        m->log(m->environment, status, "logStatusError", reason(code));
+//? exchange
+    /* a shorter step may stay where the equations have values; this is told where it is asked for */
+    if (code == @CAPITALS@_NOT_FINITE) {
+        status = fmi3Discard;
+        category = "logStatusDiscard";
+        is_told = is_told && m->is_logging;
+    }
+//?
+    if (is_told) {
+        m->log(m->environment, status, category, reason(code));
     }
     return status;
 }
 
-API const char *fmi3GetVersion(void)
+/* The instance, which must be in one of these modes. */
+#define OPEN(MODES)                                 \
+    component *m = instance;                        \
+    if (m == NULL || (m->at.mode & (MODES)) == 0) { \
+        return told(m, NOT_NOW);                    \
+    }
+
+#define MODE(NAME, FROM, TO)                        \
+    API fmi3Status FULL(fmi3##NAME)(void *instance) \
+    {                                               \
+        OPEN(FROM)                                  \
+        m->at.mode = TO;                            \
+        return fmi3OK;                              \
+    }
+
+API const char *FULL(fmi3GetVersion)(void)
 {
     return "3.0";
 }
 
-API fmi3Status fmi3SetDebugLogging(void *instance, bool on, size_t count, const fmi3String *categories)
+API fmi3Status FULL(fmi3SetDebugLogging)(void *instance, bool on, size_t count, const fmi3String *categories)
 {
-    (void)instance, (void)on, (void)count, (void)categories;
+    OPEN(ANY)
+//? exchange
+    if (has_discards(count, categories)) {
+        m->is_logging = on;
+    }
+//?
+//? !exchange
+    (void)on, (void)count, (void)categories;
+//?
     return fmi3OK;
 }
 
-static void *made(fmi3String given, void *environment, logger log)
+static void *made(fmi3String given, bool logging, void *environment, logger log)
 {
     component *m = NULL;
+//? !exchange
+    (void)logging;
+//?
     if (!is_ours(given)) {
         if (log != NULL) {
             log(environment, fmi3Error, "logStatusError", "the instantiation token is that of another FMU");
@@ -52,35 +85,38 @@ static void *made(fmi3String given, void *environment, logger log)
     if (m != NULL) {
         m->environment = environment;
         m->log = log;
+//? exchange
+        m->is_logging = logging;
+//?
         begin(&m->at);
     }
     return m;
 }
 
-API void *fmi3InstantiateCoSimulation(
+API void *FULL(fmi3InstantiateCoSimulation)(
     fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, bool events,
     bool early, const uint32_t *required, size_t count, void *environment, logger log, void (*update)(void))
 {
-    (void)name, (void)resources, (void)visible, (void)logging, (void)events, (void)early;
+    (void)name, (void)resources, (void)visible, (void)events, (void)early;
     (void)required, (void)count, (void)update;
-    return made(given, environment, log);
+    return made(given, logging, environment, log);
 }
 
-API void *fmi3InstantiateModelExchange(
+API void *FULL(fmi3InstantiateModelExchange)(
     fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, void *environment,
     logger log)
 {
-    (void)name, (void)resources, (void)visible, (void)logging;
+    (void)name, (void)resources, (void)visible;
 //? exchange
-    return made(given, environment, log);
+    return made(given, logging, environment, log);
 //?
 //? !exchange
-    (void)given, (void)environment, (void)log;
+    (void)given, (void)logging, (void)environment, (void)log;
     return NULL;
 //?
 }
 
-API void *fmi3InstantiateScheduledExecution(
+API void *FULL(fmi3InstantiateScheduledExecution)(
     fmi3String name, fmi3String given, fmi3String resources, bool visible, bool logging, void *environment,
     logger log, void (*update)(void), void (*lock)(void), void (*unlock)(void))
 {
@@ -89,39 +125,38 @@ API void *fmi3InstantiateScheduledExecution(
     return NULL;
 }
 
-API void fmi3FreeInstance(void *instance)
+API void FULL(fmi3FreeInstance)(void *instance)
 {
     free(instance);
 }
 
-API fmi3Status fmi3EnterInitializationMode(
+API fmi3Status FULL(fmi3EnterInitializationMode)(
     void *instance, bool has_tolerance, double tolerance, double start, bool has_stop, double stop)
 {
-    component *m = instance;
+    OPEN(INSTANTIATED)
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    m->at.mode = INITIALIZATION;
     m->at.time = start;
     m->at.is_settled = 0;
     return fmi3OK;
 }
 
-API fmi3Status fmi3ExitInitializationMode(void *instance)
-{
-    component *m = instance;
-    m->at.is_running = 1;
-    return fmi3OK;
-}
+MODE(ExitInitializationMode, INITIALIZATION, RUNNING)
+MODE(EnterEventMode, RUNNING, RUNNING)
+MODE(EnterStepMode, RUNNING, RUNNING)
+MODE(Terminate, INITIALIZATION | RUNNING, TERMINATED)
 
-API fmi3Status fmi3Reset(void *instance)
+API fmi3Status FULL(fmi3Reset)(void *instance)
 {
-    component *m = instance;
+    OPEN(ANY)
     begin(&m->at);
     return fmi3OK;
 }
 
-API fmi3Status fmi3GetFloat64(
+API fmi3Status FULL(fmi3GetFloat64)(
     void *instance, const uint32_t *references, size_t count, double *values, size_t size)
 {
-    component *m = instance;
+    OPEN(ANY)
     int code = count == size ? 0 : NO_VALUE;
     for (size_t i = 0; i < count && code == 0; i++) {
         code = read_value(&m->at, references[i], &values[i]);
@@ -129,10 +164,10 @@ API fmi3Status fmi3GetFloat64(
     return told(m, code);
 }
 
-API fmi3Status fmi3SetFloat64(
+API fmi3Status FULL(fmi3SetFloat64)(
     void *instance, const uint32_t *references, size_t count, const double *values, size_t size)
 {
-    component *m = instance;
+    OPEN(BEFORE | RUNNING)
     int code = count == size ? 0 : NO_VALUE;
     for (size_t i = 0; i < count && code == 0; i++) {
         code = write_value(&m->at, references[i], values[i]);
@@ -140,11 +175,11 @@ API fmi3Status fmi3SetFloat64(
     return told(m, code);
 }
 
-API fmi3Status fmi3DoStep(
+API fmi3Status FULL(fmi3DoStep)(
     void *instance, double from, double length, bool is_past_fixed, bool *has_event, bool *is_over,
     bool *is_early, double *reached)
 {
-    component *m = instance;
+    OPEN(RUNNING)
     const int code = step(&m->at, from, from + length);
     (void)is_past_fixed;
     *has_event = false;
@@ -154,20 +189,20 @@ API fmi3Status fmi3DoStep(
     return told(m, code);
 }
 
-API fmi3Status fmi3GetFMUState(void *instance, void **kept)
+API fmi3Status FULL(fmi3GetFMUState)(void *instance, void **kept)
 {
-    component *m = instance;
+    OPEN(ANY)
     return told(m, keep(&m->at, kept));
 }
 
-API fmi3Status fmi3SetFMUState(void *instance, void *kept)
+API fmi3Status FULL(fmi3SetFMUState)(void *instance, void *kept)
 {
-    component *m = instance;
+    OPEN(ANY)
     memcpy(&m->at, kept, sizeof m->at);
     return fmi3OK;
 }
 
-API fmi3Status fmi3FreeFMUState(void *instance, void **kept)
+API fmi3Status FULL(fmi3FreeFMUState)(void *instance, void **kept)
 {
     (void)instance;
     free(*kept);
@@ -175,29 +210,30 @@ API fmi3Status fmi3FreeFMUState(void *instance, void **kept)
     return fmi3OK;
 }
 
-API fmi3Status fmi3SerializedFMUStateSize(void *instance, void *kept, size_t *size)
+API fmi3Status FULL(fmi3SerializedFMUStateSize)(void *instance, void *kept, size_t *size)
 {
     (void)instance, (void)kept;
     *size = BYTES;
     return fmi3OK;
 }
 
-API fmi3Status fmi3SerializeFMUState(void *instance, void *kept, uint8_t *bytes, size_t size)
+API fmi3Status FULL(fmi3SerializeFMUState)(void *instance, void *kept, uint8_t *bytes, size_t size)
 {
     return told(instance, written(kept, bytes, size));
 }
 
-API fmi3Status fmi3DeserializeFMUState(void *instance, const uint8_t *bytes, size_t size, void **kept)
+API fmi3Status FULL(fmi3DeserializeFMUState)(void *instance, const uint8_t *bytes, size_t size, void **kept)
 {
     return told(instance, taken(bytes, size, kept));
 }
 
 /* Outputs follow what is set at once: in event mode there is nothing to do. */
-API fmi3Status fmi3UpdateDiscreteStates(
+API fmi3Status FULL(fmi3UpdateDiscreteStates)(
     void *instance, bool *is_unfinished, bool *is_over, bool *has_nominals, bool *has_values, bool *has_next,
     double *next)
 {
-    (void)instance, (void)next;
+    OPEN(RUNNING)
+    (void)next;
     *is_unfinished = false;
     *is_over = false;
     *has_nominals = false;
@@ -206,20 +242,8 @@ API fmi3Status fmi3UpdateDiscreteStates(
     return fmi3OK;
 }
 
-#define MODE(NAME)                            \
-    API fmi3Status fmi3##NAME(void *instance) \
-    {                                         \
-        (void)instance;                       \
-        return fmi3OK;                        \
-    }
-
-MODE(EnterEventMode)
-MODE(EnterStepMode)
-MODE(EvaluateDiscreteStates)
-
-API fmi3Status fmi3Terminate(void *instance)
+API fmi3Status FULL(fmi3EvaluateDiscreteStates)(void *instance)
 {
-    component *m = instance;
-    m->at.is_running = 0;
+    OPEN(INITIALIZATION | RUNNING)
     return fmi3OK;
 }

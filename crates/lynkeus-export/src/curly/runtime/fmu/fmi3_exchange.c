@@ -1,69 +1,70 @@
 
-MODE(EnterContinuousTimeMode)
+MODE(EnterContinuousTimeMode, RUNNING, RUNNING)
 
-API fmi3Status fmi3CompletedIntegratorStep(void *instance, bool is_past_fixed, bool *has_event, bool *is_over)
+API fmi3Status FULL(fmi3CompletedIntegratorStep)(void *instance, bool is_past_fixed, bool *has_event, bool *is_over)
 {
-    (void)instance, (void)is_past_fixed;
+    OPEN(RUNNING)
+    (void)is_past_fixed;
     *has_event = false;
     *is_over = false;
     return fmi3OK;
 }
 
-API fmi3Status fmi3SetTime(void *instance, double time)
+API fmi3Status FULL(fmi3SetTime)(void *instance, double time)
 {
-    component *m = instance;
+    OPEN(BEFORE | RUNNING)
     set_time(&m->at, time);
     return fmi3OK;
 }
 
-API fmi3Status fmi3SetContinuousStates(void *instance, const double *values, size_t count)
+API fmi3Status FULL(fmi3SetContinuousStates)(void *instance, const double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(RUNNING)
     return told(m, write_states(&m->at, values, count));
 }
 
-API fmi3Status fmi3GetContinuousStates(void *instance, double *values, size_t count)
+API fmi3Status FULL(fmi3GetContinuousStates)(void *instance, double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(SINCE)
     return told(m, read_states(&m->at, values, count));
 }
 
-API fmi3Status fmi3GetContinuousStateDerivatives(void *instance, double *values, size_t count)
+API fmi3Status FULL(fmi3GetContinuousStateDerivatives)(void *instance, double *values, size_t count)
 {
-    component *m = instance;
+    OPEN(SINCE)
     return told(m, read_derivatives(&m->at, values, count));
 }
 
-API fmi3Status fmi3GetNominalsOfContinuousStates(void *instance, double *values, size_t count)
+API fmi3Status FULL(fmi3GetNominalsOfContinuousStates)(void *instance, double *values, size_t count)
 {
     return told(instance, read_nominals(values, count));
 }
 
-API fmi3Status fmi3GetNumberOfContinuousStates(void *instance, size_t *count)
+API fmi3Status FULL(fmi3GetNumberOfContinuousStates)(void *instance, size_t *count)
 {
     (void)instance;
     *count = STATES;
     return fmi3OK;
 }
 
-API fmi3Status fmi3GetNumberOfEventIndicators(void *instance, size_t *count)
+API fmi3Status FULL(fmi3GetNumberOfEventIndicators)(void *instance, size_t *count)
 {
     (void)instance;
     *count = 0;
     return fmi3OK;
 }
 
-API fmi3Status fmi3GetEventIndicators(void *instance, double *values, size_t count)
+API fmi3Status FULL(fmi3GetEventIndicators)(void *instance, double *values, size_t count)
 {
     (void)values;
     return absent(instance, count);
 }
 
-API fmi3Status fmi3GetDirectionalDerivative(
+API fmi3Status FULL(fmi3GetDirectionalDerivative)(
     void *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
     const double *seed, size_t seed_count, double *result, size_t result_count)
 {
-    component *m = instance;
+    OPEN(SINCE)
     if (seed_count != known_count || result_count != unknown_count) {
         return told(m, NO_VALUE);
     }

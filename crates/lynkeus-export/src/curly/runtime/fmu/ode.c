@@ -1,44 +1,48 @@
-/* Value references: time, the inputs, the states, their derivatives, the outputs. */
+/* Value references: time, the inputs, the states, their derivatives, the outputs, the parameters. */
 enum {
     INPUTS = @CAPITALS@_INPUTS,
+    PARAMETERS = @CAPITALS@_PARAMETERS,
     STATES = @CAPITALS@_STATES,
     OUTPUTS = @CAPITALS@_OUTPUTS,
     FIRST_INPUT = 1,
     FIRST_STATE = FIRST_INPUT + INPUTS,
     FIRST_DERIVATIVE = FIRST_STATE + STATES,
     FIRST_OUTPUT = FIRST_DERIVATIVE + STATES,
-    VALUES = FIRST_OUTPUT + OUTPUTS
+    FIRST_PARAMETER = FIRST_OUTPUT + OUTPUTS,
+    VALUES = FIRST_PARAMETER + PARAMETERS,
+    GIVEN = INPUTS + PARAMETERS
 };
 
 /* C has no array without entries: where there may be none, there is room for one more. */
-static const double first_inputs[INPUTS + 1] = {@FIRST_INPUTS@};
+static const double first_given[GIVEN + 1] = {@FIRST_GIVEN@};
 static const double nominals[STATES] = {@NOMINALS@};
 
 /* All that changes: a copy is a state of the FMU. */
 typedef struct {
     double time;
-    double inputs[INPUTS + 1];
+    double given[GIVEN + 1]; /* inputs, then parameters */
     double states[STATES];
     double derivatives[STATES];
     double outputs[OUTPUTS + 1];
     int is_settled; /* whether derivatives and outputs are those of the values above */
-    int is_running; /* whether initialization is over */
+    int mode;       /* one of the modes above */
 } course;
 
 static void begin(course *c)
 {
     memset(c, 0, sizeof *c);
+    c->mode = INSTANTIATED;
     @NAME@_init(c->states);
-    for (int i = 0; i < INPUTS; i++) {
-        c->inputs[i] = first_inputs[i];
+    for (int i = 0; i < GIVEN; i++) {
+        c->given[i] = first_given[i];
     }
 }
 
 static void settle(course *c)
 {
     if (!c->is_settled) {
-        @NAME@_derivatives(c->time, c->states, c->inputs, c->derivatives);
-        @NAME@_outputs(c->time, c->states, c->inputs, c->outputs);
+        @NAME@_derivatives(c->time, c->states, c->given, c->derivatives);
+        @NAME@_outputs(c->time, c->states, c->given, c->outputs);
         c->is_settled = 1;
     }
 }
@@ -46,11 +50,7 @@ static void settle(course *c)
 /* Goes on under the inputs as they are. */
 static int step(course *c, double from, double to)
 {
-    int code = 0;
-    if (!c->is_running) {
-        return NOT_NOW;
-    }
-    code = @NAME@_advance(from, to, c->inputs, c->states);
+    const int code = @NAME@_advance(from, to, c->given, c->states);
     if (code == 0) {
         c->time = to;
         c->is_settled = 0;
@@ -63,6 +63,10 @@ static int read_value(course *c, uint32_t reference, double *value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
+    if (reference >= FIRST_PARAMETER) {
+        *value = c->given[INPUTS + reference - FIRST_PARAMETER];
+        return 0;
+    }
     if (reference >= FIRST_DERIVATIVE) {
         settle(c);
         *value = reference >= FIRST_OUTPUT ? c->outputs[reference - FIRST_OUTPUT]
@@ -72,7 +76,7 @@ static int read_value(course *c, uint32_t reference, double *value)
     if (reference >= FIRST_STATE) {
         *value = c->states[reference - FIRST_STATE];
     } else if (reference >= FIRST_INPUT) {
-        *value = c->inputs[reference - FIRST_INPUT];
+        *value = c->given[reference - FIRST_INPUT];
     } else {
         *value = c->time;
     }
@@ -84,12 +88,14 @@ static int write_value(course *c, uint32_t reference, double value)
     if (reference >= VALUES) {
         return NO_VALUE;
     }
-    if (reference >= FIRST_DERIVATIVE || reference < FIRST_INPUT) {
+    if ((reference >= FIRST_DERIVATIVE && reference < FIRST_PARAMETER) || reference < FIRST_INPUT) {
         return NOT_SETTABLE;
     }
-    if (reference < FIRST_STATE) {
-        c->inputs[reference - FIRST_INPUT] = value;
-    } else if (c->is_running) {
+    if (reference >= FIRST_PARAMETER) {
+        c->given[INPUTS + reference - FIRST_PARAMETER] = value;
+    } else if (reference < FIRST_STATE) {
+        c->given[reference - FIRST_INPUT] = value;
+    } else if ((c->mode & BEFORE) == 0) {
         return NOT_NOW;
     } else {
         c->states[reference - FIRST_STATE] = value;
@@ -160,10 +166,10 @@ static int directional(
             direction[0] = seed[i];
         }
     }
-    @NAME@_along(c->time, c->states, c->inputs, direction, derivatives, outputs);
+    @NAME@_along(c->time, c->states, c->given, direction, derivatives, outputs);
     for (size_t i = 0; i < unknown_count; i++) {
         const uint32_t unknown = unknowns[i];
-        if (unknown < FIRST_STATE || unknown >= VALUES) {
+        if (unknown < FIRST_STATE || unknown >= FIRST_PARAMETER) {
             return NO_VALUE;
         } else if (unknown >= FIRST_OUTPUT) {
             result[i] = outputs[unknown - FIRST_OUTPUT];

@@ -45,7 +45,7 @@ static const char *reason(int code)
 @REASONS@    case NO_VALUE:
         return "there is no variable of this type with such a value reference";
     case NOT_SETTABLE:
-        return "only inputs and start values can be set";
+        return "only inputs, start values and parameters can be set";
     case NOT_OURS:
         return "these bytes are no state of this FMU";
     case NOT_POSITIVE:
@@ -56,3 +56,15 @@ static const char *reason(int code)
         return "there is not enough memory";
     }
 }
+//? exchange
+
+/* Whether the category of discarded calls is meant; without a list all are. */
+static int has_discards(size_t count, const char *const *categories)
+{
+    int found = count == 0;
+    for (size_t i = 0; i < count; i++) {
+        found = found || strcmp(categories[i], "logStatusDiscard") == 0;
+    }
+    return found;
+}
+//?
