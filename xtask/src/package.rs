@@ -27,7 +27,8 @@ pub fn test(python: &Path) -> Result<(), String> {
         .args(["--quiet", "--force-reinstall", "--no-deps", "--no-index"])
         .arg(wheel);
     run(&mut install)?;
-    run(&mut cargo(&["build", "--package", "lynkeus"]))?;
+    // as all tests are built later, so that nothing is built twice
+    run(&mut cargo(&["test", "--workspace", "--no-run"]))?;
     let command = target().join("debug").join("lynkeus");
     let command = command.with_extension(std::env::consts::EXE_EXTENSION);
     let mut tests = Command::new(python);

@@ -1,8 +1,9 @@
 //! The function block: what a controller's program sees of an estimator.
 
+use super::bound::listed;
 use super::names::Identifiers;
 use super::print::{Printer, comment, section};
-use super::{Frame, about, number};
+use super::{Frame, about};
 use crate::curly::c::{READINGS, codes};
 use crate::curly::function::Entry;
 use crate::curly::syntax::Type;
@@ -102,7 +103,7 @@ impl<'a> Block<'a> {
             lines.push(format!("{is_valid} : BOOL := TRUE; (* {words} *)"));
         }
         for (name, tunable) in self.tunables.iter().zip(device.tunables) {
-            let (start, words) = (number(tunable.start), told(name, &tunable.entry));
+            let (start, words) = (listed(tunable.start), told(name, &tunable.entry));
             lines.push(format!("{name} : {real} := {start};{words}"));
         }
         lines.push("restart : BOOL; (* TRUE: from the start, before the sample *)".to_owned());

@@ -52,26 +52,44 @@ pub(super) fn literal(digits: &str) -> Bound {
         Some((mantissa, exponent)) => (mantissa, exponent.parse().unwrap_or(0)),
         None => (digits, 0),
     };
-    let point = if mantissa.contains('.') { "" } else { ".0" };
-    let written = |mantissa: &str, exponent: i32| match exponent {
-        0 => mantissa.to_owned(),
-        _ => format!("{mantissa}E{exponent}"),
-    };
-    let mantissa = format!("{mantissa}{point}");
     let mut rest: i32 = exponent;
     let mut factors = vec![];
     while rest.abs() > MOST + 6 {
         let part = MOST * rest.signum();
-        factors.push(written("1.0", part));
+        factors.push(written("1", part));
         rest -= part;
     }
-    let first = written(&mantissa, rest);
+    let first = written(mantissa, rest);
     match factors.is_empty() {
         true => Bound::atom(first),
         false => Bound {
             text: format!("{first} * {}", factors.join(" * ")),
             level: Operator::Mul.level(),
         },
+    }
+}
+
+/// A number in a statement.
+pub(super) fn signed(value: f64) -> String {
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{}", literal(&format!("{:?}", value.abs())).text)
+}
+
+/// A number in a declaration, which has no factors.
+pub(super) fn listed(value: f64) -> String {
+    let digits = format!("{value:?}");
+    match digits.split_once('e') {
+        Some((mantissa, exponent)) => written(mantissa, exponent.parse().unwrap_or(0)),
+        None => digits,
+    }
+}
+
+/// With a point.
+fn written(mantissa: &str, exponent: i32) -> String {
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    match exponent {
+        0 => format!("{mantissa}{point}"),
+        _ => format!("{mantissa}{point}E{exponent}"),
     }
 }
 
@@ -93,5 +111,7 @@ mod tests {
         ] {
             assert_eq!(literal(digits).text, expected);
         }
+        assert_eq!(listed(-2e-307), "-2.0E-307");
+        assert_eq!(listed(3.0), "3.0");
     }
 }

@@ -184,49 +184,45 @@ impl Frame<'_> {
         let prefix = self.prefix;
         let mut lines = String::new();
         for field in &self.machine.fields {
-            for (target, value) in starts(field)? {
-                lines += &format!("    s.{target} := {value};\n");
-            }
+            lines += &start(field)?;
         }
         let shared = section("VAR_IN_OUT", &[format!("s : {prefix}_state;")]);
+        let own = section("VAR", &["k : DINT;".to_owned()]);
         Ok(format!(
-            "(* Before the first sample. *)\nFUNCTION {prefix}_init : BOOL\n{shared}{lines}    \
+            "(* Before the first sample. *)\nFUNCTION {prefix}_init : BOOL\n{shared}{own}{lines}    \
              {prefix}_init := TRUE;\nEND_FUNCTION\n\n"
         ))
     }
 }
 
-/// What each number of a field is called, and what it is at the start.
-fn starts(field: &Field) -> Result<Vec<(String, String)>, Refusal> {
+/// A field at the start, entry by entry where they are not 0.
+fn start(field: &Field) -> Result<String, Refusal> {
     if field.start.iter().any(|value| !value.is_finite()) {
         return Err(lacks("a start that is no finite number"));
     }
     let name = part(field.name);
-    let starts = field.start.iter().enumerate();
-    let starts = starts.map(|(place, value)| {
-        let value = match field.kind {
-            Kind::Int => format!("{}", *value as i64),
-            Kind::Truth => if *value == 0.0 { "FALSE" } else { "TRUE" }.to_owned(),
-            _ => number(*value),
-        };
-        match field.count {
-            None => (name.to_owned(), value),
-            Some(_) => (format!("{name}[{place}]"), value),
-        }
-    });
-    Ok(starts.collect())
-}
-
-/// A number as the start of a variable.
-fn number(value: f64) -> String {
-    let digits = format!("{value:?}");
-    match digits.split_once('e') {
-        Some((mantissa, exponent)) if !mantissa.contains('.') => {
-            format!("{mantissa}.0E{exponent}")
-        }
-        Some((mantissa, exponent)) => format!("{mantissa}E{exponent}"),
-        None => digits,
-    }
+    let text = |value: f64| match field.kind {
+        Kind::Int => format!("{}", value as i64),
+        Kind::Truth => if value == 0.0 { "FALSE" } else { "TRUE" }.to_owned(),
+        _ => bound::signed(value),
+    };
+    let Some(count) = field.count else {
+        let value = text(field.start.first().copied().unwrap_or(0.0));
+        return Ok(format!("    s.{name} := {value};\n"));
+    };
+    let zeros = format!(
+        "    FOR k := 0 TO {} DO\n        s.{name}[k] := {};\n    END_FOR;\n",
+        count.max(1) - 1,
+        text(0.0)
+    );
+    let others = field
+        .start
+        .iter()
+        .enumerate()
+        .filter(|start| *start.1 != 0.0);
+    let others =
+        others.map(|(place, value)| format!("    s.{name}[{place}] := {};\n", text(*value)));
+    Ok(zeros + &others.collect::<String>())
 }
 
 /// Words behind a declaration.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use super::bound::listed;
 use super::names::Identifiers;
 use super::routine::{Instance, Routine};
 use crate::Refusal;
@@ -135,8 +136,15 @@ impl<'p> Printer<'p> {
         const LAST: &str = "3.4E38";
         match value {
             Expr::Name(name) if name == "INFINITY" => Ok(LAST.to_owned()),
-            Expr::Prefix("-", inner) if **inner == Expr::Name("INFINITY".to_owned()) => {
-                Ok(format!("-{LAST}"))
+            Expr::Prefix("-", inner) => Ok(format!("-{}", self.bounded(inner, kind)?)),
+            Expr::Real(digits) => {
+                let value = digits.parse().unwrap_or(0.0);
+                Ok(match self.precision {
+                    Precision::F64 => listed(value),
+                    Precision::F32 if (value as f32).is_infinite() => LAST.to_owned(),
+                    // as a number of that type is written
+                    Precision::F32 => listed(format!("{:?}", value as f32).parse().unwrap_or(0.0)),
+                })
             }
             value => self.value(value, kind),
         }
