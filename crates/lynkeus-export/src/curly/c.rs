@@ -6,7 +6,10 @@ use super::language::{self, Language};
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
 use super::template::{chosen, exchanged};
+use super::words::{self, READINGS};
 use crate::Refusal;
+
+pub(super) use super::words::codes;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
 const CMAKE: &str = include_str!("runtime/CMakeLists.txt");
@@ -29,58 +32,6 @@ pub struct File {
     /// its text
     pub text: String,
 }
-
-/// What `push` can say, from 1 on.
-const CODES: [(&str, &str); 5] = [
-    (
-        "TIME",
-        "the time is no number, or before that of the last sample",
-    ),
-    ("INPUT", "the first value of an input is no number"),
-    (
-        "INTERVAL",
-        "the interval is too short, or takes more than a million steps",
-    ),
-    ("DIVERGED", "an estimate has run away"),
-    ("NOT_FINITE", "the equations have no value there"),
-];
-
-/// What it says of numbers that may be changed, after the other codes.
-const TUNING: (&str, &str) = (
-    "TUNING",
-    "a number that may be changed is not finite and above 0",
-);
-
-/// What `push` of a device can say, from 1 on.
-pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
-    let tuning = (!device.tunables.is_empty()).then_some(TUNING);
-    CODES.into_iter().chain(tuning)
-}
-
-/// What can become of a reading of a filter.
-pub(super) const READINGS: [(&str, &str); 4] = [
-    ("MISSING", "the sensor did not report"),
-    ("TAKEN", "it corrected the estimate"),
-    ("REJECTED", "the gate kept it out"),
-    (
-        "AT_LIMIT",
-        "at an end of the sensor's range, beyond which the estimate is anyway",
-    ),
-];
-
-/// The words of the draft that have the device's name before them in C.
-const PREFIXED: [&str; 10] = [
-    "TIME",
-    "INPUT",
-    "INTERVAL",
-    "DIVERGED",
-    "NOT_FINITE",
-    "TUNING",
-    "MISSING",
-    "TAKEN",
-    "REJECTED",
-    "AT_LIMIT",
-];
 
 /// The files of a device: `NAME.h`, `NAME.c`, `replay.c` and `CMakeLists.txt`.
 ///
@@ -297,9 +248,7 @@ impl Frame<'_> {
             if word == "STATE" {
                 return Some(format!("{name}_state"));
             }
-            PREFIXED
-                .contains(&word)
-                .then(|| format!("{capitals}_{word}"))
+            words::number(word).map(|_| format!("{capitals}_{word}"))
         });
         let names = |entries: &[Entry]| -> String {
             let texts = entries

@@ -7,6 +7,7 @@ use super::device::Device;
 use super::function::{Entry, comment};
 use super::language::{FUNCTIONS, Language};
 use super::machine::{Field, Machine};
+use super::words;
 use crate::Refusal;
 
 /// What the library of the draft is in JavaScript, where that has it.
@@ -23,20 +24,6 @@ const OWN: [(&str, &str); 3] = [
         "larger",
         "function larger(a, b)\n{\n    return Math.max(a, b);\n}",
     ),
-];
-
-/// Numbers of the words for what happened, as in C.
-const WORDS: [(&str, usize); 10] = [
-    ("TIME", 1),
-    ("INPUT", 2),
-    ("INTERVAL", 3),
-    ("DIVERGED", 4),
-    ("NOT_FINITE", 5),
-    ("TUNING", 6),
-    ("MISSING", 0),
-    ("TAKEN", 1),
-    ("REJECTED", 2),
-    ("AT_LIMIT", 3),
 ];
 
 /// A module: `signals` and `estimates` (names), `init()`, which gives a state, and
@@ -114,8 +101,7 @@ const PUSH: &str = "function push(s, t, signals, estimates)
 
 /// What a name of the draft is called.
 fn word(name: &str) -> Option<String> {
-    let number = WORDS.iter().find(|known| known.0 == name);
-    if let Some((_, number)) = number {
+    if let Some(number) = words::number(name) {
         return Some(number.to_string());
     }
     Some(match name {

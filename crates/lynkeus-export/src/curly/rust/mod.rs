@@ -5,11 +5,12 @@ mod print;
 mod value;
 
 use self::print::printed;
-use super::c::{self, File, Precision, READINGS, prefix};
+use super::c::{File, Precision, prefix};
 use super::device::Device;
 use super::function::Entry;
 use super::machine::{Field, Kind, Machine};
 use super::template::mentions;
+use super::words::{self, READINGS};
 use crate::Refusal;
 
 const REPLAY: &str = include_str!("../runtime/replay.rs");
@@ -280,7 +281,7 @@ impl Frame<'_> {
 
 /// The codes, and what they are for people.
 fn codes(device: &Device<'_>) -> String {
-    let all = || c::codes(device).enumerate();
+    let all = || words::codes(device).enumerate();
     let constants = all().map(|(k, (code, _))| format!("const {code}: usize = {};\n", k + 1));
     let variants =
         all().map(|(_, (code, about))| format!("    /// {about}\n    {},\n", camel(code)));
