@@ -33,11 +33,37 @@ pub struct File {
     pub text: String,
 }
 
+/// What an export is made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sources {
+    /// the files of its folder
+    pub files: Vec<File>,
+    /// numbers that its `float` makes 0 or infinite, each once; of other numbers none
+    pub lost: Vec<String>,
+}
+
+impl From<File> for Sources {
+    fn from(file: File) -> Self {
+        Self {
+            files: vec![file],
+            lost: vec![],
+        }
+    }
+}
+
 /// The files of a device: `NAME.h`, `NAME.c`, `replay.c` and `CMakeLists.txt`.
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
 pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+    Ok(sources(device, precision)?.files)
+}
+
+/// The same, with what they lose.
+///
+/// # Errors
+/// As [`files`].
+pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let machine = Machine::of(device)?;
     let frame = Frame {
         device,
@@ -54,12 +80,15 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
             .replace("@REAL@", frame.real())
     };
     let file = |name: String, text: String| File { name, text };
-    Ok(vec![
-        file(format!("{}.h", frame.prefix), frame.header()),
-        file(format!("{}.c", frame.prefix), frame.source()),
-        file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
-        file("CMakeLists.txt".into(), named(CMAKE)),
-    ])
+    Ok(Sources {
+        files: vec![
+            file(format!("{}.h", frame.prefix), frame.header()),
+            file(format!("{}.c", frame.prefix), frame.source()),
+            file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
+            file("CMakeLists.txt".into(), named(CMAKE)),
+        ],
+        lost: lost(&machine, precision),
+    })
 }
 
 /// Numbers of a device that `float` makes 0 or infinite.
@@ -67,11 +96,20 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
 /// # Errors
 /// As [`files`].
 pub fn lost_in_float(device: &Device<'_>) -> Result<Vec<String>, Refusal> {
-    let machine = Machine::of(device)?;
+    Ok(lost(&Machine::of(device)?, Precision::F32))
+}
+
+/// Numbers of a draft that `float` makes 0 or infinite.
+pub(super) fn lost(machine: &Machine, precision: Precision) -> Vec<String> {
+    if precision == Precision::F64 {
+        return vec![];
+    }
     let starts = machine.fields.iter().flat_map(|field| &field.start);
     let starts: String = starts.map(|value| number(value.abs()) + "\n").collect();
-    let lost = language::lost_in_float(&(machine.tables + &machine.source + &starts));
-    Ok(lost.into_iter().collect())
+    let draft = [&machine.tables, &machine.source, &starts].map(String::as_str);
+    language::lost_in_float(&draft.concat())
+        .into_iter()
+        .collect()
 }
 
 /// Files that are there already: the bench, the answers of FMUs, the headers of C99 and of what

@@ -5,7 +5,7 @@ mod print;
 mod value;
 
 use self::print::printed;
-use super::c::{File, Precision, prefix};
+use super::c::{File, Precision, Sources, lost, prefix};
 use super::device::Device;
 use super::function::Entry;
 use super::machine::{Field, Kind, Machine};
@@ -47,11 +47,12 @@ fn power_of_two(a: REAL) -> REAL {
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
-pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let name = format!("{}_estimator", prefix(device.name));
+    let machine = &Machine::of(device)?;
     let frame = Frame {
         device,
-        machine: &Machine::of(device)?,
+        machine,
         precision,
     };
     let manifest = format!(
@@ -67,11 +68,14 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
         name: name.to_owned(),
         text,
     };
-    Ok(vec![
-        file("Cargo.toml", manifest),
-        file("src/lib.rs", frame.library()?),
-        file("examples/replay.rs", replay),
-    ])
+    Ok(Sources {
+        files: vec![
+            file("Cargo.toml", manifest),
+            file("src/lib.rs", frame.library()?),
+            file("examples/replay.rs", replay),
+        ],
+        lost: lost(machine, precision),
+    })
 }
 
 struct Frame<'a> {
