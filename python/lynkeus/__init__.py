@@ -9,7 +9,7 @@
 """
 
 from ._lynkeus import Estimator, Log
-from .errors import InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
+from .errors import ArgumentError, InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
 from .functions import abs, acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
 from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .model import Model
@@ -34,6 +34,7 @@ from .verbs import certify, check, compare, design, estimate, how_well, simulate
 
 __all__ = [
     "Answer",
+    "ArgumentError",
     "Certificate",
     "Check",
     "Comparison",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _lynkeus
+from ._arguments import optional, section, word
 from ._toml import document
+from .errors import ArgumentError
 from .model import Model
 
 #: keys of ``[sensors]`` that stand for themselves in Python
@@ -18,11 +21,21 @@ def spelled(changes: Mapping[str, Any]) -> dict[str, Any]:
     found = dict(changes)
     sensors = {name: found.pop(name) for name in SENSORS if name in found}
     if sensors:
-        found["sensors"] = {**(found.get("sensors") or {}), **sensors}
+        given = optional(section)("sensors", found.get("sensors"))
+        found["sensors"] = {**(given or {}), **sensors}
     families = found.get("compare")
     if isinstance(families, Sequence) and not isinstance(families, str):
         found["compare"] = {"families": families}
     return found
+
+
+def plant_of(name: str, given: Any) -> Model:
+    """The model that an argument of that name is, or is the path of."""
+    if isinstance(given, Model):
+        return given
+    if not isinstance(given, (str, os.PathLike)):
+        raise ArgumentError.of(name, "a Model, or the path of one", given)
+    return Model.load(given)
 
 
 class Base:
@@ -38,12 +51,11 @@ class Base:
         study, asked = dict(self._sections), spelled(changes)
         plant, choice = self._plant, self._core.model
         if "plant" in asked:
-            model = asked.pop("plant")
-            model = model if isinstance(model, Model) else Model.load(model)
+            model = plant_of("plant", asked.pop("plant"))
             plant, choice = (model.name, model.text), model.choose
             study |= {"plant": model.name, "model": model.choose}
         if "model" in asked:
-            choice = study["model"] = asked.pop("model")
+            choice = study["model"] = optional(word)("model", asked.pop("model"))
         for name, change in asked.items():
             old = study.get(name)
             if name == "observer" and isinstance(change, str):

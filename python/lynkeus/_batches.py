@@ -111,4 +111,4 @@ def _warn(doubted: dict[int, str], names: Sequence[str]) -> None:
         return
     first = min(doubted)
     text = f"{len(doubted)} of {len(names)} results are not credible, first {names[first]}: {doubted[first]}"
-    warnings.warn(text, NotCredible, stacklevel=5)  # where the method of the study is called
+    warnings.warn(text, NotCredible, stacklevel=6)  # where the method of the study is called

@@ -6,7 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ._arguments import flag, optional, path, real, word
 from .errors import InputError
+
+#: what :meth:`Study.export` takes
+EXPORT = {
+    "folder": path,
+    "to": word,
+    "precision": word,
+    "step": optional(real()),
+    "tunable": flag,
+    "fmi": word,
+    "system": optional(word),
+    "force": flag,
+}
 
 
 @dataclass(frozen=True)
@@ -33,9 +46,9 @@ def write(
         )
     try:
         for name, content in files:
-            path = folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
+            file = folder / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
     except OSError as error:
         raise InputError(f"cannot be written: {error}", place=str(folder)) from error
     return Export(tuple(folder / name for name, _ in files), tuple(notes))

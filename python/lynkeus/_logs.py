@@ -11,15 +11,15 @@ import numpy as np
 
 from . import _lynkeus
 from ._columns import Given, column, why
-from .errors import InputError
+from .errors import ArgumentError, InputError
 
 _Named = Iterable[tuple[Any, Any]]
 
 
-def log_of(data: Any) -> _lynkeus.Log:
+def log_of(data: Any, what: str = "the log") -> _lynkeus.Log:
     """The log in a file (CSV, Parquet), a mapping of columns, a data frame of pandas or polars, a
     table of Arrow or whatever else has ``__arrow_c_stream__``, a structured array, or the result of
-    a simulation. A column that cannot be read is refused where the study asks for it, not before."""
+    a simulation; ``what`` is what messages call it. A column that cannot be read is refused where the study asks for it, not before."""
     if isinstance(data, _lynkeus.Log):
         return data
     if isinstance(data, (str, os.PathLike)):
@@ -27,13 +27,13 @@ def log_of(data: Any) -> _lynkeus.Log:
     if isinstance(data, Mapping):
         return _gathered(_items(data))
     if isinstance(data, np.ndarray):
-        return _gathered(fields(data))
+        return _gathered(fields(data, what))
     pandas = sys.modules.get("pandas")
     if pandas is not None and isinstance(data, pandas.DataFrame):
-        return _gathered(frame(data))
+        return _gathered(frame(data, what))
     recorded = getattr(type(data), "log", None)
     if recorded is not None and isinstance(data.log, Mapping):  # what a simulation's logger saw
-        return log_of(data.log)
+        return log_of(data.log, what)
     has_names = hasattr(type(data), "__getitem__") and _names(data) is not None
     if hasattr(data, "__arrow_c_stream__") or hasattr(data, "__arrow_c_array__"):
         try:
@@ -42,13 +42,10 @@ def log_of(data: Any) -> _lynkeus.Log:
             raise
         except BaseException as error:  # polars panics at columns of objects
             if not has_names:
-                raise InputError(f"the log: {why(error)}") from error
+                raise InputError(f"{what}: {why(error)}") from error
     if has_names:
         return _gathered((name, lambda name=name: _taken(data, name)) for name in _names(data) or ())
-    raise InputError(
-        "the log: expected a path, a mapping of columns, a data frame or an Arrow table, found "
-        + type(data).__name__
-    )
+    raise ArgumentError.of(what, "a path, a mapping of columns, a data frame or an Arrow table", data)
 
 
 def _gathered(columns: _Named) -> _lynkeus.Log:
@@ -68,22 +65,22 @@ def _items(data: Mapping[Any, Any]) -> Iterator[tuple[Any, Any]]:
         yield name, lambda name=name: data[name]
 
 
-def fields(data: np.ndarray[Any, Any]) -> Iterator[tuple[Any, Any]]:
+def fields(data: np.ndarray[Any, Any], what: str = "the log") -> Iterator[tuple[Any, Any]]:
     """Columns of a structured array."""
     if data.dtype.names is None or data.ndim != 1:
         raise InputError(
-            "the log: expected named columns, found an array "
+            f"{what}: expected named columns, found an array "
             f"of {data.dtype} of shape {data.shape}; give a mapping: {{'t': a[:, 0], 'y': a[:, 1]}}"
         )
     for name in data.dtype.names:
         yield name, lambda name=name: data[name]
 
 
-def frame(data: Any) -> Iterator[tuple[Any, Any]]:
+def frame(data: Any, what: str = "the log") -> Iterator[tuple[Any, Any]]:
     """Columns of a frame of pandas, and what its index is called by name."""
     if data.columns.nlevels > 1:
         raise InputError(
-            f"the log: expected one header for each column, found {data.columns.nlevels} levels of them; "
+            f"{what}: expected one header for each column, found {data.columns.nlevels} levels of them; "
             "join them: frame.columns = ['_'.join(levels) for levels in frame.columns]"
         )
     for level, name in enumerate(data.index.names):

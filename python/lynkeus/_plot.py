@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, LynkeusError
+from ._arguments import optional, words
+from .errors import ArgumentError, InputError, LynkeusError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,12 +78,12 @@ def captions(svg: str | None, known: Iterable[str], time: str) -> Captions:
     return found
 
 
-def asked(names: Sequence[str] | None) -> Sequence[str] | None:
+def asked(names: Sequence[str] | None) -> list[str] | None:
     """The names to draw; a single one counts as a list of one."""
-    found = [names] if isinstance(names, str) else names
-    if found is not None and not len(found):
+    found = optional(words)("names", names)
+    if found is not None and not found:
         raise InputError("names: expected at least one quantity or column, found none")
-    return found
+    return None if found is None else list(found)
 
 
 def of_run(run: Run, names: Sequence[str] | None, truth: Mapping[str, Column]) -> tuple[list[Panel], str]:
@@ -184,6 +185,8 @@ def _axes(count: int, ax: Axes | Sequence[Axes] | None) -> list[Axes]:
         return list(made[:, 0])
     # a sequence, or NumPy's array of them
     given: list[Axes] = list(np.ravel(np.asarray(ax, dtype=object)))
+    if strangers := [each for each in given if not hasattr(each, "plot")]:
+        raise ArgumentError.of("ax", "Axes of matplotlib", strangers[0])
     if len(given) not in (1, count):
         raise InputError(f"ax: expected one Axes or {count}, one for each panel, found {len(given)}")
     return given

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 
 class LynkeusError(Exception):
     """The text is the command's: place, what is wrong, what was expected, what to do.
@@ -27,6 +29,32 @@ class LynkeusError(Exception):
 
 class InputError(LynkeusError, ValueError):
     """The input is at fault: a file, a key, a column, a name, a shape."""
+
+
+class ArgumentError(InputError, TypeError):
+    """An argument of another kind than its annotation says."""
+
+    @classmethod
+    def of(cls, argument: str, expected: str, found: object) -> ArgumentError:
+        """That of a value that is not what was expected of it."""
+        return cls(f"{argument}: expected {expected}, found {_spoken(found)}")
+
+
+def _spoken(value: object) -> str:
+    """A short value as it is written, the kind of any other."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, (bool, int, float, str)):
+        try:
+            written = repr(value)
+        except ValueError:  # a number of thousands of digits
+            return "a number beyond all limits"
+        return written if len(written) <= _SHORT else f"{written[:_SHORT]}…"
+    return type(value).__name__
+
+
+#: characters of a value that are told
+_SHORT = 40
 
 
 class RefusedError(LynkeusError):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _from_function, _lynkeus
+from ._arguments import optional, path as path_of, real, section, takes, word
 from ._columns import why
 from ._flatten import flattened, is_read
 from ._toml import key, number, valid
@@ -22,19 +23,21 @@ class Model:
     ``@ODEmodel``. ``choose`` is the model to take where the text holds several.
     """
 
+    @takes(text=word, name=word, choose=optional(word))
     def __init__(self, text: str, name: str = "model.mo", choose: str | None = None) -> None:
         self.text = valid(text)
         self.name = name
         self.choose = choose
 
     @classmethod
+    @takes(path=path_of, choose=optional(word))
     def load(cls, path: str | os.PathLike[str], choose: str | None = None) -> Model:
         """A file: ``.mo`` or ``.jl``. Where connectors or libraries keep it from being read and the
         compiler ``rumoca`` is installed (``pip install '.[modelica]'`` from a clone), what that makes of it:
         names come out dotted, ``r1.p.v``."""
         name = os.fspath(path)
         try:
-            text = Path(path).read_text(encoding="utf-8-sig")
+            text = Path(name).read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"the model {name} cannot be read: {why(error)}") from error
         if not name.endswith(".mo") or is_read(text, name, choose):
@@ -43,11 +46,13 @@ class Model:
         return cls(text, name, choose) if flat is None else cls(*flat)
 
     @classmethod
+    @takes(text=word, choose=optional(word))
     def from_modelica(cls, text: str, choose: str | None = None) -> Model:
         """A text in Modelica."""
         return cls(text, choose=choose)
 
     @classmethod
+    @takes(name=optional(word), description=optional(word))
     def from_function(
         cls,
         f: Callable[..., Any],
@@ -100,10 +105,12 @@ class Model:
         )
         return cls(text, f"{called}.mo")
 
+    @takes(parameters=optional(section))
     def functions(self, parameters: Mapping[str, float] | None = None) -> Functions:
         """The equations as functions of numbers, x' = f(t, x, u) and y = h(t, x, u); ``parameters``
         replace those of the model."""
-        given = "".join(f"{key(k)} = {number(v)}\n" for k, v in (parameters or {}).items())
+        values = ((k, real()(f"parameters.{k}", v)) for k, v in (parameters or {}).items())
+        given = "".join(f"{key(str(k))} = {number(v)}\n" for k, v in values)
         text = f"[parameters]\n{given}"
         core = _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose)
         return Functions(core.functions())

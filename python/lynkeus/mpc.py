@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InputError
+from ._arguments import instance, optional, real, section, takes
+from .errors import ArgumentError, InputError
 from .study import Study
 
 
@@ -31,9 +32,12 @@ class Estimator:
     with more sensors than the model measures, or that does not estimate a state of it, is refused.
     """
 
+    @takes(study=instance(Study, "a Study"), t_step=real(), names=optional(section))
     def __init__(self, study: Study, model: Any, t_step: float, names: Mapping[str, str] | None = None) -> None:
         self._study = study
         self._t_step = t_step
+        if not all(hasattr(model, part) for part in ("x", "y", "u")):
+            raise ArgumentError.of("model", "a do_mpc.model.Model", model)
         known = dict(names or {})
         self._measured = _entries(model.y, known)
         self._inputs = _entries(model.u, known)
@@ -85,7 +89,10 @@ class Estimator:
         return self.x0
 
     def _given(self, what: str, names: list[str], values: ArrayLike) -> dict[str, float]:
-        flat = np.ravel(values)
+        try:
+            flat = np.asarray(values).astype(float).ravel()
+        except (TypeError, ValueError, OverflowError):
+            raise ArgumentError.of(what, "numbers", values) from None
         if len(flat) != len(names):
             raise InputError(f"{what}: expected a value for each of {', '.join(names)}, found {len(flat)} values")
         given = zip(names, flat, strict=True)

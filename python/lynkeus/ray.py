@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from . import _lynkeus
+from ._arguments import function, instance, optional, section, several, takes, whole, word
 from ._base import Base
 from ._columns import Given
 from ._each import Errors, chosen
 from ._logs import columns_of, log_of
 from ._optional import needed
-from .errors import InputError, LynkeusError
+from .errors import ArgumentError, InputError, LynkeusError
 from .results import Estimation, Run, Simulation, figures
 from .study import Study
 
@@ -30,8 +31,10 @@ if TYPE_CHECKING:
     from ray.data import Dataset
 
 Keep = Callable[[Any], Mapping[str, Any]]
+_CHECKS = {"study": instance(Study, "a Study"), "keep": function, "errors": word, "blocks": optional(whole)}
 
 
+@takes(seeds=several("whole numbers"), **_CHECKS)
 def campaign(
     study: Study,
     seeds: Iterable[int],
@@ -58,6 +61,7 @@ def campaign(
     return _mapped(data, items, work, blocks, options)
 
 
+@takes(changes=several("dictionaries as of Study.replace"), **_CHECKS)
 def sweep(
     study: Study,
     changes: Iterable[Mapping[str, Any]],
@@ -75,7 +79,8 @@ def sweep(
     options are those of :func:`campaign`."""
     chosen(errors)
     data = needed("ray.data", "lynkeus.ray")
-    items = [{"place": place, "change": pickle.dumps(dict(change))} for place, change in enumerate(changes)]
+    asked = [section(f"changes[{place}]", change) for place, change in enumerate(changes)]
+    items = [{"place": place, "change": pickle.dumps(dict(change))} for place, change in enumerate(asked)]
     columns = None if log is None else columns_of(log_of(log))
     work = _Work(study, "place", _changed, keep, errors, columns)
     return _mapped(data, items, work, blocks, options)
@@ -99,10 +104,7 @@ _BLOCKS = 200
 
 
 def _seed(seed: Any) -> int:
-    try:
-        return int(seed.__index__())
-    except AttributeError:
-        raise InputError(f"seeds: expected whole numbers, found {seed!r}") from None
+    return whole("seeds", seed)
 
 
 def _seeded(row: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -147,7 +149,7 @@ class _Work:
     def _kept(self, study: _lynkeus.Study, log: _lynkeus.Log | None) -> Mapping[str, Any]:
         kept = self.keep(_run(study, log))
         if not isinstance(kept, Mapping):
-            raise TypeError(f"keep: expected a dictionary, the row's columns by name, found {kept!r}")
+            raise ArgumentError.of("keep", "a dictionary, the row's columns by name", kept)
         return kept
 
     def _example(self, log: _lynkeus.Log | None) -> Mapping[str, Any]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from . import _html, _lynkeus, _plot
 from ._logs import log_of
 from ._optional import needed
-from .errors import InputError, LynkeusError
+from .errors import InputError, LynkeusError, NotCredible
 
 if TYPE_CHECKING:
     import pandas
@@ -123,13 +124,12 @@ class Table(Answer):
         return {}
 
     def __getitem__(self, name: str) -> Column:
+        if not isinstance(name, str) or name not in self.columns:
+            raise KeyError(f"{name!r}: expected one of {', '.join(self.columns)}")
         known = self._columns.get(name)
         if known is not None:
             return known
-        try:
-            place = self.columns.index(name)
-        except ValueError:
-            raise KeyError(f"{name!r}: expected one of {', '.join(self.columns)}") from None
+        place = self.columns.index(name)
         column = self._core.column(place)
         assert column is not None  # a header has a column
         column.flags.writeable = False
@@ -137,7 +137,7 @@ class Table(Answer):
         return column
 
     def __contains__(self, name: object) -> bool:
-        return name in self.columns
+        return isinstance(name, str) and name in self.columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -235,7 +235,7 @@ class Run(Table):
         return _plot.of_run(self, names, truth)
 
     def _truth(self, data: Any) -> dict[str, Column]:
-        log = log_of(data)
+        log = log_of(data, "truth")
         if len(log) != len(self):
             raise InputError(f"truth: expected {len(self)} rows, as the run has, found {len(log)}")
         read = {name: log.values(name) for name in log.headers()}
@@ -285,11 +285,22 @@ class Comparison(Answer):
 
     def __getitem__(self, family: str) -> Record:
         for row in self.summary["families"]:
-            if row["family"] == family:
+            if isinstance(family, str) and row["family"] == family:
                 found: Record = row
                 return found
         names = ", ".join(row["family"] for row in self.summary["families"])
         raise KeyError(f"{family!r}: expected one of {names}")
+
+
+_Run = TypeVar("_Run", bound=Run)
+
+
+def judged(run: _Run) -> _Run:
+    """A run, with a warning where it is not credible."""
+    if run.refusal is not None:
+        # where the method of the study is called, which its checks of arguments wrap
+        warnings.warn(str(run.refusal), NotCredible, stacklevel=4)
+    return run
 
 
 def figures(run: Run) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._arguments import flag, instance, optional, takes, word
 from ._assets import Follower, Replay, Signals
 from ._optional import needed
 from .errors import InputError
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
     from pyspark.sql import DataFrame
 
 
+_CHECKS = {"study": instance(Study, "a Study"), "by": word, "time": optional(word)}
+
+
+@takes(is_partitioned=flag, **_CHECKS)
 def estimate(
     study: Study, frame: DataFrame, *, by: str, time: str | None = None, is_partitioned: bool = False
 ) -> DataFrame:
@@ -46,6 +51,7 @@ def estimate(
     return taken.groupBy(f"`{by}`").applyInArrow(lambda table: replay.asset(table), schema)  # one argument: a method has two
 
 
+@takes(**_CHECKS)
 def follow(study: Study, stream: DataFrame, *, by: str, time: str | None = None) -> DataFrame:
     """The estimates after each row of a stream, asset by asset, from where the last batch ended.
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, overload
+from typing import Any, overload
 
 from . import _batches, _lynkeus
-from ._base import Base, spelled
+from ._arguments import LIMITS, flag, function, instance, optional, path as path_of, progress as told_of
+from ._arguments import real, several, takes, whole, word, words
+from ._base import Base, plant_of, spelled
 from ._batches import Options
 from ._each import Errors
-from ._export import Export, write
+from ._export import EXPORT, Export, write
 from ._logs import log_of
 from ._lynkeus import MEMORY
 from ._progress import Progress, told
 from ._toml import document, valid
-from .errors import InputError, NotCredible
+from .errors import InputError
 from .systems import Functions, Observer
 from .model import Model
 from .results import (
@@ -28,13 +29,14 @@ from .results import (
     Estimation,
     HowWell,
     MonteCarlo,
-    Run,
     Simulation,
     Sweep,
+    judged,
 )
 
-_Run = TypeVar("_Run", bound=Run)
 Section = Mapping[str, Any]
+#: what runs in batches takes
+_BATCH = {"keep": optional(function), "workers": optional(whole), "errors": word, "progress": told_of, **LIMITS}
 
 
 class Study:
@@ -82,13 +84,6 @@ class Study:
         plot: Section | None = None,
         tables: str | None = None,
     ) -> None:
-        named = {
-            "measured": measured,
-            "unknown": unknown,
-            "disturbances": disturbances,
-            "noise": noise,
-            "limits": limits,
-        }
         given = {
             "tables": tables,
             "sensors": sensors,
@@ -102,10 +97,14 @@ class Study:
             "tune": tune,
             "compare": compare,
             "plot": plot,
-            **{name: value for name, value in named.items() if value is not None},
+            "measured": measured,
+            "unknown": unknown,
+            "disturbances": disturbances,
+            "noise": noise,
+            "limits": limits,
         }
-        text = document(spelled(given))
-        plant = model if isinstance(model, Model) else Model.load(model)
+        text = document(spelled({name: value for name, value in given.items() if value is not None}))
+        plant = plant_of("model", model)
         self._core = _lynkeus.Study.parse(text, "study", (plant.name, plant.text), plant.choose)
 
     @classmethod
@@ -115,6 +114,7 @@ class Study:
         return study
 
     @classmethod
+    @takes(path=path_of, model=optional(word))
     def load(cls, path: str | os.PathLike[str], model: str | None = None) -> Study:
         """A study file, or a model, which stands for the study in which every output is measured and
         every input known; ``model`` chooses among several in its file. The plant's text is read as
@@ -122,6 +122,7 @@ class Study:
         return cls._of(_lynkeus.Study.load(os.fspath(path), model))
 
     @classmethod
+    @takes(text=word, model=instance(Model, "a Model"), file=word)
     def parse(cls, text: str, model: Model, file: str = "study") -> Study:
         """A study's text in TOML with its model; ``file`` is what messages call it."""
         return cls._of(_lynkeus.Study.parse(valid(text), file, (model.name, model.text), model.choose))
@@ -155,6 +156,7 @@ class Study:
     def __repr__(self) -> str:
         return f"<Study of {self.model.name}\n{self.text.rstrip()}>"
 
+    @takes(parameters=flag, about=words, **LIMITS)
     def check(
         self,
         *,
@@ -166,17 +168,20 @@ class Study:
         """Which states, unknown inputs and (with ``parameters``) parameters can be known, and which
         observers fit; ``about``: an expression, or several, to decide on. ``time_limit`` in seconds and ``memory_limit`` in
         MiB, as everywhere: what a call may take until it ends with what is done by then."""
-        asked = [valid(x) for x in ([about] if isinstance(about, str) else about)]
+        asked = [valid(x) for x in about]
         return Check(self._core.check(parameters, asked, time_limit, memory_limit))
 
+    @takes(**LIMITS)
     def design(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Design:
         """The observer, with its gains and certificate."""
         return Design(self._core.design(time_limit, memory_limit))
 
+    @takes(**LIMITS)
     def certify(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Certificate:
         """What can be proved of the observer."""
         return Certificate(self._core.certify(time_limit, memory_limit))
 
+    @takes(horizon=optional(real()), sensors=optional(word), **LIMITS)
     def how_well(
         self,
         *,
@@ -202,6 +207,7 @@ class Study:
         time_limit: float | None = ...,
         memory_limit: float = ...,
     ) -> MonteCarlo: ...
+    @takes(runs=optional(whole), progress=told_of, **LIMITS)
     def simulate(
         self,
         *,
@@ -215,9 +221,10 @@ class Study:
             raise InputError(f"runs: expected at least 1, found {runs}")
         with told(progress, "simulating") as tell:
             if runs is None:
-                return _judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))
-            return _judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit, memory_limit)))
+                return judged(Simulation(self._core.simulate(tell, time_limit, memory_limit)))
+            return judged(MonteCarlo(self._core.monte_carlo(runs, tell, time_limit, memory_limit)))
 
+    @takes(progress=told_of, **LIMITS)
     def estimate(
         self,
         log: Any,
@@ -229,7 +236,7 @@ class Study:
         """A log through the observer: a path, a mapping of columns, a data frame, an Arrow table or a
         simulation."""
         with told(progress, "estimating") as tell:
-            return _judged(Estimation(self._core.estimate(log_of(log), tell, time_limit, memory_limit)))
+            return judged(Estimation(self._core.estimate(log_of(log), tell, time_limit, memory_limit)))
 
     @overload
     def estimate_each(
@@ -268,6 +275,7 @@ class Study:
         time_limit: float | None = ...,
         memory_limit: float = ...,
     ) -> list[Any]: ...
+    @takes(by=optional(word), **_BATCH)
     def estimate_each(
         self,
         logs: Any,
@@ -292,6 +300,7 @@ class Study:
         options = Options(keep, workers, errors, progress, time_limit, memory_limit)
         return _batches.estimate_each(self, logs, by, options)
 
+    @takes(changes=several("dictionaries as of replace"), **_BATCH)
     def sweep(
         self,
         changes: Iterable[Section],
@@ -311,6 +320,7 @@ class Study:
         options = Options(keep, workers, errors, progress, time_limit, memory_limit)
         return _batches.sweep(self, changes, log, options)
 
+    @takes(progress=told_of, **LIMITS)
     def tune(
         self,
         log: Any = None,
@@ -321,8 +331,9 @@ class Study:
     ) -> Sweep:
         """The tuning of ``[tune]`` over its values, judged by simulation or by a log."""
         with told(progress, "tuning") as tell:
-            return Sweep(self._core.tune(_some(log), tell, time_limit, memory_limit))
+            return Sweep(self._core.tune(None if log is None else log_of(log), tell, time_limit, memory_limit))
 
+    @takes(progress=told_of, **LIMITS)
     def compare(
         self,
         log: Any = None,
@@ -333,16 +344,18 @@ class Study:
     ) -> Comparison:
         """Families side by side, on a simulation or on a log."""
         with told(progress, "comparing") as tell:
-            return Comparison(self._core.compare(_some(log), tell, time_limit, memory_limit))
+            return Comparison(self._core.compare(None if log is None else log_of(log), tell, time_limit, memory_limit))
 
     def plant(self) -> Functions:
         """The plant as functions, with the study's parameters and start."""
         return Functions(self._core.functions())
 
+    @takes(**LIMITS)
     def observer(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Observer:
         """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
         return Observer(self._core.observer(time_limit, memory_limit))
 
+    @takes(**EXPORT, **LIMITS)
     def export(
         self,
         folder: str | os.PathLike[str],
@@ -373,10 +386,6 @@ class Study:
         return self._core.estimator(self)
 
 
-def _some(log: Any) -> _lynkeus.Log | None:
-    return None if log is None else log_of(log)
-
-
 def _restored(text: str, file: str, plant: tuple[str, str | None] | None, model: str | None) -> Study:
     return Study._of(_lynkeus.Study.parse(text, file, plant, model))
 
@@ -385,9 +394,3 @@ def _resumed(study: Study, snapshot: bytes) -> _lynkeus.Estimator:
     estimator = study.estimator()
     estimator.restore(snapshot)
     return estimator
-
-
-def _judged(run: _Run) -> _Run:
-    if run.refusal is not None:
-        warnings.warn(str(run.refusal), NotCredible, stacklevel=3)
-    return run

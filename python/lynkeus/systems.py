@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _lynkeus
+from ._arguments import optional, real, section, takes, word
 from ._optional import needed
-from .errors import InputError, RefusedError
+from .errors import ArgumentError, InputError, RefusedError
 
 if TYPE_CHECKING:
     import casadi
@@ -72,11 +73,13 @@ class Functions:
         """∂f/∂x, shape (n, n), from the derivatives of the equations."""
         return self._core.jacobian_x(t, _vector("x", x), _vector("u", u))
 
+    @takes(language=word)
     def source(self, language: str = "python") -> str:
         """A module with ``f(xp, t, x, u)`` and ``h(xp, t, x, u)``: in ``"python"`` ``xp`` is ``numpy``
         or ``jax.numpy``; in ``"casadi"`` it is ``casadi``."""
         return self._core.source(language)[0]
 
+    @takes(inputs=optional(section))
     def driven(self, inputs: Mapping[str, Input] | None = None) -> Driven:
         """The system with every input given as a number or as a function of time, for SciPy's
         ``solve_ivp``: ``d = system.driven({"u": math.sin}); solve_ivp(d.rhs, (0, 9), d.start, jac=d.jac)``."""
@@ -86,8 +89,9 @@ class Functions:
             raise InputError(f"no input is called {strangers[0]!r}: expected {', '.join(self.inputs)}")
         if missing := [name for name in self.inputs if name not in given]:
             raise InputError(f"the input {missing[0]!r} is missing: expected a number or a function of time")
-        return Driven(self, tuple(_course(given[name]) for name in self.inputs))
+        return Driven(self, tuple(_course(name, given[name]) for name in self.inputs))
 
+    @takes(name=optional(word))
     def to_nlsys(self, name: str | None = None) -> control.NonlinearIOSystem:
         """A system of python-control with named signals. Names hold no dot there: ``r1.v`` becomes
         ``r1_v``."""
@@ -199,7 +203,9 @@ class Driven:
 
     def u(self, t: float) -> Column:
         """The inputs at a time."""
-        return np.array([float(value(t)) for value in self.inputs])
+        at = real()("t", t)
+        named = zip(self.system.inputs, self.inputs, strict=True)
+        return np.array([real(f"a number at t = {at}")(name, value(at)) for name, value in named])
 
     def rhs(self, t: float, x: ArrayLike) -> Column:
         """x' = f(t, x, u(t)), shape (n,)."""
@@ -221,15 +227,15 @@ def _vector(name: str, values: ArrayLike) -> Column:
         if given.dtype.kind in "fiub" or (given.dtype.kind == "O" and not any(x is None for x in given.flat)):
             return given.astype(float, copy=False).reshape(-1)
         found = "None" if given.dtype.kind == "O" else str(given.dtype)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         found = str(error)
-    raise InputError(f"{name}: expected numbers, found {found}")
+    raise ArgumentError(f"{name}: expected numbers, found {found}")
 
 
-def _course(value: Input) -> Callable[[float], float]:
+def _course(name: str, value: Input) -> Callable[[float], float]:
     if callable(value):
         return value
-    number = float(value)
+    number: float = real("a number or a function of time")(name, value)
     return lambda _: number
 
 

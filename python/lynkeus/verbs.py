@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from .errors import ArgumentError
 from .results import Certificate, Check, Comparison, Design, Estimation, HowWell, MonteCarlo, Simulation, Sweep
 from .study import Study
 
@@ -12,7 +13,11 @@ _Study = Study | str | os.PathLike[str]
 
 
 def _study(study: _Study) -> Study:
-    return study if isinstance(study, Study) else Study.load(study)
+    if isinstance(study, Study):
+        return study
+    if not isinstance(study, (str, os.PathLike)):
+        raise ArgumentError.of("study", "a Study, or the path of one", study)
+    return Study.load(study)
 
 
 def check(study: _Study, **options: Any) -> Check:

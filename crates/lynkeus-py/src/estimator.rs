@@ -4,11 +4,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lynkeus::run::{self, filter::Reading};
 use numpy::{IntoPyArray, PyArray1};
-use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyMapping, PyString, PyTuple};
 
-use crate::errors::{exception, from_source};
+use crate::errors::{exception, from_source, number, wrong};
 
 /// A study's estimator; a call is short, so that it keeps the interpreter's lock.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
@@ -61,9 +60,10 @@ impl Estimator {
             };
             taken += 1;
             if !value.is_none() {
-                *x = value
-                    .extract()
-                    .map_err(|error| wrong_reading(name.bind(py), &value, error))?;
+                *x = value.extract().map_err(|error| {
+                    let name = name.bind(py).to_string();
+                    wrong(&name, "a number or None", &value, error)
+                })?;
             }
         }
         match taken == readings.len() {
@@ -104,33 +104,28 @@ impl Estimator {
 fn mapped<'py>(readings: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyDict>> {
     match readings.cast::<PyDict>() {
         Ok(known) => Ok(known.clone()),
-        Err(_) => PyDict::from_sequence(readings.cast::<PyMapping>()?.items()?.as_any()),
+        Err(_) => {
+            let known = readings.cast::<PyMapping>().map_err(|error| {
+                let expected = "a mapping of names to numbers";
+                wrong("readings", expected, readings, error.into())
+            })?;
+            PyDict::from_sequence(known.items()?.as_any())
+        }
     }
-}
-
-/// A value that is no number; what its own conversion raises is passed on.
-fn wrong_reading(name: &Bound<'_, PyString>, value: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
-    let py = value.py();
-    if !error.is_instance_of::<PyTypeError>(py) && !error.is_instance_of::<PyValueError>(py) {
-        return error;
-    }
-    let kind = value.get_type();
-    let wrong = PyTypeError::new_err(format!("{name}: expected a number or None, found {kind}"));
-    wrong.set_cause(py, Some(error));
-    wrong
 }
 
 #[pymethods]
 impl Estimator {
     /// Goes to a time at which nothing is read.
-    fn predict(&self, t: f64) -> PyResult<()> {
+    fn predict(&self, t: &Bound<'_, PyAny>) -> PyResult<()> {
+        let t = number("t", t)?;
         let predicted = self.lock().predict(t).map(drop);
         predicted.map_err(from_source)
     }
 
     /// Goes to a time and takes what was read there, by name.
-    fn update(&self, t: f64, readings: &Bound<'_, PyAny>) -> PyResult<()> {
-        let readings = &mapped(readings)?;
+    fn update(&self, t: &Bound<'_, PyAny>, readings: &Bound<'_, PyAny>) -> PyResult<()> {
+        let (t, readings) = (number("t", t)?, &mapped(readings)?);
         match [f64::NAN; FEW].get_mut(..self.signals.len()) {
             Some(sample) => self.taken(t, readings, sample),
             None => self.taken(t, readings, &mut vec![f64::NAN; self.signals.len()]),
@@ -138,7 +133,12 @@ impl Estimator {
     }
 
     /// The same with all signals in their order.
-    fn push(&self, t: f64, signals: Vec<f64>) -> PyResult<()> {
+    fn push(&self, t: &Bound<'_, PyAny>, signals: &Bound<'_, PyAny>) -> PyResult<()> {
+        let t = number("t", t)?;
+        let signals: Vec<f64> = signals.extract().map_err(|error| {
+            let expected = format!("a number for each of {}", self.signals().join(", "));
+            wrong("signals", &expected, signals, error)
+        })?;
         let pushed = self.lock().push(t, &signals).map(drop);
         pushed.map_err(from_source)
     }
@@ -225,8 +225,10 @@ impl Estimator {
         PyBytes::new(py, &self.lock().snapshot())
     }
 
-    fn restore(&self, snapshot: &[u8]) -> PyResult<()> {
-        let restored = self.lock().restore(snapshot);
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let bytes = snapshot.extract::<&[u8]>();
+        let bytes = bytes.map_err(|error| wrong("snapshot", "bytes", snapshot, error.into()))?;
+        let restored = self.lock().restore(bytes);
         restored.map_err(from_source)
     }
 

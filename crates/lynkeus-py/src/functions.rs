@@ -14,7 +14,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::away::{Terms, away};
-use crate::errors::exception;
+use crate::errors::{exception, number};
 
 type Values<'py> = PyReadonlyArray1<'py, f64>;
 
@@ -195,8 +195,13 @@ impl Functions {
         })
     }
 
-    fn arguments(&self, t: f64, x: &Values<'_>, u: &Values<'_>) -> PyResult<Vec<f64>> {
-        let mut arguments = vec![t];
+    fn arguments(
+        &self,
+        t: &Bound<'_, PyAny>,
+        x: &Values<'_>,
+        u: &Values<'_>,
+    ) -> PyResult<Vec<f64>> {
+        let mut arguments = vec![number("t", t)?];
         for (Vector { name, entries }, values) in [(&self.about.states, x), (&self.about.inputs, u)]
         {
             let values = values.as_array();
@@ -218,7 +223,7 @@ impl Functions {
         &self,
         py: Python<'py>,
         function: &Compiled,
-        (t, x, u): (f64, &Values<'_>, &Values<'_>),
+        (t, x, u): (&Bound<'py, PyAny>, &Values<'_>, &Values<'_>),
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let arguments = self.arguments(t, x, u)?;
         Ok(function.at(&arguments).into_pyarray(py))
@@ -286,7 +291,7 @@ impl Functions {
     fn f<'py>(
         &self,
         py: Python<'py>,
-        t: f64,
+        t: &Bound<'py, PyAny>,
         x: Values<'_>,
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
@@ -297,7 +302,7 @@ impl Functions {
     fn h<'py>(
         &self,
         py: Python<'py>,
-        t: f64,
+        t: &Bound<'py, PyAny>,
         x: Values<'_>,
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
@@ -308,7 +313,7 @@ impl Functions {
     fn jacobian_x<'py>(
         &self,
         py: Python<'py>,
-        t: f64,
+        t: &Bound<'py, PyAny>,
         x: Values<'_>,
         u: Values<'_>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {

@@ -8,7 +8,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::arrow::import;
-use crate::errors::exception;
+use crate::errors::{exception, text, unexpected, wrong};
 
 /// What messages call a log that is no file.
 const NAME: &str = "log";
@@ -100,7 +100,9 @@ impl Log {
 impl Log {
     /// A CSV or Parquet file.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let file = path.extract::<PathBuf>();
+        let path = file.map_err(|error| wrong("path", "a path", path, error))?;
         let table = py.detach(|| Table::load(&path));
         let table = table.map_err(|e| exception(&e))?;
         Ok(Self { table })
@@ -108,7 +110,12 @@ impl Log {
 
     /// Columns in the forms that `_logs.py` gives them.
     #[staticmethod]
-    fn from_columns(py: Python<'_>, columns: Vec<(String, Column<'_>)>) -> PyResult<Self> {
+    fn from_columns(py: Python<'_>, columns: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let named = columns.extract::<Vec<(String, Column<'_>)>>();
+        let columns = named.map_err(|error| {
+            let expected = "pairs of a name and a column";
+            wrong("columns", expected, columns, error)
+        })?;
         let log = Gathering::new(NAME);
         let columns = columns.iter();
         let gathered = columns.map(|(name, column)| column.gathered(name, &log));
@@ -120,6 +127,10 @@ impl Log {
     /// is read where it lies, as long as the log lives.
     #[staticmethod]
     fn from_arrow(py: Python<'_>, table: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if !table.hasattr("__arrow_c_stream__")? && !table.hasattr("__arrow_c_array__")? {
+            let expected = "an object with __arrow_c_stream__ or __arrow_c_array__";
+            return Err(unexpected("table", expected, table));
+        }
         let log = Gathering::new(NAME);
         let columns = import::table(table, &log)?;
         Self::of(py, &log, columns)
@@ -129,25 +140,35 @@ impl Log {
         self.table.names().map(str::to_owned).collect()
     }
 
-    fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let values = py.detach(|| self.table.readings(name).map(lynkeus::Series::to_vec));
+    fn column<'py>(
+        &self,
+        py: Python<'py>,
+        name: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let name = text("name", name)?;
+        let values = py.detach(|| self.table.readings(&name).map(lynkeus::Series::to_vec));
         Ok(values.map_err(|e| exception(&e))?.into_pyarray(py))
     }
 
     /// Why a column cannot be read, where that is so.
-    fn refusal(&self, name: &str) -> Option<&str> {
-        self.table.refusal(name)
+    fn refusal(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
+        Ok(self.table.refusal(&text("name", name)?))
     }
 
     /// A column as it is, NaN where a reading is missing; `None` where it cannot be read.
-    fn values<'py>(&self, py: Python<'py>, name: &str) -> Option<Bound<'py, PyArray1<f64>>> {
-        let values = py.detach(|| self.table.get(name).map(lynkeus::Series::to_vec))?;
-        Some(values.into_pyarray(py))
+    fn values<'py>(
+        &self,
+        py: Python<'py>,
+        name: &Bound<'_, PyAny>,
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        let name = text("name", name)?;
+        let values = py.detach(|| self.table.get(&name).map(lynkeus::Series::to_vec));
+        Ok(values.map(|values| values.into_pyarray(py)))
     }
 
     /// What stands for zero in a column of dates and times.
-    fn origin(&self, name: &str) -> Option<&str> {
-        self.table.origin(name)
+    fn origin(&self, name: &Bound<'_, PyAny>) -> PyResult<Option<&str>> {
+        Ok(self.table.origin(&text("name", name)?))
     }
 
     fn __len__(&self) -> usize {

@@ -1,7 +1,7 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
 use lynkeus_export::Refusal;
-use lynkeus_export::curly::c::{self, File, Precision};
+use lynkeus_export::curly::c::{self, File, Precision, Sources};
 use lynkeus_export::curly::fmu::Version;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust, structured};
 use lynkeus_model::Variable;
@@ -149,14 +149,14 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let about = about(study, &made, hasty);
     let files = printed(&prepared, &design, &made, &about, |device, told| {
         notes.extend(told);
-        if options.precision == Precision::F32 {
-            notes.extend(beyond_float(&c::lost_in_float(device)?));
-        }
-        let files = match options.to {
-            Target::C => c::files(device, options.precision)?,
-            Target::Rust => rust::files(device, options.precision)?,
-            Target::StructuredText => structured::files(device, options.precision)?,
+        let sources = match options.to {
+            Target::C => c::sources(device, options.precision)?,
+            Target::Rust => rust::sources(device, options.precision)?,
+            Target::StructuredText => structured::sources(device, options.precision)?,
             Target::Fmu(version) => {
+                if options.precision == Precision::F32 {
+                    notes.extend(beyond_float(&c::lost_in_float(device)?));
+                }
                 let of = fmu::Made {
                     device,
                     prepared: &prepared,
@@ -165,12 +165,13 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
                 let archive = fmu::archive(&of, version, options.precision, &mut notes)?;
                 return Ok(vec![archive]);
             }
-            _ => vec![File {
+            _ => Sources::from(File {
                 name: format!("{}.mjs", c::prefix(&plant.name)),
                 text: javascript::module(device)?,
-            }],
+            }),
         };
-        Ok(files.into_iter().map(Artifact::from).collect())
+        notes.extend(beyond_float(&sources.lost));
+        Ok(sources.files.into_iter().map(Artifact::from).collect())
     })?;
     Ok(Export { files, notes })
 }

@@ -1,8 +1,8 @@
-//! The log's sampling interval against what the observer stands.
+//! The interval between samples against what the observer stands.
 
 use lynkeus_expr::{Node, Tape, jacobian};
 use lynkeus_gain::sampling;
-use lynkeus_observers::{Design, Observer, Sampled};
+use lynkeus_observers::{Design, Observer};
 use lynkeus_structure::{Extended, figures};
 use serde_json::{Value, json};
 
@@ -15,12 +15,23 @@ use crate::{Quantity, Series, simulate};
 /// Rows of the log at which the error is linearised.
 const PLACES: usize = 12;
 
+/// What is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampled {
+    /// the plant itself: a log of its sensors
+    Log,
+    /// the simulation that the study states, where there is no log
+    Simulation,
+}
+
 /// The sampling interval of a log or of a simulation, and estimates of the largest that the observer
 /// stands: from its linearised error along the estimate, no proof.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intervals {
-    /// the median time between two readings of the log; of a simulation the time between two samples
-    pub log: f64,
+    /// the time between two samples, the median of a log's
+    pub interval: f64,
+    /// whose samples these are
+    pub of: Sampled,
     /// with `between_samples = "predict"`: beyond it errors grow from sample to sample
     pub predict: f64,
     /// with held measurements: beyond it an observer follows the steps that holding makes
@@ -42,8 +53,8 @@ pub(crate) fn intervals(
         inputs: samples.inputs.iter().collect(),
     };
     let limits = path.limits(prepared.extended(), &design.observer)?;
-    let log = median_interval(samples)?;
-    Some(Intervals::new(log, limits, prepared))
+    let interval = median_interval(samples)?;
+    Some(Intervals::new(interval, Sampled::Log, limits, prepared))
 }
 
 /// The interval of the study's simulation, where it is sampled, against the limits along its run,
@@ -76,7 +87,7 @@ pub(crate) fn simulated(
             .collect::<Option<_>>()?,
     };
     let limits = path.limits(prepared.extended(), observer)?;
-    Some(Intervals::new(step, limits, prepared))
+    Some(Intervals::new(step, Sampled::Simulation, limits, prepared))
 }
 
 /// A run of an observer: what it estimates and its inputs, row by row.
@@ -98,7 +109,7 @@ impl Path<'_> {
         if observer.filter.is_some() || !is_estimate || !observer.input_derivatives.is_empty() {
             return None;
         }
-        let Sampled {
+        let lynkeus_observers::Sampled {
             observer: sampled,
             outputs,
         } = observer.sampled(extended).ok()?;
@@ -160,9 +171,10 @@ fn median_interval(samples: &Samples) -> Option<f64> {
 }
 
 impl Intervals {
-    fn new(log: f64, limits: sampling::Limits, prepared: &Prepared<'_>) -> Self {
+    fn new(interval: f64, of: Sampled, limits: sampling::Limits, prepared: &Prepared<'_>) -> Self {
         Self {
-            log,
+            interval,
+            of,
             predict: limits.predict,
             hold: limits.hold,
             between: prepared.study().estimate.between_samples,
@@ -174,8 +186,8 @@ impl Intervals {
     #[must_use]
     pub fn is_beyond(&self) -> bool {
         match self.between {
-            BetweenSamples::Predict => self.log >= self.predict,
-            BetweenSamples::Hold => self.log > self.hold,
+            BetweenSamples::Predict => self.interval >= self.predict,
+            BetweenSamples::Hold => self.interval > self.hold,
             BetweenSamples::Linear => false,
         }
     }
@@ -189,17 +201,21 @@ impl Intervals {
         self.is_beyond().then(|| {
             format!(
                 "the samples are {} apart, and {how} between them this observer stands about {} (an estimate, no proof)",
-                figures(self.log, 2),
+                figures(self.interval, 2),
                 figures(limit, 2)
             )
         })
     }
 
-    /// For machines; a limit that was not found is null.
+    /// For machines: the interval is called by what is sampled; a limit that was not found is null.
     #[must_use]
     pub fn to_json(&self) -> Value {
+        let of = match self.of {
+            Sampled::Log => "log",
+            Sampled::Simulation => "simulation",
+        };
         json!({
-            "log": self.log,
+            of: self.interval,
             "largest_predict": Some(self.predict).filter(|x| x.is_finite()),
             "largest_hold": self.hold,
         })
@@ -207,13 +223,13 @@ impl Intervals {
 
     /// What is to be said where the log's interval is beyond the limit.
     pub(crate) fn words(&self) -> Option<String> {
-        let log = figures(self.log, 2);
+        let interval = figures(self.interval, 2);
         let (predict, hold) = (figures(self.predict, 2), figures(self.hold, 2));
-        let is_for_predict = self.log < self.predict;
+        let is_for_predict = self.interval < self.predict;
         match self.between {
             _ if !self.is_beyond() => None,
             BetweenSamples::Predict => Some(format!(
-                "the log's readings are {log} apart, and this observer stands about {predict} with between_samples = \"predict\" (an estimate from its linearised error, no proof): a smaller theta, or family = \"ekf\""
+                "the log's readings are {interval} apart, and this observer stands about {predict} with between_samples = \"predict\" (an estimate from its linearised error, no proof): a smaller theta, or family = \"ekf\""
             )),
             _ => {
                 let remedy = match is_for_predict {
@@ -227,7 +243,7 @@ impl Intervals {
                     false => String::new(),
                 };
                 Some(format!(
-                    "the log's readings are {log} apart, and beyond about {hold} this observer follows the steps that holding them makes (an estimate from its linearised error, no proof): {remedy}a smaller theta, or family = \"ekf\""
+                    "the log's readings are {interval} apart, and beyond about {hold} this observer follows the steps that holding them makes (an estimate from its linearised error, no proof): {remedy}a smaller theta, or family = \"ekf\""
                 ))
             }
         }
@@ -238,10 +254,11 @@ impl Intervals {
 mod tests {
     use super::*;
 
-    fn words(log: f64, predict: f64, hold: f64) -> String {
+    fn words(interval: f64, predict: f64, hold: f64) -> String {
         let between = BetweenSamples::Hold;
         let found = Intervals {
-            log,
+            interval,
+            of: Sampled::Log,
             predict,
             hold,
             between,

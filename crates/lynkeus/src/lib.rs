@@ -134,7 +134,7 @@ pub use export::{Artifact, Export, ExportOptions, Subject, Target, export};
 pub use figure::figure;
 pub use frozen::Frozen;
 pub use innovations::Innovations;
-pub use interval::Intervals;
+pub use interval::{Intervals, Sampled};
 pub use live::estimator;
 pub use monte_carlo::monte_carlo;
 pub use outcome::{Outcome, Watch};

@@ -2,37 +2,58 @@
 
 use lynkeus_observers::Design;
 use lynkeus_run::filter::Limits;
-use lynkeus_structure::Measurement;
 
 use crate::prepare::Prepared;
 use crate::{Error, Series, filter};
+
+/// What an observer without covariance makes of such a reading, and what would heed it.
+pub(crate) const TAKEN: &str = "this observer takes that for its value: family = \"ekf\", \"ukf\" or \"mhe\" takes it for a bound";
+
+/// A measured output whose sensor cannot show everything.
+#[derive(Clone, Debug)]
+pub(crate) struct Limited {
+    pub name: String,
+    pub limits: Limits,
+}
+
+/// The measured outputs whose sensors have limits.
+///
+/// # Errors
+/// Limits of what is not measured.
+pub(crate) fn limited(prepared: &Prepared<'_>) -> Result<Vec<Limited>, Error> {
+    let extended = prepared.extended();
+    let limits = filter::limits(prepared.study(), extended)?;
+    let pairs = extended.outputs.iter().zip(limits);
+    let of = |(output, limits): (&lynkeus_structure::Measurement, Option<Limits>)| {
+        let name = output.variable.name.clone();
+        limits.map(|limits| Limited { name, limits })
+    };
+    Ok(pairs.filter_map(of).collect())
+}
 
 /// What is to be said of readings at an end of their sensor's range, by an observer that takes them
 /// as they stand.
 ///
 /// # Errors
-/// Limits of what is not measured.
+/// As [`limited`].
 pub(crate) fn told(
     prepared: &Prepared<'_>,
     design: &Design,
     measurements: &[(String, Series)],
 ) -> Result<Vec<String>, Error> {
-    let extended = prepared.extended();
-    let limits = filter::limits(prepared.study(), extended)?;
+    let limited = limited(prepared)?;
     if design.observer.filter.is_some() {
         return Ok(vec![]);
     }
-    let of = |(output, limits): (&Measurement, Option<Limits>)| {
-        let (name, limits) = (&output.variable.name, limits?);
+    let of = |Limited { name, limits }: &Limited| {
         let (_, readings) = measurements.iter().find(|(own, _)| own == name)?;
         let count = readings.iter().filter(|y| limits.ends(*y)).count();
         (count > 0).then(|| {
             format!(
-                "{name} is at an end of its sensor's range in {count} of {} rows, and this observer takes that for its value: family = \"ekf\", \"ukf\" or \"mhe\" takes it for a bound",
+                "{name} is at an end of its sensor's range in {count} of {} rows, and {TAKEN}",
                 readings.len()
             )
         })
     };
-    let pairs = extended.outputs.iter().zip(limits);
-    Ok(pairs.filter_map(of).collect())
+    Ok(limited.iter().filter_map(of).collect())
 }

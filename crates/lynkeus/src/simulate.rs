@@ -1,13 +1,13 @@
 //! Plant and observer together.
 
-use std::collections::BTreeMap;
+mod noise;
+
 use std::ops::ControlFlow;
 
 use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
-use lynkeus_run::filter::Limits;
-use lynkeus_run::{Level, Role, Simulation};
+use lynkeus_run::{Role, Simulation};
 
 use crate::course::{Course, Samples};
 use crate::headers::log_time;
@@ -15,9 +15,10 @@ use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::spread::Spread;
-use crate::study::{Noise, SimulateSettings};
+use crate::study::SimulateSettings;
 use crate::systems::{self, method};
 use crate::{Error, Outcome, Quantity, Series, Study, Table, columns, estimate, prepare};
+use noise::noise;
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
 /// and may stop the run.
@@ -298,67 +299,6 @@ pub(crate) fn open_loop(
         noise: noise(study, settings, plant)?,
         record_outputs: true,
     })
-}
-
-fn noise(
-    study: &Study,
-    settings: &SimulateSettings,
-    plant: &Plant,
-) -> Result<lynkeus_run::Noise, Error> {
-    let mut levels = BTreeMap::new();
-    for (name, noise) in &study.sensors.noise {
-        if !plant.outputs.iter().any(|o| o.name == name.text) {
-            let outputs = plant.outputs.iter().map(|o| o.name.as_str());
-            let refusal = Error::input(format!(
-                "noise: the plant '{}' has no output named \"{name}\"",
-                plant.name
-            ))
-            .hint(crate::near::suggest(&name.text, outputs));
-            return Err(name.blame(refusal));
-        }
-        let level = match *noise {
-            Noise::Absolute(deviation) => Level::Absolute(deviation),
-            Noise::Relative(share) => Level::Relative(share),
-            Noise::Uniform(bound) => Level::Uniform(bound),
-        };
-        levels.insert(name.text.clone(), level);
-    }
-    Ok(lynkeus_run::Noise {
-        seed: settings.seed,
-        sample_step: settings.sample_step,
-        levels,
-        process: process(study, plant),
-        limits: limits(study, plant)?,
-    })
-}
-
-/// The ranges that sensors can show, by output.
-fn limits(study: &Study, plant: &Plant) -> Result<BTreeMap<String, Limits>, Error> {
-    let mut found = BTreeMap::new();
-    for (name, low, high) in &study.sensors.limits {
-        let outputs = || plant.outputs.iter().map(|o| o.name.as_str());
-        if !outputs().any(|output| output == name.text) {
-            let message = format!(
-                "limits: the plant '{}' has no output named \"{name}\"",
-                plant.name
-            );
-            let hint = crate::near::suggest(&name.text, outputs());
-            return Err(name.blame(Error::input(message).hint(hint)));
-        }
-        let (low, high) = (*low, *high);
-        found.insert(name.text.clone(), Limits { low, high });
-    }
-    Ok(found)
-}
-
-/// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.
-fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
-    let mut densities = BTreeMap::new();
-    for (name, density) in &study.process_noise {
-        let states = plant.states.iter().filter(|s| name.is_or_has(&s.name));
-        densities.extend(states.map(|s| (s.name.clone(), *density)));
-    }
-    densities
 }
 
 /// A run with what is to be said of it.

@@ -6,7 +6,10 @@ use super::language::{self, Language};
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
 use super::template::{chosen, exchanged};
+use super::words::{self, READINGS};
 use crate::Refusal;
+
+pub(super) use super::words::codes;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
 const CMAKE: &str = include_str!("runtime/CMakeLists.txt");
@@ -30,63 +33,37 @@ pub struct File {
     pub text: String,
 }
 
-/// What `push` can say, from 1 on.
-pub(super) const CODES: [(&str, &str); 5] = [
-    (
-        "TIME",
-        "the time is no number, or before that of the last sample",
-    ),
-    ("INPUT", "the first value of an input is no number"),
-    (
-        "INTERVAL",
-        "the interval is too short, or takes more than a million steps",
-    ),
-    ("DIVERGED", "an estimate has run away"),
-    ("NOT_FINITE", "the equations have no value there"),
-];
-
-/// What it says of numbers that may be changed, after the other codes.
-pub(super) const TUNING: (&str, &str) = (
-    "TUNING",
-    "a number that may be changed is not finite and above 0",
-);
-
-/// What `push` of a device can say, from 1 on.
-pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
-    let tuning = (!device.tunables.is_empty()).then_some(TUNING);
-    CODES.into_iter().chain(tuning)
+/// What an export is made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sources {
+    /// the files of its folder
+    pub files: Vec<File>,
+    /// numbers that its `float` makes 0 or infinite, each once; of other numbers none
+    pub lost: Vec<String>,
 }
 
-/// What can become of a reading of a filter.
-pub(super) const READINGS: [(&str, &str); 4] = [
-    ("MISSING", "the sensor did not report"),
-    ("TAKEN", "it corrected the estimate"),
-    ("REJECTED", "the gate kept it out"),
-    (
-        "AT_LIMIT",
-        "at an end of the sensor's range, beyond which the estimate is anyway",
-    ),
-];
-
-/// The words of the draft that have the device's name before them in C.
-const PREFIXED: [&str; 10] = [
-    "TIME",
-    "INPUT",
-    "INTERVAL",
-    "DIVERGED",
-    "NOT_FINITE",
-    "TUNING",
-    "MISSING",
-    "TAKEN",
-    "REJECTED",
-    "AT_LIMIT",
-];
+impl From<File> for Sources {
+    fn from(file: File) -> Self {
+        Self {
+            files: vec![file],
+            lost: vec![],
+        }
+    }
+}
 
 /// The files of a device: `NAME.h`, `NAME.c`, `replay.c` and `CMakeLists.txt`.
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
 pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+    Ok(sources(device, precision)?.files)
+}
+
+/// The same, with what they lose.
+///
+/// # Errors
+/// As [`files`].
+pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let machine = Machine::of(device)?;
     let frame = Frame {
         device,
@@ -103,12 +80,15 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
             .replace("@REAL@", frame.real())
     };
     let file = |name: String, text: String| File { name, text };
-    Ok(vec![
-        file(format!("{}.h", frame.prefix), frame.header()),
-        file(format!("{}.c", frame.prefix), frame.source()),
-        file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
-        file("CMakeLists.txt".into(), named(CMAKE)),
-    ])
+    Ok(Sources {
+        files: vec![
+            file(format!("{}.h", frame.prefix), frame.header()),
+            file(format!("{}.c", frame.prefix), frame.source()),
+            file("replay.c".into(), named(&chosen(REPLAY, &frame.holds()))),
+            file("CMakeLists.txt".into(), named(CMAKE)),
+        ],
+        lost: lost(&machine, precision),
+    })
 }
 
 /// Numbers of a device that `float` makes 0 or infinite.
@@ -116,11 +96,20 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
 /// # Errors
 /// As [`files`].
 pub fn lost_in_float(device: &Device<'_>) -> Result<Vec<String>, Refusal> {
-    let machine = Machine::of(device)?;
+    Ok(lost(&Machine::of(device)?, Precision::F32))
+}
+
+/// Numbers of a draft that `float` makes 0 or infinite.
+pub(super) fn lost(machine: &Machine, precision: Precision) -> Vec<String> {
+    if precision == Precision::F64 {
+        return vec![];
+    }
     let starts = machine.fields.iter().flat_map(|field| &field.start);
     let starts: String = starts.map(|value| number(value.abs()) + "\n").collect();
-    let lost = language::lost_in_float(&(machine.tables + &machine.source + &starts));
-    Ok(lost.into_iter().collect())
+    let draft = [&machine.tables, &machine.source, &starts].map(String::as_str);
+    language::lost_in_float(&draft.concat())
+        .into_iter()
+        .collect()
 }
 
 /// Files that are there already: the bench, the answers of FMUs, the headers of C99 and of what
@@ -297,9 +286,7 @@ impl Frame<'_> {
             if word == "STATE" {
                 return Some(format!("{name}_state"));
             }
-            PREFIXED
-                .contains(&word)
-                .then(|| format!("{capitals}_{word}"))
+            words::number(word).map(|_| format!("{capitals}_{word}"))
         });
         let names = |entries: &[Entry]| -> String {
             let texts = entries

@@ -3,6 +3,7 @@
 use lynkeus_expr::{Binary, Unary};
 
 use super::language::FUNCTIONS;
+use super::words;
 use crate::{Binding, Dialect, Form, Text};
 
 /// C in which the type of numbers is `real` and their literals are `R(…)`.
@@ -120,12 +121,10 @@ const RESERVED: &[&str] = &[
 
 /// Words in capitals that the runtime has a meaning for.
 const SIZES: &[&str] = &[
-    "AT_LIMIT",
     "CARRIED",
     "CARRIED_INSIDE",
     "DIMENSION",
     "DIMENSION_INSIDE",
-    "DIVERGED",
     "ENTRIES",
     "ENTRIES_INSIDE",
     "ENTRIES_ROOM",
@@ -133,33 +132,25 @@ const SIZES: &[&str] = &[
     "EPSILON",
     "ESTIMATED",
     "INFINITY",
-    "INPUT",
     "INPUTS",
-    "INTERVAL",
     "LARGER",
-    "MISSING",
     "NAN",
-    "NOT_FINITE",
     "OUTPUTS",
     "OWN",
     "PARAMETERS",
     "POINTS",
     "R",
     "RANK",
-    "REJECTED",
     "REPORTED",
     "SENSORS",
     "SIGNALS",
     "SMALLEST",
     "STATE",
     "STATES",
-    "TAKEN",
-    "TIME",
     "TOLD",
     "TUNABLES",
     "TUNABLE_NAMES",
     "TUNED",
-    "TUNING",
     "WIDTH",
     "WIDTH_INSIDE",
 ];
@@ -214,6 +205,7 @@ impl Dialect for Draft {
         is_listed(word)
             || word.strip_suffix('f').is_some_and(is_listed)
             || SIZES.contains(&word)
+            || words::number(word).is_some()
             || MACROS.contains(&word)
             || word.ends_with("_matrix")
     }

@@ -26,6 +26,7 @@ mod syntax;
 mod tables;
 mod template;
 mod tuning;
+mod words;
 
 pub use device::{Device, FirstReading, Tunable};
 pub use exchange::Exchange;

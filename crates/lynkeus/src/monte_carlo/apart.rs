@@ -7,7 +7,7 @@ use lynkeus_model::Plant;
 
 use super::statistics::of_runs;
 use super::together::Screened;
-use super::{Again, Failure, Figures, Followed};
+use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
@@ -33,6 +33,8 @@ pub(super) struct Single {
 pub(super) struct Whole {
     /// by quantity
     pub tracks: Vec<Track>,
+    /// readings at an end, by sensor with limits
+    pub at_ends: Vec<usize>,
     /// why its estimate is not credible, where it is not
     pub doubt: Option<String>,
 }
@@ -41,6 +43,7 @@ pub(super) struct Whole {
 pub(super) struct Job<'a> {
     pub study: &'a Study,
     pub followed: &'a [Followed],
+    pub sensors: &'a [Sensor],
     /// the rows of every run that reaches its end
     pub time: OnceLock<Vec<f64>>,
 }
@@ -107,10 +110,15 @@ impl Job<'_> {
             estimate: ran.course.estimates[f.estimate].to_vec(),
         });
         let tracks = tracks.collect();
+        let at_ends = self.sensors.iter().map(|s| s.count(&ran.run)).collect();
         // as `simulate` judges this run alone
         let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
         let doubt = alone.refusal().map(|refusal| refusal.to_string());
-        Ok(Some(Whole { tracks, doubt }))
+        Ok(Some(Whole {
+            tracks,
+            at_ends,
+            doubt,
+        }))
     }
 
     /// The figures of runs that went on together, with those that are not credible alone.
@@ -138,10 +146,11 @@ impl Job<'_> {
             let seed = single.seed;
             match single.result {
                 Ok(None) => {}
-                Ok(Some(Whole { tracks, doubt })) => {
+                Ok(Some(mut whole)) => {
                     seeds.push(seed);
-                    runs.push(tracks);
+                    let doubt = whole.doubt.take();
                     doubtful.extend(doubt.map(|reason| Failure { seed, reason }));
+                    runs.push(whole);
                 }
                 Err(error) => {
                     let reason = error.to_string();
@@ -160,6 +169,7 @@ impl Job<'_> {
         let found = (0..self.followed.len()).map(|place| of_runs(&runs, place));
         Ok(Figures {
             found: found.collect(),
+            clipped: Clipped::of_all(&runs, self.sensors.len()),
             seeds,
             failures,
             doubtful,

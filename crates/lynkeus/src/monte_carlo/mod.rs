@@ -5,6 +5,7 @@
 //! result does not depend on the number of processors.
 
 mod apart;
+mod ends;
 #[cfg(feature = "plot")]
 mod picture;
 mod portions;
@@ -23,7 +24,8 @@ use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
 use crate::{Error, Study, prepare};
-use apart::{Job, Track, room};
+use apart::{Job, Track, Whole, room};
+use ends::{Clipped, Sensor};
 pub use report::Settled;
 use report::headers_of;
 use statistics::Found;
@@ -156,17 +158,25 @@ pub fn monte_carlo(
         most = most.max(done);
         watch(most)
     };
+    let sensors = ends::sensors(&prepared, &plant)?;
     let together = Together {
         prepared: &prepared,
         rig: &rig,
         followed: &followed,
+        sensors: &sensors,
     };
     let job = Job {
         study,
         followed: &followed,
+        sensors: &sensors,
         time: OnceLock::new(),
     };
-    let told = |figures| reported(&prepared, &rig, &followed, runs, figures);
+    let told = |figures: Figures| {
+        let clipped = figures.clipped_in_words(&sensors, &rig);
+        let mut told = reported(&prepared, &rig, &followed, runs, figures);
+        told.notes.extend(clipped);
+        told
+    };
     let fits = || room(study, &rig, runs, followed.len());
     if together.can(runs)? {
         // what a limit of time leaves has to be kept
@@ -212,7 +222,16 @@ struct Figures {
     time: Vec<f64>,
     /// by quantity
     found: Vec<Found>,
+    /// by sensor with limits
+    clipped: Vec<Clipped>,
     again: Again,
+}
+
+impl Figures {
+    fn clipped_in_words(&self, sensors: &[Sensor], rig: &Rig) -> Option<String> {
+        let (runs, rows) = (self.seeds.len(), self.time.len());
+        ends::told(sensors, &self.clipped, rig, runs, rows)
+    }
 }
 
 /// The figures under their names.
@@ -231,6 +250,7 @@ fn reported(
         time,
         found,
         again,
+        ..
     } = figures;
     let mut headers = Headers::beside(plant);
     let time_header = headers.time();

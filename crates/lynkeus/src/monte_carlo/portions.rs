@@ -86,8 +86,12 @@ impl Together<'_> {
         for (run, &seed) in seeds.iter().enumerate() {
             let of_run = |q: &mut Quantity<Vec<Track>>| std::mem::take(&mut q.kept[run]);
             let tracks = pass.quantities.iter_mut().map(of_run).collect();
-            let doubt = None;
-            results.insert(seed, Ok(Some(Whole { tracks, doubt })));
+            let whole = Whole {
+                tracks,
+                at_ends: pass.at_ends.iter().map(|counts| counts[run]).collect(),
+                doubt: None,
+            };
+            results.insert(seed, Ok(Some(whole)));
         }
         for alone in job.singles(plant, self.rig, &suspects, quiet)? {
             match (results.get_mut(&alone.seed), alone.result) {

@@ -1,6 +1,6 @@
 //! Means, quantiles and the worst of many runs.
 
-use super::{Bands, Track};
+use super::{Bands, Track, Whole};
 
 /// The quantiles that a band reaches over.
 const LOW: f64 = 0.05;
@@ -33,8 +33,9 @@ impl Keep for Vec<Track> {
 }
 
 /// Of the quantity at a place of every run.
-pub(super) fn of_runs(runs: &[Vec<Track>], place: usize) -> Found {
-    let own: Vec<&Track> = runs.iter().filter_map(|run| run.get(place)).collect();
+pub(super) fn of_runs(runs: &[Whole], place: usize) -> Found {
+    let own = runs.iter().filter_map(|run| run.tracks.get(place));
+    let own: Vec<&Track> = own.collect();
     let rows = own.first().map_or(0, |track| track.truth.len());
     let mut scatter = Scatter::new(own.len());
     for row in 0..rows {
@@ -178,11 +179,13 @@ mod tests {
 
     #[test]
     fn the_worst_error_has_no_sign_and_a_gap_counts_nowhere() {
-        let track = |estimate: [f64; 2]| {
-            vec![Track {
+        let track = |estimate: [f64; 2]| Whole {
+            tracks: vec![Track {
                 truth: vec![1.0, 1.0],
                 estimate: estimate.to_vec(),
-            }]
+            }],
+            at_ends: vec![],
+            doubt: None,
         };
         let runs = [
             track([-4.0, 2.0]),

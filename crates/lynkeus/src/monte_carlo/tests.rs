@@ -5,6 +5,7 @@ use lynkeus_run::deviate;
 use super::*;
 use crate::simulate;
 
+mod ends;
 mod limits;
 
 /// x' = −p x with x measured: the triangular observer of one state is z' = −p z + θ (y − z).

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use lynkeus_run::{Batch, Column, Ended, Member, Method, Role, Step};
 
 use super::statistics::{Found, Keep, Scatter};
-use super::{Again, Failure, Figures, Followed};
+use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
 use crate::credible::Screen;
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
@@ -26,6 +26,7 @@ pub(super) struct Together<'a> {
     pub prepared: &'a Prepared<'a>,
     pub rig: &'a Rig,
     pub followed: &'a [Followed],
+    pub sensors: &'a [Sensor],
 }
 
 impl Together<'_> {
@@ -67,6 +68,9 @@ impl Together<'_> {
             },
         };
         let suspects = pass.suspects().map(|k| seeds[k]).collect();
+        let at_ends = pass.at_ends.into_iter();
+        let clipped = at_ends.map(|counts| Clipped::of(counts.into_iter()));
+        let clipped = clipped.collect();
         let rows = pass.time.len();
         let scatters = pass.quantities.into_iter().map(|q| q.kept);
         let mut found: Vec<Found> = scatters.map(|s| s.found(rows)).collect();
@@ -77,6 +81,7 @@ impl Together<'_> {
             doubtful: vec![],
             time: pass.time,
             found,
+            clipped,
             again: pass.again,
         };
         Ok(Some(Screened { figures, suspects }))
@@ -84,7 +89,9 @@ impl Together<'_> {
 
     fn batch(&self, seeds: &[u64]) -> Result<Option<Batch>, Error> {
         let simulation = &self.rig.simulation;
-        let columns: Vec<Column> = self.followed.iter().flat_map(Followed::columns).collect();
+        let columns = self.followed.iter().flat_map(Followed::columns);
+        let readings = self.sensors.iter().map(|sensor| sensor.readings);
+        let columns: Vec<Column> = columns.chain(readings).collect();
         let members = seeds.iter().map(|&seed| Member {
             seed,
             start: self.rig.start(seed),
@@ -117,11 +124,12 @@ impl Together<'_> {
         let mut pass = Pass {
             time: Vec::with_capacity(rows),
             quantities: self.followed.iter().map(quantity).collect(),
+            at_ends: vec![vec![0; seeds.len()]; self.sensors.len()],
             ended: vec![],
             again: Again::of(&batch),
         };
         self.drive(&mut batch, &mut |batch| {
-            pass.add(batch);
+            pass.add(batch, self.sensors);
             watch(pass.time.len() as f64 / rows as f64)
         })?;
         pass.ended = batch.ended().cloned().collect();
@@ -136,7 +144,8 @@ impl Together<'_> {
     ) -> Result<(), Error> {
         let study = self.prepared.study();
         let is_over = || study.budget.spent().is_some();
-        let row = 2 * batch.len() * self.followed.len() * size_of::<f64>();
+        let columns = 2 * self.followed.len() + self.sensors.len();
+        let row = batch.len() * columns * size_of::<f64>();
         let most = WINDOW / row.max(1);
         let mut rows = 1;
         loop {
@@ -273,13 +282,15 @@ pub(super) struct Quantity<K> {
 pub(super) struct Pass<K> {
     pub time: Vec<f64>,
     pub quantities: Vec<Quantity<K>>,
+    /// readings at an end, by sensor with limits and by run
+    pub at_ends: Vec<Vec<usize>>,
     pub ended: Vec<Ended>,
     pub again: Again,
 }
 
 impl<K: Keep> Pass<K> {
     /// The rows at hand.
-    fn add(&mut self, batch: &Batch) {
+    fn add(&mut self, batch: &Batch, sensors: &[Sensor]) {
         let (first, rows) = (self.time.len(), batch.rows());
         self.time.extend(batch.times());
         crew::each(&mut self.quantities, crew::threads(), &|place, quantity| {
@@ -292,6 +303,16 @@ impl<K: Keep> Pass<K> {
                 quantity.kept.add(pairs(), row >= rows / 2);
                 for (screen, (truth, estimate)) in quantity.screens.iter_mut().zip(pairs()) {
                     screen.add(row, truth, estimate);
+                }
+            }
+        });
+        let first = 2 * self.quantities.len();
+        crew::each(&mut self.at_ends, crew::threads(), &|place, counts| {
+            let limits = sensors[place].limits;
+            for k in 0..batch.times().len() {
+                let readings = batch.values(k, first + place);
+                for (count, reading) in counts.iter_mut().zip(readings) {
+                    *count += usize::from(limits.ends(reading));
                 }
             }
         });
@@ -323,9 +344,10 @@ fn room(study: &Study, rig: &Rig, runs: usize, quantities: usize) -> Result<(), 
     let observer = run.observer.as_ref().map_or(0, |o| o.states().len());
     let values = run.plant.states().len() + observer + run.plant.outputs().len();
     let streams = run.noise.levels.len() + run.noise.process.len();
-    // states before and after a step; starts, figures and screens; a row of what is followed
+    // states before and after a step; starts, figures and screens; a row of what is followed; readings
+    // at an end
     let screen = size_of::<Screen>() / size_of::<f64>();
-    let numbers = 3 * values + (6 + screen) * quantities + 16;
+    let numbers = 3 * values + (6 + screen) * quantities + run.noise.limits.len() + 16;
     let of_run = (numbers * size_of::<f64>() + streams * STREAM) as f64;
     let rows = ((run.until - run.start) / run.output_step).ceil() + 1.0;
     let figures = rows * (quantities * size_of::<[f64; 8]>()) as f64;

@@ -48,9 +48,10 @@ impl<'a> Bench<'a> {
             Self::Simulation(reference) => {
                 trial::simulated(prepared, &design, reference, row, watch)
             }
-            Self::Log(record) => replay::logged(prepared, design, record, row, watch),
+            Self::Log(record) | Self::SamplesOfLog(record) => {
+                replay::logged(prepared, design, record, row, watch)
+            }
             Self::Samples(samples) => filtered::simulated(prepared, &design, samples, row, watch),
-            Self::SamplesOfLog(record) => filtered::logged(prepared, design, record, row, watch),
         }
     }
 

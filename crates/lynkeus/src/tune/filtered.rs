@@ -1,25 +1,23 @@
-//! One position of a filter: the figures of observers, of replays of samples.
+//! One value of a filter: the figures of observers, of replays of samples.
 
 use std::ops::ControlFlow;
 
 use lynkeus_expr::{Node, Tape};
 use lynkeus_observers::{Design, Observer};
-use lynkeus_run::{Column, Noise, Role};
+use lynkeus_run::{Column, Role, Simulation};
 
-use super::errors::run_away;
-use super::judge::{Judge, Run};
+use super::disturbed::disturbed;
+use super::judge::{Judge, Run, Runs, Under};
 use super::record::Record;
 use super::reference::Reference;
-use super::trial::{is_answer, thrifty};
+use super::replay::course;
 use super::{Row, measures};
 use crate::course::{Course, Samples};
-use crate::crew::{Watch, part};
-use crate::estimate::{course_of, run_settings, start_at_readings};
-use crate::outcome::interrupted;
+use crate::crew::Watch;
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::simulate::{alone, open_loop, seen, settings, within};
-use crate::{Error, Series, replay};
+use crate::{Error, ErrorKind, Series};
 
 /// Samples of a simulation, the same for every position.
 #[derive(Debug)]
@@ -27,6 +25,8 @@ pub(super) struct Simulated {
     pub reference: Reference,
     exact: Sampled,
     noisy: Sampled,
+    /// none where no disturbance is stated; or why the plant has no run under it
+    disturbed: Option<Result<Sampled, String>>,
 }
 
 /// A run of the plant, and what its sensors show.
@@ -37,29 +37,63 @@ struct Sampled {
 }
 
 impl Simulated {
-    /// Samples every `step`, without noise and with it.
+    /// Samples every `step`.
     ///
     /// # Errors
     /// A study that cannot be simulated.
     pub fn new(prepared: &Prepared<'_>, observer: &Observer, step: f64) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let reference = Reference::new(prepared)?;
-        let sampled = |noise: Noise| -> Result<Sampled, Error> {
-            let mut simulation = open_loop(study, settings(study)?, plant)?;
-            simulation.output_step = step;
-            simulation.noise = noise;
-            let watch = &mut |_| ControlFlow::Continue(());
-            let run = alone(study, &simulation, &mut within(&study.budget, watch))?;
-            Ok(Sampled {
-                samples: seen(plant, observer, &run),
-                plant: run,
-            })
+        let mut exact = open_loop(study, settings(study)?, plant)?;
+        exact.output_step = step;
+        exact.noise = reference.exact();
+        let noisy = Simulation {
+            noise: reference.noise.clone(),
+            ..exact.clone()
         };
+        let is_disturbed = !study.tune.disturbance.is_empty();
+        let disturbed = is_disturbed.then(|| disturbed(study, plant, observer, exact.clone()));
+        let exact = sampled(prepared, observer, &exact)?;
         Ok(Self {
-            exact: sampled(reference.exact())?,
-            noisy: sampled(reference.noise.clone())?,
+            disturbed: disturbed
+                .transpose()?
+                .map(|run| as_read(sampled(prepared, observer, &run), &exact))
+                .transpose()?,
+            noisy: sampled(prepared, observer, &noisy)?,
+            exact,
             reference,
         })
+    }
+}
+
+/// The plant alone, and what an observer reads of it.
+fn sampled(
+    prepared: &Prepared<'_>,
+    observer: &Observer,
+    simulation: &Simulation,
+) -> Result<Sampled, Error> {
+    let study = prepared.study();
+    let watch = &mut |_| ControlFlow::Continue(());
+    let run = alone(study, simulation, &mut within(&study.budget, watch))?;
+    Ok(Sampled {
+        samples: seen(prepared.plant(), observer, &run),
+        plant: run,
+    })
+}
+
+/// A disturbed run with the inputs as they are read, those of the exact one; why there is none where
+/// the plant diverges.
+fn as_read(
+    disturbed: Result<Sampled, Error>,
+    exact: &Sampled,
+) -> Result<Result<Sampled, String>, Error> {
+    match disturbed {
+        Ok(mut disturbed) => {
+            disturbed.samples.inputs = exact.samples.inputs.clone();
+            Ok(Ok(disturbed))
+        }
+        Err(error) if error.kind() == ErrorKind::Refused => Ok(Err(error.message().to_owned())),
+        Err(error) => Err(error),
     }
 }
 
@@ -100,77 +134,81 @@ pub(super) fn simulated(
         observer: design.observer.clone(),
         reference: &ground.reference,
     };
-    let replayed = |sampled, watch: &mut Watch<'_>| replayed(prepared, design, sampled, watch);
-    let exact_run = match replayed(&ground.exact, &mut part(watch, 0, 2))? {
-        Ok(run) => run,
-        Err(reason) => return Ok(row.failed(reason)),
+    let trial = Trial {
+        prepared,
+        design,
+        ground,
     };
-    let exact = judge.errors(&exact_run);
-    if let Some(reason) = run_away(&exact.scaled) {
-        return Ok(row.failed(reason));
-    }
-    judge.exact(&mut row, &exact, &exact_run);
-    match replayed(&ground.noisy, &mut part(watch, 1, 2))? {
-        Ok(run) => judge.noisy(&mut row, &exact, &run),
-        Err(reason) => return Ok(row.failed(format!("with noise: {reason}"))),
-    }
-    Ok(row)
-}
-
-fn replayed<'s>(
-    prepared: &Prepared<'_>,
-    design: &Design,
-    sampled: &'s Sampled,
-    watch: &mut Watch<'_>,
-) -> Result<Result<Replayed<'s>, String>, Error> {
-    let course = course(prepared, design, &sampled.samples, watch)?;
-    Ok(course.map(|course| Replayed {
-        plant: &sampled.plant,
-        course,
-    }))
-}
-
-/// The filter over samples, or why its estimate is none.
-fn course(
-    prepared: &Prepared<'_>,
-    design: &Design,
-    samples: &Samples,
-    watch: &mut Watch<'_>,
-) -> Result<Result<Course, String>, Error> {
-    let mut study = prepared.study().clone();
-    study.estimate.smoothing = None;
-    let prepared = prepared.run_by(&study);
-    let mut run = run_settings(&study.estimate);
-    run.method = thrifty(run.method, samples.time.len() as f64);
-    let watch = &mut replay::Watch::only(watch);
-    let mut course = course_of(&prepared, design, samples, run, watch)?;
-    course.check()?;
-    match course.ended.take() {
-        None => Ok(Ok(course)),
-        Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
-        Some(error) => Err(interrupted(error, &study.file)),
+    match judge.judge(&mut row, &trial, watch)? {
+        None => Ok(row),
+        Some(reason) => Ok(row.failed(reason)),
     }
 }
 
-/// Judges a filter on a log by its prediction of held-out samples: it is not shown them.
+/// One value on the samples of the simulation.
+struct Trial<'a> {
+    prepared: &'a Prepared<'a>,
+    design: &'a Design,
+    ground: &'a Simulated,
+}
+
+impl<'a> Runs for Trial<'a> {
+    type Run = Replayed<'a>;
+
+    fn run(
+        &self,
+        under: Under,
+        watch: &mut Watch<'_>,
+    ) -> Result<Result<Replayed<'a>, String>, Error> {
+        let ground = self.ground;
+        let sampled = match (under, &ground.disturbed) {
+            (Under::Exact, _) | (Under::Disturbance, None) => &ground.exact,
+            (Under::Noise, _) => &ground.noisy,
+            (Under::Disturbance, Some(Ok(disturbed))) => disturbed,
+            (Under::Disturbance, Some(Err(reason))) => return Ok(Err(reason.clone())),
+        };
+        let study = self.prepared.study();
+        let course = course(
+            self.prepared,
+            self.design,
+            &sampled.samples,
+            study.estimate.between_samples,
+            &study.file,
+            watch,
+        )?;
+        Ok(course.map(|course| Replayed {
+            plant: &sampled.plant,
+            course,
+        }))
+    }
+
+    /// A filter corrects at samples only.
+    fn margin(&self, _: &Replayed<'a>) -> Option<f64> {
+        None
+    }
+}
+
+/// Fills in a filter's prediction of held-out samples, which it is not shown; the reason where it
+/// has no estimate.
 ///
 /// # Errors
 /// A study or a log that cannot be used.
-pub(super) fn logged(
+pub(super) fn held_out(
     prepared: &Prepared<'_>,
-    mut design: Design,
+    design: &Design,
     record: &Record<'_>,
-    mut row: Row,
+    row: &mut Row,
     watch: &mut Watch<'_>,
-) -> Result<Row, Error> {
-    start_at_readings(prepared, &record.log.samples, &mut design);
+) -> Result<Option<String>, Error> {
     let samples = record.left();
-    match course(prepared, &design, &samples, watch)? {
-        Err(reason) => Ok(row.failed(format!("with samples held out: {reason}"))),
+    let between = prepared.study().estimate.between_samples;
+    let place = record.log.table.place();
+    match course(prepared, design, &samples, between, &place, watch)? {
+        Err(reason) => Ok(Some(format!("with samples held out: {reason}"))),
         Ok(course) => {
-            let predicted = predicted(prepared, &design, &samples, &course)?;
+            let predicted = predicted(prepared, design, &samples, &course)?;
             row.set(measures::HELD_OUT_ERROR, record.held_out_error(&predicted));
-            Ok(row)
+            Ok(None)
         }
     }
 }

@@ -4,10 +4,11 @@ use lynkeus_model::Plant;
 use lynkeus_observers::{Estimate, Observer, Signal};
 use lynkeus_run::{Column, Role, Trajectory};
 
-use super::errors::{Errors, rms};
+use super::errors::{Errors, rms, run_away};
 use super::reference::Reference;
 use super::{Peak, Row, measures};
-use crate::{Study, systems};
+use crate::crew::{Watch, part};
+use crate::{Error, Study, systems};
 
 /// A run of the plant and of what estimates it.
 pub(super) trait Run {
@@ -27,6 +28,31 @@ impl Run for Trajectory {
     }
 }
 
+/// What a value is run under.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Under {
+    /// sensors without noise
+    Exact,
+    Noise,
+    /// sensors without noise, and `disturbance` of `[tune]` on the plant's inputs
+    Disturbance,
+}
+
+/// The runs of one value.
+pub(super) trait Runs {
+    type Run: Run;
+
+    /// A run, or why its estimate is none.
+    ///
+    /// # Errors
+    /// A study that cannot be simulated.
+    fn run(&self, under: Under, watch: &mut Watch<'_>) -> Result<Result<Self::Run, String>, Error>;
+
+    /// The longest stable step over the step of the sensor, along the exact run; none where
+    /// nothing is corrected between samples.
+    fn margin(&self, exact: &Self::Run) -> Option<f64>;
+}
+
 /// What the runs are measured by.
 pub(super) struct Judge<'a> {
     pub study: &'a Study,
@@ -36,9 +62,46 @@ pub(super) struct Judge<'a> {
 }
 
 impl Judge<'_> {
+    /// Fills the row in; the reason where a run failed.
+    ///
+    /// # Errors
+    /// A study that cannot be simulated.
+    pub fn judge(
+        &self,
+        row: &mut Row,
+        runs: &impl Runs,
+        watch: &mut Watch<'_>,
+    ) -> Result<Option<String>, Error> {
+        let is_disturbed = !self.study.tune.disturbance.is_empty();
+        let parts = if is_disturbed { 3 } else { 2 };
+        let run = match runs.run(Under::Exact, &mut part(watch, 0, parts))? {
+            Ok(run) => run,
+            Err(reason) => return Ok(Some(reason)),
+        };
+        let exact = self.errors(&run);
+        if let Some(reason) = run_away(&exact.scaled) {
+            return Ok(Some(reason));
+        }
+        self.exact(row, &exact, &run);
+        row.set(measures::SAMPLING_MARGIN, runs.margin(&run));
+        let mut failure = None;
+        match runs.run(Under::Noise, &mut part(watch, 1, parts))? {
+            Ok(run) => self.noisy(row, &exact, &run),
+            Err(reason) => failure = Some(format!("with noise: {reason}")),
+        }
+        if is_disturbed {
+            let run = runs.run(Under::Disturbance, &mut part(watch, 2, parts))?;
+            let bound = run.map(|run| self.errors(&run).from(self.reference.tail).largest());
+            row.set(measures::ULTIMATE_BOUND, bound.clone().ok().flatten());
+            let reason = bound.err().map(|e| format!("under the disturbance: {e}"));
+            failure = failure.or(reason);
+        }
+        Ok(failure)
+    }
+
     /// Scaled errors of the estimates, in the observer's order; an input is what the plant has
     /// of it, disturbance included.
-    pub fn errors(&self, run: &impl Run) -> Errors {
+    fn errors(&self, run: &impl Run) -> Errors {
         let error = |(place, estimate): (usize, &Estimate)| {
             let column = systems::column_of(self.plant, &estimate.variable)?;
             let (estimate, truth) = (run.column(Role::Estimate.at(place))?, run.column(column)?);
@@ -54,7 +117,7 @@ impl Judge<'_> {
     }
 
     /// The figures of the run without noise.
-    pub fn exact(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
+    fn exact(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
         let Reference { starts, tail, .. } = self.reference;
         let settling = exact.settling(starts, self.study.tune.tolerance);
         row.set(measures::SETTLING_TIME, settling);
@@ -76,7 +139,7 @@ impl Judge<'_> {
     }
 
     /// The figures of the run with noise, against the one without.
-    pub fn noisy(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
+    fn noisy(&self, row: &mut Row, exact: &Errors, run: &impl Run) {
         let noisy = self.errors(run);
         let caused = noisy.minus(exact);
         let level = self.noise_level(run);

@@ -6,6 +6,7 @@
 
 pub(crate) mod axis;
 mod bench;
+mod disturbed;
 pub(crate) mod errors;
 mod filtered;
 mod holdout;

@@ -1,24 +1,25 @@
 //! One value on a log: how well held-out samples are predicted, and how white the innovation is.
 
 use lynkeus_observers::Design;
-use lynkeus_run::EstimatorSettings;
 
 use super::errors::{rms, run_away};
+use super::filtered;
 use super::holdout::{predicted, switchable};
 use super::record::{Record, Replayed, span};
 use super::speed::longest_step;
 use super::trial::{is_answer, thrifty};
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
-use crate::course::Course;
+use crate::course::{Course, Samples};
 use crate::crew::{Watch, part};
 use crate::estimate::{course_of, refuse_derivatives, run_settings, start_at_readings};
 use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
 use crate::series::steps;
+use crate::study::BetweenSamples;
 use crate::{Error, Series, replay, systems};
 
-/// Judges the tuning of a study on a log; an estimate that diverges is a row without figures.
+/// Judges the tuning of an observer or of a filter on a log; an estimate that diverges is a row without figures.
 ///
 /// # Errors
 /// A study or a log that cannot be used.
@@ -31,15 +32,50 @@ pub(super) fn logged(
 ) -> Result<Row, Error> {
     refuse_derivatives(prepared.study(), &design)?;
     start_at_readings(prepared, &record.log.samples, &mut design);
-    design.observer = switchable(prepared.plant(), &design.observer);
-    let replay = Replay {
-        prepared,
-        design,
-        record,
+    let failure = if design.observer.filter.is_some() {
+        filtered::held_out(prepared, &design, record, &mut row, watch)?
+    } else {
+        design.observer = switchable(prepared.plant(), &design.observer);
+        let replay = Replay {
+            prepared,
+            design,
+            record,
+        };
+        replay.judge(&mut row, watch)?
     };
-    match replay.judge(&mut row, watch)? {
+    match failure {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
+    }
+}
+
+/// What `estimate` makes of samples, as far as a figure depends on it, or why its estimate is none;
+/// `place` is what an error of theirs is told of.
+///
+/// # Errors
+/// A study or samples that cannot be used.
+pub(super) fn course(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    between: BetweenSamples,
+    place: &str,
+    watch: &mut Watch<'_>,
+) -> Result<Result<Course, String>, Error> {
+    let mut study = prepared.study().clone();
+    study.estimate.between_samples = between;
+    study.estimate.deviations = false;
+    study.estimate.smoothing = None;
+    let prepared = prepared.run_by(&study);
+    let mut run = run_settings(&study.estimate);
+    run.method = thrifty(run.method, samples.time.len() as f64);
+    let watch = &mut replay::Watch::only(watch);
+    let mut course = course_of(&prepared, design, samples, run, watch)?;
+    course.check()?;
+    match course.ended.take() {
+        None => Ok(Ok(course)),
+        Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
+        Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
 }
 
@@ -50,9 +86,6 @@ struct Replay<'a> {
     design: Design,
     record: &'a Record<'a>,
 }
-
-/// A replay, or why its estimate is none.
-type Ran = Result<Course, String>;
 
 impl Replay<'_> {
     /// Fills the row in; the reason where a replay failed.
@@ -79,30 +112,14 @@ impl Replay<'_> {
         }
     }
 
-    /// What `estimate` does, as far as a figure depends on it.
-    fn run(&self, replayed: &Replayed, watch: &mut Watch<'_>) -> Result<Ran, Error> {
-        let mut study = self.prepared.study().clone();
-        study.estimate.between_samples = replayed.between;
-        study.estimate.deviations = false;
-        study.estimate.smoothing = None;
-        let prepared = self.prepared.with_study(&study);
-        let run = run_settings(&study.estimate);
-        let rows = replayed.samples.time.len();
-        let run = EstimatorSettings {
-            method: thrifty(run.method, rows as f64),
-            ..run
-        };
-        let watch = &mut replay::Watch::only(watch);
-        let mut course = course_of(&prepared, &self.design, &replayed.samples, run, watch)?;
-        course.check()?;
-        match course.ended.take() {
-            None => Ok(Ok(course)),
-            Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
-            Some(error) => {
-                let log = self.record.log.table.place();
-                Err(interrupted_on(error, &log, &study.file))
-            }
-        }
+    fn run(
+        &self,
+        replayed: &Replayed,
+        watch: &mut Watch<'_>,
+    ) -> Result<Result<Course, String>, Error> {
+        let (samples, between) = (&replayed.samples, replayed.between);
+        let place = self.record.log.table.place();
+        course(self.prepared, &self.design, samples, between, &place, watch)
     }
 
     /// The innovation of a replay that looks at no later sample, past the first block, in the
@@ -164,7 +181,7 @@ mod tests {
     use std::ops::ControlFlow;
     use std::path::Path;
 
-    use lynkeus_run::{BetweenSamples, Log, Role};
+    use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, Role};
 
     use super::*;
     use crate::{Study, Table, prepare};

@@ -298,9 +298,12 @@ fn javascript_has_it_too() {
     let expected_own = estimated(folder.path.path()).unwrap();
     let own = crate::export::javascript::replayed_by(&folder, "");
     assert!(difference(&expected_own, &own, "own") <= 1e-12);
+    let by_name = "if (tunables.join() !== \"theta[1],theta[2]\") { process.exit(1); }
+        state.tuning[tunables.indexOf(\"theta[1]\")] = 4.5;
+        state.tuning[tunables.indexOf(\"theta[2]\")] = 4;";
     folder.write("s.toml", &other);
     let expected: Run = estimated(folder.path.path()).unwrap();
-    let found = crate::export::javascript::replayed_by(&folder, "state.tuning.set([4.5, 4]);");
+    let found = crate::export::javascript::replayed_by(&folder, by_name);
     let off = difference(&expected, &found, "changed");
     assert!(off <= 1e-12, "{off:e}");
 }

@@ -7,6 +7,7 @@ use super::device::Device;
 use super::function::{Entry, comment};
 use super::language::{FUNCTIONS, Language};
 use super::machine::{Field, Machine};
+use super::words;
 use crate::Refusal;
 
 /// What the library of the draft is in JavaScript, where that has it.
@@ -25,23 +26,9 @@ const OWN: [(&str, &str); 3] = [
     ),
 ];
 
-/// Numbers of the words for what happened, as in C.
-const WORDS: [(&str, usize); 10] = [
-    ("TIME", 1),
-    ("INPUT", 2),
-    ("INTERVAL", 3),
-    ("DIVERGED", 4),
-    ("NOT_FINITE", 5),
-    ("TUNING", 6),
-    ("MISSING", 0),
-    ("TAKEN", 1),
-    ("REJECTED", 2),
-    ("AT_LIMIT", 3),
-];
-
-/// A module: `signals` and `estimates` (names), `init()`, which gives a state, and
-/// `push(state, t, signals, estimates)`, which writes the estimates and gives 0 or a code as the
-/// C export has it.
+/// A module: `signals` and `estimates` (names), `tunables` (names of the entries of `tuning` in the
+/// state, where there are any), `init()`, which gives a state, and `push(state, t, signals, estimates)`,
+/// which writes the estimates and gives 0 or a code as the C export has it.
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
@@ -58,8 +45,12 @@ pub fn expression(device: &Device<'_>) -> Result<String, Refusal> {
     let text = text(device, "")?;
     // strings have no <, and in code and comments a blank after one changes nothing
     let text = text.replace("</", "< /").replace("<!", "< !");
+    let tunables = match device.tunables {
+        [] => "",
+        _ => "tunables, ",
+    };
     Ok(format!(
-        "(function () {{\n\"use strict\";\n{text}return {{ signals, estimates, init, push }};\n}})()"
+        "(function () {{\n\"use strict\";\n{text}return {{ signals, estimates, {tunables}init, push }};\n}})()"
     ))
 }
 
@@ -83,11 +74,18 @@ fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
             None => format!("{}\n", printed(text, word)?),
         };
     }
+    let tunables = match device.tunables {
+        [] => String::new(),
+        tunables => {
+            let entries = tunables.iter().map(|tunable| &tunable.entry);
+            format!("{export}const tunables = {};\n", names(entries))
+        }
+    };
     let source = printed(&format!("{}\n{}", machine.tables, machine.source), word)?;
     Ok(format!(
-        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n\n{}\n{}{}\n{export}{}\n{export}{PUSH}",
-        names(device.signals),
-        names(device.estimates),
+        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n{tunables}\n{}\n{}{}\n{export}{}\n{export}{PUSH}",
+        names(device.signals.iter()),
+        names(device.estimates.iter()),
         sizes.collect::<String>(),
         library,
         source,
@@ -114,8 +112,7 @@ const PUSH: &str = "function push(s, t, signals, estimates)
 
 /// What a name of the draft is called.
 fn word(name: &str) -> Option<String> {
-    let number = WORDS.iter().find(|known| known.0 == name);
-    if let Some((_, number)) = number {
+    if let Some(number) = words::number(name) {
         return Some(number.to_string());
     }
     Some(match name {
@@ -149,8 +146,8 @@ fn init(fields: &[Field]) -> String {
     format!("function init()\n{{\n    return {{\n{entries}    }};\n}}\n")
 }
 
-fn names(entries: &[Entry]) -> String {
-    let texts: Vec<String> = entries.iter().map(|entry| string(&entry.name)).collect();
+fn names<'e>(entries: impl Iterator<Item = &'e Entry>) -> String {
+    let texts: Vec<String> = entries.map(|entry| string(&entry.name)).collect();
     format!("[{}]", texts.join(", "))
 }
 

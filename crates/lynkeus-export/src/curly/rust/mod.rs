@@ -5,11 +5,12 @@ mod print;
 mod value;
 
 use self::print::printed;
-use super::c::{self, File, Precision, READINGS, prefix};
+use super::c::{File, Precision, Sources, lost, prefix};
 use super::device::Device;
 use super::function::Entry;
 use super::machine::{Field, Kind, Machine};
 use super::template::mentions;
+use super::words::{self, READINGS};
 use crate::Refusal;
 
 const REPLAY: &str = include_str!("../runtime/replay.rs");
@@ -46,11 +47,12 @@ fn power_of_two(a: REAL) -> REAL {
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
-pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let name = format!("{}_estimator", prefix(device.name));
+    let machine = &Machine::of(device)?;
     let frame = Frame {
         device,
-        machine: &Machine::of(device)?,
+        machine,
         precision,
     };
     let manifest = format!(
@@ -66,11 +68,14 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
         name: name.to_owned(),
         text,
     };
-    Ok(vec![
-        file("Cargo.toml", manifest),
-        file("src/lib.rs", frame.library()?),
-        file("examples/replay.rs", replay),
-    ])
+    Ok(Sources {
+        files: vec![
+            file("Cargo.toml", manifest),
+            file("src/lib.rs", frame.library()?),
+            file("examples/replay.rs", replay),
+        ],
+        lost: lost(machine, precision),
+    })
 }
 
 struct Frame<'a> {
@@ -280,7 +285,7 @@ impl Frame<'_> {
 
 /// The codes, and what they are for people.
 fn codes(device: &Device<'_>) -> String {
-    let all = || c::codes(device).enumerate();
+    let all = || words::codes(device).enumerate();
     let constants = all().map(|(k, (code, _))| format!("const {code}: usize = {};\n", k + 1));
     let variants =
         all().map(|(_, (code, about))| format!("    /// {about}\n    {},\n", camel(code)));

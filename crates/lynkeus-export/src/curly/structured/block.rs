@@ -4,9 +4,9 @@ use super::bound::listed;
 use super::names::Identifiers;
 use super::print::{Printer, comment, section};
 use super::{Frame, about};
-use crate::curly::c::{READINGS, codes};
 use crate::curly::function::Entry;
 use crate::curly::syntax::Type;
+use crate::curly::words::{READINGS, codes};
 
 /// The block, with its variables named.
 pub(super) struct Block<'a> {

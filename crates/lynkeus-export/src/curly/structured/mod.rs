@@ -17,7 +17,7 @@ use self::names::Identifiers;
 use self::print::{Printer, array_type, comment, lacks, plain, section};
 use self::routine::Instance;
 use self::value::part;
-use super::c::{File, Precision};
+use super::c::{File, Precision, Sources, lost};
 use super::device::Device;
 use super::machine::{Field, Kind, Machine};
 use super::syntax::{Program, Type, parsed};
@@ -50,7 +50,7 @@ fn library(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
-pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Refusal> {
+pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let machine = Machine::of(device)?;
     let holds: &[&str] = match precision {
         Precision::F64 => &[],
@@ -102,10 +102,13 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
         printer.text,
         block.text(&taken.name)
     );
-    Ok(vec![
-        file(format!("{prefix}.st"), text),
-        file("example.st".to_owned(), block.example()),
-    ])
+    Ok(Sources {
+        files: vec![
+            file(format!("{prefix}.st"), text),
+            file("example.st".to_owned(), block.example()),
+        ],
+        lost: lost(&machine, precision),
+    })
 }
 
 struct Frame<'a> {

@@ -4,8 +4,9 @@
 use super::bound::{ATOM, Bound, SIGN, literal};
 use super::print::{Printer, lacks};
 use crate::Refusal;
-use crate::curly::c::{CODES, Precision, READINGS, TUNING};
+use crate::curly::c::Precision;
 use crate::curly::syntax::{Expr, Operator, Type, visit};
+use crate::curly::words;
 
 impl<'p> Printer<'p> {
     /// A value where one of a type is wanted.
@@ -107,7 +108,7 @@ impl<'p> Printer<'p> {
         if self.here.scope.variable(name).is_some() {
             return Ok(Bound::atom(self.here.called(name)));
         }
-        if let Some(number) = code(name) {
+        if let Some(number) = words::number(name) {
             return Ok(Bound::atom(format!("{number} (* {name} *)")));
         }
         let is_single = self.precision == Precision::F32;
@@ -288,13 +289,6 @@ impl<'p> Printer<'p> {
 /// What a part of the state is called.
 pub(super) fn part(name: &str) -> &str {
     if name == "time" { "instant" } else { name }
-}
-
-/// The number for a word.
-fn code(name: &str) -> Option<usize> {
-    let mut codes = CODES.iter().chain([&TUNING]);
-    let reading = READINGS.iter().position(|reading| reading.0 == name);
-    reading.or_else(|| Some(codes.position(|code| code.0 == name)? + 1))
 }
 
 fn variable(value: &Expr) -> Option<&str> {

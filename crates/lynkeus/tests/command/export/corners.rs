@@ -257,3 +257,32 @@ fn the_head_says_what_is_guaranteed_and_where() {
         assert!(header.contains(told), "{told}: {header}");
     }
 }
+
+/// A rate of 1e-50 is 0 in `float`: told in every language that has it, once, and of `double` never.
+#[test]
+fn numbers_that_float_has_not_are_told() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model M Real x(start = 1, min = -9, max = 9); output Real y = x; equation der(x) = -1e-50*x; end M;",
+    );
+    folder.write(
+        "s.toml",
+        "plant = \"m.mo\"\nobserver = { theta = 2 }\nestimate = { method = \"rk4\", step = 0.1 }\n",
+    );
+    let told = "`float` makes 0 or an infinity of 1e-50";
+    for to in ["c", "rust", "fmu"] {
+        for (precision, count) in [("f32", 1), ("f64", 0)] {
+            let name = format!("{to}-{precision}");
+            let arguments = ["export", "s.toml", "--to", to, "--precision", precision];
+            let ended = folder.run(&[&arguments[..], &["-o", &name]].concat());
+            assert_eq!(ended.code, 0, "{}", ended.err);
+            assert_eq!(
+                ended.err.matches(told).count(),
+                count,
+                "{name}: {}",
+                ended.err
+            );
+        }
+    }
+}

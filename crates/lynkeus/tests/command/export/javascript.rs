@@ -9,7 +9,7 @@ use crate::Folder;
 const REPLAY: &str = r#"
 import { readFileSync, readdirSync } from "node:fs";
 const file = readdirSync("js").find((name) => name.endsWith(".mjs"));
-const { signals, estimates, init, push } = await import(`${process.cwd()}/js/${file}`);
+const { signals, estimates, tunables, init, push } = await import(`${process.cwd()}/js/${file}`);
 const [header, ...rows] = readFileSync("log.csv", "utf8").trim().split("\n").map((row) => row.split(","));
 const places = signals.map((name) => header.indexOf(name));
 const time = header.indexOf("t");

@@ -193,6 +193,55 @@ fn a_filter_on_a_log_foretells_what_it_is_not_shown() {
     );
 }
 
+/// What a filter of x' = −a x + u + d, x measured every `H`, ends off by where it knows u but not
+/// the constant d: with its steady gain K, e⁺ = (1 − K)(φ e⁺ + (1 − φ) d/a), φ = exp(−a H). A UKF adds
+/// q H from sample to sample, an EKF integrates q along.
+fn steady_error(family: &str, q: f64) -> f64 {
+    const A: f64 = 0.5;
+    const H: f64 = 0.2;
+    let phi = (-A * H).exp();
+    let added = match family {
+        "ukf" => q * H,
+        _ => q * (1.0 - phi * phi) / (2.0 * A),
+    };
+    let gain = |variance: f64| variance / (variance + 0.01);
+    let prior = |p: f64| phi * phi * p + added;
+    let p = (0..10_000).fold(0.01, |p, _| (1.0 - gain(prior(p))) * prior(p));
+    let left = 1.0 - gain(prior(p));
+    left * (1.0 - phi) / A * 0.3 / (1.0 - left * phi)
+}
+
+/// The bound of a filter counts what acts on its plant unseen, as that of an observer does.
+#[test]
+fn a_disturbance_counts_in_the_bound_of_a_filter() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model Lag input Real u(min = 0, max = 2); Real x(start = 1, min = -5, max = 5); output Real y = x; equation der(x) = u - 0.5*x; end Lag;",
+    );
+    let study = "plant = \"m.mo\"\nobserver = { family = \"ekf\", initial = { x = 1 }, initial_variance = { x = 0.01 } }\nsensors = { noise = { y = 0.1 } }\nprocess_noise = { x = 0.02 }\nsimulate = { until = 80, sample_step = 0.2, output_step = 0.2, inputs = { u = \"0.5\" } }\ntune = { disturbance = { u = \"0.3\" } }\n";
+    for family in ["ekf", "ukf"] {
+        folder.write("study.toml", &study.replace("ekf", family));
+        let page = page(&folder, &["study.toml"]);
+        let table = page.split("<section id=\"tradeoff\">").nth(1).unwrap();
+        let rows = table.split("<tr>").skip(2).take(11);
+        let mut seen = 0;
+        for row in rows {
+            let cells = row.split("</td>").map(|c| c.rsplit('>').next().unwrap());
+            let cells: Vec<f64> = cells.filter_map(|c| c.parse().ok()).collect();
+            let expected = steady_error(family, 0.02 * cells[0]) / 10.0;
+            let off = (cells[7] / expected - 1.0).abs();
+            // three digits
+            assert!(off < 0.006, "{family}: {row} {expected}");
+            seen += 1;
+        }
+        assert_eq!(seen, 11);
+    }
+    folder.change("study.toml", "disturbance = { u", "disturbance = { v");
+    let page = page(&folder, &["study.toml"]);
+    assert!(page.contains("no input named &quot;v&quot;"), "{page}");
+}
+
 #[test]
 fn in_a_browser_the_slider_marks_its_row() {
     for arguments in [&["study.toml"][..], &["study.toml", "log.csv"]] {
