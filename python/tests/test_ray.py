@@ -108,7 +108,7 @@ def test_a_killed_worker_loses_nothing(study: lynkeus.Study, tmp_path: Path) -> 
 
 
 def test_what_is_asked_for_wrongly(study: lynkeus.Study) -> None:
-    with pytest.raises(lynkeus.InputError, match="seeds: expected whole numbers, found 1.5"):
+    with pytest.raises(lynkeus.InputError, match="seeds: expected a whole number of 64 bits, found 1.5"):
         lynkeus.ray.campaign(study, [1.5])  # type: ignore[list-item]
     with pytest.raises(lynkeus.InputError, match="nothing to run"):
         lynkeus.ray.campaign(study, [])

@@ -2,7 +2,7 @@
 
 use super::bound::listed;
 use super::names::Identifiers;
-use super::print::{Printer, comment, section};
+use super::print::{Made, Printer, comment, section};
 use super::{Frame, about};
 use crate::curly::function::Entry;
 use crate::curly::syntax::Type;
@@ -28,22 +28,35 @@ struct Signal {
 }
 
 /// Names that are not the model's.
-const OWN: [&str; 8] = [
+const OWN: [&str; 10] = [
     "t",
     "restart",
+    "restarted",
     "code",
     "s",
     "begun",
     "before",
     "signals",
     "estimates",
+    "done",
 ];
+
+/// What else no block is called: names in the example, and files that there are already or can never be.
+const OTHERS: [&str; 7] = ["estimator", "cycle", "example", "con", "prn", "aux", "nul"];
+
+/// What the block of a model is called.
+pub(super) fn program(model: &str) -> String {
+    let mut names = Identifiers::without(&OWN).and_without(&OTHERS);
+    names.of(&model.to_ascii_lowercase())
+}
+
+/// A reading that is none: it is beyond what counts as a number.
+const MISSING: &str = "3.0E38";
 
 impl<'a> Block<'a> {
     pub fn of(frame: &'a Frame<'a>, printer: &mut Printer<'_>) -> Self {
         let device = frame.device;
-        let taken = OWN.iter().map(|name| (*name).to_owned());
-        let mut names = Identifiers::without(taken.chain([frame.prefix.to_owned()]));
+        let mut names = printer.identifiers().and_without(&OWN);
         let signals = device.signals.iter().map(|signal| {
             let name = names.of(&signal.name);
             let is_valid = names.of(&format!("{name}_valid"));
@@ -72,7 +85,7 @@ impl<'a> Block<'a> {
     }
 
     /// Its text; `take` is the function that takes a sample.
-    pub fn text(&self, take: &str) -> String {
+    pub fn text(&self, take: &Made) -> String {
         let codes = codes(self.frame.device).enumerate();
         let codes = codes.map(|(k, (_, about))| format!("{}: {about}", k + 1));
         let codes: Vec<String> = codes.collect();
@@ -106,7 +119,10 @@ impl<'a> Block<'a> {
             let (start, words) = (listed(tunable.start), told(name, &tunable.entry));
             lines.push(format!("{name} : {real} := {start};{words}"));
         }
-        lines.push("restart : BOOL; (* TRUE: from the start, before the sample *)".to_owned());
+        lines.push(
+            "restart : BOOL; (* where it becomes TRUE: from the start, before the sample *)"
+                .to_owned(),
+        );
         lines
     }
 
@@ -130,40 +146,49 @@ impl<'a> Block<'a> {
             format!("s : {state};"),
             format!("before : {state};"),
             "begun : BOOL; (* whether s is a state *)".to_owned(),
+            "restarted : BOOL; (* whether restart has been heard *)".to_owned(),
+            "done : BOOL;".to_owned(),
             format!("signals : {};", self.signals_type),
             format!("estimates : {};", self.estimates_type),
         ]
     }
 
-    fn body(&self, take: &str) -> String {
+    fn body(&self, take: &Made) -> String {
         let mut lines = vec![
-            "IF restart OR NOT begun THEN".to_owned(),
-            format!("    begun := {}_init(s := s);", self.frame.prefix),
-            "END_IF;".to_owned(),
             "before := s;".to_owned(),
+            "IF NOT begun OR (restart AND NOT restarted) THEN".to_owned(),
+            format!("    done := {}_init(s := s);", self.frame.prefix),
+            "END_IF;".to_owned(),
         ];
         for (place, Signal { name, is_valid }) in self.signals.iter().enumerate() {
             lines.push(format!("signals[{place}] := {name};"));
             lines.push(format!("IF NOT {is_valid} THEN"));
-            let undefined = format!("{}_undefined(a := 0.0)", self.frame.prefix);
-            lines.push(format!("    signals[{place}] := {undefined};"));
+            lines.push(format!("    signals[{place}] := {MISSING};"));
             lines.push("END_IF;".to_owned());
         }
         for (place, name) in self.tunables.iter().enumerate() {
             lines.push(format!("s.tuning[{place}] := {name};"));
         }
-        lines.push(format!(
-            "code := {take}(s := s, signals := signals, estimates := estimates, t := t);"
-        ));
+        // as `take` is drafted
+        let given = ["s", "t", "signals", "estimates"];
+        let given = take.parameters.iter().zip(given);
+        let given: Vec<String> = given
+            .map(|(name, own)| format!("{name} := {own}"))
+            .collect();
+        lines.push(format!("code := {}({});", take.name, given.join(", ")));
         lines.push("IF code <> 0 THEN".to_owned());
         lines.push("    s := before;".to_owned());
         lines.push("ELSE".to_owned());
+        lines.push("    begun := TRUE;".to_owned());
         for (place, name) in self.estimates.iter().enumerate() {
             lines.push(format!("    {name} := estimates[{place}];"));
         }
         for (place, name) in self.readings.iter().enumerate() {
             lines.push(format!("    {name} := s.became[{place}];"));
         }
+        lines.push("END_IF;".to_owned());
+        lines.push("IF code = 0 OR NOT restart THEN".to_owned());
+        lines.push("    restarted := restart;".to_owned());
         lines.push("END_IF;".to_owned());
         lines.iter().map(|line| format!("    {line}\n")).collect()
     }
@@ -173,9 +198,10 @@ impl<'a> Block<'a> {
         let Frame { prefix, real, .. } = self.frame;
         let signals = self.signals.iter();
         let declared = signals.clone().map(|s| format!("{} : {real};", s.name));
-        let given = signals.map(|s| format!("{0} := {0}", s.name));
+        let given = signals.map(|s| format!("{0} := {0}, {1} := TRUE", s.name, s.is_valid));
         let given: Vec<String> = std::iter::once("t := t".to_owned()).chain(given).collect();
-        let mut names = Identifiers::without(self.signals.iter().map(|s| s.name.clone()));
+        let taken: Vec<&str> = self.signals.iter().map(|s| s.name.as_str()).collect();
+        let mut names = Identifiers::without(&taken);
         let (estimator, cycle) = (names.of("estimator"), names.of("cycle"));
         let variables: Vec<String> = [
             format!("{estimator} : {prefix};"),

@@ -69,12 +69,6 @@ pub(super) fn literal(digits: &str) -> Bound {
     }
 }
 
-/// A number in a statement.
-pub(super) fn signed(value: f64) -> String {
-    let sign = if value < 0.0 { "-" } else { "" };
-    format!("{sign}{}", literal(&format!("{:?}", value.abs())).text)
-}
-
 /// A number in a declaration, which has no factors.
 pub(super) fn listed(value: f64) -> String {
     let digits = format!("{value:?}");

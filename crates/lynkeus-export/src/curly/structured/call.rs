@@ -21,6 +21,10 @@ const STANDARD: [(&str, &str); 11] = [
     ("tan", "TAN"),
 ];
 
+/// Beyond it, no number counts as one: what is missing is. So no infinity is subtracted from another, at which
+/// there are controllers that stop.
+const FINITE: &str = "1.0E38";
+
 impl<'p> Printer<'p> {
     /// A call of the library.
     pub fn own(&mut self, name: &'static str, arguments: &str) -> Bound {
@@ -115,13 +119,14 @@ impl<'p> Printer<'p> {
     }
 }
 
-/// Whether a value is no number, or else whether it is a finite one: nothing else equals itself, or is nothing
-/// less itself.
+/// Whether a value is no number, which alone is not itself, or else whether it is a finite one.
 fn asked(is_nan: bool, value: Bound) -> Bound {
-    let value = value.at_least(ATOM);
-    let level = Operator::Equal.level();
+    let level = Operator::Less.level();
     match is_nan {
-        true => Bound::infix(&value, "<>", &value, level),
-        false => Bound::infix(&format!("{value} - {value}"), "=", "0.0", level),
+        true => {
+            let value = value.at_least(ATOM);
+            Bound::infix(&value, "<>", &value, Operator::Equal.level())
+        }
+        false => Bound::infix(&format!("ABS({})", value.text), "<", FINITE, level),
     }
 }

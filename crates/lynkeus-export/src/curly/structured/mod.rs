@@ -13,7 +13,7 @@ mod tests;
 mod value;
 
 use self::block::Block;
-use self::names::Identifiers;
+use self::bound::literal;
 use self::print::{Printer, array_type, comment, lacks, plain, section};
 use self::routine::Instance;
 use self::value::part;
@@ -62,9 +62,7 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
     let draft = format!("{}\n{library}{}", machine.tables, machine.source);
     let items = parsed(&chosen(&draft, holds))?;
     let program = Program::of(&items, &machine.fields);
-    // the other file is called so
-    let mut names = Identifiers::without(["example".to_owned()]);
-    let prefix = names.of(&device.name.to_ascii_lowercase());
+    let prefix = block::program(device.name);
     let mut printer = Printer::new(
         &items,
         &program,
@@ -84,7 +82,6 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
     };
     let state = frame.state(&mut printer);
     let block = Block::of(&frame, &mut printer);
-    printer.own.insert("undefined");
     let file = |name: String, text: String| File { name, text };
     let arrays = printer.arrays.iter().map(|(kind, size)| {
         let name = array_type(&prefix, kind, *size);
@@ -100,7 +97,7 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
         frame.library(&printer),
         frame.init()?,
         printer.text,
-        block.text(&taken.name)
+        block.text(&taken)
     );
     Ok(Sources {
         files: vec![
@@ -187,7 +184,7 @@ impl Frame<'_> {
         let prefix = self.prefix;
         let mut lines = String::new();
         for field in &self.machine.fields {
-            lines += &start(field)?;
+            lines += &self.start(field)?;
         }
         let shared = section("VAR_IN_OUT", &[format!("s : {prefix}_state;")]);
         let own = section("VAR", &["k : DINT;".to_owned()]);
@@ -196,36 +193,44 @@ impl Frame<'_> {
              {prefix}_init := TRUE;\nEND_FUNCTION\n\n"
         ))
     }
-}
 
-/// A field at the start, entry by entry where they are not 0.
-fn start(field: &Field) -> Result<String, Refusal> {
-    if field.start.iter().any(|value| !value.is_finite()) {
-        return Err(lacks("a start that is no finite number"));
+    /// A field at the start, entry by entry where they are not 0.
+    fn start(&self, field: &Field) -> Result<String, Refusal> {
+        if field.start.iter().any(|value| !value.is_finite()) {
+            return Err(lacks("a start that is no finite number"));
+        }
+        let name = part(field.name);
+        let line = |target: &str, value: f64| {
+            format!("    s.{target} := {};\n", self.number(field.kind, value))
+        };
+        let Some(count) = field.count else {
+            return Ok(line(name, field.start.first().copied().unwrap_or(0.0)));
+        };
+        let zeros = format!(
+            "    FOR k := 0 TO {} DO\n    {}    END_FOR;\n",
+            count.max(1) - 1,
+            line(&format!("{name}[k]"), 0.0)
+        );
+        let others = field.start.iter().enumerate();
+        let others = others.filter(|start| *start.1 != 0.0);
+        let others = others.map(|(place, value)| line(&format!("{name}[{place}]"), *value));
+        Ok(zeros + &others.collect::<String>())
     }
-    let name = part(field.name);
-    let text = |value: f64| match field.kind {
-        Kind::Int => format!("{}", value as i64),
-        Kind::Truth => if value == 0.0 { "FALSE" } else { "TRUE" }.to_owned(),
-        _ => bound::signed(value),
-    };
-    let Some(count) = field.count else {
-        let value = text(field.start.first().copied().unwrap_or(0.0));
-        return Ok(format!("    s.{name} := {value};\n"));
-    };
-    let zeros = format!(
-        "    FOR k := 0 TO {} DO\n        s.{name}[k] := {};\n    END_FOR;\n",
-        count.max(1) - 1,
-        text(0.0)
-    );
-    let others = field
-        .start
-        .iter()
-        .enumerate()
-        .filter(|start| *start.1 != 0.0);
-    let others =
-        others.map(|(place, value)| format!("    s.{name}[{place}] := {};\n", text(*value)));
-    Ok(zeros + &others.collect::<String>())
+
+    /// A number in a statement.
+    fn number(&self, kind: Kind, value: f64) -> String {
+        match kind {
+            Kind::Int => format!("{}", value as i64),
+            Kind::Truth => if value == 0.0 { "FALSE" } else { "TRUE" }.to_owned(),
+            Kind::Real | Kind::Double => {
+                let is_single = self.real == "REAL" && kind == Kind::Real;
+                let most = if is_single { 3.4e38 } else { f64::MAX };
+                let sign = if value < 0.0 { "-" } else { "" };
+                let size = value.abs().min(most);
+                format!("{sign}{}", literal(&format!("{size:?}")).text)
+            }
+        }
+    }
 }
 
 /// Words behind a declaration.

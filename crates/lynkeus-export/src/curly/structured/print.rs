@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::bound::listed;
 use super::names::Identifiers;
 use super::routine::{Instance, Routine};
 use crate::Refusal;
@@ -121,32 +120,46 @@ impl<'p> Printer<'p> {
         };
         let (list, kind) = (*list, *kind);
         let mut texts = vec![];
-        for value in list {
-            texts.push(self.bounded(value, kind)?);
+        let mut split = vec![];
+        for (place, value) in list.iter().enumerate() {
+            let text = self.bounded(value, kind)?;
+            // no declaration has factors
+            if text.contains('*') {
+                split.push((place, text));
+                texts.push("0.0".to_owned());
+            } else {
+                texts.push(text);
+            }
         }
         let (kind, last) = (self.kind(kind), list.len().saturating_sub(1));
         let texts = texts.join(", ");
-        Ok(self.here.once(name, |own| {
+        let is_new = self.here.is_unknown(name);
+        let own = self.here.once(name, |own| {
             format!("{own} : ARRAY [0..{last}] OF {kind} := [{texts}];")
-        }))
+        });
+        for (place, text) in split.into_iter().filter(|_| is_new) {
+            self.here.first(format!("{own}[{place}] := {text};"));
+        }
+        Ok(own)
     }
 
     /// A number of a table, where an end that is nowhere is the last number there is.
     fn bounded(&mut self, value: &'p Expr, kind: Type) -> Result<String, Refusal> {
         const LAST: &str = "3.4E38";
         match value {
-            Expr::Name(name) if name == "INFINITY" => Ok(LAST.to_owned()),
-            Expr::Prefix("-", inner) => Ok(format!("-{}", self.bounded(inner, kind)?)),
-            Expr::Real(digits) => {
-                let value = digits.parse().unwrap_or(0.0);
-                Ok(match self.precision {
-                    Precision::F64 => listed(value),
-                    Precision::F32 if (value as f32).is_infinite() => LAST.to_owned(),
-                    // as a number of that type is written
-                    Precision::F32 => listed(format!("{:?}", value as f32).parse().unwrap_or(0.0)),
-                })
-            }
+            value if self.is_infinite(value) => Ok(LAST.to_owned()),
+            Expr::Prefix("-", inner) if self.is_infinite(inner) => Ok(format!("-{LAST}")),
             value => self.value(value, kind),
+        }
+    }
+
+    fn is_infinite(&self, value: &Expr) -> bool {
+        match value {
+            Expr::Name(name) => name == "INFINITY",
+            Expr::Real(digits) if self.precision == Precision::F32 => {
+                digits.parse::<f32>().is_ok_and(f32::is_infinite)
+            }
+            _ => false,
         }
     }
 
@@ -173,13 +186,10 @@ impl<'p> Printer<'p> {
     }
 
     /// Without the names of functions and types.
-    fn identifiers(&self) -> Identifiers {
+    pub fn identifiers(&self) -> Identifiers {
+        const TYPES: [&str; 6] = ["counts", "example", "flags", "init", "reals", "state"];
         let functions = self.functions.keys().copied();
-        let all = functions
-            .chain(super::OWN)
-            .chain(["init", "state", "example"]);
-        let taken = all.map(|name| format!("{}_{name}", self.prefix));
-        Identifiers::without(taken.chain([self.prefix.to_owned()]))
+        Identifiers::inside(self.prefix, functions.chain(super::OWN).chain(TYPES))
     }
 
     fn written(

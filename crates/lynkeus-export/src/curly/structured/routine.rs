@@ -29,6 +29,8 @@ pub(super) struct Routine {
     identifiers: Identifiers,
     /// declarations, without their indent
     pub locals: Vec<String>,
+    /// lines before all others
+    head: Vec<Line>,
     lines: Vec<Line>,
     depth: usize,
     /// what it returns
@@ -68,6 +70,7 @@ impl Routine {
             names: HashMap::new(),
             identifiers: Identifiers::default(),
             locals: vec![],
+            head: vec![],
             lines: vec![],
             depth: 0,
             returns: Type::Void,
@@ -97,6 +100,16 @@ impl Routine {
         self.locals.push(declared(&own));
         self.names.insert(name.to_owned(), own.clone());
         own
+    }
+
+    /// Whether a variable is neither the draft's nor declared otherwise.
+    pub fn is_unknown(&self, name: &str) -> bool {
+        !self.names.contains_key(name)
+    }
+
+    /// A line at the beginning of the function.
+    pub fn first(&mut self, text: String) {
+        self.head.push(Line { depth: 1, text });
     }
 
     pub fn line(&mut self, text: impl Into<String>) {
@@ -139,7 +152,7 @@ impl Routine {
 
     /// All lines with their indents.
     pub fn text(&self) -> String {
-        let lines = self.lines.iter();
+        let lines = self.head.iter().chain(&self.lines);
         let lines = lines.map(|line| format!("{:1$}{2}\n", "", 4 * line.depth, line.text));
         lines.collect()
     }

@@ -92,10 +92,9 @@ fn ordered(log: &str, text: &str) -> String {
     rows.collect()
 }
 
-/// The log through the block; where the header is that of what is expected.
-fn replayed(path: &Path, text: &str, header: &[String]) -> Run {
-    let code = compiled(text) + REPLAY;
-    std::fs::write(path.join("st.c"), code).unwrap();
+/// The text as a program with such a main function, and what that prints.
+fn ran(path: &Path, text: &str, main: &str, arguments: &[&str]) -> (String, bool) {
+    std::fs::write(path.join("st.c"), compiled(text) + main).unwrap();
     let mut gcc = Command::new("gcc");
     gcc.args(["-O0", "-std=c11", "-ffp-contract=off"]);
     gcc.args(["-fsanitize=undefined", "-o", "st_replay", "st.c", "-lm"]);
@@ -105,15 +104,23 @@ fn replayed(path: &Path, text: &str, header: &[String]) -> Run {
         "{}",
         String::from_utf8_lossy(&ended.stderr)
     );
-    let log = std::fs::read_to_string(path.join("log.csv")).unwrap();
-    std::fs::write(path.join("st.csv"), ordered(&log, text)).unwrap();
-    let mut replay = Command::new(path.join("st_replay"));
-    let ended = replay.arg(path.join("st.csv")).output().unwrap();
+    let mut program = Command::new(path.join("st_replay"));
+    let ended = program.args(arguments).current_dir(path).output().unwrap();
     let told = String::from_utf8_lossy(&ended.stderr);
     assert!(told.is_empty() && ended.status.code() != Some(2), "{told}");
-    let found = String::from_utf8(ended.stdout).unwrap();
+    (
+        String::from_utf8(ended.stdout).unwrap(),
+        ended.status.success(),
+    )
+}
+
+/// The log through the block; where the header is that of what is expected.
+fn replayed(path: &Path, text: &str, header: &[String]) -> Run {
+    let log = std::fs::read_to_string(path.join("log.csv")).unwrap();
+    std::fs::write(path.join("st.csv"), ordered(&log, text)).unwrap();
+    let (found, is_whole) = ran(path, text, REPLAY, &["st.csv"]);
     let (_, rows) = crate::csv(&format!("{}\n{found}", header.join(",")));
-    (header.to_vec(), rows, ended.status.success())
+    (header.to_vec(), rows, is_whole)
 }
 
 /// Against what `estimate` gives.
@@ -148,4 +155,96 @@ fn any_name_can_stand_in_a_controller() {
         "",
     );
     assert!(off <= 1e-4, "{off:e}");
+}
+
+/// A study of a small plant.
+fn small(folder: &Folder, model: &str) {
+    folder.write(
+        "m.mo",
+        &format!(
+            "model {model}\n  Real m_reals_2(start = 1, max = 1e60);\n  Real m_solve_2(start = 0.5);\n  Real bit;\n  \
+             Real m_counts_3;\n  output Real m_undefined = m_reals_2;\n  output Real m_take = m_solve_2;\nequation\n  \
+             der(m_reals_2) = m_solve_2 - m_reals_2;\n  der(m_solve_2) = bit - m_solve_2;\n  2*bit + m_counts_3 = 1e-40;\n  \
+             bit - m_reals_2*m_counts_3 = 0.1;\nend {model};\n"
+        ),
+    );
+    folder.write(
+        "s.toml",
+        "plant = \"m.mo\"\nsensors = { measured = [\"m_undefined\", \"m_take\"], noise = { m_undefined = 1e-20, m_take = 0.1 } }\n\
+         process_noise = { m_reals_2 = 0.01, m_solve_2 = 0.01 }\nobserver = { family = \"ekf\" }\n\
+         estimate = { method = \"rk4\", step = 0.05 }\n",
+    );
+}
+
+#[test]
+fn a_model_may_be_called_like_anything_in_its_block() {
+    let folder = Folder::empty();
+    for model in [
+        "M",
+        "S",
+        "T",
+        "Signals",
+        "Estimates",
+        "Estimator",
+        "Cycle",
+        "Code",
+        "Example",
+        "Step",
+        "Var",
+    ] {
+        small(&folder, model);
+        for more in [&[][..], &["--tunable", "--precision", "f32"]] {
+            std::fs::remove_dir_all(folder.path.path().join("st")).unwrap_or_default();
+            let _ = exported(&folder, more);
+        }
+    }
+}
+
+/// What is printed: the code and the first estimate of each call.
+const CALLS: &str = r#"
+static void call(double t, double reading, int restart)
+{
+    double cells[3] = {t, reading, 0.2};
+    give(cells);
+    it.v_restart = restart;
+    block(&it);
+    printf("%d,%.17g\n", (int)it.v_code, (double)it.v_m_reals_2_hat);
+}
+
+int main(void)
+{
+    call(NAN, 1.0, 0);
+    call(0.0, 1.0, 0);
+    call(1.0, 0.9, 0);
+    call(5.0, 0.8, 0);
+    call(NAN, 0.8, 1);
+    call(2.0, 0.8, 0);
+    call(6.0, NAN, 0);
+    call(0.0, 1.0, 1);
+    call(1.0, 0.9, 1);
+    call(5.0, 0.8, 0);
+    return 0;
+}
+"#;
+
+#[test]
+fn a_restart_is_one_and_a_refused_one_is_none() {
+    if !has("gcc") {
+        return skipped("gcc is not there");
+    }
+    let folder = Folder::empty();
+    small(&folder, "Tank");
+    let text = exported(&folder, &[]);
+    let (told, _) = ran(folder.path.path(), &text, CALLS, &[]);
+    let calls: Vec<(&str, &str)> = told
+        .lines()
+        .map(|call| call.split_once(',').unwrap())
+        .collect();
+    let codes: Vec<&str> = calls.iter().map(|call| call.0).collect();
+    assert_eq!(codes, ["1", "0", "0", "0", "1", "1", "0", "0", "0", "0"]);
+    let [_, first, second, third, refused, back, missing, again @ ..] = &calls[..] else {
+        panic!("{told}");
+    };
+    assert!(refused.1 == third.1 && back.1 == third.1 && missing.1 != third.1);
+    assert_eq!(again, [*first, *second, *third]);
 }

@@ -230,6 +230,7 @@ impl<'t> Compiler<'t> {
                     variables.iter().all(|known| known.name != name),
                     "twice: {name}"
                 );
+                assert!(!self.types.contains_key(&name), "a type, too: {name}");
                 assert!(
                     !self.functions.contains_key(&name),
                     "a function, too: {name}"
@@ -251,6 +252,11 @@ impl<'t> Compiler<'t> {
         let place = parts.iter().position(|part| part.kind() == ":=")?;
         let given: Vec<Node<'_>> = parts[place + 1..].to_vec();
         let literals = given.iter().filter(|part| part.is_named());
+        for literal in literals.clone() {
+            let kinds = ["integer_literal", "real_literal", "boolean_literal"];
+            let told = &self.text[declaration.byte_range()];
+            assert!(kinds.contains(&literal.kind()), "{told}");
+        }
         let texts: Vec<String> = literals.map(|part| self.value(*part).text).collect();
         match kind {
             Kind::Named(name) => {
