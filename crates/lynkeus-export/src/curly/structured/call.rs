@@ -21,7 +21,7 @@ const STANDARD: [(&str, &str); 11] = [
     ("tan", "TAN"),
 ];
 
-/// Beyond it, no number counts as one: what is missing is. So no infinity is subtracted from another, at which
+/// What is given and beyond it counts as missing. So no infinity has to be made to say that something is, at which
 /// there are controllers that stop.
 const FINITE: &str = "1.0E38";
 
@@ -42,9 +42,18 @@ impl<'p> Printer<'p> {
             let kind = self.kind_of(argument);
             values.push(self.bound(argument, kind)?);
         }
-        if ["isfinite", "isnan"].contains(&name) {
+        if let ("isfinite" | "isnan", [argument]) = (name, arguments) {
             let value = values.pop().ok_or_else(|| lacks(name))?;
-            return Ok(asked(name == "isnan", value));
+            return Ok(match name {
+                "isnan" => differs(value),
+                _ if is_given(argument) => Bound::infix(
+                    &format!("ABS({})", value.text),
+                    "<",
+                    FINITE,
+                    Operator::Less.level(),
+                ),
+                _ => is_finite(value),
+            });
         }
         let texts: Vec<String> = values.into_iter().map(|value| value.text).collect();
         let typed = || {
@@ -119,14 +128,26 @@ impl<'p> Printer<'p> {
     }
 }
 
-/// Whether a value is no number, which alone is not itself, or else whether it is a finite one.
-fn asked(is_nan: bool, value: Bound) -> Bound {
-    let level = Operator::Less.level();
-    match is_nan {
-        true => {
-            let value = value.at_least(ATOM);
-            Bound::infix(&value, "<>", &value, Operator::Equal.level())
+/// Whether a value is what the block was given, rather than computed: the runtime's names for that.
+fn is_given(value: &Expr) -> bool {
+    match value {
+        Expr::Name(name) | Expr::Part(name) => {
+            ["reading", "readings", "signals"].contains(&name.as_str())
         }
-        false => Bound::infix(&format!("ABS({})", value.text), "<", FINITE, level),
+        Expr::Index(array, _) | Expr::Group(array) => is_given(array),
+        _ => false,
     }
+}
+
+/// Only what is no number is not itself.
+fn differs(value: Bound) -> Bound {
+    let value = value.at_least(ATOM);
+    Bound::infix(&value, "<>", &value, Operator::Equal.level())
+}
+
+/// Only a finite number less itself is nothing. A controller that stops at an infinity has stopped where it arose.
+fn is_finite(value: Bound) -> Bound {
+    let value = value.at_least(ATOM);
+    let nothing = format!("{value} - {value}");
+    Bound::infix(&nothing, "=", "0.0", Operator::Equal.level())
 }
