@@ -2,10 +2,11 @@
 
 mod implicit;
 mod still;
+mod sums;
 
 use std::collections::{BTreeMap, HashMap};
 
-use crate::partials::{Variation, is_steep, variation};
+use crate::partials::{Variation, variation};
 use crate::{Binary, Graph, Node, Op, Unary};
 
 use still::Still;
@@ -136,8 +137,8 @@ fn accumulated(
         }
         let tangent = match variation {
             Variation::Sum(terms) => {
-                let guard = still.as_ref().filter(|_| is_steep(graph.op(node)));
-                sum_tangent(&build, &terms, &tangents, guard)
+                let op = graph.op(node);
+                sums::tangent(&build, op, &terms, &tangents, still.as_ref())
             }
             Variation::Choice(c, a, b) => choice_tangent(&build, c, a, b, &tangents),
             Variation::Entry { system, entry } => solved[&system]
@@ -150,27 +151,6 @@ fn accumulated(
         }
     }
     tangents
-}
-
-fn sum_tangent(
-    build: &Builder<'_>,
-    terms: &[(Node, Node)],
-    tangents: &HashMap<Node, Tangent>,
-    guard: Option<&Still<'_>>,
-) -> Tangent {
-    let mut sum = Tangent::new();
-    for &(argument, slope) in terms {
-        for (&column, &d) in tangents.get(&argument).into_iter().flatten() {
-            let product = build.times(slope, d);
-            let guard = guard.filter(|_| build.graph.constant_value(slope).is_none());
-            let is_still = guard.and_then(|still| still.condition(argument));
-            let term = is_still.map_or(product, |is_still| {
-                build.graph.select(is_still, build.zero(), product)
-            });
-            build.add_to(&mut sum, column, term);
-        }
-    }
-    sum
 }
 
 fn choice_tangent(

@@ -1,7 +1,7 @@
 //! Plants written in Rust: functions over expressions with overloaded operators.
 
 use std::cell::{Ref, RefCell};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Expr, Graph, Node};
 
@@ -186,6 +186,7 @@ impl Model {
         let time = self.time().node();
         let parts = self.parts.into_inner();
         Ok(Plant {
+            table_points: BTreeSet::new(),
             assertions: vec![],
             warnings: vec![],
             name: self.name,

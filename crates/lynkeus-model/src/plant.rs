@@ -1,6 +1,6 @@
 //! What a model means: states, derivatives, inputs and outputs over one expression graph.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use lynkeus_expr::{Budget, Graph, Node};
@@ -33,6 +33,9 @@ pub struct Plant {
     pub algebraics: Vec<Variable>,
     /// parameters that a caller may set; constants and dependent parameters are not listed
     pub parameters: Vec<Parameter>,
+    /// what the points of tables are made of that is no number, such as parameters that stay symbolic:
+    /// that the points increase is not known
+    pub table_points: BTreeSet<Node>,
     /// what must hold along every run, in order of the text
     pub assertions: Vec<Assertion>,
     /// what the text says that has no effect here, or that looks wrong
@@ -110,6 +113,8 @@ pub struct LoadOptions {
     /// keep parameters of type Real as symbols, and allow them to have no value. Sizes,
     /// loop bounds and attributes still use the values.
     pub symbolic_parameters: bool,
+    /// of these the parameters that take their values all the same, by name, arrays element by element
+    pub numbers: BTreeSet<String>,
     /// what tables are between their points
     pub tables: Tables,
     /// when to stop; the graph of the plant keeps it

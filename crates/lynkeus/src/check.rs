@@ -7,6 +7,7 @@ mod observability;
 mod sorted;
 mod uniform;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::time::Duration;
 
@@ -84,7 +85,7 @@ const UNIFORMITY: f64 = 0.2;
 /// # Errors
 /// A study that does not fit its plant; an expression of `about` that cannot be read.
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
-    let symbolic = prepare::symbolic_plant(study)?;
+    let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),

@@ -1,14 +1,18 @@
 //! Plants and observers in continuous time for simulators.
 
+mod settable;
+
 use lynkeus_model::Plant;
 use lynkeus_run::{Method, Step, System, step_of};
 
 use crate::export::{Export, ExportOptions, Target, designed, origin};
 use crate::fixed_steps::{Unsaid, bends, sound, steps};
-use crate::fmu::equations::Equations;
+use crate::fmu::equations::{Equations, Texts};
 use crate::prepare::{self, Prepared};
 use crate::study::{self, Rk4Step};
 use crate::{Error, FmiVersion, Precision, Study, systems};
+
+use settable::{Settled, settled};
 
 /// The plant of a study as a functional mock-up unit, its parameters to be set where they can be symbols.
 ///
@@ -17,23 +21,22 @@ use crate::{Error, FmiVersion, Precision, Study, systems};
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let valued = prepare::plant(study)?;
+    systems::check_inputs(study, &valued)?;
+    let drawn = |plant: &Plant| plant_as(study, plant, version, options);
     if valued.parameters.is_empty() {
-        return plant_as(study, &valued, version, options);
+        return Ok(drawn(&valued)?.exported());
     }
-    let with_symbols = match Equations::of_plant(study, &valued)?.system()? {
-        // which is known of times alone where they are numbers
-        system if system.modes() > 0 || system.has_instants() => {
-            Err("what happens at times has to be known")
-        }
-        _ => prepare::symbolic_plant(study)
-            .and_then(|plant| plant_as(study, &plant, version, options))
-            .map_err(|_| "as symbols they make equations that cannot run elsewhere"),
+    let system = Equations::of_plant(study, &valued)?.system()?;
+    // which is known of times alone where they are numbers
+    let Settled { mut made, notes } = match system.modes() > 0 || system.has_instants() {
+        true => Settled {
+            made: drawn(&valued)?,
+            notes: vec!["parameters are numbers: what happens at times has to be known".to_owned()],
+        },
+        false => settled(study, &valued, drawn)?,
     };
-    with_symbols.or_else(|why| {
-        let mut made = plant_as(study, &valued, version, options)?;
-        made.notes.push(format!("parameters are numbers: {why}"));
-        Ok(made)
-    })
+    made.notes.extend(notes);
+    Ok(made.exported())
 }
 
 fn plant_as(
@@ -41,7 +44,7 @@ fn plant_as(
     plant: &Plant,
     version: FmiVersion,
     options: &ExportOptions,
-) -> Result<Export, Error> {
+) -> Result<Drawn, Error> {
     let settings = study.simulate.as_ref();
     let component = Component {
         study,
@@ -50,7 +53,7 @@ fn plant_as(
         section: settings.map(|_| "simulate"),
         about: vec![format!("The plant {}.", plant.name)],
     };
-    component.written(version, options)
+    component.drawn(version, options)
 }
 
 /// The observer of a study, as its family has it, as a functional mock-up unit.
@@ -60,6 +63,7 @@ fn plant_as(
 pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let plant = prepare::plant(study)?;
+    systems::check_inputs(study, &plant)?;
     let design = Prepared::new(study, &plant)?.design()?;
     if design.observer.filter.is_some() {
         return Err(filter(study, design.observer.family));
@@ -75,7 +79,7 @@ pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export,
         section: Some("estimate"),
         about: std::iter::once(about).chain(designed(study)).collect(),
     };
-    component.written(version, options)
+    Ok(component.drawn(version, options)?.exported())
 }
 
 /// The version of the standard; other languages are refused.
@@ -111,8 +115,23 @@ struct Component<'a> {
     about: Vec<String>,
 }
 
+/// The texts of an archive, which no compiler has seen yet.
+struct Drawn {
+    texts: Texts,
+    notes: Vec<String>,
+}
+
+impl Drawn {
+    fn exported(mut self) -> Export {
+        Export {
+            files: vec![self.texts.archive(&mut self.notes)],
+            notes: self.notes,
+        }
+    }
+}
+
 impl Component<'_> {
-    fn written(&self, version: FmiVersion, options: &ExportOptions) -> Result<Export, Error> {
+    fn drawn(&self, version: FmiVersion, options: &ExportOptions) -> Result<Drawn, Error> {
         let system = self.equations.system()?;
         let mut notes: Vec<String> = bends(&system).into_iter().collect();
         let method = match sound(options.step)? {
@@ -127,13 +146,10 @@ impl Component<'_> {
             ),
         ];
         about.extend(self.about.iter().cloned());
-        let archive = self
+        let texts = self
             .equations
-            .archive(&system, method, &about, version, &mut notes)?;
-        Ok(Export {
-            files: vec![archive],
-            notes,
-        })
+            .texts(&system, method, &about, version, &mut notes)?;
+        Ok(Drawn { texts, notes })
     }
 
     /// Fixed steps: those of the study, or such as the fastest mode needs.

@@ -1,6 +1,7 @@
 //! From a study to its plant and its observer.
 
 use std::cell::OnceCell;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use lynkeus_expr::Budget;
@@ -17,26 +18,27 @@ use crate::{Error, Study, calibrate, filter, systems};
 /// # Errors
 /// No plant, a file that cannot be read, or a model that is refused.
 pub fn plant(study: &Study) -> Result<Plant, Error> {
-    let plant = load(study, false)?;
+    let plant = load(study, None)?;
     match calibrate::are_asked(study, &plant) {
-        true => calibrate::as_states(study, load(study, true)?, true),
+        true => calibrate::as_states(study, load(study, Some(BTreeSet::new()))?, true),
         false => Ok(plant),
     }
 }
 
-/// The plant with its parameters as symbols, also those without value.
+/// The plant with its parameters as symbols, also those without value, but for those that are to be `numbers`.
 ///
 /// # Errors
 /// As [`plant`].
-pub(crate) fn symbolic_plant(study: &Study) -> Result<Plant, Error> {
-    let plant = load(study, true)?;
+pub(crate) fn symbolic_plant(study: &Study, numbers: BTreeSet<String>) -> Result<Plant, Error> {
+    let plant = load(study, Some(numbers))?;
     match calibrate::are_asked(study, &plant) {
         true => calibrate::as_states(study, plant, false),
         false => Ok(plant),
     }
 }
 
-fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
+/// With the parameters as numbers, or as symbols but for those that are to be numbers.
+fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, Error> {
     let Some(path) = &study.plant else {
         let message = "the study names no plant: expected `plant = \"FILE.mo\"`";
         return Err(Error::input(message).at(&study.file));
@@ -44,7 +46,8 @@ fn load(study: &Study, symbolic_parameters: bool) -> Result<Plant, Error> {
     let options = LoadOptions {
         model: study.model.clone(),
         parameters: study.parameters.clone(),
-        symbolic_parameters,
+        symbolic_parameters: symbols_but.is_some(),
+        numbers: symbols_but.unwrap_or_default(),
         tables: study.tables,
         budget: study.budget.clone(),
     };

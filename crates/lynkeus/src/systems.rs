@@ -150,17 +150,35 @@ pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<Syste
     System::new(&plant.graph, plant.time, &[], &[], &[], outputs).map_err(Error::from_source)
 }
 
+/// Looks through `inputs` of `[simulate]`, where not every input needs a value.
+///
+/// # Errors
+/// A name that is no input, or an expression that is none.
+pub(crate) fn check_inputs(study: &Study, plant: &Plant) -> Result<(), Error> {
+    let Some(settings) = &study.simulate else {
+        return Ok(());
+    };
+    check_names(plant, settings)?;
+    let mut given = settings.inputs.iter();
+    given.try_for_each(|(_, given)| expression(plant, given).map(drop))
+}
+
+fn check_names(plant: &Plant, settings: &SimulateSettings) -> Result<(), Error> {
+    for (name, _) in &settings.inputs {
+        if !plant.inputs.iter().any(|i| i.name == name.text) {
+            return Err(name.blame(unknown(plant, "input", &plant.inputs, name)));
+        }
+    }
+    Ok(())
+}
+
 /// The plant's inputs by name.
 pub(crate) fn input_expressions(
     study: &Study,
     plant: &Plant,
     settings: &SimulateSettings,
 ) -> Result<Vec<(String, Node)>, Error> {
-    for (name, _) in &settings.inputs {
-        if !plant.inputs.iter().any(|i| i.name == name.text) {
-            return Err(name.blame(unknown(plant, "input", &plant.inputs, name)));
-        }
-    }
+    check_names(plant, settings)?;
     plant
         .inputs
         .iter()

@@ -114,3 +114,37 @@ fn what_a_direction_leaves_alone_has_no_say() {
     assert!(at(a.powi(2).sqrt().node(), zero, first).is_nan());
     assert_eq!(at(a.powi(2).sqrt().node(), zero, second), 0.0);
 }
+
+/// Where a root is divided by what moves with it, one question is asked for both.
+#[test]
+fn guards_on_the_same_condition_are_one() {
+    let g = Graph::new();
+    let [a, b, u, v] = ["a", "b", "u", "v"].map(|name| g.symbol(name));
+    let sum = a + b;
+    let output = (2.0 * sum.sqrt() / (1.0 + sum.powi(2))).ln().node();
+    let [slope] = along(
+        &g,
+        &[output],
+        &[a, b].map(|e| e.node()),
+        &[u, v].map(|e| e.node()),
+    )[..] else {
+        panic!("one output, one slope");
+    };
+    let choices = g.reachable(&[slope]);
+    let choices = choices
+        .iter()
+        .filter(|&&node| matches!(g.op(node), Op::Select(..)));
+    assert_eq!(choices.count(), 1);
+    let tape = Tape::new(&g, &[a, b, u, v].map(|e| e.node()), &[slope]).unwrap();
+    let at = |point: [f64; 4]| {
+        let mut found = [0.0];
+        tape.evaluator().eval(&point, &mut found);
+        found[0]
+    };
+    // ln 2√s - ln(1 + s²): 1/(2s) - 2s/(1 + s²)
+    let s = 0.7;
+    let expected = 1.5 * (0.5 / s - 2.0 * s / (1.0 + s * s));
+    assert!((at([0.3, 0.4, 1.0, 0.5]) - expected).abs() < 1e-14);
+    assert_eq!(at([0.0; 4]), 0.0);
+    assert!(!at([0.0, 0.0, 1.0, 0.0]).is_finite());
+}

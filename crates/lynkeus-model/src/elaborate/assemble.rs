@@ -1,6 +1,6 @@
 //! The parts of a plant, from the declared names and the solved equations.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Interval, Node};
 
@@ -25,6 +25,7 @@ pub(super) struct Parts {
     outputs: Vec<Variable>,
     algebraics: Vec<Variable>,
     parameters: Vec<Parameter>,
+    table_points: BTreeSet<Node>,
     assertions: Vec<Assertion>,
     pub(super) warnings: Vec<Problem>,
 }
@@ -32,6 +33,7 @@ pub(super) struct Parts {
 impl Parts {
     pub(super) fn with_graph(self, graph: Graph) -> Plant {
         Plant {
+            table_points: self.table_points,
             assertions: self.assertions,
             warnings: vec![],
             name: self.name,
@@ -70,6 +72,7 @@ pub(super) fn parts<'a>(
         outputs: vec![],
         algebraics: vec![],
         parameters: vec![],
+        table_points: BTreeSet::new(),
         assertions: vec![],
         warnings: vec![],
     };
@@ -100,6 +103,7 @@ pub(super) fn parts<'a>(
     let variables: Vec<&Variable> = parts.states.iter().chain(&parts.inputs).collect();
     let failing = claims::failing_at_start(graph, symbols, &found, &variables);
     parts.warnings.extend(failing);
+    parts.table_points = context.table_points.take();
     parts.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
     Ok(parts)
 }

@@ -1,5 +1,8 @@
 //! Expressions of the syntax tree to values over the graph.
 
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
 use lynkeus_expr::{Graph, Node, Unary};
 
 use super::arithmetic::unequal_sizes;
@@ -46,6 +49,8 @@ pub(crate) struct Evaluator<'a> {
     pub(super) claims: Vec<Claim>,
     /// what tables are between their points
     pub(super) tables: Tables,
+    /// where it is told of what the points of tables are made
+    pub(super) table_points: Option<&'a RefCell<BTreeSet<Node>>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -76,6 +81,7 @@ impl<'a> Evaluator<'a> {
             conditions: vec![],
             claims: vec![],
             tables: Tables::Linear,
+            table_points: None,
         }
     }
 
@@ -83,6 +89,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn within(mut self, context: &Context<'a>) -> Self {
         self.classes = Some(context.classes);
         self.tables = context.options.tables;
+        self.table_points = Some(context.table_points);
         self.scopes = context.model.scopes.iter().map(String::as_str).collect();
         self
     }

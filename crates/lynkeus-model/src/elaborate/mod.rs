@@ -29,7 +29,8 @@ mod symbols;
 mod tables;
 mod value;
 
-use std::collections::HashSet;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashSet};
 
 use lynkeus_expr::{Graph, Spent};
 
@@ -71,6 +72,7 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
         graph: &graph,
         budget: &budget,
         options,
+        table_points: &RefCell::new(BTreeSet::new()),
     };
     let parts = graph.budgeted(options.budget.clone(), || {
         let symbols = Symbols::new(&context)?;

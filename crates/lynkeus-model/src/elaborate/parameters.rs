@@ -54,7 +54,8 @@ impl<'a> Symbols<'a> {
                 let symbolic = self.binding(context, declaration, Mode::Parametric)?;
                 parts.symbolic(symbolic)?
             }
-            (false, _) if keeps_symbols => parts.symbols(),
+            (false, Some(values)) if keeps_symbols => parts.symbols_but(values),
+            (false, None) if keeps_symbols => parts.symbols(),
             (false, Some(values)) => values.clone(),
             (false, None) if declaration.prefix.variability == Variability::Parameter => {
                 parts.symbols()
@@ -151,18 +152,28 @@ impl Parts<'_> {
         self.check_size(&array, id)?;
         let span = self.context.ast.expression(id).span;
         let graph = self.context.graph;
-        let real = |element: Scalar| {
+        let is_boolean = self.declaration.prefix.type_name == TypeName::Boolean;
+        let typed = |element: Scalar| {
+            if is_boolean {
+                return match element {
+                    Scalar::Boolean(_) => Ok(element),
+                    _ => Err(Problem::new(span, "expected `true` or `false`")),
+                };
+            }
             let node = element.real(graph).ok_or_else(|| expected_number(span))?;
             Ok(Scalar::Real(node))
         };
         let mut elements: Vec<Scalar> = array
             .elements
             .into_iter()
-            .map(real)
+            .map(typed)
             .collect::<Result<_>>()?;
         for &(offset, value) in self.given {
             if let Some(slot) = elements.get_mut(offset) {
-                *slot = Scalar::Real(graph.constant(value).node());
+                *slot = match is_boolean {
+                    true => self.converted(value)?,
+                    false => Scalar::Real(graph.constant(value).node()),
+                };
             }
         }
         Ok(elements)
@@ -179,6 +190,18 @@ impl Parts<'_> {
         (0..count)
             .map(|offset| Scalar::Real(symbol(offset)))
             .collect()
+    }
+
+    /// Symbols, but for elements that are to be numbers.
+    fn symbols_but(&self, values: &[Scalar]) -> Vec<Scalar> {
+        let numbers = &self.context.options.numbers;
+        let mut elements = self.symbols();
+        for (offset, (element, value)) in elements.iter_mut().zip(values).enumerate() {
+            if numbers.contains(&element_name(self.name, self.dims, offset)) {
+                *element = *value;
+            }
+        }
+        elements
     }
 
     fn check_size(&self, array: &Array, id: ExprId) -> Result<()> {

@@ -1,7 +1,7 @@
 //! The declared names of a model, with sizes, symbols and values.
 
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
@@ -37,6 +37,8 @@ pub(crate) struct Context<'a> {
     pub options: &'a LoadOptions,
     pub model: &'a FlatModel,
     pub classes: &'a Classes<'a>,
+    /// of which the points of tables are made, found on the way
+    pub table_points: &'a RefCell<BTreeSet<Node>>,
 }
 
 /// All declared names of a model.

@@ -30,6 +30,9 @@ impl<'a> Evaluator<'a> {
             return Err(Problem::new(span, message));
         }
         self.increasing(&x, abscissas)?;
+        if let Some(found) = self.table_points {
+            found.borrow_mut().extend(self.graph.symbols_of(&x));
+        }
         self.budget.charge(x.len() as u64, span)?;
         let at = self.value(at)?;
         self.map(at, span, |evaluator, at, span| {

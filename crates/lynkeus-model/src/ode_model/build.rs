@@ -38,8 +38,10 @@ pub(super) fn plant(
     for span in &roles.parameters {
         let text = span.text(source);
         let value = options.parameters.get(text).copied();
+        let symbolic =
+            options.symbolic_parameters && (value.is_none() || !options.numbers.contains(text));
         let symbol = model.parameter(text, value, Attributes::default());
-        let node = match (value, options.symbolic_parameters) {
+        let node = match (value, symbolic) {
             (_, true) => symbol.node(),
             (Some(value), false) => model.graph().constant(value).node(),
             (None, false) => return Err(no_value(text, *span)),

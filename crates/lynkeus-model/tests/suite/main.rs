@@ -14,5 +14,6 @@ mod refusals;
 mod scopes;
 mod soup;
 mod support;
+mod symbols;
 mod tables;
 mod written_out;

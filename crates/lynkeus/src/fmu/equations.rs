@@ -1,5 +1,6 @@
 //! Plants and observers in continuous time, x' = f(t, x, u), y = h(t, x, u), as functional mock-up units.
 
+use lynkeus_export::curly::c::File;
 use lynkeus_export::curly::fmu::{Quantity, Version};
 use lynkeus_export::curly::{Exchange, Ode, State};
 use lynkeus_expr::{Graph, Node};
@@ -261,19 +262,19 @@ impl<'a> Equations<'a> {
         self.states.iter().map(|equation| equation.size).collect()
     }
 
-    /// The archive of their [system](Self::system): model exchange, and co-simulation by a method with
-    /// fixed steps.
+    /// The texts of the archive of their [system](Self::system): model exchange, and co-simulation by a
+    /// method with fixed steps.
     ///
     /// # Errors
     /// What cannot run elsewhere.
-    pub fn archive(
+    pub fn texts(
         &self,
         system: &System,
         method: Method,
         about: &[String],
         version: Version,
         notes: &mut Vec<String>,
-    ) -> Result<Artifact, Error> {
+    ) -> Result<Texts, Error> {
         notes.extend(self.headers.notes.iter().cloned());
         let inputs = self.inputs.iter().map(|input| input.quantity.clone());
         let inputs: Vec<Quantity> = inputs.collect();
@@ -309,7 +310,26 @@ impl<'a> Equations<'a> {
         let files = exchange
             .files(version)
             .map_err(|refusal| Error::refused(refusal.to_string()).at(&self.study.file))?;
-        Ok(packed(&exchange.identifier(), files, version, notes))
+        Ok(Texts {
+            identifier: exchange.identifier(),
+            files,
+            version,
+        })
+    }
+}
+
+/// What an archive is made of.
+#[derive(Debug)]
+pub(crate) struct Texts {
+    identifier: String,
+    files: Vec<File>,
+    version: Version,
+}
+
+impl Texts {
+    /// With the library that the system's C compiler makes of them.
+    pub fn archive(self, notes: &mut Vec<String>) -> Artifact {
+        packed(&self.identifier, self.files, self.version, notes)
     }
 }
 

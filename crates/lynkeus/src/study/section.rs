@@ -152,6 +152,7 @@ impl<'a> Entry<'a> {
                 text: text.trim().to_owned(),
                 place: Some(self.source.place(&self.value.span())),
             }),
+            DeValue::String(_) => Err(self.wrong("a text that is not empty")),
             _ => Err(self.wrong("a text in quotes")),
         }
     }

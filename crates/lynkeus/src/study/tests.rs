@@ -87,6 +87,10 @@ fn wrong_values_say_what_was_expected_and_found() {
             "s.toml:1:9: `plant` of the study must be a text in quotes, found 3",
         ),
         (
+            "plant = \"p.mo\"\n[plot]\ntime_unit = \"\"",
+            "s.toml:3:13: `time_unit` of [plot] must be a text that is not empty, found the text \"\"",
+        ),
+        (
             "[observer]\ntheta = [1, inf]",
             "s.toml:2:13: entry 2 of `theta` of [observer] must be a finite number, found inf",
         ),

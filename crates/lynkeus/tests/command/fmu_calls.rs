@@ -16,9 +16,9 @@ end Vat;
 ";
 
 /// The sources of a model's plant, in a folder of their own.
-fn sources(folder: &Folder, model: &str, version: &str) -> String {
+pub(super) fn sources(folder: &Folder, model: &str, text: &str, version: &str) -> String {
     let to = format!("{model}{version}");
-    folder.write(&format!("{model}.mo"), &VAT.replace("Vat", model));
+    folder.write(&format!("{model}.mo"), &text.replace("Vat", model));
     let file = format!("{model}.mo");
     let made = folder.run(&["export", &file, "--to", "fmu", "--fmi", version, "-o", &to]);
     assert_eq!(made.code, 0, "{}", made.err);
@@ -36,7 +36,7 @@ fn sources(folder: &Folder, model: &str, version: &str) -> String {
     to
 }
 
-fn compiled(folder: &Path, arguments: &[&str]) {
+pub(super) fn compiled(folder: &Path, arguments: &[&str]) {
     let mut command = Command::new("cc");
     command.args([
         "-std=c99",
@@ -55,7 +55,7 @@ fn compiled(folder: &Path, arguments: &[&str]) {
     assert!(ended.status.success(), "{arguments:?}: {told}");
 }
 
-fn ran(folder: &Path) -> String {
+pub(super) fn ran(folder: &Path) -> String {
     let ran = Command::new(folder.join("bench"))
         .current_dir(folder)
         .output();
@@ -74,7 +74,7 @@ fn sources_can_be_linked_together() {
     for version in ["2", "3"] {
         let mut objects = vec![];
         for model in ["Vat", "Tub"] {
-            let to = sources(&folder, model, version);
+            let to = sources(&folder, model, VAT, version);
             let name = format!("{}_plant", model.to_lowercase());
             let define = format!("-DFMI{version}_FUNCTION_PREFIX={name}_");
             for source in [format!("{name}.c"), format!("fmi{version}.c")] {
@@ -126,6 +126,7 @@ fn sources_can_be_linked_together() {
 /// What is the same in both versions: what is called, and the status that it has to give.
 const CALLS: &str = r#"
 static int failures;
+static const double zero = 0.0;
 
 static void expect(const char *what, int status, int wanted)
 {
@@ -143,7 +144,9 @@ int main(void)
     double seed = 1.0;
     double slope = 7.0;
     void *kept = NULL;
-    void *m = make();
+    void *none = NULL;
+    void *m = make(0);
+    void *tool = make(1);
     expect("no instance", step(NULL, 0.0), ERROR);
     expect("a step before", step(m, 0.0), ERROR);
     expect("states before", states(m, x), ERROR);
@@ -166,7 +169,21 @@ int main(void)
     expect("the value", x[0] == 0.0, 1);
     expect("a step", step(m, 0.0), OK);
     expect("the state", keep(m, &kept), OK);
+    expect("a step from elsewhere", step(m, 0.5), ERROR);
+    expect("a step from nowhere", step(m, 0.0 / zero), ERROR);
+    expect("a step from about there", step(m, 1.0 + 4e-16), OK);
+    expect("the tool's states", put(m, x), ERROR);
+    expect("the tool's time", put_time(m, 5.0), ERROR);
+    expect("a list with what cannot be set", set_both(m, Q, DER_H, 7.0), ERROR);
+    expect("the input as it was", get(m, Q) == 2.0, 1);
+    expect("a state of nobody", release(m, NULL), OK);
+    expect("no state", release(m, &none), OK);
+    expect("model exchange", begin(tool), OK);
+    expect("its initialization", leave(tool), OK);
+    expect("a step of its own", step(tool, 0.0), ERROR);
+    expect("its time", put_time(tool, 5.0), OK);
     puts("--");
+    m = tool;
     /* an empty vat: the level's slope is infinite, but not that by the input */
     x[0] = 0.0;
     expect("an empty vat", put(m, x), OK);
@@ -182,8 +199,8 @@ int main(void)
     expect("the end", finish(m), OK);
     expect("an input after that", set(m, Q, 1.0), ERROR);
     expect("states after that", states(m, x), OK);
-    expect("back", restore(m, kept), OK);
-    expect("a step from there", step(m, 1.0), OK);
+    expect("anew as kept", restore(m, kept), OK);
+    expect("the kept input", get(m, Q) == 2.0, 1);
     expect("anew", reset(m), OK);
     expect("anew from the start", begin(m), OK);
     return failures;
@@ -199,7 +216,11 @@ static void logged(void *e, fmi2String name, fmi2Status status, fmi2String categ
 
 static const callbacks calls = {logged, calloc, free, NULL, NULL};
 
-static void *make(void) { return fmi2Instantiate("vat", fmi2CoSimulation, token, "", &calls, 0, 0); }
+static void *make(int is_exchange)
+{
+    const fmi2Type type = is_exchange ? fmi2ModelExchange : fmi2CoSimulation;
+    return fmi2Instantiate("vat", type, token, "", &calls, 0, 0);
+}
 static int step(void *m, double t) { return fmi2DoStep(m, t, 1.0, 0); }
 static int states(void *m, double *x) { return fmi2GetContinuousStates(m, x, 1); }
 static int put(void *m, const double *x) { return fmi2SetContinuousStates(m, x, 1); }
@@ -220,6 +241,20 @@ static int along(void *m, unsigned k, const double *seed, double *slope)
     const unsigned der_h = 3;
     return fmi2GetDirectionalDerivative(m, &der_h, 1, &k, 1, seed, slope);
 }
+static int put_time(void *m, double t) { return fmi2SetTime(m, t); }
+static int set_both(void *m, unsigned a, unsigned b, double value)
+{
+    const unsigned references[] = {a, b};
+    const double values[] = {value, value};
+    return fmi2SetReal(m, references, 2, values);
+}
+static double get(void *m, unsigned k)
+{
+    double value = -1.0;
+    fmi2GetReal(m, &k, 1, &value);
+    return value;
+}
+static int release(void *m, void **kept) { return fmi2FreeFMUstate(m, kept); }
 static int talk(void *m, int on) { return fmi2SetDebugLogging(m, on, 0, NULL); }
 "#;
 
@@ -230,8 +265,11 @@ static void logged(void *e, fmi3Status status, fmi3String category, fmi3String m
     printf("vat %d %s\n", (int)status, category);
 }
 
-static void *make(void)
+static void *make(int is_exchange)
 {
+    if (is_exchange) {
+        return fmi3InstantiateModelExchange("vat", token, "", 0, 0, NULL, logged);
+    }
     return fmi3InstantiateCoSimulation("vat", token, "", 0, 0, 0, 0, NULL, 0, NULL, logged, NULL);
 }
 static int step(void *m, double t)
@@ -255,6 +293,20 @@ static int along(void *m, unsigned k, const double *seed, double *slope)
     const unsigned der_h = 3;
     return fmi3GetDirectionalDerivative(m, &der_h, 1, &k, 1, seed, 1, slope, 1);
 }
+static int put_time(void *m, double t) { return fmi3SetTime(m, t); }
+static int set_both(void *m, unsigned a, unsigned b, double value)
+{
+    const unsigned references[] = {a, b};
+    const double values[] = {value, value};
+    return fmi3SetFloat64(m, references, 2, values, 2);
+}
+static double get(void *m, unsigned k)
+{
+    double value = -1.0;
+    fmi3GetFloat64(m, &k, 1, &value, 1);
+    return value;
+}
+static int release(void *m, void **kept) { return fmi3FreeFMUState(m, kept); }
 static int talk(void *m, int on)
 {
     const char *categories[] = {"logStatusDiscard"};
@@ -269,7 +321,7 @@ fn calls_have_their_modes_and_what_is_no_error_is_told_on_demand() {
     }
     let folder = Folder::empty();
     for (version, own) in [("2", TWO), ("3", THREE)] {
-        let to = sources(&folder, "Vat", version);
+        let to = sources(&folder, "Vat", VAT, version);
         let path = folder.path.path().join(to);
         // its functions that are called like those of the wrapper stand behind it
         let calls = CALLS
@@ -283,7 +335,7 @@ fn calls_have_their_modes_and_what_is_no_error_is_told_on_demand() {
         let told = ran(&path);
         let parts: Vec<&str> = told.split("--\n").collect();
         // each refusal with its message, but for what has no instance
-        assert_eq!(parts[0], "vat 3 logStatusError\n".repeat(11), "{told}");
+        assert_eq!(parts[0], "vat 3 logStatusError\n".repeat(17), "{told}");
         assert_eq!(parts[1], "", "{told}");
         assert_eq!(parts[2], "vat 2 logStatusDiscard\n", "{told}");
         assert_eq!(parts[3], "vat 3 logStatusError\n", "{told}");

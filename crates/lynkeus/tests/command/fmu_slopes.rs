@@ -7,6 +7,7 @@ use lynkeus::expr::{Node, Tape, jacobian};
 use lynkeus::model::{LoadOptions, Plant};
 
 use crate::export::has;
+use crate::fmu_calls::{compiled, ran, sources};
 use crate::fmu_equations::{VAT, export};
 use crate::{Folder, examples, skipped};
 
@@ -123,5 +124,89 @@ fn directional_derivatives_are_columns_of_the_jacobian() {
                 "{file}: {found} {expected}"
             );
         }
+    }
+}
+
+/// The logarithm's slope 1/h is finite where the logarithm has no value, and a seed of 0 asks nothing of the
+/// slope of a power: no value, no slope.
+const NO_VALUE: &str = r#"
+enum { DISCARD = 2, H = 1, LOG = 4, POWER = 5 };
+
+static int told_for(void *m, double h, unsigned unknown, double seed, double *slope)
+{
+    const unsigned known = H;
+    put(m, &h);
+    return slopes(m, unknown, known, seed, slope);
+}
+
+int main(void)
+{
+    double slope = 7.0;
+    int status;
+    void *m = made_ready();
+    status = told_for(m, 4.0, LOG, 1.0, &slope);
+    printf("%d %g\n", status, slope);
+    printf("%d\n", told_for(m, -1.0, LOG, 1.0, &slope));
+    printf("%d\n", told_for(m, -1.0, LOG, 0.0, &slope));
+    status = told_for(m, 4.0, POWER, 1.0, &slope);
+    printf("%d %g\n", status, slope);
+    printf("%d\n", told_for(m, -1.0, POWER, 0.0, &slope));
+    return 0;
+}
+"#;
+
+const TWO_SLOPES: &str = r#"
+static const callbacks calls = {NULL, calloc, free, NULL, NULL};
+static void *made_ready(void)
+{
+    void *m = fmi2Instantiate("vat", fmi2ModelExchange, token, "", &calls, 0, 0);
+    fmi2SetupExperiment(m, 0, 0.0, 0.0, 0, 0.0);
+    fmi2EnterInitializationMode(m);
+    fmi2ExitInitializationMode(m);
+    return m;
+}
+static void put(void *m, const double *x) { fmi2SetContinuousStates(m, x, 1); }
+static int slopes(void *m, unsigned unknown, unsigned known, double seed, double *slope)
+{
+    return fmi2GetDirectionalDerivative(m, &unknown, 1, &known, 1, &seed, slope);
+}
+"#;
+
+const THREE_SLOPES: &str = r#"
+static void *made_ready(void)
+{
+    void *m = fmi3InstantiateModelExchange("vat", token, "", 0, 0, NULL, NULL);
+    fmi3EnterInitializationMode(m, 0, 0.0, 0.0, 0, 0.0);
+    fmi3ExitInitializationMode(m);
+    return m;
+}
+static void put(void *m, const double *x) { fmi3SetContinuousStates(m, x, 1); }
+static int slopes(void *m, unsigned unknown, unsigned known, double seed, double *slope)
+{
+    return fmi3GetDirectionalDerivative(m, &unknown, 1, &known, 1, &seed, 1, slope, 1);
+}
+"#;
+
+#[test]
+fn what_has_no_value_has_no_slope() {
+    if !has("cc") {
+        return skipped("there is no C compiler");
+    }
+    let model = "model Vat
+  Real h(start = 4);
+  output Real x = h;
+  output Real y = log(h), z = h^1.5;
+equation
+  der(h) = -h;
+end Vat;
+";
+    let folder = Folder::empty();
+    for (version, own) in [("2", TWO_SLOPES), ("3", THREE_SLOPES)] {
+        let to = sources(&folder, "Vat", model, version);
+        let path = folder.path.path().join(to);
+        let bench = format!("#include <stdio.h>\n#include \"fmi{version}.c\"\n{own}{NO_VALUE}");
+        std::fs::write(path.join("bench.c"), bench).unwrap();
+        compiled(&path, &["bench.c", "vat_plant.c", "-lm", "-o", "bench"]);
+        assert_eq!(ran(&path), "0 0.25\n2\n2\n0 3\n2\n", "{version}");
     }
 }

@@ -12,6 +12,7 @@ mod fmu;
 mod fmu_calls;
 mod fmu_equations;
 mod fmu_names;
+mod fmu_parameters;
 mod fmu_slopes;
 mod hostile;
 mod how_well;

@@ -135,32 +135,40 @@ static int read_value(course *c, uint32_t reference, double *value)
     return 0;
 }
 
-static int write_value(course *c, uint32_t reference, double value)
+/* Why a value cannot be set now, or 0. */
+static int refusal(const course *c, uint32_t reference, double value)
 {
     if (reference >= VALUES) {
         return NO_VALUE;
     }
 //? tunable
     if (reference >= FIRST_TUNABLE) {
-        if (!((@REAL@)value > 0) || !isfinite((@REAL@)value)) {
-            return NOT_POSITIVE;
-        }
+        return (@REAL@)value > 0 && isfinite((@REAL@)value) ? 0 : NOT_POSITIVE;
+    }
+//?
+//? !tunable
+    (void)value;
+//?
+    if (reference >= FIRST_START) {
+        return (c->mode & BEFORE) == 0 ? NOT_NOW : 0;
+    }
+    return reference >= FIRST_SIGNAL && reference < FIRST_ESTIMATE ? 0 : NOT_SETTABLE;
+}
+
+static void write_value(course *c, uint32_t reference, double value)
+{
+//? tunable
+    if (reference >= FIRST_TUNABLE) {
         c->tuning[reference - FIRST_TUNABLE] = value;
-        return 0;
+        return;
     }
 //?
     if (reference >= FIRST_START) {
-        if ((c->mode & BEFORE) == 0) {
-            return NOT_NOW;
-        }
         c->starts[reference - FIRST_START] = value;
         c->past.x[reference - FIRST_START] = (@REAL@)value;
-    } else if (reference >= FIRST_SIGNAL && reference < FIRST_ESTIMATE) {
+    } else {
         c->signals[reference - FIRST_SIGNAL] = (@REAL@)value;
         c->is_given = 1;
-    } else {
-        return NOT_SETTABLE;
     }
     c->is_settled = 0;
-    return 0;
 }

@@ -20,7 +20,8 @@ typedef struct {
     const callbacks *calls;
     char *name;     /* of the instance */
 //? exchange
-    int is_logging; /* tells what is no error, too */
+    int is_logging;  /* tells what is no error, too */
+    int is_exchange; /* the tool integrates */
 //?
 } component;
 
@@ -53,6 +54,14 @@ static fmi2Status told(component *m, int code)
         return told(m, NOT_NOW);                    \
     }
 
+//? exchange
+/* What only one of the two interfaces has. */
+#define ONLY(IS_SO)              \
+    if (!(IS_SO)) {              \
+        return told(m, NOT_NOW); \
+    }
+
+//?
 #define MODE(NAME, FROM, TO)                        \
     API fmi2Status FULL(fmi2##NAME)(void *instance) \
     {                                               \
@@ -115,6 +124,7 @@ API void *FULL(fmi2Instantiate)(
         m->calls = calls;
 //? exchange
         m->is_logging = logging;
+        m->is_exchange = type == fmi2ModelExchange;
 //?
         begin(&m->at);
     }
@@ -160,16 +170,15 @@ API fmi2Status FULL(fmi2GetReal)(void *instance, const unsigned *references, siz
 API fmi2Status FULL(fmi2SetReal)(void *instance, const unsigned *references, size_t count, const double *values)
 {
     OPEN(BEFORE | RUNNING)
-    int code = 0;
-    for (size_t i = 0; i < count && code == 0; i++) {
-        code = write_value(&m->at, references[i], values[i]);
-    }
-    return told(m, code);
+    return told(m, write_values(&m->at, references, count, values));
 }
 
 API fmi2Status FULL(fmi2DoStep)(void *instance, double from, double length, fmi2Boolean is_past_fixed)
 {
     OPEN(RUNNING)
+//? exchange
+    ONLY(!m->is_exchange)
+//?
     (void)is_past_fixed;
     return told(m, step(&m->at, from, from + length));
 }
@@ -190,8 +199,10 @@ API fmi2Status FULL(fmi2SetFMUstate)(void *instance, void *kept)
 API fmi2Status FULL(fmi2FreeFMUstate)(void *instance, void **kept)
 {
     (void)instance;
-    free(*kept);
-    *kept = NULL;
+    if (kept != NULL) {
+        free(*kept);
+        *kept = NULL;
+    }
     return fmi2OK;
 }
 

@@ -33,6 +33,7 @@ API fmi2Status FULL(fmi2CompletedIntegratorStep)(
 API fmi2Status FULL(fmi2SetTime)(void *instance, double time)
 {
     OPEN(BEFORE | RUNNING)
+    ONLY(m->is_exchange)
     set_time(&m->at, time);
     return fmi2OK;
 }
@@ -40,6 +41,7 @@ API fmi2Status FULL(fmi2SetTime)(void *instance, double time)
 API fmi2Status FULL(fmi2SetContinuousStates)(void *instance, const double *values, size_t count)
 {
     OPEN(RUNNING)
+    ONLY(m->is_exchange)
     return told(m, write_states(&m->at, values, count));
 }
 

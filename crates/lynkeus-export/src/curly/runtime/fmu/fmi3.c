@@ -9,7 +9,8 @@ typedef struct {
     void *environment;
     logger log;
 //? exchange
-    bool is_logging; /* tells what is no error, too */
+    bool is_logging;  /* tells what is no error, too */
+    bool is_exchange; /* the tool integrates */
 //?
 } component;
 
@@ -42,6 +43,14 @@ static fmi3Status told(component *m, int code)
         return told(m, NOT_NOW);                    \
     }
 
+//? exchange
+/* What only one of the two interfaces has. */
+#define ONLY(IS_SO)              \
+    if (!(IS_SO)) {              \
+        return told(m, NOT_NOW); \
+    }
+
+//?
 #define MODE(NAME, FROM, TO)                        \
     API fmi3Status FULL(fmi3##NAME)(void *instance) \
     {                                               \
@@ -69,11 +78,11 @@ API fmi3Status FULL(fmi3SetDebugLogging)(void *instance, bool on, size_t count, 
     return fmi3OK;
 }
 
-static void *made(fmi3String given, bool logging, void *environment, logger log)
+static void *made(fmi3String given, bool is_exchange, bool logging, void *environment, logger log)
 {
     component *m = NULL;
 //? !exchange
-    (void)logging;
+    (void)is_exchange, (void)logging;
 //?
     if (!is_ours(given)) {
         if (log != NULL) {
@@ -87,6 +96,7 @@ static void *made(fmi3String given, bool logging, void *environment, logger log)
         m->log = log;
 //? exchange
         m->is_logging = logging;
+        m->is_exchange = is_exchange;
 //?
         begin(&m->at);
     }
@@ -99,7 +109,7 @@ API void *FULL(fmi3InstantiateCoSimulation)(
 {
     (void)name, (void)resources, (void)visible, (void)events, (void)early;
     (void)required, (void)count, (void)update;
-    return made(given, logging, environment, log);
+    return made(given, false, logging, environment, log);
 }
 
 API void *FULL(fmi3InstantiateModelExchange)(
@@ -108,7 +118,7 @@ API void *FULL(fmi3InstantiateModelExchange)(
 {
     (void)name, (void)resources, (void)visible;
 //? exchange
-    return made(given, logging, environment, log);
+    return made(given, true, logging, environment, log);
 //?
 //? !exchange
     (void)given, (void)logging, (void)environment, (void)log;
@@ -168,11 +178,7 @@ API fmi3Status FULL(fmi3SetFloat64)(
     void *instance, const uint32_t *references, size_t count, const double *values, size_t size)
 {
     OPEN(BEFORE | RUNNING)
-    int code = count == size ? 0 : NO_VALUE;
-    for (size_t i = 0; i < count && code == 0; i++) {
-        code = write_value(&m->at, references[i], values[i]);
-    }
-    return told(m, code);
+    return told(m, count == size ? write_values(&m->at, references, count, values) : NO_VALUE);
 }
 
 API fmi3Status FULL(fmi3DoStep)(
@@ -180,6 +186,9 @@ API fmi3Status FULL(fmi3DoStep)(
     bool *is_early, double *reached)
 {
     OPEN(RUNNING)
+//? exchange
+    ONLY(!m->is_exchange)
+//?
     const int code = step(&m->at, from, from + length);
     (void)is_past_fixed;
     *has_event = false;
@@ -205,8 +214,10 @@ API fmi3Status FULL(fmi3SetFMUState)(void *instance, void *kept)
 API fmi3Status FULL(fmi3FreeFMUState)(void *instance, void **kept)
 {
     (void)instance;
-    free(*kept);
-    *kept = NULL;
+    if (kept != NULL) {
+        free(*kept);
+        *kept = NULL;
+    }
     return fmi3OK;
 }
 

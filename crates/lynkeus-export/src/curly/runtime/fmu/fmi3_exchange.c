@@ -13,6 +13,7 @@ API fmi3Status FULL(fmi3CompletedIntegratorStep)(void *instance, bool is_past_fi
 API fmi3Status FULL(fmi3SetTime)(void *instance, double time)
 {
     OPEN(BEFORE | RUNNING)
+    ONLY(m->is_exchange)
     set_time(&m->at, time);
     return fmi3OK;
 }
@@ -20,6 +21,7 @@ API fmi3Status FULL(fmi3SetTime)(void *instance, double time)
 API fmi3Status FULL(fmi3SetContinuousStates)(void *instance, const double *values, size_t count)
 {
     OPEN(RUNNING)
+    ONLY(m->is_exchange)
     return told(m, write_states(&m->at, values, count));
 }
 

@@ -50,7 +50,12 @@ static void settle(course *c)
 /* Goes on under the inputs as they are. */
 static int step(course *c, double from, double to)
 {
-    const int code = @NAME@_advance(from, to, c->given, c->states);
+    int code;
+    /* but for what a tool loses where it adds up its steps */
+    if (!(fabs(from - c->time) <= 1e-9 * (fabs(from) + fabs(to)))) {
+        return NOT_HERE;
+    }
+    code = @NAME@_advance(from, to, c->given, c->states);
     if (code == 0) {
         c->time = to;
         c->is_settled = 0;
@@ -83,25 +88,29 @@ static int read_value(course *c, uint32_t reference, double *value)
     return 0;
 }
 
-static int write_value(course *c, uint32_t reference, double value)
+/* Why a value cannot be set now, or 0. */
+static int refusal(const course *c, uint32_t reference, double value)
 {
+    (void)value;
     if (reference >= VALUES) {
         return NO_VALUE;
     }
     if ((reference >= FIRST_DERIVATIVE && reference < FIRST_PARAMETER) || reference < FIRST_INPUT) {
         return NOT_SETTABLE;
     }
+    return reference >= FIRST_STATE && reference < FIRST_DERIVATIVE && (c->mode & BEFORE) == 0 ? NOT_NOW : 0;
+}
+
+static void write_value(course *c, uint32_t reference, double value)
+{
     if (reference >= FIRST_PARAMETER) {
         c->given[INPUTS + reference - FIRST_PARAMETER] = value;
     } else if (reference < FIRST_STATE) {
         c->given[reference - FIRST_INPUT] = value;
-    } else if ((c->mode & BEFORE) == 0) {
-        return NOT_NOW;
     } else {
         c->states[reference - FIRST_STATE] = value;
     }
     c->is_settled = 0;
-    return 0;
 }
 
 /* Model exchange: the states are the tool's. */
@@ -145,9 +154,10 @@ static void set_time(course *c, double time)
     c->is_settled = 0;
 }
 
-/* The Jacobian of the unknowns by the knowns, times the seed. */
+/* The Jacobian of the unknowns by the knowns, times the seed. What has no value has no slope either:
+   that of log is finite where log is not. */
 static int directional(
-    const course *c, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
+    course *c, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
     const double *seed, double *result)
 {
     /* of time, the states, the inputs */
@@ -169,6 +179,8 @@ static int directional(
     @NAME@_along(c->time, c->states, c->given, direction, derivatives, outputs);
     for (size_t i = 0; i < unknown_count; i++) {
         const uint32_t unknown = unknowns[i];
+        double value;
+        int code;
         if (unknown < FIRST_STATE || unknown >= FIRST_PARAMETER) {
             return NO_VALUE;
         } else if (unknown >= FIRST_OUTPUT) {
@@ -178,8 +190,9 @@ static int directional(
         } else {
             result[i] = direction[1 + unknown - FIRST_STATE];
         }
-        if (!isfinite(result[i])) {
-            return @CAPITALS@_NOT_FINITE;
+        code = read_value(c, unknown, &value);
+        if (code != 0 || !isfinite(result[i])) {
+            return code != 0 ? code : @CAPITALS@_NOT_FINITE;
         }
     }
     return 0;

@@ -1,3 +1,16 @@
+/* All of them, or none where one is refused. */
+static int write_values(course *c, const uint32_t *references, size_t count, const double *values)
+{
+    int code = 0;
+    for (size_t i = 0; i < count && code == 0; i++) {
+        code = refusal(c, references[i], values[i]);
+    }
+    for (size_t i = 0; i < count && code == 0; i++) {
+        write_value(c, references[i], values[i]);
+    }
+    return code;
+}
+
 /* A copy on the heap, into *kept where that is one already. */
 static int keep(const course *c, void **kept)
 {
@@ -50,6 +63,8 @@ static const char *reason(int code)
         return "these bytes are no state of this FMU";
     case NOT_POSITIVE:
         return "expected a finite number above 0";
+    case NOT_HERE:
+        return "a step begins at the time of the instance, where the last one ended";
     case NOT_NOW:
         return "this cannot be done in the present mode";
     default:
