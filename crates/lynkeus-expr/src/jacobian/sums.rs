@@ -25,7 +25,7 @@ impl Guarded {
 }
 
 /// Σ slope·d(argument) of an operation. Where it is known what is still, steep slopes stand behind that
-/// guard, and what is behind one already stays there: each question is asked once for all terms.
+/// guard, and the same guard within is dropped: each question is asked once for all terms.
 pub(super) fn tangent(
     build: &Builder<'_>,
     op: Op,
@@ -37,12 +37,10 @@ pub(super) fn tangent(
     let mut sums: BTreeMap<(usize, Option<Node>), Node> = BTreeMap::new();
     for &(argument, slope) in terms {
         let is_steep = is_steep(op) && graph.constant_value(slope).is_none();
+        let guard = still.filter(|_| is_steep);
+        let guard = guard.and_then(|still| still.condition(argument));
         for (&column, &d) in tangents.get(&argument).into_iter().flatten() {
-            let inner = Guarded::of(graph, d);
-            let asked = still.filter(|_| is_steep || inner.is_some());
-            let own = asked.and_then(|still| still.condition(argument));
-            let inner = inner.filter(|inner| own == Some(inner.condition));
-            let guard = own.filter(|_| is_steep || inner.is_some());
+            let inner = Guarded::of(graph, d).filter(|inner| guard == Some(inner.condition));
             let d = inner.map_or(d, |inner| inner.moving);
             build.add_to(&mut sums, (column, guard), build.times(slope, d));
         }
