@@ -115,6 +115,9 @@ impl<'p> Printer<'p> {
 
     /// A table is declared where it is read: functions see nothing else.
     pub fn table(&mut self, name: &str) -> Result<String, Refusal> {
+        if let Some(known) = self.here.known(name) {
+            return Ok(known);
+        }
         let (Some(list), Some(kind)) = (self.tables.get(name), self.kinds.get(name)) else {
             return Err(lacks(name));
         };
@@ -133,11 +136,10 @@ impl<'p> Printer<'p> {
         }
         let (kind, last) = (self.kind(kind), list.len().saturating_sub(1));
         let texts = texts.join(", ");
-        let is_new = self.here.is_unknown(name);
         let own = self.here.once(name, |own| {
             format!("{own} : ARRAY [0..{last}] OF {kind} := [{texts}];")
         });
-        for (place, text) in split.into_iter().filter(|_| is_new) {
+        for (place, text) in split {
             self.here.first(format!("{own}[{place}] := {text};"));
         }
         Ok(own)

@@ -79,9 +79,7 @@ impl Routine {
 
     /// What a variable of the draft is called here.
     pub fn called(&self, name: &str) -> String {
-        self.names
-            .get(name)
-            .map_or_else(|| name.to_owned(), Clone::clone)
+        self.known(name).unwrap_or_else(|| name.to_owned())
     }
 
     /// A variable that the draft has not.
@@ -93,8 +91,8 @@ impl Routine {
 
     /// A variable that the draft has not, declared where it is first asked for.
     pub fn once(&mut self, name: &str, declared: impl FnOnce(&str) -> String) -> String {
-        if let Some(known) = self.names.get(name) {
-            return known.clone();
+        if let Some(known) = self.known(name) {
+            return known;
         }
         let own = self.identifiers.of(name);
         self.locals.push(declared(&own));
@@ -102,9 +100,9 @@ impl Routine {
         own
     }
 
-    /// Whether a variable is neither the draft's nor declared otherwise.
-    pub fn is_unknown(&self, name: &str) -> bool {
-        !self.names.contains_key(name)
+    /// What a variable is called that is the draft's, or declared once.
+    pub fn known(&self, name: &str) -> Option<String> {
+        self.names.get(name).cloned()
     }
 
     /// A line at the beginning of the function.
@@ -130,12 +128,9 @@ impl Routine {
         self.lines.split_off(line.min(self.lines.len()))
     }
 
-    /// Lines that were taken, so much deeper.
-    pub fn put_back(&mut self, lines: Vec<Line>, deeper: usize) {
-        self.lines.extend(lines.into_iter().map(|line| Line {
-            depth: line.depth + deeper,
-            ..line
-        }));
+    /// Lines that were taken.
+    pub fn put_back(&mut self, lines: Vec<Line>) {
+        self.lines.extend(lines);
     }
 
     pub fn deeper(&mut self) {

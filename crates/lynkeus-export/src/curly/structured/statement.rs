@@ -217,7 +217,7 @@ impl<'p> Printer<'p> {
             return self.branches(other);
         }
         self.here.line("ELSE");
-        self.here.put_back(before, 0);
+        self.here.put_back(before);
         self.here.deeper();
         self.here.line(format!("IF {condition} THEN"));
         self.branches(other)?;
