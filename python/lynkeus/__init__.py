@@ -9,7 +9,7 @@
 """
 
 from ._lynkeus import Estimator, Log
-from .errors import ArgumentError, InputError, LimitError, LynkeusError, NotCredible, RefusedError, TraceError
+from .errors import ArgumentError, InputError, LimitError, LogWarning, LynkeusError, NotCredible, RefusedError, TraceError
 from .functions import abs, acos, asin, atan, atan2, ceil, cos, cosh, exp, floor, interp, log, log10
 from .functions import maximum, minimum, sign, sin, sinh, sqrt, tan, tanh, where
 from .model import Model
@@ -47,6 +47,7 @@ __all__ = [
     "InputError",
     "LimitError",
     "Log",
+    "LogWarning",
     "LynkeusError",
     "Model",
     "MonteCarlo",

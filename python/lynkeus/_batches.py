@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from ._base import Base
 from ._each import Errors, Tell, each
 from ._fleet import is_one, split
-from ._logs import log_of
+from ._logs import collected, given, log_of
 from ._progress import Progress
-from .errors import InputError, NotCredible
+from .errors import InputError, LogWarning, NotCredible
 from .results import Estimation, Run, Simulation
 
 if TYPE_CHECKING:
@@ -36,6 +36,7 @@ class Options:
 
 def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> Many:
     """See :meth:`Study.estimate_each`."""
+    logs = collected(logs)
     if by is None and not isinstance(logs, Mapping) and is_one(logs):
         raise InputError('the logs: found one table: by="asset" names the column that tells them apart')
     named = split(logs, by) if by is not None else logs
@@ -48,7 +49,7 @@ def estimate_each(study: Study, logs: Any, by: str | None, options: Options) -> 
     names = [f"the log of {key!r}" for key in keys] if keys is not None else _places("log", logs)
 
     def run(log: Any, tell: Tell) -> Run:
-        found = study._core.estimate(log_of(log), tell, options.time_limit, options.memory_limit)
+        found = study._core.estimate(given(log), tell, options.time_limit, options.memory_limit)
         return Estimation(found)
 
     found = _all(run, logs, names, "estimating", options)
@@ -85,11 +86,14 @@ def _all(
 ) -> list[Any]:
     """What is kept of the run of each item, in their order; one warning for all that are not credible."""
     doubted: dict[int, str] = {}
+    lossy: dict[int, str] = {}
 
     def work(place: int, tell: Tell) -> Any:
         found = run(items[place], tell)
         if found.refusal is not None:
             doubted[place] = str(found.refusal)
+        if warnings_of := found._core.warnings():
+            lossy[place] = warnings_of[0]
         return found if options.keep is None else options.keep(found)
 
     found = each(
@@ -101,14 +105,15 @@ def _all(
         progress=options.progress,
         what=what,
     )
-    _warn(doubted, names)
+    _warn(doubted, names, "results are not credible", NotCredible)
+    _warn(lossy, names, "logs contradict themselves or lose values", LogWarning)
     return found
 
 
-def _warn(doubted: dict[int, str], names: Sequence[str]) -> None:
+def _warn(told: dict[int, str], names: Sequence[str], what: str, kind: type[Warning]) -> None:
     """One warning for all: thousands of logs would bury everything else."""
-    if not doubted:
+    if not told:
         return
-    first = min(doubted)
-    text = f"{len(doubted)} of {len(names)} results are not credible, first {names[first]}: {doubted[first]}"
-    warnings.warn(text, NotCredible, stacklevel=6)  # where the method of the study is called
+    first = min(told)
+    text = f"{len(told)} of {len(names)} {what}, first {names[first]}: {told[first]}"
+    warnings.warn(text, kind, stacklevel=6)  # where the method of the study is called

@@ -120,9 +120,17 @@ def _sized(role: str, name: str, where: str, said: dict[str, Any]) -> Entry:
         if shape is not None and shape != value.shape:
             raise InputError(f"{where}.{key}: expected {_sizes(shape)} numbers, found {_sizes(value.shape)}")
         shape = value.shape
+    _check_range(where, attributes)
     open_ends = {"min": -math.inf, "max": math.inf}
     kept = {k: v for k, v in attributes.items() if isinstance(v, np.ndarray) or v != open_ends.get(k)}
     return Entry(role, name, shape or (), kept)
+
+
+def _check_range(where: str, attributes: Mapping[str, Any]) -> None:
+    low, high = attributes.get("min", -math.inf), attributes.get("max", math.inf)
+    if np.shape(low) in ((), np.shape(high)) or np.shape(high) == ():
+        if np.any(np.asarray(low) > np.asarray(high)):
+            raise InputError(f"{where}: expected min <= max, found min = {low} and max = {high}")
 
 
 def _checked(key: str, value: Any, where: str) -> Any:

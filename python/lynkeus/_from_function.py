@@ -13,7 +13,7 @@ import numpy as np
 from . import modelica
 from ._arrays import Named, TracedArray
 from ._declare import Entry, check_distinct, entries, literal
-from ._place import defined, raised, refusal
+from ._place import defined, raised, refusal, tables
 from .errors import InputError, TraceError
 from .trace import Expr, Graph, Value, number_of
 
@@ -81,7 +81,7 @@ class Tracing:
             raise
         except Exception as error:
             message = f"{role} raised {type(error).__name__}: {error}"
-            raise refusal(message, raised(error) or defined(function)) from error
+            raise refusal(message, raised(error) or defined(function), tables(error)) from error
 
 
 def _arity(function: Any, role: str) -> int:
@@ -203,6 +203,7 @@ def text(
     tracing = Tracing(declared)
     reader = Result(tracing.graph, f, "f", "derivative")
     derivatives = reader.matched(tracing.call(f, "f"), declared.states)
+    _check_order(f, tracing, declared.states, derivatives)
     wanted = None if outputs is None else entries("outputs", outputs)
     found = _outputs(tracing, h, wanted, declared.states)
     check_distinct(output.entry for output in found)
@@ -210,6 +211,33 @@ def text(
     other = [output for output in found if output.entry.name not in visible]
     check_distinct([*declared.all(), *(output.entry for output in other)])
     return _Printer(declared, derivatives, other, visible).text(name, description)
+
+
+def _check_order(f: _Function, tracing: Tracing, states: list[Entry], derivatives: list[list[_Scalar]]) -> None:
+    """Refuses a function that was given the time where it expects the state."""
+    used: set[Value] = set()
+    rest = [x for values in derivatives for x in values if isinstance(x, Value)]
+    while rest:
+        value = rest.pop()
+        if value not in used:
+            used.add(value)
+            rest += value.arguments
+    own = {x for state in states for x in tracing.elements(state.name)}
+    if tracing.time not in used or own & used:
+        return
+    message = "f uses the time and no state: expected arguments in the order " + _SIGNATURES
+    hint = "write `lambda t, x: f(x, t)` around a function with another order"
+    given = _names(f)
+    if given[0].lower().startswith(("t", "_")):  # what is meant, then
+        return
+    raise refusal(f"{message}, found ({', '.join(given)})", defined(f), hint)
+
+
+def _names(function: _Function) -> list[str]:
+    try:
+        return list(inspect.signature(function).parameters)
+    except (TypeError, ValueError):  # one that is not written in Python
+        return ["t"]
 
 
 def _outputs(

@@ -23,7 +23,12 @@ COLOURS = {
     "credible": GOOD,
     "not credible": BAD,
     "everywhere": GOOD,
+    "locally everywhere": OPEN,
+    "locally everywhere while inputs are constant": OPEN,
     "almost everywhere": OPEN,
+    "in part of the box": OPEN,
+    "within limits": OPEN,
+    "up to disturbances": OPEN,
     "knee": GOOD,
 }
 CELL = "padding:0.15em 0.8em;text-align:left;vertical-align:top"
@@ -166,6 +171,11 @@ def _innovations(found: Report, _: Report) -> str:
     return table("", ["sensor", "taken", "missing", "rejected", "consistency (1 is as declared)"], rows)
 
 
+def _doubts(found: Sequence[Report], _: Report) -> str:
+    rows = [(d["level"], d["name"], d["text"]) for d in found]
+    return table("", ["doubt", "of", "why"], rows)
+
+
 def _standard_error(found: Report, report: Report) -> str:
     rows = [
         (name, found[name], report["standard_error_of_start"].get(name), report["scale"].get(name))
@@ -210,6 +220,7 @@ PARTS: dict[str, Callable[[Any, Report], str]] = {
     "certificate": _certificate,
     "final": _final,
     "innovations": _innovations,
+    "doubts": _doubts,
     "standard_error": _standard_error,
     "quantities": _quantities,
     "rows": _rows,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import os
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,6 +12,7 @@ import numpy as np
 
 from . import _lynkeus
 from ._columns import Given, column, why
+from ._kept import log_again
 from .errors import ArgumentError, InputError
 
 _Named = Iterable[tuple[Any, Any]]
@@ -24,6 +26,7 @@ def log_of(data: Any, what: str = "the log") -> _lynkeus.Log:
         return data
     if isinstance(data, (str, os.PathLike)):
         return _lynkeus.Log.load(os.fspath(data))
+    data = collected(data)
     if isinstance(data, Mapping):
         return _gathered(_items(data))
     if isinstance(data, np.ndarray):
@@ -46,6 +49,21 @@ def log_of(data: Any, what: str = "the log") -> _lynkeus.Log:
     if has_names:
         return _gathered((name, lambda name=name: _taken(data, name)) for name in _names(data) or ())
     raise ArgumentError.of(what, "a path, a mapping of columns, a data frame or an Arrow table", data)
+
+
+def collected(data: Any) -> Any:
+    """What a lazy frame of polars computes; anything else as it is."""
+    polars = sys.modules.get("polars")
+    return data.collect() if polars is not None and isinstance(data, polars.LazyFrame) else data
+
+
+def given(data: Any) -> _lynkeus.Log | str:
+    """The same for a call with limits, which reads the file of a path itself."""
+    if isinstance(data, (str, os.PathLike)):
+        path = os.fspath(data)
+        if isinstance(path, str):
+            return path
+    return log_of(data)
 
 
 def _gathered(columns: _Named) -> _lynkeus.Log:
@@ -83,11 +101,22 @@ def frame(data: Any, what: str = "the log") -> Iterator[tuple[Any, Any]]:
             f"{what}: expected one header for each column, found {data.columns.nlevels} levels of them; "
             "join them: frame.columns = ['_'.join(levels) for levels in frame.columns]"
         )
+    times = _unnamed_times(data)
+    if times is not None:
+        yield times, lambda: data.index.to_series()
     for level, name in enumerate(data.index.names):
         if name is not None and name not in data.columns:
             yield name, lambda level=level: data.index.get_level_values(level).to_series()
     for place, name in enumerate(data.columns):
         yield name, lambda place=place: data.iloc[:, place]
+
+
+def _unnamed_times(data: Any) -> str | None:
+    """The header of an index of instants without a name, which is the time of the rows."""
+    kind = getattr(data.index, "inferred_type", "")
+    if data.index.nlevels > 1 or data.index.name is not None or not kind.startswith("datetime"):
+        return None
+    return next((name for name in ("t", "time") if name not in data.columns), None)
 
 
 def _names(data: Any) -> list[str] | None:
@@ -113,3 +142,10 @@ def _given(log: _lynkeus.Log, name: str) -> Given:
     if values is None:
         return log.refusal(name)
     return values if origin is None else (values, origin)
+
+
+def _reduced(log: _lynkeus.Log) -> tuple[Any, ...]:
+    return log_again, (columns_of(log),)
+
+
+copyreg.pickle(_lynkeus.Log, _reduced)

@@ -28,6 +28,9 @@ class Answer:
     def svg(self) -> str | None: ...
     def refusal(self) -> LynkeusError | None: ...
     def log(self) -> list[tuple[str, _Column]]: ...
+    def warnings(self) -> list[str]:
+        """What of a log contradicts itself, or counts nowhere."""
+
     def settled(self) -> list[tuple[str, float | None]]:
         """Root mean square errors over the last half of the rows, by name."""
 
@@ -120,18 +123,18 @@ class Study:
         self, runs: int, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
     ) -> Answer: ...
     def estimate(
-        self, log: Log, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
+        self, log: Log | str, progress: _Tell = None, time_limit: float | None = None, memory_limit: float = ...
     ) -> Answer: ...
     def tune(
         self,
-        log: Log | None,
+        log: Log | str | None,
         progress: _Tell = None,
         time_limit: float | None = None,
         memory_limit: float = ...,
     ) -> Answer: ...
     def compare(
         self,
-        log: Log | None,
+        log: Log | str | None,
         progress: _Tell = None,
         time_limit: float | None = None,
         memory_limit: float = ...,
@@ -208,7 +211,7 @@ class Estimator:
 
     @property
     def health(self) -> dict[str, Any]:
-        """Counts by sensor, and of what was held or confined."""
+        """Counts by sensor, and of what was held, confined or not solved."""
 
     def snapshot(self) -> bytes:
         """Everything that the future depends on."""

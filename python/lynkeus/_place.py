@@ -18,6 +18,12 @@ from .errors import TraceError
 
 _STDLIB = sysconfig.get_path("stdlib") + os.sep
 _OURS = tuple(os.path.dirname(str(file)) + os.sep for file in (__file__, np.__file__))
+#: a library that calls back: the line that is told is the one that called it
+_SCIPY = os.sep + os.path.join("site-packages", "scipy", "")
+_TABLES = (
+    "write `lynkeus.interp(x, points, values)` in place of SciPy's interpolation; a smooth curve is a"
+    " polynomial written out"
+)
 
 
 @dataclass(frozen=True)
@@ -54,8 +60,19 @@ def defined(function: Callable[..., Any]) -> Place | None:
     return Place(code.co_filename, code.co_firstlineno) if isinstance(code, CodeType) else None
 
 
+def tables(error: BaseException) -> str | None:
+    """What to do about an error that SciPy's interpolation raised."""
+    return _TABLES if any(_is_table(place) for place in _behind(error.__traceback__)) else None
+
+
+def _is_table(place: Place) -> bool:
+    return os.path.join(_SCIPY, "interpolate", "") in place.file
+
+
 def refusal(message: str, place: Place | None, hint: str | None = None) -> TraceError:
     """A message as those of the command: what is wrong, where, and what to do."""
+    if any(_is_table(frame) for frame in _frames(sys._getframe(1))):
+        hint = _TABLES
     lines = [message]
     if place is not None:
         lines.append(f" --> {place}")
@@ -82,6 +99,6 @@ def _innermost(places: Iterator[Place] | list[Place]) -> Place | None:
 
 
 def _is_users(file: str) -> bool:
-    if file.startswith(_OURS) or file.startswith("<frozen"):
+    if file.startswith(_OURS) or file.startswith("<frozen") or _SCIPY in file:
         return False
     return not file.startswith(_STDLIB) or "site-packages" in file

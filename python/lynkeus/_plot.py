@@ -114,10 +114,12 @@ def _panel(run: Run, name: str, estimates: Mapping[str, str], caption: str, trut
     if true is not None:
         panel.curves.append(Curve("true", true, {"color": TRUE, "linestyle": "--", "zorder": 3}))
     panel.curves.append(Curve("estimated", estimate, {"color": ESTIMATED}))
-    smooth, sd = (_derived(run, name, estimates, kind) for kind in ("smooth", "sd"))
+    smooth, sd, smooth_sd = (_derived(run, name, estimates, kind) for kind in ("smooth", "sd", "smooth_sd"))
     if smooth is not None:
         panel.curves.append(Curve("smoothed", smooth, {"color": SMOOTHED}))
-    if sd is not None:
+    if smooth is not None and smooth_sd is not None:
+        panel.band, panel.low, panel.high = "± 2 sd, smoothed", smooth - 2 * smooth_sd, smooth + 2 * smooth_sd
+    elif sd is not None:
         panel.band, panel.low, panel.high = "± 2 sd", estimate - 2 * sd, estimate + 2 * sd
     return panel
 
@@ -125,7 +127,7 @@ def _panel(run: Run, name: str, estimates: Mapping[str, str], caption: str, trut
 def _derived(run: Run, name: str, estimates: Mapping[str, str], kind: str) -> Column | None:
     """The column of that kind: these follow the estimates in their order, each kind whole."""
     start, count = run.columns.index(estimates[name]), len(estimates)
-    for header in run.columns[start + count :: count][:2]:
+    for header in run.columns[start + count :: count][:3]:
         if header.startswith(f"{name}_{kind}"):
             return run[header]
     return None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 import numpy as np
 
 
@@ -57,6 +60,12 @@ def _spoken(value: object) -> str:
 _SHORT = 40
 
 
+def near(name: str, known: Iterable[str]) -> str:
+    """A question after the name that may be meant, empty where none is near."""
+    found = get_close_matches(name, [each for each in known if not each.startswith("_")], n=1)
+    return f" (did you mean {found[0]!r}?)" if found else ""
+
+
 class RefusedError(LynkeusError):
     """The question is well posed and the answer is no: a condition is refuted, an estimate diverges."""
 
@@ -67,6 +76,10 @@ class LimitError(LynkeusError, TimeoutError):
 
 class NotCredible(UserWarning):
     """There is a result, and something speaks against it."""
+
+
+class LogWarning(UserWarning):
+    """A log contradicts itself, or values of it count nowhere."""
 
 
 class TraceError(InputError, TypeError):

@@ -113,7 +113,7 @@ class Model:
         given = "".join(f"{key(str(k))} = {number(v)}\n" for k, v in values)
         text = f"[parameters]\n{given}"
         core = _lynkeus.Study.parse(text, self.name, (self.name, self.text), self.choose)
-        return Functions(core.functions())
+        return Functions(core.functions(), (Model.functions, (self, parameters)))
 
     def __repr__(self) -> str:
         return f"Model({self.name!r})"

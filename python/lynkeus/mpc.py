@@ -39,6 +39,7 @@ class Estimator:
         if not all(hasattr(model, part) for part in ("x", "y", "u")):
             raise ArgumentError.of("model", "a do_mpc.model.Model", model)
         known = dict(names or {})
+        self._start: dict[str, float] = {}
         self._measured = _entries(model.y, known)
         self._inputs = _entries(model.u, known)
         self._states = _entries(model.x, known)
@@ -54,19 +55,29 @@ class Estimator:
             )
 
     def reset_history(self) -> None:
-        """Back to the start of the study, at time 0."""
+        """Back to the start, that of the study or what was given as ``x0``, at time 0."""
         self._estimator = self._study.estimator()
         self._steps = 0
         self._last: _Sample | None = None
 
     def set_initial_guess(self) -> None:
-        """Nothing is guessed: the start is the study's."""
+        """The estimator starts at what was given as ``x0``, else where the study says."""
+        if self._start:
+            told = self._study._core.sections().get("observer", {}).get("initial", {})
+            self._study = self._study.replace(observer={"initial": {**told, **self._start}})
+            self._start = {}
+        self.reset_history()
 
     @property
     def x0(self) -> NDArray[np.float64]:
         """The states of the model, shape (n, 1)."""
         found = self._estimator.estimate
         return np.array([[found[name]] for name in self._states])
+
+    @x0.setter
+    def x0(self, values: ArrayLike) -> None:
+        self._start = self._vector("x0", self._states, values)
+        self.set_initial_guess()
 
     def make_step(self, y0: ArrayLike, u0: ArrayLike | None = None) -> NDArray[np.float64]:
         """The states from the measurements ``y0`` and, where the study has known inputs, the inputs
@@ -89,14 +100,20 @@ class Estimator:
         return self.x0
 
     def _given(self, what: str, names: list[str], values: ArrayLike) -> dict[str, float]:
+        given = self._vector(what, names, values)
+        return {name: x for name, x in given.items() if name in self._estimator.signals}
+
+    @staticmethod
+    def _vector(what: str, names: list[str], values: ArrayLike) -> dict[str, float]:
+        """A number for each name."""
         try:
-            flat = np.asarray(values).astype(float).ravel()
+            # do-mpc's structures have their numbers in `cat`
+            flat = np.asarray(getattr(values, "cat", values)).astype(float).ravel()
         except (TypeError, ValueError, OverflowError):
             raise ArgumentError.of(what, "numbers", values) from None
         if len(flat) != len(names):
             raise InputError(f"{what}: expected a value for each of {', '.join(names)}, found {len(flat)} values")
-        given = zip(names, flat, strict=True)
-        return {name: float(x) for name, x in given if name in self._estimator.signals}
+        return {name: float(x) for name, x in zip(names, flat, strict=True)}
 
     def _take_again(self, last: _Sample, inputs: dict[str, float]) -> None:
         """The sample before, of which only now is known which inputs followed it."""

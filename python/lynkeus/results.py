@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _html, _lynkeus, _plot
+from ._kept import Kept
 from ._logs import log_of
 from ._optional import needed
-from .errors import InputError, LynkeusError, NotCredible
+from .errors import InputError, LogWarning, LynkeusError, NotCredible, near
 
 if TYPE_CHECKING:
     import pandas
@@ -32,7 +33,7 @@ class Record(dict[str, Any]):
         try:
             return self[name]
         except KeyError:
-            raise AttributeError(f"no entry {name!r}: there are {', '.join(self)}") from None
+            raise AttributeError(f"no entry {name!r}{near(name, self)}: there are {', '.join(self)}") from None
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(k for k in self if k.isidentifier())]
@@ -44,8 +45,11 @@ class Answer:
     ``summary`` is the command's ``--json``; its entries are attributes of the answer as well.
     """
 
-    def __init__(self, core: _lynkeus.Answer) -> None:
+    def __init__(self, core: _lynkeus.Answer | Kept) -> None:
         self._core = core
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (Kept.of(self._core),)
 
     @cached_property
     def summary(self) -> Record:
@@ -75,7 +79,8 @@ class Answer:
         if name in summary:
             return summary[name]
         kind = type(self).__name__
-        raise AttributeError(f"{kind!r} has no attribute {name!r}; its summary has {', '.join(summary)}")
+        hint = near(name, dir(self))
+        raise AttributeError(f"{kind!r} has no attribute {name!r}{hint}; its summary has {', '.join(summary)}")
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(k for k in self.summary if k.isidentifier())]
@@ -293,14 +298,26 @@ class Comparison(Answer):
 
 
 _Run = TypeVar("_Run", bound=Run)
+_Answer = TypeVar("_Answer", bound=Answer)
+
+#: where the method of the study is called, which its checks of arguments wrap
+_CALLER = 4
 
 
 def judged(run: _Run) -> _Run:
-    """A run, with a warning where it is not credible."""
+    """A run, with a warning where it is not credible, or its log is not whole."""
     if run.refusal is not None:
-        # where the method of the study is called, which its checks of arguments wrap
-        warnings.warn(str(run.refusal), NotCredible, stacklevel=4)
+        warnings.warn(str(run.refusal), NotCredible, stacklevel=_CALLER)
+    for text in run._core.warnings():
+        warnings.warn(text, LogWarning, stacklevel=_CALLER)
     return run
+
+
+def warned(answer: _Answer) -> _Answer:
+    """An answer, with a warning where its log is not whole."""
+    for text in answer._core.warnings():
+        warnings.warn(text, LogWarning, stacklevel=_CALLER)
+    return answer
 
 
 def figures(run: Run) -> dict[str, Any]:

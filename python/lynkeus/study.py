@@ -14,7 +14,7 @@ from ._base import Base, plant_of, spelled
 from ._batches import Options
 from ._each import Errors
 from ._export import EXPORT, Export, write
-from ._logs import log_of
+from ._logs import given
 from ._lynkeus import MEMORY
 from ._progress import Progress, told
 from ._toml import document, valid
@@ -32,6 +32,7 @@ from .results import (
     Simulation,
     Sweep,
     judged,
+    warned,
 )
 
 Section = Mapping[str, Any]
@@ -236,7 +237,7 @@ class Study:
         """A log through the observer: a path, a mapping of columns, a data frame, an Arrow table or a
         simulation."""
         with told(progress, "estimating") as tell:
-            return judged(Estimation(self._core.estimate(log_of(log), tell, time_limit, memory_limit)))
+            return judged(Estimation(self._core.estimate(given(log), tell, time_limit, memory_limit)))
 
     @overload
     def estimate_each(
@@ -331,7 +332,7 @@ class Study:
     ) -> Sweep:
         """The tuning of ``[tune]`` over its values, judged by simulation or by a log."""
         with told(progress, "tuning") as tell:
-            return Sweep(self._core.tune(None if log is None else log_of(log), tell, time_limit, memory_limit))
+            return Sweep(self._core.tune(None if log is None else given(log), tell, time_limit, memory_limit))
 
     @takes(progress=told_of, **LIMITS)
     def compare(
@@ -344,16 +345,17 @@ class Study:
     ) -> Comparison:
         """Families side by side, on a simulation or on a log."""
         with told(progress, "comparing") as tell:
-            return Comparison(self._core.compare(None if log is None else log_of(log), tell, time_limit, memory_limit))
+            recorded = None if log is None else given(log)
+            return warned(Comparison(self._core.compare(recorded, tell, time_limit, memory_limit)))
 
     def plant(self) -> Functions:
         """The plant as functions, with the study's parameters and start."""
-        return Functions(self._core.functions())
+        return Functions(self._core.functions(), (Study.plant, (self,)))
 
     @takes(**LIMITS)
     def observer(self, *, time_limit: float | None = None, memory_limit: float = MEMORY) -> Observer:
         """The observer as functions of numbers, which python-control, CasADi, JAX and SciPy can run."""
-        return Observer(self._core.observer(time_limit, memory_limit))
+        return Observer(self._core.observer(time_limit, memory_limit), (Study.observer, (self,)))
 
     @takes(**EXPORT, **LIMITS)
     def export(

@@ -50,11 +50,17 @@ class Functions:
     array([[-0.125]])
     """
 
-    def __init__(self, core: _lynkeus.Functions) -> None:
+    def __init__(self, core: _lynkeus.Functions, origin: tuple[Callable[..., Any], tuple[Any, ...]] | None = None) -> None:
         self._core = core
+        self._origin = origin
         self.states = core.states
         self.inputs = core.inputs
         self.outputs = core.outputs
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._origin is None:
+            raise TypeError(f"{type(self).__name__}: what it was made of is not known, so it cannot be pickled")
+        return self._origin
 
     @property
     def start(self) -> Column:

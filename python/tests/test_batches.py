@@ -216,11 +216,16 @@ def test_what_progress_raises_ends_it(study: lynkeus.Study) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_control_c_ends_it(study: lynkeus.Study) -> None:
+    # a job in the background ignores it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        study.replace(simulate={"until": 1e8}).sweep(seeds(4))
-    timer.join()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            study.replace(simulate={"until": 1e8}).sweep(seeds(4))
+    finally:
+        timer.join()
+        signal.signal(signal.SIGINT, before)
     assert no_threads_left()
 
 

@@ -4,6 +4,7 @@ mod attack;
 mod draw;
 mod exercise;
 mod falsify;
+mod figures;
 mod gallery;
 mod gap;
 mod numbers;
@@ -26,6 +27,8 @@ usage: cargo xtask <task>
   ci        format check, lints, documentation, then `test`
   site      build the documentation site into target/site, every link checked
   gallery   draw the pictures of docs/pictures again from the shipped studies
+  figures   draw the figures of the five papers again into target/figures, with trajectories that were
+            computed apart where they are at hand
   gap       compute the table of docs/gap.md again from the shipped studies;
             `gap NAME` only the rows of that example
   falsify   try to break the certificates of random and adversarial plants
@@ -65,6 +68,7 @@ fn main() -> ExitCode {
         "package" => package::interpreter().and_then(|python| package::test(&python)),
         "site" => package::site(),
         "gallery" => gallery::draw(),
+        "figures" => figures::draw(),
         "gap" => gap::tabulate(name),
         "attack" => attack::run(&arguments[1..]),
         "exercise" => exercise::run(&arguments[1..]),

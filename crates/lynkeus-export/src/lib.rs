@@ -12,12 +12,14 @@ mod code;
 pub mod curly;
 mod dialect;
 mod factorise;
+mod hidden;
 mod names;
 mod printer;
 pub mod python;
 
 pub use code::{Code, Part, Solver};
 pub use dialect::{Binding, Dialect, Form, Text};
+pub use hidden::is_hidden;
 pub use names::Names;
 pub use printer::Body;
 
@@ -50,6 +52,12 @@ pub enum Refusal {
          take family = \"ekf\" or \"ukf\""
     )]
     Window,
+    /// The estimate is put into bounds by a problem of optimisation.
+    #[error(
+        "`bounds = \"project\"` solves a problem of optimisation where the estimate leaves its range, \
+         which is not exported: leave the key out"
+    )]
+    Projection,
     /// Between samples the next one is needed.
     #[error(
         "lines between samples look ahead by one: take between_samples = \"hold\" or \"predict\""

@@ -1,23 +1,25 @@
 //! The analysis.
 
-use lynkeus_expr::Budget;
+use lynkeus_expr::{Budget, Node};
 use lynkeus_model::Plant;
 
+use crate::branches::{Branches, Choices, Reference};
 use crate::expansion::Columns;
 use crate::field::Modular;
 use crate::hidden::{Hidden, beside, joined, steady_from};
-use crate::model::{Model, Refused};
+use crate::model::{Model, Refused, measured};
 use crate::search::Search;
 use crate::series::Stop;
 use crate::start::{Affine, Start};
 use crate::symmetry::{Twin, symmetries};
-use crate::{Answer, Asked, Quantity, Question, QuestionError, Verdict};
+use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict};
 use crate::{hull, lie, place};
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
 /// Seed of the second point, which confirms symmetries that the first suggests.
 const SECOND: u64 = 4711;
+const CHOICES: &str = "the model makes choices (if, abs, min, max, sign, floor …)";
 const SINGULAR: &str = "its series is not defined at any of the random points tried: a division by zero, or roots of negative numbers";
 /// Products of coefficients, with a sensitivity each, that a search from a special start may
 /// cost; and the most orders it may have.
@@ -29,7 +31,145 @@ const ORDERS: usize = 1000;
 /// # Errors
 /// [`QuestionError`].
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
-    let model = match Model::new(plant, question)? {
+    let outputs = measured(plant, question)?;
+    let choices = Choices::of(plant, &outputs);
+    let own = in_branch(plant, question, &View::default())?;
+    if choices.is_empty() {
+        return Ok(own);
+    }
+    match choices.branches(plant) {
+        Some(branches) => combined(plant, question, own, &choices, &branches),
+        None => Ok(own),
+    }
+}
+
+/// Which branch is analysed, and what is measured beside the outputs.
+#[derive(Default)]
+pub(crate) struct View<'a> {
+    /// a point in it; the model's own values where there is none
+    pub reference: Option<&'a Reference>,
+    /// the guards of choices, or nothing
+    pub guards: &'a [Node],
+}
+
+/// The answers of all branches in one.
+fn combined(
+    plant: &Plant,
+    question: &Question,
+    own: Answer,
+    choices: &Choices,
+    branches: &Branches,
+) -> Result<Answer, QuestionError> {
+    let is_hidden = |answer: &Answer| {
+        let mut all = answer
+            .quantities
+            .iter()
+            .map(|(asked, _)| asked)
+            .chain(&answer.about);
+        all.any(|asked| asked.verdict == Verdict::Unobservable)
+    };
+    let mut answers = vec![];
+    let mut guarded = vec![];
+    for (k, branch) in branches.found.iter().enumerate() {
+        let reference = Some(&branch.reference).filter(|_| k > 0);
+        let view = |guards| View { reference, guards };
+        let answer = match k {
+            0 => own.clone(),
+            _ => in_branch(plant, question, &view(&[]))?,
+        };
+        // what is seen without the guards is seen with them
+        guarded.push(match is_hidden(&answer) {
+            true => Some(in_branch(plant, question, &view(&choices.guards))?),
+            false => None,
+        });
+        answers.push(answer);
+    }
+    let mut found = own;
+    let (quantities, about) = (found.quantities.len(), found.about.len());
+    let mut doubted = vec![];
+    for place in 0..quantities + about {
+        let at = |answer: &Answer| match place.checked_sub(quantities) {
+            None => answer.quantities[place].0.clone(),
+            Some(place) => answer.about[place].clone(),
+        };
+        let own = at(&found);
+        let seen: Vec<bool> = answers
+            .iter()
+            .map(|answer| at(answer).verdict == Verdict::Observable)
+            .collect();
+        let is_hidden = || {
+            guarded.iter().all(|answer| {
+                let verdict = answer.as_ref().map(|answer| at(answer).verdict);
+                verdict == Some(Verdict::Unobservable)
+            })
+        };
+        let verdict = match seen.contains(&true) {
+            true => Verdict::Observable,
+            // in branches that were left out it may be seen, unless no path leads to it
+            false if is_hidden() && (branches.left_out == 0.0 || !choices.feel(&own.name)) => {
+                Verdict::Unobservable
+            }
+            false => Verdict::Undecided,
+        };
+        if own.verdict == Verdict::Unobservable && verdict == Verdict::Undecided {
+            doubted.push(own.name.clone());
+        }
+        match place.checked_sub(quantities) {
+            None => found.quantities[place].0.verdict = verdict,
+            Some(place) => found.about[place].verdict = verdict,
+        }
+        if let Some(first) = seen.iter().position(|seen| !seen)
+            && verdict == Verdict::Observable
+        {
+            let hides = seen.iter().zip(&branches.found).filter(|(seen, _)| !**seen);
+            found.partial.push(Partial {
+                name: own.name,
+                share: hides.map(|(_, branch)| branch.share).sum(),
+                at: named(plant, choices, &branches.found[first].reference),
+            });
+        }
+    }
+    // what is told of the model's own branch goes for all
+    let is_changed = answers[0].quantities.iter().zip(&found.quantities);
+    if is_changed
+        .into_iter()
+        .any(|(was, is)| was.0.verdict != is.0.verdict)
+        && let Some(answer) = guarded.into_iter().next()
+    {
+        found.symmetries = answer.map_or(vec![], |answer| answer.symmetries);
+    }
+    found.notes.retain(|note| !note.starts_with(CHOICES));
+    found.notes.push(format!(
+        "{CHOICES}: {} found at points of the box, each analysed{}",
+        match branches.found.len() {
+            1 => "one branch was".to_owned(),
+            count => format!("{count} branches were"),
+        },
+        match branches.left_out > 0.0 {
+            true => ", and further ones were not",
+            false => "",
+        }
+    ));
+    if !doubted.is_empty() {
+        found.notes.push(format!(
+            "within each branch the outputs do not tell {}; the moments at which the branch changes may",
+            doubted.join(", ")
+        ));
+    }
+    Ok(found)
+}
+
+/// The values of what the choices read, by name.
+fn named(plant: &Plant, choices: &Choices, reference: &Reference) -> Vec<(String, f64)> {
+    let read = plant.graph.symbols_of(&choices.guards);
+    let variables = plant.states.iter().chain(&plant.inputs);
+    let read = variables.filter(|v| read.contains(&v.node));
+    read.map(|v| (v.name.clone(), reference[&v.node])).collect()
+}
+
+/// Decides what can be known in one branch.
+fn in_branch(plant: &Plant, question: &Question, view: &View<'_>) -> Result<Answer, QuestionError> {
+    let model = match Model::new(plant, question, view)? {
         Ok(model) => model,
         Err(Refused { named, reason }) => return Ok(undecided(&named, question, &reason)),
     };
@@ -58,6 +198,7 @@ fn undecided(named: &[(String, Quantity)], question: &Question, reason: &str) ->
             .map(|(name, kind)| (asked(name), *kind))
             .collect(),
         about: question.about.iter().map(asked).collect(),
+        partial: vec![],
         symmetries: vec![],
         order: 0,
         rank: 0,
@@ -177,6 +318,7 @@ impl<'a> Analysis<'a> {
         Answer {
             quantities: quantities.collect(),
             about: about.collect(),
+            partial: vec![],
             symmetries: self.symmetries(ground, &found),
             order: order + found.search.succession().order,
             rank: found.search.rank(),
@@ -330,8 +472,7 @@ impl<'a> Analysis<'a> {
         let mut notes = vec![self.method()];
         let choices = self.model.program.choices;
         if choices > 0 {
-            let them = if choices == 1 { "a choice" } else { "choices" };
-            notes.push(format!("the model makes {them} (if, abs, min, max, sign, floor …): the branch at its own values is analysed, and what another branch or the moment of the change would show is not"));
+            notes.push(format!("{CHOICES}: the branch at its own values is analysed, and what another branch or the moment of the change would show is not"));
         }
         let (order, named) = (found.search.order(), self.model.named.len());
         let open = |column: usize| {

@@ -46,6 +46,17 @@ pub struct Symmetry {
     pub invariants: Vec<String>,
 }
 
+/// A quantity that the outputs tell in some branches of the model only.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Partial {
+    /// its name
+    pub name: String,
+    /// the share of the box in branches where they do not, estimated at points spread over it
+    pub share: f64,
+    /// one of these points: what the choices read, by name
+    pub at: Vec<(String, f64)>,
+}
+
 /// A quantity or an expression that was asked about.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
@@ -62,6 +73,8 @@ pub struct Answer {
     pub quantities: Vec<(Asked, Quantity)>,
     /// the expressions asked about
     pub about: Vec<Asked>,
+    /// what is observable in some of the model's branches only
+    pub partial: Vec<Partial>,
     /// what hides the unobservable quantities
     pub symmetries: Vec<Symmetry>,
     /// derivatives of the outputs that were used

@@ -32,6 +32,7 @@
 
 mod analysis;
 mod answer;
+mod branches;
 mod echelon;
 mod expansion;
 mod field;
@@ -50,5 +51,5 @@ mod succession;
 mod symmetry;
 
 pub use analysis::analyse;
-pub use answer::{Answer, Asked, Quantity, Symmetry, Verdict};
+pub use answer::{Answer, Asked, Partial, Quantity, Symmetry, Verdict};
 pub use question::{Question, QuestionError};

@@ -3,6 +3,7 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 
+use crate::analysis::View;
 use crate::field::{Modular, Random};
 use crate::series::{Program, Unsupported};
 use crate::{Quantity, Question, QuestionError, point};
@@ -67,10 +68,15 @@ pub(crate) struct Refused {
 }
 
 impl Model {
-    /// The model, or why it has no series.
-    pub fn new(plant: &Plant, question: &Question) -> Result<Result<Self, Refused>, QuestionError> {
+    /// The model in one branch, or why it has no series.
+    pub fn new(
+        plant: &Plant,
+        question: &Question,
+        view: &View<'_>,
+    ) -> Result<Result<Self, Refused>, QuestionError> {
         let about = expressions(plant, question)?;
-        let outputs = measured(plant, question)?;
+        let mut outputs = measured(plant, question)?;
+        outputs.extend(view.guards);
         for name in question.unknown.iter().chain(&question.disturbances) {
             find("input", &plant.inputs, name)?;
         }
@@ -86,7 +92,8 @@ impl Model {
         roots.extend(&outputs);
         roots.extend(&about);
         let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
-        let reference = point::reference(plant, &mut Random::new(1));
+        let own = || point::reference(plant, &mut Random::new(1));
+        let reference = view.reference.cloned().unwrap_or_else(own);
         for symbol in &mut symbols {
             symbol.negative = reference.get(&symbol.node).is_some_and(|x| *x < 0.0);
         }
@@ -171,7 +178,8 @@ fn find<'v>(
     })
 }
 
-fn measured(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
+/// The measured outputs.
+pub(crate) fn measured(plant: &Plant, question: &Question) -> Result<Vec<Node>, QuestionError> {
     if plant.outputs.is_empty() {
         return Err(QuestionError::NothingMeasured(plant.name.clone()));
     }

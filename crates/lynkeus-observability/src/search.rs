@@ -203,7 +203,10 @@ mod tests {
             ..LoadOptions::default()
         };
         let plant = Plant::from_modelica(text, "p.mo", &options).unwrap();
-        let model = Model::new(&plant, question).unwrap().ok().unwrap();
+        let model = Model::new(&plant, question, &crate::analysis::View::default())
+            .unwrap()
+            .ok()
+            .unwrap();
         let budget = Budget::default();
         let start = crate::place::find(&model, Start::new(&model, 1), &budget).unwrap();
         let columns = Columns::new(&model, model.depth);

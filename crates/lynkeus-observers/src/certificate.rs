@@ -17,6 +17,8 @@ pub struct Assumptions {
     pub drift: Vec<f64>,
     /// per measured output: a bound of the measurement error, in the output's unit
     pub noise: Vec<f64>,
+    /// per extended state: the spectral density of white noise on x'
+    pub process_noise: Vec<f64>,
     /// per known input: bounds of |u'|, |u''|, …, as many as are known
     pub input_derivatives: Vec<Vec<f64>>,
     /// f and h have values on that box and do not jump
@@ -28,8 +30,8 @@ pub struct Assumptions {
 }
 
 impl Assumptions {
-    /// That plant and estimate stay in the box, and nothing else acts: neither drift nor
-    /// noise; of the inputs' derivatives nothing is known. The plant is examined there: what
+    /// That plant and estimate stay in the box, and nothing else acts: neither drift nor noise of any
+    /// kind; the inputs' derivatives have the bounds of the plant. That is examined there: what
     /// has no value or jumps is covered by no proof.
     ///
     /// # Errors
@@ -38,7 +40,8 @@ impl Assumptions {
         Ok(Self {
             drift: vec![0.0; extended.states.len()],
             noise: vec![0.0; extended.outputs.len()],
-            input_derivatives: vec![],
+            process_noise: vec![0.0; extended.states.len()],
+            input_derivatives: extended.input_derivatives.clone(),
             within_limits: None,
             names: extended
                 .states
@@ -77,6 +80,38 @@ impl Assumptions {
     pub fn with_drift(mut self, drift: Vec<f64>) -> Self {
         self.drift = drift;
         self
+    }
+
+    /// With the spectral densities of white noise on the derivatives, one per extended state.
+    #[must_use]
+    pub fn with_process_noise(mut self, densities: Vec<f64>) -> Self {
+        self.process_noise = densities;
+        self
+    }
+
+    /// The states that process noise moves.
+    fn moved(&self) -> Vec<&str> {
+        let pairs = self.names.iter().zip(&self.process_noise);
+        let moved = pairs.filter(|(_, density)| **density > 0.0);
+        moved.map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// The unknown inputs, from state `first` on, that neither a bound of their rate of change nor process
+    /// noise lets move.
+    pub(crate) fn constant(&self, first: usize) -> Vec<&str> {
+        let acting = [&self.drift, &self.process_noise];
+        let moves = |i: usize| {
+            acting
+                .iter()
+                .any(|sizes| sizes.get(i).is_some_and(|size| *size > 0.0))
+        };
+        let still = (first..self.drift.len()).filter(|i| !moves(*i));
+        still.map(|i| self.names[i].as_str()).collect()
+    }
+
+    /// Whether process noise moves the plant.
+    pub(crate) fn is_moved(&self) -> bool {
+        !self.moved().is_empty()
     }
 
     /// With bounds of the measurement errors, one per measured output.
@@ -151,6 +186,13 @@ impl Assumptions {
             .is_some_and(|check| !check.is_proved())
     }
 
+    /// The bound of the derivative of that order, from 1, of a known input; infinite where none is known.
+    pub(crate) fn input_derivative(&self, input: usize, order: usize) -> f64 {
+        let bounds = self.input_derivatives.get(input);
+        let bound = bounds.and_then(|bounds| bounds.get(order.checked_sub(1)?));
+        bound.copied().unwrap_or(f64::INFINITY)
+    }
+
     /// With bounds of |u'|, |u''|, … per known input, as many as are known.
     #[must_use]
     pub fn with_input_derivatives(mut self, bounds: Vec<Vec<f64>>) -> Self {
@@ -196,6 +238,15 @@ impl From<(String, f64)> for UltimateBound {
     }
 }
 
+/// What the error as a whole and quantity by quantity ends within.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bounds {
+    /// of the Euclidean norm
+    pub norm: f64,
+    /// per extended state
+    pub states: Vec<UltimateBound>,
+}
+
 /// A guarantee: |x̂(t) − x(t)| ≤ c·e^(−rate·t)·|x̂(0) − x(0)| + ultimate bound,
 /// while plant and estimate stay in the box.
 #[derive(Clone, Debug)]
@@ -212,6 +263,9 @@ pub struct Certificate {
     pub ultimate_bound: Option<f64>,
     /// the same per extended state; empty where not known
     pub ultimate: Vec<UltimateBound>,
+    /// where process noise moves the plant, what √(E|x̂ − x|²) ends within: of such an error nothing
+    /// else has a bound
+    pub mean_square: Option<Bounds>,
     /// the box
     pub region: Vec<Side>,
     /// what has to hold, with verdicts and witnesses
@@ -251,6 +305,7 @@ impl Certificate {
             overshoot: None,
             ultimate_bound: None,
             ultimate: vec![],
+            mean_square: None,
             region: sides.map(side).collect(),
             hypotheses,
             constants: vec![],
@@ -258,6 +313,41 @@ impl Certificate {
             notes: vec![],
             regularity: assumptions.regularity.clone(),
         }
+    }
+
+    /// What is left of it where process noise moves the plant: that is Gaussian, no error has a bound for
+    /// certain, and what would hold without it becomes a note.
+    pub(crate) fn under(mut self, assumptions: &Assumptions) -> Self {
+        let moved = assumptions.moved().join(", ");
+        if moved.is_empty() || self.verdict() != Standing::Proved {
+            return self;
+        }
+        let without = self.ultimate_bound.take().filter(|norm| *norm > 0.0);
+        let each = std::mem::take(&mut self.ultimate);
+        let kept = match &self.mean_square {
+            Some(_) => {
+                "what ends within a bound is its mean square, for a plant that goes on outside of the box with the same slopes"
+            }
+            None => "of its mean square no bound is known here either",
+        };
+        self.notes.push(format!("the process noise of {moved} is Gaussian, so that no bound holds of the error for certain and plant and estimate leave any box now and then: {kept}"));
+        self.notes.extend(without.map(|norm| {
+            let each: Vec<String> = each
+                .iter()
+                .map(|b| format!("{} of {}", short(b.value), b.name))
+                .collect();
+            match each.is_empty() {
+                true => format!(
+                    "without the process noise the error would end within {} (Euclidean norm)",
+                    short(norm)
+                ),
+                false => format!(
+                    "without the process noise the error would end within {}",
+                    each.join(", ")
+                ),
+            }
+        }));
+        self
     }
 
     /// A limit ended the work: nothing is decided.

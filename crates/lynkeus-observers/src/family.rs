@@ -48,6 +48,9 @@ pub trait Family: Sync {
     fn owns(&self, key: &str) -> bool {
         self.keys().iter().any(|spec| spec.name == key)
     }
+    /// How the entries of `theta` stand to one another where it is a list of so many, the last one
+    /// the rate at which the error decays; empty where it is one number.
+    fn speeds(&self) -> &'static [f64];
     /// Whether it is a filter: it takes any plant, and no theorem stands behind it.
     fn is_filter(&self) -> bool;
     /// Whether every key has a value that can be used; a required one may be absent.

@@ -37,7 +37,7 @@ mod tunable;
 mod tuning;
 pub mod unknown_input;
 
-pub use certificate::{Assumptions, Certificate, Constant, UltimateBound};
+pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, find, fit_word};
 pub use guarantee::{Claim, Correction, Injection, certify};
 pub use keys::{KeySpec, REQUIRED, Shape};

@@ -3,7 +3,7 @@
 use lynkeus_expr::flow::{self, Flow};
 use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_model::Variable;
-use lynkeus_run::filter::FilterKind;
+use lynkeus_run::filter::{Bounds, FilterKind};
 
 use crate::Tunables;
 
@@ -39,6 +39,8 @@ pub struct Monitor {
     pub alarm_below: f64,
     /// what the flag means, for people
     pub meaning: String,
+    /// the matrix whose reciprocal condition number it is, where it is one
+    pub matrix: Option<&'static str>,
 }
 
 /// A derivative of a known input that the observer's equations read. Whoever runs
@@ -92,6 +94,8 @@ pub struct FilterTuning {
     pub kind: FilterKind,
     /// a reading further from what is expected, in standard deviations, is rejected
     pub gate: Option<f64>,
+    /// where the estimate is kept, one pair per state; none where it may go anywhere
+    pub bounds: Option<Vec<Bounds>>,
     /// h(t, x̂, u), one per measured output
     pub outputs: Vec<Node>,
     /// variance of the first estimate, one per state

@@ -116,7 +116,7 @@ pub(crate) fn note(common: &Common, extended: &Extended<'_>, region: &Region) ->
     };
     let declared = extended.plant.states.iter().chain(&extended.plant.inputs);
     match (common.prolong, declared.into_iter().all(whole)) {
-        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with slopes along the chains between the same bounds ('prolong').".into(),
+        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with the same bounds of their slopes ('prolong').".into(),
         (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
         (false, _) => box_note(common.clamp),
     }

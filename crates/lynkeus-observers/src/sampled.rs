@@ -1,7 +1,7 @@
 //! Any observer on sampled measurements.
 
 use lynkeus_expr::flow::{self, Flow};
-use lynkeus_expr::{MissingInput, Node};
+use lynkeus_expr::{Graph, MissingInput, Node};
 use lynkeus_structure::Extended;
 use std::collections::HashMap;
 
@@ -15,6 +15,21 @@ pub struct Sampled {
     pub observer: Observer,
     /// h(t, x̂, u), one per sensor
     pub outputs: Vec<Node>,
+    /// L_f h(t, x̂, u), one per sensor
+    pub rates: Vec<Node>,
+}
+
+impl Sampled {
+    /// Puts a state before the measurements that stays as it is: for
+    /// [what measurements that are held fall behind by](lynkeus_run::Lag). Returns its place.
+    pub fn push_lag(&mut self, graph: &Graph) -> usize {
+        let place = self.observer.states.len() - self.outputs.len();
+        let lag = Signal::fresh(graph, "lag of", "what is held");
+        self.observer.states.insert(place, (lag, 0.0));
+        let still = graph.constant(0.0).node();
+        self.observer.derivatives.insert(place, still);
+        place
+    }
 }
 
 impl Observer {
@@ -45,7 +60,7 @@ impl Observer {
         let outputs = graph.substitute(&h, &images);
         let mut observer = self.clone();
         observer.measured.clear();
-        for (signal, rate) in self.measured.iter().zip(rates) {
+        for (signal, &rate) in self.measured.iter().zip(&rates) {
             let switch = Signal::fresh(graph, "predict", &signal.name);
             // where the measurement is held the model need not have a value
             let rate = graph
@@ -55,6 +70,10 @@ impl Observer {
             observer.derivatives.push(rate.node());
             observer.inputs.push(switch);
         }
-        Ok(Sampled { observer, outputs })
+        Ok(Sampled {
+            observer,
+            outputs,
+            rates,
+        })
     }
 }

@@ -49,6 +49,8 @@ pub trait Stages: Sync {
     const FORM_BOX: FormBox;
     /// its keys, in groups
     const KEYS: &'static [&'static [KeySpec]];
+    /// how the entries of `theta` stand to one another where it has to be a list
+    const SPEEDS: &'static [f64] = &[];
     /// whether it takes any plant, without a theorem
     const IS_FILTER: bool = false;
 
@@ -104,6 +106,10 @@ impl<S: Stages> Family for S {
         S::PAPER
     }
 
+    fn speeds(&self) -> &'static [f64] {
+        S::SPEEDS
+    }
+
     fn is_filter(&self) -> bool {
         S::IS_FILTER
     }
@@ -155,7 +161,7 @@ impl<S: Stages> Family for S {
     ) -> Result<Certificate, DesignError> {
         match theorem::<S>(extended, tuning, assumptions) {
             Err(DesignError::Spent(spent)) => Ok(Certificate::ended(S::BASIS, assumptions, spent)),
-            found => found,
+            found => found.map(|certificate| certificate.under(assumptions)),
         }
     }
 }

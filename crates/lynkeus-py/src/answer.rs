@@ -33,6 +33,10 @@ pub trait Told: Send {
     fn refusal(&self) -> Option<Error> {
         None
     }
+    /// What of a log contradicts itself, or counts nowhere.
+    fn warnings(&self) -> Vec<String> {
+        vec![]
+    }
     /// Root mean square errors over the last half of the rows, of what is estimated.
     fn settled(&self) -> Vec<(String, f64)> {
         vec![]
@@ -138,6 +142,10 @@ impl Answer {
         self.ask(py, |told| told.refusal()).map(|e| exception(&e))
     }
 
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        self.ask(py, |told| told.warnings())
+    }
+
     /// By name; none where one is no number.
     fn settled(&self, py: Python<'_>) -> Vec<(String, Option<f64>)> {
         let errors = self.ask(py, |told| told.settled()).into_iter();
@@ -193,6 +201,10 @@ impl Told for Ran {
 
     fn refusal(&self) -> Option<Error> {
         self.outcome.refusal()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.outcome.warnings.clone()
     }
 
     fn settled(&self) -> Vec<(String, f64)> {
@@ -257,6 +269,10 @@ impl Told for Of<Comparison> {
     fn svg(&self) -> Result<Option<String>, Error> {
         let picture = self.found.picture(self.study.time_unit.as_deref());
         picture.to_svg().map(Some)
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.found.warnings().to_vec()
     }
 }
 

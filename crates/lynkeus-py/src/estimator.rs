@@ -200,7 +200,7 @@ impl Estimator {
         Ok(sensors)
     }
 
-    /// Counts by sensor, and of what was held or confined.
+    /// Counts by sensor, and of what was held, confined or not solved.
     #[getter]
     fn health<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let health = self.lock().health().clone();
@@ -218,6 +218,7 @@ impl Estimator {
         found.set_item("sensors", sensors)?;
         found.set_item("inputs_held", health.inputs_held)?;
         found.set_item("confined", health.confined)?;
+        found.set_item("unsolved", health.unsolved)?;
         Ok(found)
     }
 

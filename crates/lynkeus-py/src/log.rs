@@ -1,13 +1,15 @@
 //! Logs: tables from files, and from columns that Python holds.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
-use lynkeus::Table;
-use lynkeus::table::{Cell, Gathered, Gathering, Instant};
+use lynkeus::table::{Cell, Gathered, Gathering, Instant, Request};
+use lynkeus::{Error, Study, Table};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::arrow::import;
+use crate::away::{Terms, away};
 use crate::errors::{exception, text, unexpected, wrong};
 
 /// What messages call a log that is no file.
@@ -20,6 +22,23 @@ pub const HINT: &str = "convert it before, or name another column under [estimat
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Log {
     pub table: Table,
+}
+
+/// A log that is held, or a file that is read within the limits of the call.
+#[derive(FromPyObject)]
+pub enum Given {
+    Held(Py<Log>),
+    File(PathBuf),
+}
+
+impl Given {
+    /// The table, of a file what the study asks for.
+    pub fn table(&self, study: &Study) -> Result<Cow<'_, Table>, Error> {
+        match self {
+            Self::Held(log) => Ok(Cow::Borrowed(&log.get().table)),
+            Self::File(path) => lynkeus::log(study, path).map(Cow::Owned),
+        }
+    }
 }
 
 /// A column that Python holds.
@@ -103,8 +122,13 @@ impl Log {
     fn load(py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<Self> {
         let file = path.extract::<PathBuf>();
         let path = file.map_err(|error| wrong("path", "a path", path, error))?;
-        let table = py.detach(|| Table::load(&path));
-        let table = table.map_err(|e| exception(&e))?;
+        let table = away(py, &Terms::default(), |budget, _| {
+            let request = Request {
+                budget,
+                columns: None,
+            };
+            Table::load_within(&path, &request)
+        })?;
         Ok(Self { table })
     }
 
@@ -146,7 +170,7 @@ impl Log {
         name: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let name = text("name", name)?;
-        let values = py.detach(|| self.table.readings(&name).map(lynkeus::Series::to_vec));
+        let values = py.detach(|| self.table.times(&name).map(lynkeus::Series::to_vec));
         Ok(values.map_err(|e| exception(&e))?.into_pyarray(py))
     }
 

@@ -17,7 +17,7 @@ use crate::away::{MEMORY, Terms, Watch, away};
 use crate::errors::exception;
 use crate::estimator::Estimator;
 use crate::functions::Functions;
-use crate::log::Log;
+use crate::log::Given;
 use crate::sections;
 
 /// A study with the texts that it was made from.
@@ -196,14 +196,14 @@ impl Study {
     fn estimate(
         &self,
         py: Python<'_>,
-        log: &Log,
+        log: Given,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
         memory_limit: f64,
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
         let outcome = self.ask(py, &terms, |study, watch| {
-            self.runner.estimate(study, &log.table, watch)
+            self.runner.estimate(study, &*log.table(study)?, watch)
         })?;
         Ok(self.ran(outcome, false))
     }
@@ -212,14 +212,15 @@ impl Study {
     fn tune(
         &self,
         py: Python<'_>,
-        log: Option<&Log>,
+        log: Option<Given>,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
         memory_limit: f64,
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
         let sweep = self.ask(py, &terms, |study, watch| {
-            let sweep = lynkeus::tune(study, log.map(|log| &log.table), watch)?;
+            let table = log.as_ref().map(|log| log.table(study)).transpose()?;
+            let sweep = lynkeus::tune(study, table.as_deref(), watch)?;
             match sweep.is_empty_handed() {
                 true => Err(sweep.refusal().at(&study.file)),
                 false => Ok(sweep),
@@ -232,14 +233,15 @@ impl Study {
     fn compare(
         &self,
         py: Python<'_>,
-        log: Option<&Log>,
+        log: Option<Given>,
         progress: Option<Bound<'_, PyAny>>,
         time_limit: Option<f64>,
         memory_limit: f64,
     ) -> PyResult<Answer> {
         let terms = Terms::new(progress, time_limit, memory_limit);
         let found = self.ask(py, &terms, |study, watch| {
-            lynkeus::compare(study, log.map(|log| &log.table), watch)
+            let table = log.as_ref().map(|log| log.table(study)).transpose()?;
+            lynkeus::compare(study, table.as_deref(), watch)
         })?;
         Ok(Answer::of(self.of(found)))
     }

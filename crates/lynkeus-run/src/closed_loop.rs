@@ -1,9 +1,12 @@
 //! Inputs, plant, sensors and observer as one system.
 
+use std::sync::Arc;
+
 use lynkeus_expr::Tape;
 
 use crate::joint::Parts;
 use crate::noise::Sensors;
+use crate::relays::Guards;
 use crate::routine::Runner;
 use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
 
@@ -88,6 +91,8 @@ pub(crate) struct Loop {
     is_held: bool,
     /// the derivatives of all states, as one
     joint: Runner,
+    /// where they jump and bend
+    guards: Option<Arc<Guards>>,
     /// time, states, what disturbs sensors and states, modes
     arguments: Vec<f64>,
     u: Vec<f64>,
@@ -118,16 +123,17 @@ impl Loop {
         let observer_wires = read.iter().map(|name| sources.any(name));
         let plant_wires = plant_wires.collect::<Result<Vec<_>, _>>()?;
         let observer_wires = observer_wires.collect::<Result<Vec<_>, _>>()?;
-        let joint = Parts {
+        let parts = Parts {
             inputs,
             plant,
             observer: observer.as_ref(),
             sensors: &sensors,
             plant_wires: &plant_wires,
             observer_wires: &observer_wires,
-        }
-        .joined()?;
+        };
+        let (joint, guards) = (parts.joined()?, parts.guards()?);
         Ok(Self {
+            guards,
             arguments: vec![0.0; joint.tape().inputs()],
             joint: joint.runner(),
             u: vec![0.0; inputs.outputs().len()],
@@ -209,6 +215,25 @@ impl Loop {
     /// Draws the next noise sample.
     pub(crate) fn draw(&mut self) {
         self.sensors.draw();
+        self.settle();
+    }
+
+    /// An error that ended the run at `x`, by its cause where that is the observer.
+    pub(crate) fn explained(&mut self, error: Error, x: &[f64], scale: f64) -> Error {
+        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
+        if let Some(time) = error.time() {
+            self.connect(time, plant_x);
+        }
+        let scale = plant_x.iter().fold(scale, |most, x| most.max(x.abs()));
+        match &mut self.observer {
+            Some(observer) => observer.explained(error, observer_x, scale),
+            None => error,
+        }
+    }
+
+    /// Draws what moves the states, between two samples.
+    pub(crate) fn stir(&mut self) {
+        self.sensors.stir();
         self.settle();
     }
 
@@ -358,6 +383,26 @@ impl Dynamics for Loop {
         if let Some(observer) = &mut self.observer {
             observer.hold(parts.map(|(_, observer)| observer));
         }
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.guards.clone()
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.dimension();
+        let observer = self
+            .observer
+            .as_ref()
+            .map_or(&[][..], Evaluation::held_modes);
+        let held = self.plant.held_modes().iter().chain(observer);
+        values.clear();
+        values.extend(
+            self.arguments[first..]
+                .iter()
+                .chain(held)
+                .map(|&v| [v, 0.0]),
+        );
     }
 
     fn names(&self) -> Vec<String> {

@@ -26,6 +26,11 @@ impl Bound {
         }
     }
 
+    /// The largest number seen, or 1.
+    pub(crate) fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// # Errors
     /// [`Error::Diverged`], with the hint, for a value beyond the bound, or NaN.
     pub(crate) fn check(

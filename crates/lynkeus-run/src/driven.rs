@@ -1,5 +1,8 @@
 //! Signals between two samples.
 
+use std::sync::Arc;
+
+use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{BetweenSamples, Dynamics, Error, Evaluation, Slopes, System};
 
@@ -113,6 +116,21 @@ impl Dynamics for Driven {
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.evaluation.hold(sides);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.evaluation.guards()
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.read_signals(t);
+        self.evaluation.beside(t, values);
+        if self.between == BetweenSamples::Linear {
+            let ends = self.last.iter().zip(&self.next);
+            for ([_, speed], (last, next)) in values.iter_mut().zip(ends) {
+                *speed = (next - last) / (self.to - self.from);
+            }
+        }
     }
 
     fn names(&self) -> Vec<String> {

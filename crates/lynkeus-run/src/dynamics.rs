@@ -1,6 +1,9 @@
 //! What an integrator sees of a system.
 
+use std::sync::Arc;
+
 use crate::error::state_text;
+use crate::relays::Guards;
 use crate::{Error, Slopes};
 
 /// A right-hand side x' = f(t, x), with the instants at which f jumps because
@@ -56,8 +59,19 @@ pub trait Dynamics {
     fn read_surfaces(&mut self, _t: f64, _x: &[f64], _values: &mut [f64]) {}
 
     /// Holds f, from here on, as it is on one side of each surface: where its function is
-    /// positive for 1, negative for −1. With none f is what the state says again.
+    /// positive for 1, negative for −1; both surfaces of a `floor` tell its value. With none f is
+    /// what the state says again.
     fn hold(&mut self, _sides: Option<&[f64]>) {}
+
+    /// The functions of the surfaces and of where f bends, as code, so that they can be enclosed over a
+    /// step. With none a crossing is seen by the ends of a step alone.
+    fn guards(&self) -> Option<Arc<Guards>> {
+        None
+    }
+
+    /// Writes what the code of the guards reads beside time and states at `t`, and how fast each of it
+    /// changes: until the next stop everything is a straight line.
+    fn beside(&mut self, _t: f64, _values: &mut Vec<[f64; 2]>) {}
 
     /// Asked at every step: true ends the run with [`Error::Cancelled`].
     fn is_over(&mut self) -> bool {
@@ -118,6 +132,14 @@ impl<D: Dynamics + ?Sized> Dynamics for &mut D {
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         (**self).hold(sides);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        (**self).guards()
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        (**self).beside(t, values);
     }
 
     fn is_over(&mut self) -> bool {

@@ -100,6 +100,27 @@ pub enum Error {
         limit: usize,
     },
 
+    /// The integration cannot go on where a matrix of the observer is singular.
+    #[error(
+        "the observer comes to where {matrix} is singular at t = {time} ({name} = {value:.3e}, its flag is raised below {below}) and cannot be integrated on: {meaning}; the estimate is {state}"
+    )]
+    Singular {
+        /// when
+        time: f64,
+        /// what the matrix is called
+        matrix: String,
+        /// the output that says how close it is to singular
+        name: String,
+        /// its value
+        value: f64,
+        /// its limit
+        below: f64,
+        /// what that means, and what to do
+        meaning: String,
+        /// names and values of the observer's state
+        state: String,
+    },
+
     /// An estimate left every bound.
     #[error("the estimate diverged: '{name}' is {value:e} at t = {time}{hint}")]
     Diverged {
@@ -199,6 +220,17 @@ pub enum Error {
 }
 
 impl Error {
+    /// When a run ended, where it could not go on.
+    pub(crate) fn time(&self) -> Option<f64> {
+        match self {
+            Self::StepUnderflow { time, .. }
+            | Self::StepBudget { time, .. }
+            | Self::TooStiff { time, .. }
+            | Self::Diverged { time, .. } => Some(*time),
+            _ => None,
+        }
+    }
+
     pub(crate) fn setting(
         what: impl Into<String>,
         expected: impl Into<String>,
@@ -236,7 +268,7 @@ impl From<Error> for Box<Interrupted> {
 const LISTED: usize = 6;
 
 /// All digits of a number, without three hundred zeros.
-fn digits(value: f64) -> String {
+pub(crate) fn digits(value: f64) -> String {
     let size = value.abs();
     match value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&size) {
         true => format!("{value}"),

@@ -46,8 +46,12 @@ impl Runner for Flow {
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
         self.driven.aim(from, sample.t, sample.inputs);
-        self.integrator
-            .advance(&mut self.driven, from, sample.t, &mut self.x)?;
+        let done = self
+            .integrator
+            .advance(&mut self.driven, from, sample.t, &mut self.x);
+        let scale = self.bound.scale();
+        let evaluation = &mut self.driven.evaluation;
+        done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.driven.arrive();
         Ok(())
     }
@@ -61,9 +65,12 @@ impl Runner for Flow {
 
     fn report(&mut self, t: f64) -> Result<(), Error> {
         let names = self.driven.evaluation.system().states();
-        self.bound
-            .check(t, names, &self.x, || self.integrator.hint())?;
+        let inside = self
+            .bound
+            .check(t, names, &self.x, || self.integrator.hint());
         let evaluation = &mut self.driven.evaluation;
+        let scale = self.bound.scale();
+        inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         evaluation.enter(t);
         evaluation.estimates(t, &self.x, &mut self.estimates);
         match self.estimates.iter().all(|v| v.is_finite()) {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::grid::Grid;
-use crate::{Error, Simulation};
+use crate::{Error, Simulation, process_draws};
 
 /// Most cells of a trajectory (8 bytes each).
 const MOST_CELLS: f64 = 4e8;
@@ -13,6 +13,8 @@ const MOST_CELLS: f64 = 4e8;
 pub(crate) enum Stop {
     /// the next noise sample is drawn
     Draw,
+    /// what moves the states is drawn anew, between two samples
+    Stir,
     /// time goes on
     Advance { from: f64, to: f64 },
     /// a row is recorded
@@ -27,9 +29,11 @@ pub(crate) struct Itinerary {
     until: f64,
     intervals: usize,
     sample_step: f64,
+    /// draws of process noise from one sample to the next
+    draws: usize,
     is_exact: bool,
-    /// samples drawn so far
-    samples: usize,
+    /// draws so far, those of samples and those in between
+    drawn: usize,
     /// the next row
     row: usize,
     /// the time of the last stop
@@ -51,8 +55,9 @@ impl Itinerary {
             until: simulation.until,
             intervals,
             sample_step,
+            draws: draws(simulation)?,
             is_exact: false,
-            samples: 0,
+            drawn: 0,
             row: 0,
             reached: simulation.start,
             planned: VecDeque::new(),
@@ -65,9 +70,9 @@ impl Itinerary {
         self
     }
 
-    /// The time between two samples.
-    pub fn sample_step(&self) -> f64 {
-        self.sample_step
+    /// The time for which process noise is held.
+    pub fn hold(&self) -> f64 {
+        self.sample_step / self.draws as f64
     }
 
     /// Number of intervals between rows.
@@ -84,16 +89,16 @@ impl Itinerary {
         }
     }
 
-    /// Plans up to the next sample or row; a sample due at a row is drawn there.
+    /// Plans up to the next draw or row; a draw due at a row is made there.
     fn plan(&mut self) {
         let Some(before) = self.row.checked_sub(1) else {
             self.draw();
             return self.arrive(self.start);
         };
         let (from, to) = (self.time(before), self.time(self.row));
-        // a sample and a row at the same time may differ by rounding
-        let same = 1e-9 * (to - from).min(self.sample_step);
-        let due = self.start + self.samples as f64 * self.sample_step;
+        // a draw and a row at the same time may differ by rounding
+        let same = 1e-9 * (to - from).min(self.hold());
+        let due = self.start + self.due();
         if self.is_exact || due > to + same {
             self.advance(to);
             return self.arrive(to);
@@ -102,9 +107,17 @@ impl Itinerary {
         self.draw();
     }
 
+    /// How long after the start the next draw is.
+    fn due(&self) -> f64 {
+        let (samples, rest) = (self.drawn / self.draws, self.drawn % self.draws);
+        (samples as f64 + rest as f64 / self.draws as f64) * self.sample_step
+    }
+
     fn draw(&mut self) {
-        self.planned.push_back(Stop::Draw);
-        self.samples += 1;
+        let is_sample = self.drawn.is_multiple_of(self.draws);
+        let stop = if is_sample { Stop::Draw } else { Stop::Stir };
+        self.planned.push_back(stop);
+        self.drawn += 1;
     }
 
     fn arrive(&mut self, t: f64) {
@@ -164,6 +177,15 @@ fn intervals(simulation: &Simulation) -> Result<usize, Error> {
         return Err(Error::setting("output_step", expected, found));
     }
     Ok(intervals as usize)
+}
+
+/// Draws of process noise from one sample to the next.
+fn draws(simulation: &Simulation) -> Result<usize, Error> {
+    match simulation.noise.process_draws {
+        Some(0) => Err(Error::setting("process_draws", "at least 1 per sample", 0)),
+        Some(draws) => Ok(draws),
+        None => Ok(process_draws(simulation).per_sample),
+    }
 }
 
 fn sample_step(simulation: &Simulation) -> Result<f64, Error> {

@@ -7,6 +7,7 @@ use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
 use crate::closed_loop::Source;
 use crate::filter::Limits;
 use crate::noise::{Disturbed, Sensors};
+use crate::relays::{Guards, Watched};
 use crate::routine::Routine;
 use crate::{Error, System};
 
@@ -40,6 +41,43 @@ impl Parts<'_> {
         Ok(Routine::new(symbols.tape(&derivatives)?))
     }
 
+    /// Where plant and observer jump and bend, as functions of the same and of the values of what is
+    /// held, those of the plant first.
+    pub fn guards(&self) -> Result<Option<Arc<Guards>>, Error> {
+        let parts = [Some(self.plant), self.observer];
+        let is_smooth = |s: &System| s.surfaces().is_none() && s.bends().is_none();
+        if parts.into_iter().flatten().all(is_smooth) {
+            return Ok(None);
+        }
+        let g = Graph::new();
+        let symbols = Symbols::new(&g, self);
+        let (u, w) = symbols.inputs(self);
+        let mut watched = Watched::default();
+        let mut take = |system: &System, eval: &dyn Fn(&Tape) -> Vec<Node>| {
+            if let Some((tape, counts)) = system.surfaces() {
+                watched.surfaces.extend(eval(tape));
+                watched.counts.extend(counts);
+            }
+            watched
+                .bends
+                .extend(system.bends().map(eval).unwrap_or_default());
+        };
+        take(self.plant, &|tape| nodes(&symbols.held_plant(tape, &w)));
+        if let Some(observer) = self.observer {
+            let y = symbols.held_plant(self.plant.held_outputs_tape(), &w);
+            let w = symbols.signals(self, &u, &y);
+            take(observer, &|tape| nodes(&symbols.held_observer(tape, &w)));
+        }
+        let inputs = [
+            symbols.all(),
+            nodes(&symbols.plant_held),
+            nodes(&symbols.observer_held),
+        ]
+        .concat();
+        let states = symbols.plant_x.len() + symbols.observer_x.len();
+        Ok(Guards::new(&g, &inputs, states, &watched)?)
+    }
+
     /// The values of a row, in the order of the columns of a run, as functions of the same.
     pub fn row(&self, with_outputs: bool) -> Result<Tape, Error> {
         let g = Graph::new();
@@ -62,6 +100,10 @@ impl Parts<'_> {
     }
 }
 
+fn nodes(expressions: &[Expr<'_>]) -> Vec<Node> {
+    expressions.iter().map(|e| e.node()).collect()
+}
+
 /// The arguments of what is made of the parts.
 struct Symbols<'g> {
     graph: &'g Graph,
@@ -73,6 +115,8 @@ struct Symbols<'g> {
     input_modes: Vec<Expr<'g>>,
     plant_modes: Vec<Expr<'g>>,
     observer_modes: Vec<Expr<'g>>,
+    plant_held: Vec<Expr<'g>>,
+    observer_held: Vec<Expr<'g>>,
 }
 
 impl<'g> Symbols<'g> {
@@ -88,27 +132,49 @@ impl<'g> Symbols<'g> {
             input_modes: fresh(parts.inputs.modes()),
             plant_modes: fresh(parts.plant.modes()),
             observer_modes: fresh(parts.observer.map_or(0, System::modes)),
+            plant_held: fresh(parts.plant.held_modes()),
+            observer_held: fresh(parts.observer.map_or(0, System::held_modes)),
         }
     }
 
-    fn eval(&self, tape: &Tape, arguments: [&[Expr<'g>]; 3]) -> Vec<Expr<'g>> {
-        let all = std::iter::once(&self.time).chain(arguments.into_iter().flatten());
+    fn eval(&self, tape: &Tape, arguments: &[&[Expr<'g>]]) -> Vec<Expr<'g>> {
+        let all = std::iter::once(&self.time).chain(arguments.iter().copied().flatten());
         let nodes: Vec<Node> = all.map(|e| e.node()).collect();
         let values = tape.eval_in(&Nodes(self.graph), &nodes);
         values.into_iter().map(|v| self.graph.expr(v)).collect()
     }
 
     fn plant(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
-        self.eval(tape, [&self.plant_x, w, &self.plant_modes])
+        self.eval(tape, &[&self.plant_x, w, &self.plant_modes])
     }
 
     fn observer(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
-        self.eval(tape, [&self.observer_x, w, &self.observer_modes])
+        self.eval(tape, &[&self.observer_x, w, &self.observer_modes])
+    }
+
+    /// On the sides that are held.
+    fn held_plant(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        self.eval(
+            tape,
+            &[&self.plant_x, w, &self.plant_modes, &self.plant_held],
+        )
+    }
+
+    fn held_observer(&self, tape: &Tape, w: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        self.eval(
+            tape,
+            &[
+                &self.observer_x,
+                w,
+                &self.observer_modes,
+                &self.observer_held,
+            ],
+        )
     }
 
     /// All inputs, then those that the plant reads.
     fn inputs(&self, parts: &Parts<'_>) -> (Vec<Expr<'g>>, Vec<Expr<'g>>) {
-        let u = self.eval(parts.inputs.output_tape(), [&[], &[], &self.input_modes]);
+        let u = self.eval(parts.inputs.output_tape(), &[&self.input_modes]);
         let w = parts.plant_wires.iter().map(|&wire| u[wire]).collect();
         (u, w)
     }
@@ -138,7 +204,8 @@ impl<'g> Symbols<'g> {
         parts.observer_wires.iter().map(signal).collect()
     }
 
-    fn tape(&self, values: &[Expr<'g>]) -> Result<Tape, Error> {
+    /// Everything but what is held.
+    fn all(&self) -> Vec<Node> {
         let of = [
             &self.plant_x,
             &self.observer_x,
@@ -149,8 +216,10 @@ impl<'g> Symbols<'g> {
             &self.observer_modes,
         ];
         let symbols = std::iter::once(&self.time).chain(of.into_iter().flatten());
-        let symbols: Vec<Node> = symbols.map(|e| e.node()).collect();
-        let values: Vec<Node> = values.iter().map(|e| e.node()).collect();
-        Ok(Tape::new(self.graph, &symbols, &values)?)
+        symbols.map(|e| e.node()).collect()
+    }
+
+    fn tape(&self, values: &[Expr<'g>]) -> Result<Tape, Error> {
+        Ok(Tape::new(self.graph, &self.all(), &nodes(values))?)
     }
 }

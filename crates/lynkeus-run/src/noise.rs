@@ -10,6 +10,10 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use crate::Error;
 use crate::filter::Limits;
 
+mod draws;
+
+pub use draws::{ProcessDraws, process_draws};
+
 /// Noise on measured outputs, Gaussian or uniform, drawn anew every `sample_step` and
 /// held in between.
 ///
@@ -28,9 +32,12 @@ pub struct Noise {
     /// how strong, by the output's name; outputs left out are exact
     pub levels: BTreeMap<String, Level>,
     /// process noise: the spectral density q of white noise on a state's derivative (variance per
-    /// unit of time), by the state's name. It is drawn with the samples and held in between, with
-    /// variance q/Δ for a sampling time Δ. Its streams are those of the names with `'` before them
+    /// unit of time), by the state's name. It is drawn with the samples, and so often in between that
+    /// a draw which is held for δ, with variance q/δ, acts as white noise. Its streams are those of the
+    /// names with `'` before them
     pub process: BTreeMap<String, f64>,
+    /// draws of process noise from one sample to the next; as [`process_draws`] finds where it is left out
+    pub process_draws: Option<usize>,
     /// the range that a sensor can show, by the output's name: value and noise beyond an end of it
     /// are shown as that end
     pub limits: BTreeMap<String, Limits>,
@@ -66,6 +73,39 @@ impl Level {
             Level::Relative(share) => (share * value).powi(2),
             Level::Uniform(bound) => bound.powi(2) / 3.0,
         }
+    }
+
+    /// The variance of the noise where the output is known to be `predicted` with a variance
+    /// `spread`: that of a share p is p²E[h²] = p²(ĥ² + spread). With it a linear filter has the least
+    /// variance that one can have, and says which.
+    pub(crate) fn expected_variance(self, predicted: f64, spread: f64) -> f64 {
+        match self {
+            Level::Relative(share) => share.powi(2) * (predicted.powi(2) + spread.max(0.0)),
+            other => other.variance(predicted),
+        }
+    }
+
+    /// The same given a reading that contradicts the prediction: p²E[h²] of what that reading with
+    /// that noise leaves of the prediction, ĥ + aν with a variance (1 − a)·`spread` for the innovation ν
+    /// and the gain a = spread/(spread + noise). The root of a cubic between 0 and 1, by halving.
+    pub(crate) fn variance_after(self, reading: f64, predicted: f64, spread: f64) -> f64 {
+        let Level::Relative(share) = self else {
+            return self.variance(predicted);
+        };
+        let innovation = reading - predicted;
+        let noise = |gain: f64| {
+            let value = predicted + gain * innovation;
+            share * share * (value * value + spread * (1.0 - gain))
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let gain = 0.5 * (low + high);
+            match gain * (spread + noise(gain)) < spread {
+                true => low = gain,
+                false => high = gain,
+            }
+        }
+        noise(high)
     }
 }
 
@@ -106,12 +146,12 @@ pub fn deviate(seed: u64, name: &str) -> f64 {
 }
 
 impl Sensors {
-    /// For a plant with these outputs and states, sampled every `step`.
+    /// For a plant with these outputs and states; process noise is held for `hold`.
     pub(crate) fn new(
         noise: &Noise,
         outputs: &[String],
         states: &[String],
-        step: f64,
+        hold: f64,
     ) -> Result<Self, Error> {
         for (name, level) in &noise.levels {
             if !outputs.contains(name) {
@@ -134,7 +174,7 @@ impl Sensors {
         let wander = |name: &String| {
             let density = *noise.process.get(name).filter(|density| **density > 0.0)?;
             Some(Wander {
-                deviation: (density / step).sqrt(),
+                deviation: (density / hold).sqrt(),
                 stream: stream(noise.seed, &format!("'{name}")),
                 deviate: 0.0,
             })
@@ -211,11 +251,16 @@ impl Sensors {
         sensors.chain(self.moved().map(|state| self.drive(state)))
     }
 
-    /// Draws the next sample of every channel.
-    pub(crate) fn draw(&mut self) {
+    /// Draws what moves the states from here on.
+    pub(crate) fn stir(&mut self) {
         for wander in self.process.iter_mut().flatten() {
             wander.deviate = StandardNormal.sample(&mut wander.stream);
         }
+    }
+
+    /// Draws the next sample of every channel, and what moves the states.
+    pub(crate) fn draw(&mut self) {
+        self.stir();
         for channel in self.channels.iter_mut().flatten() {
             channel.deviate = match channel.level {
                 Level::Absolute(_) | Level::Relative(_) => {

@@ -2,7 +2,7 @@
 
 use crate::divergence::{Bound, deviation_diverged};
 use crate::driven::Driven;
-use crate::filter::Health;
+use crate::filter::{Health, Innovation, Reading};
 use crate::intake::Sample;
 use crate::runner::Runner;
 use crate::snapshot::{Damaged, Persist, Walk};
@@ -65,6 +65,12 @@ pub(crate) struct Sampled {
     predict: bool,
     bound: Bound,
     spread: Option<Spread>,
+    /// the same by what is declared alone, where readings are judged and more is supposed
+    judging: Option<Spread>,
+    /// the same from an exact start, where readings are judged
+    settled: Option<Spread>,
+    /// of the last readings; empty where they are not judged
+    innovations: Vec<Innovation>,
     health: Health,
 }
 
@@ -95,6 +101,10 @@ impl Sampled {
         let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
         signals.extend(tuned);
         let spread = errors.as_ref().map(|model| Spread::new(model, method));
+        let judged = errors.as_ref().filter(|model| model.expects());
+        let judging = errors.as_ref().and_then(ErrorModel::judging);
+        let judging = judging.map(|model| Spread::new(&model, method));
+        let settled = judged.map(|model| Spread::new(&model.settled(), method));
         Ok(Self {
             driven: Driven::new(system, BetweenSamples::Hold),
             integrator: Integrator::new(method, system.states().len())?,
@@ -105,6 +115,12 @@ impl Sampled {
             predict: *predict,
             bound: Bound::new(system.start()),
             spread: spread.transpose()?,
+            judging: judging.transpose()?,
+            innovations: match judged.is_some() {
+                true => vec![Innovation::default(); count],
+                false => vec![],
+            },
+            settled: settled.transpose()?,
             health: Health::of(count),
         })
     }
@@ -121,7 +137,12 @@ impl Sampled {
             *follows = f64::from(u8::from(self.predict || !reading.is_finite()));
         }
         self.driven.start(&self.signals);
-        if let Some(spread) = &mut self.spread {
+        for spread in self
+            .spread
+            .iter_mut()
+            .chain(&mut self.judging)
+            .chain(&mut self.settled)
+        {
             spread.start(&self.signals);
         }
     }
@@ -133,6 +154,32 @@ impl Sampled {
         match self.outputs.iter().all(|v| v.is_finite()) {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
+        }
+    }
+
+    /// What is said of readings before they count.
+    fn expect(&mut self, sample: &Sample<'_>) {
+        let spread = self.judging.as_mut().or(self.spread.as_mut());
+        let (Some(spread), Some(settled)) = (spread, &mut self.settled) else {
+            return;
+        };
+        let expected = spread.expected(sample.t, &self.x, &self.signals);
+        let settled = settled.expected(sample.t, &self.x, &self.signals);
+        let expected: Vec<_> = expected.into_iter().zip(settled).collect();
+        for (i, innovation) in self.innovations.iter_mut().enumerate() {
+            let reading = sample.readings.get(i).copied().unwrap_or(f64::NAN);
+            *innovation = match expected.get(i) {
+                Some(&((predicted, deviation), (_, settled))) if reading.is_finite() => {
+                    Innovation {
+                        value: reading - predicted,
+                        deviation,
+                        settled,
+                        predicted,
+                        reading: Reading::Taken,
+                    }
+                }
+                _ => Innovation::default(),
+            };
         }
     }
 
@@ -152,17 +199,24 @@ impl Runner for Sampled {
     }
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
-        match &mut self.spread {
+        for settled in self.judging.iter_mut().chain(&mut self.settled) {
+            settled.advance(from, sample.t, &mut self.x.clone())?;
+        }
+        let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample.t, &mut self.x),
             None => self
                 .integrator
                 .advance(&mut self.driven, from, sample.t, &mut self.x),
-        }
+        };
+        let scale = self.bound.scale();
+        let evaluation = &mut self.driven.evaluation;
+        done.map_err(|error| evaluation.explained(error, &self.x, scale))
     }
 
     fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {
         self.health.inputs_held += sample.held;
         self.start(sample);
+        self.expect(sample);
         let first = self.x.len() - self.sensors;
         for (i, reading) in sample.readings.iter().enumerate() {
             let sensor = &mut self.health.sensors[i];
@@ -170,11 +224,19 @@ impl Runner for Sampled {
                 sensor.missing += 1;
                 continue;
             }
-            sensor.taken += 1;
-            self.x[first + i] = *reading;
-            if let Some(spread) = &mut self.spread {
-                spread.reset(i, *reading);
+            match self.innovations.get(i) {
+                Some(innovation) if innovation.deviation > 0.0 => sensor.count(innovation),
+                _ => sensor.taken += 1,
             }
+            self.x[first + i] = *reading;
+        }
+        for spread in self
+            .spread
+            .iter_mut()
+            .chain(&mut self.judging)
+            .chain(&mut self.settled)
+        {
+            spread.reset(sample.t, &self.x, sample.readings);
         }
         self.bound.see(&self.x[first..]);
         self.bound.see(sample.inputs);
@@ -184,8 +246,12 @@ impl Runner for Sampled {
     fn report(&mut self, t: f64) -> Result<(), Error> {
         let own = self.x.len() - self.sensors;
         let names = self.driven.evaluation.system().states();
-        self.bound
-            .check(t, names, &self.x[..own], || self.integrator.hint())?;
+        let inside = self
+            .bound
+            .check(t, names, &self.x[..own], || self.integrator.hint());
+        let scale = self.bound.scale();
+        let evaluation = &mut self.driven.evaluation;
+        inside.map_err(|error| evaluation.explained(error, &self.x, scale))?;
         self.evaluate(t)?;
         let Some(spread) = &mut self.spread else {
             return Ok(());
@@ -210,6 +276,10 @@ impl Runner for Sampled {
         self.spread.as_ref().map(|spread| &spread.deviations[..])
     }
 
+    fn innovations(&self) -> &[Innovation] {
+        &self.innovations
+    }
+
     fn health(&self) -> &Health {
         &self.health
     }
@@ -222,8 +292,16 @@ impl Persist for Sampled {
         walk.numbers(&mut self.x)?;
         walk.numbers(&mut self.outputs)?;
         self.bound.walk(walk)?;
-        if let Some(spread) = &mut self.spread {
+        for spread in self
+            .spread
+            .iter_mut()
+            .chain(&mut self.judging)
+            .chain(&mut self.settled)
+        {
             spread.walk(walk)?;
+        }
+        for innovation in &mut self.innovations {
+            innovation.walk(walk)?;
         }
         self.health.walk(walk)
     }

@@ -123,7 +123,7 @@ impl Run {
             &simulation.noise,
             plant.outputs(),
             plant.states(),
-            itinerary.sample_step(),
+            itinerary.hold(),
         )?;
         let system = Loop::new(simulation, sensors)?;
         let x = system.start();
@@ -147,9 +147,13 @@ impl Run {
         while let Some(stop) = self.itinerary.next() {
             match stop {
                 Stop::Draw => self.system.draw(),
+                Stop::Stir => self.system.stir(),
                 Stop::Advance { from, to } => {
-                    self.integrator
-                        .advance(&mut self.system, from, to, &mut self.x)?;
+                    let done = self
+                        .integrator
+                        .advance(&mut self.system, from, to, &mut self.x);
+                    let scale = self.bound.scale();
+                    done.map_err(|error| self.system.explained(error, &self.x, scale))?;
                 }
                 Stop::Row(time) => {
                     take(time, self.record(time)?);
@@ -169,8 +173,11 @@ impl Run {
         self.system.row(t, &self.x, &mut self.row)?;
         let (names, estimate) = self.system.estimate(&self.x);
         self.bound.see(&self.row[..self.system.known_columns()]);
-        self.bound
-            .check(t, names, estimate, || self.integrator.hint())?;
+        let inside = self
+            .bound
+            .check(t, names, estimate, || self.integrator.hint());
+        let scale = self.bound.scale();
+        inside.map_err(|error| self.system.explained(error, &self.x, scale))?;
         Ok(&self.row)
     }
 }

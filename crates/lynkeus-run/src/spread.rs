@@ -1,25 +1,47 @@
 //! How an observer's error spreads, for standard deviations.
 
+use std::collections::{BTreeMap, HashMap};
+
 use lynkeus_expr::{Graph, Node, jacobian};
 
 use crate::filter::Belief;
 use crate::filter::extended::Extended;
 use crate::filter::root::Root;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{BetweenSamples, Dynamics, Error, EstimatorSettings, Level, Method, System};
+use crate::{
+    BetweenSamples, Dynamics, Error, EstimatorSettings, Evaluation, Level, Method, System,
+};
 
-/// The linearised error of an observer z' = F(t, z, u), x̂ = g(z): e' = (∂F/∂z) e + white
-/// noise, driven by the declared noises of plant and sensors.
+/// The linearised error of a [sampled observer](crate::SampledObserver) z' = F(t, z, u, w), x̂ = g(z),
+/// driven by the declared noises of plant and sensors.
+///
+/// The error of a measurement w is counted from what the estimate expects, as the innovation ν = w − h(x̂):
+/// process noise moves the plant and its output alike, so that in (z, ν) it acts on the estimated
+/// states alone, between samples as well. A reading with noise v leaves ν = v − C e, C = ∂h/∂x̂.
+///
+/// A measurement that is held falls behind the plant by ẏ = L_f h(x), x = x̂ − e. Its part L_f h(x̂) is
+/// no noise; it is known along the estimate, and counts as the share of one more quantity, the lag, whose
+/// size is 1: deviations are then roots of the mean square error, as if e were independent of x̂, as that
+/// of a filter is.
 #[derive(Clone, Debug)]
 pub struct ErrorModel {
-    /// the observer; its outputs are the entries of ∂F/∂z, then those of ∂g/∂z
+    /// the observer; its outputs are the entries of its Jacobian in (z, ν), then those of ∂g/∂z, then
+    /// those of ∂h/∂z
     flow: System,
     flow_entries: Vec<(usize, usize)>,
     estimate_entries: Vec<(usize, usize)>,
+    reading_entries: Vec<(usize, usize)>,
     estimates: usize,
     process_noise: Vec<f64>,
+    declared: Vec<f64>,
     initial_variance: Vec<f64>,
+    /// place of the lag
+    lag: Option<usize>,
     noise: Vec<Level>,
+    /// what each sensor should read: without states, its signals are z and the observer's signals,
+    /// its outputs h(x̂), then the entries of ∂h/∂z; none where readings are not judged
+    expected: Option<System>,
+    expected_entries: Vec<(usize, usize)>,
 }
 
 /// What acts on an observer's error.
@@ -27,29 +49,142 @@ pub struct ErrorModel {
 pub struct ErrorNoise {
     /// spectral density on each state
     pub process: Vec<f64>,
+    /// the same as declared, by which readings are judged: what is only supposed excuses nothing
+    pub declared: Vec<f64>,
     /// variance of each state at the start
     pub initial: Vec<f64>,
     /// of each sensor
     pub sensors: Vec<Level>,
 }
 
+/// The equations of a [sampled observer](crate::SampledObserver).
+#[derive(Clone, Copy, Debug)]
+pub struct ErrorEquations<'a> {
+    /// of all nodes
+    pub graph: &'a Graph,
+    /// the symbol of time
+    pub time: Node,
+    /// names, symbols and starts of the states z, then of the measurements w
+    pub states: &'a [(String, Node, f64)],
+    /// names and symbols
+    pub signals: &'a [(String, Node)],
+    /// z', then w'
+    pub derivatives: &'a [Node],
+    /// g(z)
+    pub estimates: &'a [Node],
+    /// h(x̂), one for each w
+    pub outputs: &'a [Node],
+    /// where measurements are held
+    pub lag: Option<Lag<'a>>,
+}
+
+/// How measurements that are held fall behind.
+#[derive(Clone, Copy, Debug)]
+pub struct Lag<'a> {
+    /// place of a state whose derivative is 0 and whose initial variance is 1
+    pub state: usize,
+    /// L_f h(x̂), one for each w
+    pub rates: &'a [Node],
+}
+
+/// A matrix by its places.
+type Entries = BTreeMap<(usize, usize), Node>;
+
+impl ErrorEquations<'_> {
+    fn own(&self) -> usize {
+        self.states.len().saturating_sub(self.outputs.len())
+    }
+
+    fn symbols(&self) -> Vec<Node> {
+        self.states.iter().map(|s| s.1).collect()
+    }
+
+    /// C = ∂h/∂z.
+    fn views(&self) -> Entries {
+        let symbols = self.symbols();
+        let views = jacobian::forward(self.graph, self.outputs, &symbols[..self.own()]);
+        let places = views.entries.into_iter();
+        places.map(|(i, j, c)| ((i, j), c)).collect()
+    }
+
+    /// The Jacobian of nodes by (z, ν). w = ν + h(x̂) is put in its place first, so that what a
+    /// correction has of x̂ goes out before a gain multiplies it.
+    fn slopes(&self, nodes: &[Node]) -> Entries {
+        let graph = self.graph;
+        let mut symbols = self.symbols();
+        let (mut there, mut back) = (HashMap::new(), HashMap::new());
+        for (w, output) in symbols.iter_mut().skip(self.own()).zip(self.outputs) {
+            let innovation = graph.fresh("innovation");
+            let expected = graph.expr(*output);
+            there.insert(*w, (innovation + expected).node());
+            back.insert(innovation.node(), (graph.expr(*w) - expected).node());
+            *w = innovation.node();
+        }
+        let nodes = graph.substitute(nodes, &there);
+        let slopes = jacobian::forward(graph, &nodes, &symbols).entries;
+        let values: Vec<Node> = slopes.iter().map(|entry| entry.2).collect();
+        let values = graph.substitute(&values, &back);
+        let places = slopes.iter().map(|&(i, j, _)| (i, j));
+        places.zip(values).collect()
+    }
+
+    fn add(&self, entries: &mut Entries, place: (usize, usize), node: Node) {
+        let graph = self.graph;
+        let sum = entries.get(&place).map_or(node, |before| {
+            (graph.expr(*before) + graph.expr(node)).node()
+        });
+        entries.insert(place, sum);
+    }
+
+    /// z' and ν' = L_f h(x̂) − (h(x̂))', to which a measurement that is held adds its lag.
+    fn rates(&self) -> Vec<Node> {
+        let (graph, own) = (self.graph, self.own());
+        let moving = std::iter::once(self.time).chain(self.symbols().into_iter().take(own));
+        let one = graph.constant(1.0).node();
+        let motion = std::iter::once(one).chain(self.derivatives.iter().copied().take(own));
+        let (moving, motion): (Vec<_>, Vec<_>) = (moving.collect(), motion.collect());
+        let expected = jacobian::along(graph, self.outputs, &moving, &motion);
+        let following = self.derivatives.get(own..).unwrap_or_default();
+        let following = self.lag.map_or(following, |lag| lag.rates);
+        let both = following.iter().zip(expected);
+        let innovations = both.map(|(w, y)| (graph.expr(*w) - graph.expr(y)).node());
+        let own = self.derivatives.iter().copied().take(own);
+        own.chain(innovations).collect()
+    }
+
+    /// The Jacobian of the flow in (z, ν), with what holding leaves behind.
+    fn flow(&self) -> Entries {
+        let (graph, own) = (self.graph, self.own());
+        let mut flow = self.slopes(&self.rates());
+        if let Some(lag) = &self.lag {
+            let held = self.derivatives.iter().skip(own).zip(lag.rates).enumerate();
+            for (sensor, (w, rate)) in held {
+                let behind = graph.expr(*w) - graph.expr(*rate);
+                self.add(&mut flow, (own + sensor, lag.state), behind.node());
+            }
+        }
+        flow
+    }
+}
+
 impl ErrorModel {
-    /// Compiles the linearisation of an observer: its states (the last ones are the held
-    /// measurements), signals and derivatives, and its estimates.
+    /// Compiles the linearisation of an observer.
     ///
     /// # Errors
     /// [`Error::MissingInput`], and [`Error::Setting`] for wrong numbers of noises.
-    pub fn new(
-        graph: &Graph,
-        time: Node,
-        states: &[(String, Node, f64)],
-        signals: &[(String, Node)],
-        derivatives: &[Node],
-        estimates: &[Node],
-        noise: ErrorNoise,
-    ) -> Result<Self, Error> {
+    pub fn new(equations: ErrorEquations<'_>, noise: ErrorNoise) -> Result<Self, Error> {
+        let ErrorEquations {
+            graph,
+            time,
+            states,
+            signals,
+            derivatives,
+            estimates,
+            ..
+        } = equations;
         for (what, count) in [
             ("process noise", noise.process.len()),
+            ("declared process noise", noise.declared.len()),
             ("initial variance", noise.initial.len()),
         ] {
             if count != states.len() {
@@ -57,34 +192,68 @@ impl ErrorModel {
                 return Err(Error::setting(what, expected, count));
             }
         }
-        let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
-        let F = jacobian::forward(graph, derivatives, &symbols);
-        let G = jacobian::forward(graph, estimates, &symbols);
-        let entries = F.entries.iter().chain(&G.entries);
-        let outputs: Vec<(String, Node)> = entries
-            .map(|&(i, j, node)| (format!("{i},{j}"), node))
+        let views = equations.views();
+        let all = [equations.flow(), equations.slopes(estimates), views];
+        let outputs: Vec<(String, Node)> = all
+            .iter()
+            .flatten()
+            .map(|((i, j), node)| (format!("{i},{j}"), *node))
             .collect();
-        let places =
-            |entries: &[(usize, usize, Node)]| entries.iter().map(|e| (e.0, e.1)).collect();
+        let [flow_entries, estimate_entries, reading_entries] =
+            all.map(|entries| entries.into_keys().collect());
         Ok(Self {
             flow: System::new(graph, time, states, signals, derivatives, &outputs)?,
-            flow_entries: places(&F.entries),
-            estimate_entries: places(&G.entries),
+            flow_entries,
+            estimate_entries,
+            reading_entries,
             estimates: estimates.len(),
             process_noise: noise.process,
+            declared: noise.declared,
             initial_variance: noise.initial,
+            lag: equations.lag.map(|lag| lag.state),
             noise: noise.sensors,
+            expected: None,
+            expected_entries: vec![],
+        })
+    }
+
+    /// Readings are judged by what the observer makes of them, h(x̂): one node per sensor. States
+    /// and signals are those of [`new`](Self::new).
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`].
+    pub fn expecting(
+        self,
+        graph: &Graph,
+        time: Node,
+        states: &[(String, Node, f64)],
+        signals: &[(String, Node)],
+        outputs: &[Node],
+    ) -> Result<Self, Error> {
+        let symbols: Vec<Node> = states.iter().map(|s| s.1).collect();
+        let slopes = jacobian::forward(graph, outputs, &symbols);
+        let values = outputs.iter().chain(slopes.entries.iter().map(|e| &e.2));
+        let values: Vec<(String, Node)> = values
+            .enumerate()
+            .map(|(i, node)| (format!("{i}"), *node))
+            .collect();
+        let own = states.iter().map(|(name, node, _)| (name.clone(), *node));
+        let read: Vec<(String, Node)> = own.chain(signals.iter().cloned()).collect();
+        Ok(Self {
+            expected: Some(System::new(graph, time, &[], &read, &[], &values)?),
+            expected_entries: slopes.entries.iter().map(|e| (e.0, e.1)).collect(),
+            ..self
         })
     }
 }
 
 impl ErrorModel {
-    /// The observer; its outputs are the entries of ∂F/∂z, then those of ∂g/∂z.
+    /// The observer; its outputs are the entries of its Jacobian, then those of ∂g/∂z, then of ∂h/∂z.
     pub fn flow(&self) -> &System {
         &self.flow
     }
 
-    /// Places (row, column) of the entries of ∂F/∂z.
+    /// Places (row, column) of the entries of the Jacobian, by states and innovations.
     pub fn flow_entries(&self) -> &[(usize, usize)] {
         &self.flow_entries
     }
@@ -94,15 +263,56 @@ impl ErrorModel {
         &self.estimate_entries
     }
 
+    /// Places of the entries of ∂h/∂z.
+    pub fn reading_entries(&self) -> &[(usize, usize)] {
+        &self.reading_entries
+    }
+
     /// Number of estimates, the rows of ∂g/∂z.
     pub fn estimates(&self) -> usize {
         self.estimates
+    }
+
+    /// The same that judges no reading.
+    #[must_use]
+    pub fn without_readings(self) -> Self {
+        Self {
+            expected: None,
+            expected_entries: vec![],
+            ..self
+        }
+    }
+
+    /// The same by what is declared alone, where more is supposed.
+    pub(crate) fn judging(&self) -> Option<Self> {
+        let differs = self.expects() && self.declared != self.process_noise;
+        differs.then(|| Self {
+            process_noise: self.declared.clone(),
+            ..self.clone()
+        })
+    }
+
+    /// The same by what is declared alone, from an exact start.
+    pub(crate) fn settled(&self) -> Self {
+        let starts = self.initial_variance.iter().enumerate();
+        let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
+        Self {
+            initial_variance: starts.collect(),
+            process_noise: self.declared.clone(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether readings are judged.
+    pub(crate) fn expects(&self) -> bool {
+        self.expected.is_some()
     }
 
     /// What acts on the error.
     pub fn noise(&self) -> ErrorNoise {
         ErrorNoise {
             process: self.process_noise.clone(),
+            declared: self.declared.clone(),
             initial: self.initial_variance.clone(),
             sensors: self.noise.clone(),
         }
@@ -111,22 +321,36 @@ impl ErrorModel {
     /// What acts on the error, as text.
     pub(crate) fn noises(&self) -> String {
         format!(
-            "{:?} {:?} {:?}",
-            self.process_noise, self.initial_variance, self.noise
+            "{:?} {:?} {:?} {:?}",
+            self.process_noise, self.declared, self.initial_variance, self.noise
         )
     }
 }
 
-/// The covariance of an observer's states along its run.
+/// The covariance of an observer's states, and of its innovations, along its run.
 #[derive(Clone, Debug)]
 pub(crate) struct Spread {
     engine: Extended,
     belief: Belief,
-    entries: Vec<(usize, usize)>,
+    /// of ∂g/∂z
+    estimates: Vec<(usize, usize)>,
+    /// of ∂h/∂z
+    readings: Vec<(usize, usize)>,
+    /// entries of the Jacobian, which come before
     skipped: usize,
     values: Vec<f64>,
     noise: Vec<Level>,
+    expected: Option<Expected>,
     pub deviations: Vec<f64>,
+}
+
+/// What sensors should read.
+#[derive(Clone, Debug)]
+struct Expected {
+    evaluation: Evaluation,
+    entries: Vec<(usize, usize)>,
+    /// h(x̂), then the entries of ∂h/∂z
+    values: Vec<f64>,
 }
 
 impl Persist for Spread {
@@ -149,10 +373,16 @@ impl Spread {
                 x: model.flow.start().to_vec(),
                 root: Root::diagonal(&model.initial_variance),
             },
-            entries: model.estimate_entries.clone(),
+            estimates: model.estimate_entries.clone(),
+            readings: model.reading_entries.clone(),
             skipped: model.flow_entries.len(),
             values: vec![0.0; model.flow.outputs().len()],
             noise: model.noise.clone(),
+            expected: model.expected.as_ref().map(|system| Expected {
+                evaluation: system.evaluation(),
+                entries: model.expected_entries.clone(),
+                values: vec![0.0; system.outputs().len()],
+            }),
             deviations: vec![0.0; model.estimates],
         })
     }
@@ -165,26 +395,88 @@ impl Spread {
     /// State and covariance to a time.
     pub fn advance(&mut self, from: f64, to: f64, x: &mut [f64]) -> Result<(), Error> {
         self.belief.x.copy_from_slice(x);
-        self.engine.predict(&mut self.belief, from, to, false)?;
+        let done = self.engine.predict(&mut self.belief, from, to, false);
+        // where an error ends it early, as far as it came
         x.copy_from_slice(&self.belief.x);
-        Ok(())
+        done.map(|_| ())
     }
 
-    /// The held measurement of a sensor (its place among them) is a new reading, with an error
-    /// of its own.
-    pub fn reset(&mut self, sensor: usize, reading: f64) {
+    /// The measurements of the sensors that report are new readings, with errors of their own; z is
+    /// after them.
+    pub fn reset(&mut self, t: f64, z: &[f64], readings: &[f64]) {
+        let evaluation = &mut self.engine.driven.evaluation;
+        evaluation.enter(t);
+        evaluation.outputs(t, z, &mut self.values);
+        for (sensor, reading) in readings.iter().enumerate() {
+            if reading.is_finite() {
+                self.read(sensor, *reading);
+            }
+        }
+    }
+
+    /// ν = v − C e.
+    fn read(&mut self, sensor: usize, reading: f64) {
         let root = &mut self.belief.root;
         let n = root.n;
         let state = n - self.noise.len() + sensor;
-        let variance = self.noise[sensor].variance(reading);
-        root.entries[state * n..(state + 1) * n].fill(0.0);
+        let deviation = self.noise[sensor].variance(reading).sqrt();
+        let mut expected = vec![0.0; n];
+        let values = &self.values[self.skipped + self.estimates.len()..];
+        let views = self.readings.iter().zip(values);
+        for (&(_, j), c) in views.filter(|((i, _), _)| *i == sensor) {
+            for (expected, s) in expected.iter_mut().zip(root.row(j)) {
+                *expected -= c * s;
+            }
+        }
+        root.entries[state * n..(state + 1) * n].copy_from_slice(&expected);
         // one column more for the new error, then back to n
         let mut rows: Vec<f64> = (0..n)
             .flat_map(|k| (0..n).map(move |i| (i, k)))
             .map(|(i, k)| root.entries[i * n + k])
             .collect();
-        rows.extend((0..n).map(|i| if i == state { variance.sqrt() } else { 0.0 }));
+        rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
         root.of_rows(&mut rows);
+    }
+
+    /// What is expected of the sensors at (t, z) under the signals, before they are read there: h(x̂)
+    /// with the standard deviation of a reading around it, √(HPHᵀ + R). Nothing where readings are not
+    /// judged, or the model has no value.
+    pub fn expected(&mut self, t: f64, z: &[f64], signals: &[f64]) -> Vec<(f64, f64)> {
+        let Some(expected) = &mut self.expected else {
+            return vec![];
+        };
+        let read = expected.evaluation.signals_mut();
+        let (own, others) = read.split_at_mut(z.len());
+        own.copy_from_slice(z);
+        others.copy_from_slice(signals);
+        expected.evaluation.enter(t);
+        expected.evaluation.outputs(t, &[], &mut expected.values);
+        if expected.values.iter().any(|v| !v.is_finite()) {
+            return vec![];
+        }
+        let (values, slopes) = expected.values.split_at(self.noise.len());
+        let n = self.belief.root.n;
+        let mut projected = vec![0.0; n];
+        let each = |(i, (value, noise)): (usize, (&f64, &Level))| {
+            let mut row = vec![0.0; n];
+            for (&(_, j), slope) in expected
+                .entries
+                .iter()
+                .zip(slopes)
+                .filter(|(e, _)| e.0 == i)
+            {
+                row[j] = *slope;
+            }
+            self.belief.root.transposed_times(&row, &mut projected);
+            let own: f64 = projected.iter().map(|p| p * p).sum();
+            (*value, (own + noise.variance(*value)).sqrt())
+        };
+        values
+            .iter()
+            .zip(&self.noise)
+            .enumerate()
+            .map(each)
+            .collect()
     }
 
     /// The standard deviations of the estimates at (t, z).
@@ -196,7 +488,7 @@ impl Spread {
         let mut projected = vec![0.0; n];
         for (i, deviation) in self.deviations.iter_mut().enumerate() {
             let mut row = vec![0.0; n];
-            let values = self.entries.iter().zip(&self.values[self.skipped..]);
+            let values = self.estimates.iter().zip(&self.values[self.skipped..]);
             for (&(_, j), value) in values.filter(|((estimate, _), _)| *estimate == i) {
                 row[j] = *value;
             }
@@ -205,3 +497,6 @@ impl Spread {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

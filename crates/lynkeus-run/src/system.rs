@@ -7,11 +7,11 @@ use std::sync::{Arc, Mutex};
 
 use lynkeus_expr::{Graph, Node, Tape};
 
-use crate::Error;
-use crate::relays::{Held, Taken, take};
+use crate::relays::{Guards, Held, Taken, Watched, bends, take};
 use crate::routine::Routine;
 use crate::snapshot::Digest;
 use crate::switches::Switches;
+use crate::{Error, Margin};
 pub use evaluation::Evaluation;
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
@@ -24,6 +24,7 @@ pub use evaluation::Evaluation;
 pub struct System {
     code: Arc<Code>,
     start: Vec<f64>,
+    margins: Arc<[Margin]>,
 }
 
 #[derive(Debug)]
@@ -37,6 +38,10 @@ struct Code {
     modes: usize,
     /// the same with what jumps with the state held; none where nothing does
     held: Option<HeldCode>,
+    /// where it jumps and bends with the state, over the same inputs and the modes of what is held
+    guards: Option<Arc<Guards>>,
+    /// the functions of the guards' bends, of these inputs; none where there are none
+    bends_at: Option<Tape>,
     /// only to name an operation in an error
     graph: Mutex<Graph>,
 }
@@ -53,11 +58,10 @@ struct HeldCode {
 
 impl HeldCode {
     fn new(graph: &Graph, inputs: &[Node], taken: Taken, states: usize) -> Result<Self, Error> {
-        let inputs = [inputs, &taken.modes].concat();
         let (dx, y) = taken.roots.split_at(states);
         Ok(Self {
-            derivatives_at: Routine::new(Tape::new(graph, &inputs, dx)?),
-            outputs_at: Routine::new(Tape::new(graph, &inputs, y)?),
+            derivatives_at: Routine::new(Tape::new(graph, inputs, dx)?),
+            outputs_at: Routine::new(Tape::new(graph, inputs, y)?),
             held: taken.held,
             modes: taken.modes.len(),
         })
@@ -107,8 +111,25 @@ impl System {
         let extracted = Switches::extract(&own, image[&time], &roots)?;
         let moving = inputs.clone();
         inputs.extend(&extracted.modes);
-        let jumping = take(&own, &moving, &inputs, &extracted.roots)?;
-        let held = |taken| HeldCode::new(&own, &inputs, taken, derivatives.len());
+        let jumping = take(&own, &moving, &inputs, &extracted.roots, derivatives.len())?;
+        let modes = jumping.as_ref().map_or(&[][..], |taken| &taken.modes);
+        let all = [&inputs[..], modes].concat();
+        let smooth = jumping.as_ref().map_or(&extracted.roots, |t| &t.roots);
+        let bends = bends(&own, &moving[1..], &smooth[..derivatives.len()]);
+        let bends_at = match bends.is_empty() {
+            true => None,
+            false => Some(Tape::new(&own, &all, &bends)?),
+        };
+        let mut watched = Watched {
+            bends,
+            ..Watched::default()
+        };
+        if let Some(taken) = &jumping {
+            (watched.surfaces, watched.counts) =
+                (taken.surfaces.clone(), taken.held.counts.clone());
+        }
+        let guards = Guards::new(&own, &all, states.len(), &watched)?;
+        let held = |taken| HeldCode::new(&own, &all, taken, derivatives.len());
         let held = jumping.map(held).transpose()?;
         let (dx, y) = extracted.roots.split_at(derivatives.len());
         let code = Code {
@@ -120,6 +141,8 @@ impl System {
             modes: extracted.modes.len(),
             switches: extracted.switches,
             held,
+            guards,
+            bends_at,
             graph: Mutex::new(own),
         };
         let start = states.iter().map(|(.., value)| *value).collect();
@@ -127,6 +150,7 @@ impl System {
         Self {
             code,
             start: vec![],
+            margins: Arc::default(),
         }
         .with_start(start)
     }
@@ -150,6 +174,14 @@ impl System {
         }
         self.start = start;
         Ok(self)
+    }
+
+    /// The same system with outputs that say how far its matrices are from singular: a run that
+    /// cannot go on near such a place ends in [`Error::Singular`].
+    #[must_use]
+    pub fn with_margins(mut self, margins: Vec<Margin>) -> Self {
+        self.margins = margins.into();
+        self
     }
 
     /// Names of the states.
@@ -208,6 +240,28 @@ impl System {
     /// (t, x, w, [modes](System::modes)) → y.
     pub fn output_tape(&self) -> &Tape {
         self.code.outputs_at.tape()
+    }
+
+    /// (t, x, w, modes, held modes) → y on the sides of the surfaces that are held: the plain ones where nothing jumps with the state.
+    pub(crate) fn held_outputs_tape(&self) -> &Tape {
+        let held = self.code.held.as_ref();
+        held.map_or(self.output_tape(), |held| held.outputs_at.tape())
+    }
+
+    /// What vanishes on the surfaces, of the same inputs, and which of them belong to a `floor`.
+    pub(crate) fn surfaces(&self) -> Option<(&Tape, &[bool])> {
+        let held = &self.code.held.as_ref()?.held;
+        Some((&held.surfaces, &held.counts))
+    }
+
+    /// What vanishes where x' bends with the state, of the same inputs.
+    pub(crate) fn bends(&self) -> Option<&Tape> {
+        self.code.bends_at.as_ref()
+    }
+
+    /// How many operations jump with the state.
+    pub(crate) fn held_modes(&self) -> usize {
+        self.code.held.as_ref().map_or(0, |held| held.modes)
     }
 
     /// How many values the switches in time have: what jumps with time alone is an input of the

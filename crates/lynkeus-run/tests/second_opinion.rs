@@ -241,7 +241,6 @@ fn ukf() {
         beta: 2.0,
         kappa: 1.0,
     };
-    let Q = Matrix::new([[STEP * DENSITIES[0], 0.0], [0.0, STEP * DENSITIES[1]]]);
     for plant in [LINEAR, PENDULUM] {
         let mut cubature = plant.filter(FilterKind::Unscented(SigmaPoints::default()));
         let mut unscented = plant.filter(FilterKind::Unscented(spread));
@@ -253,8 +252,11 @@ fn ukf() {
             let flow = |x: &State| plant.flown(x).x;
             let carried = carried(ckf.state(), ckf.covariance(), flow);
             if k > 0 {
-                ckf.predict(flow, Some(&Q)).unwrap();
-                ukf.predict(flow, Some(&Q)).unwrap();
+                // what the process noise comes to along each estimate
+                let noise = |x: &State| plant.flown(x).noise;
+                let (of_ckf, of_ukf) = (noise(ckf.state()), noise(ukf.state()));
+                ckf.predict(flow, Some(&of_ckf)).unwrap();
+                ukf.predict(flow, Some(&of_ukf)).unwrap();
             }
             let before = (*ckf.state(), *ckf.covariance());
             let z = Vector::from_array(y);

@@ -7,10 +7,12 @@
 
 use lynkeus_expr::{MissingInput, Node, jacobian};
 
-use crate::{Extended, Verdict, sign};
+use crate::{Extended, Verdict, magnitude_within, sign};
 
 /// States beyond which nothing is tried.
 const STATES: usize = 300;
+/// Cells examined for the size of a slope.
+const CELLS: usize = 400;
 
 /// Per extended state whether it is known everywhere by that argument. False says nothing.
 ///
@@ -49,6 +51,57 @@ pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
         };
         open.remove(place);
         known[j] = sign::keeps_sign(graph, slope, &region)?.finding.verdict == Verdict::Proved;
+    }
+}
+
+/// Per extended state how far two of its values can be apart that the same outputs go with, where that is
+/// known: zero for those of `known`, what is `given` for some (place, size), and what follows from these by an output,
+/// or by the derivative of a known state, along a slope that never vanishes.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn uncertain(
+    extended: &Extended<'_>,
+    known: &[bool],
+    given: &[(usize, f64)],
+) -> Result<Vec<Option<f64>>, MissingInput> {
+    let (graph, region) = (extended.graph(), extended.region());
+    let mut sizes: Vec<Option<f64>> = known.iter().map(|known| known.then_some(0.0)).collect();
+    for &(place, size) in given {
+        sizes[place] = sizes[place].or(Some(size).filter(|size| size.is_finite()));
+    }
+    if sizes.len() > STATES || extended.regularity(&region)?.verdict != Verdict::Proved {
+        return Ok(sizes);
+    }
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = outputs
+        .chain(extended.derivatives.iter().copied())
+        .collect();
+    let slopes = jacobian::forward(graph, &functions, &extended.symbols());
+    let first = extended.outputs.len();
+    let mut open: Vec<usize> = (0..first + extended.plant_states())
+        .filter(|&row| row < first || known[row - first])
+        .collect();
+    loop {
+        let one = |row: usize| {
+            let mut entries = slopes.row(row).filter(|(j, _)| sizes[*j].is_none());
+            entries.next().filter(|_| entries.next().is_none())
+        };
+        let mut next = open.iter().enumerate();
+        let next = next.find_map(|(place, &row)| Some((place, row, one(row)?)));
+        let Some((place, row, (j, slope))) = next.filter(|_| graph.spent().is_none()) else {
+            return Ok(sizes);
+        };
+        open.remove(place);
+        let (least, _) = sign::keeps_sign(graph, slope, &region)?.bounds;
+        let mut sum = 0.0;
+        for (k, slope) in slopes.row(row).filter(|(k, _)| *k != j) {
+            let size = sizes[k].unwrap_or(f64::INFINITY);
+            if size > 0.0 {
+                sum += size * magnitude_within(graph, slope, &region, CELLS)?;
+            }
+        }
+        sizes[j] = Some(sum / least).filter(|size| size.is_finite());
     }
 }
 

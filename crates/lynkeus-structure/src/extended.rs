@@ -115,6 +115,8 @@ pub struct Extended<'p> {
     pub derivatives: Vec<Node>,
     /// inputs the observer knows
     pub inputs: Vec<Variable>,
+    /// per known input: bounds of |u'|, |u''|, …, as many as are known; none where they are not declared
+    pub input_derivatives: Vec<Vec<f64>>,
     /// measured outputs, in the order of the study
     pub outputs: Vec<Measurement>,
     /// row by row which extended states the derivative depends on
@@ -140,7 +142,7 @@ impl<'p> Extended<'p> {
         derivatives.extend(unknown.iter().map(|_| zero));
         let known =
             |v: &&Variable| !sensors.unknown.contains(&v.name) && !silenced.contains_key(&v.node);
-        let inputs = plant.inputs.iter().filter(known).cloned().collect();
+        let inputs: Vec<Variable> = plant.inputs.iter().filter(known).cloned().collect();
         let states: Vec<Variable> = plant.states.iter().cloned().chain(unknown).collect();
         let symbols: Vec<Node> = states.iter().map(|s| s.node).collect();
         let pattern = jacobian::pattern(graph, &derivatives, &symbols);
@@ -156,6 +158,7 @@ impl<'p> Extended<'p> {
             plant,
             states,
             derivatives,
+            input_derivatives: vec![vec![]; inputs.len()],
             inputs,
             outputs,
             pattern,
@@ -206,6 +209,13 @@ impl<'p> Extended<'p> {
                     .collect(),
             }),
         }
+    }
+
+    /// The bound of the derivative of that order, from 1, of a known input; infinite where none is known.
+    pub fn input_derivative(&self, input: usize, order: usize) -> f64 {
+        let bounds = self.input_derivatives.get(input);
+        let bound = bounds.and_then(|bounds| bounds.get(order.checked_sub(1)?));
+        bound.copied().unwrap_or(f64::INFINITY)
     }
 
     /// The graph of the plant.

@@ -135,15 +135,20 @@ impl Region {
         let widest = sides
             .into_iter()
             .max_by(|&i, &j| width(i).total_cmp(&width(j)))?;
-        let (low, high) = (cell[widest].lo(), cell[widest].hi());
-        let (left, right) = if self.dimensions[widest].integer {
-            let middle = self.middle(widest, &cell[widest]);
+        self.halves(cell, widest)
+    }
+
+    /// The cell cut along one side; none where that has nothing between its ends.
+    pub(crate) fn halves(&self, cell: &Cell, side: usize) -> Option<(Cell, Cell)> {
+        let (low, high) = (cell[side].lo(), cell[side].hi());
+        let (left, right) = if self.dimensions[side].integer {
+            let middle = self.middle(side, &cell[side]);
             (middle, (middle + 1.0).min(high))
         } else {
             let middle = between(low, high);
             (middle, middle)
         };
-        let splits = match self.dimensions[widest].integer {
+        let splits = match self.dimensions[side].integer {
             true => low < high,
             false => low < left && right < high,
         };
@@ -151,12 +156,13 @@ impl Region {
             return None;
         }
         let (mut first, mut second) = (cell.clone(), cell.clone());
-        first[widest] = Interval::new(low, left).ok()?;
-        second[widest] = Interval::new(right, high).ok()?;
+        first[side] = Interval::new(low, left).ok()?;
+        second[side] = Interval::new(right, high).ok()?;
         Some((first, second))
     }
 
-    fn relative_width(&self, i: usize, side: &Interval) -> f64 {
+    /// The width of a side as a share of the region's.
+    pub(crate) fn relative_width(&self, i: usize, side: &Interval) -> f64 {
         let width = side.hi() - side.lo();
         let whole = self.dimensions[i].max - self.dimensions[i].min;
         match whole.is_finite() && whole > 0.0 {

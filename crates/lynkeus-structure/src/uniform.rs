@@ -15,7 +15,10 @@ use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 use crate::indices::Codistribution;
 use crate::output_map::{Rows, determinant, jacobian_rows, output_derivatives};
 use crate::region::Cell;
-use crate::{Extended, Finding, Place, Region, Regularity, Side, Verdict, sign, vanishes};
+use crate::{
+    Extended, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, one_to_one, sign,
+    vanishes,
+};
 pub use blind::Blind;
 use blind::blind;
 
@@ -32,6 +35,8 @@ pub struct Uniformity {
     /// the outputs' derivatives tell neighbouring states apart everywhere, for every constant
     /// input: a determinant keeps away from zero on the whole box
     pub regular: Finding,
+    /// whether points far apart are told apart as well, while inputs stay constant
+    pub one_to_one: OneToOne,
     /// where it may be zero: cells of a subdivision, and their share of the box's volume
     pub singular: Vec<Place>,
     /// the share; without meaning where a range is missing
@@ -45,18 +50,22 @@ pub struct Uniformity {
 }
 
 /// Examines the box; none where the model has too many states, or where its outputs
-/// do not determine the state at any point.
+/// do not determine the state at any point. `known` states are [known everywhere](crate::determined).
 ///
 /// # Errors
 /// [`MissingInput`] where the plant has parameters without value.
-pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, MissingInput> {
+pub fn uniformity(
+    extended: &Extended<'_>,
+    known: &[bool],
+) -> Result<Option<Uniformity>, MissingInput> {
     let n = extended.states.len();
     if n > STATES {
         return Ok(None);
     }
     let graph = extended.graph();
     let region = extended.region();
-    let Some(Map { node, regular }) = map(extended, &region)? else {
+    let derivatives = Derivatives::new(extended)?;
+    let Some(Map { node, regular }) = map(extended, &derivatives, &region)? else {
         return Ok(None);
     };
     if vanishes(graph, node, &region)? == Verdict::Proved {
@@ -66,7 +75,10 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
         Verdict::Proved => (vec![], 0.0),
         _ => cells(graph, node, &region)?,
     };
+    // more rows than states may tell apart what no choice of them does
+    let together = regular.is_proved() || extended.outputs.len() > 1;
     Ok(Some(Uniformity {
+        one_to_one: derivatives.one_to_one(extended, known, together, &region)?,
         blind: match regular.verdict {
             Verdict::Proved => vec![],
             _ => blind(extended, node, &region)?,
@@ -92,6 +104,30 @@ pub fn uniformity(extended: &Extended<'_>) -> Result<Option<Uniformity>, Missing
     }))
 }
 
+/// Per extended state whether the outputs and those of their derivatives that come before `signals`, known inputs of the
+/// extended plant, tell it on the whole box: whatever these do. Other inputs stay constant, `known` states are known.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn apart_whatever(
+    extended: &Extended<'_>,
+    signals: &[Node],
+    known: &[bool],
+) -> Result<Vec<bool>, MissingInput> {
+    if extended.states.len() > STATES || known.iter().all(|known| *known) {
+        return Ok(known.to_vec());
+    }
+    let graph = extended.graph();
+    let mut derivatives = Derivatives::new(extended)?;
+    let reads = |y: &Node| graph.symbols_of(&[*y]).iter().any(|s| signals.contains(s));
+    for of_output in &mut derivatives.values {
+        let kept = of_output.iter().position(reads);
+        of_output.truncate(kept.unwrap_or(of_output.len()));
+    }
+    let found = derivatives.one_to_one(extended, known, true, &extended.region())?;
+    Ok(found.known)
+}
+
 /// Refuted only where the determinant is zero: where it changes its sign by a jump, as slopes
 /// do at a kink, or from one whole number to the next, no point is singular.
 fn without_jumps(found: Finding, region: &Region) -> Finding {
@@ -112,14 +148,17 @@ struct Map {
 
 /// The first choice of rows whose determinant is proved to keep its sign, else the
 /// first that is independent at generic points.
-fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingInput> {
-    let derivatives = Derivatives::new(extended)?;
+fn map(
+    extended: &Extended<'_>,
+    derivatives: &Derivatives,
+    region: &Region,
+) -> Result<Option<Map>, MissingInput> {
     let mut codistribution = Codistribution::new(extended, &derivatives.gradients)?;
     let first = codistribution.krener_respondek();
     if first.iter().sum::<usize>() < extended.states.len() {
         return Ok(None);
     }
-    let Some(found) = examined(extended, &derivatives, &first, region)? else {
+    let Some(found) = examined(extended, derivatives, &first, region)? else {
         return Ok(None);
     };
     if found.regular.verdict == Verdict::Proved {
@@ -131,7 +170,7 @@ fn map(extended: &Extended<'_>, region: &Region) -> Result<Option<Map>, MissingI
         if codistribution.changes_sign(&indices) {
             continue;
         }
-        let other = examined(extended, &derivatives, &indices, region)?;
+        let other = examined(extended, derivatives, &indices, region)?;
         let other = other.filter(|map| map.regular.verdict == Verdict::Proved);
         if other.is_some() {
             return Ok(other);
@@ -199,6 +238,23 @@ impl Derivatives {
             values,
         })
     }
+
+    /// Whether all of them together are one-to-one on the box.
+    fn one_to_one(
+        &self,
+        extended: &Extended<'_>,
+        known: &[bool],
+        together: bool,
+        region: &Region,
+    ) -> Result<OneToOne, MissingInput> {
+        let map = one_to_one::Map {
+            graph: extended.graph(),
+            functions: &self.values.concat(),
+            states: &extended.symbols(),
+            region,
+        };
+        map.one_to_one(known, together)
+    }
 }
 
 /// Cells in which the determinant may be zero, and their share of the volume.
@@ -242,7 +298,7 @@ fn cells(graph: &Graph, node: Node, region: &Region) -> Result<(Vec<Place>, f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Sensors;
+    use crate::{Sensors, determined};
     use lynkeus_model::{LoadOptions, Plant};
 
     fn examined(equations: &str) -> Option<Uniformity> {
@@ -257,7 +313,7 @@ mod tests {
         );
         let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
         let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-        uniformity(&extended).unwrap()
+        uniformity(&extended, &determined(&extended).unwrap()).unwrap()
     }
 
     #[test]
@@ -306,7 +362,9 @@ mod tests {
             );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
             let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-            let found = uniformity(&extended).unwrap().unwrap();
+            let found = uniformity(&extended, &determined(&extended).unwrap())
+                .unwrap()
+                .unwrap();
             found
                 .blind
                 .into_iter()
@@ -358,7 +416,9 @@ mod tests {
             );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
             let extended = Extended::new(&plant, &Sensors::default()).unwrap();
-            uniformity(&extended).unwrap().unwrap()
+            uniformity(&extended, &determined(&extended).unwrap())
+                .unwrap()
+                .unwrap()
         };
         let never = blind("(s - 0.5)");
         assert!(never.blind.is_empty());

@@ -26,6 +26,20 @@ pub struct Accuracy {
     pub peak_at: f64,
     /// when the error is within 5 % of the declared range
     pub settling: Settling,
+    /// beside its standard deviation; none where that is not told
+    pub coverage: Option<Coverage>,
+}
+
+/// The errors of an estimate beside its standard deviations, over the last half of the rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coverage {
+    /// share of the rows whose error is within two standard deviations
+    pub within: f64,
+    /// root of the mean of (error/deviation)²: 1 where the deviations are true; infinite where one is 0
+    /// and the error is not
+    pub ratio: f64,
+    /// rows that count
+    pub rows: usize,
 }
 
 /// When an error comes to stay within 5 % of the declared range.
@@ -38,6 +52,32 @@ pub enum Settling {
     /// no range is declared
     NoRange,
 }
+
+impl Coverage {
+    /// Of many runs together; none of none.
+    pub(crate) fn of_all(runs: impl Iterator<Item = Self>) -> Option<Self> {
+        let (mut rows, mut within, mut squares) = (0, 0.0, 0.0);
+        for run in runs {
+            let count = run.rows as f64;
+            rows += run.rows;
+            within += run.within * count;
+            squares += run.ratio.powi(2) * count;
+        }
+        let count = rows as f64;
+        (rows > 0).then(|| Self {
+            within: within / count,
+            ratio: (squares / count).sqrt(),
+            rows,
+        })
+    }
+}
+
+/// Errors that are larger than their deviations so many times contradict them: one that stays the same
+/// over a whole run, as that of a constant, does so by chance in 1 of 15,000 runs.
+const CONTRADICTED: f64 = 4.0;
+
+/// Rows that tell.
+const TELLING: usize = 10;
 
 /// Of all quantities whose true values are known, unknown inputs first.
 pub(crate) fn accuracies(time: &Series, quantities: &[Quantity], sides: &[Side]) -> Vec<Accuracy> {
@@ -67,6 +107,30 @@ fn accuracy(time: &Series, quantity: &Quantity, side: Option<&Side>) -> Option<A
         settling: width.map_or(Settling::NoRange, |width| {
             settling(errors(), SETTLED * width)
         }),
+        coverage: coverage(quantity),
+    })
+}
+
+fn coverage(quantity: &Quantity) -> Option<Coverage> {
+    let truth = quantity.truth.as_ref()?;
+    let estimates = quantity.estimate.as_ref()?.iter();
+    let told = estimates.zip(quantity.deviation.as_ref()?);
+    let shares = truth.iter().zip(told).skip(truth.len() / 2);
+    // 0/0, an exact value that is known for exact, is within
+    let shares = shares.map(|(x, (hat, deviation))| match hat == x {
+        true => 0.0 * deviation,
+        false => (hat - x) / deviation,
+    });
+    let (mut rows, mut within, mut squares) = (0, 0, 0.0);
+    for share in shares.filter(|share| !share.is_nan()) {
+        rows += 1;
+        within += usize::from(share.abs() <= 2.0);
+        squares += share * share;
+    }
+    (rows > 0).then(|| Coverage {
+        within: within as f64 / rows as f64,
+        ratio: (squares / rows as f64).sqrt(),
+        rows,
     })
 }
 
@@ -95,6 +159,8 @@ impl Accuracy {
             "peak": self.peak,
             "peak_at": self.peak_at,
             "settled_at": settled,
+            "within_2_sd": self.coverage.map(|c| c.within),
+            "rms_in_sd": self.coverage.map(|c| c.ratio).filter(|r| r.is_finite()),
         })
     }
 
@@ -108,12 +174,30 @@ impl Accuracy {
             Some(rms) => format!("RMS {} in the last half", figures(rms, 3)),
             None => "not known in the last half".to_owned(),
         };
+        let covered = self.coverage.map_or(String::new(), |c| {
+            let share = figures(100.0 * c.within, 3);
+            format!("; {share} % of the last half within 2 sd")
+        });
         format!(
-            "error of {}: {late}, at most {} (t = {}){settled}",
+            "error of {}: {late}, at most {} (t = {}){settled}{covered}",
             self.quantity,
             figures(self.peak, 3),
             instant(self.peak_at),
         )
+    }
+}
+
+impl Accuracy {
+    /// What is to be said where the truth contradicts the standard deviation.
+    fn contradiction(&self) -> Option<String> {
+        let Coverage { ratio, rows, .. } = self.coverage?;
+        (rows >= TELLING && ratio > CONTRADICTED).then(|| {
+            format!(
+                "the truth contradicts the standard deviation of {}: in the last half errors are {} times as large as it says (root mean square)",
+                self.quantity,
+                figures(ratio, 2)
+            )
+        })
     }
 }
 
@@ -124,6 +208,7 @@ pub(crate) fn told(accuracies: &[Accuracy]) -> Vec<String> {
     if more > 0 {
         words.push(format!("errors of {more} more quantities: --json"));
     }
+    words.extend(accuracies.iter().filter_map(Accuracy::contradiction));
     words
 }
 
@@ -154,6 +239,35 @@ mod tests {
         assert_eq!(of(7.0).settling, Settling::From(5.0));
         assert_eq!(of(5.0).settling, Settling::Never);
         assert_eq!(of(f64::INFINITY).settling, Settling::NoRange);
+    }
+
+    /// Four rows count: one is off by three deviations, one by half of one, two are right, of which one
+    /// is known for right.
+    #[test]
+    fn errors_are_counted_in_deviations() {
+        let of = |scale: f64| Quantity {
+            name: "x".to_owned(),
+            truth: Some(vec![0.0; 8].into()),
+            estimate: Some(vec![9.0, 9.0, 9.0, 9.0, 3.0 * scale, 0.5, 0.0, 0.0].into()),
+            deviation: Some(vec![1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0].into()),
+            ..Quantity::default()
+        };
+        let found = coverage(&of(1.0)).unwrap();
+        assert_eq!((found.within, found.rows), (0.75, 4));
+        assert!((found.ratio - (9.25_f64 / 4.0).sqrt()).abs() < 1e-15);
+        let long = |error: f64| Quantity {
+            name: "x".to_owned(),
+            truth: Some(vec![0.0; 40].into()),
+            estimate: Some(vec![error; 40].into()),
+            deviation: Some(vec![0.1; 40].into()),
+            ..Quantity::default()
+        };
+        let time = Series::from((0..40).map(f64::from).collect::<Vec<_>>());
+        let told = |error| told(&accuracies(&time, &[long(error)], &[])).join("\n");
+        assert!(told(0.5).contains("0 % of the last half within 2 sd"));
+        assert!(told(0.5).contains("the truth contradicts the standard deviation of x"));
+        assert!(!told(0.3).contains("contradicts") && !told(0.15).contains(" 0 %"));
+        assert_eq!(coverage(&Quantity::default()), None);
     }
 
     /// A laboratory's value now and then: the last half is that of the rows, as everywhere.

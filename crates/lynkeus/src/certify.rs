@@ -3,9 +3,10 @@
 use std::fmt;
 use std::ops::ControlFlow;
 
-use lynkeus_observers::{Certificate, Claim, Design, Tuning};
+use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
 use lynkeus_structure::{Extended, Standing};
 
+use crate::declared::{Account, Declared};
 use crate::interval::{self, Intervals};
 use crate::prepare::Prepared;
 use crate::{Correction, Error, Study, correction, prepare, simulate, words};
@@ -34,6 +35,8 @@ pub struct CertifyReport {
     pub correction: Correction,
     /// what both take for granted of disturbances and unknown inputs, in words
     pub assumed: Vec<String>,
+    /// which of the study's declarations counted
+    pub declared: Account,
     /// where the study itself is not in the box of the proof
     pub strays: Strays,
     /// the study's samples against what the observer stands: every proof is for sensors that are
@@ -113,7 +116,7 @@ impl<'a> Task<'a> {
         let family = lynkeus_observers::find(design.observer.family);
         let theorem = match family.filter(|_| !lmi) {
             Some(family) => {
-                let assumptions = assumptions::of(self.study, place)?;
+                let assumptions = assumptions::of(&self.prepared, place)?;
                 let tuning = Tuning {
                     clamp: false,
                     ..self.prepared.tuning()?
@@ -129,8 +132,11 @@ impl<'a> Task<'a> {
         let go_on = &mut |_| ControlFlow::Continue(());
         let run = run.map(|_| simulate::simulated(&self.prepared, go_on));
         let seen = run.as_ref().and_then(|run| run.as_ref().ok());
+        let certificates = theorem.iter().chain([&certificate]);
+        let in_mean_square = certificates.into_iter().any(|c| c.mean_square.is_some());
         Ok(CertifyReport {
             plant: self.prepared.plant().name.clone(),
+            declared: account(self.prepared.declared(), in_mean_square),
             strays: Strays::of(&self.prepared, run.as_ref(), place, &design),
             sampling: seen.and_then(|run| {
                 interval::simulated(&self.prepared, &design, &run.time, &run.quantities)
@@ -139,7 +145,7 @@ impl<'a> Task<'a> {
             certificate,
             theorem,
             correction,
-            assumed: assumptions::notes(self.study, self.prepared.plant(), place),
+            assumed: assumptions::notes(&self.prepared, place),
         })
     }
 
@@ -173,7 +179,7 @@ impl<'a> Task<'a> {
         design: &Design,
         claim: Claim,
     ) -> Result<Certificate, Error> {
-        let assumptions = assumptions::of(self.study, extended)?;
+        let assumptions = assumptions::of(&self.prepared, extended)?;
         lynkeus_observers::certify(extended, &design.observer, &assumptions, claim)
             .map_err(|error| self.prepared.refusal(error))
     }
@@ -218,6 +224,36 @@ impl<'a> Task<'a> {
             false => simulated,
         })
     }
+}
+
+/// What a certificate counts.
+fn account(declared: &Declared, in_mean_square: bool) -> Account {
+    let Declared {
+        ranges,
+        noise,
+        limits,
+        samples,
+        process_noise,
+        disturbances,
+        slew,
+        input_derivatives,
+    } = declared;
+    Account::default()
+        .counts(ranges)
+        .counts(noise)
+        .counts(limits)
+        .counts(disturbances)
+        .counts(slew)
+        .counts(input_derivatives)
+        .counts_if(
+            in_mean_square,
+            process_noise,
+            "Gaussian, so that no error has a bound for certain, and no bound in mean square is proved",
+        )
+        .leaves(
+            samples,
+            "a proof is for sensors that are read continuously; `sampling` has what the observer stands",
+        )
 }
 
 impl CertifyReport {
@@ -276,6 +312,16 @@ impl CertifyReport {
     fn is_theorem(&self, certificate: &Certificate) -> bool {
         let theorem = self.theorem.as_ref();
         theorem.is_some_and(|theorem| std::ptr::eq(theorem, certificate))
+    }
+
+    /// What the root of the error's mean square ends within, by the sharper of the two ways; none without
+    /// process noise.
+    pub fn mean_square(&self) -> Option<&Bounds> {
+        let both = [Some(&self.certificate), self.theorem.as_ref()]
+            .into_iter()
+            .flatten();
+        let found = both.filter_map(|certificate| certificate.mean_square.as_ref());
+        found.min_by(|a, b| a.norm.total_cmp(&b.norm))
     }
 
     /// The proof with the faster rate, or the certificate by inequality if there is none.

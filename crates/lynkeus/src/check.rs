@@ -4,6 +4,7 @@ mod json;
 mod knowledge;
 mod next;
 mod observability;
+mod reserves;
 mod sorted;
 mod uniform;
 
@@ -15,15 +16,18 @@ use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::{Diagnostic, Plant};
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, fit_word};
-use lynkeus_structure::{counted, determined, uniformity};
+use lynkeus_structure::{Sensors, counted, determined, uniformity};
 
 use crate::choice::Choice;
+use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
+use crate::study::Name;
 use crate::words::conditions;
-use crate::{Error, Study, calibrate, prepare};
+use crate::{Error, ErrorKind, Study, calibrate, columns, estimate, prepare};
 pub(crate) use json::point;
-pub use knowledge::{Assumption, Knowledge, Known};
+pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 pub use next::Next;
+use reserves::View;
 use sorted::Sorted;
 pub use uniform::Uniform;
 
@@ -69,6 +73,8 @@ pub struct Report {
     pub parameters: bool,
     /// what the model says that does not fit together, such as units
     pub warnings: Vec<Diagnostic>,
+    /// which of the study's declarations the families' conditions count
+    pub declared: Account,
     /// what ended the search for the places where states cannot be told apart
     ended: Option<Spent>,
 }
@@ -83,29 +89,28 @@ const UNIFORMITY: f64 = 0.2;
 /// study allows.
 ///
 /// # Errors
-/// A study that does not fit its plant; an expression of `about` that cannot be read.
+/// A study that does not fit its plant, or whose observer refuses its keys; an expression of `about` that
+/// cannot be read.
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
+    Declared::new(study, &symbolic)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),
     };
-    let unknown = calibrate::unknown_inputs(study, &symbolic);
-    let answer = observability::answer(study, &symbolic, options, unknown, time.clone())?;
+    let sensors = prepare::sensors(study, &symbolic);
+    let answer = observability::answer(study, &symbolic, options, &sensors, time.clone())?;
     let names = |of: &[lynkeus_model::Variable]| -> Vec<String> {
         of.iter().map(|v| v.name.clone()).collect()
-    };
-    let asked = |names: &[crate::study::Name]| -> Vec<String> {
-        names.iter().map(|n| n.text.clone()).collect()
     };
     let mut report = Report {
         plant: symbolic.name.clone(),
         states: names(&symbolic.states),
         measured: match &study.sensors.measured {
-            Some(measured) => asked(measured),
+            Some(measured) => Name::meant(measured, &symbolic.outputs),
             None => names(&symbolic.outputs),
         },
-        unknown: calibrate::unknown_inputs(study, &symbolic),
+        unknown: sensors.unknown,
         examinations: vec![],
         recommended: None,
         choice: None,
@@ -117,6 +122,7 @@ pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
         parameters: options.parameters,
         warnings: symbolic.warnings.clone(),
         ended: None,
+        declared: Account::default(),
     };
     let valued = symbolic.parameters.iter().all(|p| p.value.is_some());
     if valued && !options.parameters {
@@ -143,27 +149,81 @@ fn by_which(
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let part = prepare::share(&study.budget, UNIFORMITY);
-    let graph = prepared.extended().graph();
-    match graph.budgeted(part, || uniformity(prepared.extended())) {
+    let extended = prepared.extended();
+    let graph = extended.graph();
+    let examine = || {
+        let known = determined(extended)?;
+        let found = uniformity(extended, &known)?;
+        Ok((known, found))
+    };
+    let mut known = vec![false; extended.states.len()];
+    match graph.budgeted(part, examine) {
         Ok(examined) => {
-            let examined = examined.map_err(Error::from_source)?;
+            let examined: Result<_, lynkeus_expr::MissingInput> = examined;
+            let (determined, examined) = examined.map_err(Error::from_source)?;
+            known = determined;
             report.uniform =
                 examined.map(|examined| Uniform::new(examined, &report.answer, &report.unknown));
         }
         Err(spent) => report.ended = Some(spent),
     }
-    report.knowledge = knowledge(&prepared, symbolic, options, report, time)?;
+    report.declared = account(prepared.declared());
+    report.knowledge = knowledge(&prepared, &known, symbolic, options, report, time)?;
     report.examinations = prepared.examinations()?.to_vec();
     report.choice = prepared.choice()?.cloned();
     report.recommended = report.choice.as_ref().map(|choice| choice.family);
+    if report.choice.is_some() {
+        refuse(&prepared)?;
+    }
     let next = |choice| Next::new(&prepared, choice);
     report.next = report.choice.as_ref().map(next);
     Ok(())
 }
 
-/// What can be known of each quantity: whatever the unknown inputs do, and if they hardly move.
+/// What [`estimate()`](crate::estimate()) would refuse whatever the log, in its words.
+fn refuse(prepared: &Prepared<'_>) -> Result<(), Error> {
+    let study = prepared.study();
+    columns::refuse_stray_columns(prepared.plant(), &study.estimate)?;
+    // a certified gain takes long to make; of the others what is at fault in the study counts, no answer of no
+    if prepare::is_certified_gain(&study.observer.tuning) {
+        return Ok(());
+    }
+    match prepared.design() {
+        Ok(design) => estimate::refuse_settings(study, &design),
+        Err(error) if error.kind() == ErrorKind::Input => Err(error),
+        Err(_) => Ok(()),
+    }
+}
+
+/// What the families' conditions and what is known count.
+fn account(declared: &Declared) -> Account {
+    let Declared {
+        ranges,
+        noise,
+        limits,
+        samples,
+        process_noise,
+        disturbances,
+        slew,
+        input_derivatives,
+    } = declared;
+    let elsewhere = "`certify` counts it, and `check --how-well`";
+    Account::default()
+        .counts(ranges)
+        .counts(input_derivatives)
+        .leaves(noise, elsewhere)
+        .leaves(process_noise, elsewhere)
+        .counts(limits)
+        .leaves(samples, "`check --how-well` counts them")
+        .counts(disturbances)
+        .leaves(slew, "`certify` counts it")
+}
+
+/// What can be known of each quantity: whatever the unknown inputs do, and if they hardly move. `known`
+/// are the extended states known everywhere by elimination.
 fn knowledge(
     prepared: &Prepared<'_>,
+    known: &[bool],
     symbolic: &Plant,
     options: &CheckOptions,
     report: &mut Report,
@@ -177,30 +237,39 @@ fn knowledge(
         false => {
             asked.push((Assumption::Arbitrary, report.answer.clone()));
             let constant = calibrate::constant_inputs(symbolic.clone(), &report.unknown);
-            let answer = observability::answer(study, &constant, options, vec![], time)?;
-            let declared = report.unknown.iter().all(|unknown| {
-                study
-                    .process_noise
-                    .iter()
-                    .any(|(name, _)| name.is_or_has(unknown))
-            });
+            let sensors = Sensors {
+                unknown: vec![],
+                ..prepare::sensors(study, symbolic)
+            };
+            let answer = observability::answer(study, &constant, options, &sensors, time.clone())?;
+            let wander = &prepared.declared().process_noise;
+            let declared = report.unknown.iter().all(|name| wander.of(name).is_some());
             asked.push((Assumption::Wandering { declared }, answer));
         }
     }
     let graph = extended.graph();
-    let work = || -> Result<Vec<Knowledge>, lynkeus_expr::MissingInput> {
+    let view = View {
+        prepared,
+        symbolic,
+        options,
+        time,
+    };
+    let work = || -> Result<Vec<Knowledge>, Error> {
         let found = knowledge::Found {
             uniform: report.uniform.as_ref().map(Uniform::examined),
-            determined: &determined(extended)?,
+            determined: known,
         };
         let of = |(assumption, answer): &mut (Assumption, Answer)| {
             found.settle(extended, *assumption, answer);
-            Knowledge::new(extended, *assumption, answer, &found)
+            let known = Knowledge::new(extended, *assumption, answer, &found);
+            let mut known = known.map_err(Error::from_source)?;
+            view.reserve(&mut known)?;
+            Ok(known)
         };
         asked.iter_mut().map(of).collect()
     };
     let known = match graph.budgeted(prepare::share(&study.budget, UNIFORMITY), work) {
-        Ok(known) => known.map_err(Error::from_source)?,
+        Ok(known) => known?,
         Err(_) => return Ok(vec![]),
     };
     if let Some((_, settled)) = asked.into_iter().next() {
@@ -265,7 +334,7 @@ impl fmt::Display for Report {
         writeln!(f)?;
         observability::print(f, self)?;
         if let Some(uniform) = &self.uniform {
-            uniform::print(f, uniform)?;
+            uniform::print(f, uniform, &knowledge::reserves(&self.knowledge))?;
         }
         if let Some(spent) = self.ended {
             let families = match self.examinations.is_empty() {
@@ -296,6 +365,9 @@ impl fmt::Display for Report {
             return Ok(());
         }
         self.ended_families(f)?;
+        if let Some(told) = self.declared.told() {
+            writeln!(f, "\n{told}")?;
+        }
         writeln!(f)?;
         self.conclusion(f)?;
         match &self.next {

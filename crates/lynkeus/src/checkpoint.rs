@@ -12,10 +12,11 @@ use std::time::{Duration, Instant};
 use lynkeus_run::{Digest, Estimator};
 
 use crate::course::{Course, Samples};
+use crate::judge::Trace;
 use crate::replay::Halfway;
 use crate::{Error, Series};
 
-const MAGIC: &[u8; 8] = b"LYNKCHK1";
+const MAGIC: &[u8; 8] = b"LYNKCHK2";
 /// Magic, fingerprint of the observer, digest of the log.
 const HEAD: usize = 24;
 /// Between two records.
@@ -156,6 +157,11 @@ impl Checkpoint {
             payload.extend_from_slice(&(part.len() as u64).to_le_bytes());
             payload.extend_from_slice(part);
         }
+        for trace in course.traces.iter().chain(&course.settled) {
+            let numbers = trace.numbers();
+            payload.extend_from_slice(&(8 * numbers.len() as u64).to_le_bytes());
+            payload.extend(numbers.iter().flat_map(|x| x.to_le_bytes()));
+        }
         payload.extend_from_slice(&(rows as u64).to_le_bytes());
         for column in columns(course) {
             for x in column.iter_from(self.rows) {
@@ -185,6 +191,7 @@ fn columns(course: &Course) -> impl Iterator<Item = &Series> {
         .iter()
         .chain(&course.monitors)
         .chain(deviations)
+        .chain(&course.innovations)
 }
 
 fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Series> {
@@ -194,6 +201,7 @@ fn columns_mut(course: &mut Course) -> impl Iterator<Item = &mut Series> {
         .iter_mut()
         .chain(&mut course.monitors)
         .chain(deviations)
+        .chain(&mut course.innovations)
 }
 
 /// Whose replay it is.
@@ -274,20 +282,29 @@ impl Record {
         half: &mut Halfway,
     ) -> Option<usize> {
         let (halfway, rest) = part(&self.payload)?;
-        let (snapshot, rest) = part(rest)?;
+        let (snapshot, mut rest) = part(rest)?;
+        for trace in course.traces.iter_mut().chain(&mut course.settled) {
+            let (own, others) = part(rest)?;
+            *trace = Trace::of(&numbers_of(own))?;
+            rest = others;
+        }
         let (until, mut numbers) = rest.split_first_chunk()?;
         let until = usize::try_from(u64::from_le_bytes(*until)).ok()?;
         for column in columns_mut(course) {
             let size = until.checked_sub(rows)?.checked_mul(8)?;
             let (own, others) = numbers.split_at_checked(size)?;
-            let read = own.chunks_exact(8).filter_map(|x| x.try_into().ok());
-            read.for_each(|x| column.push(f64::from_le_bytes(x)));
+            numbers_of(own).iter().for_each(|x| column.push(*x));
             numbers = others;
         }
         estimator.restore(snapshot).ok()?;
         *half = Halfway::restored(halfway.to_vec(), estimator).ok()?;
         numbers.is_empty().then_some(until)
     }
+}
+
+fn numbers_of(bytes: &[u8]) -> Vec<f64> {
+    let read = bytes.chunks_exact(8).filter_map(|x| x.try_into().ok());
+    read.map(f64::from_le_bytes).collect()
 }
 
 /// Bytes with their length before them, and what follows.

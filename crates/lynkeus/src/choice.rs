@@ -2,17 +2,19 @@
 //!
 //! `auto` takes the first family whose conditions are all proved, whose keys are there or were tried in
 //! simulation, and whose error decays fast enough for the run of `[simulate]`; else one that is undecided, with
-//! the same; else the first filter, for which nothing is asked and nothing is proved.
+//! the same; else the first filter, for which nothing is asked and nothing is proved. Where a limit of time or memory
+//! ended the examination or the trial of a family that comes before it, the decision says so.
 
 use std::fmt;
 
-use lynkeus_observers::{Design, DesignError, Examination, Tuning, Value, find};
+use lynkeus_expr::Spent;
+use lynkeus_observers::{Design, DesignError, Examination, Tuning, find};
 use lynkeus_structure::Standing;
 use serde_json::{Value as Json, json};
 
 use crate::modes::decay;
 use crate::prepare::{Prepared, is_certified_gain};
-use crate::propose::{Proposal, Speed, propose};
+use crate::propose::{Proposal, Speed, propose, time_scales};
 use crate::words::number;
 use crate::{Error, study::SimulateSettings};
 
@@ -32,6 +34,8 @@ pub struct Choice {
     pub proposal: Option<Proposal>,
     /// families that may fit and are not taken, with the reason
     pub passed: Vec<String>,
+    /// the limit that ended the examination or the trial of one of those: without it another may be taken
+    pub ended: Option<Spent>,
     /// made with the study's own keys
     pub(crate) design: Option<Design>,
 }
@@ -55,6 +59,8 @@ enum Trial {
     Good(Box<Design>, Option<Proposal>),
     /// why not
     Bad(String),
+    /// a limit came first
+    Ended(Spent),
     /// a key cannot be used
     Wrong(Error),
 }
@@ -83,14 +89,26 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
             .next();
         return asked.map(|e| asked_for(prepared, e)).transpose();
     }
-    let mut passed = left_out(prepared);
+    let mut passed = Passed {
+        reasons: left_out(prepared),
+        ended: None,
+    };
     let proved: Vec<&Examination> = with(Standing::Proved).filter(|e| e.has_theorem()).collect();
-    for examination in &proved {
+    for examination in examinations {
+        let family = examination.family;
+        if let Some(spent) = examination.spent() {
+            passed.at_limit(format!("{family} was not examined to its end"), spent);
+            continue;
+        }
+        if !(examination.fit() == Standing::Proved && examination.has_theorem()) {
+            continue;
+        }
         match tried(prepared, examination) {
-            Trial::Bad(reason) => passed.push(format!("{} fits, but {reason}", examination.family)),
+            Trial::Bad(reason) => passed.push(format!("{family} fits, but {reason}")),
+            Trial::Ended(spent) => passed.at_limit(format!("{family} fits, but not tried"), spent),
             // a family before it may have taken the same key in another shape
-            Trial::Wrong(error) if examination.family == proved[0].family => return Err(error),
-            Trial::Wrong(error) => passed.push(format!("{} fits, but {error}", examination.family)),
+            Trial::Wrong(error) if family == proved[0].family => return Err(error),
+            Trial::Wrong(error) => passed.push(format!("{family} fits, but {error}")),
             Trial::Good(design, proposal) => {
                 let grounds = Grounds::Proved {
                     first_of_several: proved.len() > 1,
@@ -113,6 +131,9 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
                     passed,
                 )));
             }
+            Trial::Ended(spent) => {
+                passed.at_limit(format!("{family} may fit, but was not tried"), spent);
+            }
             Trial::Wrong(error) if proved.is_empty() => return Err(error),
             Trial::Wrong(error) => passed.push(format!("{family} may fit, but {error}")),
             Trial::Good(..) => passed.push(format!(
@@ -127,9 +148,28 @@ pub(crate) fn choose(prepared: &Prepared<'_>) -> Result<Option<Choice>, Error> {
         is_asked_for: false,
         grounds: Grounds::Filter,
         proposal: None,
-        passed,
+        passed: passed.reasons,
+        ended: passed.ended,
         design: None,
     }))
+}
+
+/// The families that come before the one that is taken.
+struct Passed {
+    reasons: Vec<String>,
+    ended: Option<Spent>,
+}
+
+impl Passed {
+    fn push(&mut self, reason: String) {
+        self.reasons.push(reason);
+    }
+
+    /// One whose work was ended.
+    fn at_limit(&mut self, what: String, spent: Spent) {
+        self.reasons.push(format!("{what}: {spent}"));
+        self.ended = self.ended.or(Some(spent).filter(|spent| spent.is_limit()));
+    }
 }
 
 /// Whether the decision follows from plant, sensors and tuning alone: every family was examined to its
@@ -152,7 +192,7 @@ fn chosen(
     grounds: Grounds,
     design: Box<Design>,
     proposal: Option<Proposal>,
-    passed: Vec<String>,
+    passed: Passed,
 ) -> Choice {
     Choice {
         family: examination.family,
@@ -160,7 +200,8 @@ fn chosen(
         design: Some(*design).filter(|_| proposal.is_none()),
         grounds,
         proposal,
-        passed,
+        passed: passed.reasons,
+        ended: passed.ended,
     }
 }
 
@@ -172,7 +213,13 @@ fn asked_for(prepared: &Prepared<'_>, examination: &Examination) -> Result<Choic
         true => None,
         false => lacked_speed(prepared, examination),
     };
-    let proposal = lacked.and_then(|speed| propose(prepared, examination, speed));
+    let (proposal, ended) = match lacked {
+        None => (None, None),
+        Some(speed) => match propose(prepared, examination, speed) {
+            Ok(proposal) => (proposal, None),
+            Err(spent) => (time_scales(prepared, examination, speed), Some(spent)),
+        },
+    };
     Ok(Choice {
         family: examination.family,
         is_asked_for: true,
@@ -185,6 +232,7 @@ fn asked_for(prepared: &Prepared<'_>, examination: &Examination) -> Result<Choic
         },
         proposal,
         passed: vec![],
+        ended,
         design: None,
     })
 }
@@ -244,11 +292,12 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
     {
         // a value that nothing was tried with is for a bare model only, which has no run
         let is_bare = prepared.study().is_bare();
-        proposal = propose(prepared, examination, speed).filter(|p| p.is_tried || is_bare);
+        proposal = match propose(prepared, examination, speed) {
+            Ok(proposal) => proposal.filter(|p| p.is_tried || is_bare),
+            Err(spent) => return Trial::Ended(spent),
+        };
         if let Some(Proposal { value, .. }) = &proposal {
-            tuned
-                .values
-                .insert(speed.key().to_owned(), Value::Number(*value));
+            tuned.values.insert(speed.key().to_owned(), value.clone());
         }
     }
     let design = match prepared.designed(examination, prepared.extended(), &tuned) {
@@ -265,6 +314,7 @@ fn tried(prepared: &Prepared<'_>, examination: &Examination) -> Trial {
         Err(DesignError::Tuning(e)) if proposal.is_none() => {
             return Trial::Wrong(prepared.refusal(DesignError::Tuning(e)));
         }
+        Err(DesignError::Spent(spent)) => return Trial::Ended(spent),
         Err(error) => return Trial::Bad(error.to_string()),
     };
     if let Some(run) = &prepared.study().simulate
@@ -291,9 +341,9 @@ impl Choice {
     /// A tuning with what is proposed where it says nothing.
     pub(crate) fn completed(&self, tuning: &Tuning) -> Tuning {
         let mut tuned = tuning.clone();
-        if let Some(Proposal { speed, value, .. }) = self.proposal {
+        if let Some(Proposal { speed, value, .. }) = &self.proposal {
             let slot = tuned.values.entry(speed.key().to_owned());
-            slot.or_insert(Value::Number(value));
+            slot.or_insert_with(|| value.clone());
         }
         tuned
     }
@@ -310,6 +360,7 @@ impl Choice {
             },
             "proposed": self.proposal.as_ref().map(Proposal::to_json),
             "passed_over": self.passed,
+            "ended": self.ended.map(|spent| spent.to_string()),
         })
     }
 
@@ -318,8 +369,22 @@ impl Choice {
         let mut notes: Vec<String> = self.proposal.iter().map(Proposal::to_string).collect();
         if !self.is_asked_for && self.grounds == Grounds::Filter {
             notes.push(format!("{} ({})", self.loss(), self.passed_over()));
+        } else if self.ended.is_some() {
+            notes.extend(self.passed.iter().cloned());
         }
+        notes.extend(self.hanging());
         notes
+    }
+
+    /// That a limit has a say in it.
+    fn hanging(&self) -> Option<String> {
+        let (family, spent) = (self.family, self.ended?);
+        Some(match self.is_asked_for {
+            true => format!("no speed of {family} is proposed by a sweep: {spent}"),
+            false => format!(
+                "which family is taken hangs on a limit of time or memory, which ended work on one that comes before {family}: without it, it may be another. Raise the limit, or name the family with `family` in [observer]"
+            ),
+        })
     }
 
     fn passed_over(&self) -> String {
@@ -367,6 +432,9 @@ impl fmt::Display for Choice {
         }
         for passed in &self.passed {
             writeln!(f, "  {passed}")?;
+        }
+        if let Some(hanging) = self.hanging() {
+            writeln!(f, "{hanging}")?;
         }
         match &self.proposal {
             Some(proposal) => writeln!(f, "{proposal}"),

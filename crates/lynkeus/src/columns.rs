@@ -1,16 +1,47 @@
 //! The columns of a log that a study reads.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
+use std::path::Path;
 
 use lynkeus_model::Plant;
 use lynkeus_structure::Extended;
 
 use crate::course::Samples;
-use crate::headers::{refuse_seconds, time_of};
+use crate::headers::{log_time, refuse_seconds, time_of};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
-use crate::table::Ordered;
-use crate::{Error, Series, Table};
+use crate::table::{APART, Lost, Ordered, Request, is_parquet};
+use crate::{Error, Series, Study, Table};
+
+/// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
+/// study may ask for.
+///
+/// # Errors
+/// As [`Table::load_within`]; for a Parquet file those of [`prepare::plant`](crate::prepare::plant), too.
+pub fn log(study: &Study, path: impl AsRef<Path>) -> Result<Table, Error> {
+    let request = Request {
+        budget: study.budget.clone(),
+        columns: match is_parquet(path.as_ref()) {
+            true => Some(asked_for(study)?),
+            false => None,
+        },
+    };
+    Table::load_within(path, &request)
+}
+
+/// Headers of time and of all that the plant has names for: readings, inputs, and what may be compared with them.
+fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
+    let plant = crate::prepare::plant(study)?;
+    let settings = &study.estimate;
+    let variables = plant
+        .states
+        .iter()
+        .chain(&plant.inputs)
+        .chain(&plant.outputs);
+    let headers = variables.map(|v| header(settings, &v.name).to_owned());
+    Ok(headers.chain([log_time(&plant, settings)]).collect())
+}
 
 /// A log in the order of time, and what the observers of a study read of it.
 #[derive(Debug)]
@@ -21,6 +52,8 @@ pub(crate) struct Log<'t> {
     pub samples: Samples,
     /// what it lacks and what was done for its order
     pub notes: Vec<String>,
+    /// what of it contradicts itself, or counts nowhere
+    pub warnings: Vec<String>,
 }
 
 impl<'t> Log<'t> {
@@ -40,10 +73,15 @@ impl<'t> Log<'t> {
             true => None,
             false => table.in_order(&time, settings.late)?,
         };
-        let (table, mut notes) = match ordered {
-            None => (Cow::Borrowed(table), vec![]),
-            Some(Ordered { table, notes }) => (Cow::Owned(table), notes),
+        let (table, mut notes, lost) = match ordered {
+            None => (Cow::Borrowed(table), vec![], vec![]),
+            Some(Ordered { table, notes, lost }) => (Cow::Owned(table), notes, lost),
         };
+        let warnings = read(extended).filter_map(|name| {
+            let own = header(settings, name);
+            lost.iter().find(|lost| lost.column == own)
+        });
+        let warnings = warnings.flat_map(|lost| told(lost, &time)).collect();
         let samples = samples(&table, &time, settings, extended)?;
         notes.extend(gaps(&table, settings, &time, extended));
         Ok(Self {
@@ -51,7 +89,51 @@ impl<'t> Log<'t> {
             time,
             samples,
             notes,
+            warnings,
         })
+    }
+}
+
+/// What of a column that is read counts nowhere, in words.
+fn told(lost: &Lost, time: &str) -> Vec<String> {
+    let Lost { column, .. } = lost;
+    let conflict = lost.first.map(|first| {
+        let times = match lost.conflicts {
+            1 => "a time".to_owned(),
+            count => format!("{count} times"),
+        };
+        format!(
+            "column \"{column}\" says different things at {times}, first {} in line {} and {} in line {} at \"{time}\" = {}; the last one counts: {APART}",
+            first.lost, first.line, first.kept, first.kept_line, first.time
+        )
+    });
+    let timeless = (lost.timeless > 0).then(|| {
+        format!(
+            "column \"{column}\": values in rows without a time, which count nowhere: {}",
+            lost.timeless
+        )
+    });
+    conflict.into_iter().chain(timeless).collect()
+}
+
+impl Log<'_> {
+    /// Takes further columns, by their headers, as inputs after the others.
+    ///
+    /// # Errors
+    /// Columns that the log does not have, or not as numbers.
+    pub fn add_inputs(
+        &mut self,
+        headers: &[String],
+        settings: &EstimateSettings,
+    ) -> Result<(), Error> {
+        for header in headers {
+            let column = match settings.strict {
+                true => self.table.column(header).cloned()?,
+                false => self.table.held(header)?,
+            };
+            self.samples.inputs.push(column);
+        }
+        Ok(())
     }
 }
 
@@ -59,6 +141,20 @@ impl<'t> Log<'t> {
 fn read<'e>(extended: &'e Extended<'_>) -> impl Iterator<Item = &'e str> {
     let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
     outputs.chain(extended.inputs.iter().map(|input| input.name.as_str()))
+}
+
+/// What a log knows to be true of an estimated quantity: what a simulation knew, else the column of that name,
+/// unless an observer reads it, for readings are no truth.
+pub(crate) fn truth<'t>(
+    prepared: &Prepared<'_>,
+    log: &'t Log<'_>,
+    name: &str,
+) -> Option<&'t Series> {
+    let settings = &prepared.study().estimate;
+    let own = header(settings, name);
+    let is_read = read(prepared.extended()).any(|name| header(settings, name) == own);
+    let unread = || logged(&log.table, settings, &log.time, name).filter(|_| !is_read);
+    log.table.truth(name).or_else(unread)
 }
 
 /// The header under which the log has a signal of the plant.
@@ -70,7 +166,11 @@ pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a s
     given.map_or(name, |(_, header)| header)
 }
 
-fn refuse_stray_columns(plant: &Plant, settings: &EstimateSettings) -> Result<(), Error> {
+/// Refuses headers under which the study looks for what the plant does not have.
+pub(crate) fn refuse_stray_columns(
+    plant: &Plant,
+    settings: &EstimateSettings,
+) -> Result<(), Error> {
     let names = || {
         plant
             .outputs
@@ -163,6 +263,8 @@ pub(crate) fn logged<'t>(
     let header = header(settings, name);
     let mut named = table.names().filter(|name| *name == header);
     let is_own = named.next().is_some() && named.next().is_none() && header != time;
-    let values = table.get(header).filter(|_| is_own)?;
+    let values = table
+        .get(header)
+        .filter(|_| is_own && table.origin(header).is_none())?;
     values.iter().any(|x| x.is_finite()).then_some(values)
 }

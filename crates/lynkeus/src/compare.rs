@@ -199,6 +199,7 @@ fn of_family(study: &Study, family: &dyn Family) -> Study {
     let is_filter = family.owns("initial_variance");
     if !is_filter && own.estimate.between_samples == BetweenSamples::Linear {
         own.estimate.deviations = false;
+        own.estimate.innovations = false;
     }
     own
 }

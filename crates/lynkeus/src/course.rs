@@ -1,9 +1,11 @@
 //! What an observer makes of samples, whatever kind of observer it is.
 
+use lynkeus_expr::Spent;
 use lynkeus_observers::Observer;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_run::{Error as RunError, Role};
 
+use crate::judge::{Doubt, Trace};
 use crate::recorded::Recorded;
 use crate::series::{Iter, Store};
 use crate::systems::monitor_column;
@@ -36,6 +38,11 @@ impl Rows<'_> {
 }
 
 impl Samples {
+    /// From the first time to the last.
+    pub fn span(&self) -> f64 {
+        self.time.last().unwrap_or(0.0) - self.time.first().unwrap_or(0.0)
+    }
+
     /// The rows from one of them on.
     pub fn rows_from(&self, row: usize) -> Rows<'_> {
         Rows {
@@ -77,16 +84,33 @@ pub(crate) struct Course {
     pub deviations: Option<Vec<Series>>,
     /// estimates given later rows, too
     pub smoothed: Option<Vec<Series>>,
+    /// their standard deviations
+    pub smoothed_deviations: Option<Vec<Series>>,
     /// how readings and model went together, by sensor; none where it was not followed
     pub sensors: Vec<SensorHealth>,
     /// the same over the last half of the rows
     pub late: Vec<SensorHealth>,
+    /// the innovations of each, by stretches
+    pub traces: Vec<Trace>,
+    /// the same beside what is expected once the start is forgotten
+    pub settled: Vec<Trace>,
     /// values of known inputs that were missing, where the last one held
     pub inputs_held: usize,
+    /// whether the innovations are kept, row by row
+    pub keeps_innovations: bool,
+    /// where they are: of each sensor its innovations, then their standard deviations; NaN where it
+    /// did not report
+    pub innovations: Vec<Series>,
+    /// what speaks against the estimates beside what is seen in them
+    pub doubts: Vec<Doubt>,
     /// what was chosen for the user
     pub notes: Vec<String>,
+    /// what of the log contradicts itself, or counts nowhere
+    pub warnings: Vec<String>,
     /// why the run ended early, with the rows before
     pub ended: Option<RunError>,
+    /// the limit that ended it, where it was one
+    pub limit: Option<Spent>,
     /// keeps what is long of the columns
     pub store: Store,
 }
@@ -127,8 +151,11 @@ impl Course {
                 .and_then(|c| c.get_mut(i))
                 .map(std::mem::take)
         };
-        quantity.deviation = of(&mut self.deviations).filter(|_| with_deviation);
+        if with_deviation {
+            quantity.deviation = of(&mut self.deviations);
+        }
         quantity.smoothed = of(&mut self.smoothed);
+        quantity.smoothed_deviation = of(&mut self.smoothed_deviations);
     }
 }
 

@@ -74,6 +74,13 @@ impl Error {
         self
     }
 
+    /// The same where a limit ended the work, and what was done before is there.
+    #[must_use]
+    pub fn as_ended(mut self) -> Self {
+        self.kind = ErrorKind::Ended;
+        self
+    }
+
     /// Keeps the error that it comes from.
     #[must_use]
     pub fn caused_by(mut self, source: impl std::error::Error + Send + Sync + 'static) -> Self {

@@ -2,12 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_observers::{Design, Observer, Signal};
+use lynkeus_observers::{Design, InputDerivative, Observer, Signal};
+use lynkeus_run::filter::FilterKind;
 use lynkeus_run::{Estimator, EstimatorSettings};
 
 use crate::checkpoint::Checkpoint;
 use crate::columns::{self, Log};
 use crate::course::{Course, Samples};
+use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
@@ -83,8 +85,10 @@ fn watched(
 ) -> Result<Outcome, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
-    refuse_derivatives(study, &design)?;
-    let log = Log::read(prepared, table)?;
+    let known = design.observer.inputs.len();
+    let derivatives = derivatives(study, &mut design)?;
+    let mut log = Log::read(prepared, table)?;
+    log.add_inputs(&derivatives, settings)?;
     let samples = &log.samples;
     start_at_readings(prepared, samples, &mut design);
     let watch = &mut Watch {
@@ -106,7 +110,7 @@ fn watched(
             name: e.variable.name.clone(),
             unit: e.variable.unit.clone(),
             description: e.variable.description.clone(),
-            truth: logged(&e.variable.name),
+            truth: columns::truth(prepared, &log, &e.variable.name).map(|x| x.shortened(rows)),
             unknown_input: e.unknown_input,
             is_input: e.unknown_input,
             ..Quantity::default()
@@ -115,7 +119,8 @@ fn watched(
         quantity
     });
     let estimated: Vec<Quantity> = estimated.collect();
-    let known = design.observer.inputs.iter().map(|signal| Quantity {
+    let known = design.observer.inputs.iter().take(known);
+    let known = known.map(|signal| Quantity {
         name: signal.name.clone(),
         truth: logged(&signal.name),
         is_input: true,
@@ -123,12 +128,15 @@ fn watched(
     });
     let mut notes = design.notes.clone();
     notes.extend_from_slice(&log.notes);
+    course.warnings.extend_from_slice(&log.warnings);
+    notes.extend(unlocated(prepared.plant(), method(&settings.method)));
     let raw = Raw {
         intervals,
-        frozen: hanging(study, &design.observer, samples),
+        frozen: hanging(prepared, &design.observer, samples),
         time: samples.time.shortened(rows),
         quantities: estimated.into_iter().chain(known).collect(),
         measurements: measurements(&design, |signal| logged(&signal.name)),
+        replayed: true,
         notes,
         course,
         prepared,
@@ -138,16 +146,14 @@ fn watched(
 }
 
 /// Where the sensors that an observer reads hang.
-fn hanging(study: &Study, observer: &Observer, samples: &Samples) -> Vec<Frozen> {
+fn hanging(prepared: &Prepared<'_>, observer: &Observer, samples: &Samples) -> Vec<Frozen> {
+    let declared = prepared.declared();
     let sensors = observer.measured.iter().zip(&samples.readings);
     let of = |(signal, readings): (&Signal, &Series)| {
-        let noises = &mut study.sensors.noise.iter();
-        let limits = &mut study.sensors.limits.iter();
+        let limits = declared.limits.of(&signal.name);
         let channel = Channel {
-            noise: noises.find(|(n, _)| n.text == signal.name).map(|n| n.1),
-            limits: limits
-                .find(|(n, ..)| n.text == signal.name)
-                .map(|(_, low, high)| (*low, *high)),
+            noise: declared.noise.of(&signal.name).copied(),
+            limits: limits.map(|limits| (limits.low, limits.high)),
         };
         frozen(&signal.name, &samples.time, readings, channel)
     };
@@ -217,6 +223,21 @@ pub(crate) fn course(
     course_of(prepared, design, samples, run, &mut Watch::only(watch))
 }
 
+/// What the study asks of an observer that it cannot give.
+pub(crate) fn refuse_settings(study: &Study, design: &Design) -> Result<(), Error> {
+    let Some(filter) = &design.observer.filter else {
+        return match study.estimate.smoothing {
+            Some(_) => Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file)),
+            None => Ok(()),
+        };
+    };
+    if let FilterKind::Unscented(points) = &filter.kind {
+        let states = design.observer.states.len();
+        points.weights(states).map_err(Error::from_source)?;
+    }
+    filter::refuse_longer_lag(study, &filter.kind)
+}
+
 /// The same with other limits of the method.
 pub(crate) fn course_of(
     prepared: &Prepared<'_>,
@@ -227,21 +248,23 @@ pub(crate) fn course_of(
 ) -> Result<Course, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
+    refuse_settings(study, design)?;
     if design.observer.filter.is_some() {
-        return filter::run(study, prepared.extended(), design, samples, run, watch);
-    }
-    if settings.smoothing.is_some() {
-        return Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file));
+        return filter::run(prepared, design, samples, run, watch);
     }
     let is_linear = settings.between_samples == BetweenSamples::Linear;
-    if is_linear && samples.have_gaps() && !settings.deviations {
+    if is_linear && samples.have_gaps() && !settings.follows_errors() {
         return across_gaps(prepared, design, samples, run, watch);
     }
-    let stands_in = samples.have_gaps() || settings.deviations;
+    let stands_in = samples.have_gaps() || settings.follows_errors();
     if stands_in || settings.between_samples == BetweenSamples::Predict {
         let mut course = sampled::run(prepared, design, samples, run.method, watch)?;
         if is_linear {
-            course.notes.push("with `sd` the measurements are held between samples, not linear: standard deviations are those of a causal observer".to_owned());
+            let key = match settings.deviations {
+                true => "sd",
+                false => "innovations",
+            };
+            course.notes.push(format!("with `{key}` the measurements are held between samples, not linear: standard deviations are those of a causal observer"));
         }
         return Ok(course);
     }
@@ -311,15 +334,50 @@ pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
     }
 }
 
-/// A log has no derivatives of the inputs.
+/// The headers of the columns that hold the derivatives of the inputs which an observer reads; they
+/// become inputs of its own, after the others.
+///
+/// # Errors
+/// A derivative for which the study names no column.
+fn derivatives(study: &Study, design: &mut Design) -> Result<Vec<String>, Error> {
+    let given = &study.estimate.input_derivatives;
+    let inputs = &design.observer.inputs;
+    let stray = given
+        .iter()
+        .find(|(name, _)| !inputs.iter().any(|input| input.name == name.text));
+    if let Some((name, _)) = stray {
+        let names = inputs.iter().map(|input| input.name.as_str());
+        let message =
+            format!("input_derivatives of [estimate]: no known input is called \"{name}\"");
+        return Err(name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names))));
+    }
+    let header = |needed: &InputDerivative| {
+        let mut own = given.iter().filter(|(name, _)| name.text == needed.input);
+        own.next()?.1.get(needed.order - 1).cloned()
+    };
+    let needed = &design.observer.input_derivatives;
+    let Some(headers) = needed.iter().map(header).collect::<Option<Vec<_>>>() else {
+        refuse_derivatives(study, design)?;
+        return Ok(vec![]);
+    };
+    let needed = std::mem::take(&mut design.observer.input_derivatives);
+    let signals = needed.into_iter().map(|derivative| derivative.signal);
+    design.observer.inputs.extend(signals);
+    Ok(headers)
+}
+
+/// Samples have no derivatives of the inputs, unless the study says where they stand.
 pub(crate) fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
     let Some(needed) = design.observer.input_derivatives.first() else {
         return Ok(());
     };
     Err(Error::input(format!(
-        "this observer reads {}, the derivative of order {} of the input \"{}\", which no log holds",
+        "this observer reads {}, the derivative of order {} of the input \"{}\", and nothing says where it stands",
         needed.signal.name, needed.order, needed.input
     ))
     .at(&study.file)
-    .hint("set variant = \"practical\" in [observer], which estimates it"))
+    .hint(format!(
+        "for a log, name its columns: input_derivatives = {{ {} = [\"…\"] }} under [estimate], one per order (they are never differences of samples); or set variant = \"practical\" in [observer], which estimates it",
+        needed.input
+    )))
 }

@@ -10,6 +10,7 @@ use lynkeus_run::Blueprint;
 
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
+use crate::choice::Choice;
 use crate::estimate::at_readings;
 use crate::fixed_steps::{bends, hasty, stepped};
 use crate::headers::Headers;
@@ -141,6 +142,8 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         true => tunable::design(&prepared)?,
         false => prepared.design()?,
     };
+    let choice = prepared.choice()?.filter(|choice| choice.ended.is_some());
+    notes.extend(choice.map(Choice::notes).into_iter().flatten());
     let made = blueprint(&prepared, &design)?;
     let made = stepped(&prepared, made, options.step, &mut notes)?;
     notes.extend(bends(made.flow()));

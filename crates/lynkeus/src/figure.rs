@@ -137,7 +137,7 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
     Panel {
         caption,
         curves,
-        bands: band(outcome, quantity).into_iter().collect(),
+        bands: bands(outcome, quantity),
         outside: outside(outcome, quantity),
     }
 }
@@ -145,19 +145,29 @@ fn panel(outcome: &Outcome, quantity: &Quantity) -> Panel {
 /// Standard deviations that a band reaches to either side.
 const DEVIATIONS: f64 = 2.0;
 
-fn band(outcome: &Outcome, quantity: &Quantity) -> Option<Band> {
-    let (estimate, deviation) = (quantity.estimate.as_ref()?, quantity.deviation.as_ref()?);
+/// About the estimate, and inside of that about the estimate given later rows.
+fn bands(outcome: &Outcome, quantity: &Quantity) -> Vec<Band> {
+    let pairs = [
+        (&quantity.estimate, &quantity.deviation),
+        (&quantity.smoothed, &quantity.smoothed_deviation),
+    ];
+    let pairs = pairs.into_iter();
+    let found = pairs.filter_map(|(x, sd)| Some(band(outcome, x.as_ref()?, sd.as_ref()?)));
+    found.collect()
+}
+
+fn band(outcome: &Outcome, estimate: &Series, deviation: &Series) -> Band {
     let edge = |side: f64| {
         let pairs = estimate.iter().zip(deviation);
         let edge = pairs.map(|(x, sd)| x + side * DEVIATIONS * sd);
         Series::gathered(estimate.store(), edge)
     };
-    Some(Band {
+    Band {
         extent: Extent::TwoDeviations,
         time: outcome.time.clone(),
         low: edge(-1.0),
         high: edge(1.0),
-    })
+    }
 }
 
 /// When the estimate is outside of its declared range.

@@ -55,6 +55,11 @@ pub(crate) fn open(path: &Path, what: &str) -> Result<File, Error> {
     }
 }
 
+/// Whether a path names a pipe or a device: what is there may come at any time, or never.
+pub(crate) fn is_stream(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|data| !data.is_file() && !data.is_dir())
+}
+
 /// Refuses a path that names no file; `named_in` is the file that names it.
 pub(crate) fn must_exist(path: &Path, what: &str, named_in: &str) -> Result<(), Error> {
     match std::fs::metadata(path) {

@@ -3,16 +3,16 @@
 use lynkeus_model::Variable;
 use lynkeus_observers::{Design, FilterTuning, Signal};
 use lynkeus_run::filter::{
-    Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Limits, Sensor,
-    Smoothed,
+    Bounds, Confined, FilterKind, FilterModel, FilterPlant, FilterSettings, Sensor, Smoothed,
 };
 use lynkeus_run::{Blueprint, EstimatorSettings};
 use lynkeus_structure::{Extended, short};
 
 use crate::course::{Course, Samples};
+use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
 use crate::series::Store;
-use crate::study::{Name, Smoothing};
+use crate::study::Smoothing;
 use crate::{Error, Series, Study};
 
 pub(crate) mod noise;
@@ -20,18 +20,21 @@ pub(crate) mod noise;
 /// Runs the design's filter over samples.
 ///
 /// # Errors
-/// Noises of the study that do not fit, or that are missing, or a checkpoint.
+/// A window shorter than the lag that is asked for, or a checkpoint.
 pub(crate) fn run(
-    study: &Study,
-    extended: &Extended<'_>,
+    prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples,
     settings: EstimatorSettings,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
-    let mut course = Course::default();
+    let (study, extended) = (prepared.study(), prepared.extended());
+    let mut course = Course {
+        keeps_innovations: study.estimate.innovations,
+        ..Course::default()
+    };
     let notes = &mut course.notes;
-    let filter = blueprint(study, extended, design, samples, settings, notes)?;
+    let filter = blueprint(prepared, design, samples, settings, notes)?;
     let mut filter = filter.estimator().map_err(Error::from_source)?;
     let n = filter.names().len();
     replay(&mut filter, samples, n, &mut course, watch)?;
@@ -43,10 +46,23 @@ pub(crate) fn run(
             health.confined
         ));
     }
+    if health.projected > 0 {
+        course.notes.push(format!(
+            "bounds = \"project\": {} times the estimate was put back into the declared ranges",
+            health.projected
+        ));
+    }
+    if health.unsolved > 0 {
+        course.notes.push(format!(
+            "at {} of {} samples the iteration did not converge: these estimates are not the minimum over their window; a shorter `horizon`, wider ranges or a better start may help",
+            health.unsolved,
+            samples.time.len()
+        ));
+    }
     let smoothed = match study.estimate.smoothing {
         None => None,
-        Some(Smoothing::Interval) => filter.smoothed(None, false),
-        Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), false),
+        Some(Smoothing::Interval) => filter.smoothed(None, study.estimate.deviations),
+        Some(Smoothing::Lag(lag)) => filter.smoothed(Some(lag), study.estimate.deviations),
     };
     if is_window(design) {
         let held = held_at_an_end(extended, &course.estimates);
@@ -56,33 +72,40 @@ pub(crate) fn run(
         let note = "nothing is smoothed: the model has no value along the last window";
         course.notes.push(note.to_owned());
     }
-    course.smoothed = smoothed.map(|rows| columns(&course.store, n, &rows));
+    if let Some(rows) = smoothed {
+        let of = |values: fn(&Smoothed) -> &[f64]| columns(&course.store, n, &rows, values);
+        course.smoothed = Some(of(|row| &row.estimate));
+        let asked = study.estimate.deviations;
+        course.smoothed_deviations = asked.then(|| of(|row| &row.deviations));
+    }
     Ok(course)
 }
 
 /// What the design's filter is made of.
 ///
 /// # Errors
-/// Noises of the study that do not fit.
+/// A window shorter than the lag that is asked for.
 pub(crate) fn blueprint(
-    study: &Study,
-    extended: &Extended<'_>,
+    prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples,
     settings: EstimatorSettings,
     notes: &mut Vec<String>,
 ) -> Result<Blueprint, Error> {
+    let study = prepared.study();
     let Some(tuning) = &design.observer.filter else {
         return Err(Error::input("this observer is no filter").at(&study.file));
     };
     refuse_longer_lag(study, &tuning.kind)?;
-    let model = model(study, extended, design, tuning, samples, notes)?;
+    refuse_smoothed_bounds(study, tuning)?;
+    let model = model(prepared, design, tuning, samples, notes)?;
     Ok(Blueprint::Filter {
         model: Box::new(model),
         settings: FilterSettings {
-            kind: tuning.kind.clone(),
             gate: tuning.gate,
+            bounds: tuning.bounds.clone(),
             keep_history: study.estimate.smoothing.is_some(),
+            ..FilterSettings::of(tuning.kind.clone())
         },
         run: settings,
     })
@@ -116,8 +139,19 @@ fn held_at_an_end(extended: &Extended<'_>, estimates: &[Series]) -> Option<Strin
     })
 }
 
+/// What is projected is no Kalman filter's estimate, and its smoother would not keep to the bounds.
+fn refuse_smoothed_bounds(study: &Study, tuning: &FilterTuning) -> Result<(), Error> {
+    if study.estimate.smoothing.is_none() || tuning.bounds.is_none() {
+        return Ok(());
+    }
+    let message = "`bounds = \"project\"` of [observer] has no smoother, and `smooth` or `lag` of [estimate] asks for one";
+    Err(Error::input(message).at(&study.file).hint(
+        "take family = \"mhe\", whose smoother keeps to the ranges, or leave one of the keys out",
+    ))
+}
+
 /// A window has no row older than its horizon.
-fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
+pub(crate) fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
     let (Some(Smoothing::Lag(lag)), FilterKind::MovingHorizon(horizon, _)) =
         (study.estimate.smoothing, kind)
     else {
@@ -134,35 +168,36 @@ fn refuse_longer_lag(study: &Study, kind: &FilterKind) -> Result<(), Error> {
         .hint("raise `horizon` of [observer], or take smooth = true"))
 }
 
-fn columns(store: &Store, count: usize, rows: &[Smoothed]) -> Vec<Series> {
-    let column = |i: usize| Series::gathered(store, rows.iter().map(|row| row.estimate[i]));
+/// So many columns of what there is of each row.
+fn columns(
+    store: &Store,
+    count: usize,
+    rows: &[Smoothed],
+    values: fn(&Smoothed) -> &[f64],
+) -> Vec<Series> {
+    let at = |row, i| values(row).get(i).copied().unwrap_or(f64::NAN);
+    let column = |i: usize| Series::gathered(store, rows.iter().map(|row| at(row, i)));
     (0..count).map(column).collect()
 }
 
 /// The plant with the study's noises.
 fn model(
-    study: &Study,
-    extended: &Extended<'_>,
+    prepared: &Prepared<'_>,
     design: &Design,
     tuning: &FilterTuning,
     samples: &Samples,
     notes: &mut Vec<String>,
 ) -> Result<FilterModel, Error> {
-    let observer = &design.observer;
+    let (extended, observer) = (prepared.extended(), &design.observer);
+    let declared = prepared.declared();
     let states = observer
         .states
         .iter()
         .map(|(s, start)| (s.name.clone(), s.symbol, *start));
     let named = |s: &Signal| (s.name.clone(), s.symbol);
-    let span = samples.time.last().unwrap_or(0.0) - samples.time.first().unwrap_or(0.0);
-    let limits = limits(study, extended)?;
-    let levels = noise::levels(study, extended, samples, notes)?;
-    let sensors = observer
-        .measured
-        .iter()
-        .zip(&tuning.outputs)
-        .zip(levels)
-        .zip(limits);
+    let span = samples.span();
+    let levels = noise::levels(declared, extended, samples, notes);
+    let sensors = observer.measured.iter().zip(&tuning.outputs).zip(levels);
     let plant = FilterPlant {
         graph: extended.graph(),
         time: observer.time,
@@ -170,14 +205,14 @@ fn model(
         derivatives: observer.derivatives.clone(),
         inputs: observer.inputs.iter().map(named).collect(),
         sensors: sensors
-            .map(|(((signal, output), noise), limits)| Sensor {
+            .map(|((signal, output), noise)| Sensor {
                 name: signal.name.clone(),
                 output: *output,
                 noise,
-                limits,
+                limits: declared.limits.of(&signal.name).copied(),
             })
             .collect(),
-        process_noise: noise::densities(study, extended, span, notes)?,
+        process_noise: noise::densities(prepared, span, notes),
         initial_variance: tuning.initial_variance.clone(),
         confined: Some(Confined {
             derivatives: tuning.confined.clone(),
@@ -192,26 +227,4 @@ fn bounds(state: &Variable) -> Bounds {
         low: state.min,
         high: state.max,
     }
-}
-
-/// `limits` of `[sensors]`, by measured output.
-pub(crate) fn limits(study: &Study, extended: &Extended<'_>) -> Result<Vec<Option<Limits>>, Error> {
-    let mut found = vec![None; extended.outputs.len()];
-    for (name, low, high) in &study.sensors.limits {
-        let place = output(extended, name, "limits")?;
-        found[place] = Some(Limits {
-            low: *low,
-            high: *high,
-        });
-    }
-    Ok(found)
-}
-
-/// The measured output of that name.
-fn output(extended: &Extended<'_>, name: &Name, key: &str) -> Result<usize, Error> {
-    let names = || extended.outputs.iter().map(|o| o.variable.name.as_str());
-    names().position(|n| n == name.text).ok_or_else(|| {
-        let message = format!("{key} of [sensors]: no measured output is called \"{name}\"");
-        name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names())))
-    })
 }

@@ -1,7 +1,8 @@
 //! Fixed steps: those that are asked for, those that are needed, and what is told of them.
 
+use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, needed_step};
+use lynkeus_run::{Blueprint, Method, NeededStep, Step, System, first_jump, needed_step};
 use lynkeus_structure::short;
 
 use crate::prepare::Prepared;
@@ -42,6 +43,18 @@ pub(crate) fn rounded(step: f64) -> f64 {
 pub(crate) fn bends(system: &System) -> Option<String> {
     let told = "the model bends with time alone (max, min, abs of time): lynkeus stops at these instants, here a step goes across them";
     system.has_instants().then(|| told.to_owned())
+}
+
+/// What fixed steps may lose of a plant that jumps with its state.
+pub(crate) fn unlocated(plant: &Plant, method: Method) -> Option<String> {
+    let Method::Rk4(_) = method else {
+        return None;
+    };
+    let states: Vec<Node> = plant.states.iter().map(|state| state.node).collect();
+    let jump = first_jump(&plant.graph, &states, &plant.derivatives)?;
+    Some(format!(
+        "with method = \"rk4\" steps go across where {jump} jumps: what happens between two crossings may be lost; method = \"adaptive\" ends its steps there"
+    ))
 }
 
 /// With fixed steps: those asked for, those of the study, or such as the fastest mode needs.

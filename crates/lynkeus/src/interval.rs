@@ -66,11 +66,8 @@ pub(crate) fn simulated(
     quantities: &[Quantity],
 ) -> Option<Intervals> {
     let study = prepared.study();
-    let noisy = study
-        .sensors
-        .noise
-        .iter()
-        .any(|(_, noise)| noise.size() > 0.0);
+    let noise = &prepared.declared().noise;
+    let noisy = noise.iter().any(|(_, noise)| noise.size() > 0.0);
     let settings = study.simulate.as_ref().filter(|_| noisy)?;
     let step = simulate::sampled_every(study, settings)?;
     let of = |name: &str| quantities.iter().find(|q| q.name == name);
@@ -112,6 +109,7 @@ impl Path<'_> {
         let lynkeus_observers::Sampled {
             observer: sampled,
             outputs,
+            ..
         } = observer.sampled(extended).ok()?;
         let states: Vec<Node> = sampled.states.iter().map(|(s, _)| s.symbol).collect();
         let graph = extended.graph();

@@ -1,7 +1,7 @@
 //! A study's estimator for samples that come one by one.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, Estimator};
+use lynkeus_run::{Blueprint, ErrorModel, Estimator};
 
 use crate::course::Samples;
 use crate::estimate::{refuse_derivatives, run_settings};
@@ -64,13 +64,17 @@ pub(crate) fn blueprint(prepared: &Prepared<'_>, design: &Design) -> Result<Blue
     let notes = &mut vec![];
     if design.observer.filter.is_some() {
         need_noises(prepared, true)?;
-        return filter::blueprint(study, prepared.extended(), design, &none, run, notes);
+        return filter::blueprint(prepared, design, &none, run, notes);
     }
     if study.estimate.deviations {
         need_noises(prepared, false)?;
     }
+    let follows = study.estimate.deviations;
+    let mut observer = sampled::observer(prepared, design, &none, follows, notes)?;
+    // nobody judges a run that has no end
+    observer.errors = observer.errors.map(ErrorModel::without_readings);
     Ok(Blueprint::Sampled {
-        observer: Box::new(sampled::observer(prepared, design, &none, notes)?),
+        observer: Box::new(observer),
         method: run.method,
     })
 }
@@ -91,29 +95,30 @@ fn refuse_looking_ahead(study: &Study, settings: &EstimateSettings) -> Result<()
 /// Without a log there is nothing to take a noise from.
 fn need_noises(prepared: &Prepared<'_>, process: bool) -> Result<(), Error> {
     let (study, extended) = (prepared.study(), prepared.extended());
+    let declared = prepared.declared();
     let missing = |what: String, hint: String| {
         let message =
             format!("{what}: expected in the study, where there is no log to take it from");
         Err(Error::input(message).at(&study.file).hint(hint))
     };
     let outputs = extended.outputs.iter().map(|o| &o.variable.name);
-    let declared = |name: &str| study.sensors.noise.iter().any(|(n, _)| n.text == name);
-    if let Some(name) = outputs.into_iter().find(|name| !declared(name)) {
+    if let Some(name) = outputs
+        .into_iter()
+        .find(|name| declared.noise.of(name).is_none())
+    {
         return missing(
             format!("the noise of {name}"),
             format!("write noise = {{ {name} = … }} under [sensors]"),
         );
     }
-    let densities = filter::noise::declared(study, extended)?;
-    let unknown = extended.states.iter().zip(&densities);
-    let mut unknown = unknown.skip(extended.plant_states());
-    let asleep = unknown.find(|(_, density)| density.is_none());
-    match asleep.map(|(input, _)| input.name.as_str()) {
-        Some(name) if process => missing(
+    let mut unknown = extended.states.iter().skip(extended.plant_states());
+    let asleep = unknown.find(|input| declared.process_noise.of(&input.name).is_none());
+    match asleep.map(|input| input.name.as_str()) {
+        Some(name) => missing(
             format!("how fast {name} wanders"),
             format!("write {name} = … under [process_noise]"),
         ),
-        None if process && study.process_noise.is_empty() => missing(
+        None if process && !declared.process_noise.is_declared() => missing(
             "what the model does not know".to_owned(),
             "write a density for some state under [process_noise], 0 where the model is exact"
                 .to_owned(),

@@ -10,11 +10,11 @@ use lynkeus_run::Error as RunError;
 use crate::accuracy::{self, Accuracy};
 use crate::assertions;
 use crate::course::Course;
-use crate::credible::{self, Doubt};
+use crate::declared::{Account, Declared};
 use crate::frozen::Frozen;
 use crate::headers::{Headers, log_time};
-use crate::innovations::{Innovations, innovations};
 use crate::interval::Intervals;
+use crate::judge::{self, By, Doubt, Evidence, Innovations, Judged, Trace, innovations};
 use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
@@ -41,6 +41,8 @@ pub struct Ended {
     pub message: String,
     /// the study
     pub file: String,
+    /// a limit of time or memory ended it, and nothing is wrong with what there is
+    pub by_limit: bool,
 }
 
 /// Rows over time.
@@ -66,13 +68,13 @@ pub struct Outcome {
     pub plant_outside: Option<Outside>,
     /// where the estimate leaves it
     pub estimate_outside: Option<Outside>,
-    /// the estimates that are not credible
+    /// what speaks against the estimates, the heaviest first
     pub doubts: Vec<Doubt>,
-    /// how the readings went together with a filter's model, by measured output; none for other
-    /// observers
+    /// how the readings went together with what was expected of them, by measured output; none for
+    /// an observer without deviations
     pub innovations: Vec<Innovations>,
-    /// where these contradict the declared noise, in words
-    pub contradictions: Vec<String>,
+    /// these row by row with their standard deviations, where they are asked for, under their headers
+    pub innovation_columns: Vec<(String, Series)>,
     /// errors of the estimates whose true values are known
     pub accuracies: Vec<Accuracy>,
     /// sensors whose readings hang
@@ -81,6 +83,10 @@ pub struct Outcome {
     pub intervals: Option<Intervals>,
     /// why the run ended before its last row
     pub ended: Option<Ended>,
+    /// which of the study's declarations the estimates count, their deviations if there are any
+    pub declared: Account,
+    /// what of the log contradicts itself, or counts nowhere
+    pub warnings: Vec<String>,
     /// what the user should know
     pub notes: Vec<String>,
 }
@@ -111,6 +117,13 @@ impl Outcome {
                 columns.push((quantity.smoothed_header.clone(), smoothed));
             }
         }
+        for quantity in &self.quantities {
+            if let Some(deviation) = &quantity.smoothed_deviation {
+                columns.push((quantity.smoothed_deviation_header.clone(), deviation));
+            }
+        }
+        let innovations = self.innovation_columns.iter();
+        columns.extend(innovations.map(|(header, values)| (header.clone(), values)));
         let watches = self.watches.iter();
         columns.extend(watches.map(|w| (w.header.clone(), &w.values)));
         columns
@@ -140,19 +153,19 @@ impl Outcome {
         Ok(columns)
     }
 
-    /// The answer "no" where an estimate is not credible: it ends far outside of what the model
-    /// declares, and not because the plant is there; its innovations contradict the declared
-    /// noise; or the run ended early.
+    /// The answer "no" where an estimate is not credible, by its [doubts](Self::doubts), or the run
+    /// ended early.
     pub fn refusal(&self) -> Option<Error> {
         if let Some(ended) = &self.ended {
             let rows = self.time.len();
             let message = format!("{} (the {rows} rows before are written)", ended.message);
-            return Some(Error::refused(message).at(&ended.file));
+            let refusal = Error::refused(message).at(&ended.file);
+            return Some(match ended.by_limit {
+                true => refusal.as_ended().hint("allow more time or memory"),
+                false => refusal,
+            });
         }
-        credible::refusal(&self.doubts).or_else(|| {
-            let first = self.contradictions.first()?;
-            Some(credible::contradicted(first))
-        })
+        judge::refusal(&self.doubts)
     }
 
     /// Whether nothing speaks against the estimates.
@@ -170,6 +183,8 @@ pub(crate) struct Raw<'r> {
     pub course: Course,
     pub quantities: Vec<Quantity>,
     pub measurements: Vec<(String, Series)>,
+    /// whether the readings are a log's, and not of a plant whose truth is known
+    pub replayed: bool,
     pub frozen: Vec<Frozen>,
     pub intervals: Option<Intervals>,
     pub notes: Vec<String>,
@@ -188,6 +203,7 @@ impl Raw<'_> {
             mut course,
             mut quantities,
             measurements,
+            replayed,
             frozen,
             intervals,
             mut notes,
@@ -195,7 +211,7 @@ impl Raw<'_> {
         notes.append(&mut course.notes);
         notes.extend(frozen.iter().map(Frozen::words));
         notes.extend(intervals.as_ref().and_then(Intervals::words));
-        notes.extend(saturated::told(prepared, &design, &measurements)?);
+        notes.extend(saturated::told(prepared, &design, &measurements));
         let innovations = innovations(&design, &course, &mut notes);
         let plant = prepared.plant();
         let mut headers = Headers::beside(plant);
@@ -213,7 +229,13 @@ impl Raw<'_> {
                 quantity.smoothed_header =
                     headers.free(&wanted, &format!("{what} given later rows"));
             }
+            if quantity.smoothed_deviation.is_some() {
+                let wanted = format!("{}_smooth_sd", quantity.name);
+                let what = format!("the deviation of {what} given later rows");
+                quantity.smoothed_deviation_header = headers.free(&wanted, &what);
+            }
         }
+        let innovation_columns = innovation_columns(&design, &mut course, &mut headers);
         let watches = watches(&design, &mut course.monitors, &time, &mut headers);
         show_measurements(plant, &measurements, &mut quantities);
         expected::give(prepared.extended(), &time, &mut quantities);
@@ -234,20 +256,58 @@ impl Raw<'_> {
                 "the {who} is outside of the declared box {words}: nothing is proved there"
             ))
         }));
-        let doubts = credible::doubts(plant, &quantities);
+        let sight = Sight {
+            prepared,
+            design: &design,
+            time: &time,
+            quantities: &quantities,
+            deviations: course.deviations.as_deref().unwrap_or_default(),
+            innovations: &innovations,
+            frozen: &frozen,
+        };
+        // a density that was guessed excuses nothing
+        let is_plain = innovations.is_empty();
+        let bare = match replayed && (is_plain || sight.wander_is_guessed()) {
+            true => judge::residuals(
+                prepared.declared(),
+                plant,
+                &time,
+                &quantities,
+                &measurements,
+                is_plain,
+            ),
+            false => vec![],
+        };
+        let mut doubts = sight.doubts(&bare);
+        doubts.splice(0..0, std::mem::take(&mut course.doubts));
+        let ended = course.ended.as_ref().map(|e| Doubt::ended(e.to_string()));
+        doubts.splice(0..0, ended);
+        let told = doubts.iter().filter(|d| d.is_told());
+        notes.extend(told.map(|d| d.text.clone()));
         // nothing of this counts where a number was lost
         course.check()?;
         time.check()?;
+        let is_weighed =
+            design.observer.filter.is_some() || quantities.iter().any(|q| q.deviation.is_some());
+        let declared = account(prepared.declared(), &design, is_weighed);
+        // of a gain that is chosen without the noises nobody takes them for counted
+        let is_claimed = is_weighed || prepared.declared().disturbances.is_declared();
+        notes.extend(declared.told().filter(|_| is_claimed));
         Ok(Outcome {
             plant: plant.name.clone(),
+            declared,
             log_time: log_time(plant, &prepared.study().estimate),
             doubts,
-            contradictions: credible::contradictions(&innovations),
             ended: course.ended.map(|error| Ended {
-                message: error.to_string(),
+                message: match course.limit {
+                    Some(spent) => not_whole(spent, &error),
+                    None => error.to_string(),
+                },
                 file: prepared.study().file.clone(),
+                by_limit: course.limit.is_some(),
             }),
             innovations,
+            innovation_columns,
             accuracies,
             frozen,
             intervals,
@@ -259,7 +319,123 @@ impl Raw<'_> {
             watches,
             plant_outside,
             estimate_outside,
+            warnings: course.warnings,
             notes,
+        })
+    }
+}
+
+/// What estimates count: a filter by its gain, a family with a theorem by its deviations if they are asked for.
+fn account(declared: &Declared, design: &Design, is_weighed: bool) -> Account {
+    let Declared {
+        ranges,
+        noise,
+        limits,
+        samples,
+        process_noise,
+        disturbances,
+        slew,
+        input_derivatives,
+    } = declared;
+    let is_filter = design.observer.filter.is_some();
+    let unweighed = "the gain is chosen without it: `sd` of [estimate] counts it, and `certify`";
+    let promised = "a promise of what the inputs do: `certify` counts it";
+    Account::default()
+        .counts(ranges)
+        .counts(samples)
+        .counts_if(is_weighed, noise, unweighed)
+        .counts_if(is_weighed, process_noise, unweighed)
+        .counts_if(is_filter, limits, saturated::TAKEN)
+        .leaves(
+            disturbances,
+            "taken as zero: neither estimate nor deviation counts what they do",
+        )
+        .leaves(slew, promised)
+        .leaves(input_derivatives, promised)
+}
+
+/// The innovations row by row, each followed by its standard deviation.
+fn innovation_columns(
+    design: &Design,
+    course: &mut Course,
+    headers: &mut Headers,
+) -> Vec<(String, Series)> {
+    let sensors = design.observer.measured.iter();
+    let named = sensors.flat_map(|s| ["innovation", "innovation_sd"].map(|what| (&s.name, what)));
+    let columns = std::mem::take(&mut course.innovations);
+    let named = named.zip(columns).map(|((name, what), values)| {
+        let header = headers.free(&format!("{name}_{what}"), &format!("the {what} of {name}"));
+        (header, values)
+    });
+    named.collect()
+}
+
+/// What a judge sees of a run.
+struct Sight<'s> {
+    prepared: &'s Prepared<'s>,
+    design: &'s Design,
+    time: &'s Series,
+    quantities: &'s [Quantity],
+    /// by estimate, where they are not told
+    deviations: &'s [Series],
+    innovations: &'s [Innovations],
+    frozen: &'s [Frozen],
+}
+
+impl Sight<'_> {
+    /// Whether an observer with a theorem estimates an unknown input of which nothing declares how fast
+    /// it wanders.
+    fn wander_is_guessed(&self) -> bool {
+        let extended = self.prepared.extended();
+        let declared = &self.prepared.study().process_noise;
+        let is_declared = |name: &str| declared.iter().any(|(n, _)| n.is_or_has(name));
+        let mut unknown = extended.states.iter().skip(extended.plant_states());
+        self.design.observer.filter.is_none() && unknown.any(|u| !is_declared(&u.name))
+    }
+
+    /// What speaks against the estimates; `bare` are readings beside them where there are no
+    /// innovations.
+    fn doubts(&self, bare: &[(String, Trace)]) -> Vec<Doubt> {
+        let is_filter = self.design.observer.filter.is_some();
+        let noise = &self.prepared.study().sensors.noise;
+        let is_declared = |name: &str| noise.iter().any(|(n, _)| n.is_or_has(name));
+        let followed = self.innovations.iter().flat_map(|i| {
+            let by = |by: By, trace| Judged {
+                name: &i.output,
+                trace,
+                late: Some(&i.late),
+                by,
+                is_declared: is_declared(&i.output),
+            };
+            match is_filter {
+                true => vec![by(By::Filter, &i.trace)],
+                false => vec![by(By::ErrorSystem, &i.trace), by(By::Settled, &i.settled)],
+            }
+        });
+        let bare = bare.iter().map(|(name, trace)| Judged {
+            name,
+            trace,
+            late: None,
+            by: By::Noise,
+            is_declared: true,
+        });
+        // a noise that was guessed from the log says nothing of an observer with a theorem
+        let sensors = followed.filter(|s| is_filter || s.is_declared).chain(bare);
+        let (extended, plant) = (self.prepared.extended(), self.prepared.plant());
+        let declared = extended.states.iter().chain(&plant.states);
+        let estimates = self.design.observer.estimates.iter();
+        let kept = estimates.zip(self.deviations);
+        let kept = kept.map(|(e, sd)| (e.variable.name.as_str(), sd));
+        let told = self.quantities.iter();
+        let told = told.filter_map(|q| Some((q.name.as_str(), q.deviation.as_ref()?)));
+        judge::doubts(&Evidence {
+            time: self.time,
+            quantities: self.quantities,
+            declared: declared.chain(&plant.inputs).collect(),
+            deviations: told.chain(kept).collect(),
+            sensors: sensors.collect(),
+            frozen: self.frozen,
+            is_filter,
         })
     }
 }
@@ -320,9 +496,8 @@ pub(crate) fn settle(
 ) -> Result<(), Error> {
     match (course.ended.take(), study.budget.marked()) {
         (None, _) => Ok(()),
-        (Some(RunError::Cancelled { time }), Some(spent)) if spent != Spent::Cancelled => {
-            let note = format!("the run is not whole: {spent} at t = {time}");
-            course.notes.push(note);
+        (Some(error @ RunError::Cancelled { .. }), Some(spent)) if spent != Spent::Cancelled => {
+            (course.ended, course.limit) = (Some(error), Some(spent));
             Ok(())
         }
         (Some(error), _) if rows > 0 && is_answer(&error) => {
@@ -333,11 +508,22 @@ pub(crate) fn settle(
     }
 }
 
+/// That a limit ended a run, in words.
+fn not_whole(spent: Spent, error: &RunError) -> String {
+    match error {
+        RunError::Cancelled { time } => format!("the run is not whole: {spent} at t = {time}"),
+        _ => format!("the run is not whole: {spent}"),
+    }
+}
+
 /// Whether the end of a run says something of the estimate, and not of the input.
 fn is_answer(error: &RunError) -> bool {
     matches!(
         error,
-        RunError::Diverged { .. } | RunError::NotFinite { .. } | RunError::StepUnderflow { .. }
+        RunError::Diverged { .. }
+            | RunError::NotFinite { .. }
+            | RunError::StepUnderflow { .. }
+            | RunError::Singular { .. }
     )
 }
 

@@ -75,7 +75,7 @@ pub(crate) fn time_itself(time: &Series) -> Quantity {
 pub(crate) type Of = fn(&Quantity) -> Option<&Series>;
 
 /// What the plant does, as far as it is known.
-pub(crate) const PLANT: Of = |quantity| quantity.truth.as_ref();
+pub(crate) const PLANT: Of = |quantity| quantity.truth.as_ref().or(quantity.measured.as_ref());
 /// What the observer makes of it.
 pub(crate) const ESTIMATE: Of = |quantity| quantity.estimate.as_ref();
 

@@ -4,12 +4,13 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use lynkeus_expr::Budget;
-use lynkeus_model::{LoadError, LoadOptions, Plant};
+use lynkeus_expr::{Budget, Spent};
+use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
 use crate::choice::{Choice, choose};
+use crate::declared::Declared;
 use crate::study::Name;
 use crate::{Error, Study, calibrate, filter, systems};
 
@@ -70,11 +71,41 @@ fn load(study: &Study, symbols_but: Option<BTreeSet<String>>) -> Result<Plant, E
     })
 }
 
+/// Who measures what, as the study says.
+pub(crate) fn sensors(study: &Study, plant: &Plant) -> Sensors {
+    let measured = study.sensors.measured.as_deref().unwrap_or_default();
+    Sensors {
+        measured: Name::meant(measured, &plant.outputs),
+        unknown: calibrate::unknown_inputs(study, plant),
+        disturbances: Name::meant(&study.sensors.disturbances, &plant.inputs),
+    }
+}
+
+/// The plant as these sensors see it, on the study's box.
+///
+/// # Errors
+/// Names among the sensors or in `[box]` that the plant does not have.
+pub(crate) fn seen_by<'a>(
+    study: &Study,
+    plant: &'a Plant,
+    sensors: &Sensors,
+) -> Result<Extended<'a>, Error> {
+    let mut extended = Extended::new(plant, sensors).map_err(|error| blame(study, error))?;
+    for (name, low, high) in &study.narrower {
+        extended
+            .narrow(&name.text, *low, *high)
+            .map_err(|error| name.blame(Error::from_source(error)))?;
+    }
+    tube(study, &mut extended)?;
+    Ok(extended)
+}
+
 /// A study with its plant as the observer sees it, and what the families find in it: made
 /// once, used by every command.
 #[derive(Debug)]
 pub struct Prepared<'a> {
     study: &'a Study,
+    declared: Declared,
     extended: Extended<'a>,
     /// made when first asked for
     examinations: OnceCell<Vec<Examination>>,
@@ -89,23 +120,19 @@ impl<'a> Prepared<'a> {
     /// Applies the study's sensors, `[box]` and tube to its plant.
     ///
     /// # Errors
-    /// Names among the sensors or in `[box]` that the plant does not have.
+    /// Names among the sensors, in `[box]` or of anything else declared that the plant does not have.
     pub fn new(study: &'a Study, plant: &'a Plant) -> Result<Self, Error> {
-        let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
-        let sensors = Sensors {
-            measured: texts(study.sensors.measured.as_deref().unwrap_or_default()),
-            unknown: calibrate::unknown_inputs(study, plant),
-            disturbances: texts(&study.sensors.disturbances),
-        };
-        let mut extended = Extended::new(plant, &sensors).map_err(|error| blame(study, error))?;
-        for (name, low, high) in &study.narrower {
-            extended
-                .narrow(&name.text, *low, *high)
-                .map_err(|error| name.blame(Error::from_source(error)))?;
-        }
-        tube(study, &mut extended)?;
+        let mut extended = seen_by(study, plant, &sensors(study, plant))?;
+        let declared = Declared::new(study, plant)?;
+        let bounds = |input: &Variable| declared.input_derivatives.of(&input.name);
+        extended.input_derivatives = extended
+            .inputs
+            .iter()
+            .map(|u| bounds(u).cloned().unwrap_or_default())
+            .collect();
         Ok(Self {
             study,
+            declared,
             extended,
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
@@ -115,6 +142,11 @@ impl<'a> Prepared<'a> {
     /// The study.
     pub fn study(&self) -> &'a Study {
         self.study
+    }
+
+    /// What the study declares.
+    pub(crate) fn declared(&self) -> &Declared {
+        &self.declared
     }
 
     /// The plant.
@@ -127,31 +159,39 @@ impl<'a> Prepared<'a> {
         &self.extended
     }
 
-    /// The same plant with another study, which differs in nothing that was prepared.
+    /// The same plant with another study, which differs in nothing else that was prepared than the numbers
+    /// that it declares.
+    ///
+    /// # Errors
+    /// Declared names that the plant does not have.
     #[cfg(feature = "tune")]
-    pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Prepared<'b>
+    pub(crate) fn with_study<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
     {
-        Prepared {
+        Ok(Prepared {
             study,
+            declared: Declared::new(study, self.plant())?,
             extended: self.extended.clone(),
             examinations: OnceCell::new(),
             choice: OnceCell::new(),
-        }
+        })
     }
 
     /// The same with another way of running what was designed: families are not asked again.
+    ///
+    /// # Errors
+    /// As [`Prepared::with_study`].
     #[cfg(feature = "tune")]
-    pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Prepared<'b>
+    pub(crate) fn run_by<'b>(&self, study: &'b Study) -> Result<Prepared<'b>, Error>
     where
         'a: 'b,
     {
-        Prepared {
+        Ok(Prepared {
             examinations: self.examinations.clone(),
             choice: self.choice.clone(),
-            ..self.with_study(study)
-        }
+            ..self.with_study(study)?
+        })
     }
 
     /// What every family that the study allows finds in the plant.
@@ -218,6 +258,10 @@ impl<'a> Prepared<'a> {
         let Some(choice) = self.choice()? else {
             return Err(none_fits(self.study, examinations));
         };
+        // where nothing is left, another observer than the study's would be made in its place
+        if let (Some(_), Some(spent)) = (choice.ended, self.study.budget.spent()) {
+            return Err(limited(self.study, spent));
+        }
         let mut design = self.made(choice, tuning)?;
         design.notes.extend(choice.notes());
         Ok(design)
@@ -239,7 +283,7 @@ impl<'a> Prepared<'a> {
         let simulated = match is_certified_gain(tuning) {
             true => {
                 let place = self.narrowed(&self.simulated_inputs()?)?;
-                tuned.noise = filter::noise::deviations(self.study, &place)?;
+                tuned.noise = filter::noise::deviations(&self.declared, &place)?;
                 Some(place)
             }
             false => None,
@@ -368,7 +412,7 @@ fn blame(study: &Study, error: SensorsError) -> Error {
         &sensors.unknown,
         &sensors.disturbances,
     ];
-    let found = lists.into_iter().flatten().rfind(|n| n.text == *name);
+    let found = lists.into_iter().flatten().rfind(|n| n.is_or_has(name));
     let refusal = Error::from_source(error);
     match found {
         Some(found) => found.blame(refusal),
@@ -381,12 +425,17 @@ pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
     tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
 }
 
+/// A limit came before the decision on the family.
+fn limited(study: &Study, spent: Spent) -> Error {
+    Error::ended(spent)
+        .at(&study.file)
+        .hint("`--time-limit` and `--memory-limit` move the limits, and `family` in [observer] names the family")
+}
+
 fn none_fits(study: &Study, examinations: &[Examination]) -> Error {
     let mut ended = examinations.iter().filter_map(Examination::spent);
     if let Some(spent) = ended.find(|spent| spent.is_limit()) {
-        return Error::ended(spent)
-            .at(&study.file)
-            .hint("`--time-limit` and `--memory-limit` move the limits");
+        return limited(study, spent);
     }
     let reasons: Vec<String> = examinations
         .iter()

@@ -3,12 +3,12 @@
 use lynkeus_proof::spectrum;
 use std::fmt;
 
-use lynkeus_observers::Examination;
+use lynkeus_expr::Spent;
+use lynkeus_observers::{Examination, Family, Value};
 use serde_json::{Value as Json, json};
 
 use crate::modes::Start;
 use crate::prepare::Prepared;
-use crate::words::number;
 
 /// Values tried in simulation.
 #[cfg(feature = "tune")]
@@ -48,11 +48,18 @@ impl Speed {
         }
     }
 
-    /// The value for an error that decays like e^(−rate t).
-    fn value(self, rate: f64) -> f64 {
+    /// The value for an error that decays like e^(−rate t): what this family takes under the key.
+    fn value(self, family: &dyn Family, rate: f64) -> Value {
         match self {
-            Self::Theta => rate,
-            Self::Poles => -rate,
+            Self::Poles => Value::Number(-rounded(rate)),
+            Self::Theta => {
+                let parts = family.speeds();
+                let part = |factor: &f64| Value::Number(rounded(factor * rate));
+                match parts {
+                    [] => Value::Number(rounded(rate)),
+                    _ => Value::List(parts.iter().map(part).collect()),
+                }
+            }
         }
     }
 }
@@ -62,8 +69,8 @@ impl Speed {
 pub struct Proposal {
     /// what it is of
     pub speed: Speed,
-    /// in 1/(unit of time)
-    pub value: f64,
+    /// a number or a list of them, in 1/(unit of time)
+    pub value: Value,
     /// where it comes from
     pub why: String,
     /// the best of values that were tried in simulation
@@ -72,13 +79,25 @@ pub struct Proposal {
 
 impl Proposal {
     pub(crate) fn to_json(&self) -> Json {
-        json!({ "key": self.speed.key(), "value": self.value, "why": self.why })
+        let value = match &self.value {
+            Value::List(values) => values.iter().map(plain).collect(),
+            one => plain(one),
+        };
+        json!({ "key": self.speed.key(), "value": value, "why": self.why })
+    }
+}
+
+/// A number for machines.
+fn plain(value: &Value) -> Json {
+    match value {
+        Value::Number(x) => json!(x),
+        _ => Json::Null,
     }
 }
 
 impl fmt::Display for Proposal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (key, value) = (self.speed.key(), number(self.value));
+        let (key, value) = (self.speed.key(), &self.value);
         write!(
             f,
             "{key} = {value} is proposed: {}; write it, or another, into [observer]",
@@ -88,38 +107,47 @@ impl fmt::Display for Proposal {
 }
 
 /// The knee of a short sweep where the study has a simulation, else twice the mean rate of the plant.
+///
+/// # Errors
+/// The limit that ended the sweep.
 pub(crate) fn propose(
     prepared: &Prepared<'_>,
     examination: &Examination,
     speed: Speed,
-) -> Option<Proposal> {
+) -> Result<Option<Proposal>, Spent> {
     #[cfg(feature = "tune")]
-    if let Some(value) = knee(prepared, examination, speed) {
-        return Some(Proposal {
+    if let Some(value) = knee(prepared, examination, speed)? {
+        return Ok(Some(Proposal {
             speed,
             value,
             is_tried: true,
             why: format!("the knee of {POINTS} values in simulation, which `lynkeus tune` refines"),
-        });
+        }));
     }
-    #[cfg(not(feature = "tune"))]
-    let _ = examination;
-    time_scales(prepared, speed)
+    Ok(time_scales(prepared, examination, speed))
 }
 
 #[cfg(feature = "tune")]
-fn knee(prepared: &Prepared<'_>, examination: &Examination, speed: Speed) -> Option<f64> {
+fn knee(
+    prepared: &Prepared<'_>,
+    examination: &Examination,
+    speed: Speed,
+) -> Result<Option<Value>, Spent> {
     use crate::study::{Name, Values};
     use std::ops::ControlFlow;
 
     let study = prepared.study();
-    let run = study.simulate.as_ref()?;
+    let (Some(run), Some(family)) = (
+        study.simulate.as_ref(),
+        lynkeus_observers::find(examination.family),
+    ) else {
+        return Ok(None);
+    };
     let span = run.until - run.start;
     let step = run.sample_step.or(run.output_step).unwrap_or(span / 500.0);
     if prepared.extended().states.len() > STATES || span / step > ROWS {
-        return None;
+        return Ok(None);
     }
-    let family = lynkeus_observers::find(examination.family)?;
     let mut own = study.clone();
     own.budget = study.budget.within(TIME);
     own.observer.family = Some(Name::from(family.name()));
@@ -130,17 +158,36 @@ fn knee(prepared: &Prepared<'_>, examination: &Examination, speed: Speed) -> Opt
         (1.0 / step).min(FASTEST / span).max(4.0 * SLOWEST / span),
     );
     let rate = |k: usize| low * (high / low).powf(k as f64 / (POINTS - 1) as f64);
-    let value = |k: usize| rounded(speed.value(rate(k)));
+    // a list is swept by factors on what stands there
+    let value = |rate: f64| speed.value(family, rate);
+    let (factor, first) = match value(low) {
+        list @ Value::List(_) => (low, Some(list)),
+        _ => (1.0, None),
+    };
+    let tried: Vec<(f64, Value)> = (0..POINTS)
+        .map(|k| match (value(rate(k)), &first) {
+            (Value::Number(x), None) => (x, Value::Number(x)),
+            (value, _) => (rate(k) / factor, value),
+        })
+        .collect();
+    if let Some(first) = first {
+        let key = speed.key().to_owned();
+        own.observer.tuning.values.insert(key, first);
+    }
     own.tune.keys = vec![(
         Name::from(speed.key()),
-        Values::Listed((0..POINTS).map(value).collect()),
+        Values::Listed(tried.iter().map(|(x, _)| *x).collect()),
     )];
-    let found = crate::tune::tune(&own, None, &mut |_| ControlFlow::Continue(())).ok()?;
+    let found = crate::tune::tune(&own, None, &mut |_| ControlFlow::Continue(()));
     // a sweep that is not whole would depend on the machine
-    match own.budget.marked() {
-        Some(_) => None,
-        None => found.chosen()?.values.first().copied(),
+    if let Some(spent) = own.budget.marked() {
+        return Err(spent);
     }
+    let best = found
+        .ok()
+        .and_then(|found| found.chosen()?.values.first().copied());
+    let chosen = tried.into_iter().find(|(x, _)| Some(*x) == best);
+    Ok(chosen.map(|(_, value)| value))
 }
 
 /// From the true start no speed would be too slow: where the study does not say where the estimate
@@ -166,7 +213,13 @@ fn start_off(own: &mut crate::Study, prepared: &Prepared<'_>) {
     }
 }
 
-fn time_scales(prepared: &Prepared<'_>, speed: Speed) -> Option<Proposal> {
+/// Twice the mean rate of the plant's modes, which nothing was tried with.
+pub(crate) fn time_scales(
+    prepared: &Prepared<'_>,
+    examination: &Examination,
+    speed: Speed,
+) -> Option<Proposal> {
+    let family = lynkeus_observers::find(examination.family)?;
     let extended = prepared.extended();
     let modes = spectrum::eigenvalues(Start::of(extended).jacobian(extended)?)?;
     let sizes: Vec<f64> = modes.iter().map(|λ| λ.norm()).collect();
@@ -187,7 +240,7 @@ fn time_scales(prepared: &Prepared<'_>, speed: Speed) -> Option<Proposal> {
     limited.is_finite().then(|| Proposal {
         speed,
         is_tried: false,
-        value: rounded(speed.value(limited)),
+        value: speed.value(family, limited),
         why,
     })
 }

@@ -23,12 +23,16 @@ pub struct Quantity {
     pub deviation: Option<Series>,
     /// the estimate given later rows, too
     pub smoothed: Option<Series>,
+    /// the standard deviation of that, where it is asked for
+    pub smoothed_deviation: Option<Series>,
     /// header of the estimate's column: `<name>_hat` unless the model has that name
     pub estimate_header: String,
     /// header of the standard deviation's column
     pub deviation_header: String,
     /// header of the column of the estimate given later rows
     pub smoothed_header: String,
+    /// header of the column of its standard deviation
+    pub smoothed_deviation_header: String,
     /// an input that nobody measures
     pub unknown_input: bool,
     /// an input of the plant

@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::filter::{Innovation, Reading, SensorHealth};
 use lynkeus_run::{Error as RunError, Estimator};
 
 use crate::checkpoint::Checkpoint;
 use crate::course::{Course, Samples, add_row};
+use crate::judge::Trace;
 use crate::{Error, Study};
 
 /// Rows between two looks at whether there is room for them.
@@ -76,6 +77,11 @@ pub(crate) fn replay(
     course.estimates = course.columns(estimates);
     course.monitors = course.columns(estimator.names().len().saturating_sub(estimates));
     course.deviations = estimator.deviations().map(|d| course.columns(d.len()));
+    course.traces = vec![Trace::default(); estimator.innovations().len()];
+    course.settled = course.traces.clone();
+    if course.keeps_innovations {
+        course.innovations = course.columns(2 * course.traces.len());
+    }
     let mut half = Halfway::default();
     let first = match &mut watch.checkpoint {
         None => 0,
@@ -102,6 +108,23 @@ pub(crate) fn replay(
         if let (Some(columns), Some(row)) = (&mut course.deviations, estimator.deviations()) {
             add_row(columns, row.iter().copied());
         }
+        let traces = course.traces.iter_mut().zip(&mut course.settled);
+        for ((trace, settled), innovation) in traces.zip(estimator.innovations()) {
+            trace.take(
+                time,
+                innovation.reading,
+                innovation.value / innovation.deviation,
+            );
+            settled.take(
+                time,
+                innovation.reading,
+                innovation.value / innovation.settled,
+            );
+        }
+        if course.keeps_innovations {
+            let kept = estimator.innovations().iter().flat_map(row_of);
+            add_row(&mut course.innovations, kept);
+        }
         if row == rows / 2 {
             half = Halfway::at(estimator, watch.checkpoint.is_some());
         }
@@ -122,6 +145,14 @@ pub(crate) fn replay(
         course.late = late.map(|(all, half)| all.since(half)).collect();
     }
     Ok(())
+}
+
+/// An innovation with its standard deviation.
+fn row_of(innovation: &Innovation) -> [f64; 2] {
+    match innovation.reading {
+        Reading::Missing => [f64::NAN; 2],
+        _ => [innovation.value, innovation.deviation],
+    }
 }
 
 /// Later rows would have to be in a checkpoint, too.

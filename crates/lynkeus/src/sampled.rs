@@ -1,15 +1,19 @@
 //! A log through an observer of the five families, where sensors report when they do.
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_observers::{Design, Sampled, Signal, Tunable};
-use lynkeus_run::{ErrorModel, ErrorNoise, Estimator, Method, SampledObserver, System, Tuned};
+use lynkeus_model::Variable;
+use lynkeus_observers::{Design, Sampled, Signal, Tunable, kalman::prior_variance};
+use lynkeus_run::{
+    ErrorEquations, ErrorModel, ErrorNoise, Estimator, Lag, Method, SampledObserver, System, Tuned,
+};
 
+use crate::Error;
 use crate::course::{Course, Samples};
 use crate::filter::noise;
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
 use crate::study::BetweenSamples;
-use crate::{Error, Study};
+use crate::systems::margins;
 
 /// Runs the design's observer over samples.
 ///
@@ -22,8 +26,16 @@ pub(crate) fn run(
     method: Method,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
-    let mut course = Course::default();
-    let observer = observer(prepared, design, samples, &mut course.notes)?;
+    let mut course = Course {
+        keeps_innovations: prepared.study().estimate.innovations,
+        ..Course::default()
+    };
+    let follows = prepared.study().estimate.follows_errors();
+    let mut observer = observer(prepared, design, samples, follows, &mut course.notes)?;
+    if prepared.study().sensors.noise.is_empty() && !course.keeps_innovations {
+        // what the log's scatter gives judges nobody
+        observer.errors = observer.errors.map(ErrorModel::without_readings);
+    }
     let mut estimator = Estimator::sampled(&observer, method).map_err(Error::from_source)?;
     let count = design.observer.estimates.len();
     replay(&mut estimator, samples, count, &mut course, watch)?;
@@ -41,7 +53,7 @@ pub(crate) fn run(
     Ok(course)
 }
 
-/// The design's observer with its measurements as states.
+/// The design's observer with its measurements as states; whether its errors are followed.
 ///
 /// # Errors
 /// Noises of the study that do not fit.
@@ -49,13 +61,20 @@ pub(crate) fn observer(
     prepared: &Prepared<'_>,
     design: &Design,
     samples: &Samples,
+    follows: bool,
     notes: &mut Vec<String>,
 ) -> Result<SampledObserver, Error> {
     let (study, extended) = (prepared.study(), prepared.extended());
     let sampled = design.observer.sampled(extended);
     let mut sampled = sampled.map_err(Error::from_source)?;
     let tuned = tuned(extended.graph(), &mut sampled)?;
-    let Sampled { observer, outputs } = sampled;
+    let predict = study.estimate.between_samples == BetweenSamples::Predict;
+    let lag = (follows && !predict).then(|| sampled.push_lag(extended.graph()));
+    let Sampled {
+        observer,
+        outputs: expected,
+        rates,
+    } = sampled;
     let states: Vec<(String, Node, f64)> = observer
         .states
         .iter()
@@ -71,7 +90,7 @@ pub(crate) fn observer(
     let told = told.map(|e| (e.variable.name.clone(), e.node));
     let monitors = observer.monitors.iter().map(|m| (m.name.clone(), m.node));
     let sensors: Vec<String> = measured(design);
-    let outputs = sensors.iter().cloned().zip(outputs);
+    let outputs = sensors.iter().cloned().zip(expected.iter().copied());
     let reported: Vec<(String, Node)> = told.chain(monitors).chain(outputs).collect();
     let graph = extended.graph();
     let system = System::new(
@@ -82,27 +101,39 @@ pub(crate) fn observer(
         &observer.derivatives,
         &reported,
     )
-    .map_err(Error::from_source)?;
-    let errors = match study.estimate.deviations {
+    .map_err(Error::from_source)?
+    .with_margins(margins(&observer));
+    let errors = match follows {
         false => None,
         true => {
-            let noise = error_noise(study, prepared, &states, samples, notes)?;
-            let model = ErrorModel::new(
+            let mut noise = error_noise(prepared, &states, samples, notes);
+            let lag = lag.map(|state| Lag {
+                state,
+                rates: &rates,
+            });
+            if let Some(lag) = &lag {
+                noise.initial[lag.state] = 1.0;
+            }
+            let equations = ErrorEquations {
                 graph,
-                observer.time,
-                &states,
-                &signals,
-                &observer.derivatives,
-                &estimates,
-                noise,
-            );
-            Some(model.map_err(Error::from_source)?)
+                time: observer.time,
+                states: &states,
+                signals: &signals,
+                derivatives: &observer.derivatives,
+                estimates: &estimates,
+                outputs: &expected,
+                lag,
+            };
+            let model = ErrorModel::new(equations, noise);
+            let model = model.map_err(Error::from_source)?;
+            let judged = model.expecting(graph, observer.time, &states, &signals, &expected);
+            Some(judged.map_err(Error::from_source)?)
         }
     };
     Ok(SampledObserver {
         system,
         sensors,
-        predict: study.estimate.between_samples == BetweenSamples::Predict,
+        predict,
         errors,
         tuned,
     })
@@ -112,7 +143,9 @@ pub(crate) fn observer(
 /// others; none where there are no such numbers.
 fn tuned(
     graph: &Graph,
-    Sampled { observer, outputs }: &mut Sampled,
+    Sampled {
+        observer, outputs, ..
+    }: &mut Sampled,
 ) -> Result<Option<Tuned>, Error> {
     let numbers = &observer.tunables.numbers;
     let named = |tunable: &Tunable| (tunable.name.clone(), tunable.symbol);
@@ -154,29 +187,27 @@ fn measured(design: &Design) -> Vec<String> {
 /// The noises on the observer's states: those of the plant on its estimate, which comes first,
 /// and none on what the gain needs.
 fn error_noise(
-    study: &Study,
     prepared: &Prepared<'_>,
     states: &[(String, Node, f64)],
     samples: &Samples,
     notes: &mut Vec<String>,
-) -> Result<ErrorNoise, Error> {
-    let extended = prepared.extended();
-    let declared = noise::declared(study, extended)?;
-    let mut process: Vec<f64> = declared.iter().map(|q| q.unwrap_or(0.0)).collect();
-    let quarter = |variable: &lynkeus_model::Variable| {
-        let width = variable.max - variable.min;
-        if width.is_finite() {
-            (width / 4.0).powi(2)
-        } else {
-            0.0
-        }
-    };
-    let mut initial: Vec<f64> = extended.states.iter().map(quarter).collect();
+) -> ErrorNoise {
+    let (extended, declared) = (prepared.extended(), prepared.declared());
+    let mut process = noise::of_families(prepared, samples.span(), notes);
+    let starts = extended.states.iter().zip(states);
+    let mut initial: Vec<f64> = starts
+        .map(|(s, (.., start))| prior_variance(s, *start))
+        .collect();
+    let density = |state: &Variable| declared.process_noise.of(&state.name).copied();
+    let said = extended.states.iter().map(|s| density(s).unwrap_or(0.0));
+    let mut said: Vec<f64> = said.collect();
     process.resize(states.len(), 0.0);
+    said.resize(states.len(), 0.0);
     initial.resize(states.len(), 0.0);
-    Ok(ErrorNoise {
+    ErrorNoise {
         process,
+        declared: said,
         initial,
-        sensors: noise::levels(study, extended, samples, notes)?,
-    })
+        sensors: noise::levels(declared, extended, samples, notes),
+    }
 }

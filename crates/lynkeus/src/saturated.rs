@@ -3,8 +3,8 @@
 use lynkeus_observers::Design;
 use lynkeus_run::filter::Limits;
 
+use crate::Series;
 use crate::prepare::Prepared;
-use crate::{Error, Series, filter};
 
 /// What an observer without covariance makes of such a reading, and what would heed it.
 pub(crate) const TAKEN: &str = "this observer takes that for its value: family = \"ekf\", \"ukf\" or \"mhe\" takes it for a bound";
@@ -17,33 +17,25 @@ pub(crate) struct Limited {
 }
 
 /// The measured outputs whose sensors have limits.
-///
-/// # Errors
-/// Limits of what is not measured.
-pub(crate) fn limited(prepared: &Prepared<'_>) -> Result<Vec<Limited>, Error> {
-    let extended = prepared.extended();
-    let limits = filter::limits(prepared.study(), extended)?;
-    let pairs = extended.outputs.iter().zip(limits);
-    let of = |(output, limits): (&lynkeus_structure::Measurement, Option<Limits>)| {
+pub(crate) fn limited(prepared: &Prepared<'_>) -> Vec<Limited> {
+    let limits = &prepared.declared().limits;
+    let of = |output: &lynkeus_structure::Measurement| {
         let name = output.variable.name.clone();
-        limits.map(|limits| Limited { name, limits })
+        let limits = *limits.of(&name)?;
+        Some(Limited { name, limits })
     };
-    Ok(pairs.filter_map(of).collect())
+    prepared.extended().outputs.iter().filter_map(of).collect()
 }
 
 /// What is to be said of readings at an end of their sensor's range, by an observer that takes them
 /// as they stand.
-///
-/// # Errors
-/// As [`limited`].
 pub(crate) fn told(
     prepared: &Prepared<'_>,
     design: &Design,
     measurements: &[(String, Series)],
-) -> Result<Vec<String>, Error> {
-    let limited = limited(prepared)?;
+) -> Vec<String> {
     if design.observer.filter.is_some() {
-        return Ok(vec![]);
+        return vec![];
     }
     let of = |Limited { name, limits }: &Limited| {
         let (_, readings) = measurements.iter().find(|(own, _)| own == name)?;
@@ -55,5 +47,5 @@ pub(crate) fn told(
             )
         })
     };
-    Ok(limited.iter().filter_map(of).collect())
+    limited(prepared).iter().filter_map(of).collect()
 }

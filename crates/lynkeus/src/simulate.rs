@@ -10,6 +10,7 @@ use lynkeus_observers::{Design, Observer};
 use lynkeus_run::{Role, Simulation};
 
 use crate::course::{Course, Samples};
+use crate::fixed_steps::unlocated;
 use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, measurements, settle};
 use crate::prepare::Prepared;
@@ -18,7 +19,7 @@ use crate::spread::Spread;
 use crate::study::SimulateSettings;
 use crate::systems::{self, method};
 use crate::{Error, Outcome, Quantity, Series, Study, Table, columns, estimate, prepare};
-use noise::noise;
+use noise::{noise, stirred};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
 /// and may stop the run.
@@ -49,7 +50,8 @@ pub(crate) fn of_rig(
     rig: Rig,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Outcome, Error> {
-    let Ran { run, course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
+    let Ran { run, mut course } = rig.run(prepared, settings(prepared.study())?.seed, watch)?;
+    course.notes.extend(rig.notes);
     outcome(prepared, rig.design, &run, course)
 }
 
@@ -60,6 +62,8 @@ pub(crate) struct Rig {
     /// a filter works on what the plant's sensors show, and is not in it
     pub simulation: Simulation,
     spread: Spread,
+    /// what is to be said of every run
+    pub notes: Vec<String>,
 }
 
 /// One run of a [`Rig`].
@@ -90,6 +94,7 @@ impl Rig {
         }
         Ok(Self {
             spread: Spread::new(plant, settings)?,
+            notes: stirred(&mut simulation).into_iter().collect(),
             simulation,
             design,
         })
@@ -104,13 +109,14 @@ impl Rig {
         let settings = settings(study)?;
         let start = systems::starts(plant, &settings.initial)?;
         let system = self.simulation.plant.with_start(start);
-        let simulation = Simulation {
+        let mut simulation = Simulation {
             plant: system.map_err(Error::from_source)?,
             noise: noise(study, settings, plant)?,
             ..self.simulation
         };
         Ok(Self {
             spread: Spread::new(plant, settings)?,
+            notes: stirred(&mut simulation).into_iter().collect(),
             simulation,
             design: self.design,
         })
@@ -234,8 +240,8 @@ pub(crate) fn within<'a>(
     }
 }
 
-/// The study's plant as a logger would have it, a sample every `step`, with the true states and unknown
-/// inputs in columns of their own.
+/// The study's plant as a logger would have it, a sample every `step`, with the true states and
+/// inputs beside it.
 ///
 /// # Errors
 /// A study that cannot be run.
@@ -247,21 +253,22 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let watch = &mut |_| ControlFlow::Continue(());
     let run = simulation.run_watched(&mut within(&study.budget, watch));
     let run = run.map_err(|interrupted| ended_early(interrupted.error, study))?;
-    let groups = [
-        (&plant.outputs, Role::Measured),
-        (&plant.inputs, Role::Input),
-        (&plant.states, Role::State),
-    ];
-    let time = log_time(plant, &study.estimate);
-    let mut found = vec![(time, run.times().to_vec())];
-    for (variables, role) in groups {
-        for (i, variable) in variables.iter().enumerate() {
-            let values = run.column(role.at(i)).unwrap_or_default();
-            let header = columns::header(&study.estimate, &variable.name);
-            found.push((header.to_owned(), values.to_vec()));
-        }
-    }
-    Table::from_columns(found)
+    let settings = &study.estimate;
+    let own = |variables: &[Variable], role: Role| -> Vec<(String, Vec<f64>)> {
+        let values = |i: usize| run.column(role.at(i)).unwrap_or_default().to_vec();
+        let variables = variables.iter().enumerate();
+        variables
+            .map(|(i, v)| (v.name.clone(), values(i)))
+            .collect()
+    };
+    let inputs = own(&plant.inputs, Role::Input);
+    let seen = own(&plant.outputs, Role::Measured).into_iter();
+    let seen = seen.chain(inputs.clone());
+    let seen = seen.map(|(name, values)| (columns::header(settings, &name).to_owned(), values));
+    let time = (log_time(plant, settings), run.times().to_vec());
+    let truth = own(&plant.states, Role::State).into_iter().chain(inputs);
+    let table = Table::from_columns([time].into_iter().chain(seen).collect())?;
+    Ok(table.with_truth(truth.collect()))
 }
 
 /// The study's `[simulate]`.
@@ -332,6 +339,9 @@ pub(crate) fn outcome(
     let mut quantities: Vec<Quantity> = states.map(|(i, v)| quantity(v, Role::State, i)).collect();
     let inputs = plant.inputs.iter().enumerate();
     quantities.extend(inputs.map(|(i, v)| quantity(v, Role::Input, i)));
+    let mut notes = design.notes.clone();
+    let settings = prepared.study().simulate.as_ref();
+    notes.extend(settings.and_then(|s| unlocated(plant, method(&s.method))));
     let measured = |signal: &lynkeus_observers::Signal| {
         let output = systems::output_of(plant, signal)?;
         run.column(Role::Measured.at(output)).cloned()
@@ -340,9 +350,10 @@ pub(crate) fn outcome(
         time: run.time.clone(),
         quantities,
         measurements: measurements(&design, measured),
+        replayed: false,
         frozen: vec![],
         intervals: None,
-        notes: design.notes.clone(),
+        notes,
         course,
         prepared,
         design,

@@ -2,8 +2,8 @@
 
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
-use lynkeus_observers::{Observer, Signal};
-use lynkeus_run::{Column, Method, Role, Step, System, Tolerances};
+use lynkeus_observers::{Monitor, Observer, Signal};
+use lynkeus_run::{Column, Margin, Method, Role, Step, System, Tolerances};
 
 use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
@@ -67,7 +67,26 @@ pub fn observer(plant: &Plant, observer: &Observer) -> Result<System, Error> {
         &observer.derivatives,
         &outputs,
     )
+    .map(|system| system.with_margins(margins(observer)))
     .map_err(Error::from_source)
+}
+
+/// The monitors of an observer that say how far a matrix is from singular.
+pub(crate) fn margins(observer: &Observer) -> Vec<Margin> {
+    let monitors = observer.monitors.iter().enumerate();
+    let margin = |(i, monitor): (usize, &Monitor)| {
+        let matrix = monitor.matrix?;
+        Some(Margin {
+            output: observer.estimates.len() + i,
+            name: monitor.name.clone(),
+            matrix: matrix.to_owned(),
+            below: monitor.alarm_below,
+            meaning: format!(
+                "the outputs and their derivatives hardly tell the states apart there, so the correction {matrix}⁻¹K(y − ŷ) has no bound; start the estimate nearer to the plant (`initial`), take slower poles, another `variant` or other inputs, or fixed steps (method = \"rk4\"), which pass such a place with the flag raised"
+            ),
+        })
+    };
+    monitors.filter_map(margin).collect()
 }
 
 /// The plant with the study's start values; its outputs are those of the model.
@@ -105,14 +124,14 @@ pub(crate) fn plant_reading(
 /// A name that is no state.
 pub(crate) fn starts(plant: &Plant, given: &[(Name, f64)]) -> Result<Vec<f64>, Error> {
     for (name, _) in given {
-        if !plant.states.iter().any(|s| s.name == name.text) {
+        if !plant.states.iter().any(|s| name.is_or_has(&s.name)) {
             return Err(name.blame(unknown(plant, "state", &plant.states, name)));
         }
     }
     let start = |variable: &Variable| {
-        let given = given.iter().find(|(name, _)| name.text == variable.name);
+        let given = Name::best(given, &variable.name);
         // Modelica's own default
-        given.map(|(_, x)| *x).or(variable.start).unwrap_or(0.0)
+        given.copied().or(variable.start).unwrap_or(0.0)
     };
     Ok(plant.states.iter().map(start).collect())
 }
@@ -165,7 +184,7 @@ pub(crate) fn check_inputs(study: &Study, plant: &Plant) -> Result<(), Error> {
 
 fn check_names(plant: &Plant, settings: &SimulateSettings) -> Result<(), Error> {
     for (name, _) in &settings.inputs {
-        if !plant.inputs.iter().any(|i| i.name == name.text) {
+        if !plant.inputs.iter().any(|i| name.is_or_has(&i.name)) {
             return Err(name.blame(unknown(plant, "input", &plant.inputs, name)));
         }
     }
@@ -208,18 +227,14 @@ pub(crate) fn input_expression(
     input: &Variable,
 ) -> Result<Node, Error> {
     let graph = &plant.graph;
-    let given = settings
-        .inputs
-        .iter()
-        .find(|(name, _)| name.text == input.name);
-    if let Some((_, given)) = given {
+    if let Some(given) = Name::best(&settings.inputs, &input.name) {
         return expression(plant, given);
     }
     let disturbance = study
         .sensors
         .disturbances
         .iter()
-        .any(|d| d.text == input.name);
+        .any(|d| d.is_or_has(&input.name));
     match input.start.or(disturbance.then_some(0.0)) {
         Some(value) => Ok(graph.constant(value).node()),
         None => Err(Error::input(format!(

@@ -5,6 +5,8 @@
 
 use std::borrow::Cow;
 
+use lynkeus_export::is_hidden;
+
 /// Text for a terminal: everything but line ends and tabs that has no width of its own is
 /// written as `\u{1b}`.
 pub fn lines(text: &str) -> Cow<'_, str> {
@@ -36,12 +38,6 @@ fn spelled<'t>(text: &'t str, kept: &[char], spell: impl Fn(char) -> String) -> 
         }
     }
     Cow::Owned(out)
-}
-
-/// Control characters, line and paragraph separators, and what changes the direction of writing.
-fn is_hidden(c: char) -> bool {
-    let reorders = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    c.is_control() || reorders || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}')
 }
 
 #[cfg(test)]

@@ -122,7 +122,6 @@ pub const ROWS: &[Row] = &[
     Row {
         label: "[Ltaief et al.](../examples/ltaief)",
         study: "ltaief/study.toml",
-        observer: "alarm = 0.005",
         spread: 0.5,
         inequality: Some("S(t) is a state"),
         ..PLAIN

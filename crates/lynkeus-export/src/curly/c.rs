@@ -6,8 +6,9 @@ use super::language::{self, Language};
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
 use super::template::{chosen, exchanged};
-use super::words::{self, READINGS};
+use super::words::{self, PATIENCE, READINGS};
 use crate::Refusal;
+use crate::hidden::is_hidden;
 
 pub(super) use super::words::codes;
 
@@ -215,7 +216,9 @@ impl Frame<'_> {
              /* Estimates, as they are returned:\n{estimate_list} */\n\
              #define {capitals}_ESTIMATES {estimate_count}\n\
              extern const char *const {name}_estimate_names[{capitals}_ESTIMATES];\n\n\
-             {tunables}/* Why a sample was refused; nothing has changed then. */\n{codes}\n{readings}\
+             {tunables}/* Why a sample was refused; nothing has changed then but `refused` of the state. When the\n\
+             \x20  equations had no value, or an estimate ran away, {PATIENCE} times in a row, an absurd reading is behind it\n\
+             \x20  that was taken before: the state is then what {name}_init makes it, and the next sample the first. */\n{codes}\n{readings}\
              /* All there is to an estimator under way: a copy is a snapshot. */\n\
              typedef struct {{\n{fields}}} {name}_state;\n\n\
              /* Before the first sample. */\n\
@@ -313,7 +316,15 @@ impl Frame<'_> {
              int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates)\n{{\n\
              \x20   const {name}_state before = *s;\n\
              \x20   const int code = take(s, t, signals, estimates);\n\
-             \x20   if (code != 0) {{\n        *s = before;\n    }}\n    return code;\n}}\n",
+             \x20   if (code != 0) {{\n        *s = before;\n    }}\n\
+             \x20   if (code == {capitals}_DIVERGED || code == {capitals}_NOT_FINITE) {{\n        s->refused++;\n\
+             \x20       if (s->refused >= {PATIENCE}) {{\n            {name}_init(s);\n{keeps}        }}\n    }}\n    return code;\n}}\n",
+            keeps = match self.device.tunables {
+                [] => String::new(),
+                _ => format!(
+                    "            for (int i = 0; i < {capitals}_TUNABLES; i++) {{\n                s->tuning[i] = before.tuning[i];\n            }}\n"
+                ),
+            },
             title = title(&format!("{name}.c"), self.device.about),
             signals = names(self.device.signals),
             estimates = names(self.device.estimates),
@@ -365,7 +376,12 @@ fn escaped(name: &str) -> String {
     let plain = |c: char| match c {
         '"' | '\\' => format!("\\{c}"),
         '?' => "\\?".to_owned(),
-        c if c.is_control() => "?".to_owned(),
+        // the same name, byte by byte
+        c if is_hidden(c) => {
+            let mut bytes = [0; 4];
+            let bytes = c.encode_utf8(&mut bytes).bytes();
+            bytes.map(|byte| format!("\\{byte:03o}")).collect()
+        }
         c => c.to_string(),
     };
     name.chars().map(plain).collect()

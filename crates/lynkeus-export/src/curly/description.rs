@@ -1,5 +1,7 @@
 //! What an archive says of itself: `modelDescription.xml` and `buildDescription.xml`.
 
+use std::collections::HashSet;
+
 use super::fmu::{Base, Component, Experiment, Quantity, Unit, Version};
 
 /// The place of a variable in the model, from which its value reference follows.
@@ -76,10 +78,11 @@ impl Description<'_> {
         let categories: String = categories
             .map(|name| format!("    <Category name=\"{name}\"/>\n"))
             .collect();
-        let variables = self.variables.iter().enumerate();
+        let names = names(self.variables);
+        let variables = self.variables.iter().zip(&names).enumerate();
         let written: String = match version {
-            Version::Two => variables.map(scalar).collect(),
-            Version::Three => variables.map(float).collect(),
+            Version::Two => variables.map(|(k, (v, name))| scalar(k, v, name)).collect(),
+            Version::Three => variables.map(|(k, (v, name))| float(k, v, name)).collect(),
         };
         format!(
             "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -194,12 +197,12 @@ impl Variable<'_> {
         }
     }
 
-    fn name(&self) -> String {
+    fn name(&self, name: &str) -> String {
         let description = match self.quantity.description.is_empty() {
             true => String::new(),
             false => format!(" description=\"{}\"", escaped(&self.quantity.description)),
         };
-        format!("name=\"{}\"", escaped(&self.quantity.name)) + &description
+        format!("name=\"{}\"", escaped(name)) + &description
     }
 
     fn unit(&self) -> String {
@@ -252,11 +255,49 @@ impl Variable<'_> {
     }
 }
 
+/// The names of the variables, each once and without what the standard or XML forbids: a question mark
+/// stands for it, and where two would be alike a number follows. A derivative is that of the new name.
+fn names(variables: &[Variable<'_>]) -> Vec<String> {
+    let own = |v: &Variable<'_>| v.quantity.name.clone();
+    let mut taken: HashSet<String> = variables
+        .iter()
+        .map(own)
+        .filter(|n| is_written(n))
+        .collect();
+    let mut names: Vec<String> = vec![];
+    for variable in variables {
+        let own = own(variable);
+        if is_written(&own) {
+            names.push(own);
+            continue;
+        }
+        let of = match variable.role {
+            Role::Derivative { of } => names.get(of).map(|state| format!("der({state})")),
+            _ => None,
+        };
+        let plain = of.unwrap_or_else(|| own.replace(is_unwritten, "?"));
+        let numbered = (2..).map(|k| format!("{plain}_{k}"));
+        let mut candidates = std::iter::once(plain.clone()).chain(numbered);
+        let name = candidates.find(|name| taken.insert(name.clone()));
+        names.push(name.unwrap_or(plain));
+    }
+    names
+}
+
+fn is_written(name: &str) -> bool {
+    !name.contains(is_unwritten)
+}
+
+/// What no name has: control characters, line ends, and what is no character of XML.
+fn is_unwritten(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
+}
+
 /// A variable of FMI 3.0.
-fn float((reference, variable): (usize, &Variable<'_>)) -> String {
+fn float(reference: usize, variable: &Variable<'_>, name: &str) -> String {
     format!(
         "    <Float64 {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}{}{}{}{}/>\n",
-        variable.name(),
+        variable.name(name),
         variable.causality(),
         variable.variability(),
         variable.initial(),
@@ -268,11 +309,11 @@ fn float((reference, variable): (usize, &Variable<'_>)) -> String {
 }
 
 /// A variable of FMI 2.0.
-fn scalar((reference, variable): (usize, &Variable<'_>)) -> String {
+fn scalar(reference: usize, variable: &Variable<'_>, name: &str) -> String {
     format!(
         "    <ScalarVariable {} valueReference=\"{reference}\" causality=\"{}\" variability=\"{}\"{}>\n\
          \x20     <Real{}{}{}{}/>\n    </ScalarVariable>\n",
-        variable.name(),
+        variable.name(name),
         variable.causality(),
         variable.variability(),
         variable.initial(),
@@ -366,6 +407,44 @@ mod tests {
         assert_eq!(
             written("l/s", Some(litre)),
             "    <Unit name=\"l/s\">\n      <BaseUnit m=\"3\" s=\"-1\" factor=\"0.001\"/>\n    </Unit>\n"
+        );
+    }
+
+    /// Names that would be alike, one that has the question mark itself, and their derivatives.
+    #[test]
+    fn names_are_written_and_stay_apart() {
+        let all = ["a\u{1}", "a\u{2}", "a?", "y\nz", "b"];
+        let quantities = all.map(|name| Quantity {
+            name: name.into(),
+            ..Quantity::default()
+        });
+        let rates = all.map(|name| Quantity {
+            name: format!("der({name})"),
+            ..Quantity::default()
+        });
+        let states = quantities.iter().map(|quantity| Variable {
+            quantity,
+            role: Role::State { is_output: false },
+        });
+        let rates = rates.iter().enumerate().map(|(of, quantity)| Variable {
+            quantity,
+            role: Role::Derivative { of },
+        });
+        let variables: Vec<Variable<'_>> = states.chain(rates).collect();
+        assert_eq!(
+            names(&variables),
+            [
+                "a?_2",
+                "a?_3",
+                "a?",
+                "y?z",
+                "b",
+                "der(a?_2)",
+                "der(a?_3)",
+                "der(a?)",
+                "der(y?z)",
+                "der(b)"
+            ]
         );
     }
 

@@ -1,6 +1,7 @@
 //! Functions of time, states and signals, drafted from code.
 
 use crate::curly::dialect::Draft;
+use crate::hidden::seen;
 use crate::{Body, Code, Dialect, Names, Refusal, Text};
 
 /// What functions read: x and w, entry by entry.
@@ -56,17 +57,12 @@ impl Target {
 
 /// Words in a comment, whatever they hold.
 pub(super) fn comment(words: &str) -> String {
-    let words: String = words
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
-    let words = words.replace("*/", "* /").replace("/*", "/ *");
+    let mut words = seen(words).replace("*/", "* /").replace("/*", "/ *");
     // no trigraphs, and no line that goes on
-    words
-        .replace("??", "? ?")
-        .trim_end()
-        .trim_end_matches('\\')
-        .to_owned()
+    while words.contains("??") {
+        words = words.replace("??", "? ?");
+    }
+    words.trim_end().trim_end_matches('\\').to_owned()
 }
 
 /// A function `static void name(real t, const real *x, …, real *target, …)` in the draft.

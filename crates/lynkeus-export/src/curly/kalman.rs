@@ -1,7 +1,7 @@
 //! Kalman filters.
 
-use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, SigmaPoints};
-use lynkeus_run::{BetweenSamples, Blueprint};
+use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
+use lynkeus_run::{BetweenSamples, Blueprint, Level};
 
 use super::device::Device;
 use super::function::{Arguments, Target, draft};
@@ -32,6 +32,9 @@ impl Machine {
         if run.between == BetweenSamples::Linear {
             return Err(Refusal::LooksAhead);
         }
+        if settings.bounds.is_some() {
+            return Err(Refusal::Projection);
+        }
         let (states, inputs) = (model.states(), model.inputs());
         let arguments = arguments(states, inputs, device);
         let room = inputs.len() + device.tunables.len();
@@ -51,11 +54,18 @@ impl Machine {
             bounds.any(|b| b.low.is_finite() || b.high.is_finite())
         });
         let has_limits = model.sensors().iter().any(|sensor| sensor.limits.is_some());
+        let is_share = |sensor: &Sensor| matches!(sensor.noise, Level::Relative(_));
+        let is_relative = model.sensors().iter().any(is_share);
         let facts = [
             (confined.is_some(), "confined"),
             (device.deviations, "deviations"),
             (settings.gate.is_some(), "gate"),
             (has_limits, "limits"),
+            (is_relative, "relative"),
+            (
+                settings.gate.is_some() || has_limits || is_relative,
+                "deviation",
+            ),
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
         self.measure(model, &arguments, &settings.kind)?;
@@ -67,9 +77,11 @@ impl Machine {
             is_tuned: !device.tunables.is_empty(),
         };
         self.tuned(device, None)?;
-        let field = self.engine(&settings.kind, &free, &arguments)?;
+        let field = self.engine(&settings.kind, &free, &arguments, &holds)?;
+        let is_extended = settings.kind == FilterKind::Extended;
         let which_inside = Which::Inside {
-            is_shared: settings.kind == FilterKind::Extended,
+            is_shared: is_extended || free.is_noisy(),
+            is_carried: is_extended,
         };
         if let Some(confined) = confined {
             let inside = Linear {
@@ -79,6 +91,7 @@ impl Machine {
                 is_tuned: free.is_tuned,
             };
             self.linear(which_inside, &inside, &arguments)?;
+            self.carried(which_inside, &inside);
             let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
                 confined.bounds.iter().map(end).collect()
             };
@@ -98,6 +111,7 @@ impl Machine {
         kind: &FilterKind,
         free: &Linear<'_>,
         arguments: &Arguments,
+        holds: &[&str],
     ) -> Result<&'static str, Refusal> {
         let n = free.flow.states().len();
         match kind {
@@ -105,11 +119,12 @@ impl Machine {
             FilterKind::Extended => {
                 self.size("LARGER", n);
                 self.linear(Which::Free, free, arguments)?;
-                self.add(EXTENDED);
+                self.carried(Which::Free, free);
+                self.add(&chosen(EXTENDED, holds));
                 Ok("linearised")
             }
             FilterKind::Unscented(points) => {
-                self.unscented(points, free, arguments)?;
+                self.unscented(points, free, arguments, holds)?;
                 Ok("flow")
             }
         }
@@ -168,7 +183,16 @@ impl Machine {
             self.tables += &table("highest", &ends(f64::INFINITY, |l| l.high));
         }
         let gate = number(settings.gate.unwrap_or_default());
-        self.add(&chosen(JUDGE, holds).replace("GATE", &gate));
+        let [shown, surprise] = match holds.contains(&"limits") {
+            true => [
+                "shown_of(i, reading)",
+                "end == 0 ? reading - predicted : R(0.0)",
+            ],
+            false => ["reading", "reading - predicted"],
+        };
+        let text = chosen(JUDGE, holds).replace("GATE", &gate);
+        let text = text.replace("SHOWN_READING", shown);
+        self.add(&text.replace("SURPRISE", surprise));
     }
 
     fn unscented(
@@ -176,26 +200,38 @@ impl Machine {
         points: &SigmaPoints,
         free: &Linear<'_>,
         arguments: &Arguments,
+        about: &[&str],
     ) -> Result<(), Refusal> {
         let n = free.flow.states().len();
+        let has_limits = about.contains(&"limits");
         let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");
         self.size("LARGER", sensors.map_or(n, |size| size.1.max(n)));
         let weights = points.weights(n).map_err(|error| Refusal::Setting {
             error: error.to_string(),
         })?;
         self.size("POINTS", 2 * n + 1);
-        self.size("DIMENSION", n);
+        match free.is_noisy() {
+            true => self.linear(Which::Free, free, arguments)?,
+            false => self.add(FIELD),
+        }
         self.flow(free.flow, arguments)?;
-        self.add(FIELD);
-        self.add(INTEGRATE);
-        self.tables += &table("process_noise", free.noise);
+        self.add(&exchanged(INTEGRATE, |word| match word {
+            "integrate" => Some("integrate_point".to_owned()),
+            "DIMENSION" => Some("STATES".to_owned()),
+            _ => None,
+        }));
         let facts = [
             (weights.centre >= 0.0, "definite"),
-            (free.is_tuned, "tunable"),
+            (free.is_noisy(), "noisy"),
+            (has_limits, "limits"),
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let first = u8::from(free.is_noisy());
+        let rounds = if has_limits { "SENSORS + 1" } else { "1" };
         let text = exchanged(&chosen(UNSCENTED, &holds), |word| {
             Some(number(match word {
+                "FIRST" => return Some(first.to_string()),
+                "ROUNDS" => return Some(rounds.to_owned()),
                 "SPREAD" => weights.spread,
                 "WEIGHT_OF_CENTRE" => weights.centre,
                 "WEIGHT_OF_OTHERS" => weights.other,

@@ -12,6 +12,7 @@ use crate::code::Part;
 
 const INTEGRATE: &str = include_str!("runtime/integrate.c");
 const LINEARISED: &str = include_str!("runtime/linearised.c");
+const ALONG: &str = include_str!("runtime/along.c");
 const PREDICT: &str = include_str!("runtime/predict.c");
 
 /// A flow with its Jacobian and the densities of the noise on its states.
@@ -31,6 +32,8 @@ pub(super) enum Which {
     Inside {
         /// whether the free flow is linearised, too: then both are integrated by the same functions
         is_shared: bool,
+        /// whether its covariance is carried by Φ, too: then by the same function
+        is_carried: bool,
     },
 }
 
@@ -45,9 +48,10 @@ const OWN: [&str; 6] = [
 ];
 
 /// And where the free flow has no covariance along it.
-const SHARED: [&str; 6] = [
+const SHARED: [&str; 7] = [
     "integrate",
-    "predict",
+    "along",
+    "rows_of_noise",
     "process_noise",
     "WIDTH",
     "CARRIED",
@@ -57,13 +61,32 @@ const SHARED: [&str; 6] = [
 impl Which {
     /// Whether the free flow has left these functions, sizes and tables.
     fn shares(self) -> bool {
-        self == Self::Inside { is_shared: true }
+        matches!(
+            self,
+            Self::Inside {
+                is_shared: true,
+                ..
+            }
+        )
+    }
+
+    /// Whether the free flow has left the function that carries a covariance.
+    fn is_carried(self) -> bool {
+        matches!(
+            self,
+            Self::Inside {
+                is_carried: true,
+                ..
+            }
+        )
     }
 
     /// The text, in which what this flow has for itself is called so.
     pub fn renamed(self, text: &str) -> String {
         exchanged(text, |word| {
-            let is_own = OWN.contains(&word) || (SHARED.contains(&word) && !self.shares());
+            let is_own = OWN.contains(&word)
+                || (SHARED.contains(&word) && !self.shares())
+                || (word == "predict" && !self.is_carried());
             let is_own = is_own && self != Self::Free;
             is_own.then(|| match word.chars().all(|c| !c.is_lowercase()) {
                 true => format!("{word}_INSIDE"),
@@ -100,7 +123,7 @@ impl Machine {
         self.tables += &table("noise_shares", &shares);
     }
 
-    /// x, Φ and W along a flow, together.
+    /// x, Φ and W along a flow, together, and the rows that W adds to a root.
     pub fn linear(
         &mut self,
         which: Which,
@@ -149,14 +172,29 @@ impl Machine {
             true => format!("R({scale:?}) * {NOISE_FACTOR}"),
             false => format!("R({scale:?})"),
         };
-        let predict = chosen(PREDICT, holds).replace("NOISE_SCALE", &scale);
+        let along = chosen(ALONG, holds).replace("NOISE_SCALE", &scale);
         let linearised = chosen(LINEARISED, holds);
         let kind = if which == Which::Free { FIELD } else { "" };
         let own = [kind, &flow, &linearised].join("\n");
         self.add(&which.renamed(&own));
         if !which.shares() {
-            self.add(&which.renamed(&[INTEGRATE, &predict].join("\n")));
+            self.add(&which.renamed(&[INTEGRATE, &along].join("\n")));
         }
         Ok(())
+    }
+
+    /// P = ΦPΦᵀ + W along a flow that is drafted already.
+    pub fn carried(&mut self, which: Which, linear: &Linear<'_>) {
+        if !which.is_carried() {
+            let holds: &[&str] = if linear.is_noisy() { &["noisy"] } else { &[] };
+            self.add(&which.renamed(&chosen(PREDICT, holds)));
+        }
+    }
+}
+
+impl Linear<'_> {
+    /// Whether anything disturbs the states.
+    pub fn is_noisy(&self) -> bool {
+        self.noise.iter().any(|q| *q > 0.0)
     }
 }

@@ -64,6 +64,8 @@ impl Machine {
             "the largest start, reading or input so far",
             1.0,
         );
+        let about = "samples in a row for which the equations had no value or an estimate ran away";
+        machine.single("refused", Kind::Int, about, 0.0);
         machine.steps(device.blueprint.method())?;
         let mut holds = vec![];
         match device.blueprint {

@@ -91,23 +91,32 @@ impl Machine {
             is_tuned: false,
         };
         self.linear(Which::Free, &linear, arguments)?;
+        self.carried(Which::Free, &linear);
         let tape = flow.output_tape();
-        let slopes = Part {
-            tape,
-            outputs: errors.flow_entries().len()..tape.outputs(),
-        };
-        let places = errors.estimate_entries().iter().map(|(i, j)| i * n + j);
-        let text = draft(
-            "The derivatives of the estimates by x, row by row.",
-            "estimate_slopes",
-            &code(&[slopes])?,
-            arguments,
-            &[Target {
+        let estimates = errors.flow_entries().len();
+        let readings = estimates + errors.estimate_entries().len();
+        for (about, name, outputs, entries) in [
+            (
+                "The derivatives of the estimates by x, row by row.",
+                "estimate_slopes",
+                estimates..readings,
+                errors.estimate_entries(),
+            ),
+            (
+                "The derivatives of what is expected of the sensors by x, row by row.",
+                "reading_slopes",
+                readings..tape.outputs(),
+                errors.reading_entries(),
+            ),
+        ] {
+            let places = entries.iter().map(|(i, j)| i * n + j);
+            let target = Target {
                 name: "c",
                 places: places.collect(),
-            }],
-        )?;
-        self.add(&text);
+            };
+            let code = code(&[Part { tape, outputs }])?;
+            self.add(&draft(about, name, &code, arguments, &[target])?);
+        }
         self.add(SPREAD);
         Ok(())
     }

@@ -24,6 +24,10 @@ const TUNING: (&str, &str) = (
     "a number that may be changed is not finite and above 0",
 );
 
+/// So many samples in a row that are refused because the equations have no value, or an estimate has run
+/// away, are behind an absurd reading that was taken: from the next on it starts anew.
+pub(super) const PATIENCE: usize = 5;
+
 /// What `push` of a device can say, from 1 on.
 pub(super) fn codes(device: &Device<'_>) -> impl Iterator<Item = (&'static str, &'static str)> {
     codes_of(!device.tunables.is_empty())

@@ -70,6 +70,15 @@ struct Balanced {
     accuracy: f64,
 }
 
+/// Standard errors, and which of them rest on parts of unseen directions that were taken as rounding.
+pub(super) struct Judged {
+    pub deviations: Deviations,
+    /// of the start
+    pub start: Vec<bool>,
+    /// of the present
+    pub present: Vec<bool>,
+}
+
 /// Standard errors from settled information, the transition over the window (columns
 /// multiplied by the scales) and the relative accuracy of both. None where the budget is spent.
 pub(super) fn of(
@@ -78,7 +87,7 @@ pub(super) fn of(
     scales: &[f64],
     accuracy: f64,
     budget: &Budget,
-) -> Option<Deviations> {
+) -> Option<Judged> {
     let count = scales.len();
     let balanced = balance(information, accuracy);
     let Singular { values, directions } = singular(balanced.factor, budget)?;
@@ -96,7 +105,8 @@ pub(super) fn of(
     };
     let at_start = |i: usize| {
         let noise = blur / balanced.lengths[i];
-        scales[i] * split.error(&|j| start[(i, j)], noise, 1.0)
+        let (σ, is_doubted) = split.error(&|j| start[(i, j)], noise, 1.0);
+        (scales[i] * σ, is_doubted)
     };
     let at_present = |i: usize| {
         let row = transition.row(i);
@@ -104,10 +114,16 @@ pub(super) fn of(
         let noise = blur * terms.map(|(phi, e)| (phi / e).abs()).fold(0.0, f64::max);
         split.error(&|j| present[(i, j)], noise, scales[i])
     };
-    Some(Deviations {
-        start: (0..count).map(at_start).collect(),
-        present: (0..count).map(at_present).collect(),
-        rank,
+    let (at_start, start) = (0..count).map(at_start).unzip();
+    let (at_present, present) = (0..count).map(at_present).unzip();
+    Some(Judged {
+        deviations: Deviations {
+            start: at_start,
+            present: at_present,
+            rank,
+        },
+        start,
+        present,
     })
 }
 
@@ -121,27 +137,29 @@ struct Split<'a> {
 
 impl Split<'_> {
     /// The standard error of a quantity with these `parts` of the directions, itself of this `scale`;
-    /// parts below `noise` are rounding.
-    fn error(&self, part: &dyn Fn(usize) -> f64, noise: f64, scale: f64) -> f64 {
+    /// parts below `noise` are rounding. And whether such a part would be an error of its own, were it none.
+    fn error(&self, part: &dyn Fn(usize) -> f64, noise: f64, scale: f64) -> (f64, bool) {
         let mut variance = 0.0;
+        let mut is_doubted = false;
         for (j, &value) in self.values.iter().enumerate() {
             let part = part(j);
             if value > self.threshold {
                 variance += (part / value).powi(2);
                 continue;
             }
-            if part.abs() <= noise {
-                // rounding, which says nothing of an error
-                continue;
-            }
             // the error that is left of one range at the start
             let left = part.abs() / self.reach[j];
+            if part.abs() <= noise {
+                // rounding, which says nothing of an error
+                is_doubted |= left > FORGOTTEN * scale;
+                continue;
+            }
             if left > FORGOTTEN * scale {
-                return f64::INFINITY;
+                return (f64::INFINITY, true);
             }
             variance += left * left;
         }
-        variance.sqrt()
+        (variance.sqrt(), is_doubted)
     }
 }
 

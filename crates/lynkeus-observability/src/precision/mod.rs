@@ -7,6 +7,9 @@
 //!
 //! F(T) = Σ_k Σ_c (∂h_c/∂z S(t_k))ᵀ (∂h_c/∂z S(t_k)) / r_c²,
 //!
+//! a sensor with limits the share of that which a clipped normal number tells
+//! ([`Limits::information`]),
+//!
 //! and no unbiased estimator is more precise than F⁻¹ at the start of the window and
 //! S(T)·F⁻¹·S(T)ᵀ at its end, the present (Cramér and Rao's bound; least squares reaches it where
 //! the noise is small). F itself is never formed: its square-root factor is, by orthogonal
@@ -26,7 +29,7 @@
 //!         state("speed", speed.node(), 1.0, 2.0),
 //!     ],
 //!     derivatives: vec![speed.node(), g.constant(0.0).node()],
-//!     sensors: vec![Sensor { name: "y".into(), node: place.node(), noise: Deviation::Absolute(0.1) }],
+//!     sensors: vec![Sensor { name: "y".into(), node: place.node(), noise: Deviation::Absolute(0.1), limits: None }],
 //!     ..Experiment::new(&g, time.node(), Window { start: 0.0, step: 1.0, horizons: vec![9] })
 //! };
 //! let found = cart.run()?;
@@ -38,17 +41,21 @@
 //! ```
 
 mod deviations;
+mod forward;
 mod information;
 mod orthogonal;
 mod sets;
 mod tangent;
 
 use lynkeus_expr::{Budget, Graph, Node};
+use lynkeus_run::filter::Limits;
 use lynkeus_run::{Error, Method};
 
 pub use deviations::{Deviations, Rank};
 pub use sets::{Advice, SensorSet};
 
+use deviations::Judged;
+use forward::Forward;
 use information::Information;
 use nalgebra::DMatrix;
 
@@ -83,6 +90,16 @@ pub enum Deviation {
     },
 }
 
+impl Sensor {
+    /// What a row of its slopes weighs where it would show a value: the root of Fisher's information
+    /// of a sample, that of a clipped normal number where it has limits.
+    pub(crate) fn weight(&self, value: f64) -> f64 {
+        let deviation = self.noise.at(value);
+        let share = self.limits.map_or(1.0, |l| l.information(value, deviation));
+        share.sqrt() / deviation
+    }
+}
+
 impl Deviation {
     /// The standard deviation of a sample of this value.
     pub fn at(self, value: f64) -> f64 {
@@ -107,6 +124,8 @@ pub struct Sensor {
     pub node: Node,
     /// how noisy its samples are; independent of each other and of other sensors
     pub noise: Deviation,
+    /// the range that it can show: near an end a sample tells less, and far beyond nothing
+    pub limits: Option<Limits>,
 }
 
 /// When samples are taken and when the question is asked.
@@ -267,6 +286,8 @@ struct Checkpoint {
     transition: DMatrix<f64>,
     /// of each sensor
     information: Vec<Information>,
+    /// the same in the coordinates of the present, where sensitivities to the start leave something in doubt
+    forward: Option<Forward>,
 }
 
 impl Precision {
@@ -278,27 +299,76 @@ impl Precision {
     }
 
     /// True where sensitivities ten times more or less accurate would change which present values
-    /// count as seen.
+    /// count as seen, or where one that they show is lost in the errors of the integrator.
     pub fn is_doubtful(&self, horizon: usize, set: &[usize]) -> bool {
         let pattern = |factor: f64| {
             let accuracy = factor * self.accuracy;
             self.deviations_at(horizon, set, accuracy).pattern()
         };
         let present = pattern(1.0);
-        [0.1, 10.0]
-            .into_iter()
-            .any(|factor| pattern(factor) != present)
+        let lost = || {
+            let judged = self.judged(horizon, set, self.accuracy);
+            let shown = judged.map_or(vec![], |judged| judged.deviations.pattern());
+            shown
+                .iter()
+                .zip(&present)
+                .any(|(shown, seen)| *shown && !seen)
+        };
+        lost()
+            || [0.1, 10.0]
+                .into_iter()
+                .any(|factor| pattern(factor) != present)
     }
 
-    fn deviations_at(&self, horizon: usize, set: &[usize], accuracy: f64) -> Deviations {
-        let Some(checkpoint) = self.checkpoints.get(horizon) else {
-            return Deviations::blind(self.names.len());
-        };
+    /// Whether something is not seen at the longest horizon by all sensors, or what is rests on what counts as rounding.
+    fn is_in_doubt(&self) -> bool {
+        let last = self.checkpoints.len().saturating_sub(1);
+        let all: Vec<usize> = (0..self.sensors.len()).collect();
+        let judged = self.judged(last, &all, self.accuracy);
+        judged.is_some_and(|judged| {
+            let mut doubts = judged.start.iter().chain(&judged.present);
+            doubts.any(|doubt| *doubt)
+        })
+    }
+
+    /// What sensitivities to the start tell.
+    fn judged(&self, horizon: usize, set: &[usize], accuracy: f64) -> Option<Judged> {
+        let checkpoint = self.checkpoints.get(horizon)?;
         let parts = set.iter().filter_map(|&s| checkpoint.information.get(s));
         let joined = Information::joined(self.names.len(), parts);
         let transition = &checkpoint.transition;
-        let found = deviations::of(&joined, transition, &self.scales, accuracy, &self.budget);
-        found.unwrap_or_else(|| Deviations::blind(self.names.len()))
+        deviations::of(&joined, transition, &self.scales, accuracy, &self.budget)
+    }
+
+    fn deviations_at(&self, horizon: usize, set: &[usize], accuracy: f64) -> Deviations {
+        let judged = self.judged(horizon, set, accuracy);
+        let Some(Judged {
+            deviations: mut found,
+            start: doubted_start,
+            present: doubted_present,
+        }) = judged
+        else {
+            return Deviations::blind(self.names.len());
+        };
+        let checkpoint = self.checkpoints.get(horizon);
+        let forward = checkpoint.and_then(|checkpoint| checkpoint.forward.as_ref());
+        let carried = forward.and_then(|forward| forward.deviations(set, &self.budget));
+        let Some([start, present]) = carried else {
+            return found;
+        };
+        let all = [
+            (&mut found.start, doubted_start, start),
+            (&mut found.present, doubted_present, present),
+        ];
+        for (values, doubted, carried) in all {
+            let values = values.iter_mut().zip(doubted).zip(carried);
+            for (((σ, is_doubted), own), scale) in values.zip(&self.scales) {
+                if is_doubted {
+                    *σ = own * scale;
+                }
+            }
+        }
+        found
     }
 }
 

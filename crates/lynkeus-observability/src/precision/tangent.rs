@@ -7,6 +7,7 @@ use lynkeus_expr::{Budget, Node, jacobian};
 use lynkeus_run::{Error, Method, System};
 use nalgebra::DMatrix;
 
+use super::forward::{Forward, WIDE};
 use super::information::Information;
 use super::{Checkpoint, Experiment, Precision};
 use batch::{Batch, Piece};
@@ -37,7 +38,9 @@ struct Tangent {
     views: Vec<(usize, usize)>,
     /// of states and unknown inputs
     scales: Vec<f64>,
-    /// sensitivities below this share of a range are rounding
+    /// of the states: what they are integrated in, so that the absolute tolerance is small beside small ones
+    units: Vec<f64>,
+    /// sensitivities below this many units are rounding
     floor: f64,
     /// of the integration; the rest of the time is for what follows from it
     budget: Budget,
@@ -65,9 +68,18 @@ impl Tangent {
             )?,
             views: h.iter().map(|&(i, j, _)| (i, j)).collect(),
             scales: experiment.quantities().map(|q| q.scale).collect(),
+            units: experiment.states.iter().map(|q| q.scale.min(1.0)).collect(),
             floor: absolute / relative,
             budget: graph.budget().part(INTEGRATION),
         })
+    }
+
+    /// States that are given in units, as they are.
+    fn in_own_units(&self, states: &[f64], own: &mut [f64]) {
+        let pairs = states.iter().zip(&self.units);
+        own.iter_mut()
+            .zip(pairs)
+            .for_each(|(own, (x, unit))| *own = x * unit);
     }
 
     /// Batches of sensitivities, by the quantities that they belong to.
@@ -144,11 +156,12 @@ pub(super) fn run(experiment: &Experiment<'_>) -> Result<Precision, Error> {
         checkpoints.push(Checkpoint {
             transition: transition(&tangent, &batches),
             information: gathered.clone(),
+            forward: None,
         });
     }
     let (relative, _) = tolerances(experiment.method);
     let length = |k: &usize| *k as f64 * window.step;
-    Ok(Precision {
+    let mut found = Precision {
         names: experiment.quantities().map(|q| q.name.clone()).collect(),
         scales: tangent.scales.clone(),
         sensors: experiment.sensors.iter().map(|s| s.name.clone()).collect(),
@@ -161,7 +174,52 @@ pub(super) fn run(experiment: &Experiment<'_>) -> Result<Precision, Error> {
         accuracy: TRUST * relative,
         budget: experiment.graph.budget(),
         checkpoints,
-    })
+    };
+    if wide <= WIDE && found.is_in_doubt() {
+        forward(experiment, &tangent, &mut found)?;
+    }
+    Ok(found)
+}
+
+/// Once more, with the information in the coordinates of the present.
+fn forward(
+    experiment: &Experiment<'_>,
+    tangent: &Tangent,
+    found: &mut Precision,
+) -> Result<(), Error> {
+    let mut batches = tangent.batches(experiment)?;
+    let (window, sensors) = (&experiment.window, experiment.sensors.len());
+    let wide = tangent.scales.len();
+    let mut carried = Forward::new(sensors, wide, found.accuracy);
+    let mut next = 0;
+    for (checkpoint, &horizon) in found.checkpoints.iter_mut().zip(&window.horizons) {
+        for k in next..horizon + 1 {
+            let pieces = match advance(&mut batches, &[window.instant(k)]) {
+                Err(Error::Cancelled { .. }) => return Ok(()),
+                pieces => pieces?,
+            };
+            let rows: Vec<DMatrix<f64>> = (0..sensors)
+                .map(|c| {
+                    let value = pieces.first().map_or(0.0, |piece| piece.values[c]);
+                    let weight = experiment.sensors[c].noise.at(value).recip();
+                    let entries = pieces.iter().flat_map(|p| p.row(&p.slopes, c));
+                    let entries: Vec<f64> = entries.map(|x| weight * x).collect();
+                    DMatrix::from_row_slice(1, wide, &entries)
+                })
+                .collect();
+            let mut transition = transition(tangent, &batches);
+            for (i, scale) in tangent.scales.iter().enumerate() {
+                transition.row_mut(i).unscale_mut(*scale);
+            }
+            if carried.advance(&rows, &transition).is_none() {
+                return Ok(());
+            }
+            batches.iter_mut().for_each(Batch::restart);
+        }
+        next = horizon + 1;
+        checkpoint.forward = Some(carried.clone());
+    }
+    Ok(())
 }
 
 /// Gathers what these samples tell.
@@ -219,7 +277,7 @@ fn gather(
         for (c, sensor) in experiment.sensors.iter().enumerate() {
             let row = k * sensors + c;
             let value = pieces.first().map_or(0.0, |piece| piece.values[row]);
-            let weight = sensor.noise.at(value).recip();
+            let weight = sensor.weight(value);
             let entries = pieces.iter().flat_map(|p| p.row(&p.slopes, row));
             let gross = pieces.iter().flat_map(|p| p.row(&p.gross, row));
             gathered[c].push(entries.map(|x| weight * x), gross.map(|x| weight * x));
@@ -234,8 +292,8 @@ fn transition(tangent: &Tangent, batches: &[Batch<'_>]) -> DMatrix<f64> {
     for batch in batches {
         for (place, &j) in batch.columns.iter().enumerate() {
             let column = batch.column(place);
-            for (i, value) in column.iter().enumerate() {
-                matrix[(i, j)] = *value;
+            for (i, value) in column.enumerate() {
+                matrix[(i, j)] = value;
             }
         }
     }

@@ -16,6 +16,7 @@ fn sensor(name: &str, node: Node, deviation: f64) -> Sensor {
         name: name.to_owned(),
         node,
         noise: Deviation::Absolute(deviation),
+        limits: None,
     }
 }
 

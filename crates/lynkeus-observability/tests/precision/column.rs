@@ -69,6 +69,7 @@ fn computed(plant: &Plant) -> Precision {
                 name: s.name.clone(),
                 node: s.node,
                 noise: Deviation::Absolute(NOISE),
+                limits: None,
             })
             .collect(),
         ..Experiment::new(&plant.graph, plant.time, window)

@@ -32,6 +32,7 @@ fn errors_of_two_thousand_fits_spread_as_computed() {
             name: "height".into(),
             node: height.node(),
             noise: Deviation::Absolute(NOISE),
+            limits: None,
         }],
         ..Experiment::new(
             &g,

@@ -86,11 +86,13 @@ impl Study<'_> {
         facts: &Facts,
         chains: &[Chain],
         σ: f64,
+        process: &[f64],
     ) -> Result<Option<Ultimate>, DesignError> {
         let drift = self.drift(facts)?;
         let outside = Disturbance {
             drift: &drift,
             noise: &self.plant.noise,
+            process: &self.process(facts, process),
         };
         let Some(mut found) = ultimate(chains, σ, &outside) else {
             return Ok(None);
@@ -131,6 +133,28 @@ impl Study<'_> {
         let factor = norms(|s| &s.M) * norms(|s| &s.inverse);
         found.overshoot = (Interval::point(found.overshoot) * factor).hi();
         Ok(Some(found))
+    }
+
+    /// Densities on ē' that make no smaller a trace than those of M ξ, ξ white with the densities given:
+    /// m mᵀ ≤ n·diag(m_a²) for a column m of n entries.
+    fn process(&self, facts: &Facts, given: &[f64]) -> Vec<f64> {
+        let mut found = given.to_vec();
+        for (i, (_, chain)) in self.blocks().order.iter().enumerate() {
+            let Some(similar) = facts.similar.get(i) else {
+                continue;
+            };
+            let count = Interval::point(chain.states.len() as f64);
+            for (&state, row) in chain.states.iter().zip(&similar.M) {
+                let terms = row
+                    .iter()
+                    .zip(&chain.states)
+                    .filter(|(_, k)| given[**k] > 0.0);
+                let terms =
+                    terms.map(|(m, k)| Interval::point(*m).powi(2) * Interval::point(given[*k]));
+                found[state] = (count * sum(terms)).hi();
+            }
+        }
+        found
     }
 
     /// What acts on ē beside K·noise: M d, L w, and the noise of the heads of later

@@ -112,21 +112,24 @@ fn examined(
         all.push(found);
     }
     checks.push(lipschitz(extended, region)?);
-    let integrators = all
+    let numbers = all
         .iter()
         .flatten()
-        .all(|partial| graph.constant_value(partial.node) == Some(1.0));
+        .map(|partial| graph.constant_value(partial.node));
     let mut summary = blocks.describe(extended);
-    if !integrators {
-        summary += match settings.correction {
-            Correction::Lee => {
-                "; not every ∂f/∂x along the chains is 1, so convergence is local (Remark 3)"
-            }
-            Correction::Classical => {
-                "; not every ∂f/∂x along the chains is 1, as in the paper's form (2)"
-            }
-        };
-    }
+    summary += match (settings.correction, numbers.clone().all(|a| a == Some(1.0))) {
+        (_, true) => "",
+        // numbers are 1 in other units
+        (Correction::Lee, false) if numbers.clone().all(|a| a.is_some()) => {
+            "; every ∂f/∂x along the chains is a number: the paper's form (2) in other units"
+        }
+        (Correction::Lee, false) => {
+            "; not every ∂f/∂x along the chains is a number, so convergence is local (Remark 3)"
+        }
+        (Correction::Classical, false) => {
+            "; not every ∂f/∂x along the chains is 1, as in the paper's form (2)"
+        }
+    };
     if orders > 1 {
         summary +=
             &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");

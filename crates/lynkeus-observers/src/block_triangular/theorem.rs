@@ -99,8 +99,8 @@ impl Study<'_> {
         certificate.constants = constants;
         certificate.notes = self.notes();
         if let Some((σ, chains)) = found {
-            let ultimate = self.ultimate(&facts, &chains, σ)?;
-            conclude(&mut certificate, extended, σ, ultimate);
+            let left = |process: &[f64]| self.ultimate(&facts, &chains, σ, process);
+            conclude(&mut certificate, extended, σ, self.plant.assumptions, left)?;
         }
         Ok(certificate)
     }
@@ -158,7 +158,7 @@ impl Study<'_> {
     fn unbounded(&self) -> Check {
         undecided(
             Lee::Assumption1,
-            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input no key bounds its derivative; correction = \"classical\" needs none of this",
+            "they have none: declare min and max of the states that M depends on and of the chains' heads; where M depends on an input, bound its derivative under `input_derivatives` in [certify]; correction = \"classical\" needs none of this",
         )
     }
 

@@ -188,18 +188,14 @@ impl Plant<'_> {
                 }
             }
         }
-        let other = self.extended.inputs.iter().map(|u| u.node);
-        for symbol in other.chain([self.extended.plant.time]) {
+        // time itself has slope one
+        let inputs = self.extended.inputs.iter().enumerate();
+        let inputs = inputs.map(|(j, u)| (u.node, self.assumptions.input_derivative(j, 1)));
+        for (symbol, speed) in inputs.chain([(self.extended.plant.time, 1.0)]) {
             let slope = self.slope_of_M(&similar[i], symbol)?;
             let product = product(&slope, &similar[i].inverse);
             for (p, &size) in product.iter().flatten().enumerate() {
-                // time itself has slope one; an input's derivative has no declared bound
-                let known = symbol == self.extended.plant.time;
-                let size = match size == 0.0 || known {
-                    true => size,
-                    false => f64::INFINITY,
-                };
-                terms[p].size = plus(terms[p].size, size);
+                terms[p].size = plus(terms[p].size, times(size, speed));
             }
         }
         Ok(())
@@ -236,12 +232,10 @@ impl Plant<'_> {
                 .get(state)
                 .copied()
                 .unwrap_or(f64::INFINITY);
-            // a noisy signal has no derivative
-            let noisy = if self.noise[c] == 0.0 {
-                0.0
-            } else {
-                f64::INFINITY
-            };
+            // a noisy signal has no derivative, nor has one that process noise moves
+            let moved = self.assumptions.process_noise.get(state);
+            let smooth = self.noise[c] == 0.0 && moved.is_none_or(|density| *density == 0.0);
+            let noisy = if smooth { 0.0 } else { f64::INFINITY };
             return Ok((
                 (Interval::point(f) + Interval::point(drift)).hi() + noisy,
                 vec![],

@@ -54,14 +54,18 @@ pub(super) fn design(
     derivatives.extend(filters.derivatives(graph));
     let mut observer = copy.observer(NAME, derivatives)?.tuned_by([&speed]);
     observer.states.extend(filters.states(&gains));
+    let matrix = match form.variant {
+        Variant::Bounded => "Q",
+        Variant::Theoretical | Variant::Practical => "Q̄",
+    };
     observer.monitors.push(Monitor {
         name: "rcond".into(),
         node: solution.rcond,
         alarm_below: ALARM,
         meaning: format!(
-            "{} is close to singular: the outputs and their derivatives hardly tell the states apart here, and the correction is large or withdrawn",
-            if form.variant == Variant::Bounded { "Q" } else { "Q̄" }
+            "{matrix} is close to singular: the outputs and their derivatives hardly tell the states apart here, and the correction is large or withdrawn"
         ),
+        matrix: Some(matrix),
     });
     if form.variant == Variant::Theoretical {
         observer.input_derivatives = input_derivatives(extended, &form);

@@ -28,7 +28,7 @@ pub(super) fn form(
     settings: &Settings,
     region: &Region,
 ) -> Searched<Form> {
-    let map = match Map::new(extended, settings.variant, region)? {
+    let map = match Map::new(extended, settings, region)? {
         Ok(map) => map,
         Err(examination) => return Ok(Err(examination)),
     };
@@ -94,7 +94,7 @@ struct Chosen {
 
 struct Search<'a, 'p> {
     extended: &'a Extended<'p>,
-    map: &'a Map,
+    map: &'a Map<'a>,
     region: Region,
     rows: Codistribution,
 }

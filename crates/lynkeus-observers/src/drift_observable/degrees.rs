@@ -13,7 +13,7 @@ use crate::DesignError;
 /// r_ij of output i with respect to input j, for indices μ.
 pub(super) fn degrees(
     extended: &Extended<'_>,
-    map: &Map,
+    map: &Map<'_>,
     μ: &[usize],
     region: &Region,
 ) -> Result<Vec<Vec<Degree>>, DesignError> {
@@ -45,13 +45,16 @@ pub(super) fn degrees(
         .iter()
         .map(|y| output_map::jacobian_rows(extended.graph(), y, &x))
         .collect();
-    of(&gradients, &with_slopes(extended, &U, region))
+    of(
+        &gradients,
+        &with_slopes(extended, &U, &extended.input_derivatives, region),
+    )
 }
 
 /// u_j, u_j', …, as many as Φ̄ depends on: for one output n − r.
 pub(super) fn input_symbols(
     extended: &Extended<'_>,
-    map: &Map,
+    map: &Map<'_>,
     indices: &[usize],
     degrees: &[Vec<Degree>],
 ) -> Vec<Vec<Node>> {
@@ -65,7 +68,7 @@ pub(super) fn input_symbols(
 }
 
 /// The symbols of u_j, u_j', …, so many of each input.
-fn jets(extended: &Extended<'_>, map: &Map, orders: &[usize]) -> Vec<Vec<Node>> {
+fn jets(extended: &Extended<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<Vec<Node>> {
     let whole = extended.inputs.iter().zip(&map.slopes);
     let whole = whole.map(|(input, slopes)| std::iter::once(input.node).chain(slopes.clone()));
     whole
@@ -84,21 +87,26 @@ pub(super) fn slopes(extended: &Extended<'_>) -> Vec<Vec<Node>> {
     extended.inputs.iter().map(one).collect()
 }
 
-/// The box with u', u'', … free.
-pub(super) fn with_slopes(extended: &Extended<'_>, U: &[Vec<Node>], region: &Region) -> Region {
+/// The box with u', u'', … within their bounds, which are those of each input's own list, and free
+/// beyond its end.
+pub(super) fn with_slopes(
+    extended: &Extended<'_>,
+    U: &[Vec<Node>],
+    bounds: &[Vec<f64>],
+    region: &Region,
+) -> Region {
     let mut region = region.clone();
-    for (input, jet) in extended.inputs.iter().zip(U) {
-        let further = jet
-            .iter()
-            .enumerate()
-            .skip(1)
-            .map(|(k, &symbol)| Dimension {
+    for ((input, jet), bounds) in extended.inputs.iter().zip(U).zip(bounds) {
+        let further = jet.iter().enumerate().skip(1).map(|(k, &symbol)| {
+            let bound = bounds.get(k - 1).copied().unwrap_or(f64::INFINITY);
+            Dimension {
                 name: derivative_name(&input.name, k),
                 symbol,
-                min: f64::NEG_INFINITY,
-                max: f64::INFINITY,
+                min: -bound,
+                max: bound,
                 integer: false,
-            });
+            }
+        });
         region.dimensions.extend(further);
     }
     region

@@ -7,6 +7,7 @@ use lynkeus_structure::output_map::{self, AffineForm, Rows};
 use lynkeus_structure::{Extended, Region, Regularity};
 
 use super::conditions::{self, Inputs};
+use super::settings::Settings;
 use super::variant::Variant;
 use super::{NAME, degrees, derivative_name, size};
 use crate::conditions::{lasts, lipschitz, names};
@@ -15,7 +16,7 @@ use crate::stages::Found;
 use crate::{DesignError, Examination};
 
 /// What does not depend on how many derivatives of which output count.
-pub(super) struct Map {
+pub(super) struct Map<'s> {
     pub affine: AffineForm,
     /// L_f^k h_i: output by output, k = 0 … n − 1
     lie: Vec<Vec<Node>>,
@@ -25,15 +26,14 @@ pub(super) struct Map {
     pub slopes: Vec<Vec<Node>>,
     /// the right-hand side is Lipschitz
     lipschitz: Check,
-    /// the key `variant`
-    asked: Option<Variant>,
+    settings: &'s Settings,
 }
 
-impl Map {
+impl<'s> Map<'s> {
     /// Inside: what breaks the form.
     pub fn new(
         extended: &Extended<'_>,
-        asked: Option<Variant>,
+        settings: &'s Settings,
         region: &Region,
     ) -> Result<Result<Self, Examination>, DesignError> {
         let affine = match output_map::affine_form(extended)? {
@@ -51,7 +51,7 @@ impl Map {
             lie,
             slopes: degrees::slopes(extended),
             lipschitz: lipschitz(extended, region)?,
-            asked,
+            settings,
         }))
     }
 }
@@ -63,6 +63,8 @@ pub struct Checks {
     pub degree: Check,
     /// drift-observability: Q is regular
     pub regular: Check,
+    /// Φ tells points far apart as well
+    pub one_to_one: Check,
     /// ∂f/∂x is bounded
     pub lipschitz: Check,
     /// the map has values and does not jump
@@ -78,6 +80,7 @@ impl Checks {
         let first = [
             &self.degree,
             &self.regular,
+            &self.one_to_one,
             &self.lipschitz,
             &self.continuous,
         ];
@@ -104,16 +107,21 @@ pub struct Form {
 }
 
 impl Form {
+    /// Whether the map reads inputs.
+    pub fn reads_inputs(&self) -> bool {
+        self.variant != Variant::Bounded && self.U.iter().any(|jet| !jet.is_empty())
+    }
+
     /// With μ_i derivatives of output i, Σμ_i = n.
     pub(super) fn new(
         extended: &Extended<'_>,
-        map: &Map,
+        map: &Map<'_>,
         indices: Vec<usize>,
         region: &Region,
     ) -> Result<Found<Self>, DesignError> {
         let degrees = degrees::degrees(extended, map, &indices, region)?;
         let U = degrees::input_symbols(extended, map, &indices, &degrees);
-        let variant = map.asked.unwrap_or_else(|| Variant::suited(&U));
+        let variant = map.settings.variant.unwrap_or_else(|| Variant::suited(&U));
         let rows: Vec<(usize, usize)> = indices
             .iter()
             .enumerate()
@@ -126,26 +134,29 @@ impl Form {
         lasts(extended)?;
         let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
         lasts(extended)?;
+        let Φ: Vec<Node> = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
+        let one_to_one = conditions::one_to_one(extended, &Φ, &regular, region)?;
+        lasts(extended)?;
         let (Φ, Q, Q_a) = match variant {
-            Variant::Bounded => {
-                let Φ = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
-                (Φ, Q, vec![])
-            }
+            Variant::Bounded => (Φ, Q, vec![]),
             _ => with_inputs(extended, &rows, &U)?,
         };
         // the map is followed along the plant: as states, inputs and time move
-        let moving = degrees::with_slopes(extended, &U, region);
+        let slopes = map.settings.known_slopes(extended, &U);
+        let moving = degrees::with_slopes(extended, &U, &slopes, region);
         let continuous = Regularity::of(extended.graph(), &Φ, &moving.symbols(), &moving)?;
         let reads = U.iter().any(|jet| !jet.is_empty());
         let inputs = Inputs {
             extended,
             U: &U,
+            slopes: &slopes,
             Q̄: &Q,
             region,
         };
         let checks = Checks {
             degree: degrees::known(extended, &indices, &degrees),
             regular,
+            one_to_one,
             lipschitz: map.lipschitz.clone(),
             continuous: Statement::from(Germani::Continuous).with(continuous.finding()),
             inputs: match reads {

@@ -1,5 +1,6 @@
 //! The study's keys.
 
+use lynkeus_expr::Node;
 use lynkeus_gain::vandermonde::{Lemma32, Pole};
 use lynkeus_structure::Extended;
 
@@ -164,6 +165,18 @@ impl Settings {
     ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
         let what = "numbers for the filter of";
         keys::numbers_per_input(self.filter_initial.as_ref(), FILTER_INITIAL, what, needed)
+    }
+
+    /// Bounds of |u'|, |u''|, … per input as far as any are declared: the family's key, else those of the plant. A
+    /// list that has not the length that a guarantee needs is no help here.
+    pub fn known_slopes(&self, extended: &Extended<'_>, U: &[Vec<Node>]) -> Vec<Vec<f64>> {
+        let needed = Needed::new(extended, U.iter().map(Vec::len).collect());
+        let own = self.slopes(&needed).unwrap_or_default().into_iter();
+        let own = own.chain(std::iter::repeat(None));
+        let general = extended.input_derivatives.iter();
+        own.zip(general)
+            .map(|(own, general)| own.unwrap_or_else(|| general.clone()))
+            .collect()
     }
 
     /// Bounds of |u'|, |u''|, … per input.

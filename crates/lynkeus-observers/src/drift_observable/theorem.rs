@@ -16,6 +16,7 @@ use lynkeus_proof::magnitude::length;
 use lynkeus_structure::Extended;
 use lynkeus_structure::Verdict;
 
+use super::conditions::Inputs;
 use super::form::Form;
 use super::gains::{Gains, closed_loop, slowest};
 use super::guarantee;
@@ -42,6 +43,7 @@ pub(super) fn certificate(
     let mut hypotheses = vec![
         conditions.degree,
         conditions.regular,
+        conditions.one_to_one,
         conditions.lipschitz,
         conditions.continuous,
         lipschitz.continuous.clone(),
@@ -58,6 +60,7 @@ pub(super) fn certificate(
         .zip(&slopes)
         .map(|(jet, given)| order(jet, given));
     let mut constants = of_lipschitz(form, &lipschitz, u_M);
+    constants.extend(largest_inputs(extended, form, assumptions)?);
     let mut found = None;
     match &gains {
         Some(gains) => {
@@ -101,12 +104,7 @@ fn notes(extended: &Extended<'_>, form: &Form, assumptions: &Assumptions) -> Vec
         Variant::Practical => "taken for granted, not proved: plant and estimate stay in the box, and so do the filter's estimates of the inputs and of their derivatives; the bound holds once the filter has settled, at the same rate".to_owned(),
         _ => "taken for granted, not proved: plant and estimate stay in the box".to_owned(),
     }];
-    let unknown = extended.states.iter().zip(&assumptions.drift);
-    let unknown = unknown.skip(extended.plant_states());
-    let constant: Vec<&str> = unknown
-        .filter(|(_, drift)| **drift == 0.0)
-        .map(|(v, _)| v.name.as_str())
-        .collect();
+    let constant = assumptions.constant(extended.plant_states());
     if !constant.is_empty() {
         notes.push(format!(
             "taken as constant: {}; bounds of rates of change go under `slew` in [certify]",
@@ -160,6 +158,27 @@ fn largest_input(extended: &Extended<'_>, assumptions: &Assumptions) -> f64 {
     largest.fold(0.0, f64::max)
 }
 
+/// Ū of Theorem 2.4, where the map reads inputs.
+fn largest_inputs(
+    extended: &Extended<'_>,
+    form: &Form,
+    assumptions: &Assumptions,
+) -> Result<Option<Constant>, DesignError> {
+    if !form.reads_inputs() {
+        return Ok(None);
+    }
+    let inputs = Inputs {
+        extended,
+        U: &form.U,
+        slopes: &[],
+        Q̄: &form.Q,
+        region: &assumptions.region,
+    };
+    let meaning = "of Theorem 2.4: det Q̄ ≠ 0 is proved on the box for inputs and derivatives of inputs up to it";
+    let found = inputs.largest()?.filter(|radius| radius.is_finite());
+    Ok(found.map(|radius| Constant::new("Ū", radius, meaning)))
+}
+
 /// Hypotheses 1 and 2 of the theorems.
 fn of_the_map(
     extended: &Extended<'_>,
@@ -168,8 +187,7 @@ fn of_the_map(
     found: &Lipschitz,
 ) -> Vec<Check> {
     let mut checks = vec![];
-    let reads = form.variant != Variant::Bounded && form.U.iter().any(|jet| !jet.is_empty());
-    if reads {
+    if form.reads_inputs() {
         let pairs = form.U.iter().zip(slopes).zip(&extended.inputs);
         let lacking = pairs.filter(|((jet, given), _)| !jet.is_empty() && given.is_none());
         let names: Vec<&str> = lacking.map(|(_, input)| input.name.as_str()).collect();

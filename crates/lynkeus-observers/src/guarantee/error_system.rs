@@ -235,15 +235,18 @@ fn seen_by(
     for side in &mut seen.dimensions {
         side.symbol = *hats.get(&side.symbol).unwrap_or(&side.symbol);
     }
-    // no key of every family bounds them
-    let unbounded = observer.input_derivatives.iter().map(|d| Dimension {
-        name: d.signal.name.clone(),
-        symbol: d.signal.symbol,
-        min: f64::NEG_INFINITY,
-        max: f64::INFINITY,
-        integer: false,
+    let moving = observer.input_derivatives.iter().map(|d| {
+        let input = extended.inputs.iter().position(|u| u.name == d.input);
+        let bound = input.map_or(f64::INFINITY, |j| assumptions.input_derivative(j, d.order));
+        Dimension {
+            name: d.signal.name.clone(),
+            symbol: d.signal.symbol,
+            min: -bound,
+            max: bound,
+            integer: false,
+        }
     });
-    seen.dimensions.extend(unbounded);
+    seen.dimensions.extend(moving);
     for (j, (signal, output)) in observer.measured.iter().zip(&extended.outputs).enumerate() {
         let values = range(extended.graph(), output.variable.node, region)?.enclosure;
         let values = values.inflate(assumptions.noise.get(j).copied().unwrap_or(0.0));

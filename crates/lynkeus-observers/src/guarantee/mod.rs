@@ -68,7 +68,8 @@ pub fn certify(
     }
     let graph = extended.graph();
     let certified = graph.budgeted(graph.budget().part(1.0), || {
-        certified(extended, observer, assumptions, claim)
+        let certificate = certified(extended, observer, assumptions, claim)?;
+        Ok(certificate.under(assumptions))
     });
     certified.unwrap_or_else(|spent| Ok(Certificate::ended(BASIS, assumptions, spent)))
 }
@@ -110,6 +111,10 @@ fn certified(
     match found {
         Some(proof) => {
             fill(&mut certificate, extended, &system, &proof, assumptions);
+            if assumptions.is_moved() && certificate.verdict() == Standing::Proved {
+                certificate.mean_square =
+                    ultimate::mean_square(extended, &system, &proof, assumptions, &search);
+            }
             let faster = |spent| format!("a faster rate was sought: {spent}");
             certificate.notes.extend(spent.map(faster));
         }

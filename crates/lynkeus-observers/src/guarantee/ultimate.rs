@@ -4,9 +4,13 @@
 //! With e' = A e + w − Eν, |w_i| ≤ drift_i and |ν_j| ≤ noise_j, V = eᵀPe obeys
 //! (√V)' ≤ −rate·√V + √(wᵀPw), so in the end √V ≤ r = max √(wᵀPw)/rate, |e| ≤ r/√λ_min(P)
 //! and |e_i| ≤ r·√(P⁻¹)_ii.
+//!
+//! Process noise, white with the densities Q on x', adds tr(PQ) to (E V)'; then √(E V) settles where
+//! rate·E V = √(wᵀPw)·√(E V) + tr(PQ)/2, and √(E e_i²) obeys what |e_i| did.
 
-use lynkeus_expr::Interval;
-use lynkeus_proof::decay::Proof;
+use lynkeus_expr::{Budget, Interval};
+use lynkeus_proof::chain::settled;
+use lynkeus_proof::decay::{self, Proof};
 use lynkeus_proof::definite::is_below;
 use lynkeus_proof::magnitude::times;
 use lynkeus_proof::matrix::sum;
@@ -15,27 +19,62 @@ use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
 use super::error_system::ErrorSystem;
-use crate::{Assumptions, UltimateBound};
+use crate::{Assumptions, Bounds};
 
 /// A guessed bound of a quadratic form is raised by this before it is tried.
 const RESERVE: f64 = 1e-6;
 /// How often it is raised further.
 const TRIES: usize = 40;
 
-/// Ultimate bounds of the error.
-pub(super) struct Bounds {
-    /// of its Euclidean norm
-    pub norm: f64,
-    /// per extended state
-    pub states: Vec<UltimateBound>,
-}
+/// Slower rates whose P may leave a smaller mean square, as shares of the fastest.
+const SLOWER: [f64; 3] = [0.85, 0.6, 0.35];
 
-/// The bounds; none where an assumed size is infinite.
+/// What the error ends within without process noise; none where an assumed size is infinite.
 pub(super) fn bounds(
     extended: &Extended<'_>,
     system: &ErrorSystem,
     proof: &Proof,
     assumptions: &Assumptions,
+) -> Option<Bounds> {
+    of(extended, system, proof, assumptions, Interval::ZERO)
+}
+
+/// What the root of its mean square ends within with process noise, by the P of the proof and those of
+/// slower rates: each of the bounds holds.
+pub(super) fn mean_square(
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+    budget: &Budget,
+) -> Option<Bounds> {
+    let slower = SLOWER.iter().filter_map(|share| {
+        decay::prove(&system.models, &system.scale, share * proof.rate, budget)
+    });
+    let each = std::iter::once(proof.clone()).chain(slower);
+    let each = each.filter_map(|proof| {
+        let densities = assumptions.process_noise.iter().enumerate();
+        let trace =
+            sum(densities.map(|(i, q)| Interval::point(proof.P[(i, i)]) * Interval::point(*q)));
+        of(extended, system, &proof, assumptions, trace)
+    });
+    each.reduce(|a, b| Bounds {
+        norm: a.norm.min(b.norm),
+        states: a
+            .states
+            .into_iter()
+            .zip(b.states)
+            .map(|(a, b)| if a.value <= b.value { a } else { b })
+            .collect(),
+    })
+}
+
+fn of(
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+    trace: Interval,
 ) -> Option<Bounds> {
     let n = extended.states.len();
     let through = |i: usize| {
@@ -55,7 +94,7 @@ pub(super) fn bounds(
     }
     let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
     let square = sum(pairs.map(|(i, j)| Interval::point(proof.P[(i, j)]).abs() * w[i] * w[j]));
-    let r = square.sqrt() / Interval::point(proof.rate);
+    let r = settled(proof.rate, square.sqrt(), trace);
     let state = |i: usize| {
         let mut unit = DMatrix::zeros(n, n);
         unit[(i, i)] = 1.0;

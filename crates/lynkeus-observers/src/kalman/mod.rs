@@ -28,6 +28,7 @@ use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
 use settings::Settings;
+pub use settings::prior_variance;
 
 pub(crate) use settings::is_or_has;
 
@@ -61,7 +62,7 @@ impl Kalman for Ekf {
     const NAME: &'static str = "ekf";
     const PAPER: &'static str = "Jazwinski 1970, the extended Kalman filter, continuous-discrete";
     const WORDS: &'static str = "extended Kalman filter";
-    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
+    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS, &settings::BOUNDS];
 
     fn kind(_: &Extended<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
         Ok(FilterKind::Extended)
@@ -72,7 +73,8 @@ impl Kalman for Ukf {
     const NAME: &'static str = "ukf";
     const PAPER: &'static str = "Julier and Uhlmann 1997, the unscented Kalman filter";
     const WORDS: &'static str = "unscented Kalman filter";
-    const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS, &settings::POINTS];
+    const KEYS: &'static [&'static [KeySpec]] =
+        &[&settings::KEYS, &settings::BOUNDS, &settings::POINTS];
 
     fn kind(_: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
         let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
@@ -98,12 +100,17 @@ impl Kalman for Mhe {
             Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
             Some(x) => return Err(horizon.wrong(x)),
         };
-        let bounds = extended.states.iter().map(|state| Bounds {
-            low: state.min,
-            high: state.max,
-        });
-        Ok(FilterKind::MovingHorizon(length, bounds.collect()))
+        Ok(FilterKind::MovingHorizon(length, ranges(extended)))
     }
+}
+
+/// The declared range of each state.
+fn ranges(extended: &Extended<'_>) -> Vec<Bounds> {
+    let bounds = extended.states.iter().map(|state| Bounds {
+        low: state.min,
+        high: state.max,
+    });
+    bounds.collect()
 }
 
 impl<K: Kalman> Stages for K {
@@ -163,6 +170,7 @@ impl<K: Kalman> Stages for K {
         observer.filter = Some(FilterTuning {
             kind: settings.kind.clone(),
             gate: settings.gate,
+            bounds: settings.projects.then(|| ranges(extended)),
             outputs: copy.at_estimate(&outputs),
             confined,
             initial_variance: variance.iter().map(|v| v.value).collect(),

@@ -26,6 +26,15 @@ const GATE: KeySpec = KeySpec {
 /// Those of every filter.
 pub(super) const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
 
+/// That of the filters that may go anywhere.
+pub(super) const BOUNDS: [KeySpec; 1] = [KeySpec {
+    name: "bounds",
+    kind: "\"project\"",
+    shape: Shape::Word(&["project"]),
+    default: "none",
+    meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
+}];
+
 /// Those of the unscented filter.
 pub(super) const POINTS: [KeySpec; 3] = [
     KeySpec {
@@ -68,6 +77,8 @@ pub struct Settings {
     pub common: Common,
     pub kind: FilterKind,
     pub gate: Option<f64>,
+    /// the estimate is kept in the declared ranges
+    pub projects: bool,
     /// as given, by extended state
     variance: Vec<Option<f64>>,
 }
@@ -89,6 +100,7 @@ impl Settings {
             common: Common::read(tuning)?,
             kind,
             gate: tuning.positive(GATE.name)?,
+            projects: tuning.choice(BOUNDS[0].name, &["project"])?.is_some(),
             variance: variances(extended, tuning)?,
         })
     }
@@ -98,7 +110,7 @@ impl Settings {
         let states = extended.states.iter().zip(starts).zip(&self.variance);
         states
             .map(|((state, (_, start)), given)| Variance {
-                value: given.unwrap_or_else(|| of_range(state, *start)),
+                value: given.unwrap_or_else(|| prior_variance(state, *start)),
                 given: given.is_some(),
             })
             .collect()
@@ -107,7 +119,7 @@ impl Settings {
 
 /// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
 /// the start value, or 1.
-fn of_range(state: &Variable, start: f64) -> f64 {
+pub fn prior_variance(state: &Variable, start: f64) -> f64 {
     let width = state.max - state.min;
     match width.is_finite() && width > 0.0 {
         true => (width / 4.0).powi(2),

@@ -5,7 +5,7 @@ use lynkeus_proof::chain::Ultimate;
 use lynkeus_structure::Standing;
 use lynkeus_structure::{Extended, Region, range};
 
-use crate::{Certificate, Constant, DesignError};
+use crate::{Assumptions, Bounds, Certificate, Constant, DesignError};
 
 /// A number for a sentence.
 pub(crate) use lynkeus_structure::short as shown;
@@ -35,15 +35,21 @@ pub(crate) fn state_noise(
     Ok(found)
 }
 
-/// Fills in what the rate σ guarantees, where every hypothesis holds.
+/// Fills in what the rate σ guarantees, where every hypothesis holds; `of` has the bounds that it leaves
+/// for the densities of process noise, by extended state.
 pub(crate) fn conclude(
     certificate: &mut Certificate,
     extended: &Extended<'_>,
     σ: f64,
-    ultimate: Option<Ultimate>,
-) {
+    assumptions: &Assumptions,
+    of: impl Fn(&[f64]) -> Result<Option<Ultimate>, DesignError>,
+) -> Result<(), DesignError> {
     if certificate.verdict() != Standing::Proved {
-        return;
+        return Ok(());
+    }
+    let ultimate = of(&vec![0.0; extended.states.len()])?;
+    if assumptions.is_moved() {
+        certificate.mean_square = of(&assumptions.process_noise)?.and_then(|u| bounds(extended, u));
     }
     let mut constant = |name: &str, value: f64, meaning: &str| {
         certificate
@@ -70,19 +76,26 @@ pub(crate) fn conclude(
     }
     certificate.rate = Some(σ);
     certificate.overshoot = ultimate.as_ref().map(|found| found.overshoot);
-    match ultimate {
-        Some(found) if found.norm.is_finite() => {
-            certificate.ultimate_bound = Some(found.norm);
-            // in the order of the states, whatever that of the chains is
-            let mut states = found.states;
-            states.sort_unstable_by_key(|(i, _)| *i);
-            let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound).into();
-            certificate.ultimate = states.into_iter().map(name).collect();
+    match ultimate.and_then(|found| bounds(extended, found)) {
+        Some(bounds) => {
+            certificate.ultimate_bound = Some(bounds.norm);
+            certificate.ultimate = bounds.states;
         }
-        _ => certificate.notes.push(
+        None => certificate.notes.push(
             "no ultimate bound: the assumed drift or noise has no bound, or S⁻¹ could not be enclosed".into(),
         ),
     }
+    Ok(())
+}
+
+/// In the order of the states, whatever that of the chains is; none that are infinite.
+fn bounds(extended: &Extended<'_>, found: Ultimate) -> Option<Bounds> {
+    let mut states = found.states;
+    states.sort_unstable_by_key(|(i, _)| *i);
+    let name = |(i, bound): (usize, f64)| (extended.states[i].name.clone(), bound).into();
+    let states = states.into_iter().map(name).collect();
+    let norm = found.norm;
+    norm.is_finite().then_some(Bounds { norm, states })
 }
 
 /// What the box means for the guarantee.

@@ -136,14 +136,16 @@ fn assemble(
     let order: Vec<usize> = form.blocks().flatten().copied().collect();
     let numbers = settings.numbers(&order)?;
     let copy = Copy::new(extended, &settings.common);
-    let Matrices { C, F } = Matrices::new(&copy, form, &order);
+    let matrices = Matrices::new(&copy, form, &order);
     let names: Vec<&str> = order
         .iter()
         .map(|&i| extended.states[i].name.as_str())
         .collect();
     let factor = Factor::new(graph, &names, &numbers.S0);
-    let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     let mut derivatives = copy.at_estimate(&extended.derivatives);
+    prolong(&copy, &matrices.F, &order, &mut derivatives);
+    let Matrices { C, F } = matrices;
+    let v: Vec<Vec<Sparse<'_>>> = C.iter().map(|row| factor.forward(row)).collect();
     // θΔ_θ⁻¹ = diag(θI, θ²I, …) over the blocks
     let meaning = "the speed θ of the gain and of S".to_owned();
     let θ = Speed::new(&copy, "theta", numbers.θ, meaning);
@@ -173,6 +175,30 @@ fn assemble(
     })
 }
 
+/// The paper's prolongation (A2), if the study asks for it: F(u, σ(x̂))x̂ + φ(u, σ(x̂)), which is the
+/// plant at σ(x̂) plus F(u, σ(x̂))(x̂ − σ(x̂)); `copy` evaluates everything at σ(x̂). Against a plant in the
+/// box what is left is F(u, σ(x̂))e and a difference of f between points of the box, as φ and F read no
+/// later block: so every bound of the proof holds wherever x̂ is.
+fn prolong<'g>(
+    copy: &Copy<'_, 'g>,
+    F: &[Vec<Sparse<'g>>],
+    order: &[usize],
+    derivatives: &mut [Node],
+) {
+    if !copy.common.prolong {
+        return;
+    }
+    let graph: &'g Graph = copy.extended.graph();
+    for (row, &state) in order.iter().enumerate() {
+        for (entry, &next) in F[row].iter().zip(order) {
+            let Some(entry) = entry else { continue };
+            let hat = copy.hats[next].symbol;
+            let outside = graph.expr(hat) - graph.expr(copy.seen_as(next, hat));
+            derivatives[state] = (graph.expr(derivatives[state]) + *entry * outside).node();
+        }
+    }
+}
+
 /// Below this excitation the flag is raised.
 fn alarm(
     extended: &Extended<'_>,
@@ -193,6 +219,7 @@ fn monitor(factor: &Factor<'_>, alarm_below: f64) -> Option<Monitor> {
         node: bound.node(),
         alarm_below,
         meaning: "excitation is lost: the inputs and the estimate do not move enough to tell every state apart (A4), so some states are not corrected any more".into(),
+        matrix: None,
     })
 }
 

@@ -4,6 +4,7 @@ use lynkeus_gain::UnitFactor;
 use lynkeus_structure::Extended;
 
 use crate::estimate::Common;
+use crate::prolongation::PROLONG;
 use crate::stages::Late;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
@@ -31,8 +32,13 @@ const ALARM: KeySpec = KeySpec {
     meaning: "the flag is raised where `excitation` is below this",
 };
 
+const CONTINUED: KeySpec = KeySpec {
+    meaning: "the observer runs on F(u, σ(x̂))x̂ + φ(u, σ(x̂)), σ the limits of the declared ranges, as A2 asks: the theorem then holds for every start of the estimate",
+    ..PROLONG
+};
+
 /// Every key of the family.
-pub(super) const KEYS: [KeySpec; 3] = [THETA, START, ALARM];
+pub(super) const KEYS: [KeySpec; 4] = [THETA, START, ALARM, CONTINUED];
 
 /// The keys, read.
 pub struct Settings {

@@ -11,8 +11,15 @@
 //! cross term. λ_M follows from the box and S(0); λ_m is assumption A4, δ_0 = e α(θ) λ_m.
 //! No box decides A4 where F moves with the inputs, but the observer watches it: while
 //! the monitor `excitation` is above its alarm, λ_m is at least that.
+//!
+//! No θ0 follows from a λ_m that holds at one θ, for λ_m itself falls as θ grows. Let F_k(u, x̂)
+//! hide a direction ξ of block k + 1 at an instant t, F_k(t)ξ = 0, and let F be Lipschitz in time
+//! along the run. Then |F_k(s)ξ| ≤ D(t − s), each block of Φ̃(s, t)ξ before k + 1 is O((t − s)²θ) and
+//! higher powers of θ(t − s) times that, and the weight θe^{−θ(t−s)} makes ξᵀSξ = O(θ⁻²): so α(θ)/θ²
+//! stays above a positive number, and (12) does not hold. It can only where every F_k has full column
+//! rank all the time, or where inputs jump.
 
-use crate::statement::{proved, standing, undecided};
+use crate::statement::{Statement, proved, standing, undecided};
 use crate::{Check, Ltaief};
 use lynkeus_expr::{Interval, Node};
 use lynkeus_proof::chain::Slope;
@@ -25,10 +32,11 @@ use lynkeus_structure::{Standing, Verdict};
 use super::gramian::{TAU, above, below, largest_eigenvalue};
 use super::settings::{Numbers, Settings};
 use super::{BASIS, alarm};
+use crate::estimate::Common;
 use crate::proof::slopes::{magnitude, slopes, undeclared};
-use crate::proof::words::{box_note, shown};
+use crate::proof::words::shown;
 use crate::stages::Found;
-use crate::{Assumptions, Certificate, Constant, DesignError};
+use crate::{Assumptions, Bounds, Certificate, Constant, DesignError, prolongation};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -44,6 +52,12 @@ pub(super) fn certificate(
         .flat_map(|(k, b)| b.iter().map(move |_| k))
         .collect();
     let alarm = alarm(extended, &form, settings)?;
+    let shows = |c: &&Check| matches!(&c.statement, Statement::Ltaief(Ltaief::BlockShows { .. }));
+    let always_shown = examination
+        .checks
+        .iter()
+        .filter(shows)
+        .all(Check::is_proved);
     let study = Study {
         extended,
         assumptions,
@@ -51,8 +65,9 @@ pub(super) fn certificate(
         order,
         block,
         numbers,
-        clamp: settings.common.clamp,
+        common: &settings.common,
         alarm,
+        always_shown,
     };
     // a direction that numbers hide is a refutation of A4; the rest A4 itself decides
     let hidden = examination.checks.into_iter();
@@ -69,8 +84,10 @@ struct Study<'a> {
     /// the block of each place
     block: Vec<usize>,
     numbers: Numbers,
-    clamp: bool,
+    common: &'a Common,
     alarm: f64,
+    /// every F_k has full column rank on the box
+    always_shown: bool,
 }
 
 /// Entries row by row.
@@ -85,9 +102,12 @@ struct Sizes {
 }
 
 /// λ_m and λ_M.
+#[derive(Clone, Copy)]
 struct Spectrum {
     smallest: f64,
     largest: f64,
+    /// λ_m is a number of the plant, not the alarm
+    is_proved: bool,
 }
 
 impl Study<'_> {
@@ -119,7 +139,8 @@ impl Study<'_> {
         checks.push(self.a4(excitation));
         let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
         certificate.constants = constants;
-        certificate.notes.push(box_note(self.clamp));
+        let note = prolongation::note(self.common, self.extended, self.region());
+        certificate.notes.push(note);
         if let Some((rate, spectrum)) = found.filter(|_| everything_else) {
             self.conclude(&mut certificate, rate, &spectrum);
         }
@@ -199,12 +220,7 @@ impl Study<'_> {
     }
 
     fn assumed_drift(&self) -> String {
-        let n = self.extended.plant_states();
-        let unknown = self.extended.states.iter().enumerate().skip(n);
-        let constant: Vec<&str> = unknown
-            .filter(|(i, _)| self.assumptions.drift[*i] == 0.0)
-            .map(|(_, v)| v.name.as_str())
-            .collect();
+        let constant = self.assumptions.constant(self.extended.plant_states());
         match constant.is_empty() {
             true => "by the assumed drift".to_owned(),
             false => format!(
@@ -230,8 +246,13 @@ impl Study<'_> {
             None => undecided(
                 name,
                 format!(
-                    "it depends on the inputs and the estimate, which no box decides. While the monitor 'excitation' is above its alarm {}, λ_m is at least that, δ_0/α(θ) = e·λ_m, and the constants hold; the key 'alarm' sets it. What is missing for a proof is a lower bound of the excitation for all time",
-                    shown(self.alarm)
+                    "it depends on the inputs and the estimate, which no box decides. While the monitor 'excitation' is above its alarm {}, λ_m is at least that, δ_0/α(θ) = e·λ_m, and the constants hold; the key 'alarm' sets it. What is missing for a proof is a lower bound of the excitation for all time{}",
+                    shown(self.alarm),
+                    match self.always_shown {
+                        true => "",
+                        false =>
+                            ". (12), α(θ)/θ² → 0, holds for no inputs without jumps where a block hides a direction at some instant: λ_min(S) falls like θ^−2 there",
+                    }
                 ),
             ),
         }
@@ -266,7 +287,11 @@ impl Study<'_> {
             δ0,
             "e·λ_m: what (11) has to provide for it, by (16)",
         );
-        Spectrum { smallest, largest }
+        Spectrum {
+            smallest,
+            largest,
+            is_proved: excitation.is_some(),
+        }
     }
 
     /// ‖G(θ)‖ ≤ √ρ(GᵀG)
@@ -307,7 +332,9 @@ impl Study<'_> {
             (Interval::point(0.5) - loss).lo()
         };
         let θ = self.numbers.θ;
-        let θ0 = first(θ, |θ| μ(θ) > 0.0);
+        // a λ_m that falls as θ grows gives none
+        let is_lasting = self.always_shown || spectrum.is_proved;
+        let θ0 = first(θ, |θ| μ(θ) > 0.0).filter(|_| is_lasting);
         let mut add = |name: &str, value: f64, meaning: &str| {
             constants.push(Constant::new(name, value, meaning));
         };
@@ -325,11 +352,21 @@ impl Study<'_> {
         if let Some(θ0) = θ0 {
             add("θ0", θ0, "μ_θ > 0 from here on, for this λ_m");
         }
+        if !is_lasting {
+            let share = Interval::point(2.0 * self.coupling(slopes, θ)) / Interval::point(θ);
+            let needed = Interval::point(spectrum.largest) * share * share;
+            add(
+                "λ_m needed",
+                needed.hi(),
+                "λ_M(2L/θ)²: where λ_min(S) is above it at the study's θ, μ_θ > 0",
+            );
+        }
         let name = Ltaief::Theta { θ };
-        let from = θ0.map_or_else(
-            || "no θ0 was found".to_owned(),
-            |θ0| format!("θ0 = {}", shown(θ0)),
-        );
+        let from = match θ0 {
+            Some(θ0) => format!("θ0 = {}", shown(θ0)),
+            None if is_lasting => "no θ0 was found".to_owned(),
+            None => "no θ0 follows from a λ_m that falls as θ grows".to_owned(),
+        };
         let rate = (Interval::point(θ) * Interval::point(μ(θ))).lo();
         checks.push(match rate > 0.0 {
             true => proved(name, format!("μ_θ = {}, {from}", shown(μ(θ)))),
@@ -338,8 +375,7 @@ impl Study<'_> {
                 format!("μ_θ = {}, {from}; sufficient, not necessary", shown(μ(θ))),
             ),
         });
-        let Spectrum { smallest, largest } = *spectrum;
-        (rate > 0.0).then_some((rate, Spectrum { smallest, largest }))
+        (rate > 0.0).then_some((rate, *spectrum))
     }
 
     /// Rate and ultimate bounds: of the certificate where A4 is proved, else as
@@ -361,21 +397,36 @@ impl Study<'_> {
                 .unwrap_or(f64::INFINITY)
         };
         let w2 = sum((0..count).map(|i| Interval::point(noise(i)) * Interval::point(noise(i))));
-        // 2θμ v² − 2b v − θw² = 0 for v = √V
+        // 2θμ v² − 2b v − θw² = 0 for v = √V; process noise adds tr(ΔSΔQ) to θw² and makes it E V
         let twice = Interval::point(2.0) * Interval::point(rate);
-        let v = (b + (b * b + twice * θ * w2).sqrt()) / twice;
-        let radius = v / Interval::point(spectrum.smallest).sqrt();
-        let bound = |p: usize| (scale(p) * radius).hi();
+        let root = |added: Interval| {
+            let v = (b + (b * b + twice * (θ * w2 + added)).sqrt()) / twice;
+            v / Interval::point(spectrum.smallest).sqrt()
+        };
+        let densities = self.order.iter().enumerate().map(|(p, &state)| {
+            Interval::point(self.assumptions.process_noise[state]) / scale(p).powi(2)
+        });
+        let moved = Interval::point(spectrum.largest) * sum(densities);
+        let radius = root(Interval::ZERO);
         let last = self.block.iter().copied().max().unwrap_or(0);
-        let norm = (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
+        let norm = |radius: Interval| (θ.powi(last as i32).max(Interval::ONE) * radius).hi();
+        let bounds = |radius: Interval| {
+            let name = |p: usize| self.extended.states[self.order[p]].name.clone();
+            let each = (0..self.order.len()).map(|p| (name(p), (scale(p) * radius).hi()).into());
+            let norm = norm(radius);
+            norm.is_finite().then(|| Bounds {
+                norm,
+                states: each.collect(),
+            })
+        };
         if certificate.verdict() == Standing::Proved {
             certificate.rate = Some(rate);
-            if norm.is_finite() {
-                certificate.ultimate_bound = Some(norm);
-                let name = |p: usize| self.extended.states[self.order[p]].name.clone();
-                certificate.ultimate = (0..self.order.len())
-                    .map(|p| (name(p), bound(p)).into())
-                    .collect();
+            if let Some(bounds) = bounds(radius) {
+                certificate.ultimate_bound = Some(bounds.norm);
+                certificate.ultimate = bounds.states;
+            }
+            if self.assumptions.is_moved() {
+                certificate.mean_square = bounds(root(moved));
             }
             return;
         }
@@ -389,10 +440,12 @@ impl Study<'_> {
             rate,
             "decay rate while the monitor raises no flag, 1/time unit",
         );
-        add(
-            "ultimate bound",
-            norm,
-            "of |e| under the assumed drift and noise, while the monitor raises no flag",
-        );
+        if !self.assumptions.is_moved() {
+            add(
+                "ultimate bound",
+                norm(radius),
+                "of |e| under the assumed drift and noise, while the monitor raises no flag",
+            );
+        }
     }
 }

@@ -292,6 +292,8 @@ pub enum Germani {
     Degree,
     /// drift-observability
     Regular,
+    /// the same for points far apart: Definition 2.1 asks for a diffeomorphism
+    OneToOne,
     /// Φ̄ along the plant
     Continuous,
     /// what (3.1) asks of the input
@@ -331,6 +333,9 @@ impl fmt::Display for Germani {
                 f.write_str("the observation relative degree r is known (Definition 2.2)")
             }
             Self::Regular => f.write_str("Q(x) is regular on the box (drift-observable)"),
+            Self::OneToOne => f.write_str(
+                "the map to the outputs' derivatives is one-to-one on the box (Definition 2.1)",
+            ),
             Self::Continuous => f.write_str(
                 "the map to the outputs' derivatives has values on the box and does not jump",
             ),

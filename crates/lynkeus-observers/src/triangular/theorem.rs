@@ -262,17 +262,14 @@ impl Study<'_> {
         let count = self.form.assignment.chains.len();
         let chain = |i: usize| self.chain(i, self.gains.θ[i], c);
         let chains: Vec<Chain> = (0..count).map(chain).collect();
-        let outside = Disturbance {
-            drift: &self.assumptions.drift,
-            noise: &noise,
-        };
-        conclude(
-            certificate,
-            self.extended,
-            σ,
-            ultimate(&chains, σ, &outside),
-        );
-        Ok(())
+        conclude(certificate, self.extended, σ, self.assumptions, |process| {
+            let outside = Disturbance {
+                drift: &self.assumptions.drift,
+                noise: &noise,
+                process,
+            };
+            Ok(ultimate(&chains, σ, &outside))
+        })
     }
 }
 

@@ -146,7 +146,11 @@ impl<'e, 'p> Signals<'e, 'p> {
         let mut measured = HashMap::new();
         for &state in &form.layers.layers[0] {
             let variable = &extended.states[state];
-            let drift = assumptions.drift.get(state).copied().unwrap_or(0.0);
+            // white noise has no bound: then G and Λ₂, which follow the signal, turn at no bounded speed
+            let drift = match assumptions.process_noise.get(state) {
+                Some(density) if *density > 0.0 => f64::INFINITY,
+                _ => assumptions.drift.get(state).copied().unwrap_or(0.0),
+            };
             let slope = slope(extended, state, drift, &mut box_)?;
             let label = format!("{} as measured", variable.name);
             let symbol = graph.fresh(&label).node();
@@ -162,9 +166,7 @@ impl<'e, 'p> Signals<'e, 'p> {
         // (H3): inputs whose derivative the study bounds
         for (j, input) in extended.inputs.iter().enumerate() {
             let name = format!("the derivative of {}", input.name);
-            let given = assumptions.input_derivatives.get(j);
-            let bound = given.and_then(|bounds| bounds.first().copied());
-            let slope = box_.within(name, bound.unwrap_or(f64::INFINITY));
+            let slope = box_.within(name, assumptions.input_derivative(j, 1));
             slopes.push((input.node, slope));
         }
         let factors = &form.layers.factors;

@@ -48,6 +48,8 @@ impl Stages for UnknownInput {
     const PAPER: &'static str = "Farza, M'Saad, Liu, Targui 2005, observer (14)";
     const BASIS: &'static str = theorem::BASIS;
     const FORM_BOX: FormBox = FormBox::Assumed;
+    /// θ₁ is four times θ₂, as in the paper's example
+    const SPEEDS: &'static [f64] = &[4.0, 1.0];
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {

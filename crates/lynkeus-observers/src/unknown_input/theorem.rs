@@ -88,9 +88,11 @@ impl Proof<'_, '_, '_> {
     /// (H5)
     fn slow(&self, assumptions: &Assumptions) -> Check {
         let ε = self.unknown_drift(assumptions);
-        let detail = match ε == 0.0 {
-            true => "assumed constant".to_owned(),
-            false => format!("assumed: |v'| ≤ {}", figures(ε)),
+        let constant = assumptions.constant(self.form.extended.plant_states());
+        let detail = match (ε == 0.0, constant.is_empty()) {
+            (true, false) => "assumed constant".to_owned(),
+            (true, true) => "assumed constant but for its process noise".to_owned(),
+            (false, _) => format!("assumed: |v'| ≤ {}", figures(ε)),
         };
         sufficient(Farza::H5, ε.is_finite(), detail)
     }

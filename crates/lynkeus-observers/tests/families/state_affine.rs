@@ -61,6 +61,47 @@ fn example(θ: f64) -> (Plant, Design) {
     (plant, design)
 }
 
+/// With `prolong` the right-hand side is F(u, σ(x̂))x̂ + φ(u, σ(x̂)) (A2), written out by hand; with `clamp`
+/// σ limits the x̂ that F multiplies, too. In the box all three are one.
+#[test]
+fn prolonged_as_the_paper_asks() {
+    let plant = plant(EXAMPLE);
+    let starts = [("x1", 1.0), ("x2", 2.0), ("x3", -2.0)];
+    let plain = tuning(10.0, &starts);
+    let mut prolonged = plain.clone();
+    prolonged
+        .values
+        .insert("prolong".to_owned(), Value::Flag(true));
+    let clamped = Tuning {
+        clamp: true,
+        ..plain.clone()
+    };
+    let slopes = |tuning: &Tuning, x: [f64; 3]| {
+        let design = design(&plant, &["e1"], tuning);
+        let mut state: Vec<f64> = design.observer.states.iter().map(|(_, s)| *s).collect();
+        state[..3].copy_from_slice(&x);
+        // y = x̂₁, so that the correction is nothing
+        slope(&plant, &design, &state, &[0.3, -0.7, 2.0], &[x[0]])
+    };
+    // at σ(x̂) = s, F times m
+    let by_hand = |s: [f64; 3], m: [f64; 3]| {
+        let [u1, u2, u3] = [0.3, -0.7, 2.0];
+        [
+            u1 * s[0] * m[1] + u2 * s[0].powi(2) * m[2] + s[0] * u3,
+            s[2] - 10.0 * s[1] + u3 - s[1].powi(3),
+            -s[2] - 2.0 * s[0] * s[1] - 10.0 * u1 * s[1],
+        ]
+    };
+    let (x, s) = ([5.0, 3.5, -7.0], [4.0, 2.0, -2.0]);
+    crate::common::assert_close(&slopes(&prolonged, x)[..3], &by_hand(s, x));
+    crate::common::assert_close(&slopes(&clamped, x)[..3], &by_hand(s, s));
+    let inside = [1.0, 0.5, -0.5];
+    for tuning in [&plain, &prolonged, &clamped] {
+        let found = slopes(tuning, inside);
+        crate::common::assert_close(&found[..3], &by_hand(inside, inside));
+    }
+}
+
 fn grid(until: f64, step: f64) -> Vec<f64> {
     let rows = (until / step).round() as usize;
     (0..=rows).map(|k| k as f64 * step).collect()

@@ -112,9 +112,9 @@ fn an_input_in_m_needs_a_bound_of_its_derivative() {
     let found = study(&plant, tuning(&[50.0], "lee")).certificate();
     assert_eq!(found.verdict(), Standing::Undecided);
     assert!(
-        hypothesis(&found, "Ṁ M⁻¹")
-            .detail
-            .contains("where M depends on an input no key bounds its derivative")
+        hypothesis(&found, "Ṁ M⁻¹").detail.contains(
+            "where M depends on an input, bound its derivative under `input_derivatives`"
+        )
     );
     let classical = study(&plant, tuning(&[50.0], "classical")).certificate();
     assert_eq!(classical.verdict(), Standing::Proved);

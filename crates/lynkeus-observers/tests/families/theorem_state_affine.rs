@@ -70,7 +70,11 @@ fn the_example_of_the_paper() {
         assert_eq!((found.verdict(), found.rate), (Standing::Undecided, None));
         close(constant(&found, "λ_M"), 544.5004595584355);
         close(constant(&found, "L"), 28.463402635597934);
-        close(constant(&found, "θ0"), θ0);
+        // λ_m falls like θ⁻² here: no θ0 follows, only what λ_min(S) would have to be at this θ
+        assert!(!found.constants.iter().any(|c| c.name == "θ0"));
+        let needed = 544.5004595584355 * (2.0 * 28.463402635597934_f64 / 10.0).powi(2);
+        close(constant(&found, "λ_m needed"), needed);
+        assert!(hypothesis(&found, "A4").detail.contains("(12)"));
         assert!(constant(&found, "μ_θ") < 0.0);
         assert!(
             hypothesis(&found, "A4")

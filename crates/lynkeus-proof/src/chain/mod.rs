@@ -195,9 +195,12 @@ pub struct Disturbance<'a> {
     pub drift: &'a [f64],
     /// per chain
     pub noise: &'a [f64],
+    /// per extended state the spectral density of white noise on its derivative; with any, what
+    /// follows is in mean square
+    pub process: &'a [f64],
 }
 
-/// What a rate σ guarantees of the error in the plant's coordinates.
+/// What a rate σ guarantees of the error in the plant's coordinates; in mean square, of √(E|e|²).
 pub struct Ultimate {
     /// λ₁: |e(t)| ≤ λ₁ e^{−σt} |e(0)| without disturbance
     pub overshoot: f64,
@@ -207,14 +210,19 @@ pub struct Ultimate {
     pub states: Vec<(usize, f64)>,
 }
 
-/// Bounds from √V' ≤ −σ√V + β and |e_j| ≤ s_j √((S⁻¹)_jj V).
+/// Bounds from √V' ≤ −σ√V + β and |e_j| ≤ s_j √((S⁻¹)_jj V); with process noise from
+/// (E V)' ≤ −2σ E V + 2β√(E V) + tr(PQ).
 pub fn ultimate(chains: &[Chain], σ: f64, outside: &Disturbance<'_>) -> Option<Ultimate> {
-    let mut β2 = Interval::ZERO;
+    let (mut β2, mut trace_PQ) = (Interval::ZERO, Interval::ZERO);
     let (mut widest, mut steepest): (f64, f64) = (0.0, 0.0);
     let mut radii: Vec<(usize, Interval)> = vec![];
     for (i, chain) in chains.iter().enumerate() {
         let β = push(chain, outside.drift, *outside.noise.get(i)?)?;
         β2 = β2 + β * β;
+        for (j, &state) in chain.states.iter().enumerate() {
+            let density = Interval::point(*outside.process.get(state)?);
+            trace_PQ = trace_PQ + chain.S[j][j] * density / chain.scales[j].powi(2);
+        }
         let steep = inverse::diagonal(&normalised(chain))?;
         let mut trace = Interval::ZERO;
         for (j, bound) in steep.into_iter().enumerate() {
@@ -229,7 +237,7 @@ pub fn ultimate(chains: &[Chain], σ: f64, outside: &Disturbance<'_>) -> Option<
             |j: usize, k: usize| chain.S[j][k].abs() / (chain.scales[j] * chain.scales[k]);
         steepest = steepest.max(metzler::spectral_radius(&upper(&square(n, weighted))));
     }
-    let level = β2.sqrt() / Interval::point(σ);
+    let level = settled(σ, β2.sqrt(), trace_PQ);
     let states = radii
         .into_iter()
         .map(|(state, radius)| (state, (radius * level).hi()));
@@ -239,6 +247,19 @@ pub fn ultimate(chains: &[Chain], σ: f64, outside: &Disturbance<'_>) -> Option<
         norm: (widest.sqrt() * level).hi(),
         states: states.collect(),
     })
+}
+
+/// Where √v settles at most, for v' ≤ −2σv + 2β√v + trace: V itself without process noise (trace 0),
+/// else E V, as E√V ≤ √(E V).
+pub fn settled(σ: f64, β: Interval, trace: Interval) -> Interval {
+    let σ = Interval::point(σ);
+    match trace == Interval::ZERO {
+        true => β / σ,
+        false => {
+            let twice = Interval::point(2.0) * σ;
+            (β + (β * β + twice * trace).sqrt()) / twice
+        }
+    }
 }
 
 /// β: what drift and noise add to the derivative of √V of one chain.

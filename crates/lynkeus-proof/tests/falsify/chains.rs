@@ -114,6 +114,7 @@ fn the_decay_of_comparison_systems_stands_the_worst_case() {
         Disturbance {
             drift: &[0.0; STATES],
             noise: &[0.0; 2],
+            process: &[0.0; STATES],
         },
     );
     for _ in 0..200 {
@@ -158,6 +159,7 @@ fn ultimate_bounds_stand_the_worst_disturbance() {
         let outside = Disturbance {
             drift: &drift,
             noise: &noise,
+            process: &[0.0; STATES],
         };
         let comparison = Comparison::new(&plant.chains, &plant.μ, &plant.slopes);
         let Some(σ) = comparison.rate() else {

@@ -1,6 +1,9 @@
 //! The explicit method of Dormand and Prince of order 8 with its error estimate of orders 5
 //! and 3 (DOP853 of Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I,
-//! section II.10), without the further stages of its dense output: runs stop at every row.
+//! section II.10). The further stages of its dense output are for steps that may cross something: runs
+//! stop at every row.
+
+mod between;
 
 use super::Point;
 use crate::{Dynamics, Tolerances};
@@ -152,6 +155,8 @@ pub(super) struct Dop853 {
     /// Σ bᵢ kᵢ
     segment: Vec<f64>,
     reached: Vec<f64>,
+    /// those of the dense output, once they were needed
+    further: [Vec<f64>; between::FURTHER],
     /// a step before this one was rejected
     is_retry: bool,
 }
@@ -163,6 +168,7 @@ impl Dop853 {
             stage: vec![0.0; dimension],
             segment: vec![0.0; dimension],
             reached: vec![0.0; dimension],
+            further: Default::default(),
             is_retry: false,
         }
     }

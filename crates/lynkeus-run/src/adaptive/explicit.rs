@@ -1,9 +1,8 @@
 //! The explicit method, step by step to the end of a leg.
 
-use super::crossing::Reach;
 use super::dop853::{Dop853, Tried};
 use super::{Adaptive, Leg, Point, Ran, resolution};
-use crate::relays::Switched;
+use crate::relays::{Ahead, Glance, Span, Switched};
 use crate::{Dynamics, Error};
 
 impl Adaptive {
@@ -46,23 +45,10 @@ impl Adaptive {
                 self.pace.next = first.max(2.0 * resolution(leg.t)).min(span);
             }
             let mut step = self.accepted_step(method, f, leg, &mut bad)?;
-            let (start, reached) = (leg.x.to_vec(), method.reached().to_vec());
-            let (t, tolerances) = (leg.t, self.tolerances);
-            let attempt = |f: &mut Switched<'_, _>, step: f64, bad: &mut Option<Point>| {
-                let tried = method.attempt(f, (t, &start), step, &tolerances, bad);
-                matches!(tried, Tried::Accepted(_)).then(|| method.reached().to_vec())
-            };
-            let crossing = self.crossing(f, leg, &start, (step, &reached), attempt)?;
-            leg.x
-                .copy_from_slice(crossing.as_ref().map_or(&reached, |crossing| &crossing.x));
-            if let Some(Reach {
-                step: shorter,
-                x,
-                margins,
-            }) = &crossing
-            {
-                step = *shorter;
-                f.pass(leg.t + step, x, margins);
+            if f.is_unwatched() {
+                leg.x.copy_from_slice(method.reached());
+            } else {
+                step = self.up_to_event(method, f, leg, step)?;
             }
             leg.t = if step == leg.to - leg.t {
                 leg.to
@@ -77,6 +63,53 @@ impl Adaptive {
                 return Ok(Ran::ToTheChange);
             }
         }
+    }
+
+    /// Takes the step that was just accepted, or a shorter one up to the first surface or bend in it: the
+    /// step up to there.
+    fn up_to_event(
+        &mut self,
+        method: &mut Dop853,
+        f: &mut Switched<'_, impl Dynamics>,
+        leg: &mut Leg<'_>,
+        step: f64,
+    ) -> Result<f64, Error> {
+        let glance = f.glance(
+            &Span {
+                from: (leg.t, leg.x),
+                step,
+                to: method.reached(),
+            },
+            |state| method.fastest(state),
+        );
+        if glance == Glance::Clear {
+            leg.x.copy_from_slice(method.reached());
+            return Ok(step);
+        }
+        let (start, reached) = (leg.x.to_vec(), method.reached().to_vec());
+        let (t, tolerances) = (leg.t, self.tolerances);
+        let span = Span {
+            from: (t, &start),
+            step,
+            to: &reached,
+        };
+        let ahead = match glance {
+            Glance::Near if method.look_inside(f, (t, &start), step) => {
+                f.ahead(&span, |state| method.between(state, start[state], step))
+            }
+            _ => Ahead::Nothing,
+        };
+        let attempt = |f: &mut Switched<'_, _>, step: f64, bad: &mut Option<Point>| {
+            let tried = method.attempt(f, (t, &start), step, &tolerances, bad);
+            matches!(tried, Tried::Accepted(_)).then(|| method.reached().to_vec())
+        };
+        let Some(event) = self.crossing(f, leg, &span, ahead, attempt)? else {
+            leg.x.copy_from_slice(&reached);
+            return Ok(step);
+        };
+        leg.x.copy_from_slice(&event.x);
+        f.pass(t + event.step, &event.x, &event.margins);
+        Ok(event.step)
     }
 
     /// Shortens the proposed step until it is accepted, and proposes the next one.

@@ -2,7 +2,7 @@
 
 use super::crossing::Reach;
 use super::{Adaptive, Leg, Point, Radau, Ran};
-use crate::relays::Switched;
+use crate::relays::{Ahead, Span, Switched};
 use crate::{Dynamics, Error};
 
 impl Adaptive {
@@ -53,7 +53,10 @@ impl Adaptive {
                 self.pace.next = self.pace.next.max(proposed);
             }
             rejected = false;
-            let step = self.up_to_crossing(f, leg, radau, &start, step)?;
+            let step = match f.is_unwatched() {
+                true => step,
+                false => self.up_to_meeting(f, leg, radau, &start, step)?,
+            };
             leg.t = if step == leg.to - leg.t {
                 leg.to
             } else {
@@ -69,9 +72,9 @@ impl Adaptive {
         }
     }
 
-    /// Where the step that was just taken crosses a surface, goes back to the crossing: the
+    /// Where the step that was just taken meets a surface or a bend, goes back to the first: the
     /// step up to there.
-    fn up_to_crossing(
+    fn up_to_meeting(
         &mut self,
         f: &mut Switched<'_, impl Dynamics>,
         leg: &mut Leg<'_>,
@@ -80,6 +83,15 @@ impl Adaptive {
         step: f64,
     ) -> Result<f64, Error> {
         let (reached, t, to, tolerances) = (leg.x.to_vec(), leg.t, leg.to, self.tolerances);
+        let span = Span {
+            from: (t, start),
+            step,
+            to: &reached,
+        };
+        let ahead = f.ahead(&span, |state| radau.between(state, start[state]));
+        if ahead == Ahead::Nothing && !f.has_bound() {
+            return Ok(step);
+        }
         let purse = leg.purse;
         let mut has_tried = false;
         let attempt = |f: &mut Switched<'_, _>, step: f64, _: &mut Option<Point>| {
@@ -95,7 +107,7 @@ impl Adaptive {
             let (accepted, _) = radau.attempt(f, &mut again, step, true, &tolerances);
             accepted.then_some(x)
         };
-        let crossing = self.crossing(f, leg, start, (step, &reached), attempt)?;
+        let crossing = self.crossing(f, leg, &span, ahead, attempt)?;
         let Some(Reach { step, x, margins }) = crossing else {
             if has_tried {
                 // what it keeps is of the steps tried

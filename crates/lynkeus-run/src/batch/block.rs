@@ -203,7 +203,8 @@ impl Block {
         self.recorded.clear();
         for event in events {
             match event {
-                Event::Draw => self.draw(desk.program),
+                Event::Draw => self.draw(desk.program, Sensors::draw),
+                Event::Stir => self.draw(desk.program, Sensors::stir),
                 Event::Leg {
                     from,
                     to,
@@ -224,10 +225,10 @@ impl Block {
         ControlFlow::Continue(())
     }
 
-    fn draw(&mut self, program: &Program) {
+    fn draw(&mut self, program: &Program, draw: fn(&mut Sensors)) {
         let own = program.states + program.disturbances;
         for run in &mut self.runs {
-            run.sensors.draw();
+            draw(&mut run.sensors);
         }
         for place in 0..self.groups * LANES {
             let run = &self.runs[place.min(self.runs.len() - 1)];

@@ -14,6 +14,8 @@ use crate::{Column, Dynamics, Error, Method, Simulation, Step};
 pub(crate) enum Event {
     /// each draws its next noise sample
     Draw,
+    /// each draws what moves its states, between two samples
+    Stir,
     /// equal steps in which nothing jumps with time
     Leg {
         from: f64,
@@ -68,7 +70,7 @@ impl Plan {
             return Ok(None);
         };
         let itinerary = Itinerary::new(simulation)?;
-        let clock = Loop::new(simulation, sensors(simulation, itinerary.sample_step(), 0)?)?;
+        let clock = Loop::new(simulation, sensors(simulation, itinerary.hold(), 0)?)?;
         let Some(program) = program(&clock)? else {
             return Ok(None);
         };
@@ -83,7 +85,7 @@ impl Plan {
 
     /// The sensors of the run of a seed.
     pub fn sensors(&self, simulation: &Simulation, seed: u64) -> Result<Sensors, Error> {
-        sensors(simulation, self.itinerary.sample_step(), seed)
+        sensors(simulation, self.itinerary.hold(), seed)
     }
 
     /// The place of a column among the values of a row.
@@ -107,6 +109,7 @@ impl Plan {
             match self.itinerary.next() {
                 None => break,
                 Some(Stop::Draw) => events.push(Event::Draw),
+                Some(Stop::Stir) => events.push(Event::Stir),
                 Some(Stop::Advance { from, to }) => self.legs(from, to, &mut events)?,
                 Some(Stop::Row(time)) => {
                     self.clock.enter(time);
@@ -137,13 +140,13 @@ impl Plan {
     }
 }
 
-fn sensors(simulation: &Simulation, sample_step: f64, seed: u64) -> Result<Sensors, Error> {
+fn sensors(simulation: &Simulation, hold: f64, seed: u64) -> Result<Sensors, Error> {
     let plant = &simulation.plant;
     let noise = crate::Noise {
         seed,
         ..simulation.noise.clone()
     };
-    Sensors::new(&noise, plant.outputs(), plant.states(), sample_step)
+    Sensors::new(&noise, plant.outputs(), plant.states(), hold)
 }
 
 /// The tapes of a step and of a row, divided into what all trajectories share (time, the step,

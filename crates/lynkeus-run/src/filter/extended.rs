@@ -1,42 +1,25 @@
 //! The extended Kalman filter, continuous-discrete.
 
 use super::Belief;
-use super::factor::Factor;
-use super::flow::Joint;
-use super::health::Reading;
+use super::along::Along;
 use super::root::{Gain, dot};
-use super::sensing::Sensing;
+use super::sensing::{Believed, Sensing};
 use super::smooth::Correction;
 use super::spanned::Rows;
-use super::taylor::Moments;
-use super::variation::Variation;
+use super::stage::Stage;
 use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
-use crate::{Error, EstimatorSettings, Method, Step, System};
-
-/// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are
-/// then the steps of all three.
-const FEW: usize = 8;
+use crate::{Error, EstimatorSettings, System};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Extended {
     pub driven: Driven,
-    way: Way,
-    /// x̂⁻, Φ and W
+    along: Along,
+    /// x̂⁻
     x: Vec<f64>,
-    moments: Moments,
     /// rows whose sum of squares is P⁻
     rows: Vec<f64>,
     sums: Vec<f64>,
-    /// of W
-    factor: Factor,
-}
-
-/// How Φ and W are found.
-#[derive(Clone, Debug)]
-enum Way {
-    Joint(Box<Joint>),
-    Variation(Box<Variation>),
 }
 
 impl Extended {
@@ -49,31 +32,12 @@ impl Extended {
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
         let n = flow.states().len();
-        let is_given = matches!(run.method, Method::Rk4(Step::AtMost(_) | Step::Substeps(_)));
-        let way = match n <= FEW || is_given {
-            true => Way::Joint(Box::new(Joint::new(
-                n,
-                flow.outputs().len(),
-                entries,
-                process_noise,
-                run.method,
-            )?)),
-            false => Way::Variation(Box::new(Variation::new(
-                n,
-                flow.outputs().len(),
-                entries,
-                process_noise,
-                run.method,
-            )?)),
-        };
         Ok(Self {
             driven: Driven::new(flow, run.between),
-            way,
+            along: Along::new(flow, entries, process_noise, run.method)?,
             x: vec![0.0; n],
-            moments: Moments::start(n, process_noise.iter().any(|q| *q > 0.0)),
             rows: vec![],
             sums: vec![0.0; n],
-            factor: Factor::default(),
         })
     }
 
@@ -87,42 +51,39 @@ impl Extended {
         keep: bool,
     ) -> Result<Rows, Error> {
         self.x.clone_from(&belief.x);
-        let (driven, x, moments) = (&mut self.driven, &mut self.x, &mut self.moments);
-        match &mut self.way {
-            Way::Joint(joint) => joint.advance(driven, from, to, x, moments)?,
-            Way::Variation(variation) => {
-                *moments = variation.advance(driven, belief, from, to, x)?;
-            }
-        };
+        let (driven, x) = (&mut self.driven, &mut self.x);
+        self.along.advance(driven, belief, from, to, x)?;
         belief.x.clone_from(&self.x);
         self.rows.clear();
-        self.push_root();
+        // the rows of W come first: their zeros are spared in the reflections
+        self.along.push_root(&mut self.rows);
         self.push_carried(belief);
         belief.root.of_rows_with(&mut self.rows, &mut self.sums);
         Ok(match keep {
-            true => Rows::of(&self.moments.transition),
+            true => Rows::of(self.along.transition()),
             false => Rows::default(),
         })
     }
 
-    /// The rows of Lᵀ, W = LLᵀ. They come first: their zeros are spared in the reflections.
-    fn push_root(&mut self) {
-        let Some(noise) = &self.moments.noise else {
-            return;
-        };
-        let n = self.x.len();
-        let lower = self.factor.of(noise.entries(), n);
-        self.rows.resize(n * n, 0.0);
-        for (i, row) in lower.chunks_exact(n).enumerate() {
-            for (k, entry) in row[..=i].iter().enumerate() {
-                self.rows[k * n + i] = *entry;
-            }
-        }
+    /// The way from a state, without carrying a belief along it; the root chooses units where there
+    /// are many states.
+    pub(super) fn stage(&mut self, about: Belief, from: f64, to: f64) -> Result<Stage, Error> {
+        self.x.clone_from(&about.x);
+        let (driven, x) = (&mut self.driven, &mut self.x);
+        self.along.advance(driven, &about, from, to, x)?;
+        let mut noise = vec![];
+        self.along.push_root(&mut noise);
+        Ok(Stage {
+            about: about.x,
+            end: self.x.clone(),
+            transition: Rows::of(self.along.transition()),
+            noise,
+        })
     }
 
     /// The rows of (ΦS)ᵀ.
     fn push_carried(&mut self, belief: &Belief) {
-        let (n, transition) = (self.x.len(), &self.moments.transition);
+        let (n, transition) = (self.x.len(), self.along.transition());
         let first = self.rows.len();
         self.rows.resize(first + n * n, 0.0);
         let into = &mut self.rows[first..];
@@ -143,10 +104,7 @@ impl Extended {
 impl Persist for Extended {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
-        match &mut self.way {
-            Way::Joint(joint) => joint.walk(walk),
-            Way::Variation(variation) => variation.walk(walk),
-        }
+        self.along.walk(walk)
     }
 }
 
@@ -162,16 +120,9 @@ pub(super) struct Room {
     taken: Vec<Believed>,
 }
 
-/// A reading that corrects.
-#[derive(Clone, Copy, Debug)]
-struct Believed {
-    sensor: usize,
-    variance: f64,
-    innovation: f64,
-}
-
 /// The readings one after the other, which for sensors with independent noises is all of them
-/// at once: slopes and predictions are those at x̂⁻.
+/// at once: slopes and predictions are those at x̂⁻. Those at an end of their sensor's range come last:
+/// what they say depends on what the others leave of the estimate.
 pub(super) fn correct(
     sensing: &mut Sensing,
     belief: &mut Belief,
@@ -213,26 +164,20 @@ fn correct_in(
         let c = &mut slopes[i * n..(i + 1) * n];
         sensing.write_slopes(i, c);
         belief.root.transposed_times(c, projected);
-        let r = sensing.noise(i, *h);
-        let variance = dot(projected, projected) + r;
-        let innovation = sensing.judge(i, readings[i], *h, variance);
-        if innovation.reading == Reading::Taken {
-            taken.push(Believed {
-                sensor: i,
-                variance: r,
-                innovation: innovation.value,
-            });
-        }
+        let spread = dot(projected, projected);
+        taken.extend(sensing.judge(i, readings[i], *h, spread));
     }
-    for believed in &*taken {
+    let inside = taken.iter().filter(|b| b.end.is_none());
+    for believed in inside.chain(taken.iter().filter(|b| b.end.is_some())) {
         let c = &slopes[believed.sensor * n..(believed.sensor + 1) * n];
         let moves = belief.x.iter().zip(&*before).map(|(x, x0)| x - x0);
         let moved: f64 = c.iter().zip(moves).map(|(c, moved)| c * moved).sum();
-        let rest = believed.innovation - moved;
         belief.root.transposed_times(c, projected);
-        let variance = dot(projected, projected) + believed.variance;
-        let root = &mut belief.root;
-        if !root.update_into(projected, believed.variance, gain) {
+        let spread = dot(projected, projected);
+        let Some((rest, noise)) = believed.weighed(moved, spread) else {
+            continue;
+        };
+        if !belief.root.update_into(projected, noise, gain) {
             continue;
         }
         for (x, k) in belief.x.iter_mut().zip(&gain.values) {
@@ -240,7 +185,7 @@ fn correct_in(
         }
         if let Some(corrections) = &mut sensing.corrections {
             let gain = gain.values.clone();
-            corrections.push(Correction::single(c.to_vec(), rest, variance, gain));
+            corrections.push(Correction::single(c.to_vec(), rest, spread + noise, gain));
         }
     }
     Ok(())

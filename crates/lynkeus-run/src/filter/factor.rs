@@ -52,6 +52,28 @@ impl Factor {
     }
 }
 
+/// x with L Lᵀ x = b, in the place of b; components that L does not reach are 0.
+pub(crate) fn substitute(lower: &[f64], m: usize, b: &mut [f64]) {
+    for i in 0..m {
+        let known = dot(&lower[i * m..i * m + i], &b[..i]);
+        let pivot = lower[i * m + i];
+        b[i] = if pivot > 0.0 {
+            (b[i] - known) / pivot
+        } else {
+            0.0
+        };
+    }
+    for i in (0..m).rev() {
+        let known: f64 = (i + 1..m).map(|j| lower[j * m + i] * b[j]).sum();
+        let pivot = lower[i * m + i];
+        b[i] = if pivot > 0.0 {
+            (b[i] - known) / pivot
+        } else {
+            0.0
+        };
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,8 +1,11 @@
 //! The estimate and how its error spreads, integrated together.
 
+use std::sync::Arc;
+
 use super::curvature::{Curvature, Layout};
 use super::taylor::Moments;
 use crate::driven::Driven;
+use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Method, Slopes};
 
@@ -190,6 +193,14 @@ impl Dynamics for Linearised<'_> {
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.driven.hold(sides);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.driven.guards()
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.driven.beside(t, values);
     }
 
     fn names(&self) -> Vec<String> {

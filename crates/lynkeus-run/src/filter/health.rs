@@ -12,17 +12,22 @@ pub enum Reading {
     Taken,
     /// the gate kept it out, or sigma points of negative weight gave it no variance
     Rejected,
-    /// at a limit of the sensor, on which the estimate is beyond it
+    /// at a limit of the sensor, where the model expects the output there or beyond: it says little,
+    /// and is not judged
     AtLimit,
 }
 
 /// A reading beside what was expected of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Innovation {
-    /// y − ŷ, in the unit of the output; 0 where the sensor did not report
+    /// y − ŷ, in the unit of the output; 0 where the sensor did not report. Of a reading at a limit of
+    /// its sensor the mean of what y may be, less ŷ
     pub value: f64,
-    /// its standard deviation before the correction
+    /// its standard deviation before the correction, over what the sensor can show
     pub deviation: f64,
+    /// the same once the start is forgotten: of an observer with a theorem, whose error system is
+    /// driven by the noises alone; of a filter, the deviation itself
+    pub settled: f64,
     /// what the model expected: ŷ before the correction
     pub predicted: f64,
     /// what became of it
@@ -38,7 +43,7 @@ pub struct SensorHealth {
     pub missing: usize,
     /// readings that the gate kept out
     pub rejected: usize,
-    /// readings at a limit that said nothing new
+    /// readings at a limit, the model expecting the output there or beyond
     pub at_limit: usize,
     /// of these, those of which it was known how far off they may be
     pub judged: usize,
@@ -70,7 +75,7 @@ impl SensorHealth {
         }
     }
 
-    pub(super) fn count(&mut self, innovation: &Innovation) {
+    pub(crate) fn count(&mut self, innovation: &Innovation) {
         match innovation.reading {
             Reading::Missing => self.missing += 1,
             Reading::AtLimit => self.at_limit += 1,
@@ -100,6 +105,10 @@ pub struct Health {
     /// samples at which the estimate was put back into the declared ranges, because the plant has
     /// no value where it was
     pub confined: usize,
+    /// times that the estimate was put into the bounds where it is kept
+    pub projected: usize,
+    /// samples at which a moving horizon has not come to the minimum over its window
+    pub unsolved: usize,
 }
 
 impl Health {
@@ -124,7 +133,9 @@ impl Persist for Health {
             walk.count(&mut sensor.locked_out)?;
         }
         walk.count(&mut self.inputs_held)?;
-        walk.count(&mut self.confined)
+        walk.count(&mut self.confined)?;
+        walk.count(&mut self.projected)?;
+        walk.count(&mut self.unsolved)
     }
 }
 
@@ -132,6 +143,7 @@ impl Persist for Innovation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.number(&mut self.value)?;
         walk.number(&mut self.deviation)?;
+        walk.number(&mut self.settled)?;
         walk.number(&mut self.predicted)?;
         let mut place = Reading::ALL.iter().position(|r| *r == self.reading);
         let place = place.get_or_insert_default();

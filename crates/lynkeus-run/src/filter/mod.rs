@@ -37,6 +37,8 @@
 //! # Ok::<(), lynkeus_run::Error>(())
 //! ```
 
+mod along;
+mod censored;
 mod curvature;
 mod doubling;
 pub(crate) mod extended;
@@ -48,10 +50,12 @@ mod horizon;
 mod model;
 mod nodes;
 mod persist;
+mod project;
 pub(crate) mod root;
 mod sensing;
 mod smooth;
 mod spanned;
+mod stage;
 mod taylor;
 mod unscented;
 mod variation;
@@ -68,6 +72,7 @@ use crate::runner::Runner;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;
+use project::Projection;
 use root::Root;
 use sensing::Sensing;
 use smooth::History;
@@ -105,16 +110,25 @@ pub struct FilterSettings {
     pub gate: Option<f64>,
     /// keep what a smoother needs
     pub keep_history: bool,
+    /// where the estimate is kept, one pair per state: after each prediction and correction it is
+    /// put to the nearest such place by the covariance's metric. The covariance stays: a bound says where
+    /// the estimate is, and not how sure it is
+    pub bounds: Option<Vec<Bounds>>,
+    /// readings are what the model shows, and only covariances are asked for: a sensor with limits
+    /// counts as its readings do on average (Fisher's information of a clipped normal number)
+    pub foresees: bool,
 }
 
 impl FilterSettings {
-    /// No gate, no history.
+    /// No gate, no history, no bounds.
     #[must_use]
     pub fn of(kind: FilterKind) -> Self {
         Self {
             kind,
             gate: None,
             keep_history: false,
+            bounds: None,
+            foresees: false,
         }
     }
 }
@@ -147,6 +161,7 @@ pub(crate) struct Filter {
     /// the same inside the declared ranges
     spare: Option<Spare>,
     belief: Belief,
+    projection: Option<Projection>,
     sensing: Sensing,
     inputs: Vec<f64>,
     deviations: Vec<f64>,
@@ -171,6 +186,16 @@ impl Filter {
                 "a number of standard deviations above 0",
                 gate,
             ));
+        }
+        if let Some(bounds) = &settings.bounds {
+            if bounds.len() != model.dimension() {
+                let expected = format!("{}, one pair per state", model.dimension());
+                return Err(Error::setting("bounds", expected, bounds.len()));
+            }
+            if settings.keep_history {
+                let found = "a smoother beside them";
+                return Err(Error::setting("bounds", "no smoother", found));
+            }
         }
         let is_window = matches!(settings.kind, FilterKind::MovingHorizon(..));
         let keep_corrections = settings.keep_history && !is_window;
@@ -210,7 +235,8 @@ impl Filter {
                 root: Root::diagonal(&model.initial_variance),
                 x: x.clone(),
             },
-            sensing: Sensing::new(model, settings.gate, keep_corrections),
+            projection: settings.bounds.map(Projection::new),
+            sensing: Sensing::new(model, settings.gate, keep_corrections, settings.foresees),
             inputs: vec![0.0; model.inputs().len()],
             bound: Bound::new(&x),
             history: settings.keep_history.then(History::default),
@@ -240,7 +266,11 @@ impl Filter {
         let result = match &mut self.engine {
             Engine::Extended(engine) => engine.predict(belief, from, to, keep),
             Engine::Unscented(engine) => engine.predict(belief, from, to, keep),
-            Engine::MovingHorizon(horizon) => horizon.engine.predict(belief, from, to, keep),
+            Engine::MovingHorizon(horizon) => {
+                let result = horizon.engine.predict(belief, from, to, keep);
+                confine(&mut belief.x, horizon.bounds());
+                result
+            }
         };
         match (result, &mut self.spare) {
             (Err(error), Some(spare)) if is_undefined(&error) => {
@@ -253,6 +283,14 @@ impl Filter {
                 spare.engine.predict(&mut self.belief, from, to, keep)
             }
             (result, _) => result,
+        }
+    }
+
+    /// The estimate into the bounds where it is to be kept there.
+    fn keep_inside(&mut self) {
+        if let Some(projection) = &mut self.projection {
+            let Belief { x, root } = &mut self.belief;
+            self.sensing.health.projected += usize::from(projection.project(x, root));
         }
     }
 
@@ -299,6 +337,7 @@ impl Runner for Filter {
         self.bound.see(&self.inputs);
         let transition = self.predict(from, sample.t, sample.inputs)?;
         self.driven().arrive();
+        self.keep_inside();
         if self.keeps_transitions() {
             self.pending = Some(match self.pending.take() {
                 None => transition,
@@ -314,7 +353,9 @@ impl Runner for Filter {
         self.sensing.take_corrections();
         self.inputs.copy_from_slice(sample.inputs);
         self.driven().start(sample.inputs);
-        self.correct(sample.t, sample.readings)
+        self.correct(sample.t, sample.readings)?;
+        self.keep_inside();
+        Ok(())
     }
 
     fn report(&mut self, t: f64) -> Result<(), Error> {

@@ -1,5 +1,6 @@
 //! The sensors: what the model expects of them, and which readings are believed.
 
+use super::censored::{self, End};
 use super::extended::Room;
 use super::health::{Health, Innovation, Reading};
 use super::model::{FilterModel, Limits, Sensor};
@@ -13,6 +14,60 @@ const LOCKED_OUT: usize = 10;
 /// Of them so many have to differ from the reading before: a sensor that hangs, or shows an end
 /// of its range, is no reason to doubt the estimate.
 const MOVED: usize = 5;
+
+/// A reading so many deviations from what is expected contradicts the prediction: then it has a say in
+/// how large a noise that grows with the value is. A nearer one has none: readings that come out high
+/// would count less than those that come out low.
+const SURPRISE: f64 = 3.0;
+
+/// A reading that corrects.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Believed {
+    pub sensor: usize,
+    pub reading: f64,
+    /// of its noise
+    pub variance: f64,
+    /// reading − prediction
+    pub innovation: f64,
+    /// of the sensor's range, where the reading is at one
+    pub end: Option<End>,
+}
+
+impl Believed {
+    /// Innovation and variance of the noise with which it corrects, `moved` after what was predicted
+    /// before has moved so far, and is known with a variance `spread`. None of a reading at an end of
+    /// its range that says nothing new.
+    pub fn weighed(&self, moved: f64, spread: f64) -> Option<(f64, f64)> {
+        let innovation = self.innovation - moved;
+        match self.end {
+            None => Some((innovation, self.variance)),
+            Some(end) => end.weighed(innovation, spread, self.variance),
+        }
+    }
+
+    /// The reading, and the variance of its noise, where the output is taken to be h: one at an end of
+    /// its range as the parabola that its likelihood −2 log Φ is like about h, by its slope and
+    /// curvature there.
+    pub fn about(&self, h: f64) -> Option<(f64, f64)> {
+        let Some(end) = self.end else {
+            return Some((self.reading, self.variance));
+        };
+        let weighed = end.weighed(self.reading - h, 0.0, self.variance);
+        weighed.map(|(innovation, variance)| (h + innovation, variance))
+    }
+
+    /// Of a plant with so many sensors.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, sensors: usize) -> Result<(), Damaged> {
+        walk.below(&mut self.sensor, sensors)?;
+        for number in [&mut self.reading, &mut self.variance, &mut self.innovation] {
+            walk.number(number)?;
+        }
+        let mut end = self.end.map_or(0, |end| 1 + end as usize);
+        walk.below(&mut end, 3)?;
+        self.end = [None, Some(End::Low), Some(End::High)][end];
+        Ok(())
+    }
+}
 
 /// The readings of a sensor that were rejected in a row.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,6 +86,8 @@ pub(super) struct Sensing {
     /// h, then the entries of C
     values: Vec<f64>,
     gate: Option<f64>,
+    /// of readings that only stand for others ([`super::FilterSettings::foresees`])
+    foresees: bool,
     lockouts: Vec<Lockout>,
     pub innovations: Vec<Innovation>,
     pub health: Health,
@@ -41,7 +98,12 @@ pub(super) struct Sensing {
 }
 
 impl Sensing {
-    pub fn new(model: &FilterModel, gate: Option<f64>, keep_corrections: bool) -> Self {
+    pub fn new(
+        model: &FilterModel,
+        gate: Option<f64>,
+        keep_corrections: bool,
+        foresees: bool,
+    ) -> Self {
         let count = model.sensors.len();
         Self {
             output_map: model.output_map.evaluation(),
@@ -50,6 +112,7 @@ impl Sensing {
             output_entries: model.output_entries.clone(),
             values: vec![0.0; count + model.output_entries.len()],
             gate,
+            foresees,
             lockouts: vec![Lockout::default(); count],
             innovations: vec![Innovation::default(); count],
             health: Health::of(count),
@@ -111,35 +174,67 @@ impl Sensing {
         }
     }
 
-    /// The variance of a sensor's noise where the model predicts a value.
-    pub fn noise(&self, i: usize, predicted: f64) -> f64 {
-        self.sensors[i].noise.variance(predicted)
-    }
-
-    /// Decides what becomes of a reading whose innovation has the given variance. Sigma points of
-    /// negative weight may give a negative one, by which no reading can be weighed.
-    pub fn judge(&mut self, i: usize, reading: f64, predicted: f64, variance: f64) -> Innovation {
-        let deviation = variance.max(0.0).sqrt();
+    /// Decides what becomes of a reading where the model predicts a value with a variance `spread`; what
+    /// is returned corrects. Sigma points of negative weight may give an innovation a negative
+    /// variance, by which no reading can be weighed.
+    pub fn judge(
+        &mut self,
+        i: usize,
+        reading: f64,
+        predicted: f64,
+        spread: f64,
+    ) -> Option<Believed> {
+        let Sensor {
+            noise, mut limits, ..
+        } = self.sensors[i];
+        let mut variance = noise.expected_variance(predicted, spread);
+        if self.foresees {
+            let told = |limits: Limits| limits.information(predicted, variance.sqrt());
+            variance /= limits.take().map_or(1.0, told).max(f64::MIN_POSITIVE);
+        }
+        let deviation = (spread + variance).max(0.0).sqrt();
         let mut innovation = Innovation {
             value: 0.0,
             deviation,
+            settled: deviation,
             predicted,
             reading: Reading::Missing,
         };
+        let mut believed = None;
         if reading.is_finite() {
-            innovation.value = reading - predicted;
-            innovation.reading = match self.sensors[i].limits {
-                Some(limits) if says_nothing(limits, reading, predicted) => Reading::AtLimit,
-                _ if variance < 0.0 || self.is_outlier(i, innovation.value, deviation) => {
-                    Reading::Rejected
+            innovation.reading = Reading::Taken;
+            let (mut shown, mut end) = (reading, None);
+            if let Some(limits) = limits {
+                (shown, end) = (limits.shown(reading), End::of(limits, reading));
+            }
+            let plain = shown - predicted;
+            innovation.value = plain;
+            if let Some(limits) = limits {
+                censored::judge(limits, end, &mut innovation);
+            }
+            if innovation.reading == Reading::Taken
+                && (spread + variance < 0.0 || self.is_outlier(i, plain, deviation))
+            {
+                innovation.reading = Reading::Rejected;
+            }
+            if innovation.reading != Reading::Rejected {
+                if end.is_none() && plain.abs() > SURPRISE * deviation {
+                    variance = noise.variance_after(reading, predicted, spread);
                 }
-                _ => Reading::Taken,
-            };
+                believed = Some(Believed {
+                    sensor: i,
+                    reading: shown,
+                    variance,
+                    innovation: plain,
+                    end,
+                });
+            }
         }
+        innovation.settled = innovation.deviation;
         self.follow(i, reading, innovation.reading);
         self.health.sensors[i].count(&innovation);
         self.innovations[i] = innovation;
-        innovation
+        believed
     }
 
     fn is_outlier(&self, i: usize, innovation: f64, deviation: f64) -> bool {
@@ -172,11 +267,4 @@ impl Persist for Sensing {
         }
         self.health.walk(walk)
     }
-}
-
-/// A reading at a limit says that the output is there or beyond; nothing new where the model
-/// expects just that.
-fn says_nothing(limits: Limits, reading: f64, predicted: f64) -> bool {
-    (reading <= limits.low && predicted <= limits.low)
-        || (reading >= limits.high && predicted >= limits.high)
 }

@@ -285,6 +285,18 @@ impl Adjoint {
                 }
             }
         }
+        self.mirror();
+    }
+
+    /// Λ exactly symmetric: readings do not take away what rounding leaves of its difference from
+    /// its transpose, and the flow of an unstable plant lets that grow.
+    fn mirror(&mut self) {
+        let n = self.vector.len();
+        for i in 0..n {
+            for j in 0..i {
+                self.matrix[j * n + i] = self.matrix[i * n + j];
+            }
+        }
     }
 
     fn through(&mut self, transition: &Rows) {
@@ -306,5 +318,6 @@ impl Adjoint {
         self.matrix = rows
             .flat_map(|row| transition.transposed_times(row))
             .collect();
+        self.mirror();
     }
 }

@@ -54,12 +54,7 @@ fn the_variance_of_a_scalar_follows_its_formula() {
             if k > 0 {
                 let grown = (2.0 * a * step).exp();
                 x *= (a * step).exp();
-                p = match kind {
-                    FilterKind::Extended | FilterKind::MovingHorizon(..) => {
-                        grown * p + q * (grown - 1.0) / (2.0 * a)
-                    }
-                    FilterKind::Unscented(_) => grown * p + q * step,
-                };
+                p = grown * p + q * (grown - 1.0) / (2.0 * a);
             }
             let gain = p / (p + r);
             x += gain * (y - x);
@@ -250,20 +245,19 @@ fn an_estimate_without_a_value_of_the_plant_is_put_back() {
     assert!(result.is_ok() && confined > 5, "{result:?} {confined}");
 }
 
-/// A snapshot has what the smoother keeps; ways with stops give the same transitions. The kick of
-/// the noise on a way is larger for the sigma points where the way has no stop.
+/// A snapshot has what the smoother keeps; ways with stops give the same transitions.
 #[test]
 fn smoothing_goes_on_after_a_restore_and_over_predictions() {
-    for (kind, noise) in [
-        (FilterKind::Extended, 0.2),
-        (FilterKind::Unscented(SigmaPoints::default()), 0.0),
-        (window(4, 100.0), 0.2),
+    for kind in [
+        FilterKind::Extended,
+        FilterKind::Unscented(SigmaPoints::default()),
+        window(4, 100.0),
     ] {
         let settings = FilterSettings {
             keep_history: true,
             ..FilterSettings::of(kind)
         };
-        let model = scalar(-0.3, noise, 0.1);
+        let model = scalar(-0.3, 0.2, 0.1);
         let new = || Estimator::filter(&model, settings.clone(), exact()).unwrap();
         let (mut whole, mut stopped, mut restored) = (new(), new(), new());
         for k in 0..12 {

@@ -1,11 +1,11 @@
 //! The unscented Kalman filter.
 
 use super::Belief;
-use super::factor::factor;
-use super::health::Reading;
+use super::along::Along;
+use super::factor::{Factor, factor, substitute};
 use super::model::FilterModel;
 use super::root::{Root, dot};
-use super::sensing::Sensing;
+use super::sensing::{Believed, Sensing};
 use super::smooth::Correction;
 use super::spanned::{Rows, Spanned};
 use crate::driven::Driven;
@@ -74,19 +74,31 @@ impl SigmaPoints {
     }
 }
 
+/// The filter between its samples.
 #[derive(Clone, Debug)]
 pub(super) struct Unscented {
     pub driven: Driven,
     integrator: Integrator,
     weights: Weights,
-    process_noise: Vec<f64>,
+    /// what the process noise comes to; none without noise
+    along: Option<Along>,
+    room: Room,
 }
 
-/// Points beside their weighted mean.
-struct Cloud {
+/// Room for points and what is made of them, kept from sample to sample.
+#[derive(Clone, Debug, Default)]
+struct Room {
+    /// x̂ at the end of the way
+    centre: Vec<f64>,
+    points: Vec<f64>,
     mean: Vec<f64>,
-    /// deviations from the mean, point by point
-    deviations: Vec<Vec<f64>>,
+    /// what the sensors show of each point
+    shown: Vec<f64>,
+    expected: Vec<f64>,
+    rows: Vec<f64>,
+    extra: Vec<f64>,
+    sums: Vec<f64>,
+    factor: Factor,
 }
 
 impl Unscented {
@@ -95,73 +107,27 @@ impl Unscented {
         points: SigmaPoints,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
-        let n = model.dimension();
+        let (n, noise) = (model.dimension(), &model.process_noise);
+        let along = match noise.iter().any(|q| *q > 0.0) {
+            true => Some(Along::new(
+                &model.flow,
+                &model.flow_entries,
+                noise,
+                run.method,
+            )?),
+            false => None,
+        };
         Ok(Self {
             driven: Driven::new(&model.flow, run.between),
             integrator: Integrator::new(run.method, n)?,
             weights: points.weights(n)?,
-            process_noise: model.process_noise.clone(),
+            along,
+            room: Room::default(),
         })
     }
 
-    /// x̂ and x̂ ± columns of √(n+λ) L, L the lower factor of P.
-    fn points(&self, belief: &Belief) -> Vec<Vec<f64>> {
-        let n = belief.x.len();
-        let mut points = vec![belief.x.clone()];
-        for sign in [1.0, -1.0] {
-            points.extend((0..n).map(|k| {
-                let column = (0..n).map(|i| belief.root.row(i)[k]);
-                let moved = belief.x.iter().zip(column);
-                moved
-                    .map(|(x, l)| x + sign * self.weights.spread * l)
-                    .collect()
-            }));
-        }
-        points
-    }
-
-    fn cloud(&self, mut points: Vec<Vec<f64>>) -> Cloud {
-        let size = points[0].len();
-        let weight = |k: usize| {
-            if k == 0 {
-                self.weights.mean_of_centre
-            } else {
-                self.weights.other
-            }
-        };
-        let mean: Vec<f64> = (0..size)
-            .map(|i| {
-                points
-                    .iter()
-                    .enumerate()
-                    .map(|(k, p)| weight(k) * p[i])
-                    .sum()
-            })
-            .collect();
-        for point in &mut points {
-            point.iter_mut().zip(&mean).for_each(|(x, m)| *x -= m);
-        }
-        Cloud {
-            mean,
-            deviations: points,
-        }
-    }
-
-    fn weight(&self, k: usize) -> f64 {
-        if k == 0 {
-            self.weights.centre
-        } else {
-            self.weights.other
-        }
-    }
-
-    /// Σ W (a − ā)(b − b̄)ᵀ of components i and j.
-    fn moment(&self, a: &Cloud, i: usize, b: &Cloud, j: usize) -> f64 {
-        let pairs = a.deviations.iter().zip(&b.deviations).enumerate();
-        pairs.map(|(k, (a, b))| self.weight(k) * a[i] * b[j]).sum()
-    }
-
-    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + QΔt. Where it is to be kept, the transition
+    /// Each point through the flow; P⁻ = Σ W(…)(…)ᵀ + W, W what the process noise comes to along
+    /// the estimate ([`Along`]), which is exact on linear plants. Where it is to be kept, the transition
     /// of the linear flow that carries the points best is returned: Φ = DᵀP⁻¹ with the covariance D
     /// of the points before and after (S. Särkkä, "Unscented Rauch–Tung–Striebel smoother", *IEEE
     /// Transactions on Automatic Control* 53 (2008) 845–849).
@@ -172,174 +138,286 @@ impl Unscented {
         to: f64,
         keep: bool,
     ) -> Result<Rows, Error> {
-        let mut points = self.points(belief);
-        for point in &mut points {
-            self.integrator.advance(&mut self.driven, from, to, point)?;
+        let Self {
+            driven,
+            integrator,
+            weights,
+            along,
+            room,
+        } = self;
+        let n = belief.x.len();
+        draw(belief, weights.spread, &mut room.points);
+        let (centre, others) = room.points.split_at_mut(n);
+        match along {
+            None => integrator.advance(driven, from, to, centre)?,
+            Some(along) => {
+                room.centre.clone_from(&belief.x);
+                along.advance(driven, belief, from, to, &mut room.centre)?;
+                centre.copy_from_slice(&room.centre);
+            }
+        }
+        for point in others.chunks_exact_mut(n) {
+            integrator.advance(driven, from, to, point)?;
         }
         let transition = match keep {
-            true => self.carried(&belief.root, &points),
+            true => {
+                let rows = (0..n).flat_map(|i| weights.row(&belief.root, &room.points, n, i));
+                Rows::of(&Spanned::dense(n, rows.collect()))
+            }
             false => Rows::default(),
         };
-        let cloud = self.cloud(points);
-        let noise: Vec<f64> = self.process_noise.iter().map(|q| q * (to - from)).collect();
-        let deviations = &cloud.deviations;
-        let extra = (0..noise.len()).map(|i| {
-            let mut row = vec![0.0; noise.len()];
-            row[i] = noise[i].sqrt();
-            row
-        });
-        belief.root = self.spread(deviations, extra.collect());
-        belief.x = cloud.mean;
+        weights.centre(&mut room.points, n, &mut belief.x);
+        room.extra.clear();
+        if let Some(along) = along {
+            along.push_root(&mut room.extra);
+        }
+        weights.spread(room, &mut belief.root);
         Ok(transition)
     }
 
-    /// Row i of the linear map that takes the points drawn from `root` to their images best.
-    fn row(&self, root: &Root, images: &[Vec<f64>], i: usize) -> Vec<f64> {
-        let n = root.n;
-        let apart = (0..n).map(|k| images[1 + k][i] - images[1 + n + k][i]);
-        let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.weights.spread).collect();
-        root.against(&halves)
-    }
-
-    fn carried(&self, root: &Root, images: &[Vec<f64>]) -> Rows {
-        let rows = (0..root.n).flat_map(|i| self.row(root, images, i));
-        Rows::of(&Spanned::dense(root.n, rows.collect()))
-    }
-
-    /// The lower root of Σ W d dᵀ + Σ e eᵀ. Where the first weight is negative the sum is formed,
-    /// and what it lacks of being definite taken as nothing.
-    fn spread(&self, deviations: &[Vec<f64>], extra: Vec<Vec<f64>>) -> Root {
-        let n = deviations[0].len();
-        let mut root = Root::diagonal(&vec![0.0; n]);
-        let weighed = deviations
-            .iter()
-            .enumerate()
-            .map(|(k, d)| (self.weight(k), d));
-        if self.weights.centre >= 0.0 {
-            let scaled = weighed.flat_map(|(w, d)| d.iter().map(move |x| w.sqrt() * x));
-            let mut rows: Vec<f64> = scaled.chain(extra.into_iter().flatten()).collect();
-            root.of_rows(&mut rows);
-            return root;
-        }
-        let all = weighed.chain(extra.iter().map(|e| (1.0, e)));
-        let mut sum = vec![0.0; n * n];
-        for (w, d) in all {
-            for (k, entry) in sum.iter_mut().enumerate() {
-                *entry += w * d[k / n] * d[k % n];
-            }
-        }
-        root.entries = factor(&sum, n);
-        root
-    }
-
-    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed.
+    /// The points drawn again from x̂⁻, P⁻; K = P_xz P_zz⁻¹ over the readings that are believed. For
+    /// each of those at an end of their sensor's range they are drawn once more.
     pub fn correct(
-        &self,
+        &mut self,
         sensing: &mut Sensing,
         belief: &mut Belief,
         t: f64,
         readings: &[f64],
         inputs: &[f64],
     ) -> Result<(), Error> {
-        let states = self.cloud(self.points(belief));
-        let points = self.points(belief);
-        let shown = points
-            .iter()
-            .map(|x| Ok(sensing.predict(t, x, inputs)?.to_vec()));
-        let outputs = self.cloud(shown.collect::<Result<_, Error>>()?);
-        let mut taken = vec![];
+        self.show(sensing, belief, t, inputs)?;
+        let m = readings.len();
+        let (mut inside, mut at_ends) = (vec![], vec![]);
         for (i, reading) in readings.iter().enumerate() {
-            let r = sensing.noise(i, outputs.mean[i]);
-            let variance = self.moment(&outputs, i, &outputs, i) + r;
-            let innovation = sensing.judge(i, *reading, outputs.mean[i], variance);
-            if innovation.reading == Reading::Taken && variance > 0.0 {
-                taken.push((i, r, innovation.value));
+            let spread = self.weights.moment(&self.room.shown, m, i, i);
+            let believed = sensing.judge(i, *reading, self.room.expected[i], spread);
+            if let Some(believed) = believed.filter(|b| spread + b.variance > 0.0) {
+                match believed.end {
+                    None => inside.push(believed),
+                    Some(_) => at_ends.push((believed, self.room.expected[i])),
+                }
             }
         }
-        let m = taken.len();
-        if m == 0 {
-            return Ok(());
+        let mut is_moved = false;
+        if !inside.is_empty() {
+            self.take(sensing, belief, m, &inside);
+            is_moved = true;
         }
-        let mut variance = vec![0.0; m * m];
-        for (a, (i, r, _)) in taken.iter().enumerate() {
-            for (b, (j, ..)) in taken.iter().enumerate() {
-                variance[a * m + b] = self.moment(&outputs, *i, &outputs, *j);
+        for (mut believed, before) in at_ends {
+            if is_moved && self.show(sensing, belief, t, inputs).is_err() {
+                // the sensors' model has no value about the estimate as it is now: the others count
+                break;
             }
-            variance[a * m + a] += r;
+            let i = believed.sensor;
+            let spread = self.weights.moment(&self.room.shown, m, i, i);
+            let moved = self.room.expected[i] - before;
+            if let Some((innovation, noise)) = believed.weighed(moved, spread) {
+                (believed.innovation, believed.variance) = (innovation, noise);
+                self.take(sensing, belief, m, &[believed]);
+                is_moved = true;
+            }
         }
-        let lower = factor(&variance, m);
-        let gain: Vec<Vec<f64>> = (0..belief.x.len())
+        Ok(())
+    }
+
+    /// Points of the belief beside their mean, and what the sensors show of them.
+    fn show(
+        &mut self,
+        sensing: &mut Sensing,
+        belief: &Belief,
+        t: f64,
+        inputs: &[f64],
+    ) -> Result<(), Error> {
+        let (room, weights) = (&mut self.room, &self.weights);
+        let n = belief.x.len();
+        draw(belief, weights.spread, &mut room.points);
+        room.shown.clear();
+        let mut m = 0;
+        for point in room.points.chunks_exact(n) {
+            let shown = sensing.predict(t, point, inputs)?;
+            m = shown.len();
+            room.shown.extend_from_slice(shown);
+        }
+        weights.centre(&mut room.points, n, &mut room.mean);
+        weights.centre(&mut room.shown, m, &mut room.expected);
+        Ok(())
+    }
+
+    /// Corrects by readings of `m` sensors, together.
+    fn take(&mut self, sensing: &mut Sensing, belief: &mut Belief, m: usize, taken: &[Believed]) {
+        let (room, weights) = (&mut self.room, &self.weights);
+        let (n, count) = (belief.x.len(), taken.len());
+        let mut variance = vec![0.0; count * count];
+        for (a, one) in taken.iter().enumerate() {
+            for (b, other) in taken.iter().enumerate() {
+                variance[a * count + b] = weights.moment(&room.shown, m, one.sensor, other.sensor);
+            }
+            variance[a * count + a] += one.variance;
+        }
+        let lower = factor(&variance, count);
+        let gain: Vec<Vec<f64>> = (0..n)
             .map(|s| {
-                let cross: Vec<f64> = taken
-                    .iter()
-                    .map(|(i, ..)| self.moment(&states, s, &outputs, *i))
-                    .collect();
-                solve(&lower, m, cross)
+                let cross = taken.iter().map(|b| {
+                    let states = room.points.iter().skip(s).step_by(n);
+                    let shown = room.shown.iter().skip(b.sensor).step_by(m);
+                    weights.sum(states.zip(shown))
+                });
+                solved(&lower, count, cross.collect())
             })
             .collect();
-        let slopes = |&(i, ..): &(usize, f64, f64)| self.row(&belief.root, &outputs.deviations, i);
         let column = |a: usize| gain.iter().map(|k| k[a]).collect();
-        let unit = |a: usize| (0..m).map(|b| f64::from(u8::from(a == b))).collect();
-        let innovations = || taken.iter().map(|t| t.2).collect();
+        let unit = |a: usize| (0..count).map(|b| f64::from(u8::from(a == b))).collect();
         if let Some(corrections) = &mut sensing.corrections {
+            let slopes = taken
+                .iter()
+                .map(|b| weights.row(&belief.root, &room.shown, m, b.sensor));
             corrections.push(Correction {
-                slopes: taken.iter().map(slopes).collect(),
-                gains: (0..m).map(column).collect(),
-                information: (0..m).flat_map(|a| solve(&lower, m, unit(a))).collect(),
-                weighed: solve(&lower, m, innovations()),
+                slopes: slopes.collect(),
+                gains: (0..count).map(column).collect(),
+                information: (0..count)
+                    .flat_map(|a| solved(&lower, count, unit(a)))
+                    .collect(),
+                weighed: solved(&lower, count, taken.iter().map(|b| b.innovation).collect()),
             });
         }
         for (x, k) in belief.x.iter_mut().zip(&gain) {
-            *x += taken.iter().zip(k).map(|((.., nu), k)| k * nu).sum::<f64>();
+            *x += taken
+                .iter()
+                .zip(k)
+                .map(|(b, k)| k * b.innovation)
+                .sum::<f64>();
         }
         // P⁺ = Σ W (dx − K dz)(…)ᵀ + K R Kᵀ, which is P⁻ − K P_zz Kᵀ
-        let left: Vec<Vec<f64>> = states
-            .deviations
-            .iter()
-            .zip(&outputs.deviations)
-            .map(|(dx, dz)| {
-                let dz: Vec<f64> = taken.iter().map(|(i, ..)| dz[*i]).collect();
-                dx.iter()
-                    .zip(&gain)
-                    .map(|(dx, k)| dx - dot(k, &dz))
-                    .collect()
-            })
-            .collect();
-        let noise = taken
-            .iter()
-            .enumerate()
-            .map(|(a, (_, r, _))| gain.iter().map(|k| k[a] * r.sqrt()).collect());
-        belief.root = self.spread(&left, noise.collect());
-        Ok(())
+        let mut dz = vec![0.0; count];
+        let points = room.points.chunks_exact_mut(n);
+        for (dx, shown) in points.zip(room.shown.chunks_exact(m)) {
+            for (dz, b) in dz.iter_mut().zip(taken) {
+                *dz = shown[b.sensor];
+            }
+            for (dx, gain) in dx.iter_mut().zip(&gain) {
+                *dx -= dot(gain, &dz);
+            }
+        }
+        room.extra.clear();
+        for (a, b) in taken.iter().enumerate() {
+            room.extra
+                .extend(gain.iter().map(|k| k[a] * b.variance.sqrt()));
+        }
+        weights.spread(room, &mut belief.root);
+    }
+}
+
+/// x̂ and x̂ ± columns of √(n+λ) L, L the lower factor of P, point by point.
+fn draw(belief: &Belief, spread: f64, points: &mut Vec<f64>) {
+    let n = belief.x.len();
+    points.clear();
+    points.extend_from_slice(&belief.x);
+    for sign in [1.0, -1.0] {
+        for k in 0..n {
+            let column = (0..n).map(|i| belief.root.row(i)[k]);
+            let moved = belief.x.iter().zip(column);
+            points.extend(moved.map(|(x, l)| x + sign * spread * l));
+        }
+    }
+}
+
+impl Weights {
+    fn of(&self, k: usize) -> f64 {
+        match k {
+            0 => self.centre,
+            _ => self.other,
+        }
+    }
+
+    /// Points of `size` numbers beside their weighed mean.
+    fn centre(&self, points: &mut [f64], size: usize, mean: &mut Vec<f64>) {
+        mean.clear();
+        mean.resize(size, 0.0);
+        for (k, point) in points.chunks_exact(size.max(1)).enumerate() {
+            let weight = match k {
+                0 => self.mean_of_centre,
+                _ => self.other,
+            };
+            for (m, x) in mean.iter_mut().zip(point) {
+                *m += weight * x;
+            }
+        }
+        for point in points.chunks_exact_mut(size.max(1)) {
+            point.iter_mut().zip(&*mean).for_each(|(x, m)| *x -= m);
+        }
+    }
+
+    /// Σ W ab over the points.
+    fn sum<'p>(&self, pairs: impl Iterator<Item = (&'p f64, &'p f64)>) -> f64 {
+        let weighed = pairs.enumerate().map(|(k, (a, b))| self.of(k) * a * b);
+        weighed.sum()
+    }
+
+    /// Σ W ab of components i and j of points of `size` numbers.
+    fn moment(&self, points: &[f64], size: usize, i: usize, j: usize) -> f64 {
+        let component = |i: usize| points.iter().skip(i).step_by(size);
+        self.sum(component(i).zip(component(j)))
+    }
+
+    /// The linear map that takes the points drawn from `root` best to component i of their images
+    /// of `size` numbers.
+    fn row(&self, root: &Root, images: &[f64], size: usize, i: usize) -> Vec<f64> {
+        let n = root.n;
+        let of = |k: usize| images[k * size + i];
+        let apart = (0..n).map(|k| of(1 + k) - of(1 + n + k));
+        let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
+        root.against(&halves)
+    }
+
+    /// The lower root of Σ W d dᵀ + Σ e eᵀ over points and extra rows. Where the first weight is
+    /// negative the sum is formed, and what it lacks of being definite taken as nothing.
+    fn spread(&self, room: &mut Room, root: &mut Root) {
+        let n = root.n;
+        let Room {
+            points,
+            extra,
+            rows,
+            sums,
+            factor,
+            ..
+        } = room;
+        rows.clear();
+        if self.centre >= 0.0 {
+            let weighed = points.chunks_exact(n).enumerate();
+            rows.extend(weighed.flat_map(|(k, d)| {
+                let weight = self.of(k).sqrt();
+                d.iter().map(move |x| weight * x)
+            }));
+            rows.extend_from_slice(extra);
+            sums.resize(n, 0.0);
+            root.of_rows_with(rows, sums);
+            return;
+        }
+        rows.resize(n * n, 0.0);
+        let points = points.chunks_exact(n).enumerate();
+        let points = points.map(|(k, d)| (self.of(k), d));
+        for (w, d) in points.chain(extra.chunks_exact(n).map(|e| (1.0, e))) {
+            for (k, entry) in rows.iter_mut().enumerate() {
+                *entry += w * d[k / n] * d[k % n];
+            }
+        }
+        root.entries.copy_from_slice(factor.of(rows, n));
     }
 }
 
 impl Persist for Unscented {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.driven.walk(walk)?;
-        self.integrator.walk(walk)
+        self.integrator.walk(walk)?;
+        match &mut self.along {
+            Some(along) => along.walk(walk),
+            None => Ok(()),
+        }
     }
 }
 
-/// x with L Lᵀ x = b; components that L does not reach are 0.
-fn solve(lower: &[f64], m: usize, mut b: Vec<f64>) -> Vec<f64> {
-    for i in 0..m {
-        let known = dot(&lower[i * m..i * m + i], &b[..i]);
-        let pivot = lower[i * m + i];
-        b[i] = if pivot > 0.0 {
-            (b[i] - known) / pivot
-        } else {
-            0.0
-        };
-    }
-    for i in (0..m).rev() {
-        let known: f64 = (i + 1..m).map(|j| lower[j * m + i] * b[j]).sum();
-        let pivot = lower[i * m + i];
-        b[i] = if pivot > 0.0 {
-            (b[i] - known) / pivot
-        } else {
-            0.0
-        };
-    }
+/// x with L Lᵀ x = b.
+fn solved(lower: &[f64], m: usize, mut b: Vec<f64>) -> Vec<f64> {
+    substitute(lower, m, &mut b);
     b
 }

@@ -1,14 +1,15 @@
 //! On which sides of its surfaces a system is.
 
-use super::Switched;
+use super::{REACHED, Switched};
 use crate::Dynamics;
 
-/// A surface counts as reached this close to it, against the largest value of its function.
-const REACHED: f64 = 1e-10;
+/// The argument of a `floor` may be so far beyond the whole numbers that it was between.
+const AROUND: f64 = 1e-6;
 
 impl<D: Dynamics> Switched<'_, D> {
     /// Decides on which sides an interval starts.
     pub(super) fn start(&mut self, t: f64, x: &[f64]) {
+        self.encounter(t, x);
         self.align(t, x, &[]);
         let reached = self.reached(t, x);
         let at_hand: Vec<usize> = (0..reached.len()).filter(|&i| reached[i]).collect();
@@ -16,6 +17,42 @@ impl<D: Dynamics> Switched<'_, D> {
             self.decide(i, t, x);
         }
         self.align(t, x, &at_hand);
+        self.settle(t, x, &at_hand);
+    }
+
+    /// Decides on what has come to lie on a surface exactly, as a whole number does that another one makes,
+    /// and carries the surfaces of each `floor` along.
+    fn settle(&mut self, t: f64, x: &[f64], at_hand: &[usize]) {
+        let mut done = at_hand.to_vec();
+        for _ in 0..self.values.len() {
+            self.look(t, x);
+            let is_new = |i: &usize| {
+                let is_held = self.at.sides[*i] != 0.0 && !self.at.sliding[*i];
+                is_held && self.values[*i] == 0.0 && !done.contains(i)
+            };
+            let Some(i) = (0..self.values.len()).find(is_new) else {
+                break;
+            };
+            self.decide(i, t, x);
+            done.push(i);
+            self.align(t, x, &done);
+        }
+        self.carry();
+        self.hold();
+    }
+
+    /// Puts the surfaces of each `floor` around where the state is: one may be within another.
+    fn encounter(&mut self, t: f64, x: &[f64]) {
+        for first in self.pairs() {
+            self.hold();
+            self.look(t, x);
+            let value = self.values[first] + self.at.levels[first];
+            let [a, b] = [first, first + 1].map(|i| self.at.levels[i]);
+            let around = a.min(b) - AROUND..=a.max(b) + AROUND;
+            if a == b || !around.contains(&value) {
+                self.surround(first, value);
+            }
+        }
     }
 
     /// Goes on where margins have become negative: across, along, or off the surface.
@@ -35,6 +72,7 @@ impl<D: Dynamics> Switched<'_, D> {
             }
         }
         self.align(t, x, &at_hand);
+        self.settle(t, x, &at_hand);
     }
 
     /// Takes every surface but those at hand by the sign of its function, where it is not
@@ -56,7 +94,13 @@ impl<D: Dynamics> Switched<'_, D> {
             let mut changed = false;
             for i in off.into_iter().filter(|&i| !reached[i]) {
                 self.at.sliding[i] = false;
-                self.at.sides[i] = side_of(self.values[i]);
+                match self.pair(i) {
+                    Some(first) => {
+                        let value = self.values[i] + self.at.levels[i];
+                        self.surround(first, value);
+                    }
+                    None => self.at.sides[i] = side_of(self.values[i]),
+                }
                 changed = true;
             }
             if !changed {

@@ -1,44 +1,57 @@
 //! Which operations jump with the state, and on which surfaces.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
 
-use super::{Held, Relay};
+use super::{Held, Kind, Relay};
 
 /// Expressions in which each jump of the state is an input of its own.
 pub(crate) struct Taken {
     pub roots: Vec<Node>,
     /// the symbols of these inputs
     pub modes: Vec<Node>,
+    /// what vanishes on the surfaces
+    pub surfaces: Vec<Node>,
     pub held: Held,
 }
 
-/// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots; none
-/// where there is none. Several that change on one surface change together. The surfaces are
-/// functions of `arguments`, which hold the inputs and what else the roots read.
+/// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots, and every `floor`
+/// that one of the first `moving` roots reads; none where there is none. Several that change on one
+/// surface change together. The surfaces are functions of `arguments`, which hold the inputs and what
+/// else the roots read.
 pub(crate) fn take(
     graph: &Graph,
     inputs: &[Node],
     arguments: &[Node],
     roots: &[Node],
+    moving: usize,
 ) -> Result<Option<Taken>, MissingInput> {
     let mut replaced: HashMap<Node, Node> = HashMap::new();
-    let (mut relays, mut modes, mut surfaces) = (vec![], vec![], vec![]);
+    let (mut relays, mut modes) = (vec![], vec![]);
+    let mut surfaces = Surfaces::default();
+    let moves: HashSet<Node> = graph.reachable(&roots[..moving]).into_iter().collect();
     for node in graph.reachable(roots) {
         let Some(jump) = Jump::of(graph, node) else {
             continue;
         };
-        if !graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s)) {
+        if jump.kind == Kind::Floor && !moves.contains(&node) {
+            // the steps of a reading do not stop the state
+            continue;
+        }
+        if !depends(graph, node, inputs) {
             continue;
         }
         let quantity = graph.substitute(&[jump.quantity], &replaced)[0];
         let mode = graph.fresh(graph.render(node, 60)).node();
-        let (surface, is_reversed) = place(graph, &mut surfaces, quantity);
+        let (surface, is_reversed) = match jump.kind {
+            Kind::Floor => (surfaces.counting(quantity), false),
+            _ => surfaces.place(graph, quantity),
+        };
         relays.push(Relay {
             surface,
             is_reversed,
-            is_sign: jump.is_sign,
+            kind: jump.kind,
             at_zero: jump.at_zero,
         });
         modes.push(mode);
@@ -53,14 +66,14 @@ pub(crate) fn take(
             continue;
         };
         let quantity = graph.substitute(&[kink.quantity], &replaced)[0];
-        let Some((surface, is_reversed)) = found(graph, &surfaces, quantity) else {
+        let Some((surface, is_reversed)) = surfaces.found(graph, quantity) else {
             continue;
         };
         let mode = graph.fresh(graph.render(node, 60)).node();
         relays.push(Relay {
             surface,
             is_reversed,
-            is_sign: false,
+            kind: Kind::Truth,
             // both branches are the same there
             at_zero: 1.0,
         });
@@ -69,26 +82,55 @@ pub(crate) fn take(
         replaced.insert(node, graph.select(mode, branches[0], branches[1]));
     }
     let all: Vec<Node> = arguments.iter().chain(&modes).copied().collect();
+    let names = surfaces.nodes.iter().zip(&surfaces.counts);
+    let name = |(&q, &counts): (&Node, &bool)| match counts {
+        true => format!("{} = a whole number", graph.render(q, 60)),
+        false => format!("{} = 0", graph.render(q, 60)),
+    };
     Ok(Some(Taken {
         roots: graph.substitute(roots, &replaced),
         modes,
         held: Held {
             relays,
-            surfaces: Tape::new(graph, &all, &surfaces)?,
-            names: surfaces
-                .iter()
-                .map(|&q| format!("{} = 0", graph.render(q, 60)))
-                .collect(),
+            surfaces: Tape::new(graph, &all, &surfaces.nodes)?,
+            names: names.map(name).collect(),
+            counts: surfaces.counts,
         },
+        surfaces: surfaces.nodes,
     }))
+}
+
+/// What vanishes where one of the roots bends with one of `inputs`, each once.
+pub(crate) fn bends(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Vec<Node> {
+    let mut found = vec![];
+    for node in graph.reachable(roots) {
+        let Some(kink) = kink(graph, node).filter(|_| depends(graph, node, inputs)) else {
+            continue;
+        };
+        let (quantity, _) = bare(graph, kink.quantity);
+        if !found.contains(&quantity) {
+            found.push(quantity);
+        }
+    }
+    found
+}
+
+/// The first operation of the roots that jumps with one of `inputs`, as it reads.
+pub fn first_jump(graph: &Graph, inputs: &[Node], roots: &[Node]) -> Option<String> {
+    let jumps = |node: &Node| Jump::of(graph, *node).is_some() && depends(graph, *node, inputs);
+    let found = graph.reachable(roots).into_iter().find(jumps)?;
+    Some(graph.render(found, 60))
+}
+
+fn depends(graph: &Graph, node: Node, inputs: &[Node]) -> bool {
+    graph.symbols_of(&[node]).iter().any(|s| inputs.contains(s))
 }
 
 /// An operation that jumps.
 struct Jump {
     /// what changes its sign there
     quantity: Node,
-    /// the operation is that sign
-    is_sign: bool,
+    kind: Kind,
     /// its value where the quantity is zero
     at_zero: f64,
 }
@@ -97,14 +139,19 @@ impl Jump {
     fn of(graph: &Graph, node: Node) -> Option<Self> {
         let relation = |a: Node, b: Node, at_zero: f64| Self {
             quantity: graph.binary(Binary::Sub, b, a),
-            is_sign: false,
+            kind: Kind::Truth,
             at_zero,
         };
         match graph.op(node) {
             Op::Unary(Unary::Sign, quantity) => Some(Self {
                 quantity,
-                is_sign: true,
+                kind: Kind::Sign,
                 at_zero: 0.0,
+            }),
+            Op::Unary(Unary::Floor, quantity) => Some(Self {
+                quantity,
+                kind: Kind::Floor,
+                at_zero: 1.0,
             }),
             Op::Binary(Binary::Less, a, b) => Some(relation(a, b, 0.0)),
             Op::Binary(Binary::LessEq, a, b) => Some(relation(a, b, 1.0)),
@@ -139,27 +186,48 @@ fn kink(graph: &Graph, node: Node) -> Option<Kink> {
     }
 }
 
-/// The place of a surface, and whether it stands there with the other sign; a new one where it
-/// is none yet.
-fn place(graph: &Graph, surfaces: &mut Vec<Node>, quantity: Node) -> (usize, bool) {
-    found(graph, surfaces, quantity).unwrap_or_else(|| {
-        let (quantity, is_reversed) = bare(graph, quantity);
-        surfaces.push(quantity);
-        (surfaces.len() - 1, is_reversed)
-    })
+/// The surfaces found, by what vanishes on them.
+#[derive(Default)]
+struct Surfaces {
+    nodes: Vec<Node>,
+    /// one of two on which a `floor` jumps
+    counts: Vec<bool>,
 }
 
-fn found(graph: &Graph, surfaces: &[Node], quantity: Node) -> Option<(usize, bool)> {
-    let (quantity, is_reversed) = bare(graph, quantity);
-    let known = |sought: Node| surfaces.iter().position(|&known| known == sought);
-    let same = known(quantity).map(|surface| (surface, is_reversed));
-    same.or_else(|| match graph.op(quantity) {
-        Op::Binary(Binary::Sub, a, b) => {
-            let opposite = graph.binary(Binary::Sub, b, a);
-            known(opposite).map(|surface| (surface, !is_reversed))
-        }
-        _ => None,
-    })
+impl Surfaces {
+    /// The place of a surface, and whether it stands there with the other sign; a new one where it
+    /// is none yet.
+    fn place(&mut self, graph: &Graph, quantity: Node) -> (usize, bool) {
+        self.found(graph, quantity).unwrap_or_else(|| {
+            let (quantity, is_reversed) = bare(graph, quantity);
+            self.nodes.push(quantity);
+            self.counts.push(false);
+            (self.nodes.len() - 1, is_reversed)
+        })
+    }
+
+    /// Two new ones, for the whole numbers that a quantity meets next; the place of the first.
+    fn counting(&mut self, quantity: Node) -> usize {
+        self.nodes.extend([quantity, quantity]);
+        self.counts.extend([true, true]);
+        self.nodes.len() - 2
+    }
+
+    fn found(&self, graph: &Graph, quantity: Node) -> Option<(usize, bool)> {
+        let (quantity, is_reversed) = bare(graph, quantity);
+        let known = |sought: Node| {
+            let mut all = self.nodes.iter().zip(&self.counts);
+            all.position(|(&known, counts)| known == sought && !counts)
+        };
+        let same = known(quantity).map(|surface| (surface, is_reversed));
+        same.or_else(|| match graph.op(quantity) {
+            Op::Binary(Binary::Sub, a, b) => {
+                let opposite = graph.binary(Binary::Sub, b, a);
+                known(opposite).map(|surface| (surface, !is_reversed))
+            }
+            _ => None,
+        })
+    }
 }
 
 /// A quantity without its constant factors, and whether they change its sign: multiples of one

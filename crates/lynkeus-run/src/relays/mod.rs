@@ -9,20 +9,36 @@
 //! from one side to the other in steps as short as time resolves. What is on a surface and stays
 //! there by the equations as they are written (an input that is held at a threshold) is on
 //! neither side: operations have the value then that they have at zero.
+//!
+//! Whether a step crosses a surface is not asked of its ends alone: the function is enclosed by
+//! interval arithmetic along the polynomial that the method has between them, stretch by stretch,
+//! so that a pulse is found however short it is beside the step. Where `abs`, `min`, `max` and tables
+//! bend, steps end as well. A `floor` jumps on two surfaces that move along with it: the next even
+//! integer and the next odd one.
 
+mod ahead;
 mod decide;
 mod extract;
+mod guard;
+mod path;
 mod slide;
+
+use std::sync::Arc;
 
 use lynkeus_expr::Tape;
 
-pub(crate) use extract::{Taken, take};
+pub(crate) use ahead::{Ahead, Glance, Span};
+pub use extract::first_jump;
+pub(crate) use extract::{Taken, bends, take};
+pub use guard::Guards;
+pub(crate) use guard::Watched;
+pub(crate) use path::{COEFFICIENTS, Poly};
 
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Slopes};
 
-/// A margin this small beside those at the ends of a step may be negative where a cubic is not.
-const CLOSE: f64 = 0.05;
+/// A surface counts as reached this close to it, against the largest value of its function.
+const REACHED: f64 = 1e-10;
 
 /// A surface passed so often in a run is named where the steps run out.
 const OFTEN: usize = 1000;
@@ -33,10 +49,20 @@ pub(crate) struct Relay {
     surface: usize,
     /// its own argument has the other sign
     is_reversed: bool,
-    /// its value is −1 or 1 instead of 0 or 1
-    is_sign: bool,
+    kind: Kind,
     /// its value on the surface
     at_zero: f64,
+}
+
+/// What an operation is on a side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// −1 or 1
+    Sign,
+    /// 0 or 1
+    Truth,
+    /// the integer that is held
+    Floor,
 }
 
 /// The jumps of a system and the surfaces on which they happen.
@@ -47,20 +73,24 @@ pub(crate) struct Held {
     pub surfaces: Tape,
     /// how the surfaces read
     pub names: Vec<String>,
+    /// the surfaces that are one of two of a `floor`, even ones first
+    pub counts: Vec<bool>,
 }
 
 impl Held {
-    /// Writes the values of the operations on the given sides of the surfaces.
+    /// Writes the values of the operations on the given sides of the surfaces; of a `floor` its value
+    /// stands for the side.
     pub fn modes(&self, sides: &[f64], modes: &mut [f64]) {
         for (mode, relay) in modes.iter_mut().zip(&self.relays) {
             let side = match relay.is_reversed {
                 true => -sides[relay.surface],
                 false => sides[relay.surface],
             };
-            *mode = match relay.is_sign {
+            *mode = match relay.kind {
+                Kind::Floor => side,
                 _ if side == 0.0 => relay.at_zero,
-                true => side,
-                false => f64::from(u8::from(side > 0.0)),
+                Kind::Sign => side,
+                Kind::Truth => f64::from(u8::from(side > 0.0)),
             };
         }
     }
@@ -71,17 +101,24 @@ impl Held {
 pub(crate) struct Sides {
     /// −1 or 1; 0 on a surface on which the state stays
     sides: Vec<f64>,
+    /// the values of their functions on them: 0, but for a `floor`
+    levels: Vec<f64>,
     sliding: Vec<bool>,
     /// the largest values seen of their functions
     largest: Vec<f64>,
     /// how often they were reached
     passes: Vec<usize>,
+    /// what is read beside time and states, each with its speed: room for it
+    beside: Vec<[f64; 2]>,
+    /// what the guards read over a step, the middle and how far it may be from there: room for it
+    boxes: Vec<[f64; 2]>,
 }
 
 impl Sides {
     /// Room for so many surfaces.
     fn fit(&mut self, count: usize) {
         self.sides.resize(count, 1.0);
+        self.levels.resize(count, 0.0);
         self.sliding.resize(count, false);
         self.largest.resize(count, 0.0);
         self.passes.resize(count, 0);
@@ -94,6 +131,7 @@ impl Persist for Sides {
         let count = walk.length(self.sides.len())?;
         self.fit(count);
         walk.numbers(&mut self.sides)?;
+        walk.numbers(&mut self.levels)?;
         walk.numbers(&mut self.largest)?;
         self.sliding.iter_mut().try_for_each(|s| walk.flag(s))?;
         self.passes.iter_mut().try_for_each(|p| walk.count(p))
@@ -109,6 +147,8 @@ pub(crate) struct Switched<'a, D: Dynamics> {
     /// parts of the other side's right-hand side, of each surface that is slid along
     parts: Vec<f64>,
     values: Vec<f64>,
+    /// what is watched over a step
+    guards: Option<Arc<Guards>>,
 }
 
 impl<'a, D: Dynamics> Switched<'a, D> {
@@ -117,6 +157,7 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         let count = inner.surfaces();
         at.fit(count);
         let mut switched = Self {
+            guards: inner.guards(),
             inner,
             at,
             length,
@@ -134,14 +175,84 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         self.values.is_empty()
     }
 
-    /// Tells the system on which sides it is.
-    fn hold(&mut self) {
-        self.inner.hold(Some(&self.at.sides));
+    /// Whether the surface is one of two of a `floor`: the first one of them.
+    fn pair(&self, i: usize) -> Option<usize> {
+        let counts = &self.guards.as_ref()?.counts;
+        let is_second = |i: usize| counts[..i].iter().filter(|&&c| c).count() % 2 == 1;
+        counts.get(i)?.then(|| i - usize::from(is_second(i)))
     }
 
-    /// Reads the functions of the surfaces.
+    /// The first surface of each `floor`.
+    fn pairs(&self) -> Vec<usize> {
+        (0..self.values.len())
+            .filter(|&i| self.pair(i) == Some(i))
+            .collect()
+    }
+
+    /// What a `floor` is on the sides of its two surfaces.
+    fn floor(&self, first: usize) -> f64 {
+        let passed = |i: usize| f64::from(u8::from(self.at.sides[i] >= 0.0));
+        let low = self.at.levels[first].min(self.at.levels[first + 1]);
+        low - 1.0 + passed(first) + passed(first + 1)
+    }
+
+    /// Puts both surfaces of a `floor` around the value of its argument.
+    fn surround(&mut self, first: usize, value: f64) {
+        let low = value.floor();
+        let is_even = 0.5 * low == (0.5 * low).floor();
+        let (even, odd) = if is_even {
+            (low, low + 1.0)
+        } else {
+            (low + 1.0, low)
+        };
+        for (i, level) in [(first, even), (first + 1, odd)] {
+            self.at.levels[i] = level;
+            self.at.sides[i] = if level == low { 1.0 } else { -1.0 };
+        }
+    }
+
+    /// Carries the surfaces of a `floor` along where both were passed.
+    fn carry(&mut self) {
+        for first in self.pairs() {
+            let (levels, sides) = (&mut self.at.levels, &mut self.at.sides);
+            let (low, high) = match levels[first] < levels[first + 1] {
+                true => (first, first + 1),
+                false => (first + 1, first),
+            };
+            if sides[high] > 0.0 && !self.at.sliding[low] {
+                (levels[low], sides[low]) = (levels[low] + 2.0, -1.0);
+            } else if sides[low] < 0.0 && !self.at.sliding[high] {
+                (levels[high], sides[high]) = (levels[high] - 2.0, 1.0);
+            }
+        }
+    }
+
+    /// Tells the system on which sides it is.
+    fn hold(&mut self) {
+        let pairs = self.pairs();
+        if pairs.is_empty() {
+            return self.inner.hold(Some(&self.at.sides));
+        }
+        let mut sides = self.at.sides.clone();
+        for first in pairs {
+            sides[first..first + 2].fill(self.floor(first));
+        }
+        self.inner.hold(Some(&sides));
+    }
+
+    /// Reads the functions of the surfaces, against what they are there.
+    fn read(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.inner.read_surfaces(t, x, values);
+        for (value, level) in values.iter_mut().zip(&self.at.levels) {
+            *value -= level;
+        }
+    }
+
+    /// Reads the functions of the surfaces, and remembers how large they were.
     fn look(&mut self, t: f64, x: &[f64]) {
-        self.inner.read_surfaces(t, x, &mut self.values);
+        let mut values = std::mem::take(&mut self.values);
+        self.read(t, x, &mut values);
+        self.values = values;
         for (largest, value) in self.at.largest.iter_mut().zip(&self.values) {
             *largest = largest.max(value.abs());
         }
@@ -167,28 +278,6 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         }
     }
 
-    /// Where between two points the margin of a surface may be negative although it is not at
-    /// either.
-    pub fn dip(&mut self, from: (f64, &[f64]), to: (f64, &[f64])) -> Option<f64> {
-        let [(before, falls), (after, rises)] = [from, to].map(|(t, x)| {
-            let mut dx = vec![0.0; x.len()];
-            self.derivatives(t, x, &mut dx);
-            let speeds = self.speeds(t, x, &dx);
-            self.look(t, x);
-            (self.values.clone(), speeds)
-        });
-        let step = to.0 - from.0;
-        let free = (0..self.values.len()).filter(|&i| !self.at.sliding[i]);
-        let lowest = free.filter_map(|i| {
-            let side = self.at.sides[i];
-            let (a, b) = (side * before[i], side * after[i]);
-            let (p, q) = (side * falls[i] * step, side * rises[i] * step);
-            let dips = p < 0.0 && q > 0.0;
-            dips.then(|| least_of_cubic([a, p], [b, q])).flatten()
-        });
-        lowest.reduce(f64::min)
-    }
-
     /// A branch need have no value beyond its side: f as the state says, then.
     fn mend(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
         if !self.is_plain() && !dx.iter().all(|v| v.is_finite()) {
@@ -205,18 +294,6 @@ impl<'a, D: Dynamics> Switched<'a, D> {
         let name = self.inner.surface_names().into_iter().nth(i)?;
         (*count >= OFTEN).then(|| format!("{name} was passed {count} times; "))
     }
-}
-
-/// The part of the way at which the cubic through two values with their slopes is least, where it
-/// is negative there, or so close to it that only a look tells.
-fn least_of_cubic([a, p]: [f64; 2], [b, q]: [f64; 2]) -> Option<f64> {
-    let third = 2.0 * (a - b) + p + q;
-    let second = 3.0 * (b - a) - 2.0 * p - q;
-    // of the two roots of 3·third·s² + 2·second·s + p the one that is a minimum
-    let root = (second * second - 3.0 * third * p).max(0.0).sqrt();
-    let least = -p / (second + root);
-    let value = a + least * (p + least * (second + least * third));
-    (least > 0.0 && least < 1.0 && value < CLOSE * (a + b)).then_some(least)
 }
 
 impl<D: Dynamics> Drop for Switched<'_, D> {

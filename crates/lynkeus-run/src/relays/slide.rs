@@ -15,7 +15,7 @@ impl<D: Dynamics> Switched<'_, D> {
         let mut at = |step: f64| {
             let moved: Vec<f64> = x.iter().zip(dx).map(|(x, dx)| x + step * dx).collect();
             let mut values = vec![0.0; self.parts.len()];
-            self.inner.read_surfaces(t + step, &moved, &mut values);
+            self.read(t + step, &moved, &mut values);
             values
         };
         let (after, before) = (at(step), at(-step));
@@ -70,14 +70,14 @@ impl<D: Dynamics> Switched<'_, D> {
         let [mut before, mut after] = [vec![0.0; count], vec![0.0; count]];
         let is_alone = count == 1;
         if !is_alone {
-            self.inner.read_surfaces(t, x, &mut before);
+            self.read(t, x, &mut before);
         }
         self.at.sides[i] = -self.at.sides[i];
         self.hold();
         if is_alone {
             return;
         }
-        self.inner.read_surfaces(t, x, &mut after);
+        self.read(t, x, &mut after);
         for j in (0..count).filter(|&j| !self.at.sliding[j]) {
             if before[j] * after[j] < 0.0 {
                 self.at.sides[j] = -self.at.sides[j];

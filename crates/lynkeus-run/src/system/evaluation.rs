@@ -1,13 +1,17 @@
 //! A system at work.
 
+use std::sync::Arc;
+
 use lynkeus_expr::Evaluator;
 
 use super::System;
 use crate::error::state_text;
+use crate::relays::Guards;
 use crate::routine::Runner;
+use crate::singular::Place;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::switches::Switches;
-use crate::{Dynamics, Error, Slopes};
+use crate::{Dynamics, Error, Margin, Slopes};
 
 /// Evaluates a system on known sides of the surfaces on which it jumps.
 #[derive(Clone, Debug)]
@@ -116,9 +120,37 @@ impl Evaluation {
         }
     }
 
+    /// An error that ended a run at `x`, by its cause where a matrix of the system is singular
+    /// there or the state is far beyond `scale`, the largest number among starts and signals.
+    pub(crate) fn explained(&mut self, error: Error, x: &[f64], scale: f64) -> Error {
+        let Some(time) = error.time() else {
+            return error;
+        };
+        let system = self.system.clone();
+        let mut values = vec![0.0; system.outputs().len()];
+        if !system.margins.is_empty() {
+            self.outputs(time, x, &mut values);
+        }
+        let value = |margin: &Margin| values.get(margin.output).copied();
+        let margins = system.margins.iter();
+        let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
+        Place {
+            names: system.states(),
+            x,
+            scale,
+            margins: &margins,
+        }
+        .explained(error)
+    }
+
     /// Values of the switches at the last [`Dynamics::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
         &self.inputs[self.inputs.len() - self.system.code.modes..]
+    }
+
+    /// Values of the operations that jump with the state, on the sides that are held.
+    pub(crate) fn held_modes(&self) -> &[f64] {
+        self.held.as_ref().map_or(&[], |held| &held.modes)
     }
 
     fn place(&mut self, t: f64, x: &[f64]) {
@@ -187,6 +219,17 @@ impl Dynamics for Evaluation {
         if let Some(sides) = sides {
             code.held.modes(sides, &mut evaluation.modes);
         }
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.system.code.guards.clone()
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.system.states().len();
+        let held = self.held_modes();
+        values.clear();
+        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {

@@ -1,6 +1,9 @@
 //! Systems that jump with their state: crossed, slid along, left again; against solutions by
 //! hand.
 
+#[path = "../common/mod.rs"]
+mod common;
+mod pulses;
 mod thresholds;
 
 use lynkeus_expr::{Binary, Expr, Graph, Node};

@@ -1,7 +1,9 @@
 //! What rests on a surface, surfaces that move with others, and what looking for them costs.
 
+use std::sync::Arc;
+
 use lynkeus_expr::{Binary, Expr, Graph};
-use lynkeus_run::{Dynamics, Evaluation, Integrator, Method, System};
+use lynkeus_run::{Dynamics, Evaluation, Guards, Integrator, Method, System};
 
 use super::{close, methods, run};
 
@@ -153,6 +155,14 @@ impl Dynamics for Counted {
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.0.hold(sides);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.0.guards()
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.0.beside(t, values);
     }
 }
 

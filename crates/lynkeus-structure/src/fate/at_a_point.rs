@@ -5,11 +5,15 @@
 //! On it δx' = (F + GK) δx, δv = K δx. Where more than one v will do, R ⊂ V is reached by them, and
 //! what moves along R can do anything.
 
+use std::collections::HashSet;
+
 use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
+use super::exact::{self, Shows};
 use super::modes::Modes;
+use super::rest::Rest;
 use super::subspace::{image, null_space, reached};
 use super::{Fate, Hidden, Told, clock, coupled};
 use crate::{Coordinate, Dimension, Region};
@@ -26,8 +30,8 @@ pub(super) struct Local {
     pub point: Vec<Coordinate>,
 }
 
-/// At the first of a few points whose linearisation hides exactly what is hidden; none where
-/// there is no such point.
+/// At the first of a few points whose linearisation hides exactly what is hidden, those at which nothing moves that it
+/// reads before the others; none where there is no such point. Of what reads something that moves on no rate is told.
 pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInput> {
     let extended = hidden.extended;
     if extended.states.len() > STATES {
@@ -46,12 +50,16 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
     let nodes: Vec<Node> = slopes.entries.iter().map(|e| e.2).collect();
     let tape = Tape::new(extended.graph(), &region.symbols(), &nodes)?;
     let mut evaluator = tape.evaluator();
-    let timed = clock::timed(hidden, &slopes);
+    let clock = HashSet::from([extended.plant.time]);
+    let timed = clock::moved(hidden, &slopes, &clock);
     let is_asked = |i: usize| hidden.told[i] == Told::Hidden;
     if (0..timed.len()).all(|i| timed[i] || !is_asked(i)) {
         return Ok(None);
     }
-    for point in points(hidden, &region) {
+    let mut rest = Rest::new(hidden, &slopes, &region)?;
+    let starts = points(hidden, &region);
+    let near: Vec<_> = starts.iter().filter_map(|point| rest.near(point)).collect();
+    for point in near.into_iter().chain(starts) {
         let mut values = vec![0.0; nodes.len()];
         evaluator.eval(&point, &mut values);
         let mut J = DMatrix::zeros(functions.len(), symbols.len());
@@ -62,11 +70,27 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             .iter()
             .all(|x| x.is_finite())
             .then(|| Linear::new(hidden, &J).fates(hidden));
-        if let Some(mut of) = found.flatten() {
+        if let Some(found) = found.flatten() {
+            let states = (0..symbols.len()).filter(|&i| !hidden.is_signal(i)).count();
+            let exact = exact::shows(&J, states);
+            let sure = exact.map_or(vec![false; symbols.len()], |exact| {
+                found
+                    .iter()
+                    .zip(exact)
+                    .map(|((_, shown), exact)| *shown == exact)
+                    .collect()
+            });
+            let mut of: Vec<Fate> = found.into_iter().map(|(fate, _)| fate).collect();
             for (fate, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
                 *fate = Fate::Undecided;
             }
-            coupled::weaken(hidden, &slopes, &mut of);
+            coupled::weaken(hidden, &slopes, &sure, &mut of);
+            let moved = clock::moved(hidden, &slopes, &rest.moving(&point));
+            for (fate, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
+                if matches!(fate, Fate::Decays { .. } | Fate::Grows { .. }) {
+                    *fate = Fate::Undecided;
+                }
+            }
             let sides = || region.dimensions.iter().zip(&point);
             let is_time = |d: &Dimension| d.symbol == extended.plant.time;
             let is_read = clock::is_read(extended, &nodes);
@@ -180,8 +204,8 @@ impl Linear {
         }
     }
 
-    /// The fates, where the linearisation hides what is hidden and nothing else.
-    fn fates(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<Fate>> {
+    /// The fates, with what they rest on, where the linearisation hides what is hidden and nothing else.
+    fn fates(&self, hidden: &Hidden<'_, '_>) -> Option<Vec<(Fate, Shows)>> {
         let Traceless { pairs, V } = self.traceless()?;
         let n = self.F.nrows();
         if pairs.ncols() == 0 {
@@ -208,28 +232,28 @@ impl Linear {
                 false => (K.row(i - n).into_owned(), free.row(i - n).amax()),
             };
             if alone > ZERO || (&row * &R).amax() > ZERO {
-                return Some(Some(Fate::Moved));
+                return Some((Fate::Moved, Shows::Moved));
             }
             let row = &row * &S;
             if row.norm() <= ZERO {
-                return Some(None);
+                return Some((Fate::Undecided, Shows::Nothing));
             }
             let row = DMatrix::from_fn(1, row.ncols(), |_, j| row[j]);
-            modes.fate(&row).map(Some)
+            let (fate, count) = modes.fate(&row)?;
+            Some((fate, Shows::Modes(count)))
         });
-        let of: Vec<Option<Fate>> = of.collect::<Option<_>>()?;
-        let agrees = of.iter().zip(&hidden.told).all(|(fate, told)| match told {
-            Told::Determined => fate.is_none(),
-            Told::Hidden => fate.is_some(),
-            Told::Open => true,
-        });
+        let of: Vec<(Fate, Shows)> = of.collect::<Option<_>>()?;
+        let agrees = of
+            .iter()
+            .zip(&hidden.told)
+            .all(|((_, shown), told)| match told {
+                Told::Determined => *shown == Shows::Nothing,
+                Told::Hidden => *shown != Shows::Nothing,
+                Told::Open => true,
+            });
         let is_open = hidden.told.contains(&Told::Open);
         let counts = is_open || hidden.directions == pairs.ncols();
-        (agrees && counts).then(|| {
-            of.into_iter()
-                .map(|fate| fate.unwrap_or(Fate::Undecided))
-                .collect()
-        })
+        (agrees && counts).then_some(of)
     }
 }
 

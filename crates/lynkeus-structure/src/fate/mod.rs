@@ -16,9 +16,11 @@ mod at_a_point;
 mod clock;
 mod constraints;
 mod coupled;
+mod exact;
 mod linearised;
 mod modes;
 mod on_the_box;
+mod rest;
 mod subspace;
 
 use lynkeus_expr::MissingInput;
@@ -68,11 +70,13 @@ pub enum Fate {
         /// proved, or linearised
         ground: Ground,
     },
-    /// an unknown input keeps it alive, in the end below this bound, in its unit; proved on the
-    /// box, unknown inputs staying in their ranges
+    /// in the end it is below this bound, in its unit; proved on the box, unknown inputs staying in
+    /// their ranges
     Bounded {
         /// in the unit of the quantity
         bound: f64,
+        /// linearised an unknown input keeps it alive; else it may decay
+        is_kept: bool,
     },
     /// linearised it stays as it is, or hardly moves
     Stays,
@@ -128,6 +132,10 @@ impl Hidden<'_, '_> {
             let fate = match (proved[i], there) {
                 // a bound says little where the error vanishes near some point
                 (Some(Fate::Bounded { .. }), Some(Fate::Decays { .. })) | (None, Some(_)) => there,
+                (Some(Fate::Bounded { bound, .. }), there) => Some(Fate::Bounded {
+                    bound,
+                    is_kept: there == Some(Fate::Moved),
+                }),
                 (proved, _) => proved,
             };
             (self.told[i] == Told::Hidden).then(|| fate.unwrap_or(Fate::Undecided))

@@ -38,20 +38,22 @@ struct Doubt {
 
 impl Modes {
     /// The slowest mode that shows in a row, undecided where rounding may carry it across the
-    /// imaginary axis, or where it rests on how small a coupling counts as none; none where its
-    /// eigenvalues are not found.
-    pub fn fate(&self, row: &DMatrix<f64>) -> Option<Fate> {
+    /// imaginary axis, or where it rests on how small a coupling counts as none; with the number of modes that
+    /// show. None where its eigenvalues are not found.
+    pub fn fate(&self, row: &DMatrix<f64>) -> Option<(Fate, usize)> {
         let coarse = self.shown(row, ZERO)?;
-        if coarse.A.nrows() == self.A.nrows() {
-            return coarse.slowest();
+        let count = coarse.A.nrows();
+        if count == self.A.nrows() {
+            return Some((coarse.slowest()?, count));
         }
         let fine = self.shown(row, ROUNDED)?;
-        if coarse.A.nrows() == fine.A.nrows() {
-            return coarse.slowest();
+        if count == fine.A.nrows() {
+            return Some((coarse.slowest()?, count));
         }
-        let (coarse, fine) = (coarse.slowest()?, fine.slowest()?);
-        let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&fine);
-        Some(if agree { fine } else { Fate::Undecided })
+        let (coarse, found) = (coarse.slowest()?, fine.slowest()?);
+        let agree = std::mem::discriminant(&coarse) == std::mem::discriminant(&found);
+        let found = if agree { found } else { Fate::Undecided };
+        Some((found, fine.A.nrows()))
     }
 
     /// What shows in a row. In it every eigenvalue has one eigenvector.
@@ -186,7 +188,7 @@ mod tests {
         let row = DMatrix::from_row_slice(1, n, row) * &Q;
         let A = &Q * A * &Q;
         let modes = Modes { gross: A.norm(), A };
-        modes.fate(&row).unwrap()
+        modes.fate(&row).unwrap().0
     }
 
     fn first(n: usize) -> Vec<f64> {

@@ -184,7 +184,10 @@ impl Cascade {
         let bound = (sum / Interval::point(rate)).hi();
         // the range itself is a bound
         let tells = bound < self.scales[s] && sum.is_defined();
-        tells.then_some(Fate::Bounded { bound })
+        tells.then_some(Fate::Bounded {
+            bound,
+            is_kept: false,
+        })
     }
 }
 

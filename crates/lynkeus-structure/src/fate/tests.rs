@@ -84,17 +84,34 @@ fn a_state_that_nothing_reads_decays_on_the_box() {
     assert!((rate(found.fate("c"), Ground::Box) - 0.99).abs() < 1e-9);
 }
 
-/// −b³ has slope −3b², which vanishes at b = 0: at b = 0.5 alone it decays with 0.75.
+/// b³ − b has the slope 3b² − 1, positive for large b: near b = 0, where it rests, it decays with 1.
 #[test]
-fn what_decays_in_a_part_of_the_box_is_linearised() {
+fn what_decays_in_a_part_of_the_box_is_linearised_where_it_rests() {
     let found = case(
-        "der(a) = -a; der(b) = -b^3; der(c) = u - c;",
+        "der(a) = -a; der(b) = b^3 - b; der(c) = u - c;",
         &["b", "c"],
         2,
     )
     .known();
-    assert!((rate(found.fate("b"), Ground::Point) - 0.75).abs() < 1e-9);
+    assert!((rate(found.fate("b"), Ground::Point) - 1.0).abs() < 1e-9);
     assert!((rate(found.fate("c"), Ground::Box) - 1.0).abs() < 1e-9);
+}
+
+/// a = e^−t, so that of an error in b' = −a²b the share e^(−1/2) stays; where a rests all of it does. What reads a state that
+/// never rests has no rate either, and what reads no state has one wherever it is.
+#[test]
+fn a_slope_that_moves_tells_no_rate() {
+    let of = |equations: &str, hidden: &'static [&'static str]| {
+        case(equations, hidden, hidden.len()).known().fate("b")
+    };
+    let fading = "der(a) = -a; der(b) = -b*a^2; der(c) = -c;";
+    assert_eq!(of(fading, &["b", "c"]), Some(Fate::Stays));
+    let growing = "der(a) = 1 + a^2; der(b) = b*a; der(c) = -c;";
+    assert_eq!(of(growing, &["b", "c"]), Some(Fate::Undecided));
+    let behind = "der(a) = 1 + c^2; der(c) = -a*c; der(b) = -b*c + 0.1*b^3;";
+    assert_eq!(of(behind, &["b"]), Some(Fate::Undecided));
+    let steady = "der(a) = 1 + a^2; der(b) = a - b; der(c) = -c;";
+    assert!((rate(of(steady, &["b", "c"]), Ground::Box) - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -105,7 +122,11 @@ fn what_an_unknown_input_feeds_does_not_decay() {
         3,
     );
     // |w − w̃| ≤ 3, over the rate 2
-    let Some(Fate::Bounded { bound }) = found.fate("b") else {
+    let Some(Fate::Bounded {
+        bound,
+        is_kept: true,
+    }) = found.fate("b")
+    else {
         panic!("{:?}", found.fate("b"))
     };
     assert!((bound - 1.5).abs() < 1e-9, "{bound}");
@@ -203,8 +224,8 @@ fn a_linearisation_that_hides_something_else_is_no_answer() {
     // at b = 0 the slope of b² vanishes, but elsewhere b is seen
     let mut found = case("der(a) = b^2; der(b) = -b; der(c) = c*c*c - u;", &["c"], 1).known();
     found.text = found.text.replace("b(start = 0.5", "b(start = 0");
-    // judged in the middle of the box, where c = 0 is marginal
-    assert_eq!(found.fate("c"), Some(Fate::Stays));
+    // judged where b shows, and c³ = u
+    assert!(matches!(found.fate("c"), Some(Fate::Grows { .. })));
 }
 
 /// Of b·c only the product shows; frozen at a point both do, as they move at rates of their own, and there is
@@ -218,10 +239,15 @@ fn what_a_frozen_point_sees_is_told_of_no_point() {
             2,
         )
     };
+    // b and 1/c scale together, so that an error in b grows as b does
+    let is_right = |fate| match fate {
+        Some(Fate::Grows { rate }) => (rate - 0.1_f64).abs() < 1e-9,
+        fate => matches!(fate, Some(Fate::Undecided | Fate::Moved)),
+    };
     for name in ["b", "w"] {
-        assert_eq!(product().fate(name), Some(Fate::Undecided), "{name}");
+        assert!(is_right(product().fate(name)), "{name}");
     }
-    assert_eq!(product().known().fate("b"), Some(Fate::Undecided));
+    assert!(is_right(product().known().fate("b")));
     // c alone is proved to decay
     assert!((rate(product().known().fate("c"), Ground::Box) - 2.0).abs() < 1e-9);
 }
@@ -253,7 +279,7 @@ fn two_unknown_inputs_in_one_equation_move_each_other() {
     assert_eq!(alone.fate("w0"), Some(Fate::Moved));
 }
 
-/// Beside a rate of 10⁶ one of 1.06 is no rounding: ∂(c + 0.3c²)/∂c at c = 0.1.
+/// Beside a rate of 10⁶ one of 1 is no rounding: ∂(c + 0.3c²)/∂c at c = 0.
 #[test]
 fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
     let hidden = &["b", "c"];
@@ -262,21 +288,20 @@ fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
         let growing = "der(a) = -a; der(b) = -1e6*b + c; der(c) = c + 0.3*c^2 + b;";
         let fate = of(growing, name);
         assert!(
-            matches!(fate, Some(Fate::Grows { rate }) if (rate - 1.060001).abs() < 1e-6),
+            matches!(fate, Some(Fate::Grows { rate }) if (rate - 1.000001).abs() < 1e-6),
             "{name}: {fate:?}"
         );
-        // 2·0.3·0.1 − 1
         let decaying =
             "der(a) = -a; der(b) = -1e6*b + c; der(c) = -c + 0.3*c^2 - 3*c^3 + b + 1.5*c*b;";
         let fate = of(decaying, name);
-        let at_the_point = |rate: f64| (rate - (1.03 - 0.75)).abs() < 1e-5;
+        let at_the_point = |rate: f64| (rate - 1.0).abs() < 1e-5;
         assert!(
             matches!(fate, Some(Fate::Decays { rate, .. }) if at_the_point(rate)),
             "{name}: {fate:?}"
         );
     }
-    // hardly damped: a slope of −0.1·b² at b = 0.5, half of it in the real part, beside 10⁴ turns
-    let ringing = "der(a) = -a; der(b) = 1e4*c - 0.1*b^3/3; der(c) = -1e4*b;";
+    // hardly damped: a slope of −0.025 at b = 0, half of it in the real part, beside 10⁴ turns
+    let ringing = "der(a) = -a; der(b) = 1e4*c - 0.025*b + 0.025*b^3; der(c) = -1e4*b;";
     assert!((rate(of(ringing, "c"), Ground::Point) - 0.0125).abs() < 1e-6);
     // a coupling of 10⁻⁹ beside the rate still carries what grows
     let weak = of("der(a) = -a; der(b) = -1e6*b + 1e-3*c; der(c) = c;", "b");
@@ -290,28 +315,27 @@ fn a_slow_mode_beside_a_fast_one_is_no_rounding() {
 #[test]
 fn what_reads_the_time_is_not_told_of_one_instant() {
     let of = |equations: &str, name: &str| case(equations, &["b", "c"], 2).known().fates(name);
-    let fading = "der(a) = -a; der(b) = -b*exp(-time); der(c) = -c^3;";
+    let fading = "der(a) = -a; der(b) = -b*exp(-time); der(c) = -c + c^3;";
     assert_eq!(of(fading, "b").1, Some(Fate::Undecided));
     // beside it
     let (point, fate) = of(fading, "c");
-    assert!((rate(fate, Ground::Point) - 0.03).abs() < 1e-9);
+    assert!((rate(fate, Ground::Point) - 1.0).abs() < 1e-9);
     assert_eq!(point[0], "time", "{point:?}");
     // behind it
-    let behind = "der(a) = -a; der(b) = -b/(1 + time); der(c) = -c^3 + b;";
+    let behind = "der(a) = -a; der(b) = -b/(1 + time); der(c) = -c + c^3 + b;";
     assert_eq!(of(behind, "c").1, Some(Fate::Undecided));
     // coupled by what is seen, in an equation or in an output
-    let seen = "der(a) = b + c; der(b) = -b*exp(-time) - b^3; der(c) = -c^3;";
+    let seen = "der(a) = b + c; der(b) = -b*exp(-time) - b^3; der(c) = -c + c^3;";
     let mut sum = case(seen, &["b", "c"], 1).known();
     assert_eq!(sum.fate("c"), Some(Fate::Undecided));
     sum.text = sum.text.replace("y = a;", "y = a; output Real z = b + c;");
     assert_eq!(sum.fate("c"), Some(Fate::Undecided));
     // proved for every instant
-    let proved = "der(a) = -a; der(b) = -b*(2 + sin(time)); der(c) = -c^3;";
+    let proved = "der(a) = -a; der(b) = -b*(2 + sin(time)); der(c) = -c + c^3;";
     assert!((rate(of(proved, "b").1, Ground::Box) - 1.0).abs() < 1e-9);
-    let steady = "der(a) = -a; der(b) = -b^3; der(c) = -c^3 + sin(time);";
-    let (point, fate) = of(steady, "c");
-    assert!((rate(fate, Ground::Point) - 0.03).abs() < 1e-9);
-    assert!(!point.contains(&"time".to_owned()), "{point:?}");
+    // what time moves never rests
+    let moved = "der(a) = -a; der(b) = -b^3; der(c) = -c + c^3 + sin(time);";
+    assert_eq!(of(moved, "c").1, Some(Fate::Undecided));
 }
 
 /// However weakly it reads them, what reads what grows, or an unknown input, is not said to decay; nor is what a

@@ -1,6 +1,6 @@
 //! Certificates for machines.
 
-use lynkeus_observers::{Certificate, Check};
+use lynkeus_observers::{Certificate, Check, UltimateBound};
 use lynkeus_structure::Verdict;
 use serde_json::{Map, Value, json};
 
@@ -8,12 +8,15 @@ use super::CertifyReport;
 use crate::check::point;
 use crate::interval::Intervals;
 
-/// `{verdict, rate, ultimate_bound, box, hypotheses, …}`; the hypotheses are those of
+/// `{verdict, rate, ultimate_bound, mean_square_bound, box, hypotheses, …}`; the hypotheses are those of
 /// the inequality, then those of the theorem.
 pub(crate) fn certificate(report: &CertifyReport) -> Value {
     let mut best = report.best().clone();
+    best.mean_square = None;
     if report.is_contradiction() {
         (best.rate, best.ultimate_bound, best.ultimate) = (None, None, vec![]);
+    } else {
+        best.mean_square = report.mean_square().cloned();
     }
     let theorem = report.theorem.iter().flat_map(|t| &t.hypotheses);
     let hypotheses: Vec<Value> = report
@@ -26,6 +29,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     let mut object = summary(&best);
     object["verdict"] = json!(report.verdict().word());
     object["hypotheses"] = json!(hypotheses);
+    object["declared"] = report.declared.to_json();
     object["outside_box"] = report.strays.to_json();
     object["sampling"] = json!(report.sampling.map(sampling));
     let notes = report.theorem.iter().flat_map(|t| &t.notes);
@@ -52,10 +56,11 @@ fn summary(certificate: &Certificate) -> Value {
         .region
         .iter()
         .map(|s| (s.name.clone(), json!([s.min, s.max])));
-    let bounds = certificate
-        .ultimate
-        .iter()
-        .map(|b| (b.name.clone(), json!(b.value)));
+    let bounds = |each: &[UltimateBound]| -> Map<String, Value> {
+        let pairs = each.iter().map(|b| (b.name.clone(), json!(b.value)));
+        pairs.collect()
+    };
+    let mean_square = certificate.mean_square.as_ref();
     let constants = certificate
         .constants
         .iter()
@@ -65,7 +70,9 @@ fn summary(certificate: &Certificate) -> Value {
         "verdict": certificate.verdict().word(),
         "rate": certificate.rate,
         "ultimate_bound": certificate.ultimate_bound,
-        "ultimate_bounds": bounds.collect::<Map<_, _>>(),
+        "ultimate_bounds": bounds(&certificate.ultimate),
+        "mean_square_bound": mean_square.map(|b| b.norm),
+        "mean_square_bounds": bounds(mean_square.map_or(&[], |b| &b.states)),
         "box": sides.collect::<Map<_, _>>(),
         "constants": constants.collect::<Vec<_>>(),
     })

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lynkeus_observers::Certificate;
+use lynkeus_observers::{Certificate, UltimateBound};
 use lynkeus_structure::Standing;
 
 use super::CertifyReport;
@@ -45,6 +45,7 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         .cloned()
         .chain(strays)
         .chain(unseen)
+        .chain(report.declared.told())
         .collect();
     if !notes.is_empty() {
         writeln!(f)?;
@@ -115,29 +116,34 @@ const NAMED: usize = 4;
 
 /// What is left of the error in the end.
 fn left(report: &CertifyReport, best: &Certificate) -> String {
-    let Some(bound) = best.ultimate_bound else {
-        return "; what disturbances and measurement errors leave of it has no bound, see the notes".to_owned();
+    let (bound, each, what) = match (best.ultimate_bound, report.mean_square()) {
+        (Some(bound), _) if bound <= 0.0 => return String::new(),
+        (Some(bound), _) => (bound, &best.ultimate, "in the end within"),
+        (None, Some(found)) => (found.norm, &found.states, IN_MEAN_SQUARE),
+        (None, None) => {
+            return "; what disturbances, process noise and measurement errors leave of it has no bound, see the notes".to_owned();
+        }
     };
-    if bound <= 0.0 {
-        return String::new();
-    }
-    let bounds = bounds(report, best);
+    let bounds = bounds(report, each);
     match bounds.len() {
         0 => format!(
-            ", in the end within {} (Euclidean norm of all quantities)",
+            ", {what} {} (Euclidean norm of all quantities)",
             number(bound)
         ),
-        count if count <= NAMED => format!(", in the end within {}", bounds.join(", ")),
+        count if count <= NAMED => format!(", {what} {}", bounds.join(", ")),
         count => format!(
-            ", in the end within {} and {} more",
+            ", {what} {} and {} more",
             bounds[..NAMED].join(", "),
             count - NAMED
         ),
     }
 }
 
+/// Of what process noise leaves.
+const IN_MEAN_SQUARE: &str = "in the end in mean square (the root of E e²) within";
+
 /// `0.3 K of T`, for every bounded quantity.
-fn bounds(report: &CertifyReport, certificate: &Certificate) -> Vec<String> {
+fn bounds(report: &CertifyReport, each: &[UltimateBound]) -> Vec<String> {
     let estimates = &report.design.observer.estimates;
     let unit = |name: &str| {
         let mut found = estimates.iter().filter(|e| e.variable.name == name);
@@ -145,8 +151,7 @@ fn bounds(report: &CertifyReport, certificate: &Certificate) -> Vec<String> {
         unit.filter(|unit| !unit.is_empty())
             .map_or(String::new(), |unit| format!(" {unit}"))
     };
-    let entries = certificate.ultimate.iter();
-    entries
+    each.iter()
         .map(|b| format!("{}{} of {}", number(b.value), unit(&b.name), b.name))
         .collect()
 }
@@ -187,8 +192,12 @@ fn certificate(
         )?;
     }
     if !certificate.ultimate.is_empty() && certificate.ultimate_bound.is_some_and(|b| b > 0.0) {
-        let bounds = bounds(report, certificate).join(", ");
+        let bounds = bounds(report, &certificate.ultimate).join(", ");
         writeln!(f, "  in the end within: {bounds}")?;
+    }
+    if let Some(found) = &certificate.mean_square {
+        let bounds = bounds(report, &found.states).join(", ");
+        writeln!(f, "  {IN_MEAN_SQUARE}: {bounds}")?;
     }
     for note in &certificate.notes {
         writeln!(f, "  note: {note}")?;

@@ -38,6 +38,7 @@ impl Report {
         );
         report["knowledge"] = self.knowledge.iter().map(Knowledge::to_json).collect();
         report["choice"] = json!(self.choice.as_ref().map(Choice::to_json));
+        report["declared"] = self.declared.to_json();
         report["next"] = json!(self.next.as_ref().map(Next::to_json));
         report
     }

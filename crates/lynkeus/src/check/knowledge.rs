@@ -20,8 +20,20 @@ pub enum Known {
     /// on the whole box while known inputs stay constant: proved; at almost every state and input
     /// else
     WhileConstant,
+    /// neighbouring states are told apart on the whole box: proved; whether states far apart are is not
+    Locally {
+        /// while known inputs stay constant
+        constant: bool,
+    },
     /// at almost every state and input; everywhere is not decided
     AlmostEverywhere,
+    /// in some of the branches of the model's choices only
+    InPart {
+        /// the share of the box in the others, estimated
+        share: f64,
+        /// a point there
+        at: Vec<(String, f64)>,
+    },
     /// not while this input has this value
     WhileExcited {
         /// name of the input
@@ -29,10 +41,31 @@ pub enum Known {
         /// a constant value of it that hides the quantity
         value: f64,
     },
+    /// only where sensors are within their limits, or but for what disturbances do
+    Reserved {
+        /// what is known then
+        known: Box<Known>,
+        /// the reserve
+        reserve: Reserve,
+    },
     /// the outputs do not determine it; what becomes of an error in it
     Hidden(Fate),
     /// a limit ended the analysis, or it does not apply
     Undecided,
+}
+
+/// What stands between a quantity and its outputs.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Reserve {
+    /// measured outputs beyond whose limits nothing shows it
+    Limits(Vec<String>),
+    /// inputs that act on the plant and that the observer takes as zero
+    Disturbances {
+        /// their names
+        names: Vec<String>,
+        /// how far they can move what the outputs tell of it, in its unit; none where no bound is proved
+        bound: Option<f64>,
+    },
 }
 
 /// What is taken for granted of the unknown inputs.
@@ -101,7 +134,7 @@ impl Knowledge {
             },
         };
         let known = |i: usize| match verdicts[i] {
-            Some(Verdict::Observable) => found.seen(extended, i, assumption),
+            Some(Verdict::Observable) => found.seen(extended, i, assumption, answer),
             Some(Verdict::Unobservable) => Known::Hidden(fates.of[i].unwrap_or(Fate::Undecided)),
             Some(Verdict::Undecided) | None => Known::Undecided,
         };
@@ -117,6 +150,12 @@ impl Knowledge {
                 .collect(),
             point: fates.point,
         })
+    }
+
+    /// What is known of a quantity.
+    pub(super) fn of(&self, name: &str) -> Option<&Known> {
+        let mut quantities = self.quantities.iter();
+        quantities.find(|(n, _)| n == name).map(|(_, known)| known)
     }
 
     /// Names of what is known, of what follows in the end, of what is not known, and of what is
@@ -175,7 +214,9 @@ impl Found<'_> {
         for (asked, _) in &mut answer.quantities {
             let place = extended.state_index(&asked.name);
             let is_proved = place.is_some_and(|place| {
-                self.determined.get(place) == Some(&true) || self.is_regular(assumption)
+                self.determined.get(place) == Some(&true)
+                    || self.is_one_to_one(place, assumption)
+                    || self.is_regular(assumption)
             });
             if asked.verdict == Verdict::Undecided && is_proved {
                 asked.verdict = Verdict::Observable;
@@ -191,16 +232,38 @@ impl Found<'_> {
         assumption != Assumption::Arbitrary && self.uniform.is_some_and(is_proved)
     }
 
+    /// Whether no two points of the box that differ in this state have equal outputs for ever, under the same assumptions.
+    fn is_one_to_one(&self, place: usize, assumption: Assumption) -> bool {
+        let is_proved = |u: &Uniformity| u.one_to_one.known.get(place) == Some(&true);
+        assumption != Assumption::Arbitrary && self.uniform.is_some_and(is_proved)
+    }
+
     /// Of a quantity that is observable at generic points.
-    fn seen(&self, extended: &Extended<'_>, place: usize, assumption: Assumption) -> Known {
+    fn seen(
+        &self,
+        extended: &Extended<'_>,
+        place: usize,
+        assumption: Assumption,
+        answer: &Answer,
+    ) -> Known {
         let name = &extended.states[place].name;
         if self.determined.get(place) == Some(&true) {
             return Known::Everywhere;
         }
+        let constant = !extended.inputs.is_empty();
+        if self.is_one_to_one(place, assumption) {
+            return match constant {
+                true => Known::WhileConstant,
+                false => Known::Everywhere,
+            };
+        }
         if self.is_regular(assumption) {
-            return match extended.inputs.is_empty() {
-                true => Known::Everywhere,
-                false => Known::WhileConstant,
+            return Known::Locally { constant };
+        }
+        if let Some(part) = answer.partial.iter().find(|part| part.name == *name) {
+            return Known::InPart {
+                share: part.share,
+                at: part.at.clone(),
             };
         }
         let blind = self.uniform.into_iter().flat_map(|u| &u.blind);
@@ -216,12 +279,46 @@ impl Found<'_> {
 }
 
 impl Known {
+    /// Whether the outputs tell it, be it in part.
+    pub(super) fn is_seen(&self) -> bool {
+        !matches!(self, Known::Hidden(_) | Known::Undecided)
+    }
+
+    /// The one that says less, of two that the outputs tell.
+    pub(super) fn weaker<'k>(&'k self, other: &'k Self) -> &'k Self {
+        let rank = |known: &Self| match known {
+            Known::Everywhere => 0,
+            Known::WhileConstant => 1,
+            Known::Locally { .. } => 2,
+            Known::AlmostEverywhere => 3,
+            Known::WhileExcited { .. } => 4,
+            Known::InPart { .. } => 5,
+            _ => 6,
+        };
+        if rank(self) >= rank(other) {
+            self
+        } else {
+            other
+        }
+    }
+
     fn word(&self) -> &'static str {
         match self {
             Known::Everywhere => "everywhere",
             Known::WhileConstant => "everywhere while inputs are constant",
+            Known::Locally { constant: false } => "locally everywhere",
+            Known::Locally { constant: true } => "locally everywhere while inputs are constant",
             Known::AlmostEverywhere => "almost everywhere",
+            Known::InPart { .. } => "in part of the box",
             Known::WhileExcited { .. } => "while excited",
+            Known::Reserved {
+                reserve: Reserve::Limits(_),
+                ..
+            } => "within limits",
+            Known::Reserved {
+                reserve: Reserve::Disturbances { .. },
+                ..
+            } => "up to disturbances",
             Known::Hidden(Fate::Decays { .. }) => "decays",
             Known::Hidden(_) => "no",
             Known::Undecided => "undecided",
@@ -234,11 +331,34 @@ impl Known {
             Known::WhileExcited { input, value } => {
                 entry["hidden_by"] = json!({ "input": input, "value": value })
             }
+            Known::InPart { share, at } => {
+                entry["hidden_share"] = json!(share);
+                entry["hidden_at"] = at
+                    .iter()
+                    .map(|(name, x)| (name.clone(), json!(x)))
+                    .collect::<Map<_, _>>()
+                    .into();
+            }
+            Known::Reserved { known, reserve } => {
+                entry["otherwise"] = known.to_json();
+                match reserve {
+                    Reserve::Limits(sensors) => entry["sensors"] = json!(sensors),
+                    Reserve::Disturbances { names, bound } => {
+                        entry["disturbances"] = json!(names);
+                        entry["bound"] = json!(bound);
+                    }
+                }
+            }
             Known::Hidden(Fate::Decays { rate, ground }) => {
                 entry["rate"] = json!(rate);
                 entry["proved"] = json!(*ground == Ground::Box);
             }
-            Known::Hidden(Fate::Bounded { bound }) => entry["bound"] = json!(bound),
+            Known::Hidden(Fate::Bounded { bound, is_kept }) => {
+                entry["bound"] = json!(bound);
+                if !is_kept {
+                    entry["error"] = json!("undecided");
+                }
+            }
             Known::Hidden(fate) => entry["error"] = json!(error_word(*fate)),
             _ => {}
         }
@@ -252,8 +372,20 @@ impl Known {
             Known::WhileConstant => {
                 "known everywhere while inputs are constant (proved on the box), and for almost every other input".to_owned()
             }
+            Known::Locally { constant } => format!(
+                "known locally: neighbouring states are told apart everywhere{} (proved on the box), states far apart may not be",
+                if *constant { " while inputs are constant" } else { "" }
+            ),
             Known::AlmostEverywhere => {
-                "known at almost every state and input (everywhere is not proved)".to_owned()
+                "known at almost every state and input, locally (everywhere is not proved)".to_owned()
+            }
+            Known::InPart { share, at } => {
+                let sides = at.iter().map(|(name, x)| format!("{name} = {}", number(*x)));
+                format!(
+                    "known on a part of the box only: the model makes choices, and in the branch at {}, as on about {} % of the box, the outputs do not show it",
+                    sides.collect::<Vec<_>>().join(", "),
+                    number((100.0 * share).round())
+                )
             }
             Known::WhileExcited { input, value } => {
                 format!(
@@ -261,8 +393,51 @@ impl Known {
                     number(*value)
                 )
             }
+            Known::Reserved { known, reserve } => reserve.line(&known.line(unit)),
             Known::Hidden(fate) => told(*fate, unit),
             Known::Undecided => "undecided".to_owned(),
+        }
+    }
+}
+
+/// What all that is said of the map to the outputs rests on, in words; nothing without reserves.
+pub(super) fn reserves(all: &[Knowledge]) -> String {
+    let known = all.iter().flat_map(|knowledge| &knowledge.quantities);
+    let mut told: Vec<String> = vec![];
+    for (_, known) in known {
+        let Known::Reserved { reserve, .. } = known else {
+            continue;
+        };
+        let words = match reserve {
+            Reserve::Limits(sensors) => {
+                format!(", where {} is within its limits", sensors.join(", "))
+            }
+            Reserve::Disturbances { names, .. } => {
+                format!(", were the disturbance {} zero", names.join(", "))
+            }
+        };
+        if !told.contains(&words) {
+            told.push(words);
+        }
+    }
+    told.concat()
+}
+
+impl Reserve {
+    fn line(&self, otherwise: &str) -> String {
+        match self {
+            Reserve::Limits(sensors) => format!(
+                "{otherwise}, where {} is within its limits: beyond, the reading hides it",
+                sensors.join(", ")
+            ),
+            Reserve::Disturbances { names, bound } => {
+                let names = names.join(", ");
+                let size = match bound {
+                    Some(bound) => format!("within {} (proved on the box)", number(*bound)),
+                    None => "of which no bound is proved".to_owned(),
+                };
+                format!("known up to the disturbance {names}, {size}; were it zero: {otherwise}")
+            }
         }
     }
 }
@@ -292,8 +467,18 @@ fn told(fate: Fate, unit: &str) -> String {
             "not observable, but its error decays by itself, at {} per {unit} (linearised at one point only, see below)",
             number(rate)
         ),
-        Fate::Bounded { bound } => format!(
+        Fate::Bounded {
+            bound,
+            is_kept: true,
+        } => format!(
             "not known: an unknown input keeps its error alive, in the end below {} (proved on the box)",
+            number(bound)
+        ),
+        Fate::Bounded {
+            bound,
+            is_kept: false,
+        } => format!(
+            "not known: its error ends below {} (proved on the box); whether it decays is not decided",
             number(bound)
         ),
         Fate::Stays => {

@@ -162,7 +162,7 @@ fn observer(prepared: &Prepared<'_>, choice: &Choice) -> String {
     let given = given.filter(|(name, _)| family.is_some_and(|family| family.owns(name)));
     lines.extend(given.map(|(name, value)| format!("{} = {}", key(name), toml(value))));
     lines.extend(common(&study.observer.tuning));
-    if choice.grounds == Grounds::Filter && study.process_noise.is_empty() {
+    if choice.grounds == Grounds::Filter && !prepared.declared().process_noise.is_declared() {
         lines.extend(process_noise(prepared));
     }
     lines.join("\n") + "\n"

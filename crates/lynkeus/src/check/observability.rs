@@ -5,10 +5,10 @@ use std::fmt;
 use lynkeus_expr::Budget;
 use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Quantity, Question, QuestionError, Verdict, analyse};
+use lynkeus_structure::Sensors;
 use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
-use crate::study::Name;
 use crate::{Error, Study};
 
 /// Names listed before the rest becomes a count.
@@ -20,15 +20,13 @@ pub(super) fn answer(
     study: &Study,
     plant: &Plant,
     options: &CheckOptions,
-    unknown: Vec<String>,
+    sensors: &Sensors,
     budget: Budget,
 ) -> Result<Answer, Error> {
-    let texts = |names: &[Name]| names.iter().map(|n| n.text.clone()).collect::<Vec<_>>();
-    let sensors = &study.sensors;
     let question = Question {
-        measured: texts(sensors.measured.as_deref().unwrap_or_default()),
-        unknown,
-        disturbances: texts(&sensors.disturbances),
+        measured: sensors.measured.clone(),
+        unknown: sensors.unknown.clone(),
+        disturbances: sensors.disturbances.clone(),
         parameters: options.parameters,
         about: options.about.clone(),
         budget,
@@ -51,7 +49,7 @@ fn blame(study: &Study, error: QuestionError) -> Error {
         .iter()
         .chain(&sensors.unknown)
         .chain(&sensors.disturbances);
-    match names.find(|n| n.text == name) {
+    match names.find(|n| n.is_or_has(&name)) {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),
     }

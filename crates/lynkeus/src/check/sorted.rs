@@ -25,8 +25,11 @@ impl<'a> Sorted<'a> {
             let group = match known {
                 Known::Everywhere
                 | Known::WhileConstant
+                | Known::Locally { .. }
                 | Known::AlmostEverywhere
-                | Known::WhileExcited { .. } => &mut sorted.seen,
+                | Known::WhileExcited { .. }
+                | Known::InPart { .. }
+                | Known::Reserved { .. } => &mut sorted.seen,
                 Known::Hidden(Fate::Decays { .. }) => &mut sorted.follows,
                 Known::Hidden(_) => &mut sorted.hidden,
                 Known::Undecided => &mut sorted.open,

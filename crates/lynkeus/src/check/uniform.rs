@@ -5,6 +5,7 @@ use std::fmt;
 use lynkeus_structure::{self as structure, Blind, Place, Uniformity, counted};
 use serde_json::{Map, Value, json};
 
+use super::json::point;
 use crate::words::{number, side};
 #[cfg(feature = "plot")]
 use crate::{Error, plot::Plane};
@@ -60,17 +61,23 @@ impl Uniform {
     }
 }
 
-pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Result {
+/// `reserves` are those of what is known, in words.
+pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform, reserves: &str) -> fmt::Result {
     let Some(uniformity) = uniform.said() else {
         return Ok(());
     };
     let assumption = uniform.assumption();
     match &uniformity.regular.verdict {
         structure::Verdict::Proved => {
-            return writeln!(
+            writeln!(
                 f,
-                "for every constant input{assumption} and everywhere on the box: proved"
-            );
+                "for every constant input{assumption} and everywhere on the box: proved{}{reserves}",
+                match uniformity.one_to_one.finding.is_proved() {
+                    true => "",
+                    false => ", for neighbouring states: locally",
+                }
+            )?;
+            return twins(f, uniformity);
         }
         structure::Verdict::Refuted(witness) => {
             let place = witness.zero().map(|p| {
@@ -90,6 +97,7 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Resul
             writeln!(f, "not decided everywhere on the box{assumption}")?;
         }
     }
+    twins(f, uniformity)?;
     for blind in &uniformity.blind {
         writeln!(f, "  {}", told(blind))?;
     }
@@ -113,6 +121,28 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, uniform: &Uniform) -> fmt::Resul
         )?;
     }
     Ok(())
+}
+
+/// Two states far apart that nothing tells apart.
+fn twins(f: &mut fmt::Formatter<'_>, uniformity: &Uniformity) -> fmt::Result {
+    let Some(alike) = &uniformity.one_to_one.alike else {
+        return Ok(());
+    };
+    let [one, other] = alike.points.each_ref().map(|point| {
+        let sides = point.coordinates.iter();
+        let sides = sides.map(|c| side(&c.name, c.value, c.value));
+        sides.collect::<Vec<_>>().join(", ")
+    });
+    writeln!(
+        f,
+        "  ({one}) and ({other}) give the same outputs and first {} derivatives{}",
+        uniformity.sides.len().saturating_sub(1),
+        if alike.is_proved {
+            ""
+        } else {
+            ", to twelve digits"
+        }
+    )
 }
 
 fn told(blind: &Blind) -> String {
@@ -149,7 +179,7 @@ fn hull(parts: &[Place]) -> String {
     sides.collect::<Vec<_>>().join(", ")
 }
 
-/// `{verdict, detail, share, singular, blind}`
+/// `{verdict, detail, one_to_one, share, singular, blind}`
 pub(super) fn json(uniformity: &Uniformity) -> Value {
     let part = |part: &Place| {
         let sides = part
@@ -164,6 +194,13 @@ pub(super) fn json(uniformity: &Uniformity) -> Value {
     json!({
         "verdict": uniformity.regular.verdict.word(),
         "detail": uniformity.regular.detail,
+        "one_to_one": {
+            "verdict": uniformity.one_to_one.finding.verdict.word(),
+            "detail": uniformity.one_to_one.finding.detail,
+            "alike": uniformity.one_to_one.alike.as_ref().map(|alike| {
+                alike.points.iter().map(point).collect::<Vec<_>>()
+            }),
+        },
         "share": uniformity.share,
         "singular": uniformity.singular.iter().take(LISTED).map(part).collect::<Vec<_>>(),
         "blind": blind.collect::<Vec<_>>(),

@@ -1,10 +1,9 @@
 //! Studies and logs, from files or from standard input.
 
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use lynkeus::expr::Budget;
-use lynkeus::{Error, Study, Table};
+use lynkeus::{Error, Incoming, Study, Table};
 
 use super::files::{Files, is_standard};
 
@@ -18,32 +17,28 @@ pub(super) struct Source {
 }
 
 impl Source {
-    pub fn load(path: &Path) -> Result<Self, Error> {
-        let study = match is_standard(path) {
-            true => Study::parse(&standard_input()?, STANDARD),
-            false => Study::load(path),
-        };
+    /// A study, read and worked on under a budget of time and memory.
+    pub fn load(path: &Path, budget: Budget) -> Result<Self, Error> {
+        let mut study = match is_standard(path) {
+            true => Study::parse(&Incoming::standard(&budget).text(STANDARD)?, STANDARD),
+            false => Study::load_within(path, &budget),
+        }?;
+        study.budget = budget;
         Ok(Self {
-            study: study?,
+            study,
             path: path.to_owned(),
         })
     }
 
-    /// The same under a budget of time and memory.
-    pub fn within(mut self, budget: Budget) -> Self {
-        self.study.budget = budget;
-        self
-    }
-
     /// A study, or a model that stands for one.
-    pub fn load_or_bare(path: &Path, model: Option<String>) -> Result<Self, Error> {
-        if !is_standard(path) {
-            return Ok(Self {
-                study: Study::load_or_bare(path, model)?,
+    pub fn load_or_bare(path: &Path, model: Option<String>, budget: Budget) -> Result<Self, Error> {
+        let mut source = match Study::bare(path).filter(|_| !is_standard(path)) {
+            Some(study) => Self {
+                study: Study { budget, ..study },
                 path: path.to_owned(),
-            });
-        }
-        let mut source = Self::load(path)?;
+            },
+            None => Self::load(path, budget)?,
+        };
         source.study.model = model.or(source.study.model);
         Ok(source)
     }
@@ -59,20 +54,10 @@ impl Source {
     }
 }
 
-/// A log.
-pub(super) fn log(path: &Path) -> Result<Table, Error> {
+/// The log of a study.
+pub(super) fn log(study: &Study, path: &Path) -> Result<Table, Error> {
     match is_standard(path) {
-        true => Table::read(io::stdin().lock(), STANDARD),
-        false => Table::load(path),
-    }
-}
-
-fn standard_input() -> Result<String, Error> {
-    let mut text = String::new();
-    let read = io::stdin().lock().read_to_string(&mut text);
-    read.map_err(|e| Error::input(format!("cannot read {STANDARD}: {e}")))?;
-    match text.strip_prefix('\u{feff}') {
-        Some(rest) => Ok(rest.to_owned()),
-        None => Ok(text),
+        true => Table::read(Incoming::standard(&study.budget), STANDARD),
+        false => lynkeus::log(study, path),
     }
 }

@@ -276,7 +276,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             limits,
             how_well,
         } => {
-            let source = Source::load_or_bare(&study, model)?.within(limits.budget());
+            let source = Source::load_or_bare(&study, model, limits.budget())?;
             if how_well.is_asked() {
                 return how_well::how_well(&source, &how_well, json);
             }
@@ -289,7 +289,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             json,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.for_a_proof());
+            let source = Source::load(&study, limits.for_a_proof())?;
             run::design(&source, output.as_deref(), json)
         }
         Command::Certify {
@@ -298,7 +298,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             json,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.for_a_proof());
+            let source = Source::load(&study, limits.for_a_proof())?;
             run::certify(&source, output.as_deref(), json)
         }
         Command::Simulate {
@@ -309,7 +309,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             runs,
             limits,
         } => {
-            let mut source = Source::load(&study)?.within(limits.budget());
+            let mut source = Source::load(&study, limits.budget())?;
             if let (Some(seed), Some(settings)) = (seed, &mut source.study.simulate) {
                 settings.seed = seed;
             }
@@ -325,7 +325,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             checkpoint,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.budget());
+            let source = Source::load(&study, limits.budget())?;
             run::estimate(&source, &log, &output, checkpoint.as_deref())
         }
         Command::Tune {
@@ -341,7 +341,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             quiet,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.budget());
+            let source = Source::load(&study, limits.budget())?;
             let output = Output {
                 output: None,
                 plot,
@@ -356,7 +356,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             options,
             limits,
         } => {
-            let source = Source::load_or_bare(&study, model)?.within(limits.for_a_proof());
+            let source = Source::load_or_bare(&study, model, limits.for_a_proof())?;
             export::export(&source, &options)
         }
         Command::Report {
@@ -365,7 +365,7 @@ fn execute(command: Command) -> Result<ExitCode, Error> {
             options,
             limits,
         } => {
-            let source = Source::load(&study)?.within(limits.for_a_proof());
+            let source = Source::load(&study, limits.for_a_proof())?;
             report::report(&source, log.as_deref(), &options)
         }
         Command::Schema => {

@@ -58,6 +58,10 @@ pub(super) fn note(text: &str) {
     say(&format!("note: {text}"));
 }
 
+pub(super) fn warn(text: &str) {
+    say(&format!("warning: {text}"));
+}
+
 pub(super) fn complain(error: &Error) {
     let heading = if brings_heading(error) { "" } else { "error: " };
     say(&format!("{heading}{error}"));

@@ -32,7 +32,7 @@ pub(super) fn report(
     let path = &options.output;
     let files = source.files().reads("the log", log);
     files.writes("-o", Some(path)).check()?;
-    let table = log.map(inputs::log).transpose()?;
+    let table = log.map(|log| inputs::log(&source.study, log)).transpose()?;
     let mut progress = Progress::new("reporting", options.quiet);
     let wanted = ReportOptions { step: options.step };
     let page = lynkeus::report(

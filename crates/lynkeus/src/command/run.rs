@@ -111,8 +111,8 @@ pub(super) fn estimate(
     let files = source.files().reads("the log", Some(log));
     let files = output.added_to(files).writes("--checkpoint", checkpoint);
     files.check()?;
-    let table = inputs::log(log)?;
     let study = &source.study;
+    let table = inputs::log(study, log)?;
     let mut checkpoint = checkpoint.map(Checkpoint::new);
     let mut progress = Progress::new("estimating", output.quiet);
     let outcome = match &mut checkpoint {
@@ -144,10 +144,11 @@ pub(super) fn compare(
 ) -> Result<ExitCode, Error> {
     let files = source.files().reads("the log", log);
     output.added_to(files).check()?;
-    let table = log.map(inputs::log).transpose()?;
+    let table = log.map(|log| inputs::log(&source.study, log)).transpose()?;
     let mut progress = Progress::new("comparing", output.quiet);
     let found = lynkeus::compare(&source.study, table.as_ref(), &mut progress.watch())?;
     progress.finish();
+    found.warnings().iter().for_each(|text| output::warn(text));
     let mut results = Results::default();
     if let Some(path) = &output.plot {
         let picture = found.picture(source.study.time_unit.as_deref());
@@ -171,6 +172,7 @@ fn finish(
     simulated: bool,
     mut results: Results,
 ) -> Result<ExitCode, Error> {
+    outcome.warnings.iter().for_each(|text| output::warn(text));
     if !output.quiet {
         outcome.notes.iter().for_each(|note| output::note(note));
     }

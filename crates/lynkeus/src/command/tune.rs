@@ -43,7 +43,7 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
     if options.write && is_standard(path) {
         return Err(Error::input("--write needs a study that is a file"));
     }
-    let source = Source::load(path)?.within(limits.budget());
+    let source = Source::load(path, limits.budget())?;
     let files = match options.write {
         true => source.plant().writes("--write", Some(path)),
         false => source.files(),
@@ -54,7 +54,8 @@ pub(super) fn tune(path: &Path, options: &Options, limits: &Limits) -> Result<Ex
         .draws("--plot", options.plot.as_deref())
         .prints_json(options.json)
         .check()?;
-    let log = options.log.as_deref().map(inputs::log).transpose()?;
+    let log = options.log.as_deref();
+    let log = log.map(|log| inputs::log(&source.study, log)).transpose()?;
     let mut progress = Progress::new("tuning", options.quiet);
     let sweep = lynkeus::tune(&source.study, log.as_ref(), &mut progress.watch())?;
     progress.finish();

@@ -5,6 +5,8 @@ use std::fmt;
 use lynkeus_structure::figures;
 use serde_json::{Map, Value, json};
 
+use crate::Doubt;
+
 use super::{Against, Compared, Comparison, Interval};
 
 impl Comparison {
@@ -27,6 +29,7 @@ impl Comparison {
                     "roughness": run.roughness,
                     "seconds_per_sample": run.per_sample,
                     "credible": run.doubt.is_none(),
+                    "doubts": run.outcome.doubts.iter().map(Doubt::to_json).collect::<Vec<_>>(),
                 })
             }
         };
@@ -39,7 +42,15 @@ impl Comparison {
             },
             "sampling": self.interval.as_ref().map(Interval::to_json),
             "families": self.rows.iter().map(row).collect::<Vec<_>>(),
+            "warnings": self.warnings(),
         })
+    }
+
+    /// What of the log contradicts itself, or counts nowhere: the same for every family.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        let mut runs = self.rows.iter().filter_map(|row| row.run.as_ref().ok());
+        runs.next().map_or(&[], |run| &run.outcome.warnings)
     }
 }
 

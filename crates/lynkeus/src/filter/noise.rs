@@ -7,26 +7,25 @@ use lynkeus_run::Level;
 use lynkeus_structure::{Extended, range, short};
 
 use crate::course::Samples;
+use crate::declared::Declared;
+use crate::prepare::Prepared;
 use crate::series::{Sorted, steps};
 use crate::study::Noise;
-use crate::{Error, Series, Study};
+use crate::{Error, Series};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own
 /// readings scatter.
 pub(crate) fn levels(
-    study: &Study,
+    declared: &Declared,
     extended: &Extended<'_>,
     samples: &Samples,
     notes: &mut Vec<String>,
-) -> Result<Vec<Level>, Error> {
+) -> Vec<Level> {
     let mut levels = vec![];
     for (i, output) in extended.outputs.iter().enumerate() {
         let name = &output.variable.name;
-        let declared = study.sensors.noise.iter().find(|(n, _)| n.text == *name);
-        levels.push(match declared.map(|(_, noise)| *noise) {
-            Some(Noise::Absolute(deviation)) => Level::Absolute(deviation),
-            Some(Noise::Relative(share)) => Level::Relative(share),
-            Some(Noise::Uniform(bound)) => Level::Uniform(bound),
+        levels.push(match declared.noise.of(name) {
+            Some(noise) => Level::from(*noise),
             None => {
                 let readings = &samples.readings[i];
                 let found = scatter(&samples.time, readings, 0).unwrap_or_else(|| even(readings));
@@ -38,19 +37,19 @@ pub(crate) fn levels(
             }
         });
     }
-    Ok(levels)
+    levels
 }
 
 /// The declared noise as standard deviations, by output; that of a share is one of the largest value
 /// on the box, which may be infinite.
 pub(crate) fn deviations(
-    study: &Study,
+    declared: &Declared,
     extended: &Extended<'_>,
 ) -> Result<BTreeMap<String, f64>, Error> {
     let mut found = BTreeMap::new();
-    for (name, noise) in &study.sensors.noise {
-        let mut outputs = extended.outputs.iter();
-        let Some(output) = outputs.find(|o| o.variable.name == name.text) else {
+    for output in &extended.outputs {
+        let name = &output.variable.name;
+        let Some(noise) = declared.noise.of(name) else {
             continue;
         };
         let deviation = match *noise {
@@ -61,7 +60,7 @@ pub(crate) fn deviations(
                 share * values.map_err(Error::from_source)?.enclosure.magnitude()
             }
         };
-        found.insert(name.text.clone(), deviation);
+        found.insert(name.clone(), deviation);
     }
     Ok(found)
 }
@@ -124,24 +123,19 @@ fn off_line(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> f64 {
 /// Spectral densities, one per estimated quantity: the study's `[process_noise]`; for an
 /// unknown input without one, a wander over a quarter of its range in a tenth of the log. Where the
 /// study declares none at all every state may drift a little.
-pub(crate) fn densities(
-    study: &Study,
-    extended: &Extended<'_>,
-    span: f64,
-    notes: &mut Vec<String>,
-) -> Result<Vec<f64>, Error> {
-    let states = &extended.states;
-    let densities = declared(study, extended)?;
-    let is_declared = !study.process_noise.is_empty();
+pub(crate) fn densities(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
+    let (study, extended) = (prepared.study(), prepared.extended());
+    let declared = &prepared.declared().process_noise;
+    let is_declared = declared.is_declared();
     let is_constant = |state: &Variable| {
         let mut names = study.sensors.unknown.iter();
         names.any(|name| name.is_or_has(&state.name))
     };
     let mut is_awake = false;
-    let chosen = densities.into_iter().zip(states).enumerate();
+    let chosen = extended.states.iter().enumerate();
     let chosen: Vec<f64> = chosen
-        .map(|(i, (density, state))| match density {
-            Some(density) => density,
+        .map(|(i, state)| match declared.of(&state.name) {
+            Some(density) => *density,
             None if span <= 0.0 => 0.0,
             None if i >= extended.plant_states() => wander(state, span, notes),
             None if is_declared || is_constant(state) => 0.0,
@@ -162,32 +156,20 @@ pub(crate) fn densities(
             100.0 * DOUBT
         ));
     }
-    Ok(chosen)
+    chosen
 }
 
-/// Spectral densities as the study declares them, one per estimated quantity.
-pub(crate) fn declared(study: &Study, extended: &Extended<'_>) -> Result<Vec<Option<f64>>, Error> {
-    let states = &extended.states;
-    let mut densities = vec![None; states.len()];
-    for (name, density) in &study.process_noise {
-        let mut meant = 0;
-        for (found, _) in densities
-            .iter_mut()
-            .zip(states)
-            .filter(|(_, s)| name.is_or_has(&s.name))
-        {
-            *found = Some(*density);
-            meant += 1;
-        }
-        if meant == 0 {
-            let names = states.iter().map(|s| s.name.as_str());
-            let message =
-                format!("[process_noise]: nothing that is estimated is called \"{name}\"");
-            let refusal = Error::input(message).hint(crate::near::suggest(&name.text, names));
-            return Err(name.blame(refusal));
-        }
-    }
-    Ok(densities)
+/// The same for a family with a theorem, whose gain reads none: what is not declared is an unknown
+/// input's wander, and no doubt of the model.
+pub(crate) fn of_families(prepared: &Prepared<'_>, span: f64, notes: &mut Vec<String>) -> Vec<f64> {
+    let (extended, declared) = (prepared.extended(), &prepared.declared().process_noise);
+    let states = extended.states.iter().enumerate();
+    let density = |(i, state): (usize, &Variable)| match declared.of(&state.name) {
+        Some(density) => *density,
+        None if i >= extended.plant_states() && span > 0.0 => wander(state, span, notes),
+        None => 0.0,
+    };
+    states.map(density).collect()
 }
 
 /// What a model may be wrong by where the study does not say: this share of a state's range.

@@ -3,7 +3,7 @@
 use lynkeus_export::curly::c::File;
 use lynkeus_export::curly::fmu::{Quantity, Version};
 use lynkeus_export::curly::{Exchange, Ode, State};
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Budget, Graph, Node};
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::Observer;
 use lynkeus_run::{Method, System};
@@ -314,6 +314,7 @@ impl<'a> Equations<'a> {
             identifier: exchange.identifier(),
             files,
             version,
+            budget: self.study.budget.clone(),
         })
     }
 }
@@ -324,12 +325,19 @@ pub(crate) struct Texts {
     identifier: String,
     files: Vec<File>,
     version: Version,
+    budget: Budget,
 }
 
 impl Texts {
     /// With the library that the system's C compiler makes of them.
     pub fn archive(self, notes: &mut Vec<String>) -> Artifact {
-        packed(&self.identifier, self.files, self.version, notes)
+        packed(
+            &self.identifier,
+            self.files,
+            self.version,
+            &self.budget,
+            notes,
+        )
     }
 }
 

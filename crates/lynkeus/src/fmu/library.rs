@@ -1,5 +1,7 @@
 //! The library of an archive, by the system's C compiler.
 
+mod folder;
+
 use std::env::consts::{ARCH, DLL_EXTENSION, OS};
 use std::fs::File;
 use std::io::Read;
@@ -8,6 +10,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lynkeus_export::curly::fmu::Version;
+use lynkeus_expr::Budget;
+
+use folder::Folder;
 
 /// Compilers that take the options of cc, in the order in which they are tried.
 const COMPILERS: [&str; 3] = ["cc", "gcc", "clang"];
@@ -55,12 +60,16 @@ impl From<String> for Missing {
     }
 }
 
-/// The library of the sources among the files.
+/// The library of the sources among the files, within the limits of the command.
 ///
 /// # Errors
 /// Why there is none.
-pub(super) fn compile(name: &str, files: &[(String, Vec<u8>)]) -> Result<Vec<u8>, Missing> {
-    let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
+pub(super) fn compile(
+    name: &str,
+    files: &[(String, Vec<u8>)],
+    budget: &Budget,
+) -> Result<Vec<u8>, Missing> {
+    let folder = Folder::new().map_err(|e| format!("no temporary folder: {e}"))?;
     let mut sources = vec![];
     for (path, content) in files {
         let Some(file) = path.strip_prefix("sources/") else {
@@ -74,8 +83,8 @@ pub(super) fn compile(name: &str, files: &[(String, Vec<u8>)]) -> Result<Vec<u8>
     }
     let library = format!("{name}.{DLL_EXTENSION}");
     for compiler in COMPILERS {
-        if let Some(started) = start(compiler, folder.path(), &library, &sources) {
-            finish(compiler, started?, folder.path())?;
+        if let Some(started) = start(compiler, folder.path(), &library, &sources, budget) {
+            finish(compiler, started?, folder.path(), budget)?;
             return std::fs::read(folder.path().join(&library))
                 .map_err(|e| format!("{compiler} left no library: {e}").into());
         }
@@ -92,8 +101,9 @@ fn start(
     folder: &Path,
     library: &str,
     sources: &[String],
+    budget: &Budget,
 ) -> Option<Result<Child, String>> {
-    let mut command = Command::new(compiler);
+    let mut command = confined(compiler, budget.room())?;
     command.args(["-std=c99", "-O2", "-shared", "-fvisibility=hidden"]);
     // the same digits as `estimate`
     command.arg("-ffp-contract=off");
@@ -114,16 +124,60 @@ fn start(
     }
 }
 
-fn finish(compiler: &str, mut child: Child, folder: &Path) -> Result<(), Missing> {
+/// A compiler that gets no more memory than this, where the system can see to it; none where there is
+/// no such compiler.
+#[cfg(target_os = "linux")]
+fn confined(compiler: &str, room: Option<usize>) -> Option<Command> {
+    use std::os::unix::process::CommandExt;
+    let is_there = |folder: std::path::PathBuf| folder.join(compiler).is_file();
+    let path = std::env::var_os("PATH")?;
+    if !std::env::split_paths(&path).any(is_there) {
+        return None;
+    }
+    let mut command = match room {
+        None => Command::new(compiler),
+        Some(bytes) => {
+            let mut shell = Command::new("/bin/sh");
+            let script = "ulimit -v \"$0\" && exec \"$@\"";
+            shell.args(["-c", script, &(bytes >> 10).to_string(), compiler]);
+            shell
+        }
+    };
+    // what it starts itself ends with it
+    command.process_group(0);
+    Some(command)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn confined(compiler: &str, _: Option<usize>) -> Option<Command> {
+    Some(Command::new(compiler))
+}
+
+/// Ends the compiler and what it has started.
+fn stop(child: &mut Child) {
+    if cfg!(target_os = "linux") {
+        let group = format!("-{}", child.id());
+        let mut kill = Command::new("/bin/sh");
+        kill.args(["-c", "kill -KILL \"$0\"", &group]);
+        let _ = kill.stderr(Stdio::null()).status();
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+fn finish(compiler: &str, mut child: Child, folder: &Path, budget: &Budget) -> Result<(), Missing> {
     let began = Instant::now();
     let ended = loop {
         match child.try_wait() {
             Err(e) => return Err(format!("{compiler} cannot be waited for: {e}").into()),
             Ok(Some(status)) => break status,
             Ok(None) if began.elapsed() > LONGEST => {
-                let _ = child.kill();
-                let _ = child.wait();
+                stop(&mut child);
                 return Err(format!("{compiler} was not done after {LONGEST:?}").into());
+            }
+            Ok(None) if let Some(spent) = budget.spent() => {
+                stop(&mut child);
+                return Err(format!("{compiler} was stopped: {spent}").into());
             }
             Ok(None) => std::thread::sleep(Duration::from_millis(5)),
         }

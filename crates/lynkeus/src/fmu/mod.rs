@@ -12,6 +12,7 @@ use lynkeus_export::Refusal;
 use lynkeus_export::curly::c::{File, Precision};
 use lynkeus_export::curly::fmu::{self, Base, Component, Experiment, Quantity, Unit, Version};
 use lynkeus_export::curly::{Device, Entry};
+use lynkeus_expr::Budget;
 use lynkeus_model::{BaseUnit, Variable};
 use lynkeus_observers::Design;
 use lynkeus_run::Blueprint;
@@ -47,7 +48,14 @@ pub(crate) fn archive(
     notes.extend(described.notes.iter().cloned());
     let component = described.component(made);
     let files = fmu::files(&component, version, precision)?;
-    Ok(packed(&component.identifier(), files, version, notes))
+    let budget = &made.prepared.study().budget;
+    Ok(packed(
+        &component.identifier(),
+        files,
+        version,
+        budget,
+        notes,
+    ))
 }
 
 /// The archive of these texts with the library that the system's C compiler makes of them.
@@ -55,13 +63,14 @@ fn packed(
     identifier: &str,
     files: Vec<File>,
     version: Version,
+    budget: &Budget,
     notes: &mut Vec<String>,
 ) -> Artifact {
     let mut entries: Vec<(String, Vec<u8>)> = files
         .into_iter()
         .map(|file| (file.name, file.text.into_bytes()))
         .collect();
-    match library::compile(identifier, &entries) {
+    match library::compile(identifier, &entries, budget) {
         Ok(library) => entries.push((library::place(identifier, version), library)),
         Err(Missing::Compiler(why)) => notes.push(format!(
             "sources only, which not every tool takes: {why}. Where there is a C compiler, export again"

@@ -11,13 +11,15 @@ use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
-use crate::{Error, Study};
+use crate::{Coverage, Error, Study};
 
 /// True course and estimate of one quantity in one run.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Track {
     pub truth: Vec<f64>,
     pub estimate: Vec<f64>,
+    /// its errors beside the deviations told
+    pub coverage: Option<Coverage>,
 }
 
 /// What one run gave.
@@ -98,6 +100,9 @@ impl Job<'_> {
             Err(_) if study.budget.marked().is_some() => return Ok(None),
             ran => ran?,
         };
+        if ran.course.limit.is_some() {
+            return Ok(None);
+        }
         if let Some(ended) = &ran.course.ended {
             return Err(Error::refused(ended.to_string()).at(&study.file));
         }
@@ -108,11 +113,19 @@ impl Job<'_> {
         let tracks = self.followed.iter().map(|f| Track {
             truth: ran.run.column(f.truth).map_or(vec![], |x| x.to_vec()),
             estimate: ran.course.estimates[f.estimate].to_vec(),
+            coverage: None,
         });
-        let tracks = tracks.collect();
+        let mut tracks: Vec<Track> = tracks.collect();
         let at_ends = self.sensors.iter().map(|s| s.count(&ran.run)).collect();
         // as `simulate` judges this run alone
         let alone = simulate::outcome(&own, rig.design.clone(), &ran.run, ran.course)?;
+        let estimates = &alone.design.observer.estimates;
+        for (track, followed) in tracks.iter_mut().zip(self.followed) {
+            let name = &estimates[followed.estimate].variable.name;
+            let mut own = alone.accuracies.iter();
+            let own = own.find(|a| a.quantity == *name);
+            track.coverage = own.and_then(|a| a.coverage);
+        }
         let doubt = alone.refusal().map(|refusal| refusal.to_string());
         Ok(Some(Whole {
             tracks,

@@ -6,7 +6,6 @@ use lynkeus_run::{Column, Role};
 use lynkeus_structure::figures;
 
 use super::{Rig, Whole};
-use crate::Error;
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::saturated::{Limited, TAKEN, limited};
@@ -29,10 +28,7 @@ pub(super) struct Clipped {
 }
 
 /// The sensors with limits.
-///
-/// # Errors
-/// Limits of what is not measured.
-pub(super) fn sensors(prepared: &Prepared<'_>, plant: &Plant) -> Result<Vec<Sensor>, Error> {
+pub(super) fn sensors(prepared: &Prepared<'_>, plant: &Plant) -> Vec<Sensor> {
     let of = |Limited { name, limits }| {
         let place = plant.outputs.iter().position(|o| o.name == name)?;
         let readings = Role::Measured.at(place);
@@ -42,7 +38,7 @@ pub(super) fn sensors(prepared: &Prepared<'_>, plant: &Plant) -> Result<Vec<Sens
             readings,
         })
     };
-    Ok(limited(prepared)?.into_iter().filter_map(of).collect())
+    limited(prepared).into_iter().filter_map(of).collect()
 }
 
 impl Sensor {

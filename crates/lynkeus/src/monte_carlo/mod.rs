@@ -23,7 +23,7 @@ use crate::headers::Headers;
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
-use crate::{Error, Study, prepare};
+use crate::{Coverage, Error, Study, prepare};
 use apart::{Job, Track, Whole, room};
 use ends::{Clipped, Sensor};
 pub use report::Settled;
@@ -48,6 +48,8 @@ pub struct MonteCarlo {
     pub failures: Vec<Failure>,
     /// Those among `seeds` whose estimates are not credible.
     pub doubtful: Vec<Failure>,
+    /// What a limit of time or memory left undone, in words.
+    pub limit: Option<String>,
     /// What repeats one of the runs.
     pub again: Again,
     /// Times of the rows.
@@ -104,6 +106,9 @@ pub struct Scattered {
     pub worst_run: usize,
     /// The error of that run; NaN from where a limit ended its repetition.
     pub worst_course: Vec<f64>,
+    /// Errors beside the standard deviations told, over the last half of the rows of all runs; none where
+    /// there are no deviations.
+    pub coverage: Option<Coverage>,
     /// Headers of its columns: mean and quantiles of truth and error, then the largest |error|.
     pub headers: [String; 7],
 }
@@ -158,7 +163,7 @@ pub fn monte_carlo(
         most = most.max(done);
         watch(most)
     };
-    let sensors = ends::sensors(&prepared, &plant)?;
+    let sensors = ends::sensors(&prepared, &plant);
     let together = Together {
         prepared: &prepared,
         rig: &rig,
@@ -269,6 +274,7 @@ fn reported(
             error: found.error,
             error_worst: found.error_worst,
             rms: found.rms,
+            coverage: found.coverage,
             worst_run: found.worst_run,
             worst_course: found.worst_course,
         }
@@ -276,16 +282,13 @@ fn reported(
     let quantities = quantities.collect();
     let mut notes = rig.design.notes.clone();
     notes.append(&mut headers.notes);
+    notes.extend_from_slice(&rig.notes);
     if !rig.is_random() {
         notes.push("nothing differs from run to run: `noise` of [sensors], [process_noise] and `spread` of [simulate] draw by the seed".to_owned());
     }
     let done = seeds.len() + failures.len();
-    notes.extend(
-        study
-            .budget
-            .marked()
-            .map(|spent| format!("{done} of {asked} runs: {spent}")),
-    );
+    let limit = study.budget.marked();
+    let limit = limit.map(|spent| format!("{done} of {asked} runs: {spent}"));
     MonteCarlo {
         plant: plant.name.clone(),
         family: rig.design.observer.family,
@@ -294,6 +297,7 @@ fn reported(
         seeds,
         failures,
         doubtful,
+        limit,
         again,
         time,
         time_header,

@@ -116,6 +116,7 @@ fn whole(runs: usize, rows: usize) -> Vec<Track> {
     let tracks = || Track {
         truth: Vec::with_capacity(rows),
         estimate: Vec::with_capacity(rows),
+        coverage: None,
     };
     (0..runs).map(|_| tracks()).collect()
 }

@@ -84,14 +84,17 @@ impl MonteCarlo {
         columns
     }
 
-    /// The answer "no" where a run diverged or was refused, or its estimate is not credible.
+    /// The answer "no" where a run diverged or was refused, its estimate is not credible, or a limit left runs undone.
     #[must_use]
     pub fn refusal(&self) -> Option<Error> {
         let (runs, what) = match self.failures.is_empty() {
             true => (&self.doubtful, "have estimates that are not credible"),
             false => (&self.failures, "did not reach their end"),
         };
-        let first = runs.first()?;
+        let Some(first) = runs.first() else {
+            let limit = Error::refused(self.limit.as_ref()?).at(&self.file);
+            return Some(limit.as_ended().hint("allow more time or memory"));
+        };
         let message = format!(
             "{} of {} runs {what}; the first, of seed {}: {}",
             runs.len(),
@@ -125,6 +128,8 @@ impl MonteCarlo {
                     "worst": worst,
                     "worst_seed": self.worst_seed(q),
                 },
+                "within_2_sd": q.coverage.map(|c| c.within),
+                "rms_in_sd": q.coverage.map(|c| c.ratio).filter(|r| r.is_finite()),
             });
             (q.name.clone(), entry)
         });
@@ -142,6 +147,8 @@ impl MonteCarlo {
             "completed": self.seeds.len(),
             "failed": counted(&self.failures),
             "not_credible": counted(&self.doubtful),
+            "credible": self.refusal().is_none(),
+            "ended": self.limit.as_ref().map(|message| json!({ "message": message, "by_limit": true })),
             "rows": self.time.len(),
             "quantities": Value::Object(quantities.collect::<Map<_, _>>()),
             "notes": self.notes,
@@ -177,6 +184,14 @@ impl fmt::Display for MonteCarlo {
                 "  {:width$}  {mean:>10}  {q95:>10}  {worst:>10}  {seed}",
                 q.name
             )?;
+        }
+        let covered = self.quantities.iter().filter_map(|q| {
+            let share = figures(100.0 * q.coverage?.within, 3);
+            Some(format!("{} {share} %", q.name))
+        });
+        let covered: Vec<String> = covered.collect();
+        if !covered.is_empty() {
+            writeln!(f, "within 2 sd there: {}", covered.join(", "))?;
         }
         for (runs, what) in [
             (&self.failures, "not in these figures, ended early"),

@@ -1,6 +1,7 @@
 //! Means, quantiles and the worst of many runs.
 
 use super::{Bands, Track, Whole};
+use crate::Coverage;
 
 /// The quantiles that a band reaches over.
 const LOW: f64 = 0.05;
@@ -14,6 +15,7 @@ pub(super) struct Found {
     pub rms: Vec<f64>,
     pub worst_run: usize,
     pub worst_course: Vec<f64>,
+    pub coverage: Option<Coverage>,
 }
 
 /// What is made of one quantity, row after row.
@@ -47,6 +49,7 @@ pub(super) fn of_runs(runs: &[Whole], place: usize) -> Found {
         let errors = (0..rows).map(|row| worst.estimate(row) - worst.truth[row]);
         found.worst_course.extend(errors);
     }
+    found.coverage = Coverage::of_all(own.iter().filter_map(|track| track.coverage));
     found
 }
 
@@ -86,6 +89,7 @@ impl Scatter {
             error_worst: self.error_worst,
             worst_run: worst.unwrap_or(0),
             worst_course: vec![],
+            coverage: None,
             rms,
         }
     }
@@ -183,6 +187,7 @@ mod tests {
             tracks: vec![Track {
                 truth: vec![1.0, 1.0],
                 estimate: estimate.to_vec(),
+                coverage: None,
             }],
             at_ends: vec![],
             doubt: None,

@@ -9,8 +9,8 @@ use lynkeus_run::{Batch, Column, Ended, Member, Method, Role, Step};
 
 use super::statistics::{Found, Keep, Scatter};
 use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
-use crate::credible::Screen;
 use crate::crew::{self, Watch};
+use crate::judge::Screen;
 use crate::prepare::Prepared;
 use crate::simulate::Rig;
 use crate::{Error, Study};

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::Outcome;
-use crate::{Frozen, Intervals, Outside, Quantity, Series};
+use crate::{Doubt, Frozen, Intervals, Outside, Quantity, Series};
 
 impl Outcome {
     /// The run in figures, as the command's `--json` prints it; `with_truth` as in
@@ -26,10 +26,6 @@ impl Outcome {
             (w.monitor.name.clone(), entry)
         });
         let headers = estimated().map(|q| (q.name.clone(), json!(q.estimate_header)));
-        let doubts = self.doubts.iter().map(|d| {
-            let entry = json!({ "rows": d.rows, "widths": d.widths });
-            (d.name.clone(), entry)
-        });
         let outside = |outside: &Option<Outside>| json!(outside.as_ref().map(|o| o.to_json()));
         json!({
             "plant": self.plant,
@@ -51,7 +47,10 @@ impl Outcome {
             },
             "innovations": object(self.innovations.iter().map(|i| (i.output.clone(), i.to_json())).collect()),
             "credible": self.is_credible(),
-            "doubts": object(doubts.collect()),
+            "declared": self.declared.to_json(),
+            "ended": self.ended.as_ref().map(|e| json!({ "message": e.message, "by_limit": e.by_limit })),
+            "doubts": self.doubts.iter().map(Doubt::to_json).collect::<Vec<_>>(),
+            "warnings": self.warnings,
             "notes": self.notes,
         })
     }

@@ -9,7 +9,9 @@ use lynkeus_run::{Method, Tolerances, Trajectory};
 use lynkeus_structure::Extended;
 
 use super::{Assumed, Candidates, Options, POINTS};
+use crate::declared::Declared;
 use crate::outcome::interrupted;
+use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
@@ -32,11 +34,11 @@ pub(super) struct Setup<'p> {
 
 impl<'p> Setup<'p> {
     pub fn new(
-        study: &Study,
+        prepared: &Prepared<'p>,
         settings: &SimulateSettings,
-        extended: &Extended<'p>,
         options: &Options,
     ) -> Result<Self, Error> {
+        let (study, extended) = (prepared.study(), prepared.extended());
         let plant = extended.plant;
         let mut run = simulate::open_loop(study, settings, plant)?;
         let step = settings.sample_step.unwrap_or(run.output_step);
@@ -56,7 +58,7 @@ impl<'p> Setup<'p> {
             .filter_map(|o| plant.outputs.iter().find(|p| p.name == o.variable.name))
             .cloned()
             .collect();
-        let sensors = Sensors::new(study, extended, &measured, &reach);
+        let sensors = Sensors::new(prepared.declared(), extended, &measured, &reach);
         let others = candidates(plant, &measured, options.sensors);
         let all = measured.iter().chain(&others).map(|v| sensors.sensor(v));
         let (judged, assumed): (Vec<Sensor>, Vec<Assumed>) = all.unzip();
@@ -178,7 +180,7 @@ fn deviation_of_uniform(bound: f64) -> f64 {
 
 /// How noisy sensors are.
 struct Sensors<'a> {
-    study: &'a Study,
+    declared: &'a Declared,
     states: &'a [Variable],
     reach: &'a Reach<'a>,
     /// of a sensor that the study says nothing of
@@ -189,13 +191,13 @@ impl<'a> Sensors<'a> {
     /// A sensor of unknown noise is as noisy as the measured ones are on average (geometric mean):
     /// relative to its value where all of these are, else to its range.
     fn new(
-        study: &'a Study,
+        declared: &'a Declared,
         extended: &'a Extended<'_>,
         measured: &[Variable],
         reach: &'a Reach<'a>,
     ) -> Self {
         let mut sensors = Self {
-            study,
+            declared,
             states: &extended.states,
             reach,
             usual: Noise::Absolute(SHARE),
@@ -220,11 +222,8 @@ impl<'a> Sensors<'a> {
 
     /// The noise in the study; one of zero would tell everything and counts as not stated.
     fn stated(&self, variable: &Variable) -> Option<Noise> {
-        let noise = &self.study.sensors.noise;
-        let found = noise.iter().find(|(name, _)| name.text == variable.name);
-        found
-            .map(|(_, noise)| *noise)
-            .filter(|noise| noise.size() > 0.0)
+        let noise = self.declared.noise.of(&variable.name).copied();
+        noise.filter(|noise| noise.size() > 0.0)
     }
 
     /// The range of an output, else that of the state that it shows.
@@ -238,13 +237,14 @@ impl<'a> Sensors<'a> {
     }
 
     fn sensor(&self, variable: &Variable) -> (Sensor, Assumed) {
+        let limits = self.declared.limits.of(&variable.name).copied();
         let stated = self.stated(variable);
         let noise = match (stated, self.usual) {
             (Some(noise), _) => noise,
             (None, Noise::Absolute(share)) => Noise::Absolute(share * self.scale(variable)),
             (None, relative) => relative,
         };
-        let (deviation, words) = match noise {
+        let (deviation, mut words) = match noise {
             Noise::Absolute(deviation) => (
                 Deviation::Absolute(deviation),
                 format!("±{}", number(deviation)),
@@ -268,7 +268,11 @@ impl<'a> Sensors<'a> {
             name: variable.name.clone(),
             node: variable.node,
             noise: deviation,
+            limits,
         };
+        if let Some(limits) = limits {
+            words += &format!(", from {} to {}", number(limits.low), number(limits.high));
+        }
         let assumed = Assumed {
             name: variable.name.clone(),
             noise: words,

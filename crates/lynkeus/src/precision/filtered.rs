@@ -1,20 +1,22 @@
 //! What a filter knows along the run that trusts the model only as far as `[process_noise]` says: the
-//! standard deviations of the extended Kalman filter itself, on readings without noise.
+//! standard deviations of the extended Kalman filter itself, on readings without noise, a
+//! sensor with limits as its readings tell on average.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use lynkeus_model::Variable;
 use lynkeus_observability::precision::Deviation;
-use lynkeus_observers::{Initial, Tuning, Value};
-use lynkeus_run::{Role, Simulation};
+use lynkeus_observers::{Design, Initial, Tuning, Value};
+use lynkeus_run::{Blueprint, Role, Simulation};
 
 use super::experiment::Setup;
-use crate::course::Samples;
+use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
+use crate::replay::{Watch, replay};
 use crate::simulate::within;
 use crate::study::{Name, Noise};
-use crate::{Error, Study, estimate};
+use crate::{Error, Series, Study, estimate, filter};
 
 /// Nothing is known at the start: a standard deviation of so many ranges.
 const PRIOR: f64 = 1000.0;
@@ -69,8 +71,7 @@ pub(super) fn filtered(
             })
             .collect(),
     };
-    let course = estimate::course(&own, &design, &samples, &mut within(&budget, watch))?;
-    let deviations = course.deviations.unwrap_or_default();
+    let deviations = foreseen(&own, &design, &samples, &mut within(&budget, watch))?;
     let at = |&horizon: &usize| -> Option<Vec<f64>> {
         deviations
             .iter()
@@ -78,6 +79,32 @@ pub(super) fn filtered(
             .collect()
     };
     Ok(window.horizons.iter().map(at).collect())
+}
+
+/// The standard deviations of the filter on readings that stand for those that will come.
+fn foreseen(
+    own: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<Vec<Series>, Error> {
+    let run = estimate::run_settings(&own.study().estimate);
+    let notes = &mut vec![];
+    let mut blueprint = filter::blueprint(own, design, samples, run, notes)?;
+    if let Blueprint::Filter { settings, .. } = &mut blueprint {
+        settings.foresees = true;
+    }
+    let mut filter = blueprint.estimator().map_err(Error::from_source)?;
+    let mut course = Course::default();
+    let count = filter.names().len();
+    replay(
+        &mut filter,
+        samples,
+        count,
+        &mut course,
+        &mut Watch::only(watch),
+    )?;
+    Ok(course.deviations.unwrap_or_default())
 }
 
 /// The study with the filter for its observer, the noises as they were assumed, and a start at the truth.
@@ -117,7 +144,6 @@ fn study(study: &Study, setup: &Setup<'_>, start: &dyn Fn(&str) -> Option<f64>) 
             (Name::from(sensor.name.as_str()), noise)
         })
         .collect();
-    own.sensors.limits.clear();
     own.estimate.smoothing = None;
     own
 }

@@ -14,6 +14,7 @@ mod words;
 
 use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
+use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::{Error, Study, prepare, simulate};
 use experiment::Setup;
@@ -80,10 +81,14 @@ pub struct Report {
     pub filtered: Option<Vec<Vec<f64>>>,
     /// The study declares `[process_noise]`: then the present standard errors count it.
     pub counts_process_noise: bool,
+    /// Which of the study's declarations the present standard errors count.
+    pub declared: Account,
     /// All sensors considered, the study's first.
     pub sensors: Vec<Assumed>,
     /// How many of them are the study's.
     pub measured: usize,
+    /// Inputs that are taken as zero: what they add to errors is not in these numbers.
+    pub disturbances: Vec<String>,
     /// Whether which quantities are seen at the longest horizon hangs on the integrator's accuracy.
     pub is_doubtful: bool,
     /// Which sensors help most, where it was asked.
@@ -99,7 +104,7 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let settings = simulate::settings(study)?;
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let setup = Setup::new(study, settings, prepared.extended(), options)?;
+    let setup = Setup::new(&prepared, settings, options)?;
     let found = setup.experiment.run().map_err(|error| {
         ended(study).unwrap_or_else(|| Error::from_source(error).at(&study.file))
     })?;
@@ -111,7 +116,8 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     let mut run = simulate::open_loop(study, settings, &plant)?;
     run.until = run.start + found.horizons.last().copied().unwrap_or_default();
     let filtered = filtered::filtered(&prepared, &setup, run)?;
-    let counts_process_noise = !study.process_noise.is_empty() && filtered.is_some();
+    let counts_process_noise =
+        prepared.declared().process_noise.is_declared() && filtered.is_some();
     if let (true, Some(filtered)) = (counts_process_noise, &filtered) {
         deviations
             .iter_mut()
@@ -119,10 +125,12 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
             .for_each(|(d, own)| count(d, own));
     }
     let report = Report {
+        disturbances: prepare::sensors(study, &plant).disturbances,
         asked: setup.experiment.window.horizons.len(),
         exact,
         filtered,
         counts_process_noise,
+        declared: account(prepared.declared(), counts_process_noise),
         plant: plant.name.clone(),
         time_unit: study.time_unit.clone(),
         states: plant.states.len(),
@@ -141,6 +149,36 @@ pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
     };
     // what was computed after the end does not count
     ended(study).map_or(Ok(report), Err)
+}
+
+/// What the standard errors count.
+fn account(declared: &Declared, counts_process_noise: bool) -> Account {
+    let Declared {
+        ranges,
+        noise,
+        limits,
+        samples,
+        process_noise,
+        disturbances,
+        slew,
+        input_derivatives,
+    } = declared;
+    Account::default()
+        .counts(ranges)
+        .counts(noise)
+        .counts(limits)
+        .counts(samples)
+        .counts_if(
+            counts_process_noise,
+            process_noise,
+            "the filter on the study's noises breaks down along this run",
+        )
+        .leaves(disturbances, "taken as zero, as the observer takes them")
+        .leaves(
+            slew,
+            "how far an unknown input wanders counts by [process_noise]",
+        )
+        .leaves(input_derivatives, "the inputs are those of [simulate]")
 }
 
 /// What ended the work, if anything did.

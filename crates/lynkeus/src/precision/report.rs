@@ -42,6 +42,8 @@ impl Report {
             "standard_error_exact_model": self.by_name(self.exact.last()),
             "filter_sd": self.by_name(self.filtered.as_ref().and_then(|all| all.last())),
             "counts_process_noise": self.counts_process_noise,
+            "declared": self.declared.to_json(),
+            "disturbances_taken_as_zero": self.disturbances,
             "ranked": self.ranked().iter().map(|&i| &self.names[i]).collect::<Vec<_>>(),
             "rank": {
                 "seen": rank.seen,

@@ -32,6 +32,9 @@ impl fmt::Display for Report {
                 self.asked
             )?;
         }
+        if let Some(told) = self.declared.told() {
+            writeln!(f, "{told}")?;
+        }
         self.doubts(f)
     }
 }
@@ -119,6 +122,13 @@ impl Report {
 
     /// What the figures count, in words.
     fn meaning(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.disturbances.is_empty() {
+            writeln!(
+                f,
+                "disturbances ({}) are taken as zero: what they add to errors is not counted; `lynkeus check` bounds what it can",
+                self.disturbances.join(", ")
+            )?;
+        }
         match (self.counts_process_noise, &self.filtered) {
             (true, _) => writeln!(
                 f,

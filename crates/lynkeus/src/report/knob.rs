@@ -61,7 +61,7 @@ impl Fixed {
         let mut study = prepared.study().clone();
         // a filter has them anyway
         study.estimate.deviations |= is_filter;
-        let asked = prepared.run_by(&study);
+        let asked = prepared.run_by(&study)?;
         let plain = blueprint(&asked, design)?;
         let is_chosen = step.is_none() && fixed(plain.method()).is_none();
         let made = stepped(&asked, plain, step, &mut vec![])?;
@@ -116,7 +116,7 @@ fn variant(prepared: &Prepared<'_>, fixed: &Fixed, position: &Position) -> Resul
     let mut study = position.study.clone();
     study.estimate = prepared.study().estimate.clone();
     study.estimate.deviations = fixed.study.estimate.deviations;
-    let prepared = prepared.with_study(&study);
+    let prepared = prepared.with_study(&study)?;
     let design = prepared.design()?;
     let made = blueprint(&prepared, &design)?;
     // every position needs steps of its own, but where the study has some

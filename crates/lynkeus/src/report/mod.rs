@@ -82,7 +82,7 @@ pub fn report(
         (None, None) => return Err(Error::input("neither a log nor a simulation")),
     };
     let design = prepared.design()?;
-    let as_it_is = prepared.run_by(study);
+    let as_it_is = prepared.run_by(study)?;
     let positions = Positions::new(&as_it_is, &design)?;
     let (moving, outcome) = match run::fixed(&prepared, &design, step, table, watch)? {
         Ok((fixed, outcome)) => {
@@ -103,6 +103,7 @@ pub fn report(
         None => None,
     };
     let samples = Log::read(&prepared, table)?.samples;
+    notes.extend_from_slice(&outcome.warnings);
     notes.extend_from_slice(&outcome.notes);
     let mut certified = certify(study);
     if let Ok(certified) = &mut certified {

@@ -1,6 +1,6 @@
 //! The certificate and what it certifies, as tables.
 
-use lynkeus_observers::Certificate;
+use lynkeus_observers::{Certificate, UltimateBound};
 
 use super::html::{Cell, Html, badge, escaped};
 use super::sections::conditions;
@@ -29,14 +29,30 @@ fn one(html: &mut Html, report: &CertifyReport, certificate: &Certificate) {
             "in the end it is within (Euclidean norm)",
             certificate.ultimate_bound,
         ),
+        (
+            "in the end it is in mean square (the root of E e²) within",
+            certificate.mean_square.as_ref().map(|found| found.norm),
+        ),
     ];
     let guaranteed = guaranteed
         .into_iter()
         .filter_map(|(what, value)| Some(vec![Cell::from(what), Cell::Number(number(value?))]));
     html.table(&["guarantee", "value"], guaranteed.collect());
-    let bounds = certificate.ultimate.iter();
-    let bounds = bounds.map(|b| vec![Cell::from(b.name.as_str()), Cell::Number(number(b.value))]);
-    html.table(&["quantity", "error in the end within"], bounds.collect());
+    let bounds = |each: &[UltimateBound]| -> Vec<Vec<Cell>> {
+        let row =
+            |b: &UltimateBound| vec![Cell::from(b.name.as_str()), Cell::Number(number(b.value))];
+        each.iter().map(row).collect()
+    };
+    html.table(
+        &["quantity", "error in the end within"],
+        bounds(&certificate.ultimate),
+    );
+    if let Some(found) = &certificate.mean_square {
+        html.table(
+            &["quantity", "in the end in mean square within"],
+            bounds(&found.states),
+        );
+    }
     conditions(html, &certificate.hypotheses);
     let constants = certificate.constants.iter().map(|c| {
         vec![

@@ -107,7 +107,7 @@ pub(super) fn fixed(
             Ok(fixed) => fixed,
             Err(why) => return Ok(Err(why)),
         };
-        let outcome = estimate::estimated(&prepared.run_by(&fixed.study), table, watch)?;
+        let outcome = estimate::estimated(&prepared.run_by(&fixed.study)?, table, watch)?;
         Ok(Ok((fixed, outcome)))
     };
     let mut best = match run(1, watch)? {

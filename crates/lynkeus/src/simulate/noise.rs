@@ -1,75 +1,50 @@
 //! What a simulation draws, and what its sensors can show of it.
 
-use std::collections::BTreeMap;
-
 use lynkeus_model::Plant;
-use lynkeus_run::Level;
-use lynkeus_run::filter::Limits;
+use lynkeus_run::{Level, Simulation, process_draws};
+use lynkeus_structure::figures;
 
-use crate::study::{Noise, SimulateSettings};
+use crate::declared::Declared;
+use crate::study::SimulateSettings;
 use crate::{Error, Study};
 
-/// The study's noises, by output and by state, and what its sensors can show.
+/// The study's noises, by output and by state, and what its sensors can show. An unknown input has the
+/// course that `inputs` gives it.
 ///
 /// # Errors
-/// Names of outputs that the plant does not have.
+/// Names that the plant does not have.
 pub(super) fn noise(
     study: &Study,
     settings: &SimulateSettings,
     plant: &Plant,
 ) -> Result<lynkeus_run::Noise, Error> {
-    let mut levels = BTreeMap::new();
-    for (name, noise) in &study.sensors.noise {
-        if !plant.outputs.iter().any(|o| o.name == name.text) {
-            let outputs = plant.outputs.iter().map(|o| o.name.as_str());
-            let refusal = Error::input(format!(
-                "noise: the plant '{}' has no output named \"{name}\"",
-                plant.name
-            ))
-            .hint(crate::near::suggest(&name.text, outputs));
-            return Err(name.blame(refusal));
-        }
-        let level = match *noise {
-            Noise::Absolute(deviation) => Level::Absolute(deviation),
-            Noise::Relative(share) => Level::Relative(share),
-            Noise::Uniform(bound) => Level::Uniform(bound),
-        };
-        levels.insert(name.text.clone(), level);
-    }
+    let declared = Declared::new(study, plant)?;
+    let levels = declared.noise.iter();
+    let limits = declared.limits.iter();
+    let density = |name: &String| Some((name.clone(), *declared.process_noise.of(name)?));
+    let states = plant.states.iter();
     Ok(lynkeus_run::Noise {
         seed: settings.seed,
         sample_step: settings.sample_step,
-        levels,
-        process: process(study, plant),
-        limits: limits(study, plant)?,
+        levels: levels
+            .map(|(name, noise)| (name.clone(), Level::from(*noise)))
+            .collect(),
+        process: states.filter_map(|state| density(&state.name)).collect(),
+        limits: limits
+            .map(|(name, limits)| (name.clone(), *limits))
+            .collect(),
+        process_draws: None,
     })
 }
 
-/// The ranges that sensors can show, by output.
-fn limits(study: &Study, plant: &Plant) -> Result<BTreeMap<String, Limits>, Error> {
-    let mut found = BTreeMap::new();
-    for (name, low, high) in &study.sensors.limits {
-        let outputs = || plant.outputs.iter().map(|o| o.name.as_str());
-        if !outputs().any(|output| output == name.text) {
-            let message = format!(
-                "limits: the plant '{}' has no output named \"{name}\"",
-                plant.name
-            );
-            let hint = crate::near::suggest(&name.text, outputs());
-            return Err(name.blame(Error::input(message).hint(hint)));
-        }
-        let (low, high) = (*low, *high);
-        found.insert(name.text.clone(), Limits { low, high });
-    }
-    Ok(found)
-}
-
-/// The process noise of the plant's states; an unknown input has the course that `inputs` gives it.
-fn process(study: &Study, plant: &Plant) -> BTreeMap<String, f64> {
-    let mut densities = BTreeMap::new();
-    for (name, density) in &study.process_noise {
-        let states = plant.states.iter().filter(|s| name.is_or_has(&s.name));
-        densities.extend(states.map(|s| (s.name.clone(), *density)));
-    }
-    densities
+/// Settles how often process noise is drawn, for all runs alike; says so where it is not often enough.
+pub(super) fn stirred(simulation: &mut Simulation) -> Option<String> {
+    let draws = process_draws(simulation);
+    simulation.noise.process_draws = Some(draws.per_sample);
+    (!draws.are_enough).then(|| {
+        format!(
+            "[process_noise]: a draw is held for {}, too coarse for the fastest states that it moves, which scatter too little: the run would need too many draws; a shorter `until`, or such a state left out of [process_noise]",
+            figures(draws.hold, 2)
+        )
+    })
 }

@@ -18,6 +18,8 @@ pub struct EstimateSettings {
     pub time: Option<String>,
     /// Where the log names a signal differently: (the plant's name, the column's header).
     pub columns: Vec<(Name, String)>,
+    /// Columns of the log that hold u', u'', … of known inputs.
+    pub input_derivatives: Vec<(Name, Vec<String>)>,
     /// A log with missing cells in a column that is read, or whose times do not increase, is refused.
     pub strict: bool,
     /// How much later than the row before it a row may come, in units of time.
@@ -26,6 +28,15 @@ pub struct EstimateSettings {
     pub smoothing: Option<Smoothing>,
     /// Standard deviations beside the estimates.
     pub deviations: bool,
+    /// Innovations of the measured outputs, with theirs.
+    pub innovations: bool,
+}
+
+impl EstimateSettings {
+    /// Whether an observer with a theorem has its errors followed.
+    pub fn follows_errors(&self) -> bool {
+        self.deviations || self.innovations
+    }
 }
 
 /// Which later rows an estimate may use.
@@ -47,6 +58,15 @@ pub enum BetweenSamples {
     Predict,
     /// The straight line to the next row: looks ahead one sample, so only off-line.
     Linear,
+}
+
+/// A header, or a list of them.
+fn headers(entry: Entry<'_>) -> Result<Vec<String>, Error> {
+    let names = match entry.is_list() {
+        true => entry.list_of(Entry::name)?,
+        false => vec![entry.name()?],
+    };
+    Ok(names.into_iter().map(|name| name.text).collect())
 }
 
 pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
@@ -72,6 +92,9 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
             (None, false) => None,
         },
         deviations: section.optional("sd", Entry::boolean)?.unwrap_or_default(),
+        innovations: section
+            .optional("innovations", Entry::boolean)?
+            .unwrap_or_default(),
         time: section.optional("time", Entry::name)?.map(|name| name.text),
         columns: match section.take("columns") {
             None => Vec::new(),
@@ -81,6 +104,14 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
                 .map(|(name, header)| Ok((name, header.name()?.text)))
                 .collect::<Result<_, Error>>()?,
         },
+        input_derivatives: section
+            .optional("input_derivatives", |entry| {
+                let pairs = entry.pairs()?.into_iter();
+                pairs
+                    .map(|(name, value)| Ok((name, headers(value)?)))
+                    .collect()
+            })?
+            .unwrap_or_default(),
         late: section.optional("late", Entry::positive)?,
         strict: section.optional("strict", Entry::boolean)?.unwrap_or(false),
     })

@@ -57,7 +57,7 @@ pub(super) const SECTIONS: [KeySpec; 10] = [
         kind: "table: name = number ≥ 0",
         shape: Shape::Table(&Shape::NotNegative),
         default: "0; for an unknown input, from its range and the log's length",
-        meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md), `sd` and `--how-well`; `simulate` moves the plant's states by it",
+        meaning: "spectral density (variance per unit of time) of white noise on a state's derivative; for an unknown input, how fast it wanders. Read by the [filters](ekf.md), `sd` and `--how-well`; `simulate` moves the plant's states by it, and [`certify`](certificates.md) then bounds the error in mean square",
     },
     KeySpec {
         name: "observer",
@@ -127,7 +127,7 @@ pub(super) const SENSORS: [KeySpec; 5] = [
         kind: "table: output = `[lowest, highest]`",
         shape: Shape::Table(&Shape::List(&Shape::Number)),
         default: "none",
-        meaning: "the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": it corrects a filter only where that expects less; the other families take it as it stands, and a note says how often",
+        meaning: "the range that a sensor can show. `simulate` shows no more than that, and `certify` proves nothing where readings may leave it. A reading at an end only says \"at most\" or \"at least\": the [filters](ekf.md) take it as a censored one, and `--how-well` counts what a clipped reading tells (Fisher's information); the other families take it as it stands, and a note says how often",
     },
     KeySpec {
         name: "measured",
@@ -338,7 +338,7 @@ pub(super) const SIMULATE: [KeySpec; 8] = [
 ];
 
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 8] = [
+pub(super) const ESTIMATE: [KeySpec; 10] = [
     KeySpec {
         name: "late",
         kind: "number > 0",
@@ -365,7 +365,14 @@ pub(super) const ESTIMATE: [KeySpec; 8] = [
         kind: "true, false",
         shape: Shape::Flag,
         default: "false",
-        meaning: "also `<name>_sd`, the standard deviation of each estimate",
+        meaning: "also `<name>_sd`, the standard deviation of each estimate; with `smooth` or `lag` also `<name>_smooth_sd`",
+    },
+    KeySpec {
+        name: "innovations",
+        kind: "true, false",
+        shape: Shape::Flag,
+        default: "false",
+        meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that",
     },
     KeySpec {
         name: "between_samples",
@@ -387,6 +394,13 @@ pub(super) const ESTIMATE: [KeySpec; 8] = [
         shape: Shape::Table(&Shape::Text),
         default: "the plant's names",
         meaning: "where the log's header names a signal differently",
+    },
+    KeySpec {
+        name: "input_derivatives",
+        kind: "table: input = text, or list of texts",
+        shape: Shape::Table(&Shape::Either(&[Shape::Text, Shape::NAMES])),
+        default: "none",
+        meaning: "the log's columns of u', u'', … of a known input, for an observer that reads them ([drift-observable](drift-observable.md), `variant = \"theoretical\"`)",
     },
     KeySpec {
         name: "strict",

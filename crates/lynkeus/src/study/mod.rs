@@ -116,6 +116,20 @@ impl Study {
         Self::of_file(&crate::files::read_text(path, "study")?, path)
     }
 
+    /// The same for somebody who does not wait for ever for one that comes through a pipe.
+    ///
+    /// # Errors
+    /// As [`Study::load`], or the budget is spent.
+    pub fn load_within(path: impl AsRef<Path>, budget: &Budget) -> Result<Self, Error> {
+        let path = path.as_ref();
+        if !crate::files::is_stream(path) {
+            return Self::load(path);
+        }
+        let name = path.display().to_string();
+        let text = crate::Incoming::open(path, "study", budget)?.text(&name)?;
+        Self::of_file(&text, path)
+    }
+
     /// Reads the text of that file.
     fn of_file(text: &str, path: &Path) -> Result<Self, Error> {
         let file = path.display().to_string();
@@ -140,21 +154,21 @@ impl Study {
     /// As [`Study::load`].
     pub fn load_or_bare(path: impl AsRef<Path>, model: Option<String>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let mut study = match is_model(path) {
-            true => Self::bare(path),
-            false => Self::load(path)?,
+        let mut study = match Self::bare(path) {
+            Some(study) => study,
+            None => Self::load(path)?,
         };
         study.model = model.or(study.model);
         Ok(study)
     }
 
-    /// What stands for a model.
-    fn bare(path: &Path) -> Self {
-        Self {
+    /// What stands for a model; none where the file is none by its name.
+    pub fn bare(path: &Path) -> Option<Self> {
+        is_model(path).then(|| Self {
             file: path.display().to_string(),
             plant: Some(path.to_owned()),
             ..Self::default()
-        }
+        })
     }
 
     /// Whether it stands for a bare model: see [`Study::load_or_bare`].

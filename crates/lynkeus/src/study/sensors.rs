@@ -1,5 +1,7 @@
 //! `[sensors]`: what is measured, what is unknown, how noisy.
 
+use lynkeus_run::Level;
+
 use super::Name;
 use super::keys::{NOISE, SENSORS};
 use super::section::Entry;
@@ -37,6 +39,16 @@ impl Noise {
     pub fn size(self) -> f64 {
         match self {
             Noise::Absolute(size) | Noise::Relative(size) | Noise::Uniform(size) => size,
+        }
+    }
+}
+
+impl From<Noise> for Level {
+    fn from(noise: Noise) -> Self {
+        match noise {
+            Noise::Absolute(deviation) => Level::Absolute(deviation),
+            Noise::Relative(share) => Level::Relative(share),
+            Noise::Uniform(bound) => Level::Uniform(bound),
         }
     }
 }

@@ -4,6 +4,8 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+use lynkeus_model::Variable;
+
 /// A place in a study file: `file:line:column`, both counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -37,6 +39,28 @@ impl Name {
     pub(crate) fn is_or_has(&self, variable: &str) -> bool {
         let element = variable.strip_prefix(self.text.as_str());
         element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+    }
+
+    /// What is said of a variable: by its own name, else by that of its array.
+    pub(crate) fn best<'a, T>(said: &'a [(Name, T)], variable: &str) -> Option<&'a T> {
+        let own = said.iter().find(|(name, _)| name.text == variable);
+        let meant = own.or_else(|| said.iter().find(|(name, _)| name.is_or_has(variable)));
+        meant.map(|(_, value)| value)
+    }
+
+    /// The variables that names mean, an array's name its elements; a name that means none stays, for the
+    /// message about it.
+    pub(crate) fn meant(names: &[Name], variables: &[Variable]) -> Vec<String> {
+        let of = |name: &Name| {
+            let meant = variables.iter().filter(|v| name.is_or_has(&v.name));
+            let meant: Vec<String> = meant.map(|v| v.name.clone()).collect();
+            if meant.is_empty() {
+                vec![name.text.clone()]
+            } else {
+                meant
+            }
+        };
+        names.iter().flat_map(of).collect()
     }
 
     /// Puts this name's place on an error about it.

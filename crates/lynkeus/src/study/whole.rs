@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Study, is_model};
+use super::Study;
 use crate::Error;
 use crate::files::read_text;
 
@@ -24,9 +24,9 @@ impl Whole {
     /// As [`Study::load`], of both files.
     pub fn load(path: impl AsRef<Path>, model: Option<String>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let (mut study, text) = match is_model(path) {
-            true => (Study::bare(path), String::new()),
-            false => {
+        let (mut study, text) = match Study::bare(path) {
+            Some(study) => (study, String::new()),
+            None => {
                 let text = read_text(path, "study")?;
                 (Study::of_file(&text, path)?, text)
             }

@@ -98,6 +98,12 @@ impl Column {
         self.values.push(f64::NAN);
     }
 
+    /// It is not read, for nobody asks for it.
+    #[cfg(feature = "parquet")]
+    pub(super) fn leave(&mut self) {
+        self.refuse(0, "it was not read".to_owned(), "read the whole log");
+    }
+
     /// Takes the next row's point in time.
     #[cfg(feature = "parquet")]
     pub(super) fn put_instant(&mut self, instant: Instant) {
@@ -221,7 +227,7 @@ impl Column {
     }
 
     /// Only the first refusal is kept.
-    fn refuse(&mut self, line: u64, message: String, hint: &'static str) {
+    pub(super) fn refuse(&mut self, line: u64, message: String, hint: &'static str) {
         self.refusal.get_or_insert(Refusal {
             line,
             message,

@@ -163,6 +163,7 @@ impl Gathering {
         Ok(Table {
             file: self.name.clone(),
             columns: columns.into_iter().map(Gathered::finished).collect(),
+            truth: vec![],
             lines: Lines::counted(rows),
             store: self.store.clone(),
         })

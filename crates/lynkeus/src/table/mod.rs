@@ -31,7 +31,9 @@ pub use column::Fault;
 pub use gathering::{Cell, Gathered, Gathering};
 pub use instant::Instant;
 pub use number::{exact, significant};
-pub use order::Ordered;
+pub(crate) use order::APART;
+pub use order::{Conflict, Lost, Ordered};
+pub use read::Request;
 pub use write::write_csv;
 
 /// Whether a file is a Parquet file by its name.
@@ -49,6 +51,8 @@ pub fn is_parquet(path: &std::path::Path) -> bool {
 pub struct Table {
     file: String,
     columns: Vec<Column>,
+    /// what is true of quantities, by their names: no column that anybody reads
+    truth: Vec<(String, Series)>,
     lines: Lines,
     store: Store,
 }
@@ -64,6 +68,20 @@ impl Table {
         let columns = columns.map(|(name, values)| table.owned(&name, values));
         let columns = columns.collect();
         table.ragged(columns)
+    }
+
+    /// The same with what is true of quantities, row by row.
+    #[cfg(feature = "tune")]
+    pub(crate) fn with_truth(mut self, truth: Vec<(String, Vec<f64>)>) -> Self {
+        let truth = truth.into_iter();
+        self.truth = truth.map(|(name, values)| (name, values.into())).collect();
+        self
+    }
+
+    /// What is true of a quantity, where that is known apart from the columns.
+    pub(crate) fn truth(&self, name: &str) -> Option<&Series> {
+        let mut named = self.truth.iter().filter(|(known, _)| known == name);
+        named.next().map(|(_, values)| values)
     }
 
     /// The number of rows.
@@ -129,13 +147,13 @@ impl Table {
         column.origin.as_ref().map(|origin| origin.text.as_str())
     }
 
-    /// A column in which cells may be missing: those are NaN.
+    /// A column of times, numbers or dates, in which cells may be missing: those are NaN.
     ///
     /// # Errors
     /// There is no such column (the message lists those found), there are two, a cell begins like
     /// a number and is none, a decimal mark cannot be told (the message gives the line), or every
     /// cell is missing.
-    pub fn readings(&self, name: &str) -> Result<&Series, Error> {
+    pub fn times(&self, name: &str) -> Result<&Series, Error> {
         let column = self.find(name)?;
         if let Some(refusal) = &column.refusal {
             return Err(
@@ -147,6 +165,22 @@ impl Table {
         match column.missing == column.values.len() {
             true => Err(self.without_number(column)),
             false => Ok(&column.values),
+        }
+    }
+
+    /// A column of numbers in which cells may be missing: those are NaN.
+    ///
+    /// # Errors
+    /// As [`Table::times`], or it holds dates.
+    pub fn readings(&self, name: &str) -> Result<&Series, Error> {
+        let values = self.times(name)?;
+        match self.origin(name) {
+            None => Ok(values),
+            Some(date) => Err(Error::input(format!(
+                "column \"{name}\" must hold numbers, found dates such as {date}: only times may be dates"
+            ))
+            .at(self.place())
+            .hint("name another column under [estimate] columns, or convert this one")),
         }
     }
 
@@ -178,12 +212,20 @@ impl Table {
         Ok(Series::gathered(&self.store, held))
     }
 
-    /// A column without missing cells.
+    /// A column of numbers without missing cells.
     ///
     /// # Errors
     /// As [`Table::readings`], or a cell is missing (the message gives the first one's line).
     pub fn column(&self, name: &str) -> Result<&Series, Error> {
-        let values = self.readings(name);
+        self.whole(name, self.readings(name))
+    }
+
+    /// These values of a column, if none is missing.
+    fn whole<'v>(
+        &self,
+        name: &str,
+        values: Result<&'v Series, Error>,
+    ) -> Result<&'v Series, Error> {
         let column = self.find(name)?;
         if let (None, Some(fault)) = (&column.refusal, column.faults.first()) {
             return Err(Error::input(format!(
@@ -202,12 +244,12 @@ impl Table {
     /// The time column: strictly increasing.
     ///
     /// # Errors
-    /// As [`Table::column`], or a row's time is not after the one before it.
+    /// As [`Table::times`], a cell is missing, or a row's time is not after the one before it.
     pub fn time(&self, name: &str) -> Result<&Series, Error> {
         if !self.names().any(|n| n == name) {
             return Err(self.without_time(name));
         }
-        let time = self.column(name)?;
+        let time = self.whole(name, self.times(name))?;
         let mut pairs = time.iter().zip(time.iter().skip(1)).enumerate();
         let Some((i, (before, at))) = pairs.find(|(_, (a, b))| b <= a) else {
             return Ok(time);

@@ -16,6 +16,36 @@ pub struct Ordered {
     pub table: Table,
     /// in words
     pub notes: Vec<String>,
+    /// what of each column counts nowhere, in their order
+    pub lost: Vec<Lost>,
+}
+
+/// Values of a column that count nowhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lost {
+    /// header of the column
+    pub column: String,
+    /// times at which rows have different values; the last one of them counts
+    pub conflicts: usize,
+    /// the first of these
+    pub first: Option<Conflict>,
+    /// values in rows without a time
+    pub timeless: usize,
+}
+
+/// Two values of one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Conflict {
+    /// the time
+    pub time: f64,
+    /// the value that does not count
+    pub lost: f64,
+    /// where it stands
+    pub line: u64,
+    /// the value that counts
+    pub kept: f64,
+    /// where that stands
+    pub kept_line: u64,
 }
 
 impl Table {
@@ -30,7 +60,7 @@ impl Table {
         if !self.names().any(|n| n == time) {
             return Err(self.without_time(time));
         }
-        let times = self.readings(time)?;
+        let times = self.times(time)?;
         let mut before = f64::NEG_INFINITY;
         if times
             .iter()
@@ -51,13 +81,20 @@ impl Table {
         let groups = Groups::of(times)?;
         let timeless = times.len() - groups.rows.len();
         let repeated = groups.rows.len() - groups.count;
+        let mut lost = vec![];
         let merged = |column: &Column| {
             // nobody reads it, and it may have no rows
             if column.refusal.is_some() {
                 return Ok(column.clone());
             }
-            let values = groups.merged(&column.values)?;
+            let (values, contradicted) = groups.merged(&column.values)?;
             let faults = groups.faults_left(&column.faults, &values, &self.lines);
+            lost.push(Lost {
+                column: column.name.clone(),
+                conflicts: contradicted.count,
+                first: contradicted.first.map(|pair| self.conflict(times, pair)),
+                timeless: without_time(times, &column.values),
+            });
             Ok(column.with(values, faults))
         };
         let columns: Result<Vec<Column>, Error> = self.columns.iter().map(merged).collect();
@@ -73,6 +110,7 @@ impl Table {
             table: Table {
                 file: self.file.clone(),
                 columns: columns?,
+                truth: vec![],
                 lines: Lines::counted(groups.count),
                 store: self.store.clone(),
             },
@@ -81,7 +119,18 @@ impl Table {
                 .filter(|(count, _)| *count > 0)
                 .map(|(count, what)| format!("rows of the log {what}: {count}"))
                 .collect(),
+            lost,
         }))
+    }
+
+    fn conflict(&self, times: &Series, [lost, kept]: [(usize, f64); 2]) -> Conflict {
+        Conflict {
+            time: times.get(kept.0).unwrap_or(f64::NAN),
+            lost: lost.1,
+            line: self.lines.of(lost.0),
+            kept: kept.1,
+            kept_line: self.lines.of(kept.0),
+        }
     }
 
     fn jumped(&self, time: &str, row: usize, t: f64, latest: f64) -> Error {
@@ -89,15 +138,35 @@ impl Table {
             "the clock jumps back: \"{time}\" = {t} after {latest}, more than a late row may be"
         ))
         .at(self.place_of(self.lines.of(row)))
-        .hint("split the log there, or allow later rows: `late` of [estimate], in units of time")
+        .hint(format!("{APART}, or split it there, or allow later rows: `late` of [estimate], in units of time"))
     }
 }
 
-/// The median of the steps that go forward.
+/// What to do about a log of several assets.
+pub(crate) const APART: &str =
+    "give each of several assets a log of its own (in Python: `estimate_each` with `by`)";
+
+/// The median of the steps from each time to the next later one: what order the rows are in has no say.
 fn usual_step(times: &Series) -> f64 {
-    let forward = steps(times.iter()).filter(|step| *step > 0.0);
-    let sorted = Sorted::new(times.store(), forward);
-    sorted.median().unwrap_or(0.0)
+    let there = times.iter().filter(|t| t.is_finite());
+    let in_order = Sorted::new(times.store(), there);
+    let forward = steps(in_order.iter()).filter(|step| *step > 0.0);
+    Sorted::new(times.store(), forward).median().unwrap_or(0.0)
+}
+
+/// Values in rows that have no time.
+fn without_time(times: &Series, values: &Series) -> usize {
+    let rows = times.iter().zip(values);
+    rows.filter(|(t, x)| !t.is_finite() && x.is_finite())
+        .count()
+}
+
+/// Times at which a column says different things.
+#[derive(Default)]
+struct Contradicted {
+    count: usize,
+    /// the first of them: a row and its value that do not count, and those that do
+    first: Option<[(usize, f64); 2]>,
 }
 
 /// The rows that have a time, in the order of their times; those of one time are a group.
@@ -124,21 +193,29 @@ impl Groups {
         Ok(Self { rows, ends, count })
     }
 
-    /// A column over the groups: of each the last value that is there.
-    fn merged(&self, values: &Series) -> Result<Series, Error> {
+    /// A column over the groups: of each the last value that is there, and where others are different.
+    fn merged(&self, values: &Series) -> Result<(Series, Contradicted), Error> {
         let of_row = values.held()?;
         let mut merged = Series::within(values.store());
-        let mut last = f64::NAN;
+        let mut contradicted = Contradicted::default();
+        // a row with its value, and another one of the same time before it
+        let (mut last, mut other): (Option<(usize, f64)>, Option<(usize, f64)>) = (None, None);
         for (&row, &is_end) in self.rows.iter().zip(&self.ends) {
             if of_row[row].is_finite() {
-                last = of_row[row];
+                // what counts nowhere differs from what counts
+                other = last.filter(|(_, before)| *before != of_row[row]).or(other);
+                last = Some((row, of_row[row]));
             }
             if is_end {
-                merged.push(last);
-                last = f64::NAN;
+                merged.push(last.map_or(f64::NAN, |(_, value)| value));
+                if let (Some(other), Some(last)) = (other, last) {
+                    contradicted.count += 1;
+                    contradicted.first.get_or_insert([other, last]);
+                }
+                (last, other) = (None, None);
             }
         }
-        Ok(merged)
+        Ok((merged, contradicted))
     }
 
     /// The faults that no other row of the same time mends.
@@ -172,11 +249,17 @@ mod tests {
     #[test]
     fn late_rows_find_their_place_and_doubles_become_one() {
         let text = "t,y,u\n0,1,5\n2,3,5\n1,2,6\n2,,7\n,9,9\n3,4,8\n";
-        let Ordered { table, notes } = read(text, None).unwrap().unwrap();
+        let Ordered { table, notes, lost } = read(text, None).unwrap().unwrap();
         assert_eq!(table.time("t").unwrap().to_vec(), [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(table.readings("y").unwrap().to_vec(), [1.0, 2.0, 3.0, 4.0]);
         assert_eq!(table.readings("u").unwrap().to_vec(), [5.0, 6.0, 7.0, 8.0]);
         assert_eq!(notes.len(), 3, "{notes:?}");
+        let [_, y, u] = &lost[..] else { unreachable!() };
+        assert_eq!((y.conflicts, y.timeless), (0, 1));
+        let first = u.first.unwrap();
+        assert_eq!((u.conflicts, u.timeless), (1, 1));
+        assert_eq!((first.time, first.lost, first.kept), (2.0, 5.0, 7.0));
+        assert_eq!((first.line, first.kept_line), (3, 5));
         assert!(read("t,y\n0,1\n1,2\n", None).unwrap().is_none());
     }
 

@@ -1,19 +1,42 @@
 //! CSV text to tables.
 
-use std::io::{BufRead, BufReader};
+use std::collections::HashSet;
+use std::io::BufRead;
 use std::path::Path;
+
+use lynkeus_expr::Budget;
 
 use super::Table;
 use super::column::Column;
 use super::marks::FileMarks;
 use super::row::{Broken, Rows};
-use crate::Error;
+use crate::incoming::unread;
+use crate::{Error, Incoming};
 
 /// Rows between two looks at whether there is room for them.
 const SAMPLE: usize = 1 << 16;
 
 /// Most columns of a log.
 const MOST_COLUMNS: usize = 100_000;
+
+/// What of a log is read, and within which limits.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// what reading may take
+    pub budget: Budget,
+    /// headers of the columns that are asked for, as far as it can be left out what else there is; all without it
+    pub columns: Option<HashSet<String>>,
+}
+
+impl Request {
+    /// Whether somebody asks for a column.
+    #[cfg(feature = "parquet")]
+    pub(super) fn wants(&self, header: &str) -> bool {
+        self.columns
+            .as_ref()
+            .is_none_or(|columns| columns.contains(header))
+    }
+}
 
 impl Table {
     /// Reads a CSV file with a header row, or a Parquet file if it is called `*.parquet`.
@@ -27,14 +50,24 @@ impl Table {
     /// The file is missing, no file, not UTF-8 text, empty, has no rows, there is no room for its
     /// numbers, or a row has more or fewer cells than the header.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::load_within(path, &Request::default())
+    }
+
+    /// The same for somebody who asks for less, or who does not wait for ever.
+    ///
+    /// # Errors
+    /// As [`Table::load`], or the budget is spent.
+    pub fn load_within(path: impl AsRef<Path>, request: &Request) -> Result<Self, Error> {
         let path = path.as_ref();
-        let file = crate::files::open(path, "log")?;
+        let name = path.display().to_string();
         #[cfg(feature = "parquet")]
         if super::is_parquet(path) {
-            return super::parquet::load(file, &path.display().to_string());
+            return match crate::files::is_stream(path) {
+                true => Err(super::parquet::no_file(&name)),
+                false => super::parquet::load(crate::files::open(path, "log")?, &name, request),
+            };
         }
-        let input = BufReader::with_capacity(1 << 16, file);
-        Self::read(input, &path.display().to_string())
+        Self::read(Incoming::open(path, "log", &request.budget)?, &name)
     }
 
     /// Reads CSV text; `file` names it in messages.
@@ -150,9 +183,7 @@ impl<R: BufRead> Reading<R> {
 
     fn broken(&self, broken: &Broken) -> Error {
         match broken {
-            Broken::Io(e) => {
-                Error::input(format!("cannot read the log file: {e}")).at(&self.table.file)
-            }
+            Broken::Io(e) => unread(e, "cannot read the log file", &self.table.file),
             Broken::Long => self
                 .error("expected rows of text, found one of more than 4 MiB".to_owned())
                 .hint("a quote that is never closed, or no CSV file"),

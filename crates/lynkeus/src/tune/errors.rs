@@ -1,6 +1,6 @@
 //! Errors of an estimate over time, each as a share of its quantity's scale, and what is read off them.
 
-use crate::credible::RUN_AWAY;
+use crate::judge::RUN_AWAY;
 
 /// Scaled errors: estimate minus truth, divided by the quantity's scale.
 #[derive(Clone, Debug, PartialEq)]

@@ -19,12 +19,13 @@ pub(super) const HELD_OUT: &str = "held out";
 /// order.
 pub(super) fn predicted<'c>(observer: &Observer, course: &'c Course) -> &'c [Series] {
     let states = observer.states.len();
-    course.monitors.get(states..).unwrap_or_default()
+    let range = states..states + observer.measured.len();
+    course.monitors.get(range).unwrap_or_default()
 }
 
 /// The observer with a switch: where [`HELD_OUT`] is above zero, it reads its own prediction
 /// h(x̂) in the place of every measurement, so that its innovation is zero and it runs as a
-/// model. Its monitors are its states, then its predictions.
+/// model. Its monitors are its states, then its predictions, then those of [`transparent`].
 pub(super) fn switchable(plant: &Plant, observer: &Observer) -> Observer {
     let graph = &plant.graph;
     let predictions = predictions(plant, observer);
@@ -44,14 +45,15 @@ pub(super) fn switchable(plant: &Plant, observer: &Observer) -> Observer {
         symbol: switch.node(),
     });
     let pairs = observer.measured.iter().zip(predictions);
-    switchable
-        .monitors
-        .extend(pairs.map(|(signal, node)| Monitor {
-            name: signal.name.clone(),
-            node,
-            alarm_below: f64::NEG_INFINITY,
-            meaning: String::new(),
-        }));
+    let shown = pairs.map(|(signal, node)| Monitor {
+        name: signal.name.clone(),
+        node,
+        alarm_below: f64::NEG_INFINITY,
+        meaning: String::new(),
+        matrix: None,
+    });
+    let states = observer.states.len();
+    switchable.monitors.splice(states..states, shown);
     switchable
 }
 

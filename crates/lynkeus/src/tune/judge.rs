@@ -144,7 +144,9 @@ impl Judge<'_> {
         let caused = noisy.minus(exact);
         let level = self.noise_level(run);
         let tail = caused.from(self.reference.tail);
-        let gain = (level > 0.0).then(|| tail.worst_rms() / level);
+        // what process noise adds is no noise of a sensor that comes through
+        let is_moved = self.reference.noise.process.values().any(|q| *q > 0.0);
+        let gain = (level > 0.0 && !is_moved).then(|| tail.worst_rms() / level);
         row.set(measures::NOISE_GAIN, gain);
         row.set(measures::NOISE_ERROR, Some(caused.mean()));
         row.set(measures::TOTAL_ERROR, Some(noisy.mean()));

@@ -32,6 +32,7 @@ pub use measures::Measure;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
 
+use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::simulate::within;
 use crate::{Error, Study, Table, crew, prepare};
@@ -109,6 +110,8 @@ pub struct Sweep {
     pub knee: Option<usize>,
     /// The unit of time, if the study states it.
     pub time_unit: Option<String>,
+    /// Which of the study's declarations the figures count.
+    pub declared: Account,
     /// What the user should know.
     pub notes: Vec<String>,
 }
@@ -143,6 +146,7 @@ pub fn tune(
     let bench = Bench::new(&prepared, log)?;
     let mut sweep = judged(&prepared, &bench, axes, &grid, watch)?;
     sweep.notes.splice(0..0, pinned.notes);
+    sweep.declared = account(prepared.declared(), log.is_none());
     sweep.log = log.map(|table| table.file().to_owned());
     let at_an_end = sweep.at_an_end().map(|(axis, value)| {
         format!(
@@ -199,8 +203,37 @@ fn judged(
         knee: least(&rows),
         rows,
         time_unit: study.time_unit.clone(),
+        declared: Account::default(),
         notes,
     })
+}
+
+/// What the figures count; on a log they are of its own noise and samples.
+fn account(declared: &Declared, is_simulated: bool) -> Account {
+    let Declared {
+        ranges,
+        noise,
+        limits,
+        samples,
+        process_noise,
+        disturbances,
+        slew,
+        input_derivatives,
+    } = declared;
+    let measured = "the log's own is in its readings";
+    let promised = "a promise of what the inputs do: `certify` counts it";
+    Account::default()
+        .counts(ranges)
+        .counts(limits)
+        .counts_if(is_simulated, noise, measured)
+        .counts_if(is_simulated, process_noise, measured)
+        .counts_if(is_simulated, samples, "the log has its own")
+        .leaves(
+            disturbances,
+            "what `inputs` of [simulate] and `disturbance` of [tune] make of them counts",
+        )
+        .leaves(slew, promised)
+        .leaves(input_derivatives, promised)
 }
 
 /// A filter that the study names has nothing to sweep, whatever its keys.
@@ -314,6 +347,7 @@ mod tests {
             knee: least(&rows),
             rows,
             time_unit: None,
+            declared: Account::default(),
             notes: vec![],
         }
     }

@@ -60,6 +60,9 @@ pub(super) fn pinned(prepared: &Prepared<'_>) -> Result<Pinned, Error> {
         pinned.proposed = Some(proposal.speed.key());
         pinned.notes.push(proposal.to_string());
     }
+    if choice.ended.is_some() {
+        pinned.notes.extend(choice.notes());
+    }
     if study.observer.family.is_none() {
         pinned.notes.push(format!(
             "every value is one of the family {family}; `family` of [observer] names another"

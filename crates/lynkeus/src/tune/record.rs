@@ -43,7 +43,7 @@ impl<'t> Record<'t> {
             false => log.samples.clone(),
             true => held_out(&log.samples, &plan, between),
         };
-        let mut notes = log.notes.clone();
+        let mut notes = [&log.warnings[..], &log.notes].concat();
         for (i, output) in prepared.extended().outputs.iter().enumerate() {
             let name = &output.variable.name;
             let is_left = |readings: &Series| readings.iter().any(f64::is_finite);

@@ -122,7 +122,7 @@ fn starts(study: &Study, plant: &Plant) -> Result<Vec<f64>, Error> {
     let sensors = &study.sensors;
     let unread = |name: &str| {
         let mut names = sensors.unknown.iter().chain(&sensors.disturbances);
-        names.any(|n| n.text == name)
+        names.any(|n| n.is_or_has(name))
     };
     let inputs = systems::input_expressions(study, plant, settings)?;
     let inputs: Vec<(String, Node)> = inputs.into_iter().filter(|(n, _)| unread(n)).collect();

@@ -65,8 +65,9 @@ pub(super) fn course(
     let mut study = prepared.study().clone();
     study.estimate.between_samples = between;
     study.estimate.deviations = false;
+    study.estimate.innovations = false;
     study.estimate.smoothing = None;
-    let prepared = prepared.run_by(&study);
+    let prepared = prepared.run_by(&study)?;
     let mut run = run_settings(&study.estimate);
     run.method = thrifty(run.method, samples.time.len() as f64);
     let watch = &mut replay::Watch::only(watch);

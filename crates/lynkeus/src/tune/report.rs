@@ -47,6 +47,7 @@ impl Sweep {
             "knee": self.chosen().map(|row| self.row_to_json(row)),
             "nearly_as_good": good,
             "rows": self.rows.iter().map(|row| self.row_to_json(row)).collect::<Vec<_>>(),
+            "declared": self.declared.to_json(),
             "notes": self.notes,
         })
     }

@@ -233,6 +233,7 @@ mod tests {
             rows: vec![row],
             knee: Some(0),
             time_unit: None,
+            declared: crate::Account::default(),
             notes: vec![],
         }
     }

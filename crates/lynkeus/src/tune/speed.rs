@@ -10,9 +10,10 @@ const STABLE: f64 = 2.7;
 const LOOKS: usize = 64;
 
 /// The observer with its states as its monitors, in their order, so that a run can be looked
-/// into afterwards.
+/// into afterwards; what says how far a matrix is from singular comes last.
 pub(super) fn transparent(observer: &Observer) -> Observer {
     let mut observer = observer.clone();
+    let margins = std::mem::take(&mut observer.monitors).into_iter();
     let states = observer.states.iter();
     observer.monitors = states
         .map(|(signal, _)| Monitor {
@@ -20,7 +21,9 @@ pub(super) fn transparent(observer: &Observer) -> Observer {
             node: signal.symbol,
             alarm_below: f64::NEG_INFINITY,
             meaning: String::new(),
+            matrix: None,
         })
+        .chain(margins.filter(|monitor| monitor.matrix.is_some()))
         .collect();
     observer
 }

@@ -164,5 +164,6 @@ pub(super) fn is_answer(error: &RunError) -> bool {
             | RunError::StepUnderflow { .. }
             | RunError::StepBudget { .. }
             | RunError::TooStiff { .. }
+            | RunError::Singular { .. }
     )
 }

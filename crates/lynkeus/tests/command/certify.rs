@@ -1,6 +1,7 @@
 //! `certify`, and `gain = "lmi"`: what is proved, and what a refusal says.
 
 mod column;
+mod declared;
 mod errors;
 mod moving;
 mod printed;

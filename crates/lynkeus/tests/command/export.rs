@@ -1,6 +1,8 @@
 //! `export`: what compilers make of it gives what `estimate` gives.
 
 mod corners;
+mod glitch;
+mod hidden;
 pub(super) mod javascript;
 mod names;
 mod rust;
@@ -96,7 +98,29 @@ fn example(random: &mut Normal, folder: &Folder, place: usize) {
     let estimate = format!(
         "\n[estimate]\nmethod = \"rk4\"\n{step}\nbetween_samples = \"{between}\"\nsd = {sd}\n"
     );
-    folder.write("s.toml", &(study + &estimate));
+    let wandering = if sd {
+        densities(&study, 0.01)
+    } else {
+        String::new()
+    };
+    folder.write("s.toml", &(study + &wandering + &estimate));
+}
+
+/// Densities of a study's unknown inputs, without which an exported deviation would be none.
+pub(super) fn densities(study: &str, density: f64) -> String {
+    let unknown = study
+        .lines()
+        .find_map(|line| line.strip_prefix("unknown = ["));
+    let names = unknown.map_or("", |rest| rest.split(']').next().unwrap());
+    let names = names.split(',').map(|name| name.trim().trim_matches('"'));
+    let lines = names.filter(|name| !name.is_empty() && !study.contains("[process_noise]"));
+    let lines: String = lines
+        .map(|name| format!("\"{name}\" = {density}\n"))
+        .collect();
+    match lines.is_empty() {
+        true => lines,
+        false => format!("\n[process_noise]\n{lines}"),
+    }
 }
 
 /// A filter of a random plant on a random log.
@@ -113,8 +137,15 @@ fn filter(random: &mut Normal, folder: &Folder) {
     let mut study = format!(
         "plant = \"m.mo\"\n[sensors]\nmeasured = [\"y\"]\nunknown = {unknown:?}\nnoise = {{ y = {noise} }}\n"
     );
-    if random.uniform() < 0.3 {
-        study += "limits = { y = [-1.5, 1.5] }\n";
+    if random.uniform() < 0.4 {
+        // out of reach, or in the midst of the readings
+        study += *pick(
+            random,
+            &[
+                "limits = { y = [-1.5, 1.5] }\n",
+                "limits = { y = [-0.3, 0.4] }\n",
+            ],
+        );
     }
     study += "[process_noise]\n";
     for name in ["x0", "x1", "x2", "x3"]

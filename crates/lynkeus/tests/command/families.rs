@@ -115,6 +115,202 @@ fn the_practical_observer_passes_its_singularity() {
     }
 }
 
+/// (4.1) reaches det Q̄ = 0 in finite time where u₀ is small: the run ends there and says which
+/// matrix, where and what to do, with the table so far; the same from a log by (4.22), in `compare`
+/// and in `tune`.
+#[test]
+fn a_run_that_comes_to_a_singular_map_says_so() {
+    let (folder, file) = copied("germani-manes/theoretical.toml");
+    folder.change("germani_manes.mo", "min = 3, max = 7", "min = -3, max = 7");
+    folder.change(&file, "output_step = 0.08", "output_step = 0.01");
+    for (input, variant, until) in [
+        ("0 + 0.2*sin", "theoretical", 0.12),
+        ("0 + 2*sin", "theoretical", 0.50),
+        ("2 + 2*sin", "theoretical", 1.03),
+        ("3 + 2*sin", "theoretical", 0.75),
+    ] {
+        let text = folder.read(&file);
+        folder.write("s.toml", &text.replace("5 + 2*sin", input));
+        let ended = folder.run(&["simulate", "s.toml", "-o", "o.csv"]);
+        assert_eq!(ended.code, 1, "{input}: {}", ended.err);
+        for words in [
+            "Q̄ is singular at t = ",
+            "(rcond = ",
+            "the estimate is x1 = ",
+            "`initial`",
+        ] {
+            assert!(
+                ended.err.contains(words),
+                "{input}, {variant}: {}",
+                ended.err
+            );
+        }
+        assert!(!ended.err.contains("relay"), "{}", ended.err);
+        let (_, rows) = csv(&folder.read("o.csv"));
+        let last = rows.last().unwrap()[0];
+        assert!((last - until).abs() < 0.02, "{input}: {last}");
+    }
+    let tuned = folder.run(&["tune", "s.toml", "--json"]);
+    let told = format!("{}{}", tuned.out, tuned.err);
+    assert!(told.contains("Q̄ is singular"), "{told}");
+    // stiff steps do not pass either
+    folder.change("s.toml", "until = 4", "until = 4\nmethod = \"stiff\"");
+    let ended = folder.run(&["simulate", "s.toml", "-o", "o.csv"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(ended.err.contains("Q̄ is singular"), "{}", ended.err);
+}
+
+/// (4.1) on a log that holds u' in a column of its own (Remark 4.2) follows the plant as in the
+/// simulation; without the column it is refused, and the key is named.
+#[test]
+fn the_theoretical_observer_reads_slopes_of_inputs_from_a_log() {
+    let (folder, file) = copied("germani-manes/theoretical.toml");
+    folder.change(&file, "output_step = 0.08", "output_step = 0.001");
+    let ended = folder.run(&["simulate", &file, "--log", "log.csv", "-q", "-o", "s.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let text = folder.read("log.csv");
+    let mut lines = text.lines();
+    let mut log = format!("{},speed\n", lines.next().unwrap());
+    for line in lines {
+        let t: f64 = line.split(',').next().unwrap().parse().unwrap();
+        let turn = 2.0 * std::f64::consts::PI;
+        log += &format!("{line},{}\n", 2.0 * turn * (turn * t).cos());
+    }
+    folder.write("log.csv", &log);
+    let refused = folder.run(&["estimate", &file, "log.csv"]);
+    assert_eq!(refused.code, 2);
+    for words in [
+        "input_derivatives = { u = ",
+        "under [estimate]",
+        "practical",
+    ] {
+        assert!(refused.err.contains(words), "{}", refused.err);
+    }
+    let with = |key: &str| {
+        let text = folder.read(&file);
+        folder.write(
+            "e.toml",
+            &format!(
+                "{text}\n[estimate]\nbetween_samples = \"linear\"\ninput_derivatives = {key}\n"
+            ),
+        );
+        folder.run(&["estimate", "e.toml", "log.csv", "-o", "e.csv"])
+    };
+    let ended = with("{ u = \"speed\" }");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (names, rows) = csv(&folder.read("e.csv"));
+    let (truth_names, truth) = csv(&folder.read("s.csv"));
+    for x in ["x1", "x2", "x3"] {
+        let place = |names: &[String], name: &str| names.iter().position(|n| n == name).unwrap();
+        let estimate = rows.last().unwrap()[place(&names, &format!("{x}_hat"))];
+        let exact = truth.last().unwrap()[place(&truth_names, x)];
+        assert!(
+            (estimate - exact).abs() < 1e-3,
+            "{x}: {estimate} against {exact}"
+        );
+    }
+    let ended = with("{ v = \"speed\" }");
+    assert_eq!(ended.code, 2);
+    assert!(
+        ended.err.contains("no known input is called \"v\""),
+        "{}",
+        ended.err
+    );
+    let ended = with("{ u = \"sped\" }");
+    assert_eq!(ended.code, 2);
+    assert!(ended.err.contains("sped"), "{}", ended.err);
+}
+
+/// (3.1) on the paper's input "does not work at all": it diverges, which is an answer with a table.
+/// With a small input it converges.
+#[test]
+fn the_bounded_observer_diverges_with_a_table() {
+    let (folder, file) = copied("germani-manes/bounded.toml");
+    let ended = folder.run(&["simulate", &file, "-o", "o.csv", "--json"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(
+        ended.err.contains("the estimate diverged: 'x2'"),
+        "{}",
+        ended.err
+    );
+    let (header, rows) = csv(&folder.read("o.csv"));
+    let x2 = header.iter().position(|n| n == "x2_hat").unwrap();
+    let away = rows.iter().find(|row| row[x2].abs() > 1e6).unwrap();
+    assert!((away[0] - 0.26).abs() < 0.005, "{}", away[0]);
+    assert_eq!(ended.json()["credible"], false);
+    folder.change(&file, "5 + 2*sin", "0.2*sin");
+    let ended = folder.run(&["simulate", &file, "--json"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+/// The errors of x₂ and x₃ of Ltaief's example for t from 5 to 10.
+fn late_errors(folder: &Folder, study: &str) -> [Vec<f64>; 2] {
+    let ended = folder.run(&["simulate", study]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let (header, rows) = csv(&ended.out);
+    let column = |name: &str| header.iter().position(|n| n == name).unwrap();
+    ["x2", "x3"].map(|x| {
+        let (truth, estimate) = (column(x), column(&format!("{x}_hat")));
+        let late = rows.iter().filter(|row| row[0] >= 5.0);
+        late.map(|row| row[estimate] - row[truth]).collect()
+    })
+}
+
+/// With the noise of section 5 θ = 10 leaves nothing of x₂ and x₃, which move within ±0.44; θ = 1
+/// does: figures of docs/state-affine.md, and of an observer programmed apart.
+#[test]
+fn the_noisy_example_of_ltaief_asks_for_a_small_theta() {
+    let (folder, file) = copied("ltaief/study-noise.toml");
+    let rms = |errors: &Vec<f64>| {
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
+    };
+    for (theta, [least, most]) in [("1", [0.04, 0.15]), ("10", [0.7, 1.3])] {
+        let text = folder.read(&file);
+        folder.write(
+            "s.toml",
+            &text.replace("theta = 1\n", &format!("theta = {theta}\n")),
+        );
+        for errors in late_errors(&folder, "s.toml") {
+            let rms = rms(&errors);
+            assert!((least..most).contains(&rms), "θ = {theta}: {rms}");
+        }
+    }
+}
+
+/// Without noise the error of x₃ grows again beyond θ = 100, and λ_min(S)θ² tends to about 60: (12) does
+/// not hold. `certify` gives no θ0.
+#[test]
+fn the_excitation_of_ltaief_falls_like_the_square_of_theta() {
+    let (folder, file) = copied("ltaief/study.toml");
+    let text = folder.read(&file);
+    let at = |theta: f64| {
+        let text = text.replace("theta = 10\n", &format!("theta = {theta}\n"));
+        folder.write(
+            "s.toml",
+            &text.replace("output_step = 0.05", "output_step = 0.005"),
+        );
+        let errors = late_errors(&folder, "s.toml");
+        let (header, rows) = csv(&folder.run(&["simulate", "s.toml"]).out);
+        let excitation = header.iter().position(|n| n == "excitation").unwrap();
+        let between = rows.iter().filter(|row| (1.0..=3.0).contains(&row[0]));
+        let least = between
+            .map(|row| row[excitation])
+            .fold(f64::INFINITY, f64::min);
+        let worst = errors[1].iter().fold(0.0_f64, |m, e| m.max(e.abs()));
+        (worst, least * theta * theta)
+    };
+    let (at_100, _) = at(100.0);
+    let (at_400, slow) = at(400.0);
+    assert!((at_100 - 0.0038).abs() < 1e-4 && (at_400 - 0.0057).abs() < 1e-4);
+    assert!((slow - 57.4).abs() < 0.5, "{slow}");
+    let report = folder.run(&["certify", &file, "--json"]).json();
+    let constants = report["certificate"]["theorem"]["constants"].to_string();
+    assert!(
+        !constants.contains("θ0") && constants.contains("λ_m needed"),
+        "{constants}"
+    );
+}
+
 /// Renames whole words.
 fn renamed(text: &str, pairs: &[(&str, &str)]) -> String {
     let mut out = String::new();
@@ -412,7 +608,15 @@ fn every_shipped_study_runs() {
             let name = file.unwrap().file_name().to_str().unwrap().to_owned();
             if name.ends_with(".toml") {
                 let ended = run(&folder, &["simulate", &name, "--json"]);
-                assert_eq!(ended.code, 0, "{}/{name}: {}", folder.display(), ended.err);
+                // what a paper says does not work at all
+                let code = i32::from(name == "bounded.toml");
+                assert_eq!(
+                    ended.code,
+                    code,
+                    "{}/{name}: {}",
+                    folder.display(),
+                    ended.err
+                );
             }
         }
     }

@@ -77,3 +77,69 @@ fn a_bare_model_has_no_run_to_judge() {
     assert_eq!(ended.code, 2);
     assert!(ended.err.contains("[simulate]"), "{}", ended.err);
 }
+
+/// The standard errors of a plant at the end of a run.
+fn standard_errors(model: &str, noise: &str, run: &str) -> serde_json::Value {
+    let folder = Folder::empty();
+    folder.write("m.mo", model);
+    let sensors =
+        format!("plant = \"m.mo\"\n[sensors]\nnoise = {{ y = {noise} }}\n[simulate]\n{run}");
+    folder.write("s.toml", &sensors);
+    folder
+        .run(&["check", "s.toml", "--how-well", "--json"])
+        .json()
+}
+
+fn near(found: &serde_json::Value, expected: f64) {
+    let found = found.as_f64().unwrap_or(f64::NAN);
+    assert!((found / expected - 1.0).abs() < 0.01, "{found} {expected}");
+}
+
+/// Beside what grows by e^40 the rest is not lost (F in a hundred digits gives these numbers); what nothing shows stays unseen.
+#[test]
+fn what_hardly_moves_is_seen_beside_what_grows() {
+    let found = standard_errors(
+        "model M Real x0(start = 0.1, min = -5, max = 5); Real x1(start = 0.1, min = -5, max = 5); Real x2(start = 0.3, min = -5, max = 5);
+         output Real y = 0.76*x0 + 0.87*x1; equation der(x0) = 5*x0 - 0.74*x1; der(x1) = -0.01*x1; der(x2) = 0.3*x1 - 0.2*x2; end M;",
+        "0.01",
+        "until = 8\noutput_step = 0.2",
+    );
+    near(&found["standard_error"]["x1"], 0.001_565_4);
+    near(&found["standard_error_of_start"]["x1"], 0.001_695_8);
+    assert!(found["standard_error"]["x2"].is_null(), "{found}");
+}
+
+/// The same plant in smaller units: errors scale with them.
+#[test]
+fn small_units_are_seen_as_well() {
+    let at = |unit: &str| {
+        standard_errors(
+            &format!(
+                "model M Real x(start = {unit}, min = -5*{unit}, max = 5*{unit}); Real v(start = 0, min = -5*{unit}, max = 5*{unit});
+                 output Real y = x; equation der(x) = v; der(v) = -x - 0.1*v; end M;"
+            ),
+            &format!("{}", 0.05 * unit.parse::<f64>().unwrap()),
+            "until = 5\noutput_step = 0.1",
+        )
+    };
+    let (own, small) = (at("1.0"), at("1e-13"));
+    for name in ["x", "v"] {
+        let expected = 1e-13 * own["standard_error"][name].as_f64().unwrap();
+        near(&small["standard_error"][name], expected);
+    }
+}
+
+/// They may be of any size, and are in no figure.
+#[test]
+fn disturbances_that_are_not_counted_are_named() {
+    let folder = Folder::empty();
+    folder.write("m.mo", "model M Real x(start = 1, min = -2, max = 2); input Real d(min = -1, max = 1); output Real y = x + d; equation der(x) = 0; end M;");
+    folder.write("s.toml", "plant = \"m.mo\"\n[sensors]\ndisturbances = [\"d\"]\nnoise = { y = 0.01 }\n[simulate]\nuntil = 1\noutput_step = 0.1");
+    let ended = folder.run(&["check", "s.toml", "--how-well"]);
+    assert!(
+        ended.out.contains("disturbances (d) are taken as zero"),
+        "{}{}",
+        ended.out,
+        ended.err
+    );
+}

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Ended, Folder};
+use super::{Ended, Folder, examples};
 
 /// Seconds that each command may take.
 const LIMIT: u64 = 2;
@@ -233,4 +233,70 @@ fn a_filter_that_a_limit_ends_keeps_its_rows() {
     let ended = limited(&folder, &["simulate", "s.toml", "-o", "p.csv"]);
     assert_eq!(ended.code, 3, "{}", ended.err);
     assert!(!folder.files().contains(&"p.csv".to_owned()));
+}
+
+/// Where a limit ends the work on a family, no other is taken in its place without a word.
+#[test]
+fn a_limit_takes_no_other_observer_in_silence() {
+    let folder = Folder::empty();
+    for file in ["quadrotor.mo", "study.toml"] {
+        let text = std::fs::read_to_string(examples().join("quadrotor").join(file)).unwrap();
+        folder.write(file, &text);
+    }
+    let text = folder.read("study.toml");
+    let start = text.find("[observer]").unwrap();
+    let end = start
+        + text[start + 1..]
+            .find("\n[")
+            .map_or(text.len() - start, |at| at + 2);
+    let open = format!(
+        "{}[process_noise]\nwind = 0.1\n\n[observer]\nfamily = \"auto\"\n\n{}",
+        &text[..start],
+        &text[end..]
+    );
+    folder.write("study.toml", &open);
+    let family = |ended: &Ended| {
+        ended.json()["family"]
+            .as_str()
+            .unwrap_or_default()
+            .to_owned()
+    };
+    let free = family(&folder.run(&["design", "study.toml", "--json"]));
+    assert_ne!(free, "ekf");
+    for limit in [
+        ["--memory-limit", "1"],
+        ["--time-limit", "0.004"],
+        ["--time-limit", "0.02"],
+        ["--time-limit", "0.1"],
+    ] {
+        let design = folder.run(&[&["design", "study.toml"][..], &limit].concat());
+        let told = format!("{}{}", design.out, design.err);
+        let same = design.code == 0 && told.contains(&format!("{free} observer"));
+        assert!(
+            design.code == 3 || same || told.contains("hangs on a limit"),
+            "{limit:?}: {told}"
+        );
+        let export = folder.run(
+            &[
+                &["export", "study.toml", "--to", "c", "-o", "c", "--force"][..],
+                &limit,
+            ]
+            .concat(),
+        );
+        let header = folder.path.path().join("c").join("quadrotor.h");
+        let header = std::fs::read_to_string(header).unwrap_or_default();
+        assert!(
+            export.code == 3
+                || header.contains(&format!("{free} observer"))
+                || export.err.contains("hangs on a limit"),
+            "{limit:?}: {}",
+            export.err
+        );
+        let check = folder.run(&[&["check", "study.toml"][..], &limit].concat());
+        assert!(
+            !check.out.contains("no family with a theorem fits"),
+            "{}",
+            check.out
+        );
+    }
 }

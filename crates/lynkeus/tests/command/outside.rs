@@ -147,10 +147,12 @@ fn an_estimate_that_runs_away_is_an_answer_no_with_its_table() {
     let json = ended.json();
     assert_eq!(json["credible"], false);
     assert!(json["final"]["z"].as_f64().unwrap().abs() > 1e6, "{json}");
-    assert!(
-        json["doubts"]["z"]["widths"].as_f64().unwrap() > 1e6,
-        "{json}"
+    let doubt = &json["doubts"][0];
+    assert_eq!(
+        (&doubt["kind"], &doubt["name"]),
+        (&"range".into(), &"z".into())
     );
+    assert_eq!(doubt["level"], "refusal");
     assert_eq!(csv(&folder.read("o.csv")).1.len(), 56);
     assert!(folder.files().contains(&"p.svg".to_owned()));
 

@@ -161,5 +161,6 @@ fn readings_at_an_end_are_told() {
     folder.write("study.toml", &wide.replace("limits = { y", "limits = { q"));
     let ended = folder.run(&["simulate", "study.toml", "-o", "run.csv"]);
     assert_eq!(ended.code, 2);
-    assert!(ended.err.contains("no output named \"q\""), "{}", ended.err);
+    let refusal = "no output is called \"q\"";
+    assert!(ended.err.contains(refusal), "{}", ended.err);
 }

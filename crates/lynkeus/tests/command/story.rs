@@ -254,6 +254,35 @@ fn what_is_pasted_keeps_the_start() {
     assert_eq!(folder.read("a.csv"), folder.read("b.csv"), "{observer}");
 }
 
+/// A family whose θ is a list is proposed a list, and what `check` prints can be pasted.
+#[test]
+fn a_list_of_speeds_is_proposed_where_the_family_takes_one() {
+    let folder = Folder::empty();
+    folder.copy_models("farza");
+    let study = "plant = \"farza.mo\"\n[sensors]\nmeasured = [\"y1\", \"y2\", \"y3\"]\nunknown = [\"v\"]\n[observer]\nfamily = \"unknown-input\"\ninitial = { x1 = 1, x2 = 1, x3 = 1, x4 = 0, x5 = 0, v = -1 }\n[simulate]\nuntil = 10\noutput_step = 0.02\ninputs = { v = \"5*sin(5*time)\" }\n";
+    folder.write("study.toml", study);
+    let report = folder.run(&["check", "study.toml", "--json"]).json();
+    let proposed = &report["choice"]["proposed"];
+    assert_eq!(proposed["key"], "theta");
+    let value: Vec<f64> = serde_json::from_value(proposed["value"].clone()).unwrap();
+    assert!(value.len() == 2 && value[0] > value[1], "{value:?}");
+    let text = folder.run(&["check", "study.toml"]).out;
+    let line = format!("theta = [{}, {}]", value[0], value[1]);
+    assert!(text.contains(&line), "{line} is missing:\n{text}");
+    let ended = folder.run(&["simulate", "study.toml"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert!(
+        ended.err.contains(&format!("{line} is proposed")),
+        "{}",
+        ended.err
+    );
+    // pasted, it is the same observer, and nothing is proposed
+    folder.change("study.toml", "initial", &format!("{line}\ninitial"));
+    let pasted = folder.run(&["simulate", "study.toml"]);
+    assert_eq!((pasted.code, pasted.out), (0, ended.out), "{}", pasted.err);
+    assert!(!pasted.err.contains("is proposed"), "{}", pasted.err);
+}
+
 /// `tune` begins where `check` ends: around the speed that is proposed, on its own side of zero.
 #[test]
 fn a_study_without_a_speed_is_tuned_around_the_proposal() {

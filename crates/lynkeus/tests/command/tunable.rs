@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::export::{Run, compiled, difference, estimated, has, replayed, without};
+use crate::export::{Run, compiled, densities, difference, estimated, has, replayed, without};
 use crate::{Folder, examples, skipped};
 
 /// Text of a study in place of another, that has to be there.
@@ -130,7 +130,9 @@ fn prepared(folder: &Folder, case: &Case) -> String {
     let study = setting.fold(study, |study, change| changed(&study, *change));
     simulated(folder, &study);
     let sd = study.contains("\nnoise");
-    study + &format!("\n[estimate]\nmethod = \"rk4\"\nsubsteps = 4\nsd = {sd}\n")
+    // without process noise, whose covariance over a step is singular but for rounding
+    let wandering = densities(&study, 0.0);
+    study + &wandering + &format!("\n[estimate]\nmethod = \"rk4\"\nsubsteps = 4\nsd = {sd}\n")
 }
 
 fn simulated(folder: &Folder, study: &str) {

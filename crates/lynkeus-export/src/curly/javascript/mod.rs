@@ -9,6 +9,7 @@ use super::language::{FUNCTIONS, Language};
 use super::machine::{Field, Machine};
 use super::words;
 use crate::Refusal;
+use crate::hidden::{is_hidden, seen};
 
 /// What the library of the draft is in JavaScript, where that has it.
 const OWN: [(&str, &str); 3] = [
@@ -83,14 +84,23 @@ fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
     };
     let source = printed(&format!("{}\n{}", machine.tables, machine.source), word)?;
     Ok(format!(
-        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n{tunables}\n{}\n{}{}\n{export}{}\n{export}{PUSH}",
+        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n{tunables}\n{}\n{}{}\n{export}{}\n{export}{}",
         names(device.signals.iter()),
         names(device.estimates.iter()),
         sizes.collect::<String>(),
         library,
         source,
         init(&machine.fields),
+        push(),
     ))
+}
+
+/// With the numbers of the words in it.
+fn push() -> String {
+    let number = |word: &str| words::number(word).unwrap_or_default().to_string();
+    PUSH.replace("@DIVERGED@", &number("DIVERGED"))
+        .replace("@NOT_FINITE@", &number("NOT_FINITE"))
+        .replace("@PATIENCE@", &words::PATIENCE.to_string())
 }
 
 const PUSH: &str = "function push(s, t, signals, estimates)
@@ -103,6 +113,20 @@ const PUSH: &str = "function push(s, t, signals, estimates)
                 s[name].set(before[name]);
             } else {
                 s[name] = before[name];
+            }
+        }
+    }
+    if (code === @DIVERGED@ || code === @NOT_FINITE@) {
+        s.refused += 1;
+        // an absurd reading that was taken is behind it: from the next sample on it starts anew
+        const fresh = s.refused < @PATIENCE@ ? {} : init();
+        for (const name of Object.keys(fresh)) {
+            if (name === \"tuning\") {
+                // stays what it was made
+            } else if (ArrayBuffer.isView(s[name])) {
+                s[name].set(fresh[name]);
+            } else {
+                s[name] = fresh[name];
             }
         }
     }
@@ -156,8 +180,8 @@ fn string(text: &str) -> String {
     let escaped = text.chars().map(|c| match c {
         '"' | '\\' => format!("\\{c}"),
         '<' => "\\u003c".to_owned(),
-        '\u{2028}' | '\u{2029}' => " ".to_owned(),
-        c if c.is_control() => " ".to_owned(),
+        // the same name, whatever shows it; two code units beyond the first plane, where nothing is hidden
+        c if is_hidden(c) => format!("\\u{:04x}", u32::from(c)),
         c => c.to_string(),
     });
     format!("\"{}\"", escaped.collect::<String>())
@@ -165,13 +189,5 @@ fn string(text: &str) -> String {
 
 /// A line of a comment.
 fn one_line(text: &str) -> String {
-    let plain = |c: char| match c {
-        '\u{2028}' | '\u{2029}' => ' ',
-        c if c.is_control() => ' ',
-        c => c,
-    };
-    text.chars()
-        .map(plain)
-        .collect::<String>()
-        .replace("</", "< /")
+    seen(text).replace("</", "< /")
 }

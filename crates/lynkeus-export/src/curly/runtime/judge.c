@@ -1,26 +1,32 @@
-/* Whether a reading corrects the estimate; variance is that of its innovation. */
-static truth judge(STATE *s, int i, real reading, real predicted, real variance)
+/* Whether a reading corrects the estimate; spread is the variance of what is predicted. The
+   variance of the reading's noise is left among the noises. */
+static truth judge(STATE *s, int i, real reading, real predicted, real spread, real *noises)
 {
-    (void)predicted;
+    noises[i] = expected_noise(i, predicted, spread);
     if (!isfinite(reading)) {
         s->became[i] = MISSING;
         return 0;
     }
+    const real variance = spread + noises[i];
     s->became[i] = TAKEN;
-    if (variance < R(0.0)) {
+//? deviation
+    const real deviation = sqrt(variance > R(0.0) ? variance : R(0.0));
+//?
+//? limits
+    const int end = end_of(i, reading);
+    const real outward = (real)end * (shown_of(i, reading) - predicted);
+    if (end != 0 && (outward < R(0.0) || (!(outward > R(0.0)) && !(deviation > R(0.0))))) {
+        s->became[i] = AT_LIMIT;
+    }
+//?
+    if (s->became[i] == TAKEN && variance < R(0.0)) {
         s->became[i] = REJECTED;
     }
 //? gate
     /* a gate must not lock the filter out for ever: a sensor that moves is believed in the end */
-    const real spread = sqrt(variance > R(0.0) ? variance : R(0.0));
     const truth is_heard = s->rejected[i] >= 10 && s->moved[i] >= 5;
-    if (!is_heard && fabs(reading - predicted) > GATE * spread) {
+    if (s->became[i] == TAKEN && !is_heard && fabs(SHOWN_READING - predicted) > GATE * deviation) {
         s->became[i] = REJECTED;
-    }
-//?
-//? limits
-    if ((reading <= lowest[i] && predicted <= lowest[i]) || (reading >= highest[i] && predicted >= highest[i])) {
-        s->became[i] = AT_LIMIT;
     }
 //?
     if (s->became[i] == REJECTED) {
@@ -33,5 +39,12 @@ static truth judge(STATE *s, int i, real reading, real predicted, real variance)
         s->rejected[i] = 0;
     }
     s->last[i] = reading;
-    return s->became[i] == TAKEN ? 1 : 0;
+//? relative
+    /* a reading that contradicts the prediction has a say in how large its noise is */
+    const real surprise = SURPRISE;
+    if (fabs(surprise) > R(3.0) * deviation) {
+        noises[i] = noise_after(i, reading, predicted, spread);
+    }
+//?
+    return s->became[i] == REJECTED ? 0 : 1;
 }

@@ -341,6 +341,112 @@ static real noise_variance(int i, real predicted)
     return noise_variances[i] + share * share;
 }
 
+//= expected_noise
+/* The variance of a sensor's noise where the model predicts a value with some variance. */
+static real expected_noise(int i, real predicted, real spread)
+{
+    const real mean = predicted * predicted + (spread > R(0.0) ? spread : R(0.0));
+    return noise_variances[i] + noise_shares[i] * noise_shares[i] * mean;
+}
+
+//= noise_after
+/* The same given a reading that contradicts the prediction: of what that reading with that noise
+   leaves of it. */
+static real noise_after(int i, real reading, real predicted, real spread)
+{
+    const real share = noise_shares[i] * noise_shares[i];
+    real low = R(0.0);
+    real high = R(1.0);
+    real noise = noise_variances[i];
+    for (int k = 0; k < 60; k++) {
+        const real gain = R(0.5) * (low + high);
+        const real value = predicted + gain * (reading - predicted);
+        noise = noise_variances[i] + share * (value * value + spread * (R(1.0) - gain));
+        if (gain * (spread + noise) < spread) {
+            low = gain;
+        } else {
+            high = gain;
+        }
+    }
+    const real last = predicted + high * (reading - predicted);
+    return noise_variances[i] + share * (last * last + spread * (R(1.0) - high));
+}
+
+//= end_of
+/* The end of its sensor's range that a reading is at: -1, 1, or 0 for none. */
+static int end_of(int i, real reading)
+{
+    if (reading >= highest[i]) {
+        return 1;
+    }
+    return reading <= lowest[i] ? -1 : 0;
+}
+
+//= shown_of
+/* A reading within the range of its sensor. */
+static real shown_of(int i, real reading)
+{
+    const real capped = reading > highest[i] ? highest[i] : reading;
+    return capped < lowest[i] ? lowest[i] : capped;
+}
+
+//= tail_beyond
+/* A standard normal number beyond a: its mean, and how far that is beyond a. */
+static void tail_beyond(real a, real *tail)
+{
+    const real size = fabs(a);
+    const real density = R(0.3989422804014327) * exp(R(-0.5) * a * a);
+    if (size < R(2.25)) {
+        real term = a;
+        real sum = a;
+        for (int k = 1; k < 40; k++) {
+            const int odd = 2 * k + 1;
+            term *= a * a / (real)odd;
+            sum += term;
+        }
+        tail[0] = density / (R(0.5) - density * sum);
+        tail[1] = tail[0] - a;
+    } else {
+        real excess = R(0.0);
+        for (int k = 0; k < 79; k++) {
+            excess = (real)(79 - k) / (size + excess);
+        }
+        if (a > R(0.0)) {
+            tail[0] = a + excess;
+            tail[1] = excess;
+        } else {
+            tail[0] = density / (R(1.0) - density / (size + excess));
+            tail[1] = tail[0] - a;
+        }
+    }
+}
+
+//= weigh
+/* A reading at an end of its sensor's range as an ordinary one: its innovation, and the variance of
+   its noise. 0 where it says nothing. */
+static truth weigh(int end, real innovation, real spread, real noise, real *weighed)
+{
+    real tail[2];
+    const real side = (real)end;
+    const real variance = spread + noise;
+    if (!(variance > R(0.0))) {
+        weighed[0] = innovation;
+        weighed[1] = noise;
+        return side * innovation > R(0.0) ? 1 : 0;
+    }
+    const real deviation = sqrt(variance);
+    const real a = side * innovation / deviation;
+    tail_beyond(a, tail);
+    const real told = tail[0] * tail[1];
+    if (!(told > R(1e-10))) {
+        return 0;
+    }
+    const real more = R(1.0) / told - R(1.0);
+    weighed[0] = side * deviation / tail[1];
+    weighed[1] = noise + variance * (more > R(0.0) ? more : R(0.0));
+    return 1;
+}
+
 //= widen
 /* Widens what counts as a plausible value. */
 static void widen(STATE *s, real value)

@@ -4,33 +4,14 @@ static truth predict(field f, double from, double to, int steps, const real *w, 
 {
     real z[DIMENSION];
     real rows[CARRIED * STATES];
-    for (int i = 0; i < DIMENSION; i++) {
-        z[i] = R(0.0);
-    }
-    for (int i = 0; i < STATES; i++) {
-        z[i] = x[i];
-        z[STATES + i * WIDTH + i] = R(1.0);
-    }
-    if (!integrate(f, from, to, steps, w, z)) {
+    if (!along(f, from, to, steps, w, x, z)) {
         return 0;
     }
     for (int i = 0; i < CARRIED * STATES; i++) {
         rows[i] = R(0.0);
     }
 //? noisy
-    real noise[STATES * STATES];
-    real lower[STATES * STATES];
-    for (int i = 0; i < STATES; i++) {
-        for (int j = 0; j < STATES; j++) {
-            noise[i * STATES + j] = NOISE_SCALE * z[STATES + i * WIDTH + STATES + j];
-        }
-    }
-    factorise(noise, STATES, lower);
-    for (int i = 0; i < STATES; i++) {
-        for (int k = 0; k <= i; k++) {
-            rows[k * STATES + i] = lower[i * STATES + k];
-        }
-    }
+    rows_of_noise(z, w, rows);
 //?
     for (int i = 0; i < STATES; i++) {
         for (int j = 0; j < STATES; j++) {

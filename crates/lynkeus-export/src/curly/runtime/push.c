@@ -42,5 +42,6 @@ static int take(STATE *s, double t, const real *signals, real *estimates)
     }
     s->time = t;
     s->started = 1;
+    s->refused = 0;
     return code;
 }

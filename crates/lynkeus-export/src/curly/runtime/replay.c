@@ -51,6 +51,23 @@ static int split(char *text)
     return count;
 }
 
+/* The next line; -1 where it is longer than there is room for, 0 at the end. */
+static int next_line(void)
+{
+    size_t length;
+    if (fgets(line, LONGEST, stdin) == NULL) {
+        return 0;
+    }
+    length = strlen(line);
+    if (length == LONGEST - 1 && line[length - 1] != '\n') {
+        const int next = getchar();
+        if (next != EOF) {
+            return -1;
+        }
+    }
+    return 1;
+}
+
 static int column(const char *name, int count)
 {
     for (int i = 0; i < count; i++) {
@@ -109,8 +126,14 @@ int main(void)
     int count = 0;
     long row = 1;
 
-    if (fgets(line, LONGEST, stdin) == NULL) {
+    int has_line = next_line();
+
+    if (has_line == 0) {
         (void)fprintf(stderr, "expected a table on standard input, found nothing\n");
+        return 2;
+    }
+    if (has_line < 0) {
+        (void)fprintf(stderr, "row %ld: expected at most %d bytes, found more\n", row, LONGEST - 1);
         return 2;
     }
     count = split(line);
@@ -146,10 +169,14 @@ int main(void)
         }
     }
 //?
-    while (fgets(line, LONGEST, stdin) != NULL) {
+    for (has_line = next_line(); has_line != 0; has_line = next_line()) {
         int code = 0;
         double t = 0.0;
         row++;
+        if (has_line < 0) {
+            (void)fprintf(stderr, "row %ld: expected at most %d bytes, found more\n", row, LONGEST - 1);
+            return 2;
+        }
         count = split(line);
         if (count == 1 && cells[0][0] == '\0') {
             continue;

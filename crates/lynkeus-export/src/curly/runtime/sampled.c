@@ -47,11 +47,18 @@ static int update(STATE *s, double t, const real *signals)
 {
     (void)t;
     start(s, signals);
+//? deviations
+    real c[SENSORS * STATES];
+    for (int i = 0; i < SENSORS * STATES; i++) {
+        c[i] = R(0.0);
+    }
+    reading_slopes((real)t, s->x, s->inputs, c);
+//?
     for (int i = 0; i < SENSORS; i++) {
         if (isfinite(signals[i])) {
             s->x[OWN + i] = signals[i];
 //? deviations
-            reset(s->root, i, signals[i]);
+            reset(s->root, c, i, signals[i]);
 //?
         }
         widen(s, s->x[OWN + i]);

@@ -1,11 +1,14 @@
-/* The held measurement of a sensor is a new reading, with an error of its own. */
-static void reset(real *root, int sensor, real reading)
+/* The measurement of a sensor is a new reading: it is off from what is expected by an error of its own, less the
+   estimate's. c: how the sensors depend on x. */
+static void reset(real *root, const real *c, int sensor, real reading)
 {
     real rows[(STATES + 1) * STATES];
+    real expected[STATES];
     const int state = OWN + sensor;
+    project(root, c, sensor, expected);
     for (int k = 0; k < STATES; k++) {
         for (int i = 0; i < STATES; i++) {
-            rows[k * STATES + i] = i == state ? R(0.0) : root[i * STATES + k];
+            rows[k * STATES + i] = i == state ? -expected[k] : root[i * STATES + k];
         }
     }
     for (int i = 0; i < STATES; i++) {

@@ -69,35 +69,37 @@ static void root_of_points(const real *points, const real *extra, int count, rea
 //?
 }
 
-/* Each point through the flow. 0, and nothing changed, where the flow has no value. */
+/* Each point through the flow; P is their spread and W. 0, and nothing changed, where the flow has no value. */
 static truth predict(field f, double from, double to, int steps, const real *w, real *x, real *root)
 {
     real points[POINTS * STATES];
     real point[STATES];
     real extra[STATES * STATES];
+    for (int i = 0; i < STATES * STATES; i++) {
+        extra[i] = R(0.0);
+    }
     draw(x, root, points);
-    for (int k = 0; k < POINTS; k++) {
+//? noisy
+    /* the estimate with what the process noise comes to along it */
+    real z[DIMENSION];
+    if (!along(linearised, from, to, steps, w, x, z)) {
+        return 0;
+    }
+    rows_of_noise(z, w, extra);
+    for (int i = 0; i < STATES; i++) {
+        points[i] = z[i];
+    }
+//?
+    for (int k = FIRST; k < POINTS; k++) {
         for (int i = 0; i < STATES; i++) {
             point[i] = points[k * STATES + i];
         }
-        if (!integrate(f, from, to, steps, w, point)) {
+        if (!integrate_point(f, from, to, steps, w, point)) {
             return 0;
         }
         for (int i = 0; i < STATES; i++) {
             points[k * STATES + i] = point[i];
         }
-    }
-    for (int i = 0; i < STATES * STATES; i++) {
-        extra[i] = R(0.0);
-    }
-    const double span = to - from;
-    for (int i = 0; i < STATES; i++) {
-//? tunable
-        extra[i * STATES + i] = sqrt(process_noise[i] * w[INPUTS] * (real)span);
-//?
-//? !tunable
-        extra[i * STATES + i] = sqrt(process_noise[i] * (real)span);
-//?
     }
     centre(points, STATES, x);
     root_of_points(points, extra, STATES, root);
@@ -120,24 +122,12 @@ static void substitute(const real *lower, int n, real *b)
     }
 }
 
-/* Points drawn again; the gain over the readings that are believed. 0 where the sensors' model has
-   no value. */
-static truth correct(STATE *s, double t)
+/* Points drawn again beside their mean, and what the sensors show of them beside theirs, h. 0 where
+   the sensors' model has no value. */
+static truth show(STATE *s, double t, real *points, real *shown, real *h)
 {
-    real points[POINTS * STATES];
     real point[STATES];
-    real shown[POINTS * SENSORS];
-    real h[SENSORS];
     real mean[STATES];
-    real noises[SENSORS];
-    real innovations[SENSORS];
-    int taken[SENSORS];
-    real variances[SENSORS * SENSORS];
-    real lower[SENSORS * SENSORS];
-    real row[SENSORS];
-    real gain[STATES * SENSORS];
-    real extra[SENSORS * STATES];
-    int count = 0;
     draw(s->x, s->root, points);
     for (int k = 0; k < POINTS; k++) {
         for (int i = 0; i < STATES; i++) {
@@ -153,57 +143,119 @@ static truth correct(STATE *s, double t)
     }
     centre(points, STATES, mean);
     centre(shown, SENSORS, h);
-    for (int i = 0; i < SENSORS; i++) {
-        real variance = R(0.0);
-        for (int k = 0; k < POINTS; k++) {
-            variance += weight(k) * shown[k * SENSORS + i] * shown[k * SENSORS + i];
-        }
-        const real noise = noise_variance(i, h[i]);
-        variance += noise;
-        if (judge(s, i, s->readings[i], h[i], variance) && variance > R(0.0)) {
-            taken[count] = i;
-            noises[count] = noise;
-            innovations[count] = s->readings[i] - h[i];
-            count++;
-        }
-    }
-    if (count == 0) {
-        return 1;
-    }
-    for (int a = 0; a < count; a++) {
-        for (int b = 0; b < count; b++) {
-            real variance = R(0.0);
-            for (int k = 0; k < POINTS; k++) {
-                variance += weight(k) * shown[k * SENSORS + taken[a]] * shown[k * SENSORS + taken[b]];
-            }
-            variances[a * count + b] = a == b ? variance + noises[a] : variance;
-        }
-    }
-    factorise(variances, count, lower);
-    for (int i = 0; i < STATES; i++) {
-        for (int a = 0; a < count; a++) {
-            row[a] = R(0.0);
-            for (int k = 0; k < POINTS; k++) {
-                row[a] += weight(k) * points[k * STATES + i] * shown[k * SENSORS + taken[a]];
-            }
-        }
-        substitute(lower, count, row);
-        real moved = R(0.0);
-        for (int a = 0; a < count; a++) {
-            gain[i * SENSORS + a] = row[a];
-            extra[a * STATES + i] = row[a] * sqrt(noises[a]);
-            moved += row[a] * innovations[a];
-        }
-        s->x[i] += moved;
-    }
+    return 1;
+}
+
+/* The covariance of what two sensors show. */
+static real shown_together(const real *shown, int i, int j)
+{
+    real sum = R(0.0);
     for (int k = 0; k < POINTS; k++) {
+        sum += weight(k) * shown[k * SENSORS + i] * shown[k * SENSORS + j];
+    }
+    return sum;
+}
+
+/* The gain over the readings that are believed, together. 0 where the sensors' model has no
+   value. */
+static truth correct(STATE *s, double t)
+{
+    real points[POINTS * STATES];
+    real shown[POINTS * SENSORS];
+    real h[SENSORS];
+    real noises[SENSORS];
+    real innovations[SENSORS];
+    truth believed[SENSORS];
+    int taken[SENSORS];
+    real variances[SENSORS * SENSORS];
+    real lower[SENSORS * SENSORS];
+    real row[SENSORS];
+    real gain[STATES * SENSORS];
+    real extra[SENSORS * STATES];
+    if (!show(s, t, points, shown, h)) {
+        return 0;
+    }
+    for (int i = 0; i < SENSORS; i++) {
+        const real spread = shown_together(shown, i, i);
+        believed[i] = judge(s, i, s->readings[i], h[i], spread, noises);
+        if (!(spread + noises[i] > R(0.0))) {
+            believed[i] = 0;
+        }
+    }
+//? limits
+    /* first all that are inside the ranges of their sensors, then those at an end one by one */
+    truth is_moved = 0;
+//?
+    for (int round = 0; round < ROUNDS; round++) {
+        int count = 0;
+        for (int i = 0; i < SENSORS; i++) {
+//? limits
+            const int end = end_of(i, s->readings[i]);
+            if (end != 0 && round != i + 1) {
+                continue;
+            }
+            if (believed[i] != 0 && end != 0) {
+                real weighed[2];
+                if (is_moved) {
+                    if (!show(s, t, points, shown, h)) {
+                        return 1;
+                    }
+                }
+                const real rest = shown_of(i, s->readings[i]) - h[i];
+                const real spread = shown_together(shown, i, i);
+                if (weigh(end, rest, spread, noises[i], weighed)) {
+                    taken[count] = i;
+                    innovations[count] = weighed[0];
+                    noises[i] = weighed[1];
+                    count++;
+                }
+                continue;
+            }
+//?
+            if (believed[i] != 0 && round == 0) {
+                taken[count] = i;
+                innovations[count] = s->readings[i] - h[i];
+                count++;
+            }
+        }
+        if (count == 0) {
+            continue;
+        }
+//? limits
+        is_moved = 1;
+//?
+        for (int a = 0; a < count; a++) {
+            for (int b = 0; b < count; b++) {
+                const real both = shown_together(shown, taken[a], taken[b]);
+                variances[a * count + b] = a == b ? both + noises[taken[a]] : both;
+            }
+        }
+        factorise(variances, count, lower);
         for (int i = 0; i < STATES; i++) {
             for (int a = 0; a < count; a++) {
-                row[a] = shown[k * SENSORS + taken[a]];
+                row[a] = R(0.0);
+                for (int k = 0; k < POINTS; k++) {
+                    row[a] += weight(k) * points[k * STATES + i] * shown[k * SENSORS + taken[a]];
+                }
             }
-            points[k * STATES + i] -= dot(gain, i * SENSORS, row, 0, count);
+            substitute(lower, count, row);
+            real moved = R(0.0);
+            for (int a = 0; a < count; a++) {
+                gain[i * SENSORS + a] = row[a];
+                extra[a * STATES + i] = row[a] * sqrt(noises[taken[a]]);
+                moved += row[a] * innovations[a];
+            }
+            s->x[i] += moved;
         }
+        for (int k = 0; k < POINTS; k++) {
+            for (int i = 0; i < STATES; i++) {
+                for (int a = 0; a < count; a++) {
+                    row[a] = shown[k * SENSORS + taken[a]];
+                }
+                points[k * STATES + i] -= dot(gain, i * SENSORS, row, 0, count);
+            }
+        }
+        root_of_points(points, extra, count, s->root);
     }
-    root_of_points(points, extra, count, s->root);
     return 1;
 }

@@ -10,8 +10,9 @@ use super::device::Device;
 use super::function::Entry;
 use super::machine::{Field, Kind, Machine};
 use super::template::mentions;
-use super::words::{self, READINGS};
+use super::words::{self, PATIENCE, READINGS};
 use crate::Refusal;
+use crate::hidden::seen;
 
 const REPLAY: &str = include_str!("../runtime/replay.rs");
 
@@ -110,13 +111,19 @@ impl Frame<'_> {
              impl State {{\n{new}\n\
              \x20   /// Goes to time `t` and takes the signals there; NaN: a sensor did not report, an input stays.\n\
              \x20   /// The first sample only updates the start.\n    ///\n\
-             \x20   /// # Errors\n    /// [`Refused`]; the state and the estimates are then what they were.\n\
+             \x20   /// # Errors\n    /// [`Refused`]; the state, but for `refused`, and the estimates are then what they were. When the\n\
+             \x20   /// equations had no value, or an estimate ran away, {PATIENCE} times in a row, an absurd reading is behind\n\
+             \x20   /// it that was taken before: the state is then a new one, and the next sample the first.\n\
              \x20   pub fn push(\n        &mut self,\n        t: f64,\n        signals: &[{real}; SIGNALS],\n\
              \x20       estimates: &mut [{real}; ESTIMATES],\n    ) -> Result<(), Refused> {{\n\
              \x20       let before = self.clone();\n\
              \x20       let refused = Refused::of(take(self, t, signals, estimates));\n\
              \x20       match refused {{\n            None => Ok(()),\n            Some(refused) => {{\n\
-             \x20               *self = before;\n                Err(refused)\n            }}\n        }}\n    }}\n}}\n\n\
+             \x20               *self = before;\n                self.give_up(refused);\n                Err(refused)\n            }}\n        }}\n    }}\n\n\
+             \x20   /// Where an absurd reading that was taken is behind it, the next sample is the first.\n\
+             \x20   fn give_up(&mut self, refused: Refused) {{\n\
+             \x20       if matches!(refused, Refused::Diverged | Refused::NotFinite) {{\n            self.refused += 1;\n\
+             \x20           if self.refused >= {PATIENCE} {{\n{restart}            }}\n        }}\n    }}\n}}\n\n\
              impl Default for State {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}\n\n\
              // places are counted up to a million\nconst _: () = assert!(usize::BITS >= 32);\n\n\
              {own}{body}",
@@ -128,6 +135,11 @@ impl Frame<'_> {
             readings = self.readings(),
             state = self.state(),
             new = self.new_state(),
+            restart = match self.device.tunables {
+                [] => "                *self = Self::new();\n",
+                _ =>
+                    "                let tuning = self.tuning;\n                *self = Self { tuning, ..Self::new() };\n",
+            },
         ))
     }
 
@@ -318,14 +330,7 @@ fn camel(word: &str) -> String {
 
 /// Words in a comment of one line.
 fn plain(words: &str) -> String {
-    let words = words.chars();
-    let words = words.map(|c| match c {
-        // these turn the direction of what follows, which the compiler refuses
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => ' ',
-        c if c.is_control() => ' ',
-        c => c,
-    });
-    words.collect()
+    seen(words)
 }
 
 /// Words in documentation, where brackets would be links and angles elements.

@@ -6,7 +6,7 @@ use super::print::{Made, Printer, comment, section};
 use super::{Frame, about};
 use crate::curly::function::Entry;
 use crate::curly::syntax::Type;
-use crate::curly::words::{READINGS, codes};
+use crate::curly::words::{self, PATIENCE, READINGS, codes};
 
 /// The block, with its variables named.
 pub(super) struct Block<'a> {
@@ -90,7 +90,8 @@ impl<'a> Block<'a> {
         let codes = codes.map(|(k, (_, about))| format!("{}: {about}", k + 1));
         let codes: Vec<String> = codes.collect();
         format!(
-            "(* Takes a sample at each call. Where it is refused, nothing changes but code:\n   {}. *)\n\
+            "(* Takes a sample at each call. Where it is refused, nothing changes but code:\n   {}.\n\
+             \x20  {PATIENCE} times in a row an estimate has run away, or no value: it starts anew with the next sample. *)\n\
              FUNCTION_BLOCK {}\n{}{}{}{}END_FUNCTION_BLOCK\n",
             codes.join(";\n   "),
             self.frame.prefix,
@@ -178,6 +179,17 @@ impl<'a> Block<'a> {
         lines.push(format!("code := {}({});", take.name, given.join(", ")));
         lines.push("IF code <> 0 THEN".to_owned());
         lines.push("    s := before;".to_owned());
+        // an absurd reading that was taken is behind it: the next sample is the first
+        let number = |word: &str| words::number(word).unwrap_or_default();
+        let (diverged, not_finite) = (number("DIVERGED"), number("NOT_FINITE"));
+        lines.push(format!(
+            "    IF code = {diverged} OR code = {not_finite} THEN"
+        ));
+        lines.push("        s.refused := s.refused + 1;".to_owned());
+        lines.push(format!("        IF s.refused >= {PATIENCE} THEN"));
+        lines.push("            begun := FALSE;".to_owned());
+        lines.push("        END_IF;".to_owned());
+        lines.push("    END_IF;".to_owned());
         lines.push("ELSE".to_owned());
         lines.push("    begun := TRUE;".to_owned());
         for (place, name) in self.estimates.iter().enumerate() {

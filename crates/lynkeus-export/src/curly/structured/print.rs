@@ -8,6 +8,7 @@ use crate::Refusal;
 use crate::curly::c::Precision;
 use crate::curly::machine::Field;
 use crate::curly::syntax::{Declaration, Expr, Function, Item, Program, Type, Value};
+use crate::hidden::seen;
 
 /// Writes one function after the other, those that are called first.
 pub(super) struct Printer<'p> {
@@ -295,9 +296,7 @@ pub(super) fn comment(words: &str) -> String {
 
 /// Words in a comment, whatever they hold.
 pub(super) fn plain(words: &str) -> String {
-    let words = words.chars();
-    let words = words.map(|c| if c.is_control() { ' ' } else { c });
-    let words: String = words.collect();
+    let words = seen(words);
     // a $ or a quote means nothing in a comment, its ends do
     words.replace("*)", "* )").replace("(*", "( *")
 }

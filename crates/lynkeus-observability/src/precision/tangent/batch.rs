@@ -13,8 +13,10 @@ pub(super) struct Batch<'t> {
     dynamics: Variation<'t>,
     sight: Evaluation,
     integrator: Integrator,
-    /// states, then one column after the other
+    /// states, then one column after the other, in units
     x: Vec<f64>,
+    /// states as they are
+    states: Vec<f64>,
     t: f64,
 }
 
@@ -43,30 +45,47 @@ impl<'t> Batch<'t> {
     ) -> Result<Self, Error> {
         let n = tangent.states;
         let mut x = vec![0.0; n * (1 + columns.len())];
-        x[..n].copy_from_slice(tangent.flow.start());
-        for (place, &j) in columns.iter().enumerate().filter(|(_, j)| **j < n) {
-            x[n + place * n + j] = tangent.scales[j];
-        }
-        Ok(Self {
+        let start = tangent.flow.start().iter().zip(&tangent.units);
+        x.iter_mut()
+            .zip(start)
+            .for_each(|(x, (start, unit))| *x = start / unit);
+        let mut batch = Self {
             dynamics: Variation {
                 tangent,
                 columns: columns.clone(),
                 flow: tangent.flow.evaluation(),
                 slopes: vec![0.0; tangent.slopes.len()],
+                states: vec![0.0; n],
                 budget: tangent.budget.clone(),
             },
             columns,
             sight: tangent.sight.evaluation(),
             integrator: Integrator::new(experiment.method, x.len())?,
             x,
+            states: vec![0.0; n],
             t: experiment.window.start,
-        })
+        };
+        batch.restart();
+        Ok(batch)
+    }
+
+    /// Makes the present the start that sensitivities are about.
+    pub fn restart(&mut self) {
+        let tangent = self.dynamics.tangent;
+        let n = tangent.states;
+        self.x[n..].fill(0.0);
+        let own = self.columns.iter().enumerate().filter(|(_, j)| **j < n);
+        for (place, &j) in own {
+            self.x[n + place * n + j] = tangent.scales[j] / tangent.units[j];
+        }
     }
 
     /// A column of the sensitivity of the states.
-    pub fn column(&self, place: usize) -> &[f64] {
-        let n = self.dynamics.tangent.states;
-        &self.x[n + place * n..n + (place + 1) * n]
+    pub fn column(&self, place: usize) -> impl Iterator<Item = f64> + '_ {
+        let tangent = self.dynamics.tangent;
+        let n = tangent.states;
+        let column = &self.x[n + place * n..n + (place + 1) * n];
+        column.iter().zip(&tangent.units).map(|(x, unit)| x * unit)
     }
 
     /// Integrates from instant to instant and looks at each.
@@ -91,6 +110,8 @@ impl<'t> Batch<'t> {
     fn look(&mut self, piece: &mut Piece) -> Result<(), Error> {
         let tangent = self.dynamics.tangent;
         let (states, columns) = self.x.split_at(tangent.states);
+        tangent.in_own_units(states, &mut self.states);
+        let states = &self.states;
         let mut seen = vec![0.0; self.sight.system().outputs().len()];
         self.sight.enter(self.t);
         self.sight.outputs(self.t, states, &mut seen);
@@ -110,7 +131,13 @@ impl<'t> Batch<'t> {
         for (&(c, i), &slope) in tangent.views.iter().zip(views) {
             for (place, &j) in self.columns.iter().enumerate() {
                 let (sensitivity, floor) = match i < tangent.states {
-                    true => (columns[place * tangent.states + i], tangent.floor),
+                    true => {
+                        let unit = tangent.units[i];
+                        (
+                            columns[place * tangent.states + i] * unit,
+                            tangent.floor * unit,
+                        )
+                    }
                     false if i == j => (tangent.scales[j], 0.0),
                     false => continue,
                 };
@@ -130,6 +157,8 @@ struct Variation<'t> {
     flow: Evaluation,
     /// entries of ∂f/∂z
     slopes: Vec<f64>,
+    /// states as they are
+    states: Vec<f64>,
     budget: Budget,
 }
 
@@ -142,14 +171,19 @@ impl Dynamics for Variation<'_> {
         let n = self.tangent.states;
         let (states, columns) = x.split_at(n);
         let (d_states, d_columns) = dx.split_at_mut(n);
-        self.flow.derivatives(t, states, d_states);
-        self.flow.outputs(t, states, &mut self.slopes);
+        let tangent = self.tangent;
+        tangent.in_own_units(states, &mut self.states);
+        self.flow.derivatives(t, &self.states, d_states);
+        self.flow.outputs(t, &self.states, &mut self.slopes);
+        let units = d_states.iter_mut().zip(&tangent.units);
+        units.for_each(|(x, unit)| *x /= unit);
         d_columns.fill(0.0);
-        for (&(i, j), &slope) in self.tangent.slopes.iter().zip(&self.slopes) {
+        for (&(i, j), &slope) in tangent.slopes.iter().zip(&self.slopes) {
+            let unit = tangent.units[i];
             for (place, &own) in self.columns.iter().enumerate() {
                 let sensitivity = match j < n {
-                    true => columns[place * n + j],
-                    false if j == own => self.tangent.scales[j],
+                    true => columns[place * n + j] * (tangent.units[j] / unit),
+                    false if j == own => tangent.scales[j] / unit,
                     false => continue,
                 };
                 d_columns[place * n + i] += slope * sensitivity;
@@ -180,7 +214,8 @@ impl Dynamics for Variation<'_> {
     }
 
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        let states = &x[..self.tangent.states];
-        self.flow.not_finite(t, states)
+        let tangent = self.tangent;
+        tangent.in_own_units(&x[..tangent.states], &mut self.states);
+        self.flow.not_finite(t, &self.states)
     }
 }

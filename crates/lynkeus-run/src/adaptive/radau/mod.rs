@@ -15,6 +15,7 @@ use newton::{NEWTON_ITERATIONS, Newton};
 use shifted::Shifted;
 
 use super::{Leg, Point};
+use crate::relays::Poly;
 use crate::{Dynamics, Slopes, Tolerances};
 
 const SQRT_6: f64 = 2.449_489_742_783_178;
@@ -162,6 +163,21 @@ impl Radau {
         // an unchanged step saves a factorisation
         let kept = self.θ < KEEP_JACOBIAN && next >= h && next <= KEEP_STEP * h;
         (true, if kept { h } else { next })
+    }
+
+    /// What a state is between the ends of the step accepted last, which began at `from`: the polynomial
+    /// of the collocation.
+    pub(super) fn between(&self, state: usize, from: f64) -> Poly {
+        let [a, b] = [C[0], C[1]];
+        let [z1, z2, z3] = [0, 1, 2].map(|k| self.z[k][state]);
+        // divided differences over 0, c₁, c₂, 1
+        let (first, second, third) = (z1 / a, (z2 - z1) / (b - a), (z3 - z2) / (1.0 - b));
+        let (bends, late) = ((second - first) / b, (third - second) / (1.0 - a));
+        let twists = late - bends;
+        let mut poly = Poly::line(from, first - a * bends + a * b * twists);
+        poly.0[2] = bends - (a + b) * twists;
+        poly.0[3] = twists;
+        poly
     }
 
     /// Factors of E₁ and E₂ for this step, kept ones where they fit.

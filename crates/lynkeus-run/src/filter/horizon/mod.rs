@@ -5,11 +5,13 @@
 //! |x_j − x̄|²_{P̄⁻¹} + Σ |y_i − h(x_i)|²_{R⁻¹} + Σ |x_{i+1} − φ(x_i)|²_{W⁻¹}
 //!
 //! with min ≤ x_i ≤ max, φ the flow between samples and x̄, P̄ what the filter knew before the
-//! window. Each Gauss–Newton step is the Kalman smoother of the problem linearised along the
-//! present trajectory, so that its band structure is used and no noise need be invertible. A
-//! bound that is met is an exact reading of that state; it is let go where it would pull inward.
+//! window. Each Gauss–Newton step is the minimum of the problem linearised along the present
+//! trajectory ([`problem`]), found by Kalman smoothers, so that its band structure is used and no
+//! noise need be invertible. Steps that do not shrink are shortened (P. Deuflhard, *Newton Methods
+//! for Nonlinear Problems*, 2004, 4.3: the natural monotonicity test).
 
 mod pass;
+mod problem;
 mod row;
 
 use std::collections::VecDeque;
@@ -22,11 +24,14 @@ use super::smooth::Step;
 use super::{Belief, Bounds, confine};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
-use pass::{Pass, Smooth, backward, corrected, judged, predicted};
-use row::{Met, Row};
+use pass::{Linear, Pass, Pin, Way, corrected, judged, seen};
+use problem::{Problem, Solution};
+use row::Row;
 
-/// Most Gauss–Newton steps and changes of the bounds that are met, per sample.
-const STEPS: usize = 8;
+/// Most Gauss–Newton steps per sample,
+const STEPS: usize = 40;
+/// and the shortest share of one that is tried.
+const SHORTEST: f64 = 1.0 / 64.0;
 /// A step smaller than this, in standard deviations, is the last.
 const SMALL: f64 = 1e-6;
 /// Below this a step that is no longer half of the one before is the integration's own error.
@@ -114,29 +119,29 @@ impl Horizon {
     ) -> Result<(), Error> {
         self.done = Done::default();
         let taken = judged(sensing, belief, t, readings, inputs)?;
+        let mut guess = belief.x.clone();
+        confine(&mut guess, &self.bounds);
         self.rows.push_back(Row {
             t,
             inputs: inputs.to_vec(),
             readings: taken,
-            guess: belief.x.clone(),
+            guess,
             ..Row::default()
         });
-        let passes = self.solve(sensing)?;
-        if let Some(last) = passes.last() {
-            belief.x.copy_from_slice(&last.after.x);
-            belief.root = match self.meets_bounds() {
-                true => self.free_root(sensing)?,
-                false => last.after.root.clone(),
-            };
-            // rounding may leave an estimate a last digit outside
-            confine(&mut belief.x, &self.bounds);
+        let solved = self.solve(sensing)?;
+        sensing.health.unsolved += usize::from(!solved.is_minimum);
+        if let Some(newest) = self.rows.back() {
+            belief.x.copy_from_slice(&newest.guess);
         }
+        // A bound that is met says where the estimate is, and not how sure it is: taken for an exact
+        // reading it would leave no variance, and a gate that keeps every later reading out.
+        belief.root.clone_from(&solved.root);
         if self.keep {
             let guesses = self.rows.iter().flat_map(|row| &row.guess);
             self.done.window = guesses.copied().collect();
         }
         if self.rows.len() > self.length {
-            self.shorten(passes)?;
+            self.shorten(solved);
         }
         // the flow goes on from the newest row
         self.engine.driven.start(inputs);
@@ -151,7 +156,10 @@ impl Horizon {
     /// The rows of the window for a smoother; none where the problem has no value about them.
     pub fn steps(&self, sensing: &Sensing) -> Option<Vec<Step>> {
         let mut own = self.clone();
-        let passes = own.forward(&mut sensing.clone()).ok()?;
+        let problem = own.linearise(&mut sensing.clone()).ok()?;
+        let pins = self.rows.iter().map(|row| row.met.iter().copied());
+        let pins: Vec<Vec<Pin>> = pins.map(|met| met.map(Pin::from).collect()).collect();
+        let passes = problem.forward(&pins);
         let mut steps: Vec<Step> = passes.into_iter().map(Pass::kept).collect();
         if let (Some(first), Some(row)) = (steps.first_mut(), self.rows.front()) {
             first.transition.clone_from(&row.entered);
@@ -170,22 +178,25 @@ impl Horizon {
 
     /// The first row leaves. What is known before the second are the states as the window has
     /// them. A bound that was met there told where the state is, and not that it will never leave.
-    fn shorten(&mut self, passes: Vec<Pass>) -> Result<(), Error> {
-        let mut passes = passes.into_iter();
-        let (Some(first), Some(second)) = (passes.next(), passes.next()) else {
-            return Ok(());
+    fn shorten(&mut self, solved: Solved) {
+        let Solved { passes, rows, .. } = solved;
+        let (mut passes, mut rows) = (passes.into_iter(), rows.into_iter().skip(1));
+        let (Some(first), Some(second), Some(linear)) = (passes.next(), passes.next(), rows.next())
+        else {
+            return;
         };
         let mut step = first.leaving();
-        self.prior = match self.rows[0].met.is_empty() {
-            true => second.before,
-            false => {
-                let free = Belief {
-                    x: first.after.x,
-                    root: first.by_readings,
-                };
-                let (from, to) = (&self.rows[0], &self.rows[1]);
-                predicted(&mut self.engine, &free, from, to)?.0
-            }
+        let met = !self.rows[0].met.is_empty();
+        let free = Pass {
+            after: Belief {
+                x: first.after.x.clone(),
+                root: first.by_readings.clone(),
+            },
+            ..first
+        };
+        self.prior = match met {
+            false => second.before,
+            true => linear.way.carry(&self.prior, Some(&free)).0,
         };
         let left = self.rows.pop_front();
         if self.keep {
@@ -193,112 +204,146 @@ impl Horizon {
             self.done.left = Some(step);
             self.rows[0].entered = second.transition;
         }
-        Ok(())
     }
 
-    fn meets_bounds(&self) -> bool {
-        self.rows.iter().any(|row| !row.met.is_empty())
-    }
-
-    /// The root of the newest row's covariance by the readings alone. A bound that is met says
-    /// where the estimate is, and not how sure it is: taken for an exact reading it would leave no
-    /// variance, and a gate that keeps every later reading out.
-    fn free_root(&mut self, sensing: &mut Sensing) -> Result<Root, Error> {
-        let met: Vec<Vec<Met>> = self
-            .rows
-            .iter_mut()
-            .map(|row| std::mem::take(&mut row.met))
-            .collect();
-        let passes = self.forward(sensing);
-        for (row, met) in self.rows.iter_mut().zip(met) {
-            row.met = met;
-        }
-        let newest = passes?.pop();
-        Ok(newest.map_or_else(|| self.prior.root.clone(), |pass| pass.after.root))
-    }
-
-    fn solve(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {
-        let mut passes = self.forward(sensing)?;
-        let mut before = f64::INFINITY;
+    /// Gauss–Newton steps from the guesses to the minimum.
+    fn solve(&mut self, sensing: &mut Sensing) -> Result<Solved, Error> {
+        let mut share = 1.0;
+        let mut best: Option<Tried> = None;
         for _ in 0..STEPS {
-            let found = backward(&passes);
-            let step = self.move_to(&found, &passes);
-            let changed = self.change_bounds(&found);
-            let is_last = step < SMALL || (step < NOISE && step > 0.5 * before);
-            if !changed && is_last {
+            let tried = match (self.tried(sensing), &best) {
+                // the plant has no value along a step that was too long
+                (Err(_), Some(_)) => None,
+                (tried, _) => Some(tried?),
+            };
+            let before = best.as_ref().map_or(f64::INFINITY, |best| best.step);
+            match tried {
+                Some(tried) if tried.is_last(before) => return Ok(self.settle(tried, true)),
+                Some(tried) if tried.step <= (1.0 - 0.25 * share) * before => {
+                    share = (2.0 * share).min(1.0);
+                    best = Some(tried);
+                }
+                _ => share *= 0.5,
+            }
+            let Some(best) = &best else { break };
+            if share < SHORTEST {
                 break;
             }
-            before = step;
-            passes = self.forward(sensing)?;
+            self.go(best, share);
         }
-        Ok(passes)
+        match best {
+            Some(best) => Ok(self.settle(best, false)),
+            None => self.tried(sensing).map(|tried| self.settle(tried, false)),
+        }
     }
 
-    /// The smoothed states as the next guess; how far the guess moved, in deviations.
-    fn move_to(&mut self, found: &[Smooth], passes: &[Pass]) -> f64 {
-        let mut largest = 0.0_f64;
-        for ((row, found), pass) in self.rows.iter_mut().zip(found).zip(passes) {
-            for (i, (old, new)) in row.guess.iter_mut().zip(&found.x).enumerate() {
+    /// One step from the guesses.
+    fn tried(&mut self, sensing: &mut Sensing) -> Result<Tried, Error> {
+        let met = self.rows.iter().map(|row| row.met.clone()).collect();
+        let problem = self.linearise(sensing)?;
+        let solution = problem.solve(met);
+        let Problem { rows, free, .. } = problem;
+        let mut step = 0.0_f64;
+        for ((row, x), pass) in self.rows.iter().zip(&solution.x).zip(&free) {
+            for (i, (old, new)) in row.guess.iter().zip(x).enumerate() {
                 let deviation = pass.before.root.deviation(i).max(f64::MIN_POSITIVE);
-                largest = largest.max((*new - *old).abs() / deviation);
-                *old = new.max(self.bounds[i].low).min(self.bounds[i].high);
+                step = step.max((new - old).abs() / deviation);
             }
         }
-        largest
+        Ok(Tried {
+            from: self.rows.iter().map(|row| row.guess.clone()).collect(),
+            step,
+            solution,
+            rows,
+            free,
+        })
     }
 
-    /// Bounds that are exceeded are met from now on; those that pull inward are let go.
-    fn change_bounds(&mut self, found: &[Smooth]) -> bool {
-        let mut changed = false;
-        for (row, Smooth { x, forces }) in self.rows.iter_mut().zip(found) {
-            let before = row.met.len();
-            let bounds = &self.bounds;
-            let mut place = 0;
-            row.met.retain(|&Met { state, bound }| {
-                let force = forces.iter().find(|f| f.place == place);
-                let force = force.map_or(0.0, |f| f.push);
-                place += 1;
-                let Bounds { low, high } = bounds[state];
-                let outward = if bound == low { -force } else { force };
-                // a single value pushes either way
-                low == high || outward <= 0.0
-            });
-            changed |= row.met.len() != before;
-            for (i, (x, bounds)) in x.iter().zip(bounds).enumerate() {
-                let slack = 1e-9 * (bounds.high - bounds.low).min(x.abs().max(1e-3));
-                let exceeded = match (*x < bounds.low - slack, *x > bounds.high + slack) {
-                    (true, _) => bounds.low,
-                    (_, true) => bounds.high,
-                    _ => continue,
+    /// A share of a step from where it was tried.
+    fn go(&mut self, tried: &Tried, share: f64) {
+        let all = self.rows.iter_mut().zip(&tried.from);
+        for ((row, from), (x, met)) in all.zip(tried.solution.x.iter().zip(&tried.solution.met)) {
+            for (guess, (from, to)) in row.guess.iter_mut().zip(from.iter().zip(x)) {
+                // all of it without rounding
+                *guess = if share < 1.0 {
+                    from + share * (to - from)
+                } else {
+                    *to
                 };
-                if !row.met.iter().any(|m| m.state == i) {
-                    row.met.push(Met {
-                        state: i,
-                        bound: exceeded,
-                    });
-                    changed = true;
-                }
             }
+            confine(&mut row.guess, &self.bounds);
+            row.met.clone_from(met);
         }
-        changed
     }
 
-    /// The Kalman filter of the problem linearised about the guesses.
-    fn forward(&mut self, sensing: &mut Sensing) -> Result<Vec<Pass>, Error> {
-        let mut passes: Vec<Pass> = vec![];
-        for k in 0..self.rows.len() {
-            let (before, transition) = match passes.last() {
-                None => (self.prior.clone(), None),
-                Some(last) => {
-                    let (from, to) = (&self.rows[k - 1], &self.rows[k]);
-                    let (before, transition) = predicted(&mut self.engine, &last.after, from, to)?;
-                    (before, Some(transition))
-                }
-            };
-            passes.push(corrected(sensing, &self.rows[k], before, transition)?);
+    fn settle(&mut self, tried: Tried, converged: bool) -> Solved {
+        self.go(&tried, 1.0);
+        let root = tried.free.last().map(|pass| pass.after.root.clone());
+        Solved {
+            root: root.unwrap_or_else(|| self.prior.root.clone()),
+            passes: tried.solution.passes.unwrap_or(tried.free),
+            rows: tried.rows,
+            is_minimum: converged && tried.solution.is_least,
         }
-        Ok(passes)
     }
+
+    /// The problem about the guesses, and the Kalman filter of it without bounds.
+    fn linearise(&mut self, sensing: &mut Sensing) -> Result<Problem<'_>, Error> {
+        let (mut rows, mut free): (Vec<Linear>, Vec<Pass>) = (vec![], vec![]);
+        for (k, row) in self.rows.iter().enumerate() {
+            let way = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
+                (Some(from), Some(_)) if row.t <= from.t => Way::Same,
+                (Some(from), Some(last)) => {
+                    self.engine.driven.start(&from.inputs);
+                    self.engine.driven.aim(from.t, row.t, &row.inputs);
+                    let about = Belief {
+                        x: from.guess.clone(),
+                        root: last.after.root.clone(),
+                    };
+                    Way::Over(self.engine.stage(about, from.t, row.t)?)
+                }
+                _ => Way::First,
+            };
+            let before = way.carry(&self.prior, free.last());
+            let spread = (0..row.guess.len()).map(|i| before.0.root.deviation(i));
+            let spread: Vec<f64> = spread.collect();
+            let seen = seen(sensing, row)?;
+            free.push(corrected(&seen, &spread, &[], before));
+            rows.push(Linear { way, seen, spread });
+        }
+        Ok(Problem {
+            prior: &self.prior,
+            bounds: &self.bounds,
+            rows,
+            free,
+        })
+    }
+}
+
+/// A Gauss–Newton step.
+struct Tried {
+    from: Vec<Vec<f64>>,
+    /// its length, in deviations
+    step: f64,
+    solution: Solution,
+    rows: Vec<Linear>,
+    free: Vec<Pass>,
+}
+
+impl Tried {
+    /// Whether it is no more than the integration's own error.
+    fn is_last(&self, before: f64) -> bool {
+        self.step < SMALL || (self.step < NOISE && self.step > 0.5 * before)
+    }
+}
+
+/// A window that is solved, as well as it can be.
+struct Solved {
+    /// of the newest row's covariance by the readings alone
+    root: Root,
+    passes: Vec<Pass>,
+    rows: Vec<Linear>,
+    is_minimum: bool,
 }
 
 #[cfg(test)]

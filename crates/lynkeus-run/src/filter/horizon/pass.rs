@@ -1,15 +1,18 @@
 //! The problem of a window, linearised about its guesses: forward a Kalman filter, backward its
 //! smoother.
 
-use super::row::{Believed, Met, Row};
+use super::row::{Met, Row};
 use crate::Error;
 use crate::filter::Belief;
-use crate::filter::extended::Extended;
-use crate::filter::health::Reading;
 use crate::filter::root::{Packed, Root, dot};
-use crate::filter::sensing::Sensing;
+use crate::filter::sensing::{Believed, Sensing};
 use crate::filter::smooth::{Adjoint, Correction, Step};
 use crate::filter::spanned::Rows;
+use crate::filter::stage::Stage;
+
+/// What is left of a state's deviation where the window holds it by other means: another reading of it
+/// says nothing, and its gain would be rounding.
+const HELD: f64 = 1e-9;
 
 /// A row given the whole window.
 pub(super) struct Smooth {
@@ -17,28 +20,71 @@ pub(super) struct Smooth {
     pub forces: Vec<Force>,
 }
 
-/// How hard a bound that is met pushes its state upward.
+/// How hard a pin pushes its state upward.
 pub(super) struct Force {
-    /// its place among `met`
+    /// its place among the pins of the row
     pub place: usize,
     pub push: f64,
+}
+
+/// A row of the linearised problem.
+pub(super) struct Linear {
+    pub way: Way,
+    pub seen: Vec<Seen>,
+    /// deviations of the states by all readings up to the row before, without bounds
+    pub spread: Vec<f64>,
+}
+
+/// From the row before.
+pub(super) enum Way {
+    /// there is none
+    First,
+    /// it is at the same instant
+    Same,
+    Over(Stage),
+}
+
+/// A reading: cᵀx = value, with noise.
+pub(super) struct Seen {
+    pub slopes: Vec<f64>,
+    pub value: f64,
+    pub variance: f64,
+}
+
+/// A state that is drawn to a value.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pin {
+    pub state: usize,
+    pub value: f64,
+    /// 0 where it is held there
+    pub variance: f64,
+}
+
+impl From<Met> for Pin {
+    fn from(Met { state, bound }: Met) -> Self {
+        Self {
+            state,
+            value: bound,
+            variance: 0.0,
+        }
+    }
 }
 
 /// One row of a forward pass.
 pub(super) struct Pass {
     pub before: Belief,
     pub after: Belief,
-    /// the root before the bounds
+    /// the root before the pins
     pub by_readings: Root,
     /// Φ from the row before; none of the first
     pub transition: Option<Rows>,
     pub readings: Vec<Correction>,
-    pub bounds: Vec<AtBound>,
+    pub pins: Vec<AtPin>,
 }
 
-/// What a bound did that is met.
-pub(super) struct AtBound {
-    /// its place among `met`
+/// What a pin did.
+pub(super) struct AtPin {
+    /// its place among the pins of the row
     place: usize,
     correction: Correction,
 }
@@ -47,12 +93,12 @@ impl Pass {
     /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
     /// exact readings.
     pub fn kept(self) -> Step {
-        let bounds = self.bounds.into_iter().map(|b| b.correction);
+        let pins = self.pins.into_iter().map(|b| b.correction);
         Step {
             transition: self.transition,
             x: self.after.x,
             root: Packed::of(&self.after.root),
-            corrections: self.readings.into_iter().chain(bounds).collect(),
+            corrections: self.readings.into_iter().chain(pins).collect(),
         }
     }
 
@@ -83,95 +129,92 @@ pub(super) fn judged(
         belief
             .root
             .transposed_times(&sensing.slopes(sensor), &mut projected);
-        let noise = sensing.noise(sensor, h[sensor]);
-        let variance = dot(&projected, &projected) + noise;
-        let innovation = sensing.judge(sensor, *reading, h[sensor], variance);
-        if innovation.reading == Reading::Taken {
-            taken.push(Believed {
-                sensor,
-                reading: *reading,
-                variance: noise,
-            });
-        }
+        let spread = dot(&projected, &projected);
+        taken.extend(sensing.judge(sensor, *reading, h[sensor], spread));
     }
     Ok(taken)
 }
 
-/// x⁻ = φ(x̃) + Φ(x − x̃), P⁻ = ΦPΦᵀ + W, linearised at the guess x̃.
-pub(super) fn predicted(
-    engine: &mut Extended,
-    after: &Belief,
-    from: &Row,
-    to: &Row,
-) -> Result<(Belief, Rows), Error> {
-    let mut belief = Belief {
-        x: from.guess.clone(),
-        root: after.root.clone(),
+/// The readings of a row, h linearised at its guess.
+pub(super) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error> {
+    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    let seen = |believed: &Believed| {
+        let slopes = sensing.slopes(believed.sensor);
+        let offset = h[believed.sensor] - dot(&slopes, &row.guess);
+        let (value, variance) = believed.about(h[believed.sensor])?;
+        Some(Seen {
+            value: value - offset,
+            variance,
+            slopes,
+        })
     };
-    if to.t <= from.t {
-        // the same instant again
-        return Ok((after.clone(), Rows::identity(belief.x.len())));
-    }
-    engine.driven.start(&from.inputs);
-    engine.driven.aim(from.t, to.t, &to.inputs);
-    let transition = engine.predict(&mut belief, from.t, to.t, true)?;
-    let off: Vec<f64> = after
-        .x
-        .iter()
-        .zip(&from.guess)
-        .map(|(x, g)| x - g)
-        .collect();
-    for (x, (first, row)) in belief.x.iter_mut().zip(transition.iter()) {
-        *x += dot(row, &off[first..]);
-    }
-    Ok((belief, transition))
+    Ok(row.readings.iter().filter_map(seen).collect())
 }
 
+impl Way {
+    /// What is believed at a row before its readings, and Φ.
+    pub fn carry(&self, prior: &Belief, last: Option<&Pass>) -> (Belief, Option<Rows>) {
+        match (self, last) {
+            (Self::Over(stage), Some(last)) => {
+                let transition = stage.transition.clone();
+                (stage.carry(&last.after), Some(transition))
+            }
+            (Self::Same, Some(last)) => {
+                let after = last.after.clone();
+                let identity = Rows::identity(after.x.len());
+                (after, Some(identity))
+            }
+            _ => (prior.clone(), None),
+        }
+    }
+}
+
+/// A row by its readings, then by its pins.
 pub(super) fn corrected(
-    sensing: &mut Sensing,
-    row: &Row,
-    before: Belief,
-    transition: Option<Rows>,
-) -> Result<Pass, Error> {
-    let h = sensing.evaluate(row.t, &row.guess, &row.inputs)?.to_vec();
+    seen: &[Seen],
+    spread: &[f64],
+    pins: &[Pin],
+    (before, transition): (Belief, Option<Rows>),
+) -> Pass {
     let mut after = before.clone();
     let mut readings = vec![];
-    for believed in &row.readings {
-        let c = sensing.slopes(believed.sensor);
-        // h linearised at the guess
-        let offset = h[believed.sensor] - dot(&c, &row.guess);
-        let y = believed.reading - offset;
-        readings.extend(take(&mut after, c, y, believed.variance));
+    for s in seen {
+        readings.extend(take(&mut after, &s.slopes, s.value, s.variance, 0.0));
     }
     let by_readings = after.root.clone();
-    let mut bounds = vec![];
-    for (place, Met { state, bound }) in row.met.iter().enumerate() {
+    let mut at = vec![];
+    for (place, pin) in pins.iter().enumerate() {
         let mut c = vec![0.0; after.x.len()];
-        c[*state] = 1.0;
-        let correction = take(&mut after, c, *bound, 0.0);
-        bounds.extend(correction.map(|correction| AtBound { place, correction }));
+        c[pin.state] = 1.0;
+        let least = HELD * spread[pin.state];
+        let correction = take(&mut after, &c, pin.value, pin.variance, least);
+        at.extend(correction.map(|correction| AtPin { place, correction }));
     }
-    Ok(Pass {
+    Pass {
         before,
         after,
         by_readings,
         transition,
         readings,
-        bounds,
-    })
+        pins: at,
+    }
 }
 
-/// Corrects by cᵀx = y with noise of variance r.
-fn take(belief: &mut Belief, c: Vec<f64>, y: f64, r: f64) -> Option<Correction> {
+/// Corrects by cᵀx = y with noise of variance r; not where what is predicted has a deviation of no more
+/// than `least`.
+fn take(belief: &mut Belief, c: &[f64], y: f64, r: f64, least: f64) -> Option<Correction> {
     let mut projected = vec![0.0; c.len()];
-    belief.root.transposed_times(&c, &mut projected);
-    let variance = dot(&projected, &projected) + r;
-    let innovation = y - dot(&c, &belief.x);
+    belief.root.transposed_times(c, &mut projected);
+    let own = dot(&projected, &projected);
+    if own <= least * least && least > 0.0 {
+        return None;
+    }
+    let innovation = y - dot(c, &belief.x);
     let gain = belief.root.update(&projected, r)?;
     for (x, k) in belief.x.iter_mut().zip(&gain) {
         *x += k * innovation;
     }
-    Some(Correction::single(c, innovation, variance, gain))
+    Some(Correction::single(c.to_vec(), innovation, own + r, gain))
 }
 
 /// The window's rows given all of it.
@@ -183,7 +226,7 @@ pub(super) fn backward(passes: &[Pass]) -> Vec<Smooth> {
         let shift = pass.after.root.covariance_times(&adjoint.vector);
         let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
         let x = x.collect();
-        let forces = pass.bounds.iter().rev().map(|at| Force {
+        let forces = pass.pins.iter().rev().map(|at| Force {
             place: at.place,
             push: adjoint.over_vector(&at.correction).iter().sum(),
         });

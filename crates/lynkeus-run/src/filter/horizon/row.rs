@@ -1,5 +1,6 @@
 //! A sample in the window.
 
+use crate::filter::sensing::Believed;
 use crate::filter::spanned::Rows;
 use crate::snapshot::{Damaged, Walk};
 
@@ -13,15 +14,6 @@ pub(super) struct Row {
     pub met: Vec<Met>,
     /// Φ from the row before, which has left; where a smoother will ask for it
     pub entered: Option<Rows>,
-}
-
-/// A reading that corrects.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Believed {
-    pub sensor: usize,
-    pub reading: f64,
-    /// of its noise
-    pub variance: f64,
 }
 
 /// A bound that is met.
@@ -47,9 +39,7 @@ impl Row {
         let count = walk.length(self.readings.len())?;
         self.readings.resize(count, Believed::default());
         for believed in &mut self.readings {
-            walk.below(&mut believed.sensor, sensors)?;
-            walk.number(&mut believed.reading)?;
-            walk.number(&mut believed.variance)?;
+            believed.walk(walk, sensors)?;
         }
         let count = walk.length(self.met.len())?;
         self.met.resize(count, Met::default());

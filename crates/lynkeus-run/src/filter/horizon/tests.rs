@@ -1,5 +1,7 @@
 //! Windows against bounded least squares, and against the filter where nothing bounds them.
 
+mod windows;
+
 use lynkeus_expr::Graph;
 
 use crate::filter::tests::{exact, scalar, window};

@@ -51,7 +51,8 @@ fn a_limit_of_time_leaves_the_runs_that_are_done() {
     assert!((8..asked).contains(&done), "{done}");
     assert_eq!(found.seeds, (5..5 + done as u64).collect::<Vec<u64>>());
     let words = format!("{done} of {asked} runs: the limit of 2 s ended it");
-    assert!(found.notes.contains(&words), "{:?}", found.notes);
+    assert_eq!(found.limit.as_ref(), Some(&words));
+    assert_eq!(found.refusal().unwrap().kind(), crate::ErrorKind::Ended);
     study.budget = lynkeus_expr::Budget::default();
     for run in [0, done / 2, done - 1] {
         let outcome = alone(&study, found.seeds[run]);

@@ -65,7 +65,7 @@ fn instants_count_from_the_first_and_keep_their_kind() {
     }
     let table = log.table(vec![t, mixed, zones]).unwrap();
     assert_eq!(table.origin("t"), Some("2026-11-22T00:00:00Z"));
-    let seconds = table.readings("t").unwrap().to_vec();
+    let seconds = table.times("t").unwrap().to_vec();
     assert!(seconds[0].is_nan() && seconds[1..] == [0.0, 0.25]);
     let message = refusal(&table, "mixed");
     assert!(message.starts_with("log:3: "), "{message}");
@@ -149,7 +149,7 @@ fn seconds_since_an_instant_are_what_instants_give() {
     let again = log.since("t", seconds.clone(), origin).unwrap();
     let again = log.table(vec![again]).unwrap();
     assert_eq!(again.origin("t"), Some(origin));
-    let found = again.readings("t").unwrap().to_vec();
+    let found = again.times("t").unwrap().to_vec();
     assert_eq!((found[3], again.missing("t")), (seconds[3], 1));
     assert!(log.since("t", seconds, "midnight").is_err());
 }

@@ -1,7 +1,18 @@
-use ::parquet::data_type::{BoolType, ByteArrayType, FloatType, Int32Type, Int64Type};
+use std::sync::Arc;
+use std::time::Duration;
+
+use ::parquet::basic::Compression;
+use ::parquet::data_type::{
+    BoolType, ByteArray, ByteArrayType, FixedLenByteArray, FixedLenByteArrayType, FloatType,
+    Int32Type, Int64Type,
+};
+use ::parquet::file::properties::WriterProperties;
+use ::parquet::file::writer::SerializedFileWriter;
 use ::parquet::schema::parser::parse_message_type;
+use lynkeus_expr::{Budget, Memory};
 
 use super::*;
+use crate::Series;
 
 /// A file with one group of three rows, each column's values and which of them are there.
 fn written(schema: &str, fill: impl FnOnce(&mut Group<'_>)) -> tempfile::NamedTempFile {
@@ -95,7 +106,7 @@ fn every_kind_of_number_and_time() {
     assert_eq!(table.time("t").unwrap().to_vec(), [0.0, 0.25, 1.0]);
     assert_eq!(table.origin("t"), Some("2026-11-22T00:00:00Z"));
     assert_eq!(
-        table.readings("day").unwrap().to_vec(),
+        table.times("day").unwrap().to_vec(),
         [0.0, 86_400.0, -86_400.0]
     );
     let count = table.held("count").unwrap();
@@ -138,4 +149,124 @@ fn damaged_files_are_refused_by_a_line() {
         assert!(message.contains("cut short"), "{length}: {message}");
         assert_eq!(message.lines().count(), 1);
     }
+}
+
+/// The bytes of a decimal may be digits of a text as well.
+#[test]
+fn decimals_and_halves_are_what_they_are_whatever_their_bytes() {
+    let schema = "message log {
+        required fixed_len_byte_array(1) level (DECIMAL(2, 1));
+        required binary deep (DECIMAL(30, 3));
+        required fixed_len_byte_array(2) half (FLOAT16);
+        required int64 clock (TIME(MICROS, true));
+        required fixed_len_byte_array(16) id (UUID);
+        required fixed_len_byte_array(2) raw;
+    }";
+    let file = written(schema, |group| {
+        let fixed = |bytes: &[u8]| FixedLenByteArray::from(ByteArray::from(bytes.to_vec()));
+        let levels = [&[0x34][..], &[0x39], &[0xfe]].map(fixed);
+        column::<FixedLenByteArrayType>(group, &levels, None);
+        let deep = [
+            vec![0x31],
+            vec![0xff, 0x31],
+            123_456_789_000_i128.to_be_bytes().to_vec(),
+        ];
+        column::<ByteArrayType>(group, &deep.map(ByteArray::from), None);
+        let halves = [[0x33, 0x45], [0x00, 0xc0], [0x00, 0x7e]].map(|b| fixed(&b));
+        column::<FixedLenByteArrayType>(group, &halves, None);
+        column::<Int64Type>(group, &[0, 1, 2], None);
+        column::<FixedLenByteArrayType>(group, &[0, 1, 2].map(|k| fixed(&[k; 16])), None);
+        column::<FixedLenByteArrayType>(
+            group,
+            &["12", "34", "56"].map(|t| fixed(t.as_bytes())),
+            None,
+        );
+    });
+    let table = Table::load(file.path()).unwrap();
+    let of = |name: &str| table.readings(name).unwrap().to_vec();
+    assert_eq!(of("level"), [5.2, 5.7, -0.2]);
+    assert_eq!(of("deep"), [0.049, -0.207, 123_456_789.0]);
+    assert_eq!(
+        (of("half")[..2].to_vec(), table.missing("half")),
+        (vec![5.199_218_75, -2.0], 1)
+    );
+    for (name, what) in [
+        ("clock", "times of a day"),
+        ("id", "UUIDs"),
+        ("raw", "bytes"),
+    ] {
+        let refusal = table.times(name).unwrap_err().to_string();
+        assert!(refusal.contains(&format!("found {what}")), "{refusal}");
+    }
+    let refusal = refused_reading("required int32 level (DATE)");
+    assert!(refusal.contains("only times may be dates"), "{refusal}");
+}
+
+/// Why a column of three days is no reading.
+fn refused_reading(declared: &str) -> String {
+    let file = written(&format!("message log {{ {declared}; }}"), |group| {
+        column::<Int32Type>(group, &[0, 1, 2], None);
+    });
+    let table = Table::load(file.path()).unwrap();
+    assert!(table.times("level").is_ok());
+    table.readings("level").unwrap_err().to_string()
+}
+
+/// Whatever a byte says, a file is read or refused, and never ends the program.
+#[test]
+fn files_of_which_bytes_were_changed_are_read_or_refused() {
+    let values: Vec<f64> = (0..300).map(|k| f64::from(k % 7)).collect();
+    let mut whole = Vec::new();
+    let columns: Vec<Series> = vec![values.clone().into(), values.into()];
+    write_parquet(&mut whole, &[("t", &columns[0]), ("y", &columns[1])]).unwrap();
+    let file = tempfile::Builder::new()
+        .suffix(".parquet")
+        .tempfile()
+        .unwrap();
+    let (mut refused, mut seed) = (0, 7_u64);
+    let mut draw = |below: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 33) as usize % below
+    };
+    for _ in 0..600 {
+        let mut bytes = whole.clone();
+        for _ in 0..=draw(10) {
+            let place = draw(bytes.len());
+            bytes[place] = u8::try_from(draw(256)).unwrap();
+        }
+        std::fs::write(file.path(), &bytes).unwrap();
+        if let Err(error) = Table::load(file.path()) {
+            refused += 1;
+            assert!(error.to_string().contains("Parquet file"), "{error}");
+        }
+    }
+    assert!(refused > 100, "{refused}");
+}
+
+#[test]
+fn what_nobody_asks_for_is_left_and_limits_hold_while_the_rest_is_read() {
+    let zeros = Series::from(vec![0.0; 3_000_000]);
+    let file = tempfile::Builder::new()
+        .suffix(".parquet")
+        .tempfile()
+        .unwrap();
+    let columns = [("t", &zeros), ("junk", &zeros)];
+    write_parquet(&mut file.reopen().unwrap(), &columns).unwrap();
+    let load = |columns: &[&str], budget: Budget| {
+        let columns = Some(columns.iter().map(ToString::to_string).collect());
+        Table::load_within(file.path(), &Request { budget, columns })
+    };
+    let table = load(&["t"], Budget::default()).unwrap();
+    assert_eq!((table.names().count(), table.rows()), (2, 3_000_000));
+    assert!(table.times("t").is_ok() && table.get("junk").is_none());
+    let kind = |budget| load(&["t"], budget).map(drop).unwrap_err().kind();
+    let ended = crate::ErrorKind::Ended;
+    assert_eq!(kind(Budget::new(Some(Duration::ZERO), None)), ended);
+    let memory = |limit| Memory {
+        limit,
+        used: || 0,
+        before: 0,
+    };
+    assert_eq!(kind(Budget::new(None, Some(memory(10)))), ended);
+    assert!(load(&["t"], Budget::new(None, Some(memory(64 << 20)))).is_ok());
 }

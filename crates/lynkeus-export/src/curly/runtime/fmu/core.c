@@ -74,6 +74,14 @@ static int settle(course *c)
     return code;
 }
 
+/* What a refused sample leaves: the state before it, which counts that, or begins anew. */
+static void give_up(course *c, const course *before)
+{
+    const @NAME@_state left = c->now;
+    *c = *before;
+    c->past = left;
+}
+
 /* Takes the sample of the communication point, and goes to the next, of which the estimates then
    are a prediction. */
 static int step(course *c, double from, double to)
@@ -88,7 +96,7 @@ static int step(course *c, double from, double to)
     }
     code = settle(c);
     if (code != 0) {
-        *c = before;
+        give_up(c, &before);
         return code;
     }
     c->past = c->now;

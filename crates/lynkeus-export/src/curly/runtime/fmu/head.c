@@ -29,7 +29,7 @@
 #endif
 
 /* What can go wrong besides the codes of @NAME@.h, which are above 0. */
-enum { NO_VALUE = -1, NOT_SETTABLE = -2, NOT_NOW = -3, NO_MEMORY = -4, NOT_POSITIVE = -5, NOT_OURS = -6, NOT_HERE = -7 };
+enum { NO_VALUE = -1, NOT_SETTABLE = -2, NOT_NOW = -3, NO_MEMORY = -4, NOT_POSITIVE = -5, NOT_OURS = -6, NOT_HERE = -7, NO_PLACE = -8 };
 
 static const char token[] = "@TOKEN@";
 

@@ -14,6 +14,9 @@ static int write_values(course *c, const uint32_t *references, size_t count, con
 /* A copy on the heap, into *kept where that is one already. */
 static int keep(const course *c, void **kept)
 {
+    if (kept == NULL) {
+        return NO_PLACE;
+    }
     if (*kept == NULL) {
         *kept = malloc(sizeof *c);
     }
@@ -24,27 +27,72 @@ static int keep(const course *c, void **kept)
     return 0;
 }
 
-/* A state as bytes, behind the token of the FMU that it is of. */
-enum { TOKEN = sizeof token - 1, BYTES = TOKEN + sizeof(course) };
+/* Back to what was kept. */
+static int restored(course *c, const void *kept)
+{
+    if (kept == NULL) {
+        return NO_PLACE;
+    }
+    memcpy(c, kept, sizeof *c);
+    return 0;
+}
+
+/* FNV-1a of 64 bits. */
+static uint64_t checksum(const unsigned char *bytes, size_t size)
+{
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < size; i++) {
+        sum = (sum ^ bytes[i]) * 0x100000001b3u;
+    }
+    return sum;
+}
+
+/* A state as bytes, between the token of the FMU that it is of and a checksum of both. */
+enum { TOKEN = sizeof token - 1, CHECKED = TOKEN + sizeof(course), BYTES = CHECKED + sizeof(uint64_t) };
 
 static int written(const course *c, void *bytes, size_t size)
 {
+    unsigned char *to = bytes;
+    uint64_t sum = 0;
+    if (c == NULL || to == NULL) {
+        return NO_PLACE;
+    }
     if (size != BYTES) {
         return NO_VALUE;
     }
-    memcpy(bytes, token, TOKEN);
-    memcpy((char *)bytes + TOKEN, c, sizeof *c);
+    memcpy(to, token, TOKEN);
+    memcpy(to + TOKEN, c, sizeof *c);
+    sum = checksum(to, CHECKED);
+    memcpy(to + CHECKED, &sum, sizeof sum);
     return 0;
 }
 
 static int taken(const void *bytes, size_t size, void **kept)
 {
+    const unsigned char *from = bytes;
     course saved;
-    if (size != BYTES || memcmp(bytes, token, TOKEN) != 0) {
+    uint64_t sum = 0;
+    if (from == NULL || kept == NULL) {
+        return NO_PLACE;
+    }
+    if (size != BYTES || memcmp(from, token, TOKEN) != 0) {
         return NOT_OURS;
     }
-    memcpy(&saved, (const char *)bytes + TOKEN, sizeof saved);
+    memcpy(&sum, from + CHECKED, sizeof sum);
+    if (sum != checksum(from, CHECKED)) {
+        return NOT_OURS;
+    }
+    memcpy(&saved, from + TOKEN, sizeof saved);
     return keep(&saved, kept);
+}
+
+static int measured(size_t *size)
+{
+    if (size == NULL) {
+        return NO_PLACE;
+    }
+    *size = BYTES;
+    return 0;
 }
 
 static int is_ours(const char *given)
@@ -65,6 +113,8 @@ static const char *reason(int code)
         return "expected a finite number above 0";
     case NOT_HERE:
         return "a step begins at the time of the instance, where the last one ended";
+    case NO_PLACE:
+        return "expected a place, found NULL";
     case NOT_NOW:
         return "this cannot be done in the present mode";
     default:

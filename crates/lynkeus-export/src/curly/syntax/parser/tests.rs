@@ -1,7 +1,8 @@
 use super::*;
 use crate::curly::template::{chosen, parts};
 
-const RUNTIME: [(&str, &str); 13] = [
+const RUNTIME: [(&str, &str); 14] = [
+    ("along", include_str!("../../runtime/along.c")),
     ("extended", include_str!("../../runtime/extended.c")),
     ("filter", include_str!("../../runtime/filter.c")),
     ("integrate", include_str!("../../runtime/integrate.c")),

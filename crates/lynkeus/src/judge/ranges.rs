@@ -1,11 +1,12 @@
-//! Estimates that nobody should believe: they end far outside of what the model declares.
+//! Estimates outside of what the model declares.
 
-use lynkeus_model::{Plant, Variable};
+use lynkeus_model::Variable;
 use lynkeus_structure::figures;
 
-use crate::innovations::Innovations;
-use crate::words::{number, side};
-use crate::{Error, Quantity, Series};
+use super::{Doubt, Evidence, Kind, Level};
+use crate::outside::percent;
+use crate::words::{instant, number, side};
+use crate::{Quantity, Series};
 
 /// An estimate that keeps this far away, over the whole of this last share of the rows, is not
 /// credible. A peak is allowed: it comes back.
@@ -46,41 +47,122 @@ impl Limit {
 /// number that is known; a thousand times more ends the run.
 const LARGER: f64 = 1e9;
 
-/// An estimate that is not credible.
+/// An estimate that is far outside at its end.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Doubt {
+struct Away {
     /// the quantity's name in the plant
-    pub name: String,
+    name: String,
     /// smallest declared value
-    pub min: f64,
+    min: f64,
     /// largest declared value
-    pub max: f64,
+    max: f64,
     /// the estimate at the last row
-    pub last: f64,
+    last: f64,
     /// number of rows, up to the last, over which it stays away
-    pub rows: usize,
+    rows: usize,
     /// in multiples of max − min: how far at least it is there from the declared range, or
     /// from the nearest of true and measured value where these are outside, too. Without a declared
     /// range: in multiples of the largest number among starts, signals and true values, or 1
-    pub widths: f64,
+    widths: f64,
 }
 
-/// The estimates that are not credible.
-pub(crate) fn doubts(plant: &Plant, quantities: &[Quantity]) -> Vec<Doubt> {
-    let declared = || plant.states.iter().chain(&plant.inputs);
+/// Estimates that are outside of their declared ranges, by their ends or by their own deviations.
+pub(super) fn doubts(evidence: &Evidence<'_>) -> Vec<Doubt> {
+    let mut away = away(&evidence.declared, evidence.quantities);
+    away.sort_by(|a, b| b.widths.total_cmp(&a.widths));
+    let mut found: Vec<Doubt> = away.iter().map(Away::doubt).collect();
+    for quantity in evidence.quantities {
+        let is_known = |d: &Doubt| d.name == quantity.name;
+        if !found.iter().any(is_known) {
+            found.extend(beyond(evidence, quantity));
+            found.extend(misread(evidence, quantity));
+        }
+    }
+    found
+}
+
+/// The estimates that end far outside.
+fn away(declared: &[&Variable], quantities: &[Quantity]) -> Vec<Away> {
     let largest = largest(quantities);
-    let doubt = |quantity: &Quantity| {
-        let variable = declared().find(|v| v.name == quantity.name)?;
+    let away = |quantity: &Quantity| {
+        let variable = declared.iter().find(|v| v.name == quantity.name)?;
         match (variable.max - variable.min).is_finite() {
             true => of_range(variable, quantity),
             false => of_none(variable, quantity, largest),
         }
     };
-    quantities.iter().filter_map(doubt).collect()
+    quantities.iter().filter_map(away).collect()
 }
 
-/// The same of one quantity, row by row, without what is measured: an estimate that [`doubts`] would
-/// doubt is suspect, and few others are.
+/// A range that a sensor sees left by more of its widths is not sloppy, but of another unit.
+const NARROW: f64 = 3.0;
+
+/// Outside by so many of its own deviations is no chance.
+const DEVIATIONS: f64 = 3.0;
+
+/// What is beyond by less than a share of the range, or for less than a share of the rows, is no
+/// contradiction: ranges are declared in round numbers.
+struct Allowance {
+    /// in widths of the declared range; without one, in the largest magnitude of the estimate
+    widths: f64,
+    rows: f64,
+}
+
+const OF_FILTER: Allowance = Allowance {
+    widths: 0.01,
+    rows: 0.05,
+};
+/// Deviations of a linearised error system know of no peak at the start.
+const OF_ERROR_SYSTEM: Allowance = Allowance {
+    widths: 0.05,
+    rows: 0.1,
+};
+
+/// The doubt about an estimate that is outside by more than its own deviations explain.
+fn beyond(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
+    let declared = evidence.declared.iter();
+    let declared = declared.into_iter().find(|v| v.name == quantity.name)?;
+    let estimate = quantity.estimate.as_ref()?;
+    let named = |(name, _): &&(&str, &Series)| *name == quantity.name;
+    let deviation = evidence.deviations.iter().find(named)?.1;
+    let allowance = match evidence.is_filter {
+        true => OF_FILTER,
+        false => OF_ERROR_SYSTEM,
+    };
+    let width = declared.max - declared.min;
+    let width = match width.is_finite() {
+        true => width,
+        false => estimate.iter().fold(0.0, |m: f64, x| m.max(x.abs())),
+    };
+    let (mut count, mut until, mut rows) = (0, 0.0, 0_usize);
+    let mut seen = seen_beyond(evidence);
+    let away = distances(declared, quantity, 0).zip(deviation.iter());
+    for ((away, sd), t) in away.zip(evidence.time.iter()) {
+        rows += 1;
+        let seen = seen();
+        let is_seen = seen <= NARROW && away <= 2.0 * seen * width;
+        if !is_seen && away > DEVIATIONS * sd && away > allowance.widths * width {
+            count += 1;
+            until = t;
+        }
+    }
+    let share = f64::from(count) / rows.max(1) as f64;
+    (share >= allowance.rows).then(|| Doubt {
+        kind: Kind::Range,
+        name: declared.name.clone(),
+        text: format!(
+            "{} is outside of its declared range ({}) by more than {DEVIATIONS} of its own deviations in {} of the rows, until t = {}",
+            declared.name,
+            side(&declared.name, declared.min, declared.max),
+            percent(share),
+            instant(until)
+        ),
+        level: Level::Refusal,
+    })
+}
+
+/// The same of one quantity, row by row, without what is measured: an estimate that [`away`] would
+/// find is suspect, and few others are.
 #[cfg_attr(not(feature = "tune"), allow(dead_code))]
 #[derive(Clone, Debug)]
 pub(crate) struct Screen {
@@ -139,9 +221,9 @@ fn largest(quantities: &[Quantity]) -> f64 {
 }
 
 /// The doubt about a quantity without a range.
-fn of_none(declared: &Variable, quantity: &Quantity, largest: f64) -> Option<Doubt> {
+fn of_none(declared: &Variable, quantity: &Quantity, largest: f64) -> Option<Away> {
     let last = quantity.estimate.as_ref()?.last()?;
-    let doubt = Doubt {
+    let away = Away {
         name: declared.name.clone(),
         min: declared.min,
         max: declared.max,
@@ -149,11 +231,11 @@ fn of_none(declared: &Variable, quantity: &Quantity, largest: f64) -> Option<Dou
         rows: 1,
         widths: last.abs() / largest,
     };
-    (doubt.widths > LARGER).then_some(doubt)
+    (away.widths > LARGER).then_some(away)
 }
 
 /// The doubt about a quantity with a range.
-fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Doubt> {
+fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Away> {
     let width = declared.max - declared.min;
     let estimate = quantity.estimate.as_ref().filter(|_| width > 0.0)?;
     let rows = estimate.len();
@@ -167,7 +249,7 @@ fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Doubt> {
         (widths > limit.widths).then_some((rows - first, widths))
     });
     let (rows, widths) = exceeded?;
-    Some(Doubt {
+    Some(Away {
         name: declared.name.clone(),
         min: declared.min,
         max: declared.max,
@@ -197,90 +279,93 @@ fn distances<'q>(
     })
 }
 
-/// The answer where an estimate is not credible; none where all are.
-pub(crate) fn refusal(doubts: &[Doubt]) -> Option<Error> {
-    let worst = doubts.iter().max_by(|a, b| a.widths.total_cmp(&b.widths))?;
-    let others = match doubts.len() - 1 {
-        0 => String::new(),
-        1 => ", and another quantity likewise".to_owned(),
-        count => format!(", and {count} other quantities likewise"),
-    };
-    let times = figures(worst.widths, 2);
-    let range = side(&worst.name, worst.min, worst.max);
-    let why = match (worst.max - worst.min).is_finite() {
-        true if worst.rows == 1 => {
-            format!("that is {times} times the width of its declared range away from it ({range})")
-        }
-        true => format!(
-            "over its last {} rows it is at least {times} times the width of its declared range away from it ({range})",
-            worst.rows
+/// How far at the next row a sensor sees its own state outside of its declared range, in widths of
+/// that. Where ranges are narrower than what the plant does, the same excess elsewhere is no doubt.
+fn seen_beyond<'e>(evidence: &Evidence<'e>) -> impl FnMut() -> f64 + 'e {
+    let measured = evidence.quantities.iter();
+    let measured = measured.filter_map(|q| readings_beyond(evidence, q));
+    let mut measured: Vec<_> = measured.collect();
+    move || {
+        let next = measured.iter_mut().filter_map(Iterator::next);
+        next.fold(0.0, f64::max)
+    }
+}
+
+/// Of a measured quantity with a range: by row, how many widths its readings are beyond it.
+fn readings_beyond<'e>(
+    evidence: &Evidence<'e>,
+    quantity: &'e Quantity,
+) -> Option<impl Iterator<Item = f64> + 'e> {
+    let mut declared = evidence.declared.iter();
+    let &declared = declared.find(|v| v.name == quantity.name)?;
+    let width = declared.max - declared.min;
+    let readings = quantity.measured.as_ref()?.iter();
+    let beyond = move |y: f64| ((declared.min - y).max(y - declared.max) / width).max(0.0);
+    (width.is_finite() && width > 0.0).then(|| readings.map(beyond))
+}
+
+/// A sensor whose readings are mostly outside of what is declared.
+fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
+    let (mut count, mut rows, mut farthest) = (0, 0_usize, 0.0_f64);
+    for beyond in readings_beyond(evidence, quantity)? {
+        rows += 1;
+        count += usize::from(beyond > OF_ERROR_SYSTEM.widths);
+        farthest = farthest.max(beyond);
+    }
+    (2 * count > rows).then(|| Doubt {
+        kind: Kind::Range,
+        name: quantity.name.clone(),
+        text: format!(
+            "the readings of {} are outside of its declared range in {} of the rows, by up to {} times its width: is their unit the model's?",
+            quantity.name,
+            percent(count as f64 / rows as f64),
+            figures(farthest, 2)
         ),
-        false => format!("that is {times} times the largest number among starts and signals"),
-    };
-    let message = format!(
-        "the estimate is not credible: {} ends at {}, and {why}{others}",
-        worst.name,
-        number(worst.last),
-    );
-    Some(Error::refused(message).hint(
-        "see whether `lynkeus certify` proves this tuning, try another `theta` or `clamp = true`, compare the model with the log; if the plant really goes there, declare a wider min and max (the result is written all the same)",
-    ))
+        level: Level::Warning,
+    })
 }
 
-/// Innovations so many times larger than declared, in the mean over the last half of a run,
-/// contradict the model.
-const CONTRADICTION: f64 = 3.0;
-/// Readings on which such a mean rests.
-const ENOUGH: usize = 20;
-
-/// Where innovations contradict the declared noise, in words.
-pub(crate) fn contradictions(innovations: &[Innovations]) -> Vec<String> {
-    let words = |i: &Innovations| {
-        let late = &i.late;
-        let offered = late.taken + late.rejected;
-        if offered < ENOUGH {
-            return None;
+impl Away {
+    fn doubt(&self) -> Doubt {
+        let times = figures(self.widths, 2);
+        let range = side(&self.name, self.min, self.max);
+        let why = match (self.max - self.min).is_finite() {
+            true if self.rows == 1 => {
+                format!(
+                    "that is {times} times the width of its declared range away from it ({range})"
+                )
+            }
+            true => format!(
+                "over its last {} rows it is at least {times} times the width of its declared range away from it ({range})",
+                self.rows
+            ),
+            false => format!("that is {times} times the largest number among starts and signals"),
+        };
+        Doubt {
+            kind: Kind::Range,
+            name: self.name.clone(),
+            text: format!("{} ends at {}, and {why}", self.name, number(self.last)),
+            level: Level::Refusal,
         }
-        if 2 * late.rejected > offered {
-            return Some(format!(
-                "{} of the last {offered} readings of {} are rejected by the gate",
-                late.rejected, i.output
-            ));
-        }
-        let ratio = late.consistency()?.sqrt();
-        (ratio > CONTRADICTION).then(|| {
-            format!(
-                "the innovations of {} are {} times as large as its noise and the process noise explain",
-                i.output,
-                figures(ratio, 2)
-            )
-        })
-    };
-    innovations.iter().filter_map(words).collect()
-}
-
-/// The answer where they do.
-pub(crate) fn contradicted(first: &str) -> Error {
-    Error::refused(format!("the estimate is not credible: {first}")).hint(
-        "declare larger densities under [process_noise] for what the model does not know, or a larger noise of the sensor; compare the model with the log (the result is written all the same)",
-    )
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use lynkeus_model::LoadOptions;
+    use lynkeus_model::{LoadOptions, Plant};
 
     use super::*;
+    use crate::judge::refusal;
 
     /// Whether an estimate of x in [−1, 1] is doubted.
-    fn doubted(declared: &str, quantity: Quantity) -> Vec<Doubt> {
+    fn doubted(declared: &str, quantity: Quantity) -> Vec<Away> {
         let text = format!("model M Real x{declared}; equation der(x) = -x; end M;");
         let plant = Plant::from_modelica(&text, "m.mo", &LoadOptions::default()).unwrap();
         let quantity = Quantity {
             name: "x".to_owned(),
             ..quantity
         };
-        doubts(&plant, &[quantity])
+        away(&[&plant.states[0]], &[quantity])
     }
 
     fn estimate(values: impl Iterator<Item = f64>) -> Quantity {
@@ -345,13 +430,14 @@ mod tests {
             assert_eq!(doubted(open, values()), vec![]);
             let found = doubted(open, estimate([0.0, 1e10].into_iter()));
             assert_eq!(found[0].widths, 1e10);
-            let error = refusal(&found).unwrap().to_string();
+            let error = refusal(&[found[0].doubt()]).unwrap().to_string();
             assert!(error.contains("1e10 times the largest number"), "{error}");
             // large numbers are usual there
             let large = estimate([20.0, 1e10].into_iter());
             assert_eq!(doubted(open, large), vec![]);
         }
-        let error = refusal(&doubted(BOX, values())).unwrap().to_string();
+        let found = doubted(BOX, values());
+        let error = refusal(&[found[0].doubt()]).unwrap().to_string();
         assert!(
             error.starts_with(
                 "the estimate is not credible: x ends at 1e9, and that is 5e8 times the width"

@@ -1,10 +1,11 @@
-//! How readings went together with a filter's model.
+//! How readings went together with what was expected of them.
 
 use lynkeus_observers::Design;
 use lynkeus_run::filter::SensorHealth;
 use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
+use super::Trace;
 use crate::course::Course;
 
 /// The innovations of one measured output.
@@ -16,6 +17,10 @@ pub struct Innovations {
     pub all: SensorHealth,
     /// over the last half of its rows
     pub late: SensorHealth,
+    /// by stretches of readings
+    pub(crate) trace: Trace,
+    /// the same beside what is expected once the start is forgotten
+    pub(crate) settled: Trace,
 }
 
 impl Innovations {
@@ -77,12 +82,15 @@ pub(crate) fn innovations(
     notes: &mut Vec<String>,
 ) -> Vec<Innovations> {
     let sensors = course.sensors.iter().zip(&course.late);
+    let sensors = sensors.zip(course.traces.iter().zip(&course.settled));
     let found: Vec<Innovations> = sensors
         .zip(&design.observer.measured)
-        .map(|((all, late), signal)| Innovations {
+        .map(|(((all, late), (trace, settled)), signal)| Innovations {
             output: signal.name.clone(),
             all: *all,
             late: *late,
+            trace: trace.clone(),
+            settled: settled.clone(),
         })
         .collect();
     notes.extend(found.iter().take(TOLD).map(Innovations::words));

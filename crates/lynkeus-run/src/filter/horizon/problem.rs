@@ -1,0 +1,326 @@
+//! The linearised problem of a window within its bounds: a convex quadratic one.
+//!
+//! First by sets: bounds that are exceeded are met, those that pull inward are let go, and a set that
+//! does not change is that of the minimum (Hintermüller, Ito, Kunisch, *SIAM Journal on Optimization*
+//! 13 (2003) 865–888). It takes few passes, and may go round in circles. Where it does, an interior
+//! point method (S. Mehrotra, *SIAM Journal on Optimization* 2 (1992) 575–601) comes as close to the
+//! minimum as one likes, whatever the bounds: each of its steps is a smoother in which every bounded
+//! state is drawn to a value with some variance. Sets then go on from what it ends with.
+
+use super::pass::{Linear, Pass, Pin, Smooth, backward, corrected};
+use super::row::Met;
+use crate::filter::{Belief, Bounds};
+
+/// Most changes of a set before it is taken to go round.
+const CHANGES: usize = 12;
+
+/// Most steps of the interior point method.
+const STEPS: usize = 80;
+
+/// The cost is within this of the least one.
+const GAP: f64 = 1e-10;
+
+/// Share of the way to the nearest bound that a step takes.
+const SHORT: f64 = 0.995;
+
+/// The problem.
+pub(super) struct Problem<'a> {
+    pub prior: &'a Belief,
+    pub bounds: &'a [Bounds],
+    pub rows: Vec<Linear>,
+    /// without bounds
+    pub free: Vec<Pass>,
+}
+
+/// What solves it.
+pub(super) struct Solution {
+    /// the states, row by row
+    pub x: Vec<Vec<f64>>,
+    /// the bounds that they meet
+    pub met: Vec<Vec<Met>>,
+    /// the filter with these for exact readings; none where there are none
+    pub passes: Option<Vec<Pass>>,
+    /// whether its cost is the least one
+    pub is_least: bool,
+}
+
+/// One bound of one state of one row, in units of the state's deviation.
+struct Side {
+    row: usize,
+    state: usize,
+    bound: f64,
+    /// 1 of a lower bound, −1 of an upper one
+    sign: f64,
+    unit: f64,
+    /// how far the state is from it
+    room: f64,
+    force: f64,
+}
+
+/// What a step would change at a side.
+#[derive(Clone, Copy)]
+struct Change {
+    room: f64,
+    force: f64,
+}
+
+impl Problem<'_> {
+    /// The least cost, from a first guess at the bounds that are met.
+    pub fn solve(&self, met: Vec<Vec<Met>>) -> Solution {
+        let free = backward(&self.free);
+        if self.are_inside(&free) {
+            let met = vec![vec![]; self.rows.len()];
+            return Solution::least(free, met, None);
+        }
+        if let Some(found) = self.by_sets(met) {
+            return found;
+        }
+        let (x, met, is_least) = self.from_inside(free);
+        if let Some(found) = self.by_sets(met.clone()) {
+            return found;
+        }
+        Solution {
+            x,
+            passes: Some(self.forward(&pins(&met))),
+            met,
+            is_least,
+        }
+    }
+
+    /// The Kalman filter, with pins.
+    pub fn forward(&self, pins: &[Vec<Pin>]) -> Vec<Pass> {
+        let mut passes: Vec<Pass> = vec![];
+        for (linear, pins) in self.rows.iter().zip(pins) {
+            let before = linear.way.carry(self.prior, passes.last());
+            passes.push(corrected(&linear.seen, &linear.spread, pins, before));
+        }
+        passes
+    }
+
+    fn are_inside(&self, found: &[Smooth]) -> bool {
+        found.iter().all(|row| {
+            let mut all = row.x.iter().zip(self.bounds);
+            all.all(|(x, bounds)| exceeded(*x, *bounds).is_none())
+        })
+    }
+
+    /// By sets; none where they go round, or do not hold the states.
+    fn by_sets(&self, mut met: Vec<Vec<Met>>) -> Option<Solution> {
+        for _ in 0..CHANGES {
+            let passes = self.forward(&pins(&met));
+            let found = backward(&passes);
+            if !self.change(&mut met, &found) {
+                let holds = self.are_inside(&found);
+                return holds.then(|| Solution::least(found, met, Some(passes)));
+            }
+        }
+        None
+    }
+
+    /// Bounds that are exceeded are met from now on; those that pull inward are let go.
+    fn change(&self, met: &mut [Vec<Met>], found: &[Smooth]) -> bool {
+        let mut changed = false;
+        for (met, Smooth { x, forces }) in met.iter_mut().zip(found) {
+            let before = met.len();
+            let mut place = 0;
+            met.retain(|&Met { state, bound }| {
+                let force = forces.iter().find(|f| f.place == place);
+                let force = force.map_or(0.0, |f| f.push);
+                place += 1;
+                let Bounds { low, high } = self.bounds[state];
+                let outward = if bound == low { -force } else { force };
+                // a single value pushes either way
+                low == high || outward <= 0.0
+            });
+            changed |= met.len() != before;
+            for (state, (x, bounds)) in x.iter().zip(self.bounds).enumerate() {
+                let Some(bound) = exceeded(*x, *bounds) else {
+                    continue;
+                };
+                if !met.iter().any(|m| m.state == state) {
+                    met.push(Met { state, bound });
+                    changed = true;
+                }
+            }
+        }
+        changed
+    }
+
+    /// By an interior point method: the states, the bounds that they meet, and whether the cost is
+    /// the least one.
+    fn from_inside(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Met>>, bool) {
+        let mut x: Vec<Vec<f64>> = free.into_iter().map(|row| row.x).collect();
+        let mut sides = self.sides(&mut x);
+        let mut off = 1.0;
+        let count = sides.len().max(1) as f64;
+        let mut is_least = false;
+        for _ in 0..STEPS {
+            let gap: f64 = sides.iter().map(|s| s.room * s.force).sum();
+            is_least = gap <= GAP && off <= GAP;
+            if is_least || !gap.is_finite() {
+                break;
+            }
+            let towards = self.step(&x, &sides, |_| 0.0);
+            let aim: Vec<Change> = sides.iter().map(|s| s.change(&x, &towards, 0.0)).collect();
+            let share = longest(&sides, &aim);
+            let left = sides
+                .iter()
+                .zip(&aim)
+                .map(|(s, c)| (s.room + share * c.room) * (s.force + share * c.force));
+            let centre = (left.sum::<f64>() / gap).clamp(0.0, 1.0).powi(3) * gap / count;
+            let product = |k: usize| centre - aim[k].room * aim[k].force;
+            let towards = self.step(&x, &sides, product);
+            let change = |(k, s): (usize, &Side)| s.change(&x, &towards, product(k));
+            let changes: Vec<Change> = sides.iter().enumerate().map(change).collect();
+            let share = (SHORT * longest(&sides, &changes)).min(1.0);
+            off *= 1.0 - share;
+            for (x, towards) in x.iter_mut().flatten().zip(towards.iter().flatten()) {
+                *x += share * (towards - *x);
+            }
+            for (side, change) in sides.iter_mut().zip(&changes) {
+                side.room += share * change.room;
+                side.force += share * change.force;
+            }
+        }
+        // what does not move may be outside
+        let mut all = x.iter().flat_map(|row| row.iter().zip(self.bounds));
+        is_least &= all.all(|(x, bounds)| exceeded(*x, *bounds).is_none());
+        let mut met = self.single();
+        for side in sides.iter().filter(|s| s.force > s.room) {
+            met[side.row].push(Met {
+                state: side.state,
+                bound: side.bound,
+            });
+            x[side.row][side.state] = side.bound;
+        }
+        for row in &mut x {
+            super::confine(row, self.bounds);
+        }
+        (x, met, is_least)
+    }
+
+    /// The bounds of states that have one value alone.
+    fn single(&self) -> Vec<Vec<Met>> {
+        let states = self.bounds.iter().enumerate();
+        let single = states.filter(|(_, b)| b.low == b.high);
+        let met = single.map(|(state, b)| Met {
+            state,
+            bound: b.low,
+        });
+        vec![met.collect(); self.rows.len()]
+    }
+
+    /// All sides, each with room; the states are moved inside.
+    fn sides(&self, x: &mut [Vec<f64>]) -> Vec<Side> {
+        let mut sides = vec![];
+        for (row, x) in x.iter_mut().enumerate() {
+            for (state, (x, Bounds { low, high })) in x.iter_mut().zip(self.bounds).enumerate() {
+                let unit = self.rows[row].spread[state];
+                // what does not move needs no bounds
+                if low == high || unit <= 0.0 {
+                    continue;
+                }
+                let margin = (0.1 * (high - low)).min(unit);
+                *x = x.max(low + margin).min(high - margin);
+                for (bound, sign) in [(*low, 1.0), (*high, -1.0)] {
+                    if bound.is_finite() {
+                        let room = sign * (*x - bound) / unit;
+                        sides.push(Side {
+                            row,
+                            state,
+                            bound,
+                            sign,
+                            unit,
+                            room,
+                            force: 1.0 / room,
+                        });
+                    }
+                }
+            }
+        }
+        sides
+    }
+
+    /// The states of one Newton step, after which room times force would be `product` at every side.
+    fn step(
+        &self,
+        x: &[Vec<f64>],
+        sides: &[Side],
+        product: impl Fn(usize) -> f64,
+    ) -> Vec<Vec<f64>> {
+        let single = self.single();
+        let mut all = pins(&single);
+        let mut k = 0;
+        while let Some(first) = sides.get(k) {
+            // both sides of a state draw at it together
+            let mine = sides[k..].iter().take(2);
+            let mine = mine.take_while(|s| (s.row, s.state) == (first.row, first.state));
+            let (mut pull, mut weight) = (0.0, 0.0);
+            for side in mine {
+                weight += side.force / side.room;
+                pull += side.sign * product(k) / side.room;
+                k += 1;
+            }
+            all[first.row].push(Pin {
+                state: first.state,
+                value: x[first.row][first.state] + first.unit * pull / weight,
+                variance: first.unit * first.unit / weight,
+            });
+        }
+        let found = backward(&self.forward(&all));
+        found.into_iter().map(|smooth| smooth.x).collect()
+    }
+}
+
+impl Solution {
+    fn least(found: Vec<Smooth>, met: Vec<Vec<Met>>, passes: Option<Vec<Pass>>) -> Self {
+        Self {
+            x: found.into_iter().map(|smooth| smooth.x).collect(),
+            met,
+            passes,
+            is_least: true,
+        }
+    }
+}
+
+impl Side {
+    /// What becomes of it where the states become `towards`, and its room times its force
+    /// `product`.
+    fn change(&self, x: &[Vec<f64>], towards: &[Vec<f64>], product: f64) -> Change {
+        let (row, state) = (self.row, self.state);
+        let room = self.sign * (towards[row][state] - x[row][state]) / self.unit;
+        let force = (product - self.force * room) / self.room;
+        Change {
+            room,
+            force: force - self.force,
+        }
+    }
+}
+
+/// The share of a step up to which all room and forces stay positive; 1 at most.
+fn longest(sides: &[Side], changes: &[Change]) -> f64 {
+    let mut share = 1.0_f64;
+    for (side, change) in sides.iter().zip(changes) {
+        for (value, change) in [(side.room, change.room), (side.force, change.force)] {
+            if change < 0.0 {
+                share = share.min(-value / change);
+            }
+        }
+    }
+    share
+}
+
+fn pins(met: &[Vec<Met>]) -> Vec<Vec<Pin>> {
+    let row = |met: &Vec<Met>| met.iter().copied().map(Pin::from).collect();
+    met.iter().map(row).collect()
+}
+
+/// The bound that a state is beyond, by more than rounding.
+fn exceeded(x: f64, Bounds { low, high }: Bounds) -> Option<f64> {
+    let slack = 1e-9 * (high - low).min(x.abs().max(1e-3));
+    match (x < low - slack, x > high + slack) {
+        (true, _) => Some(low),
+        (_, true) => Some(high),
+        _ => None,
+    }
+}

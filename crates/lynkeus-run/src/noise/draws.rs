@@ -1,0 +1,297 @@
+//! How often process noise is drawn.
+//!
+//! What is held for δ is white only for what is slow beside δ: the variance of x' = −ax + w then comes
+//! out as tanh(aδ/2)/(aδ/2) of what it is. Draws are as dense as the linearised plant needs.
+
+use std::ops::ControlFlow;
+
+use nalgebra::DMatrix;
+
+use crate::spectral::fastest;
+use crate::{Dynamics, Noise, Role, Simulation, Slopes};
+
+/// A variance of a state at the end of the run may be off by this share.
+const OFF: f64 = 0.02;
+
+/// Points of a run without noise at which the plant is linearised.
+const PLACES: usize = 8;
+
+/// Larger plants are judged by their fastest mode alone,
+const SMALL: usize = 48;
+
+/// which may turn by so much while noise is held: its variance is then off by 2 %.
+const TURN: f64 = 0.5;
+
+/// Most draws of a run.
+const MOST: f64 = 3e5;
+
+/// Most doublings of a step.
+const DOUBLINGS: usize = 60;
+
+/// How often process noise is drawn from one sample to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProcessDraws {
+    /// draws from one sample to the next
+    pub per_sample: usize,
+    /// the time that each holds
+    pub hold: f64,
+    /// whether they are dense enough for the plant's time scales; too many would be needed otherwise
+    pub are_enough: bool,
+}
+
+/// How often the process noise of a simulation has to be drawn so that the plant, linearised at some
+/// points of its run without noise, scatters as under white noise to 1 % of every standard deviation.
+/// It depends on neither seed nor observer.
+pub fn process_draws(simulation: &Simulation) -> ProcessDraws {
+    let sample = (simulation.noise.sample_step).unwrap_or(simulation.output_step);
+    let samples = ((simulation.until - simulation.start) / sample).max(1.0);
+    let states = simulation.plant.states();
+    let density = |name: &String| simulation.noise.process.get(name).copied().unwrap_or(0.0);
+    let densities: Vec<f64> = states.iter().map(density).collect();
+    let mut needed = 0;
+    if densities.iter().any(|q| *q > 0.0) && samples.is_finite() && sample > 0.0 {
+        let most = (MOST / samples).max(1.0).log2().floor() as usize;
+        for place in linearised(simulation) {
+            let found = place.halvings(&densities, sample, samples, most + 1);
+            needed = needed.max(found);
+        }
+        let halvings = needed.min(most);
+        let per_sample = 1 << halvings;
+        return ProcessDraws {
+            per_sample,
+            hold: sample / per_sample as f64,
+            are_enough: needed <= most,
+        };
+    }
+    ProcessDraws {
+        per_sample: 1,
+        hold: sample,
+        are_enough: true,
+    }
+}
+
+/// The plant about one point.
+enum Place {
+    Small(DMatrix<f64>),
+    /// its fastest mode
+    Large(f64),
+}
+
+/// The plant along its run without noise, as far as that goes.
+fn linearised(simulation: &Simulation) -> Vec<Place> {
+    let quiet = Simulation {
+        observer: None,
+        record_outputs: false,
+        noise: Noise::default(),
+        output_step: (simulation.until - simulation.start) / PLACES as f64,
+        ..simulation.clone()
+    };
+    let watch = &mut |_| ControlFlow::Continue(());
+    let run = match quiet.run_watched(watch) {
+        Ok(run) => run,
+        Err(ended) => ended.partial,
+    };
+    let mut plant = simulation.plant.evaluation();
+    let (n, inputs) = (plant.dimension(), plant.signals().len());
+    let mut slopes = Slopes::default();
+    let mut places = vec![];
+    for (row, &t) in run.times().iter().enumerate() {
+        let value = |role: Role, i: usize| run.column(role.at(i)).map_or(f64::NAN, |c| c[row]);
+        let x: Vec<f64> = (0..n).map(|i| value(Role::State, i)).collect();
+        for i in 0..inputs {
+            plant.signals_mut()[i] = value(Role::Input, i);
+        }
+        plant.enter(t);
+        places.push(match n <= SMALL {
+            true => {
+                slopes.look(&mut plant, t, &x);
+                Place::Small(slopes.dense(n))
+            }
+            false => Place::Large(fastest(&mut plant, t, &x, &[]).radius),
+        });
+    }
+    places
+}
+
+impl Place {
+    /// How often a sampling interval has to be halved; `most` where that is too often, 0 where the
+    /// plant has no slopes.
+    fn halvings(&self, densities: &[f64], sample: f64, samples: f64, most: usize) -> usize {
+        match self {
+            Self::Large(rate) => {
+                let fits = |j: &usize| rate * sample / 2.0_f64.powi(*j as i32) <= TURN;
+                match rate.is_finite() {
+                    true => (0..most).find(fits).unwrap_or(most),
+                    false => 0,
+                }
+            }
+            Self::Small(F) if F.iter().all(|f| f.is_finite()) => {
+                let flow = Flow::new(F, densities, sample, samples);
+                (0..most).find(|j| flow.fits(*j)).unwrap_or(most)
+            }
+            Self::Small(_) => 0,
+        }
+    }
+}
+
+/// Φ = exp(Fh), ∫ exp(Fs) ds and W = ∫ exp(Fs) Q exp(Fᵀs) ds over h.
+struct Step {
+    transition: DMatrix<f64>,
+    integral: DMatrix<f64>,
+    noise: DMatrix<f64>,
+}
+
+impl Step {
+    /// Over a step in which F turns little: by series.
+    fn short(F: &DMatrix<f64>, Q: &DMatrix<f64>, h: f64) -> Self {
+        const TERMS: usize = 12;
+        let n = F.nrows();
+        let one = DMatrix::<f64>::identity(n, n);
+        let mut step = Self {
+            transition: one.clone(),
+            integral: &one * h,
+            noise: Q * h,
+        };
+        let (mut power, mut part) = (one, Q * h);
+        for k in 1..=TERMS {
+            power = F * power * (h / k as f64);
+            step.transition += &power;
+            step.integral += &power * (h / (k + 1) as f64);
+            let next = F * &part;
+            part = (&next + next.transpose()) * (h / (k + 1) as f64);
+            step.noise += &part;
+        }
+        step
+    }
+
+    /// Over twice the time.
+    fn doubled(&self) -> Self {
+        let Self {
+            transition,
+            integral,
+            noise,
+        } = self;
+        Self {
+            transition: transition * transition,
+            integral: integral + transition * integral,
+            noise: noise + transition * noise * transition.transpose(),
+        }
+    }
+}
+
+/// A linear plant x' = Fx + w over 1/2^k of a sampling interval, then over the interval, then over more
+/// and more of them.
+struct Flow {
+    Q: DMatrix<f64>,
+    /// the shortest first
+    steps: Vec<Step>,
+    /// which of them is the interval, and its length
+    sample: usize,
+    interval: f64,
+}
+
+impl Flow {
+    fn new(F: &DMatrix<f64>, densities: &[f64], interval: f64, samples: f64) -> Self {
+        let Q = DMatrix::from_diagonal(&densities.to_vec().into());
+        let turn = (F.norm() * interval).max(f64::MIN_POSITIVE);
+        let halvings = (turn / 0.125).log2().ceil().clamp(0.0, DOUBLINGS as f64) as usize;
+        let h = interval / 2.0_f64.powi(halvings as i32);
+        let mut steps = vec![Step::short(F, &Q, h)];
+        let all = halvings + (samples.log2().ceil() as usize).min(DOUBLINGS);
+        while steps.len() <= all {
+            let Some(next) = steps.last().map(Step::doubled) else {
+                break;
+            };
+            let size = next.noise.norm() + next.transition.norm();
+            if steps.len() > halvings && !(size < 1e150) {
+                break;
+            }
+            steps.push(next);
+        }
+        Self {
+            Q,
+            steps,
+            sample: halvings,
+            interval,
+        }
+    }
+
+    /// Whether noise that is held for 1/2^j of an interval makes the variances of the states that
+    /// white noise makes, at the end.
+    fn fits(&self, j: usize) -> bool {
+        let Some(first) = self.sample.checked_sub(j) else {
+            return true;
+        };
+        let (Some(step), Some(last)) = (self.steps.get(first), self.steps.last()) else {
+            return true;
+        };
+        let hold = self.interval / 2.0_f64.powi(j as i32);
+        let mut held = &step.integral * &self.Q * step.integral.transpose() / hold;
+        for step in &self.steps[first..self.steps.len() - 1] {
+            held += &step.transition * &held * step.transition.transpose();
+        }
+        (0..held.nrows()).all(|i| {
+            let white = last.noise[(i, i)];
+            // what is no number tells nothing
+            !((held[(i, i)] - white).abs() > OFF * white.abs())
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::System;
+    use lynkeus_expr::Graph;
+
+    fn needed(F: &[f64], densities: &[f64], samples: f64) -> usize {
+        let n = densities.len();
+        Place::Small(DMatrix::from_row_slice(n, n, F)).halvings(densities, 1.0, samples, 30)
+    }
+
+    /// x' = −ax + w: tanh(aδ/2)/(aδ/2) is within 2 % of 1 where aδ is below 0.496.
+    #[test]
+    fn a_fast_state_is_drawn_often_and_a_slow_one_as_before() {
+        assert_eq!(needed(&[-0.4], &[1.0], 1e4), 0);
+        assert_eq!(needed(&[-0.6], &[1.0], 1e4), 1);
+        assert_eq!(needed(&[-5.0], &[1.0], 1e4), 4);
+        assert_eq!(needed(&[0.0], &[1.0], 1e4), 0);
+        assert_eq!(needed(&[0.1], &[1.0], 1e4), 0);
+    }
+
+    /// Where a run would need too many draws there are as many as it can have, and it is told.
+    #[test]
+    fn too_many_draws_are_told() {
+        let of = |rate: f64, until: f64| {
+            let g = Graph::new();
+            let (x, time) = (g.symbol("x"), g.symbol("time").node());
+            let states = [("x".to_owned(), x.node(), 0.0)];
+            let plant = System::new(&g, time, &states, &[], &[(x * -rate).node()], &[]).unwrap();
+            let inputs = System::new(&g, time, &[], &[], &[], &[]).unwrap();
+            let mut simulation = Simulation::new(plant, inputs, until, 1.0);
+            simulation.noise.process.insert("x".to_owned(), 1.0);
+            process_draws(&simulation)
+        };
+        assert_eq!(of(0.1, 100.0).per_sample, 1);
+        let fast = of(5.0, 3000.0);
+        assert_eq!((fast.per_sample, fast.are_enough), (16, true));
+        assert_eq!(fast.hold, 1.0 / 16.0);
+        let stiff = of(1e7, 3000.0);
+        assert!(!stiff.are_enough && stiff.per_sample as f64 * 3000.0 <= MOST);
+    }
+
+    /// An oscillator turns; what is stiff and driven by nothing but a slow state needs no more draws.
+    #[test]
+    fn what_noise_moves_counts() {
+        let oscillator = |w: f64| needed(&[0.0, 1.0, -w * w, -0.02 * w], &[0.0, 1.0], 1e4);
+        assert_eq!(oscillator(0.3), 0);
+        assert!(oscillator(7.0) >= 4, "{}", oscillator(7.0));
+        let slaved = [-0.1, 0.0, 1e5, -1e5];
+        assert_eq!(needed(&slaved, &[1.0, 0.0], 1e4), 0);
+        assert!(needed(&slaved, &[0.0, 1.0], 1e4) > 15);
+        // integrators have no time of their own, and are seen over the whole run
+        let chain = [0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        assert_eq!(needed(&chain, &[0.0, 0.0, 1.0], 100.0), 0);
+        assert_eq!(needed(&[f64::NAN], &[1.0], 10.0), 0);
+    }
+}

@@ -1,0 +1,164 @@
+//! The verdict `credible`: of short logs, of every family, on the whole run.
+
+use std::fmt::Write;
+
+use crate::{Ended, Folder, csv};
+
+const CONSTANT: &str =
+    "model M\n  Real x(start = 1);\n  output Real y = x;\nequation\n  der(x) = 0;\nend M;\n";
+const WELLS: &str = "model M\n  Real x(start = 1, min = -2, max = 2);\n  output Real y = x;\nequation\n  der(x) = x - x^3;\nend M;\n";
+
+/// A log of y at whole times, `estimate`d with `--json`.
+fn estimated(model: &str, study: &str, y: impl Iterator<Item = f64>) -> (Folder, Ended) {
+    let folder = Folder::empty();
+    folder.write("m.mo", model);
+    let sensors = "plant = \"m.mo\"\n[sensors]\nmeasured = [\"y\"]\nnoise = { y = 0.01 }\n";
+    folder.write("s.toml", &format!("{sensors}{study}"));
+    let mut log = "t,y\n".to_owned();
+    for (k, y) in y.enumerate() {
+        let cell = if y.is_nan() {
+            String::new()
+        } else {
+            y.to_string()
+        };
+        writeln!(log, "{k},{cell}").unwrap();
+    }
+    folder.write("log.csv", &log);
+    let ended = folder.run(&["estimate", "s.toml", "log.csv", "--json", "-o", "o.csv"]);
+    (folder, ended)
+}
+
+/// ±0.01, the same in every run.
+fn noise(k: usize) -> f64 {
+    0.01 * if (k * k / 3).is_multiple_of(2) {
+        1.0
+    } else {
+        -1.0
+    }
+}
+
+fn levels(ended: &Ended, level: &str) -> Vec<String> {
+    let json = ended.json();
+    let doubts = json["doubts"].as_array().unwrap();
+    let own = doubts.iter().filter(|d| d["level"] == level);
+    own.map(|d| {
+        format!(
+            "{} {}",
+            d["kind"].as_str().unwrap(),
+            d["name"].as_str().unwrap()
+        )
+    })
+    .collect()
+}
+
+const EKF: &str =
+    "[process_noise]\nx = 0\n[observer]\nfamily = \"ekf\"\ninitial_variance = { x = 0.01 }\n";
+
+/// A constant that grows by a hundred noises per row is refused from two readings on, one that is
+/// constant never.
+#[test]
+fn short_logs_are_judged() {
+    for rows in [2, 3, 5, 8, 13, 19, 25, 60] {
+        let (folder, wrong) = estimated(CONSTANT, EKF, (0..rows).map(|k| 1.0 + k as f64));
+        assert_eq!(wrong.code, 1, "{rows}: {}", wrong.err);
+        assert!(
+            wrong.err.contains("not credible: the innovations of y"),
+            "{}",
+            wrong.err
+        );
+        assert_eq!(levels(&wrong, "refusal"), ["innovations y"]);
+        assert_eq!(csv(&folder.read("o.csv")).1.len(), rows);
+        let (_, right) = estimated(CONSTANT, EKF, (0..rows).map(|k| 1.0 + noise(k)));
+        assert_eq!(
+            (right.code, right.json()["credible"].as_bool()),
+            (0, Some(true))
+        );
+    }
+}
+
+/// A third of the run, wherever it is, and however few readings there are.
+#[test]
+fn a_stretch_counts_as_the_end_does() {
+    for rows in [30, 300] {
+        for from in [rows / 9, rows / 3] {
+            let hang = from..from + rows / 3;
+            let drifting = "[process_noise]\nx = 1e-8\n[observer]\nfamily = \"ekf\"\n";
+            let y = move |k: usize| {
+                1.0 + noise(k)
+                    + if hang.contains(&k) {
+                        0.3 * k as f64
+                    } else {
+                        0.0
+                    }
+            };
+            let (_, ended) = estimated(CONSTANT, drifting, (0..rows).map(y));
+            assert_eq!(ended.code, 1, "{rows} {from}: {}", ended.out);
+        }
+    }
+}
+
+/// An estimate in the wrong well, with a gain that is too small to bring it over, and one that does.
+#[test]
+fn families_are_judged_by_their_own_sensors() {
+    for sd in ["sd = true", "sd = false", "between_samples = \"linear\""] {
+        let study = |theta: f64| {
+            format!(
+                "[observer]\nfamily = \"triangular\"\ntheta = {theta}\ninitial = {{ x = -1 }}\n[estimate]\n{sd}\n"
+            )
+        };
+        let y = || (0..80).map(|k| 1.0 + noise(k));
+        let (_, wrong) = estimated(WELLS, &study(0.1), y());
+        assert_eq!(wrong.code, 1, "{sd}: {}", wrong.out);
+        assert_eq!(levels(&wrong, "refusal"), ["innovations y"]);
+        let (_, right) = estimated(WELLS, &study(4.0), y());
+        assert_eq!(right.code, 0, "{sd}: {}", right.err);
+    }
+}
+
+/// A noise that is declared a hundred times too large is told, and refuses nothing.
+#[test]
+fn too_small_is_a_warning() {
+    let (_, ended) = estimated(CONSTANT, EKF, (0..60).map(|k| 1.0 + 0.01 * noise(k)));
+    assert_eq!(ended.code, 0);
+    assert_eq!(levels(&ended, "warning"), ["noise y"]);
+    assert!(
+        ended.err.contains("note: the innovations of y are"),
+        "{}",
+        ended.err
+    );
+}
+
+#[test]
+fn innovations_are_columns() {
+    let families = [EKF, "[observer]\nfamily = \"triangular\"\ntheta = 1\n"];
+    for (family, model) in families.iter().zip([CONSTANT, WELLS]) {
+        let y = |k: usize| if k == 7 { f64::NAN } else { 1.0 + noise(k) };
+        let study = format!("{family}[estimate]\ninnovations = true\n");
+        let (folder, ended) = estimated(model, &study, (0..20).map(y));
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        // what is not there is an empty cell
+        let text = folder
+            .read("o.csv")
+            .replace(",,", ",NaN,")
+            .replace(",\n", ",NaN\n");
+        let (header, rows) = csv(&text);
+        assert_eq!(header, ["t", "x_hat", "y_innovation", "y_innovation_sd"]);
+        for (k, row) in rows.iter().enumerate().filter(|(k, _)| *k > 0) {
+            if k == 7 {
+                assert!(row[2].is_nan() && row[3].is_nan());
+                continue;
+            }
+            // x is constant between the rows of the first model, so that y is expected where x was
+            if model == CONSTANT {
+                assert!(
+                    (row[2] - (y(k) - rows[k - 1][1])).abs() < 1e-9,
+                    "{k}: {row:?}"
+                );
+            }
+            assert!(
+                row[3] >= 0.01 && row[2].abs() < 6.0 * row[3],
+                "{k}: {row:?}"
+            );
+        }
+    }
+}
