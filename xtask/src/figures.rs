@@ -233,16 +233,12 @@ fn points((header, rows): &Table, shown: Shown) -> Result<Vec<(f64, f64)>, Strin
         let found = header.iter().position(|known| known == name);
         found.ok_or_else(|| format!("no column {name}; there are: {}", header.join(", ")))
     };
-    let value: Box<dyn Fn(&[f64]) -> f64> = match shown {
-        Shown::Column(name) => {
-            let place = place(name)?;
-            Box::new(move |row| row[place])
-        }
-        Shown::Error(name) => {
-            let (truth, estimate) = (place(name)?, place(&format!("{name}_hat"))?);
-            Box::new(move |row| row[estimate] - row[truth])
-        }
+    // an error is the estimate less the truth
+    let (shown, truth) = match shown {
+        Shown::Column(name) => (place(name)?, None),
+        Shown::Error(name) => (place(&format!("{name}_hat"))?, Some(place(name)?)),
     };
+    let value = |row: &[f64]| row[shown] - truth.map_or(0.0, |truth| row[truth]);
     let finite = rows.iter().map(|row| (row[0], value(row)));
     Ok(finite
         .filter(|(t, y)| t.is_finite() && y.is_finite())

@@ -203,7 +203,7 @@ impl Flow {
                 break;
             };
             let size = next.noise.norm() + next.transition.norm();
-            if steps.len() > halvings && !(size < 1e150) {
+            if steps.len() > halvings && (size.is_nan() || size >= 1e150) {
                 break;
             }
             steps.push(next);
@@ -232,8 +232,9 @@ impl Flow {
         }
         (0..held.nrows()).all(|i| {
             let white = last.noise[(i, i)];
+            let off = (held[(i, i)] - white).abs();
             // what is no number tells nothing
-            !((held[(i, i)] - white).abs() > OFF * white.abs())
+            off.is_nan() || white.is_nan() || off <= OFF * white.abs()
         })
     }
 }

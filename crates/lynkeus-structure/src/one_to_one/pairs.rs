@@ -1,5 +1,6 @@
 //! Pairs of boxes, cut until no two of their points have the same values.
 
+use super::alike::Guess;
 use std::collections::VecDeque;
 
 use lynkeus_expr::interval::{Intervals, solve};
@@ -81,7 +82,7 @@ impl<'a> Pairs<'a> {
 
     /// Cuts pairs until all are decided. `seek` has the middles of pairs that are not, and ends the search
     /// by true.
-    pub fn decide(mut self, seek: &mut dyn FnMut(&[[Vec<(String, f64)>; 2]]) -> bool) -> Found {
+    pub fn decide(mut self, seek: &mut dyn FnMut(&[Guess]) -> bool) -> Found {
         let whole = self.region.cell();
         let first = Pair {
             left: whole.clone(),
@@ -141,7 +142,7 @@ impl<'a> Pairs<'a> {
     }
 
     /// Middles of pairs, evenly among those that are open.
-    fn guesses(&self, open: &VecDeque<Pair>) -> Vec<[Vec<(String, f64)>; 2]> {
+    fn guesses(&self, open: &VecDeque<Pair>) -> Vec<Guess> {
         let named = |cell: &Cell| -> Vec<(String, f64)> {
             let middle = self.region.middle_point(cell);
             let names = self.region.dimensions.iter().map(|d| d.name.clone());

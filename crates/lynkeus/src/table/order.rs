@@ -199,7 +199,8 @@ impl Groups {
         let mut merged = Series::within(values.store());
         let mut contradicted = Contradicted::default();
         // a row with its value, and another one of the same time before it
-        let (mut last, mut other): (Option<(usize, f64)>, Option<(usize, f64)>) = (None, None);
+        let mut last: Option<(usize, f64)> = None;
+        let mut other: Option<(usize, f64)> = None;
         for (&row, &is_end) in self.rows.iter().zip(&self.ends) {
             if of_row[row].is_finite() {
                 // what counts nowhere differs from what counts

@@ -97,7 +97,7 @@ fn a_state_at_the_end_of_a_range_is_found_without_bias() {
             assert!((x - 1.0).abs() <= 4.0 * sd, "{what}");
             if let Some(told) = told {
                 // 1001 readings beside the start
-                let expected = (0.01 / (1001.0 * told) as f64).sqrt();
+                let expected = f64::sqrt(0.01 / (1001.0 * told));
                 assert!((sd / expected - 1.0).abs() < 0.12, "{what} for {expected}");
             }
         }

@@ -75,7 +75,7 @@ impl Problem<'_> {
         if let Some(found) = self.by_sets(met) {
             return found;
         }
-        let (x, met, is_least) = self.from_inside(free);
+        let (x, met, is_least) = self.by_interior_point(free);
         if let Some(found) = self.by_sets(met.clone()) {
             return found;
         }
@@ -148,7 +148,7 @@ impl Problem<'_> {
 
     /// By an interior point method: the states, the bounds that they meet, and whether the cost is
     /// the least one.
-    fn from_inside(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Met>>, bool) {
+    fn by_interior_point(&self, free: Vec<Smooth>) -> (Vec<Vec<f64>>, Vec<Vec<Met>>, bool) {
         let mut x: Vec<Vec<f64>> = free.into_iter().map(|row| row.x).collect();
         let mut sides = self.sides(&mut x);
         let mut off = 1.0;
