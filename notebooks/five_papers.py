@@ -144,7 +144,7 @@ assert abs(error(frozen, "x3")[frozen.t >= 8.25]).max() < 0.02
 study = load("ltaief/study.toml")
 late, excitation = {}, {}
 for theta in (2, 10, 40, 100, 400, 1000):
-    run = study.replace(observer={"theta": theta}).simulate()
+    run = study.replace(observer={"theta": theta}, simulate={"output_step": 0.01}).simulate()
     late[theta] = [float(abs(error(run, x)[run.t >= 5]).max()) for x in ("x1", "x2", "x3")]
     excitation[theta] = float(run["excitation"][(run.t >= 1) & (run.t <= 3)].min())
     print(theta, [f"{e:.2g}" for e in late[theta]], f"λ_min·θ² = {excitation[theta] * theta**2:.3g}")

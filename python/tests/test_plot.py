@@ -46,7 +46,7 @@ def test_a_panel_for_each_quantity_shown(tanks: lynkeus.Study) -> None:
         np.testing.assert_array_equal(drawn[label].get_ydata(), run[header])
     (band,) = axes[0].collections
     ends = band.get_paths()[0].vertices[:, 1]
-    assert ends.max() == (run["pump_hat"] + 2 * run["pump_sd"]).max()
+    assert ends.max() == (run["pump_smooth"] + 2 * run["pump_smooth_sd"]).max()
 
 
 def test_truth_from_a_log(tanks: lynkeus.Study, examples: Path) -> None:

@@ -186,7 +186,7 @@ impl Machine {
         let [shown, surprise] = match holds.contains(&"limits") {
             true => [
                 "shown_of(i, reading)",
-                "end == 0 ? reading - predicted : R(0.0)",
+                "end == R(0.0) ? reading - predicted : R(0.0)",
             ],
             false => ["reading", "reading - predicted"],
         };

@@ -33,13 +33,15 @@ fn of_many(n: usize, deviate: f64) -> f64 {
 
 /// The smallest x whose lower tail of χ² of n degrees of freedom is beyond.
 fn solve(n: usize, is_beyond: impl Fn(f64) -> bool) -> f64 {
+    let log_gamma = log_gamma(n as f64);
+    let lower_tail = |x: f64| lower_tail(n, log_gamma, x);
     let (mut low, mut high) = (0.0, 1.0);
-    while !is_beyond(lower_tail(n, high)) && high < 1e18 {
+    while !is_beyond(lower_tail(high)) && high < 1e18 {
         high *= 2.0;
     }
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
-        match is_beyond(lower_tail(n, middle)) {
+        match is_beyond(lower_tail(middle)) {
             true => high = middle,
             false => low = middle,
         }
@@ -48,14 +50,14 @@ fn solve(n: usize, is_beyond: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// P(χ²ₙ ≤ x): the regularised incomplete gamma function of n/2 and x/2, by its series where that
-/// converges fast, else by its continued fraction (Lentz).
-fn lower_tail(n: usize, x: f64) -> f64 {
+/// converges fast, else by its continued fraction (Lentz). `log_gamma` is ln Γ(n/2).
+fn lower_tail(n: usize, log_gamma: f64, x: f64) -> f64 {
     if n == 0 || x <= 0.0 {
         return if n == 0 { 1.0 } else { 0.0 };
     }
     let n = n as f64;
     let (a, x) = (0.5 * n, 0.5 * x);
-    let front = (a * x.ln() - x - log_gamma(n)).exp();
+    let front = (a * x.ln() - x - log_gamma).exp();
     if x < a + 1.0 {
         let (mut term, mut sum, mut k) = (1.0 / a, 1.0 / a, a);
         while term > 1e-17 * sum {

@@ -85,7 +85,8 @@ impl Stretch {
             0..5 => (self.taken, self.clipped),
             taken => (taken - 1, self.clipped - self.largest.min(CLIP * CLIP)),
         };
-        count > 0 && squares > largest_sum(count).max(limit.powi(2) * count as f64)
+        // the quantile last: it takes the longest
+        count > 0 && squares > limit.powi(2) * count as f64 && squares > largest_sum(count)
     }
 }
 

@@ -372,7 +372,7 @@ pub(super) const ESTIMATE: [KeySpec; 10] = [
         kind: "true, false",
         shape: Shape::Flag,
         default: "false",
-        meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that",
+        meaning: "also `<name>_innovation` and `<name>_innovation_sd` of each measured output: its reading less what was expected of it, and the standard deviation of that ([what they are judged by](credibility.md))",
     },
     KeySpec {
         name: "between_samples",

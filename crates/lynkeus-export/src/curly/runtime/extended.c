@@ -15,9 +15,9 @@ static truth believe(STATE *s, int i, const real *c, const real *before, real pr
 //? limits
     real rest = shown_of(i, s->readings[i]) - predicted - moved;
     real variance = noise;
-    const int end = end_of(i, s->readings[i]);
+    const real end = end_of(i, s->readings[i]);
     truth is_told = 1;
-    if (end != 0) {
+    if (end != R(0.0)) {
         real weighed[2];
         const real spread = dot(projected, 0, projected, 0, STATES);
         is_told = weigh(end, rest, spread, noise, weighed);
@@ -72,7 +72,7 @@ static truth correct(STATE *s, double t)
     }
     for (int i = 0; i < SENSORS; i++) {
 //? limits
-        if (end_of(i, s->readings[i]) != 0) {
+        if (end_of(i, s->readings[i]) != R(0.0)) {
             continue;
         }
 //?
@@ -83,7 +83,7 @@ static truth correct(STATE *s, double t)
 //? limits
     /* at the end of a range: what such a reading says depends on what the others leave */
     for (int i = 0; i < SENSORS; i++) {
-        if (believed[i] != 0 && end_of(i, s->readings[i]) != 0) {
+        if (believed[i] != 0 && end_of(i, s->readings[i]) != R(0.0)) {
             (void)believe(s, i, c, before, h[i], noises[i]);
         }
     }

@@ -13,9 +13,9 @@ static truth judge(STATE *s, int i, real reading, real predicted, real spread, r
     const real deviation = sqrt(variance > R(0.0) ? variance : R(0.0));
 //?
 //? limits
-    const int end = end_of(i, reading);
-    const real outward = (real)end * (shown_of(i, reading) - predicted);
-    if (end != 0 && (outward < R(0.0) || (!(outward > R(0.0)) && !(deviation > R(0.0))))) {
+    const real end = end_of(i, reading);
+    const real outward = end * (shown_of(i, reading) - predicted);
+    if (end != R(0.0) && (outward < R(0.0) || (!(outward > R(0.0)) && !(deviation > R(0.0))))) {
         s->became[i] = AT_LIMIT;
     }
 //?

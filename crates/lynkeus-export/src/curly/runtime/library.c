@@ -357,11 +357,10 @@ static real noise_after(int i, real reading, real predicted, real spread)
     const real share = noise_shares[i] * noise_shares[i];
     real low = R(0.0);
     real high = R(1.0);
-    real noise = noise_variances[i];
     for (int k = 0; k < 60; k++) {
         const real gain = R(0.5) * (low + high);
         const real value = predicted + gain * (reading - predicted);
-        noise = noise_variances[i] + share * (value * value + spread * (R(1.0) - gain));
+        const real noise = noise_variances[i] + share * (value * value + spread * (R(1.0) - gain));
         if (gain * (spread + noise) < spread) {
             low = gain;
         } else {
@@ -373,13 +372,13 @@ static real noise_after(int i, real reading, real predicted, real spread)
 }
 
 //= end_of
-/* The end of its sensor's range that a reading is at: -1, 1, or 0 for none. */
-static int end_of(int i, real reading)
+/* The end of its sensor's range that a reading is at: -1.0, 1.0, or 0.0 for none. */
+static real end_of(int i, real reading)
 {
     if (reading >= highest[i]) {
-        return 1;
+        return R(1.0);
     }
-    return reading <= lowest[i] ? -1 : 0;
+    return reading <= lowest[i] ? R(-1.0) : R(0.0);
 }
 
 //= shown_of
@@ -424,10 +423,9 @@ static void tail_beyond(real a, real *tail)
 //= weigh
 /* A reading at an end of its sensor's range as an ordinary one: its innovation, and the variance of
    its noise. 0 where it says nothing. */
-static truth weigh(int end, real innovation, real spread, real noise, real *weighed)
+static truth weigh(real side, real innovation, real spread, real noise, real *weighed)
 {
     real tail[2];
-    const real side = (real)end;
     const real variance = spread + noise;
     if (!(variance > R(0.0))) {
         weighed[0] = innovation;

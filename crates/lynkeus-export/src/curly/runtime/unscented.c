@@ -190,11 +190,11 @@ static truth correct(STATE *s, double t)
         int count = 0;
         for (int i = 0; i < SENSORS; i++) {
 //? limits
-            const int end = end_of(i, s->readings[i]);
-            if (end != 0 && round != i + 1) {
+            const real end = end_of(i, s->readings[i]);
+            if (end != R(0.0) && round != i + 1) {
                 continue;
             }
-            if (believed[i] != 0 && end != 0) {
+            if (believed[i] != 0 && end != R(0.0)) {
                 real weighed[2];
                 if (is_moved) {
                     if (!show(s, t, points, shown, h)) {

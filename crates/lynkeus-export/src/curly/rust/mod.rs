@@ -306,7 +306,7 @@ fn codes(device: &Device<'_>) -> String {
     let words = all()
         .map(|(_, (code, about))| format!("            Self::{} => {about:?},\n", camel(code)));
     format!(
-        "{}\n/// Why a sample was refused; nothing has changed then.\n\
+        "{}\n/// Why a sample was refused; nothing has changed then but `refused` of the state.\n\
          #[derive(Clone, Copy, Debug, PartialEq, Eq)]\npub enum Refused {{\n{}}}\n\n\
          impl Refused {{\n    fn of(code: usize) -> Option<Self> {{\n        Some(match code {{\n{}            _ => return None,\n        }})\n    }}\n}}\n\n\
          impl core::fmt::Display for Refused {{\n    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {{\n\

@@ -8,7 +8,7 @@ use crate::curly::syntax::{
     Declaration, Expr, Function, If, Item, Line, Otherwise, Parameter, Program, Range, Statement,
     Type, Value, any, parsed, values, visit,
 };
-use crate::curly::template::chosen;
+use crate::curly::template::{chosen, mentions};
 
 /// A draft in Rust.
 ///
@@ -228,7 +228,7 @@ impl<'p> Printer<'p> {
             (false, _, None) => format!("({to}..={from}).rev()"),
         };
         let name = self.values.name(range.name);
-        self.line(place.depth, &format!("for {name} in {places} {{"));
+        let before = std::mem::take(&mut self.text);
         if let Some(only) = range.only {
             let inside = place.inside().depth;
             let only = self.values.negated(only);
@@ -237,6 +237,10 @@ impl<'p> Printer<'p> {
             self.line(inside, "}");
         }
         self.block(place.inside(), body)?;
+        let inside = std::mem::replace(&mut self.text, before);
+        let name = if mentions(&inside, &name) { &name } else { "_" };
+        self.line(place.depth, &format!("for {name} in {places} {{"));
+        self.text += &inside;
         self.line(place.depth, "}");
         Ok(())
     }

@@ -138,7 +138,11 @@ fn a_killed_replay_with_standard_deviations_goes_on() {
         "between_samples = \"linear\"",
         "sd = true\nbetween_samples = \"predict\"",
     );
-    goes_on(&slow(|folder| folder.change("study.toml", held.0, held.1)));
+    let wander = ("[observer]", "[process_noise]\npump = 0.25\n[observer]");
+    goes_on(&slow(|folder| {
+        folder.change("study.toml", held.0, held.1);
+        folder.change("study.toml", wander.0, wander.1);
+    }));
 }
 
 #[test]

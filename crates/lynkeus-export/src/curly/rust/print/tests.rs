@@ -31,7 +31,7 @@ fn pointers_are_slices_and_only_what_changes_is_mutable() {
 #[test]
 fn loops_are_ranges_where_they_can_be() {
     let draft = "static void f(real *a, int n)\n{\n    int k = 0;\n    for (int i = 1; i < n; i++) {\n        a[i] = (real)i;\n    }\n    for (int i = 0; i <= n && k != n; i++) {\n        continue;\n    }\n    for (int i = n - 1; i >= 2; i--) {\n        a[i] /= -(-R(0.1));\n    }\n    for (; k + 4 <= n; k += 4) {\n        a[k] = INFINITY;\n    }\n    for (int i = n; i >= 0; i--) {\n        a[i] = (a[0] - (a[1] - a[2])) * R(2.0);\n    }\n}\n";
-    let expected = "fn f(a: &mut [f32], n: usize) {\n    let mut k = 0;\n    for i in 1..n {\n        a[i] = i as f32;\n    }\n    for i in 0..=n {\n        if k == n {\n            break;\n        }\n        continue;\n    }\n    for i in (2..n).rev() {\n        a[i] /= -(-0.1);\n    }\n    while k + 4 <= n {\n        a[k] = f32::INFINITY;\n        k += 4;\n    }\n    for i in (0..=n).rev() {\n        a[i] = (a[0] - (a[1] - a[2])) * 2.0;\n    }\n}\n";
+    let expected = "fn f(a: &mut [f32], n: usize) {\n    let mut k = 0;\n    for i in 1..n {\n        a[i] = i as f32;\n    }\n    for _ in 0..=n {\n        if k == n {\n            break;\n        }\n        continue;\n    }\n    for i in (2..n).rev() {\n        a[i] /= -(-0.1);\n    }\n    while k + 4 <= n {\n        a[k] = f32::INFINITY;\n        k += 4;\n    }\n    for i in (0..=n).rev() {\n        a[i] = (a[0] - (a[1] - a[2])) * 2.0;\n    }\n}\n";
     assert_eq!(rust(draft, Precision::F32), expected);
 }
 
