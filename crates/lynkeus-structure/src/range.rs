@@ -106,6 +106,28 @@ pub fn magnitude_within(
     Ok(size)
 }
 
+/// Whether an expression has a value everywhere on the region, and none is zero. What
+/// [`range`] would find takes longer: its ends do not matter here.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn excludes_zero(graph: &Graph, node: Node, region: &Region) -> Result<bool, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let question = Question::new(node, &region, BUDGET);
+    if let Some(known) = graph.noted::<_, Range>(&question) {
+        return Ok(!known.enclosure.contains_zero() && known.enclosure.is_defined());
+    }
+    if let Some(known) = graph.noted(&question) {
+        return Ok(known);
+    }
+    let found = match valued(graph, node, &region, BUDGET)? {
+        Some(mut search) => search.excludes_zero(),
+        None => false,
+    };
+    graph.note(question, found);
+    Ok(found)
+}
+
 /// The search of an expression that has a value everywhere on the region; none of another.
 fn valued<'a>(
     graph: &'a Graph,

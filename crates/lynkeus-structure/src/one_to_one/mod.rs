@@ -7,9 +7,9 @@
 //! keeps its sign, gives that state: it is strictly monotone along the box, which is convex.
 //!
 //! *Several together.* Between two points x and x' the map differs by J̃(x − x'), where J̃ averages the Jacobian over the
-//! segment between them and lies in its range over the hull of the boxes that hold x and x' ([`pairs`]). Where all such
+//! segment between them and lies in its range over the hull of the boxes that hold x and x' (`pairs.rs`). Where all such
 //! matrices have full column rank, no two points of these boxes are confused; nor are any where the values of the map are disjoint.
-//! Pairs of boxes are cut until each is decided, or two points with equal values are found ([`alike`]).
+//! Pairs of boxes are cut until each is decided, or two points with equal values are found (`alike.rs`).
 
 mod alike;
 mod pairs;
@@ -18,7 +18,7 @@ use std::collections::HashSet;
 
 use lynkeus_expr::{Graph, MissingInput, Node};
 
-use crate::{Finding, Matrix, Point, Region, Regularity, Verdict, Witness, sign};
+use crate::{Finding, Matrix, Point, Region, Regularity, Verdict, Witness, range};
 use alike::Twins;
 use pairs::Pairs;
 
@@ -188,7 +188,7 @@ impl Steps<'_> {
                 continue;
             }
             let slope = self.jacobian.node(row, state);
-            if sign::keeps_sign(graph, slope, region)?.finding.is_proved() {
+            if range::excludes_zero(graph, slope, region)? {
                 self.known[state] = true;
                 return Ok(true);
             }

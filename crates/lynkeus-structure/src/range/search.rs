@@ -136,7 +136,7 @@ impl<'a> Search<'a> {
 
     /// The end of the range, as well as the budget allows.
     pub fn end(&mut self, end: End) -> Found {
-        self.end_beyond(end, f64::INFINITY)
+        self.end_beyond(end, f64::NEG_INFINITY, f64::INFINITY)
     }
 
     /// A bound of the absolute values, as well as the budget allows. The end that values were
@@ -149,11 +149,22 @@ impl<'a> Search<'a> {
             false => (End::Upper, End::Lower),
         };
         let size = -self.end(first).bound;
-        size.max(-self.end_beyond(second, -size).bound)
+        size.max(-self.end_beyond(second, f64::NEG_INFINITY, -size).bound)
     }
 
-    /// The same where a bound of `enough` is as good as a better one.
-    fn end_beyond(&mut self, end: End, enough: f64) -> Found {
+    /// Whether no value is zero, as well as the budget allows: not once values of both signs were seen.
+    pub fn excludes_zero(&mut self) -> bool {
+        self.sample(0, true);
+        let keeps = |end: &End| self.attained(*end).is_some_and(|value| value > 0.0);
+        let Some(end) = [End::Lower, End::Upper].into_iter().find(keeps) else {
+            return false;
+        };
+        self.end_beyond(end, 0.0, f64::MIN_POSITIVE).bound > 0.0
+    }
+
+    /// The same where a bound of `enough` is as good as a better one, and none matters once a value of at
+    /// most `hopeless` was seen.
+    fn end_beyond(&mut self, end: End, hopeless: f64, enough: f64) -> Found {
         self.sample(0, true);
         let mut open = BinaryHeap::from([Open {
             bound: end.bound(self.tree[0].values),
@@ -162,7 +173,8 @@ impl<'a> Search<'a> {
         for step in 0..self.budget {
             let Some(weakest) = open.peek() else { break };
             let looks = step % OFTEN == 0;
-            let done = weakest.bound >= enough || self.is_close(weakest.bound, end);
+            let is_hopeless = self.attained(end).is_some_and(|best| best <= hopeless);
+            let done = is_hopeless || weakest.bound >= enough || self.is_close(weakest.bound, end);
             if done || looks && self.graph.spent().is_some() {
                 break;
             }
