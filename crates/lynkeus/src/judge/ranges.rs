@@ -123,6 +123,9 @@ fn beyond(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
     let declared = evidence.declared.iter();
     let declared = declared.into_iter().find(|v| v.name == quantity.name)?;
     let estimate = quantity.estimate.as_ref()?;
+    if estimate.iter().all(|x| declared.min <= x && x <= declared.max) {
+        return None;
+    }
     let named = |(name, _): &&(&str, &Series)| *name == quantity.name;
     let deviation = evidence.deviations.iter().find(named)?.1;
     let allowance = match evidence.is_filter {
@@ -243,6 +246,10 @@ fn of_range(declared: &Variable, quantity: &Quantity) -> Option<Away> {
         let away = distances(declared, quantity, from).take(rows - from);
         away.fold(f64::INFINITY, |least, away| least.min(away / width))
     };
+    // every limit looks at the last row
+    if rows == 0 || least(rows - 1) <= LIMITS.iter().fold(f64::INFINITY, |w, l| w.min(l.widths)) {
+        return None;
+    }
     let exceeded = LIMITS.iter().find_map(|limit| {
         let first = limit.first(rows)?;
         let widths = least(first);
