@@ -1,5 +1,7 @@
 //! The extended Kalman filter, continuous-discrete.
 
+use std::sync::Arc;
+
 use super::Belief;
 use super::along::Along;
 use super::root::{Gain, dot};
@@ -76,7 +78,7 @@ impl Extended {
         Ok(Stage {
             about: about.x,
             end: self.x.clone(),
-            transition: Rows::of(self.along.transition()),
+            transition: Arc::new(Rows::of(self.along.transition())),
             noise,
         })
     }

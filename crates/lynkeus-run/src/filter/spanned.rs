@@ -166,7 +166,11 @@ pub(crate) struct Rows {
 
 impl Rows {
     pub(super) fn of(matrix: &Spanned) -> Self {
-        let mut rows = Self::default();
+        let count = (0..matrix.n).map(|i| matrix.row(i).len()).sum();
+        let mut rows = Self {
+            begins: Vec::with_capacity(matrix.n),
+            entries: Vec::with_capacity(count),
+        };
         for i in 0..matrix.n {
             rows.begins.push((matrix.span(i).start, rows.entries.len()));
             rows.entries.extend_from_slice(matrix.row(i));

@@ -123,7 +123,10 @@ fn beyond(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
     let declared = evidence.declared.iter();
     let declared = declared.into_iter().find(|v| v.name == quantity.name)?;
     let estimate = quantity.estimate.as_ref()?;
-    if estimate.iter().all(|x| declared.min <= x && x <= declared.max) {
+    if estimate
+        .iter()
+        .all(|x| declared.min <= x && x <= declared.max)
+    {
         return None;
     }
     let named = |(name, _): &&(&str, &Series)| *name == quantity.name;

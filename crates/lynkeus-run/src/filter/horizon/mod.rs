@@ -15,6 +15,7 @@ mod problem;
 mod row;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use super::extended::Extended;
 use super::model::FilterModel;
@@ -190,7 +191,7 @@ impl Horizon {
         let free = Pass {
             after: Belief {
                 x: first.after.x.clone(),
-                root: first.by_readings.clone(),
+                root: first.by_readings().clone(),
             },
             ..first
         };
@@ -202,7 +203,7 @@ impl Horizon {
         if self.keep {
             step.transition = left.and_then(|row| row.entered);
             self.done.left = Some(step);
-            self.rows[0].entered = second.transition;
+            self.rows[0].entered = second.transition.map(Arc::unwrap_or_clone);
         }
     }
 
@@ -289,7 +290,9 @@ impl Horizon {
 
     /// The problem about the guesses, and the Kalman filter of it without bounds.
     fn linearise(&mut self, sensing: &mut Sensing) -> Result<Problem<'_>, Error> {
-        let (mut rows, mut free): (Vec<Linear>, Vec<Pass>) = (vec![], vec![]);
+        let count = self.rows.len();
+        let mut rows: Vec<Linear> = Vec::with_capacity(count);
+        let mut free: Vec<Pass> = Vec::with_capacity(count);
         for (k, row) in self.rows.iter().enumerate() {
             let way = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
                 (Some(from), Some(_)) if row.t <= from.t => Way::Same,

@@ -1,6 +1,8 @@
 //! The problem of a window, linearised about its guesses: forward a Kalman filter, backward its
 //! smoother.
 
+use std::sync::Arc;
+
 use super::row::{Met, Row};
 use crate::Error;
 use crate::filter::Belief;
@@ -74,10 +76,10 @@ impl From<Met> for Pin {
 pub(super) struct Pass {
     pub before: Belief,
     pub after: Belief,
-    /// the root before the pins
-    pub by_readings: Root,
+    /// the root before the pins, where there are any
+    pub by_readings: Option<Root>,
     /// Φ from the row before; none of the first
-    pub transition: Option<Rows>,
+    pub transition: Option<Arc<Rows>>,
     pub readings: Vec<Correction>,
     pub pins: Vec<AtPin>,
 }
@@ -90,12 +92,17 @@ pub(super) struct AtPin {
 }
 
 impl Pass {
+    /// The root by the readings alone.
+    pub fn by_readings(&self) -> &Root {
+        self.by_readings.as_ref().unwrap_or(&self.after.root)
+    }
+
     /// What a smoother keeps of a row that stays in the window: the bounds that it meets are
     /// exact readings.
     pub fn kept(self) -> Step {
         let pins = self.pins.into_iter().map(|b| b.correction);
         Step {
-            transition: self.transition,
+            transition: self.transition.map(Arc::unwrap_or_clone),
             x: self.after.x,
             root: Packed::of(&self.after.root),
             corrections: self.readings.into_iter().chain(pins).collect(),
@@ -106,9 +113,9 @@ impl Pass {
     /// and told no more than that.
     pub fn leaving(&self) -> Step {
         Step {
-            transition: self.transition.clone(),
+            transition: self.transition.as_deref().cloned(),
             x: self.after.x.clone(),
-            root: Packed::of(&self.by_readings),
+            root: Packed::of(self.by_readings()),
             corrections: self.readings.clone(),
         }
     }
@@ -153,16 +160,16 @@ pub(super) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error>
 
 impl Way {
     /// What is believed at a row before its readings, and Φ.
-    pub fn carry(&self, prior: &Belief, last: Option<&Pass>) -> (Belief, Option<Rows>) {
+    pub fn carry(&self, prior: &Belief, last: Option<&Pass>) -> (Belief, Option<Arc<Rows>>) {
         match (self, last) {
             (Self::Over(stage), Some(last)) => {
-                let transition = stage.transition.clone();
+                let transition = Arc::clone(&stage.transition);
                 (stage.carry(&last.after), Some(transition))
             }
             (Self::Same, Some(last)) => {
                 let after = last.after.clone();
                 let identity = Rows::identity(after.x.len());
-                (after, Some(identity))
+                (after, Some(Arc::new(identity)))
             }
             _ => (prior.clone(), None),
         }
@@ -174,14 +181,14 @@ pub(super) fn corrected(
     seen: &[Seen],
     spread: &[f64],
     pins: &[Pin],
-    (before, transition): (Belief, Option<Rows>),
+    (before, transition): (Belief, Option<Arc<Rows>>),
 ) -> Pass {
     let mut after = before.clone();
-    let mut readings = vec![];
+    let mut readings = Vec::with_capacity(seen.len());
     for s in seen {
         readings.extend(take(&mut after, &s.slopes, s.value, s.variance, 0.0));
     }
-    let by_readings = after.root.clone();
+    let by_readings = (!pins.is_empty()).then(|| after.root.clone());
     let mut at = vec![];
     for (place, pin) in pins.iter().enumerate() {
         let mut c = vec![0.0; after.x.len()];
@@ -221,7 +228,7 @@ fn take(belief: &mut Belief, c: &[f64], y: f64, r: f64, least: f64) -> Option<Co
 pub(super) fn backward(passes: &[Pass]) -> Vec<Smooth> {
     let n = passes.first().map_or(0, |p| p.after.x.len());
     let mut adjoint = Adjoint::nothing(n);
-    let mut rows = vec![];
+    let mut rows = Vec::with_capacity(passes.len());
     for pass in passes.iter().rev() {
         let shift = pass.after.root.covariance_times(&adjoint.vector);
         let x = pass.after.x.iter().zip(&shift).map(|(x, s)| x - s);
