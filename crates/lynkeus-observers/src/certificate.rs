@@ -214,9 +214,9 @@ pub struct Constant {
 
 impl Constant {
     /// The constant `name` = `value`.
-    pub fn new(name: &str, value: f64, meaning: impl Into<String>) -> Self {
+    pub fn new(name: impl Into<String>, value: f64, meaning: impl Into<String>) -> Self {
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             value,
             meaning: meaning.into(),
         }

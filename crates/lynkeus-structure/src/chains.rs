@@ -9,10 +9,18 @@
 //! * Two outputs, form (8): a *leading* chain with rows 1 … n₁−1 strict and a
 //!   *following* one with rows 1 … n₂−2 strict; row n₂−1 may also depend on the
 //!   whole leading chain, and the last rows are free.
+//! * More outputs: the same with several following chains, each tied to the leading one.
 
 use std::collections::BTreeSet;
 
 use crate::Extended;
+
+/// Following chains that are tried, in all cuts together.
+const TRIED: usize = 100_000;
+/// Assignments that are returned.
+const MOST: usize = 64;
+/// Assignments that a refusal names.
+const NAMED: usize = 8;
 
 /// States of one chain, as indices into the extended states; the first is measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,8 +36,8 @@ pub struct Assignment {
     pub chains: Vec<Chain>,
     /// which chain plays the part of the paper's first one (n₁ rows, n₁−1 strict)
     pub leading: usize,
-    /// the other one can play it as well
-    pub either: bool,
+    /// all that can play it
+    pub leads: Vec<usize>,
 }
 
 impl Assignment {
@@ -64,24 +72,23 @@ pub fn find(extended: &Extended<'_>, request: &ChainRequest) -> Result<Vec<Assig
     let heads = heads(extended)?;
     let mut found = match heads[..] {
         [head] => vec![single(extended, head)?],
-        [first, second] => pairs(extended, [first, second])?,
-        _ => {
-            return Err(format!(
-                "{} outputs are measured; the triangular family is for one or two: leave some out of 'measured'",
-                heads.len()
-            ));
-        }
+        _ => cuts(extended, &heads)?,
     };
     let all = found.clone();
     found.retain(|assignment| fits(extended, assignment, request));
     if found.is_empty() {
-        let options: Vec<String> = all.iter().map(|a| describe(extended, a)).collect();
+        let options: Vec<String> = all
+            .iter()
+            .take(NAMED)
+            .map(|a| describe(extended, a))
+            .collect();
         return Err(format!(
             "no assignment has the chains asked for; the equations allow {}",
             options.join(" or ")
         ));
     }
     found.sort_by_key(|a| (a.imbalance(), a.leading));
+    found.truncate(MOST);
     Ok(found)
 }
 
@@ -182,7 +189,7 @@ fn single(extended: &Extended<'_>, head: usize) -> Result<Assignment, String> {
         return Ok(Assignment {
             chains: vec![Chain { states: path }],
             leading: 0,
-            either: false,
+            leads: vec![0],
         });
     }
     Err(stuck(extended, &path, &new))
@@ -191,16 +198,8 @@ fn single(extended: &Extended<'_>, head: usize) -> Result<Assignment, String> {
 /// Why a path does not reach every state.
 fn stuck(extended: &Extended<'_>, path: &[usize], new: &[usize]) -> String {
     let last = &extended.states[path[path.len() - 1]].name;
-    let chain = describe(
-        extended,
-        &Assignment {
-            chains: vec![Chain {
-                states: path.to_vec(),
-            }],
-            leading: 0,
-            either: false,
-        },
-    );
+    let states = path.to_vec();
+    let chain = describe_chains(extended, &[Chain { states }], "");
     if new.is_empty() {
         let left = (0..extended.states.len()).filter(|i| !path.contains(i));
         return format!(
@@ -214,25 +213,39 @@ fn stuck(extended: &Extended<'_>, path: &[usize], new: &[usize]) -> String {
     )
 }
 
-fn pairs(extended: &Extended<'_>, heads: [usize; 2]) -> Result<Vec<Assignment>, String> {
-    let paths = heads.map(|head| strict_path(extended, head));
+/// Every cut into a leading chain and following ones.
+fn cuts(extended: &Extended<'_>, heads: &[usize]) -> Result<Vec<Assignment>, String> {
+    let paths: Vec<_> = heads.iter().map(|&h| strict_path(extended, h)).collect();
     let n = extended.states.len();
     let mut found: Vec<Assignment> = vec![];
-    for leading in [0, 1] {
-        let (lead, follow) = (&paths[leading].0, &paths[1 - leading].0);
-        for n1 in 1..=lead.len().min(n - 1) {
-            if let Some(following) = follower(extended, &lead[..n1], follow) {
+    let mut left = TRIED;
+    for leading in 0..heads.len() {
+        let lead = &paths[leading].0;
+        for n1 in 1..=lead.len().min(n + 1 - heads.len()) {
+            let others = paths.iter().enumerate().filter(|(i, _)| *i != leading);
+            let mut cut = Cut {
+                extended,
+                lead: &lead[..n1],
+                taken: vec![false; n],
+                following: others.map(|(_, (path, _))| path.as_slice()).collect(),
+                chains: vec![],
+                found: vec![],
+                left,
+            };
+            cut.take(&lead[..n1]);
+            cut.go();
+            left = cut.left;
+            for mut chains in cut.found {
                 let leader = Chain {
                     states: lead[..n1].to_vec(),
                 };
-                let mut chains = vec![leader, Chain { states: following }];
-                chains.rotate_left(leading);
+                chains.insert(leading, leader);
                 match found.iter_mut().find(|a| a.chains == chains) {
-                    Some(known) => known.either = true,
+                    Some(known) => known.leads.push(leading),
                     None => found.push(Assignment {
                         chains,
                         leading,
-                        either: false,
+                        leads: vec![leading],
                     }),
                 }
             }
@@ -243,37 +256,92 @@ fn pairs(extended: &Extended<'_>, heads: [usize; 2]) -> Result<Vec<Assignment>, 
             .iter()
             .map(|(path, new)| stuck(extended, path, new))
             .collect();
+        let count = match heads.len() {
+            2 => "two".to_owned(),
+            count => count.to_string(),
+        };
         return Err(format!(
-            "no cut into two chains covers every state: {}",
+            "no cut into {count} chains covers every state: {}",
             reasons.join("; ")
         ));
     }
     Ok(found)
 }
 
-/// The states left over by the leading chain as a following chain, if they form one.
-fn follower(extended: &Extended<'_>, lead: &[usize], path: &[usize]) -> Option<Vec<usize>> {
-    let n = extended.states.len();
-    let n2 = n - lead.len();
-    // rows 1 … n₂−2 are strict: the first n₂−1 states are those of the strict path; most cuts
-    // of a long plant end here
-    let strict = path.get(..n2 - 1)?;
-    let mut taken = vec![false; n];
-    lead.iter().for_each(|&i| taken[i] = true);
-    if strict
-        .iter()
-        .any(|&i| std::mem::replace(&mut taken[i], true))
-    {
-        return None;
+/// Following chains behind a leading one, one after the other.
+struct Cut<'a> {
+    extended: &'a Extended<'a>,
+    lead: &'a [usize],
+    taken: Vec<bool>,
+    /// the strict paths of their outputs
+    following: Vec<&'a [usize]>,
+    chains: Vec<Chain>,
+    found: Vec<Vec<Chain>>,
+    /// chains that may still be tried
+    left: usize,
+}
+
+impl Cut<'_> {
+    /// Takes states; false, and none is taken, where one is taken already.
+    fn take(&mut self, states: &[usize]) -> bool {
+        let is_free = states.iter().all(|&i| !self.taken[i]);
+        if is_free {
+            states.iter().for_each(|&i| self.taken[i] = true);
+        }
+        is_free
     }
-    let last = taken.iter().position(|taken| !taken)?;
-    if n2 == 1 {
-        return (path[0] == last).then(|| vec![last]);
+
+    /// The next chain in every length that it can have, and those behind it.
+    fn go(&mut self) {
+        let rest = self.taken.iter().filter(|taken| !**taken).count();
+        let Some(&path) = self.following.get(self.chains.len()) else {
+            if rest == 0 {
+                self.found.push(self.chains.clone());
+            }
+            return;
+        };
+        let behind = self.following.len() - self.chains.len() - 1;
+        // the last one takes what is left, and each behind this one a state at least
+        let (shortest, longest) = match behind {
+            0 => (rest.max(1), rest),
+            _ => (1, (path.len() + 1).min(rest.saturating_sub(behind))),
+        };
+        for length in shortest..=longest {
+            if self.left == 0 {
+                return;
+            }
+            self.left -= 1;
+            let Some(states) = self.follower(path, length) else {
+                continue;
+            };
+            if self.take(&states) {
+                self.chains.push(Chain {
+                    states: states.clone(),
+                });
+                self.go();
+                self.chains.pop();
+                states.iter().for_each(|&i| self.taken[i] = false);
+            }
+        }
     }
-    let row = strict[n2 - 2];
-    extended.pattern[row]
-        .contains(&last)
-        .then(|| strict.iter().copied().chain([last]).collect())
+
+    /// A following chain of n states: rows 1 … n−2 are strict, so that its first n−1 states are those of the
+    /// strict path; row n−1 reads one more state, beside the leading chain.
+    fn follower(&self, path: &[usize], n: usize) -> Option<Vec<usize>> {
+        if n == 1 {
+            return Some(vec![path[0]]);
+        }
+        let strict = path.get(..n - 1)?;
+        let row = &self.extended.pattern[strict[n - 2]];
+        let mut new = row
+            .iter()
+            .copied()
+            .filter(|i| !strict.contains(i) && !self.lead.contains(i));
+        let last = new.next()?;
+        new.next()
+            .is_none()
+            .then(|| strict.iter().copied().chain([last]).collect())
+    }
 }
 
 #[cfg(test)]
@@ -364,6 +432,39 @@ mod tests {
             text.contains("equation of a: it depends on b, c at once"),
             "{text}"
         );
+    }
+
+    /// Three sensors: the chain of a may be read before the others' ends, those of b and c not.
+    #[test]
+    fn more_chains_follow_one() {
+        let text = |row: &str| {
+            format!(
+                "model M Real a1; Real a2; Real b1; Real b2; Real b3; Real c1;
+                 output Real y = a1; output Real z = b1; output Real w = c1;
+                 equation der(a1) = a2; der(a2) = -a1; der(b1) = b2; der(b2) = {row};
+                 der(b3) = -c1*a1*b1; der(c1) = -c1; end M;"
+            )
+        };
+        with(&text("b3 + a2"), &[], |extended| {
+            let found = find(extended, &ChainRequest::default()).unwrap();
+            assert_eq!(found.len(), 1, "{found:?}");
+            assert_eq!(
+                describe(extended, &found[0]),
+                "(a1 → a2) and (b1 → b2 → b3) and (c1)"
+            );
+            assert_eq!((found[0].leading, &found[0].leads), (0, &vec![0]));
+        });
+        let leads = with(&text("b3"), &[], |extended| {
+            find(extended, &ChainRequest::default()).unwrap()[0]
+                .leads
+                .clone()
+        });
+        assert_eq!(leads, [0, 1, 2]);
+        // it would have to follow two
+        let refused = with(&text("b3 + a2 + c1"), &[], |extended| {
+            find(extended, &ChainRequest::default()).unwrap_err()
+        });
+        assert!(refused.contains("no cut into 3 chains"), "{refused}");
     }
 
     #[test]

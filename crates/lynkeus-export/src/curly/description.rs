@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 
+use crate::hidden::is_hidden;
+
 use super::fmu::{Base, Component, Experiment, Quantity, Unit, Version};
 
 /// The place of a variable in the model, from which its value reference follows.
@@ -381,6 +383,8 @@ fn escaped(text: &str) -> String {
         '\n' => "&#10;".to_owned(),
         '\u{fffe}' | '\u{ffff}' => "?".to_owned(),
         c if c.is_control() => "?".to_owned(),
+        // a reader of the file sees it
+        c if is_hidden(c) => format!("&#{};", u32::from(c)),
         c => c.to_string(),
     };
     text.chars().map(each).collect()
@@ -454,8 +458,8 @@ mod tests {
         assert_eq!(number(f64::NEG_INFINITY), "-INF");
         assert_eq!(number(1e-300), "1e-300");
         assert_eq!(
-            escaped("a \"<&>\"\u{1}\n"),
-            "a &quot;&lt;&amp;&gt;&quot;?&#10;"
+            escaped("a \"<&>\"\u{1}\n\u{202e}"),
+            "a &quot;&lt;&amp;&gt;&quot;?&#10;&#8238;"
         );
     }
 }

@@ -263,7 +263,7 @@ impl Study<'_> {
         let σ = self.comparison(facts, P, μ, &self.θ, &c).rate();
         for (i, c) in c.iter().enumerate().skip(1) {
             constants.push(Constant::new(
-                &format!("c{}", i + 1),
+                format!("c{}", i + 1),
                 *c,
                 "weight of V_i in V, the paper has 1",
             ));

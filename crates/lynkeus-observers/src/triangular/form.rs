@@ -31,10 +31,10 @@ pub(super) fn form(
         Err(summary) => return Ok(Err(refusal(summary))),
     };
     if let Some(leading) = settings.leading {
-        assignments.retain(|a| a.either || a.leading == leading);
+        assignments.retain(|a| a.leads.contains(&leading));
         assignments.iter_mut().for_each(|a| a.leading = leading);
         if assignments.is_empty() {
-            let summary = "the chain that 'leading' names cannot lead: beside its last equation it reads the other chain's hidden states";
+            let summary = "the chain that 'leading' names cannot lead: beside its last equation it reads another chain's hidden states";
             return Ok(Err(refusal(summary.into())));
         }
     } else if let Some(δ) = &settings.δ {
@@ -65,15 +65,14 @@ pub(super) fn form(
         .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
 }
 
-/// Where either chain can lead, the one for which the given exponents lie in the window.
+/// Where several chains can lead, the first for which the given exponents lie in the window.
 fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
-    let holds = |a: &Assignment| Window::of(a, δ).is_none_or(|w| w.holds());
-    if assignment.either && !holds(assignment) {
-        let mut swapped = assignment.clone();
-        swapped.leading = 1 - assignment.leading;
-        if holds(&swapped) {
-            *assignment = swapped;
-        }
+    let lengths = assignment.lengths();
+    let holds = |lead: &usize| Window::all(&lengths, *lead, δ).iter().all(Window::holds);
+    if !holds(&assignment.leading)
+        && let Some(lead) = assignment.leads.iter().copied().find(holds)
+    {
+        assignment.leading = lead;
     }
 }
 
@@ -104,10 +103,15 @@ fn examined(
             ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
         );
     }
-    if assignment.either {
+    if assignment.leads.len() > 1 {
         let leading = &extended.outputs[assignment.leading].variable.name;
+        let which = match assignment.leads.len() {
+            count if count < assignment.chains.len() => format!("{count} of the chains"),
+            2 => "either chain".to_owned(),
+            _ => "any chain".to_owned(),
+        };
         summary += &format!(
-            "; either chain can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
+            "; {which} can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
         );
     }
     let found = family::Form { summary, chains };

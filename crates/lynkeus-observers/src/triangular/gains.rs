@@ -46,8 +46,8 @@ impl<'s> Gains<'s> {
             transient: settings.remedies.transient.as_ref(),
             notes: vec![],
         };
-        let window = Window::of(&form.assignment, &gains.δ);
-        gains.notes.extend(window.and_then(|w| w.note()));
+        let windows = Window::of(&form.assignment, &gains.δ);
+        gains.notes.extend(windows.iter().filter_map(Window::note));
         Ok(gains)
     }
 
@@ -119,8 +119,8 @@ fn lemma1_matrices(
     Ok((S, ρ))
 }
 
-/// δ: given, or δ = 1 for the leading chain and 2n₁/(2n₂−1) for the other, the
-/// middle of Theorem 2's window.
+/// δ: given, or δ = 1 for the leading chain and 2n₁/(2nᵢ−1) for another, the middle of Theorem 2's window. Two of
+/// these then are in theirs: |nᵢδᵢ − nₖδₖ| = |δᵢ − δₖ|/2.
 pub(super) fn exponents(form: &Form, settings: &Settings) -> Vec<f64> {
     if let Some(δ) = &settings.δ {
         return δ.clone();
@@ -134,27 +134,47 @@ pub(super) fn exponents(form: &Form, settings: &Settings) -> Vec<f64> {
     (0..lengths.len()).map(exponent).collect()
 }
 
-/// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁.
+/// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁, where the second chain follows the first.
+///
+/// Two chains that follow another one meet at their last equations alone: |nᵢδᵢ − nₖδₖ| < (δᵢ + δₖ)/2, which is
+/// (2nᵢ−1)/(2nₖ+1) δᵢ < δₖ < (2nᵢ+1)/(2nₖ−1) δᵢ.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
+    /// the chains i and k
+    pub pair: [usize; 2],
+    /// whether the first one leads
+    pub leads: bool,
     pub low: f64,
     pub high: f64,
-    /// δ₂/δ₁
+    /// δₖ/δᵢ
     pub ratio: f64,
 }
 
 impl Window {
-    /// None for one chain.
-    pub fn of(assignment: &Assignment, δ: &[f64]) -> Option<Self> {
-        let lengths = assignment.lengths();
-        let [_, _] = lengths[..] else { return None };
-        let lead = assignment.leading;
-        let (n1, n2) = (lengths[lead] as f64, lengths[1 - lead] as f64);
-        Some(Self {
-            low: (2.0 * n1 - 1.0) / (2.0 * n2 - 1.0),
-            high: (2.0 * n1 + 1.0) / (2.0 * n2 - 1.0),
-            ratio: δ[1 - lead] / δ[lead],
-        })
+    /// Of every two chains; none of one chain.
+    pub fn of(assignment: &Assignment, δ: &[f64]) -> Vec<Self> {
+        Self::all(&assignment.lengths(), assignment.leading, δ)
+    }
+
+    /// The same by the chains' lengths.
+    pub fn all(lengths: &[usize], lead: usize, δ: &[f64]) -> Vec<Self> {
+        let others = (0..lengths.len()).filter(|&i| i != lead);
+        let order: Vec<usize> = std::iter::once(lead).chain(others).collect();
+        let mut found = vec![];
+        for (place, &i) in order.iter().enumerate() {
+            for &k in &order[place + 1..] {
+                let [first, second] = [i, k].map(|chain| 2.0 * lengths[chain] as f64);
+                let leads = i == lead;
+                found.push(Self {
+                    pair: [i, k],
+                    leads,
+                    low: (first - 1.0) / if leads { second - 1.0 } else { second + 1.0 },
+                    high: (first + 1.0) / (second - 1.0),
+                    ratio: δ[k] / δ[i],
+                });
+            }
+        }
+        found
     }
 
     pub fn holds(&self) -> bool {
@@ -163,7 +183,9 @@ impl Window {
 
     /// What the reader should know of an observer outside of it.
     pub fn note(&self) -> Option<String> {
-        let Self { low, high, ratio } = self;
+        let Self {
+            low, high, ratio, ..
+        } = self;
         (!self.holds()).then(|| {
             format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
         })

@@ -91,7 +91,7 @@ fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<
         });
     let mut list = vec![];
     let mut add = |name: &str, value: f64, meaning: &str| {
-        list.push(Constant::new(&format!("{name}{suffix}"), value, meaning));
+        list.push(Constant::new(format!("{name}{suffix}"), value, meaning));
     };
     if upper > 0.0 {
         add("α1", lower, "lower bound of the partials along the chain");

@@ -58,7 +58,11 @@ pub(super) fn assemble(
         });
         factors.extend(factor_rows(output, added));
     }
-    notes.extend(Window::of(&form.assignment, &δ).and_then(|w| w.note()));
+    notes.extend(
+        Window::of(&form.assignment, &δ)
+            .iter()
+            .filter_map(Window::note),
+    );
     let list = |values: &[f64]| {
         values
             .iter()

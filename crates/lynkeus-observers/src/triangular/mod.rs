@@ -1,7 +1,7 @@
 //! Hammouri, Targui and Armanet, *High gain observer based on a triangular
 //! structure*, Int. J. Robust Nonlinear Control 12 (2002) 497–518.
 //!
-//! x' = f(x, u) in one chain (4) or two (8), y_i = x^i_1, observer (9):
+//! x' = f(x, u) in one chain (4) or two (8), y_i = x^i_1, observer (9) (more chains: `docs/triangular.md`):
 //!
 //! x̂^i' = f^i(x̂, u) − r_i Δ_{θ^δi} S_i⁻¹ Cᵀ (x̂^i_1 − y_i),  Δ_{θ^δ} = diag(θ^δ, …, θ^{nδ}).
 //!

@@ -80,7 +80,7 @@ const LEADING: KeySpec = KeySpec {
     kind: "name of a measured output",
     shape: Shape::Text,
     default: "the first chain that can; with `delta`, one for which it lies in the window",
-    meaning: "which of two chains plays the first part in Theorem 2, where either can",
+    meaning: "which of several chains plays the first part in Theorem 2, where more than one can",
 };
 
 /// Those of the paper and its extensions.

@@ -6,7 +6,7 @@
 //! the paper every entry of the comparison matrix beside −μ carries a power of θ:
 //! −δ_i(1 + j − k) ≤ −δ_i inside a chain, at most n₂δ₂ − n₁δ₁ − (δ₁ + δ₂)/2 and
 //! n₁δ₁ − (n₂ − 1)δ₂ − (δ₁ + δ₂)/2 between the chains. Both are negative exactly in
-//! the window of Theorem 2. So its largest eigenvalue falls with θ, and from the
+//! the window of Theorem 2 (of more than two chains each pair has one, `Window`). So its largest eigenvalue falls with θ, and from the
 //! first θ0 for which it is negative on the decay is proved, θ < 1 included.
 
 use crate::statement::{proved, standing, undecided};
@@ -44,9 +44,13 @@ pub(super) fn certificate(
     let region = &assumptions.region;
     let facts = Facts::new(extended, &form, region)?;
     let mut checks = facts.checks.clone();
+    let basis = match form.assignment.chains.len() {
+        1 | 2 => BASIS,
+        _ => MANY,
+    };
     if let Some(departure) = Departure::of(settings.lmi.as_ref(), &settings.remedies) {
         checks.push(departure.check(Hammouri::Observer));
-        return Ok(Certificate::new(BASIS, assumptions, checks));
+        return Ok(Certificate::new(basis, assumptions, checks));
     }
     let unbounded = facts
         .bounds
@@ -58,7 +62,7 @@ pub(super) fn certificate(
         checks.extend(without_bounds(extended, &form, &facts, region));
     }
     if standing(&checks) == Standing::Refuted || (unbounded && !given) {
-        let mut certificate = Certificate::new(BASIS, assumptions, checks);
+        let mut certificate = Certificate::new(basis, assumptions, checks);
         certificate.notes.push(remainder(&facts));
         return Ok(certificate);
     }
@@ -75,6 +79,7 @@ pub(super) fn certificate(
         form: &form,
         facts: &facts,
         gains: &gains,
+        basis,
     }
     .certificate(checks)
 }
@@ -86,6 +91,7 @@ struct Study<'a> {
     form: &'a Form,
     facts: &'a Facts,
     gains: &'a Gains<'a>,
+    basis: &'static str,
 }
 
 impl Study<'_> {
@@ -106,8 +112,8 @@ impl Study<'_> {
             constants.extend(found.constants);
             μ.extend(found.μ);
         }
-        let window = Window::of(&self.form.assignment, &self.gains.δ);
-        checks.extend(window.map(|w| windowed(&w, &mut constants)));
+        let windows = Window::of(&self.form.assignment, &self.gains.δ);
+        checks.extend(windows.iter().map(|w| windowed(w, count, &mut constants)));
         let (lipschitz, known) = self.steepest();
         constants.push(Constant::new(
             "c",
@@ -116,11 +122,11 @@ impl Study<'_> {
         ));
         let ready = known && μ.len() == count && standing(&checks) != Standing::Refuted;
         let rate = if ready {
-            self.rate(&μ, window, &mut checks, &mut constants)
+            self.rate(&μ, &windows, &mut checks, &mut constants)
         } else {
             None
         };
-        let mut certificate = Certificate::new(BASIS, self.assumptions, checks);
+        let mut certificate = Certificate::new(self.basis, self.assumptions, checks);
         certificate.constants = constants;
         let place = prolongation::note(
             &self.settings.common,
@@ -130,12 +136,12 @@ impl Study<'_> {
         certificate.notes.push(place);
         certificate.notes.extend(broken.then(|| BROKEN.to_owned()));
         if let Some((σ, c)) = rate {
-            self.conclude(&mut certificate, σ, c)?;
+            self.conclude(&mut certificate, σ, &c)?;
         }
         Ok(certificate)
     }
 
-    /// Chain i at θ, in the coordinates x̃ = T x; c weighs the second chain's V.
+    /// Chain i at θ, in the coordinates x̃ = T x; c weighs its V.
     fn chain(&self, i: usize, θ: f64, c: f64) -> Chain {
         let states = self.form.assignment.chains[i].states.clone();
         let gains = self.gains;
@@ -151,7 +157,7 @@ impl Study<'_> {
         }
         let error = Interval::new(1.0 - GAIN_ERROR, 1.0 + GAIN_ERROR).unwrap_or(Interval::ONE);
         let S = &gains.S[i];
-        let weight = Interval::point(if i == 0 { 1.0 } else { c });
+        let weight = Interval::point(c);
         let entry = |j: usize| {
             (0..S.size())
                 .map(move |k| weight * Interval::point(S.get(j, k)))
@@ -175,19 +181,15 @@ impl Study<'_> {
         }
     }
 
-    fn comparison(&self, μ: &[f64], θ: impl Fn(usize) -> f64, c: f64) -> Comparison {
-        let chains: Vec<Chain> = (0..μ.len()).map(|i| self.chain(i, θ(i), c)).collect();
+    fn comparison(&self, μ: &[f64], θ: impl Fn(usize) -> f64, c: &[f64]) -> Comparison {
+        let chains: Vec<Chain> = (0..μ.len()).map(|i| self.chain(i, θ(i), c[i])).collect();
         Comparison::new(&chains, μ, &self.facts.slopes)
     }
 
-    /// (c, θ0) for V = V1 + c·V2; the paper has c = 1.
-    fn least(&self, μ: &[f64], θ: f64) -> (f64, Option<f64>) {
-        let at = |c: &[f64]| {
-            let c = c.get(1).copied().unwrap_or(1.0);
-            first(θ, |θ| self.comparison(μ, |_| θ, c).holds())
-        };
-        let (c, θ0) = lightest(μ.len(), at);
-        (c.get(1).copied().unwrap_or(1.0), θ0)
+    /// (c, θ0) for V = V1 + c2·V2 + …; the paper has c2 = 1.
+    fn least(&self, μ: &[f64], θ: f64) -> (Vec<f64>, Option<f64>) {
+        let at = |c: &[f64]| first(θ, |θ| self.comparison(μ, |_| θ, c).holds());
+        lightest(μ.len(), at)
     }
 
     /// `partials = true` divides by the partials at the estimate.
@@ -216,28 +218,33 @@ impl Study<'_> {
         (largest, largest.is_finite())
     }
 
-    /// (σ, c) at the study's θ, with the hypothesis θ ≥ θ0.
+    /// (σ, c) at the study's θ, with the hypothesis θ ≥ θ0; c has a weight for each chain.
     fn rate(
         &self,
         μ: &[f64],
-        window: Option<Window>,
+        windows: &[Window],
         checks: &mut Vec<Check>,
         constants: &mut Vec<Constant>,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<(f64, Vec<f64>)> {
         let θ = &self.gains.θ;
         let alike = θ.iter().all(|x| *x == θ[0]);
-        let inside = window.is_none_or(|w| w.holds());
+        let inside = windows.iter().all(Window::holds);
         let (c, θ0) = match alike && inside {
             true => self.least(μ, θ[0]),
-            false => (1.0, None),
+            false => (vec![1.0; μ.len()], None),
         };
-        let σ = self.comparison(μ, |i| θ[i], c).rate();
-        if μ.len() > 1 {
-            constants.push(Constant::new(
-                "c of V",
-                c,
-                "weight of the second chain in V = V1 + c·V2",
-            ));
+        let σ = self.comparison(μ, |i| θ[i], &c).rate();
+        for (i, &weight) in c.iter().enumerate().skip(1) {
+            constants.push(match c.len() {
+                2 => {
+                    let meaning = "weight of the second chain in V = V1 + c·V2";
+                    Constant::new("c of V", weight, meaning)
+                }
+                _ => {
+                    let meaning = format!("weight of chain {} in V = V1 + c2·V2 + …", i + 1);
+                    Constant::new(format!("c{}", i + 1), weight, meaning)
+                }
+            });
         }
         if let Some(θ0) = θ0 {
             constants.push(Constant::new(
@@ -253,14 +260,19 @@ impl Study<'_> {
         σ.map(|σ| (σ, c))
     }
 
-    fn conclude(&self, certificate: &mut Certificate, σ: f64, c: f64) -> Result<(), DesignError> {
+    fn conclude(
+        &self,
+        certificate: &mut Certificate,
+        σ: f64,
+        c: &[f64],
+    ) -> Result<(), DesignError> {
         let noise = state_noise(
             self.extended,
             &self.assumptions.region,
             &self.assumptions.noise,
         )?;
         let count = self.form.assignment.chains.len();
-        let chain = |i: usize| self.chain(i, self.gains.θ[i], c);
+        let chain = |i: usize| self.chain(i, self.gains.θ[i], c[i]);
         let chains: Vec<Chain> = (0..count).map(chain).collect();
         conclude(certificate, self.extended, σ, self.assumptions, |process| {
             let outside = Disturbance {
@@ -273,20 +285,36 @@ impl Study<'_> {
     }
 }
 
+/// What a certificate of more than two chains rests on.
+const MANY: &str =
+    "Theorem 2 of Hammouri, Targui and Armanet, its proof with every two chains' window";
+
 const BROKEN: &str = "A refuted Lemma 1 ends this proof, whatever θ is. It does not say that the estimate diverges: a plant that is damped by itself may carry the observer. Lemma 1's own S (leave the key S out) satisfies it.";
 
-/// Theorem 2's window for δ2/δ1.
-fn windowed(window: &Window, constants: &mut Vec<Constant>) -> Check {
-    let Window { low, high, ratio } = *window;
-    let mut add =
-        |name: &str, value: f64, meaning: &str| constants.push(Constant::new(name, value, meaning));
-    add(
-        "(2n1−1)/(2n2−1)",
+/// Theorem 2's window for two of so many chains; of two, the paper's first one leads.
+fn windowed(window: &Window, count: usize, constants: &mut Vec<Constant>) -> Check {
+    let Window {
+        pair,
+        leads,
         low,
-        "lower end of Theorem 2's window for δ2/δ1",
-    );
-    add("δ2/δ1", ratio, "ratio of the exponents");
-    add("(2n1+1)/(2n2−1)", high, "upper end of the window");
+        high,
+        ratio,
+    } = *window;
+    let [i, k] = match count {
+        2 => [1, 2],
+        _ => pair.map(|chain| chain + 1),
+    };
+    let beside = if leads { '−' } else { '+' };
+    let lower = format!("lower end of Theorem 2's window for δ{k}/δ{i}");
+    constants.extend([
+        Constant::new(format!("(2n{i}−1)/(2n{k}{beside}1)"), low, lower),
+        Constant::new(format!("δ{k}/δ{i}"), ratio, "ratio of the exponents"),
+        Constant::new(
+            format!("(2n{i}+1)/(2n{k}−1)"),
+            high,
+            "upper end of the window",
+        ),
+    ]);
     let name = Hammouri::Window;
     let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
     match window.holds() {
@@ -307,7 +335,7 @@ fn at_these(holds: bool) -> Check {
         true => proved(name, "one θ per chain has no common θ0: checked at these"),
         false => undecided(
             name,
-            "it is not; the theorem is sufficient, not necessary: try a larger θ, the same for both chains",
+            "it is not; the theorem is sufficient, not necessary: try a larger θ, the same for all chains",
         ),
     }
 }

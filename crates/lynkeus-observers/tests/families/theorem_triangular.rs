@@ -71,6 +71,46 @@ fn a_pendulum_by_hand() {
     }
 }
 
+const THREE: &str = "model Three
+  Real a1(min = -2, max = 2); Real a2(min = -2, max = 2); Real a3(min = -2, max = 2);
+  Real b1(min = -2, max = 2); Real b2(min = -2, max = 2); Real c1(min = -2, max = 2); Real c2(min = -2, max = 2);
+  output Real y = a1; output Real z = b1; output Real w = c1;
+equation
+  der(a1) = a2; der(a2) = a3 - 0.3*sin(a1); der(a3) = -a1 - 2*a2 - 2*a3 + 0.2*sin(b2) + 0.1*c2;
+  der(b1) = b2 + 0.1*sin(a3); der(b2) = -b1 - b2 + 0.2*cos(a2) + 0.1*c2;
+  der(c1) = c2 + 0.1*a2; der(c2) = -c1 - c2 + 0.2*a3 + 0.1*sin(b2);
+end Three;";
+
+/// Chains of 3, 2 and 2 states: δ = 1, 2, 2, windows (5/3, 7/3) behind the first chain and (3/5, 5/3) between the
+/// others.
+#[test]
+fn three_chains_have_a_theorem_with_a_window_for_each_pair() {
+    let plant = plant(THREE);
+    let found = study(&plant, Tuning::from([("theta", 100.0)])).certificate();
+    assert_eq!(found.verdict(), Standing::Proved, "{found:#?}");
+    for (name, expected) in [
+        ("(2n1−1)/(2n2−1)", 5.0 / 3.0),
+        ("(2n1+1)/(2n3−1)", 7.0 / 3.0),
+        ("(2n2−1)/(2n3+1)", 0.6),
+        ("(2n2+1)/(2n3−1)", 5.0 / 3.0),
+        ("δ3/δ1", 2.0),
+        ("δ3/δ2", 1.0),
+    ] {
+        assert!((constant(&found, name) - expected).abs() < 1e-12, "{name}");
+    }
+    let θ0 = constant(&found, "θ0");
+    assert!(1.0 < θ0 && θ0 < 100.0, "{θ0}");
+    let above = study(&plant, Tuning::from([("theta", 1.001 * θ0)])).certificate();
+    assert_eq!(above.verdict(), Standing::Proved);
+    // (n₂δ₂ − n₃δ₃) outside
+    let mut outside = Tuning::from([("theta", 100.0)]);
+    outside
+        .values
+        .insert("delta".into(), list(&[1.0, 2.3, 1.3]));
+    let found = study(&plant, outside).certificate();
+    assert_eq!(found.verdict(), Standing::Undecided);
+}
+
 /// Below θ0 nothing is claimed, and nothing refuted: the theorem is sufficient.
 #[test]
 fn below_θ0_the_theorem_is_silent() {
