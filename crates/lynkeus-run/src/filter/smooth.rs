@@ -82,7 +82,9 @@ impl Step {
             unit[i] = 1.0;
             let column = root.covariance_times(&unit);
             let less = quadratic(&adjoint.matrix, &column);
-            (column[i] - less).max(0.0).sqrt()
+            // what later samples say is lost where numbers end: without it the deviation is no smaller
+            let left = column[i] - if less.is_finite() { less } else { 0.0 };
+            left.max(0.0).sqrt()
         });
         Smoothed {
             estimate,

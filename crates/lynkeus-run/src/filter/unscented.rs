@@ -12,6 +12,9 @@ use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings, Integrator};
 
+/// Images of two points that differ by no more than this share of their size do not differ.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
 /// How sigma points are spread and weighed, after Julier, Uhlmann and van der Merwe; the
 /// default makes the cubature filter of Arasaratnam and Haykin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -364,7 +367,14 @@ impl Weights {
     fn row(&self, root: &Root, images: &[f64], size: usize, i: usize) -> Vec<f64> {
         let n = root.n;
         let of = |k: usize| images[k * size + i];
-        let apart = (0..n).map(|k| of(1 + k) - of(1 + n + k));
+        let apart = (0..n).map(|k| {
+            let (one, other) = (of(1 + k), of(1 + n + k));
+            // what is left of a direction without variance is rounding, and would be divided by nothing
+            let rounding = ROUNDING * one.abs().max(other.abs());
+            Some(one - other)
+                .filter(|d| d.abs() > rounding)
+                .unwrap_or(0.0)
+        });
         let halves: Vec<f64> = apart.map(|d| 0.5 * d / self.spread).collect();
         root.against(&halves)
     }

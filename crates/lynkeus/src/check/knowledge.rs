@@ -389,7 +389,7 @@ impl Known {
             }
             Known::WhileExcited { input, value } => {
                 format!(
-                    "known only while inputs excite it (hidden for {input} = {})",
+                    "known only while inputs excite it, and locally (hidden for {input} = {})",
                     number(*value)
                 )
             }

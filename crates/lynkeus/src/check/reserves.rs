@@ -6,6 +6,7 @@
 
 use lynkeus_expr::{Budget, MissingInput, Node};
 use lynkeus_model::Plant;
+use lynkeus_structure::fate::{Fate, Hidden, Told};
 use lynkeus_structure::{
     Extended, Sensors, apart_whatever, determined, range_within, uncertain, uniformity,
 };
@@ -30,12 +31,13 @@ pub(super) struct View<'a> {
 impl View<'_> {
     /// Weakens what is known under an assumption to what limits and disturbances leave of it.
     pub fn reserve(&self, knowledge: &mut Knowledge) -> Result<(), Error> {
+        let own = sensors(self.study(), self.prepared.plant());
+        if !own.disturbances.is_empty() {
+            self.disturbed(knowledge, own)?;
+        }
         let limited = self.limited()?;
         if !limited.is_empty() {
             self.within(limited, knowledge)?;
-        }
-        if !self.study().sensors.disturbances.is_empty() {
-            self.disturbed(knowledge)?;
         }
         Ok(())
     }
@@ -98,13 +100,30 @@ impl View<'_> {
         let names = outputs.iter().map(|o| o.variable.name.clone());
         let measured: Vec<String> = names.filter(|name| !limited.contains(name)).collect();
         let rest = match measured.is_empty() {
-            true => None,
-            false => Some(self.known(Sensors { measured, ..own }, knowledge.assumption)?),
+            true => self.unseen(&own, knowledge.assumption)?,
+            false => {
+                let left = Sensors { measured, ..own };
+                let mut rest = self.known(left.clone(), knowledge.assumption)?;
+                // both at once: what is left may rest on a disturbance that is zero
+                if !left.disturbances.is_empty() {
+                    self.disturbed(&mut rest, left)?;
+                }
+                rest
+            }
         };
         for (name, known) in &mut knowledge.quantities {
-            let left = rest.as_ref().and_then(|rest| rest.of(name));
+            let left = rest.of(name);
             let is_left = left.is_some_and(|left| left == known || *left == Known::Everywhere);
-            if known.is_seen() && !is_left {
+            if is_left {
+                continue;
+            }
+            if let Known::Hidden(fate) = known {
+                // an error that decays may do so only once others are known
+                *fate = match left {
+                    Some(Known::Hidden(left)) => *left,
+                    _ => Fate::Undecided,
+                };
+            } else if known.is_seen() {
                 *known = Known::Reserved {
                     known: Box::new(known.clone()),
                     reserve: Reserve::Limits(limited.clone()),
@@ -112,6 +131,28 @@ impl View<'_> {
             }
         }
         Ok(())
+    }
+
+    /// What becomes of every quantity without sensors.
+    fn unseen(&self, own: &Sensors, assumption: Assumption) -> Result<Knowledge, Error> {
+        let mut extended = seen_by(self.study(), self.prepared.plant(), own)?;
+        extended.outputs.clear();
+        let states = &extended.states;
+        let hidden = Hidden {
+            extended: &extended,
+            told: vec![Told::Hidden; states.len()],
+            arbitrary: assumption == Assumption::Arbitrary,
+            directions: states.len(),
+        };
+        let fates = hidden.fates().map_err(Error::from_source)?;
+        let names = states.iter().map(|state| state.name.clone());
+        let of = |fate: Option<Fate>| Known::Hidden(fate.unwrap_or(Fate::Undecided));
+        Ok(Knowledge {
+            assumption,
+            unknown: vec![],
+            quantities: names.zip(fates.of.into_iter().map(of)).collect(),
+            point: fates.point,
+        })
     }
 
     /// What these sensors tell.
@@ -150,9 +191,9 @@ impl View<'_> {
         )
     }
 
-    fn disturbed(&self, knowledge: &mut Knowledge) -> Result<(), Error> {
+    /// Weakens what the sensors of `own` tell.
+    fn disturbed(&self, knowledge: &mut Knowledge, own: Sensors) -> Result<(), Error> {
         let (numbers, symbols, mut signals) = self.plants(knowledge.assumption);
-        let own = sensors(self.study(), self.prepared.plant());
         let names = own.disturbances.clone();
         let firm = match knowledge.assumption {
             Assumption::Arbitrary => None,
