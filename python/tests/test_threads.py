@@ -67,7 +67,8 @@ def test_a_time_limit_ends_the_run_that_a_sweep_is_judged_by() -> None:
 
 
 _INTERRUPTED = """
-import _thread, threading
+import _thread, signal, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
 from test_threads import VERBS, slow
 import lynkeus
 lynkeus.check(slow())  # everything is loaded

@@ -1,5 +1,6 @@
 //! Live estimation, sample by sample.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lynkeus::run::{self, filter::Reading};
@@ -22,7 +23,15 @@ pub struct Estimator {
     names: Vec<Py<PyString>>,
     /// how many of the signals are measured
     sensors: usize,
+    /// as it was before its first sample
+    fresh: Vec<u8>,
+    /// samples in a row that the equations refused
+    refused: AtomicUsize,
 }
+
+/// So many samples in a row that the equations refuse are behind an absurd reading that was taken: from the
+/// next on the estimator starts anew, as exported code does.
+const PATIENCE: usize = 5;
 
 /// Signals of a call that need no room of their own.
 const FEW: usize = 32;
@@ -39,6 +48,8 @@ impl Estimator {
             signals: interned(estimator.signals()),
             names: interned(estimator.names()),
             sensors: estimator.sensors(),
+            fresh: estimator.snapshot(),
+            refused: AtomicUsize::new(0),
             estimator: Mutex::new(estimator),
             study,
         }
@@ -74,7 +85,30 @@ impl Estimator {
 
     fn taken(&self, t: f64, readings: &Bound<'_, PyDict>, sample: &mut [f64]) -> PyResult<()> {
         self.read(readings, sample)?;
-        let pushed = self.lock().push(t, sample).map(drop);
+        self.go(t, sample)
+    }
+
+    /// Takes a sample; anew where the equations have refused too many.
+    fn go(&self, t: f64, sample: &[f64]) -> PyResult<()> {
+        let mut estimator = self.lock();
+        let pushed = estimator.push(t, sample).map(drop);
+        match &pushed {
+            Ok(()) => self.refused.store(0, Ordering::Relaxed),
+            Err(
+                run::Error::Diverged { .. }
+                | run::Error::NotFinite { .. }
+                | run::Error::StepUnderflow { .. }
+                | run::Error::Singular { .. }
+                | run::Error::TooStiff { .. },
+            ) => {
+                if self.refused.fetch_add(1, Ordering::Relaxed) + 1 >= PATIENCE {
+                    self.refused.store(0, Ordering::Relaxed);
+                    estimator.restore(&self.fresh).map_err(from_source)?;
+                }
+            }
+            Err(_) => {}
+        }
+        drop(estimator);
         pushed.map_err(from_source)
     }
 
@@ -139,8 +173,7 @@ impl Estimator {
             let expected = format!("a number for each of {}", self.signals().join(", "));
             wrong("signals", &expected, signals, error)
         })?;
-        let pushed = self.lock().push(t, &signals).map(drop);
-        pushed.map_err(from_source)
+        self.go(t, &signals)
     }
 
     #[getter]

@@ -113,6 +113,10 @@ impl<'a> Task<'a> {
             certificate.notes.push(note);
             place = simulated;
         }
+        // a limit that has a say in the family is no note of a proof only
+        if let Some(choice) = self.prepared.choice()?.filter(|c| c.ended.is_some()) {
+            certificate.notes.extend(choice.notes());
+        }
         let family = lynkeus_observers::find(design.observer.family);
         let theorem = match family.filter(|_| !lmi) {
             Some(family) => {

@@ -60,7 +60,7 @@ pub(crate) fn frozen(
         return vec![];
     }
     let Some(noise) = Scatter::of(runs(time, readings)) else {
-        return vec![];
+        return dead(output, &all, channel).into_iter().collect();
     };
     let is_improbable = |run: &Run| {
         let own = run.rows - 1;
@@ -82,6 +82,27 @@ pub(crate) fn frozen(
             at_end: all.low == run.value || all.high == run.value,
         })
         .collect()
+}
+
+/// A sensor that shows one number for the whole log, though its declared noise is white and above the last digit
+/// of that number.
+fn dead(output: &str, all: &Totals, channel: Channel) -> Option<Frozen> {
+    let Some(Noise::Absolute(deviation)) = channel.noise else {
+        return None;
+    };
+    let digits = format!("{:e}", all.low);
+    let (mantissa, exponent) = digits.split_once('e')?;
+    let decimals = mantissa.split_once('.').map_or(0, |(_, d)| d.len());
+    let step = 10_f64.powi(exponent.parse::<i32>().ok()? - decimals as i32);
+    let is_dead = all.low == all.high && all.points >= ENOUGH && deviation >= 2.0 * step;
+    (is_dead && !channel.explains(all.low, step)).then(|| Frozen {
+        output: output.to_owned(),
+        value: all.low,
+        from: all.from,
+        to: all.to,
+        rows: all.points,
+        at_end: true,
+    })
 }
 
 /// Equal readings, one after the other.
@@ -115,6 +136,9 @@ fn runs(time: &Series, readings: &Series) -> impl Iterator<Item = Run> {
 /// What all runs are together.
 struct Totals {
     points: usize,
+    /// times of the first and the last
+    from: f64,
+    to: f64,
     /// readings that equal the one before them
     equal: usize,
     low: f64,
@@ -127,12 +151,18 @@ impl Totals {
     fn of(runs: impl Iterator<Item = Run>) -> Self {
         let mut all = Self {
             points: 0,
+            from: f64::NAN,
+            to: f64::NAN,
             equal: 0,
             low: f64::INFINITY,
             high: f64::NEG_INFINITY,
             has_long: false,
         };
         for run in runs {
+            if all.points == 0 {
+                all.from = run.from;
+            }
+            all.to = run.to;
             all.points += run.rows;
             all.equal += run.rows - 1;
             all.low = all.low.min(run.value);

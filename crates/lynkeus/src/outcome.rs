@@ -43,6 +43,8 @@ pub struct Ended {
     pub file: String,
     /// a limit of time or memory ended it, and nothing is wrong with what there is
     pub by_limit: bool,
+    /// measured outputs of a log that the estimate followed, the one farthest from what was expected first
+    pub followed: Vec<String>,
 }
 
 /// Rows over time.
@@ -158,12 +160,20 @@ impl Outcome {
     pub fn refusal(&self) -> Option<Error> {
         if let Some(ended) = &self.ended {
             let rows = self.time.len();
-            let message = format!("{} (the {rows} rows before are written)", ended.message);
-            let refusal = Error::refused(message).at(&ended.file);
-            return Some(match ended.by_limit {
-                true => refusal.as_ended().hint("allow more time or memory"),
-                false => refusal,
-            });
+            let kept = format!("(the {rows} rows before are written)");
+            if ended.by_limit {
+                let refusal = Error::refused(format!("{} {kept}", ended.message)).as_ended();
+                return Some(refusal.at(&ended.file).hint("allow more time or memory"));
+            }
+            let message = match ended.followed.is_empty() {
+                true => format!("{} {kept}", ended.message),
+                false => format!(
+                    "the estimate is not credible: {}; it followed the readings of {} {kept}",
+                    ended.message,
+                    ended.followed.join(", ")
+                ),
+            };
+            return Some(Error::refused(message).at(&ended.file));
         }
         judge::refusal(&self.doubts)
     }
@@ -264,6 +274,7 @@ impl Raw<'_> {
             deviations: course.deviations.as_deref().unwrap_or_default(),
             innovations: &innovations,
             frozen: &frozen,
+            replayed,
         };
         // a density that was guessed excuses nothing
         let is_plain = innovations.is_empty();
@@ -305,6 +316,10 @@ impl Raw<'_> {
                 },
                 file: prepared.study().file.clone(),
                 by_limit: course.limit.is_some(),
+                followed: match replayed {
+                    true => followed(&design, &innovations),
+                    false => vec![],
+                },
             }),
             innovations,
             innovation_columns,
@@ -323,6 +338,18 @@ impl Raw<'_> {
             notes,
         })
     }
+}
+
+/// Measured outputs, the one whose readings were farthest from what was expected first.
+fn followed(design: &Design, innovations: &[Innovations]) -> Vec<String> {
+    let mut named: Vec<(f64, &str)> = vec![];
+    for signal in &design.observer.measured {
+        let own = innovations.iter().find(|i| i.output == signal.name);
+        let largest = own.map_or(0.0, |i| i.trace.whole().largest);
+        named.push((largest, &signal.name));
+    }
+    named.sort_by(|a, b| b.0.total_cmp(&a.0));
+    named.into_iter().map(|(_, name)| name.to_owned()).collect()
 }
 
 /// What estimates count: a filter by its gain, a family with a theorem by its deviations if they are asked for.
@@ -380,6 +407,7 @@ struct Sight<'s> {
     deviations: &'s [Series],
     innovations: &'s [Innovations],
     frozen: &'s [Frozen],
+    replayed: bool,
 }
 
 impl Sight<'_> {
@@ -436,6 +464,7 @@ impl Sight<'_> {
             sensors: sensors.collect(),
             frozen: self.frozen,
             is_filter,
+            replayed: self.replayed,
         })
     }
 }

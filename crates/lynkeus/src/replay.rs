@@ -61,6 +61,10 @@ impl Halfway {
     }
 }
 
+/// The start is forgotten once the deviation with it is at most so many times that without it: half of
+/// what the judge allows a settled innovation.
+const FORGOTTEN: f64 = 2.5;
+
 /// Runs an estimator over samples; the first `estimates` of its names are estimates, the rest
 /// monitors. What ends the run early is told in the course.
 ///
@@ -115,11 +119,11 @@ pub(crate) fn replay(
                 innovation.reading,
                 innovation.value / innovation.deviation,
             );
-            settled.take(
-                time,
-                innovation.reading,
-                innovation.value / innovation.settled,
-            );
+            // while the start counts, an innovation says nothing of what is left without it
+            if innovation.deviation <= FORGOTTEN * innovation.settled {
+                let z = innovation.value / innovation.settled;
+                settled.take(time, innovation.reading, z);
+            }
         }
         if course.keeps_innovations {
             let kept = estimator.innovations().iter().flat_map(row_of);

@@ -151,6 +151,8 @@ pub(crate) struct Evidence<'e> {
     pub frozen: &'e [Frozen],
     /// whether the deviations are a filter's own, or those of a linearised error system
     pub is_filter: bool,
+    /// whether the readings are those of a log
+    pub replayed: bool,
 }
 
 /// Hanging readings are worth a refusal from this share of a sensor's readings on.
@@ -180,8 +182,8 @@ fn hanging(evidence: &Evidence<'_>) -> Vec<Doubt> {
             return None;
         }
         let own = || evidence.frozen.iter().filter(|f| f.output == sensor.name);
-        // an end of the range may well be shown for long
-        let rows: usize = own().filter(|f| !f.at_end).map(|f| f.rows).sum();
+        // an end of the sensor's range may well be shown for long: where `limits` declare it, it is no fault here
+        let rows: usize = own().map(|f| f.rows).sum();
         let share = rows as f64 / sensor.trace.readings().max(1) as f64;
         let first = own().next()?;
         let text = match share >= HANGS {

@@ -314,14 +314,19 @@ fn readings_beyond<'e>(
     (width.is_finite() && width > 0.0).then(|| readings.map(beyond))
 }
 
+/// Readings that are nearly all outside by more than the range itself are in another unit, or the range is wrong.
+const NEARLY_ALL: f64 = 0.9;
+
 /// A sensor whose readings are mostly outside of what is declared.
 fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
-    let (mut count, mut rows, mut farthest) = (0, 0_usize, 0.0_f64);
-    for beyond in readings_beyond(evidence, quantity)? {
+    let (mut count, mut far, mut rows, mut farthest) = (0, 0, 0_usize, 0.0_f64);
+    for beyond in readings_beyond(evidence, quantity)?.filter(|b| b.is_finite()) {
         rows += 1;
         count += usize::from(beyond > OF_ERROR_SYSTEM.widths);
+        far += usize::from(beyond > 1.0);
         farthest = farthest.max(beyond);
     }
+    let is_elsewhere = rows > 0 && far as f64 >= NEARLY_ALL * rows as f64;
     (2 * count > rows).then(|| Doubt {
         kind: Kind::Range,
         name: quantity.name.clone(),
@@ -331,7 +336,10 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
             percent(count as f64 / rows as f64),
             figures(farthest, 2)
         ),
-        level: Level::Warning,
+        level: match is_elsewhere && evidence.replayed {
+            true => Level::Refusal,
+            false => Level::Warning,
+        },
     })
 }
 
