@@ -148,3 +148,21 @@ def test_mistakes_are_told_with_what_may_be_meant() -> None:
         with pytest.raises(lynkeus.InputError) as error:
             wrong()
         assert any(word in str(error.value) for word in ("family", "observer", "expected a path"))
+
+
+def test_a_live_estimator_gets_over_an_absurd_sample() -> None:
+    model = lynkeus.Model.from_function(
+        lambda t, x, u: [np.exp(u[0]) - x[0]],
+        states={"x": {"start": 1, "min": -5, "max": 5}},
+        inputs=["u"],
+        name="M",
+    )
+    live = lynkeus.Study(model, noise={"x": 0.1}, observer="ekf", estimate={"method": "rk4"}).estimator()
+    refused = 0
+    for k in range(100):
+        try:
+            live.update(0.1 * k, {"x": 1.0, "u": 1e3 if k == 20 else 0.0})
+        except lynkeus.LynkeusError:
+            refused += 1
+    assert 1 <= refused <= 6
+    assert live.time == pytest.approx(9.9) and live.estimate["x"] == pytest.approx(1.0, abs=0.1)

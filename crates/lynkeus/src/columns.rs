@@ -210,6 +210,18 @@ fn samples(
         true => table.column(header(settings, name)).cloned(),
         false => table.held(header(settings, name)),
     };
+    let outputs = extended.outputs.iter().map(|o| &o.variable.name);
+    let mut read: Vec<(&str, &str)> = vec![];
+    for name in outputs.chain(extended.inputs.iter().map(|u| &u.name)) {
+        let own = header(settings, name);
+        if let Some((other, _)) = read.iter().find(|(_, known)| *known == own) {
+            let message = format!("{other} and {name} both read the column \"{own}\"");
+            return Err(Error::input(message)
+                .at(table.place())
+                .hint("give each a column of its own: `columns` of [estimate]"));
+        }
+        read.push((name, own));
+    }
     let readings = extended.outputs.iter().map(|o| reading(&o.variable.name));
     let inputs = extended.inputs.iter().map(|u| input(&u.name));
     Ok(Samples {

@@ -225,6 +225,7 @@ pub(crate) fn course(
 
 /// What the study asks of an observer that it cannot give.
 pub(crate) fn refuse_settings(study: &Study, design: &Design) -> Result<(), Error> {
+    refuse_stray_derivatives(study, design)?;
     let Some(filter) = &design.observer.filter else {
         return match study.estimate.smoothing {
             Some(_) => Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file)),
@@ -340,17 +341,8 @@ pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
 /// # Errors
 /// A derivative for which the study names no column.
 fn derivatives(study: &Study, design: &mut Design) -> Result<Vec<String>, Error> {
+    refuse_stray_derivatives(study, design)?;
     let given = &study.estimate.input_derivatives;
-    let inputs = &design.observer.inputs;
-    let stray = given
-        .iter()
-        .find(|(name, _)| !inputs.iter().any(|input| input.name == name.text));
-    if let Some((name, _)) = stray {
-        let names = inputs.iter().map(|input| input.name.as_str());
-        let message =
-            format!("input_derivatives of [estimate]: no known input is called \"{name}\"");
-        return Err(name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names))));
-    }
     let header = |needed: &InputDerivative| {
         let mut own = given.iter().filter(|(name, _)| name.text == needed.input);
         own.next()?.1.get(needed.order - 1).cloned()
@@ -364,6 +356,19 @@ fn derivatives(study: &Study, design: &mut Design) -> Result<Vec<String>, Error>
     let signals = needed.into_iter().map(|derivative| derivative.signal);
     design.observer.inputs.extend(signals);
     Ok(headers)
+}
+
+/// Columns of derivatives of what is no input of the observer.
+fn refuse_stray_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
+    let inputs = &design.observer.inputs;
+    let mut given = study.estimate.input_derivatives.iter();
+    let stray = given.find(|(name, _)| !inputs.iter().any(|input| input.name == name.text));
+    let Some((name, _)) = stray else {
+        return Ok(());
+    };
+    let names = inputs.iter().map(|input| input.name.as_str());
+    let message = format!("input_derivatives of [estimate]: no known input is called \"{name}\"");
+    Err(name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names))))
 }
 
 /// Samples have no derivatives of the inputs, unless the study says where they stand.

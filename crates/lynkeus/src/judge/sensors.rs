@@ -122,6 +122,16 @@ fn contradiction(sensor: &Judged<'_>) -> Option<Doubt> {
             );
             return doubt(sensor, Kind::Rejected, Level::Refusal, text);
         }
+        // of a filter, nothing is left out: what jumps so far moves all that follows
+        let ratio = late.consistency().unwrap_or(0.0).sqrt();
+        if *by == By::Filter && offered >= ENOUGH && ratio > by.limit() {
+            return doubt(
+                sensor,
+                Kind::Innovations,
+                Level::Refusal,
+                larger(name, ratio),
+            );
+        }
     }
     let late = sensor.trace.late();
     if late.exceeds(by.limit()) {

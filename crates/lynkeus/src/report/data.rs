@@ -135,7 +135,11 @@ fn column(values: &Series) -> Value {
 /// JSON that no script ends with.
 pub(super) fn in_a_script(value: &Value) -> String {
     let text = value.to_string();
-    text.replace('<', "\\u003c")
-        .replace('\u{2028}', "\\u2028")
-        .replace('\u{2029}', "\\u2029")
+    let each = |c: char| match c {
+        '<' => "\\u003c".to_owned(),
+        // a reader of the page sees it; there is none beyond 16 bits
+        c if lynkeus_export::is_hidden(c) => format!("\\u{:04x}", u32::from(c)),
+        c => c.to_string(),
+    };
+    text.chars().map(each).collect()
 }

@@ -162,3 +162,56 @@ fn innovations_are_columns() {
         }
     }
 }
+
+const PENDULUM: &str = "model M\n  Real y0(start = 0.3, min = -4, max = 4);\n  Real v(start = 0, min = -8, max = 8);\n  output Real y = y0;\nequation\n  der(y0) = v;\n  der(v) = -4*sin(y0) - 0.5*v;\nend M;\n";
+const TRIANGULAR: &str = "[process_noise]\nv = 0.001\n[observer]\nfamily = \"triangular\"\ntheta = 4\n[estimate]\nsd = true\n";
+
+/// A few rows of a right log, from 0.21 beside the declared start: the observer has had no time, which says nothing
+/// against it.
+#[test]
+fn a_start_that_is_not_forgotten_is_no_contradiction() {
+    let slow = PENDULUM.replace("-4*sin(y0) - 0.5*v", "-1e-6*sin(y0)");
+    let slow = slow.replace("der(y0) = v", "der(y0) = 0.05*v");
+    for rows in [3, 5, 10] {
+        let right = (0..rows).map(|k| 0.51 + noise(k));
+        let study = TRIANGULAR.replace("theta = 4", "theta = 0.05");
+        let (_, ended) = estimated(&slow, &study, right);
+        assert_eq!(ended.code, 0, "{rows}: {}", ended.err);
+    }
+}
+
+/// Readings of the wrong sign take the estimate where the model has no value.
+#[test]
+fn a_run_that_readings_end_names_them() {
+    let model = "model M\n  Real h(start = 1, min = 0.1, max = 4);\n  Real q(start = 0.1, min = 0, max = 1);\n  output Real y = h;\nequation\n  der(h) = q - 0.2*sqrt(h);\n  der(q) = 0;\nend M;\n";
+    let study = "[process_noise]\nq = 1e-4\n[observer]\nfamily = \"triangular\"\ntheta = 2\n";
+    let (folder, ended) = estimated(model, study, (0..40).map(|k| -1.0 - noise(k)));
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(
+        ended.err.contains("the estimate is not credible: ")
+            && ended.err.contains("it followed the readings of y ("),
+        "{}",
+        ended.err
+    );
+    assert!(!folder.read("o.csv").is_empty());
+}
+
+/// One number for the whole log, though the noise that is declared is a hundred of its last digits; one whose last
+/// digit is coarser than the noise may well stand still.
+#[test]
+fn a_dead_sensor_is_refused() {
+    let (_, ended) = estimated(CONSTANT, EKF, (0..60).map(|_| 0.9871));
+    assert_eq!(levels(&ended, "refusal"), ["frozen y"], "{}", ended.err);
+    let (_, ended) = estimated(CONSTANT, EKF, (0..60).map(|_| 1.0));
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+/// Kelvin where the model has a range in degrees.
+#[test]
+fn readings_in_another_range_are_refused() {
+    let study = EKF.replace("x = 0\n", "x = 1\n").replace("0.01 }", "1e6 }");
+    let ranged = CONSTANT.replace("start = 1", "start = 1, min = 0, max = 100");
+    let (_, ended) = estimated(&ranged, &study, (0..40).map(|k| 300.0 + noise(k)));
+    let refusals = levels(&ended, "refusal");
+    assert!(refusals.contains(&"range x".to_owned()), "{refusals:?}");
+}

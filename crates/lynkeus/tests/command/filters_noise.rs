@@ -220,3 +220,48 @@ fn smoothers_say_how_sure_they_are() {
         }
     }
 }
+
+/// A fast state whose variance vanishes leaves no deviation of the others behind: the smoother of `ukf` has those of `ekf`.
+#[test]
+fn smoothed_deviations_survive_a_state_without_variance() {
+    let table = |family: &str| {
+        let folder = Folder::empty();
+        folder.write("m.mo", "model M Real x(start = 0); Real z(start = 0); output Real y = x + z; equation der(x) = -0.1*x; der(z) = -20*z; end M;");
+        let study = format!(
+            "plant = \"m.mo\"\n[sensors]\nnoise = {{ y = 0.1 }}\n[process_noise]\nx = 0.1\n[observer]\nfamily = \"{family}\"\ninitial_variance = {{ x = 1, z = 1 }}\n[estimate]\nsd = true\nsmooth = true\n"
+        );
+        folder.write("s.toml", &study);
+        let rows = (0..40).map(|k| format!("{k},{}\n", if k % 2 == 0 { 0.1 } else { -0.1 }));
+        folder.write("log.csv", &format!("t,y\n{}", rows.collect::<String>()));
+        let ended = folder.run(&["estimate", "s.toml", "log.csv", "-o", "o.csv"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        column(&folder.read("o.csv"), "x_smooth_sd")
+    };
+    for (k, (of_ekf, of_ukf)) in table("ekf").iter().zip(table("ukf")).enumerate() {
+        assert!(
+            (of_ukf / of_ekf - 1.0).abs() < 1e-6,
+            "{k}: {of_ekf} {of_ukf}"
+        );
+    }
+}
+
+/// x' = −100x³ + w starts where nothing draws it back, and scatters as exp(−50x⁴) says: by quadrature with 0.2186.
+#[test]
+fn process_noise_is_drawn_for_where_it_takes_the_plant() {
+    let folder = Folder::empty();
+    folder.write(
+        "m.mo",
+        "model M Real x(start = 0); output Real y = x; equation der(x) = -100*x^3; end M;",
+    );
+    folder.write("s.toml", "plant = \"m.mo\"\n[sensors]\nnoise = { y = 0.1 }\n[process_noise]\nx = 1\n[observer]\nfamily = \"ekf\"\n[simulate]\nuntil = 1500\noutput_step = 1\nseed = 3\n");
+    let ended = folder.run(&["simulate", "s.toml", "-o", "o.csv"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let x = column(&folder.read("o.csv"), "x");
+    let variance = x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64;
+    // of 1,500 independent samples to 1.5 %
+    assert!(
+        (variance.sqrt() / 0.2186 - 1.0).abs() < 0.06,
+        "{}",
+        variance.sqrt()
+    );
+}

@@ -177,3 +177,51 @@ fn what_a_step_may_show_is_not_called_unobservable() {
     assert_eq!(report["observability"]["b"], "unobservable");
     assert!(!text.contains("x can have any value"), "{text}");
 }
+
+/// Beyond the limits of one sensor the other is all there is, and a disturbance acts on that.
+#[test]
+fn limits_and_disturbances_count_together() {
+    let outputs = |z: &str, b: &str| {
+        let model = format!(
+            "input Real d(min = -1, max = 1); Real a(start = 1, min = 0, max = 10); Real b(start = 0, min = -1, max = 1);
+             output Real y = a; output Real z = {z}; equation der(a) = {b}; der(b) = -b;"
+        );
+        check(&model, "disturbances = [\"d\"]\nlimits = { y = [0, 5] }")
+    };
+    let (report, text) = outputs("a + d", "b");
+    for name in ["a", "b"] {
+        assert_eq!(known(&report, name)["known"], "within limits", "{text}");
+    }
+    // what both sensors tell together is told by neither alone
+    let (report, text) = outputs("b + d", "b");
+    assert_eq!(known(&report, "b")["known"], "within limits", "{text}");
+    let (report, text) = outputs("b", "b");
+    assert_eq!(known(&report, "b")["known"], "everywhere", "{text}");
+    // the bound for the disturbance holds within the limits only
+    let (report, text) = check(
+        "input Real d(min = -1, max = 1); Real a(start = 1, min = 0, max = 10);
+         output Real y = a + d; equation der(a) = 0;",
+        "disturbances = [\"d\"]\nlimits = { y = [0, 5] }",
+    );
+    let a = known(&report, "a");
+    assert_eq!(
+        (&a["known"], &a["otherwise"]["known"]),
+        (&"within limits".into(), &"up to disturbances".into()),
+        "{text}"
+    );
+}
+
+/// b' = −b + a: the error of b decays once a is known, which it is within the limits only.
+#[test]
+fn decay_that_rests_on_a_limited_sensor_is_not_told() {
+    let fate = |b: &str| {
+        let model = format!(
+            "Real a(start = 1, min = 0, max = 2); Real b(start = 0, min = -2, max = 2); output Real y = a;
+             equation der(a) = 0; der(b) = {b};"
+        );
+        let (report, _) = check(&model, "limits = { y = [0, 1] }");
+        known(&report, "b")["known"].clone()
+    };
+    assert_eq!(fate("-b + a"), "no");
+    assert_eq!(fate("-b"), "decays");
+}

@@ -292,6 +292,14 @@ fn a_limit_takes_no_other_observer_in_silence() {
             "{limit:?}: {}",
             export.err
         );
+        let certify = folder.run(&[&["certify", "study.toml"][..], &limit].concat());
+        let said = format!("{}{}", certify.out, certify.err);
+        assert!(
+            certify.code == 3
+                || said.contains(&format!("{free} observer"))
+                || said.contains("hangs on a limit"),
+            "{limit:?}: {said}"
+        );
         let check = folder.run(&[&["check", "study.toml"][..], &limit].concat());
         assert!(
             !check.out.contains("no family with a theorem fits"),

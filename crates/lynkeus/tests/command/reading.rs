@@ -280,3 +280,35 @@ fn a_run_that_a_limit_ended_is_not_credible() {
         assert_eq!(json["ended"]["by_limit"].as_bool(), Some(true), "{json}");
     }
 }
+
+/// What `estimate` refuses of a study `check` refuses, too.
+#[test]
+fn columns_of_derivatives_of_no_input_are_refused_by_check() {
+    let study = format!("{STUDY}[estimate]\ninput_derivatives = {{ pmp = \"dp\" }}\n");
+    let folder = tank(&study);
+    folder.write("log.csv", "t,pump,level\n0,1,4\n1,1,4\n");
+    for arguments in [&["check", "s.toml"][..], &["estimate", "s.toml", "log.csv"]] {
+        let ended = folder.run(arguments);
+        assert_eq!(ended.code, 2, "{arguments:?}: {}", ended.err);
+        assert!(
+            ended
+                .err
+                .contains("no known input is called \"pmp\"; did you mean \"pump\"?"),
+            "{}",
+            ended.err
+        );
+    }
+}
+
+/// One column is one signal.
+#[test]
+fn two_signals_of_one_column_are_refused() {
+    let folder = tank(&format!(
+        "{STUDY}[estimate]\ncolumns = {{ level = \"pump\" }}\n"
+    ));
+    folder.write("log.csv", "t,pump,level\n0,1,4\n1,1,4\n");
+    let ended = folder.run(&["estimate", "s.toml", "log.csv"]);
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    let said = "level and pump both read the column \"pump\"";
+    assert!(ended.err.contains(said), "{}", ended.err);
+}
