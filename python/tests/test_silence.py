@@ -157,7 +157,8 @@ def test_a_live_estimator_gets_over_an_absurd_sample() -> None:
         inputs=["u"],
         name="M",
     )
-    live = lynkeus.Study(model, noise={"x": 0.1}, observer="ekf", estimate={"method": "rk4"}).estimator()
+    study = lynkeus.Study(model, noise={"x": 0.1}, process_noise={"x": 0.01}, observer="ekf", estimate={"method": "rk4"})
+    live = study.estimator()
     refused = 0
     for k in range(100):
         try:
