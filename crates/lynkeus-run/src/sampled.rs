@@ -65,10 +65,6 @@ pub(crate) struct Sampled {
     predict: bool,
     bound: Bound,
     spread: Option<Spread>,
-    /// the same by what is declared alone, where readings are judged and more is supposed
-    judging: Option<Spread>,
-    /// the same from an exact start, where readings are judged
-    settled: Option<Spread>,
     /// of the last readings; empty where they are not judged
     innovations: Vec<Innovation>,
     health: Health,
@@ -102,9 +98,6 @@ impl Sampled {
         signals.extend(tuned);
         let spread = errors.as_ref().map(|model| Spread::new(model, method));
         let judged = errors.as_ref().filter(|model| model.expects());
-        let judging = errors.as_ref().and_then(ErrorModel::judging);
-        let judging = judging.map(|model| Spread::new(&model, method));
-        let settled = judged.map(|model| Spread::new(&model.settled(), method));
         Ok(Self {
             driven: Driven::new(system, BetweenSamples::Hold),
             integrator: Integrator::new(method, system.states().len())?,
@@ -115,12 +108,10 @@ impl Sampled {
             predict: *predict,
             bound: Bound::new(system.start()),
             spread: spread.transpose()?,
-            judging: judging.transpose()?,
             innovations: match judged.is_some() {
                 true => vec![Innovation::default(); count],
                 false => vec![],
             },
-            settled: settled.transpose()?,
             health: Health::of(count),
         })
     }
@@ -137,12 +128,7 @@ impl Sampled {
             *follows = f64::from(u8::from(self.predict || !reading.is_finite()));
         }
         self.driven.start(&self.signals);
-        for spread in self
-            .spread
-            .iter_mut()
-            .chain(&mut self.judging)
-            .chain(&mut self.settled)
-        {
+        if let Some(spread) = &mut self.spread {
             spread.start(&self.signals);
         }
     }
@@ -159,25 +145,20 @@ impl Sampled {
 
     /// What is said of readings before they count.
     fn expect(&mut self, sample: &Sample<'_>) {
-        let spread = self.judging.as_mut().or(self.spread.as_mut());
-        let (Some(spread), Some(settled)) = (spread, &mut self.settled) else {
+        let Some(spread) = &mut self.spread else {
             return;
         };
         let expected = spread.expected(sample.t, &self.x, &self.signals);
-        let settled = settled.expected(sample.t, &self.x, &self.signals);
-        let expected: Vec<_> = expected.into_iter().zip(settled).collect();
         for (i, innovation) in self.innovations.iter_mut().enumerate() {
             let reading = sample.readings.get(i).copied().unwrap_or(f64::NAN);
             *innovation = match expected.get(i) {
-                Some(&((predicted, deviation), (_, settled))) if reading.is_finite() => {
-                    Innovation {
-                        value: reading - predicted,
-                        deviation,
-                        settled,
-                        predicted,
-                        reading: Reading::Taken,
-                    }
-                }
+                Some(&[predicted, deviation, settled]) if reading.is_finite() => Innovation {
+                    value: reading - predicted,
+                    deviation,
+                    settled,
+                    predicted,
+                    reading: Reading::Taken,
+                },
                 _ => Innovation::default(),
             };
         }
@@ -199,9 +180,6 @@ impl Runner for Sampled {
     }
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
-        for settled in self.judging.iter_mut().chain(&mut self.settled) {
-            settled.advance(from, sample.t, &mut self.x.clone())?;
-        }
         let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample.t, &mut self.x),
             None => self
@@ -230,12 +208,7 @@ impl Runner for Sampled {
             }
             self.x[first + i] = *reading;
         }
-        for spread in self
-            .spread
-            .iter_mut()
-            .chain(&mut self.judging)
-            .chain(&mut self.settled)
-        {
+        if let Some(spread) = &mut self.spread {
             spread.reset(sample.t, &self.x, sample.readings);
         }
         self.bound.see(&self.x[first..]);
@@ -292,12 +265,7 @@ impl Persist for Sampled {
         walk.numbers(&mut self.x)?;
         walk.numbers(&mut self.outputs)?;
         self.bound.walk(walk)?;
-        for spread in self
-            .spread
-            .iter_mut()
-            .chain(&mut self.judging)
-            .chain(&mut self.settled)
-        {
+        if let Some(spread) = &mut self.spread {
             spread.walk(walk)?;
         }
         for innovation in &mut self.innovations {

@@ -33,7 +33,6 @@ pub struct ErrorModel {
     reading_entries: Vec<(usize, usize)>,
     estimates: usize,
     process_noise: Vec<f64>,
-    declared: Vec<f64>,
     initial_variance: Vec<f64>,
     /// place of the lag
     lag: Option<usize>,
@@ -49,8 +48,6 @@ pub struct ErrorModel {
 pub struct ErrorNoise {
     /// spectral density on each state
     pub process: Vec<f64>,
-    /// the same as declared, by which readings are judged: what is only supposed excuses nothing
-    pub declared: Vec<f64>,
     /// variance of each state at the start
     pub initial: Vec<f64>,
     /// of each sensor
@@ -184,7 +181,6 @@ impl ErrorModel {
         } = equations;
         for (what, count) in [
             ("process noise", noise.process.len()),
-            ("declared process noise", noise.declared.len()),
             ("initial variance", noise.initial.len()),
         ] {
             if count != states.len() {
@@ -208,7 +204,6 @@ impl ErrorModel {
             reading_entries,
             estimates: estimates.len(),
             process_noise: noise.process,
-            declared: noise.declared,
             initial_variance: noise.initial,
             lag: equations.lag.map(|lag| lag.state),
             noise: noise.sensors,
@@ -283,24 +278,11 @@ impl ErrorModel {
         }
     }
 
-    /// The same by what is declared alone, where more is supposed.
-    pub(crate) fn judging(&self) -> Option<Self> {
-        let differs = self.expects() && self.declared != self.process_noise;
-        differs.then(|| Self {
-            process_noise: self.declared.clone(),
-            ..self.clone()
-        })
-    }
-
-    /// The same by what is declared alone, from an exact start.
-    pub(crate) fn settled(&self) -> Self {
+    /// The covariance from an exact start: of the lag alone.
+    fn settled(&self) -> Root {
         let starts = self.initial_variance.iter().enumerate();
         let starts = starts.map(|(i, v)| if Some(i) == self.lag { *v } else { 0.0 });
-        Self {
-            initial_variance: starts.collect(),
-            process_noise: self.declared.clone(),
-            ..self.clone()
-        }
+        Root::diagonal(&starts.collect::<Vec<f64>>())
     }
 
     /// Whether readings are judged.
@@ -312,7 +294,6 @@ impl ErrorModel {
     pub fn noise(&self) -> ErrorNoise {
         ErrorNoise {
             process: self.process_noise.clone(),
-            declared: self.declared.clone(),
             initial: self.initial_variance.clone(),
             sensors: self.noise.clone(),
         }
@@ -321,8 +302,8 @@ impl ErrorModel {
     /// What acts on the error, as text.
     pub(crate) fn noises(&self) -> String {
         format!(
-            "{:?} {:?} {:?} {:?}",
-            self.process_noise, self.declared, self.initial_variance, self.noise
+            "{:?} {:?} {:?}",
+            self.process_noise, self.initial_variance, self.noise
         )
     }
 }
@@ -332,6 +313,8 @@ impl ErrorModel {
 pub(crate) struct Spread {
     engine: Extended,
     belief: Belief,
+    /// the covariance from an exact start, where readings are judged
+    settled: Option<Root>,
     /// of ∂g/∂z
     estimates: Vec<(usize, usize)>,
     /// of ∂h/∂z
@@ -357,6 +340,9 @@ impl Persist for Spread {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         self.engine.walk(walk)?;
         self.belief.walk(walk)?;
+        if let Some(settled) = &mut self.settled {
+            settled.walk(walk)?;
+        }
         walk.numbers(&mut self.deviations)
     }
 }
@@ -373,6 +359,7 @@ impl Spread {
                 x: model.flow.start().to_vec(),
                 root: Root::diagonal(&model.initial_variance),
             },
+            settled: model.expects().then(|| model.settled()),
             estimates: model.estimate_entries.clone(),
             readings: model.reading_entries.clone(),
             skipped: model.flow_entries.len(),
@@ -398,7 +385,11 @@ impl Spread {
         let done = self.engine.predict(&mut self.belief, from, to, false);
         // where an error ends it early, as far as it came
         x.copy_from_slice(&self.belief.x);
-        done.map(|_| ())
+        done?;
+        if let Some(settled) = &mut self.settled {
+            self.engine.carry(settled);
+        }
+        Ok(())
     }
 
     /// The measurements of the sensors that report are new readings, with errors of their own; z is
@@ -407,42 +398,27 @@ impl Spread {
         let evaluation = &mut self.engine.driven.evaluation;
         evaluation.enter(t);
         evaluation.outputs(t, z, &mut self.values);
+        let views = &self.values[self.skipped + self.estimates.len()..];
         for (sensor, reading) in readings.iter().enumerate() {
-            if reading.is_finite() {
-                self.read(sensor, *reading);
+            if !reading.is_finite() {
+                continue;
+            }
+            let own = self.readings.iter().zip(views);
+            let own = own.filter(|((i, _), _)| *i == sensor);
+            let own: Vec<(usize, f64)> = own.map(|((_, j), c)| (*j, *c)).collect();
+            let state = self.belief.root.n - self.noise.len() + sensor;
+            let deviation = self.noise[sensor].variance(*reading).sqrt();
+            for root in std::iter::once(&mut self.belief.root).chain(&mut self.settled) {
+                read(root, state, &own, deviation);
             }
         }
-    }
-
-    /// ν = v − C e.
-    fn read(&mut self, sensor: usize, reading: f64) {
-        let root = &mut self.belief.root;
-        let n = root.n;
-        let state = n - self.noise.len() + sensor;
-        let deviation = self.noise[sensor].variance(reading).sqrt();
-        let mut expected = vec![0.0; n];
-        let values = &self.values[self.skipped + self.estimates.len()..];
-        let views = self.readings.iter().zip(values);
-        for (&(_, j), c) in views.filter(|((i, _), _)| *i == sensor) {
-            for (expected, s) in expected.iter_mut().zip(root.row(j)) {
-                *expected -= c * s;
-            }
-        }
-        root.entries[state * n..(state + 1) * n].copy_from_slice(&expected);
-        // one column more for the new error, then back to n
-        let mut rows: Vec<f64> = (0..n)
-            .flat_map(|k| (0..n).map(move |i| (i, k)))
-            .map(|(i, k)| root.entries[i * n + k])
-            .collect();
-        rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
-        root.of_rows(&mut rows);
     }
 
     /// What is expected of the sensors at (t, z) under the signals, before they are read there: h(x̂)
-    /// with the standard deviation of a reading around it, √(HPHᵀ + R). Nothing where readings are not
-    /// judged, or the model has no value.
-    pub fn expected(&mut self, t: f64, z: &[f64], signals: &[f64]) -> Vec<(f64, f64)> {
-        let Some(expected) = &mut self.expected else {
+    /// with the standard deviation of a reading around it, √(HPHᵀ + R), and the same once the start is
+    /// forgotten. Nothing where readings are not judged, or the model has no value.
+    pub fn expected(&mut self, t: f64, z: &[f64], signals: &[f64]) -> Vec<[f64; 3]> {
+        let (Some(expected), Some(settled)) = (&mut self.expected, &self.settled) else {
             return vec![];
         };
         let read = expected.evaluation.signals_mut();
@@ -467,9 +443,12 @@ impl Spread {
             {
                 row[j] = *slope;
             }
-            self.belief.root.transposed_times(&row, &mut projected);
-            let own: f64 = projected.iter().map(|p| p * p).sum();
-            (*value, (own + noise.variance(*value)).sqrt())
+            let mut deviation = |root: &Root| {
+                root.transposed_times(&row, &mut projected);
+                let own: f64 = projected.iter().map(|p| p * p).sum();
+                (own + noise.variance(*value)).sqrt()
+            };
+            [*value, deviation(&self.belief.root), deviation(settled)]
         };
         values
             .iter()
@@ -496,6 +475,25 @@ impl Spread {
             *deviation = projected.iter().map(|p| p * p).sum::<f64>().sqrt();
         }
     }
+}
+
+/// ν = v − C e becomes what a sensor's state is off by: `views` are the entries of its row of C.
+fn read(root: &mut Root, state: usize, views: &[(usize, f64)], deviation: f64) {
+    let n = root.n;
+    let mut expected = vec![0.0; n];
+    for (j, c) in views {
+        for (expected, s) in expected.iter_mut().zip(root.row(*j)) {
+            *expected -= c * s;
+        }
+    }
+    root.entries[state * n..(state + 1) * n].copy_from_slice(&expected);
+    // one column more for the new error, then back to n
+    let mut rows: Vec<f64> = (0..n)
+        .flat_map(|k| (0..n).map(move |i| (i, k)))
+        .map(|(i, k)| root.entries[i * n + k])
+        .collect();
+    rows.extend((0..n).map(|i| if i == state { deviation } else { 0.0 }));
+    root.of_rows(&mut rows);
 }
 
 #[cfg(test)]

@@ -91,13 +91,20 @@ fn watched(
     log.add_inputs(&derivatives, settings)?;
     let samples = &log.samples;
     start_at_readings(prepared, samples, &mut design);
-    let watch = &mut Watch {
-        watch: &mut within(&study.budget, watch.watch),
+    let run = run_settings(settings);
+    let is_judged_beside = is_judged_beside(study, &design);
+    let share = if is_judged_beside { 0.5 } else { 1.0 };
+    let mut told = within(&study.budget, watch.watch);
+    let own = &mut Watch {
+        watch: &mut |done| told(share * done),
         checkpoint: watch.checkpoint,
     };
-    let run = run_settings(settings);
-    let mut course = course_of(prepared, &design, samples, run, watch)?;
+    let mut course = course_of(prepared, &design, samples, run, own)?;
     let rows = course.estimates.first().map_or(0, Series::len);
+    if is_judged_beside && course.ended.is_none() {
+        let beside = &mut |done| told(share * (1.0 + done));
+        sampled::judge(prepared, &design, samples, run.method, beside, &mut course)?;
+    }
     settle(&mut course, rows, study, &log.table.place())?;
     let intervals = interval::intervals(prepared, &design, samples, &course);
     let logged = |name: &str| {
@@ -143,6 +150,12 @@ fn watched(
         design,
     };
     raw.finish()
+}
+
+/// Whether readings have noises to be judged by, and the run itself follows no error.
+fn is_judged_beside(study: &Study, design: &Design) -> bool {
+    let is_followed = design.observer.filter.is_some() || study.estimate.follows_errors();
+    !is_followed && !study.sensors.noise.is_empty()
 }
 
 /// Where the sensors that an observer reads hang.

@@ -276,16 +276,18 @@ impl Raw<'_> {
             frozen: &frozen,
             replayed,
         };
-        // a density that was guessed excuses nothing
-        let is_plain = innovations.is_empty();
-        let bare = match replayed && (is_plain || sight.wander_is_guessed()) {
+        // what is told stands beside its readings, too: a density that was guessed excuses nothing, and
+        // errors that were followed beside the run are those of held readings
+        let follows = prepared.study().estimate.follows_errors();
+        let is_family = design.observer.filter.is_none();
+        let bare = match replayed && is_family && (!follows || sight.wander_is_guessed()) {
             true => judge::residuals(
                 prepared.declared(),
                 plant,
                 &time,
                 &quantities,
                 &measurements,
-                is_plain,
+                !follows,
             ),
             false => vec![],
         };
@@ -411,29 +413,30 @@ struct Sight<'s> {
 }
 
 impl Sight<'_> {
-    /// Whether an observer with a theorem estimates an unknown input of which nothing declares how fast
-    /// it wanders.
+    /// Whether an unknown input is estimated of which nothing declares how fast it wanders.
     fn wander_is_guessed(&self) -> bool {
         let extended = self.prepared.extended();
-        let declared = &self.prepared.study().process_noise;
-        let is_declared = |name: &str| declared.iter().any(|(n, _)| n.is_or_has(name));
+        let declared = &self.prepared.declared().process_noise;
         let mut unknown = extended.states.iter().skip(extended.plant_states());
-        self.design.observer.filter.is_none() && unknown.any(|u| !is_declared(&u.name))
+        unknown.any(|u| declared.of(&u.name).is_none())
     }
 
-    /// What speaks against the estimates; `bare` are readings beside them where there are no
-    /// innovations.
+    /// What speaks against the estimates; `bare` are readings beside those of an observer with a theorem.
     fn doubts(&self, bare: &[(String, Trace)]) -> Vec<Doubt> {
         let is_filter = self.design.observer.filter.is_some();
         let noise = &self.prepared.study().sensors.noise;
         let is_declared = |name: &str| noise.iter().any(|(n, _)| n.is_or_has(name));
-        let followed = self.innovations.iter().flat_map(|i| {
+        // a noise that was guessed from the log says nothing of an observer with a theorem
+        let followed = self.innovations.iter();
+        let followed = followed.filter(|i| is_filter || is_declared(&i.output));
+        let is_guessed = !is_filter && self.wander_is_guessed();
+        let followed = followed.flat_map(|i| {
             let by = |by: By, trace| Judged {
                 name: &i.output,
                 trace,
                 late: Some(&i.late),
                 by,
-                is_declared: is_declared(&i.output),
+                is_declared: is_declared(&i.output) && !is_guessed,
             };
             match is_filter {
                 true => vec![by(By::Filter, &i.trace)],
@@ -447,8 +450,7 @@ impl Sight<'_> {
             by: By::Noise,
             is_declared: true,
         });
-        // a noise that was guessed from the log says nothing of an observer with a theorem
-        let sensors = followed.filter(|s| is_filter || s.is_declared).chain(bare);
+        let sensors = followed.chain(bare);
         let (extended, plant) = (self.prepared.extended(), self.prepared.plant());
         let declared = extended.states.iter().chain(&plant.states);
         let estimates = self.design.observer.estimates.iter();

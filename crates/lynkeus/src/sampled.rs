@@ -1,7 +1,8 @@
 //! A log through an observer of the five families, where sensors report when they do.
 
+use std::ops::ControlFlow;
+
 use lynkeus_expr::{Graph, Node};
-use lynkeus_model::Variable;
 use lynkeus_observers::{Design, Sampled, Signal, Tunable, kalman::prior_variance};
 use lynkeus_run::{
     ErrorEquations, ErrorModel, ErrorNoise, Estimator, Lag, Method, SampledObserver, System, Tuned,
@@ -15,7 +16,8 @@ use crate::replay::{Watch, replay};
 use crate::study::BetweenSamples;
 use crate::systems::margins;
 
-/// Runs the design's observer over samples.
+/// Runs the design's observer over samples; its errors are followed where the study tells deviations
+/// or innovations.
 ///
 /// # Errors
 /// Noises of the study that do not fit, or a checkpoint.
@@ -26,11 +28,50 @@ pub(crate) fn run(
     method: Method,
     watch: &mut Watch<'_>,
 ) -> Result<Course, Error> {
+    let follows = prepared.study().estimate.follows_errors();
+    followed(prepared, design, samples, method, follows, watch)
+}
+
+/// Judges the readings of a run whose errors nobody follows: the observer runs once more, with its
+/// errors and with held measurements, and the run's course has from it what is expected of the readings,
+/// and the deviations. Where it ends early, the readings before are judged so.
+///
+/// # Errors
+/// Noises of the study that do not fit.
+pub(crate) fn judge(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    method: Method,
+    watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    course: &mut Course,
+) -> Result<(), Error> {
+    let watch = &mut Watch::only(watch);
+    let beside = followed(prepared, design, samples, method, true, watch)?;
+    course.deviations = beside.deviations;
+    course.sensors = beside.sensors;
+    course.late = beside.late;
+    course.traces = beside.traces;
+    course.settled = beside.settled;
+    // who stops it, or a limit, ends the run
+    course.ended = beside
+        .ended
+        .filter(|error| matches!(error, lynkeus_run::Error::Cancelled { .. }));
+    Ok(())
+}
+
+fn followed(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    method: Method,
+    follows: bool,
+    watch: &mut Watch<'_>,
+) -> Result<Course, Error> {
     let mut course = Course {
         keeps_innovations: prepared.study().estimate.innovations,
         ..Course::default()
     };
-    let follows = prepared.study().estimate.follows_errors();
     let mut observer = observer(prepared, design, samples, follows, &mut course.notes)?;
     if prepared.study().sensors.noise.is_empty() && !course.keeps_innovations {
         // what the log's scatter gives judges nobody
@@ -198,15 +239,10 @@ fn error_noise(
     let mut initial: Vec<f64> = starts
         .map(|(s, (.., start))| prior_variance(s, *start))
         .collect();
-    let density = |state: &Variable| declared.process_noise.of(&state.name).copied();
-    let said = extended.states.iter().map(|s| density(s).unwrap_or(0.0));
-    let mut said: Vec<f64> = said.collect();
     process.resize(states.len(), 0.0);
-    said.resize(states.len(), 0.0);
     initial.resize(states.len(), 0.0);
     ErrorNoise {
         process,
-        declared: said,
         initial,
         sensors: noise::levels(declared, extended, samples, notes),
     }

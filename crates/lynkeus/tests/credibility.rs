@@ -125,7 +125,7 @@ impl Case {
         let noise = noise.map(|(name, sd)| format!("{name} = {:e}", sd * scale));
         let noise: Vec<String> = noise.collect();
         let text = format!(
-            "plant = \"plant.mo\"\n[parameters]\n{parameters}\n[sensors]\n{}\nnoise = {{ {} }}\n[process_noise]\n{}\n[observer]\n{observer}\n[estimate]\nsd = true\n[simulate]\nuntil = {}\noutput_step = {}\nseed = {seed}\n{}\n",
+            "plant = \"plant.mo\"\n[parameters]\n{parameters}\n[sensors]\n{}\nnoise = {{ {} }}\n[process_noise]\n{}\n[observer]\n{observer}\n[simulate]\nuntil = {}\noutput_step = {}\nseed = {seed}\n{}\n",
             self.sensors,
             noise.join(", "),
             self.wander,
@@ -242,7 +242,7 @@ macro_rules! calibrations {
             #[test]
             fn $name() {
                 assert_eq!($case.false_alarms(10), 0);
-                for wrong in [Wrong::Hundred, Wrong::Fahrenheit] {
+                for wrong in [Wrong::Hundred, Wrong::Fahrenheit, Wrong::Sign] {
                     assert!(!$case.judged(1, wrong).is_credible(), "{wrong:?}");
                 }
             }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Belief;
 use super::along::Along;
-use super::root::{Gain, dot};
+use super::root::{Gain, Root, dot};
 use super::sensing::{Believed, Sensing};
 use super::smooth::Correction;
 use super::spanned::Rows;
@@ -56,15 +56,20 @@ impl Extended {
         let (driven, x) = (&mut self.driven, &mut self.x);
         self.along.advance(driven, belief, from, to, x)?;
         belief.x.clone_from(&self.x);
-        self.rows.clear();
-        // the rows of W come first: their zeros are spared in the reflections
-        self.along.push_root(&mut self.rows);
-        self.push_carried(belief);
-        belief.root.of_rows_with(&mut self.rows, &mut self.sums);
+        self.carry(&mut belief.root);
         Ok(match keep {
             true => Rows::of(self.along.transition()),
             false => Rows::default(),
         })
+    }
+
+    /// ΦPΦᵀ + W over the way that was gone last.
+    pub fn carry(&mut self, root: &mut Root) {
+        self.rows.clear();
+        // the rows of W come first: their zeros are spared in the reflections
+        self.along.push_root(&mut self.rows);
+        self.push_carried(root);
+        root.of_rows_with(&mut self.rows, &mut self.sums);
     }
 
     /// The way from a state, without carrying a belief along it; the root chooses units where there
@@ -84,7 +89,7 @@ impl Extended {
     }
 
     /// The rows of (ΦS)ᵀ.
-    fn push_carried(&mut self, belief: &Belief) {
+    fn push_carried(&mut self, root: &Root) {
         let (n, transition) = (self.x.len(), self.along.transition());
         let first = self.rows.len();
         self.rows.resize(first + n * n, 0.0);
@@ -93,7 +98,7 @@ impl Extended {
         for i in 0..n {
             sums.fill(0.0);
             for (j, phi) in transition.span(i).zip(transition.row(i)) {
-                for (sum, s) in sums.iter_mut().zip(&belief.root.row(j)[..=j]) {
+                for (sum, s) in sums.iter_mut().zip(&root.row(j)[..=j]) {
                     *sum += phi * s;
                 }
             }

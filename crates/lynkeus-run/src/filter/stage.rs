@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::Belief;
 use super::root::{Root, dot};
 use super::spanned::Rows;
+use crate::snapshot::{Damaged, Walk};
 
 /// x⁻ = φ(x̃) + Φ(x − x̃) and P⁻ = ΦPΦᵀ + W about a state x̃.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Stage {
     /// x̃
     pub about: Vec<f64>,
@@ -19,6 +20,20 @@ pub(super) struct Stage {
 }
 
 impl Stage {
+    /// Of so many states.
+    pub fn walk(&mut self, walk: &mut Walk<'_>, states: usize) -> Result<(), Damaged> {
+        for vector in [&mut self.about, &mut self.end] {
+            vector.resize(states, 0.0);
+            walk.numbers(vector)?;
+        }
+        Arc::make_mut(&mut self.transition).walk(walk, states)?;
+        let mut is_disturbed = !self.noise.is_empty();
+        walk.flag(&mut is_disturbed)?;
+        let count = if is_disturbed { states * states } else { 0 };
+        self.noise.resize(count, 0.0);
+        walk.numbers(&mut self.noise)
+    }
+
     /// What is believed at the next sample.
     pub fn carry(&self, after: &Belief) -> Belief {
         let n = self.end.len();

@@ -73,7 +73,6 @@ impl Plant {
         };
         let noise = ErrorNoise {
             process: vec![self.q[0], self.q[1], 0.0, 0.0],
-            declared: vec![self.q[0], self.q[1], 0.0, 0.0],
             initial: vec![self.p[0], self.p[1], 1.0, 0.0],
             sensors: vec![Level::Absolute(self.noise)],
         };

@@ -34,7 +34,7 @@ pub(crate) struct Judged<'e> {
     pub late: Option<&'e SensorHealth>,
     /// whose deviations the innovations are measured in
     pub by: By,
-    /// whether the study declares its noise
+    /// whether the study declares what its deviation rests on
     pub is_declared: bool,
 }
 

@@ -22,6 +22,7 @@ use super::model::FilterModel;
 use super::root::Root;
 use super::sensing::Sensing;
 use super::smooth::Step;
+use super::stage::Stage;
 use super::{Belief, Bounds, confine};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Error, EstimatorSettings};
@@ -200,6 +201,9 @@ impl Horizon {
             true => linear.way.carry(&self.prior, Some(&free)).0,
         };
         let left = self.rows.pop_front();
+        if let Some(first) = self.rows.front_mut() {
+            first.stage = None;
+        }
         if self.keep {
             step.transition = left.and_then(|row| row.entered);
             self.done.left = Some(step);
@@ -274,11 +278,17 @@ impl Horizon {
             }
             confine(&mut row.guess, &self.bounds);
             row.met.clone_from(met);
+            row.stage = None;
         }
     }
 
     fn settle(&mut self, tried: Tried, converged: bool) -> Solved {
         self.go(&tried, 1.0);
+        if converged {
+            for (row, linear) in self.rows.iter_mut().zip(&tried.rows) {
+                row.stage = linear.way.stage();
+            }
+        }
         let root = tried.free.last().map(|pass| pass.after.root.clone());
         Solved {
             root: root.unwrap_or_else(|| self.prior.root.clone()),
@@ -296,15 +306,10 @@ impl Horizon {
         for (k, row) in self.rows.iter().enumerate() {
             let way = match (k.checked_sub(1).map(|k| &self.rows[k]), free.last()) {
                 (Some(from), Some(_)) if row.t <= from.t => Way::Same,
-                (Some(from), Some(last)) => {
-                    self.engine.driven.start(&from.inputs);
-                    self.engine.driven.aim(from.t, row.t, &row.inputs);
-                    let about = Belief {
-                        x: from.guess.clone(),
-                        root: last.after.root.clone(),
-                    };
-                    Way::Over(self.engine.stage(about, from.t, row.t)?)
-                }
+                (Some(from), Some(last)) => match &row.stage {
+                    Some(stage) => Way::Over(Arc::clone(stage)),
+                    None => Way::Over(Arc::new(between(&mut self.engine, from, row, last)?)),
+                },
                 _ => Way::First,
             };
             let before = way.carry(&self.prior, free.last());
@@ -321,6 +326,17 @@ impl Horizon {
             free,
         })
     }
+}
+
+/// The way between two rows, about the guess at the first.
+fn between(engine: &mut Extended, from: &Row, to: &Row, last: &Pass) -> Result<Stage, Error> {
+    engine.driven.start(&from.inputs);
+    engine.driven.aim(from.t, to.t, &to.inputs);
+    let about = Belief {
+        x: from.guess.clone(),
+        root: last.after.root.clone(),
+    };
+    engine.stage(about, from.t, to.t)
 }
 
 /// A Gauss–Newton step.

@@ -43,7 +43,7 @@ pub(super) enum Way {
     First,
     /// it is at the same instant
     Same,
-    Over(Stage),
+    Over(Arc<Stage>),
 }
 
 /// A reading: cᵀx = value, with noise.
@@ -159,6 +159,14 @@ pub(super) fn seen(sensing: &mut Sensing, row: &Row) -> Result<Vec<Seen>, Error>
 }
 
 impl Way {
+    /// What leads over to a row.
+    pub fn stage(&self) -> Option<Arc<Stage>> {
+        match self {
+            Self::Over(stage) => Some(Arc::clone(stage)),
+            _ => None,
+        }
+    }
+
     /// What is believed at a row before its readings, and Φ.
     pub fn carry(&self, prior: &Belief, last: Option<&Pass>) -> (Belief, Option<Arc<Rows>>) {
         match (self, last) {

@@ -1,7 +1,10 @@
 //! A sample in the window.
 
+use std::sync::Arc;
+
 use crate::filter::sensing::Believed;
 use crate::filter::spanned::Rows;
+use crate::filter::stage::Stage;
 use crate::snapshot::{Damaged, Walk};
 
 #[derive(Clone, Debug, Default)]
@@ -12,6 +15,9 @@ pub(super) struct Row {
     /// the trajectory about which the problem is linearised
     pub guess: Vec<f64>,
     pub met: Vec<Met>,
+    /// the way from the row before, about a guess from which the present one differs by no more than the
+    /// last step: the next window begins with it
+    pub stage: Option<Arc<Stage>>,
     /// Φ from the row before, which has left; where a smoother will ask for it
     pub entered: Option<Rows>,
 }
@@ -47,6 +53,9 @@ impl Row {
             walk.below(&mut met.state, states)?;
             walk.number(&mut met.bound)?;
         }
+        walk.optional(&mut self.stage, |walk, stage| {
+            Arc::make_mut(stage).walk(walk, states)
+        })?;
         walk.optional(&mut self.entered, |walk, entered| {
             entered.walk(walk, states)
         })
