@@ -230,7 +230,7 @@ fn tune_reads_slopes_of_inputs() {
             "s.toml",
             &format!("{text}[estimate]\nbetween_samples = \"linear\"\n{keys}\n{sweep}"),
         );
-        folder.run(&["tune", "s.toml", "log.csv", "--json"])
+        folder.run(&["tune", "s.toml", "--log", "log.csv", "--json"])
     };
     let errors = [
         "input_derivatives = { u = [\"du\", \"ddu\"] }",
