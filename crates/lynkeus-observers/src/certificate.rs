@@ -281,6 +281,13 @@ pub struct Certificate {
 }
 
 impl Certificate {
+    /// A constant by its name.
+    #[must_use]
+    pub fn constant(&self, name: &str) -> Option<f64> {
+        let mut constants = self.constants.iter();
+        constants.find(|c| c.name == name).map(|c| c.value)
+    }
+
     /// A certificate without rate, bounds, constants and notes; its verdict is
     /// that of the hypotheses, of which the first is always that the plant has values on
     /// the box of the assumptions and does not jump there.

@@ -157,6 +157,7 @@ impl Copy<'_, '_> {
             derivatives,
             inputs: self.extended.inputs.iter().map(signal).collect(),
             input_derivatives: vec![],
+            generated: vec![],
             measured: self.measured.clone(),
             estimates: self.estimates(),
             monitors: vec![],

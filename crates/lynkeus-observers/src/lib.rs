@@ -19,6 +19,7 @@ pub mod drift_observable;
 mod enclosure;
 mod estimate;
 mod family;
+mod generator;
 mod guarantee;
 pub mod kalman;
 mod keys;
@@ -39,8 +40,10 @@ pub mod unknown_input;
 
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
 pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, find, fit_word};
+pub use generator::{Generator, GeneratorError, Prefilter};
 pub use guarantee::{Claim, Correction, Injection, certify};
 pub use keys::{KeySpec, REQUIRED, Shape};
+pub use lynkeus_gain::vandermonde::Pole;
 pub use observer::{Estimate, FilterTuning, InputDerivative, Monitor, Observer, Signal};
 pub use sampled::Sampled;
 pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};

@@ -45,9 +45,9 @@ pub struct Monitor {
 
 /// A derivative of a known input that the observer's equations read. Whoever runs
 /// the observer supplies it like an input: exact, from the study's expressions
-/// ([`Observer::input_derivative_expressions`]). A log does not hold it, and
-/// differences of its samples would not do: there the observer has to be refused,
-/// with the advice to take one that estimates the derivatives itself
+/// ([`Observer::input_derivative_expressions`]), from columns of a log, or from the
+/// generator of the input ([`Observer::generate`]). Differences of samples would not do: where
+/// there is nothing else, an observer that estimates the derivatives itself is needed
 /// (`variant = "practical"` of the family `drift-observable`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputDerivative {
@@ -74,6 +74,9 @@ pub struct Observer {
     pub inputs: Vec<Signal>,
     /// derivatives of the known inputs; empty for most families
     pub input_derivatives: Vec<InputDerivative>,
+    /// known inputs and their derivatives that are expressions of time, with these: they are no signals
+    /// any more ([`Observer::generate`])
+    pub generated: Vec<(Node, Node)>,
     /// measured outputs y
     pub measured: Vec<Signal>,
     /// what is estimated, plant states first

@@ -55,6 +55,7 @@ impl Observer {
             .iter()
             .copied()
             .zip(self.estimates.iter().map(|e| e.node))
+            .chain(self.generated.iter().copied())
             .collect();
         let rates = graph.substitute(&rates, &images);
         let outputs = graph.substitute(&h, &images);

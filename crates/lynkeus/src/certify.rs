@@ -12,10 +12,12 @@ use crate::prepare::Prepared;
 use crate::{Correction, Error, Study, correction, prepare, simulate, words};
 
 mod assumptions;
+mod excited;
 mod json;
 mod print;
 mod strays;
 
+pub use excited::{AtTheta, Excitation, Excited};
 pub(crate) use json::certificate as certificate_json;
 pub(crate) use print::region;
 pub use strays::Strays;
@@ -42,6 +44,8 @@ pub struct CertifyReport {
     /// the study's samples against what the observer stands: every proof is for sensors that are
     /// read continuously. None where the study has no samples, or no limit is known
     pub sampling: Option<Intervals>,
+    /// α(θ) of Ltaief et al. as the study's run shows it; none for observers without that
+    pub excited: Option<Excited>,
 }
 
 /// Proves, refutes or leaves undecided that the study's observer converges: on the
@@ -117,8 +121,8 @@ impl<'a> Task<'a> {
         if let Some(choice) = self.prepared.choice()?.filter(|c| c.ended.is_some()) {
             certificate.notes.extend(choice.notes());
         }
-        let family = lynkeus_observers::find(design.observer.family);
-        let theorem = match family.filter(|_| !lmi) {
+        let family = lynkeus_observers::find(design.observer.family).filter(|_| !lmi);
+        let theorem = match family {
             Some(family) => {
                 let assumptions = assumptions::of(&self.prepared, place)?;
                 let tuning = Tuning {
@@ -136,6 +140,10 @@ impl<'a> Task<'a> {
         let go_on = &mut |_| ControlFlow::Continue(());
         let run = run.map(|_| simulate::simulated(&self.prepared, go_on));
         let seen = run.as_ref().and_then(|run| run.as_ref().ok());
+        let excited = match self.explore {
+            true => Excited::of(&self.prepared, seen, place, family)?,
+            false => None,
+        };
         let certificates = theorem.iter().chain([&certificate]);
         let in_mean_square = certificates.into_iter().any(|c| c.mean_square.is_some());
         Ok(CertifyReport {
@@ -145,6 +153,7 @@ impl<'a> Task<'a> {
             sampling: seen.and_then(|run| {
                 interval::simulated(&self.prepared, &design, &run.time, &run.quantities)
             }),
+            excited,
             design,
             certificate,
             theorem,

@@ -189,7 +189,7 @@ fn refuse(prepared: &Prepared<'_>) -> Result<(), Error> {
         return Ok(());
     }
     match prepared.design() {
-        Ok(design) => estimate::refuse_settings(study, &design),
+        Ok(design) => estimate::refuse_settings(prepared, &design),
         Err(error) if error.kind() == ErrorKind::Input => Err(error),
         Err(_) => Ok(()),
     }

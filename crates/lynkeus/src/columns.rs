@@ -9,6 +9,7 @@ use lynkeus_structure::Extended;
 
 use crate::course::Samples;
 use crate::headers::{log_time, refuse_seconds, time_of};
+use crate::inputs::further_headers;
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::table::{APART, Lost, Ordered, Request, is_parquet};
@@ -40,11 +41,12 @@ fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
         .chain(&plant.inputs)
         .chain(&plant.outputs);
     let headers = variables.map(|v| header(settings, &v.name).to_owned());
+    let headers = headers.chain(further_headers(settings));
     Ok(headers.chain([log_time(&plant, settings)]).collect())
 }
 
 /// A log in the order of time, and what the observers of a study read of it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Log<'t> {
     pub table: Cow<'t, Table>,
     /// the header of time
@@ -116,27 +118,6 @@ fn told(lost: &Lost, time: &str) -> Vec<String> {
     conflict.into_iter().chain(timeless).collect()
 }
 
-impl Log<'_> {
-    /// Takes further columns, by their headers, as inputs after the others.
-    ///
-    /// # Errors
-    /// Columns that the log does not have, or not as numbers.
-    pub fn add_inputs(
-        &mut self,
-        headers: &[String],
-        settings: &EstimateSettings,
-    ) -> Result<(), Error> {
-        for header in headers {
-            let column = match settings.strict {
-                true => self.table.column(header).cloned()?,
-                false => self.table.held(header)?,
-            };
-            self.samples.inputs.push(column);
-        }
-        Ok(())
-    }
-}
-
 /// Names of the measured outputs, then of the known inputs.
 fn read<'e>(extended: &'e Extended<'_>) -> impl Iterator<Item = &'e str> {
     let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
@@ -206,9 +187,9 @@ fn samples(
         true => table.column(header(settings, name)).cloned(),
         false => table.readings(header(settings, name)).cloned(),
     };
-    let input = |name: &str| match settings.strict {
-        true => table.column(header(settings, name)).cloned(),
-        false => table.held(header(settings, name)),
+    let input = |name: &str| match is_made(table, settings, name) {
+        true => Ok(Series::default()),
+        false => held(table, settings, header(settings, name)),
     };
     let outputs = extended.outputs.iter().map(|o| &o.variable.name);
     let mut read: Vec<(&str, &str)> = vec![];
@@ -229,6 +210,28 @@ fn samples(
         readings: readings.collect::<Result<_, _>>()?,
         inputs: inputs.collect::<Result<_, _>>()?,
     })
+}
+
+/// A column as an input reads it.
+///
+/// # Errors
+/// The log has none, or not of numbers, or a strict study one with missing cells.
+pub(crate) fn held(
+    table: &Table,
+    settings: &EstimateSettings,
+    header: &str,
+) -> Result<Series, Error> {
+    match settings.strict {
+        true => table.column(header).cloned(),
+        false => table.held(header),
+    }
+}
+
+/// Whether the log leaves an input to its generator: its samples are then empty.
+fn is_made(table: &Table, settings: &EstimateSettings, name: &str) -> bool {
+    let mut made = settings.generator.iter();
+    let own = header(settings, name);
+    made.any(|(input, _)| input.text == name) && !table.names().any(|known| known == own)
 }
 
 /// What the log lacks in words, and where its times count from.

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_observers::{Design, InputDerivative, Observer, Signal};
+use lynkeus_observers::{Design, Observer, Signal};
 use lynkeus_run::filter::FilterKind;
 use lynkeus_run::{Estimator, EstimatorSettings};
 
@@ -11,6 +11,7 @@ use crate::columns::{self, Log};
 use crate::course::{Course, Samples};
 use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
+use crate::inputs::{are_logged, refuse_strays, supplied};
 use crate::outcome::{Raw, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
@@ -85,10 +86,11 @@ fn watched(
 ) -> Result<Outcome, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
-    let known = design.observer.inputs.len();
-    let derivatives = derivatives(study, &mut design)?;
+    let sources = supplied(prepared, &mut design)?;
     let mut log = Log::read(prepared, table)?;
-    log.add_inputs(&derivatives, settings)?;
+    if !are_logged(prepared, &sources) {
+        log.samples.inputs = log.inputs(prepared, &sources)?;
+    }
     let samples = &log.samples;
     start_at_readings(prepared, samples, &mut design);
     let run = run_settings(settings);
@@ -126,10 +128,10 @@ fn watched(
         quantity
     });
     let estimated: Vec<Quantity> = estimated.collect();
-    let known = design.observer.inputs.iter().take(known);
-    let known = known.map(|signal| Quantity {
-        name: signal.name.clone(),
-        truth: logged(&signal.name),
+    let known = prepared.extended().inputs.iter();
+    let known = known.map(|input| Quantity {
+        name: input.name.clone(),
+        truth: logged(&input.name),
         is_input: true,
         ..Quantity::default()
     });
@@ -237,8 +239,9 @@ pub(crate) fn course(
 }
 
 /// What the study asks of an observer that it cannot give.
-pub(crate) fn refuse_settings(study: &Study, design: &Design) -> Result<(), Error> {
-    refuse_stray_derivatives(study, design)?;
+pub(crate) fn refuse_settings(prepared: &Prepared<'_>, design: &Design) -> Result<(), Error> {
+    refuse_strays(prepared)?;
+    let study = prepared.study();
     let Some(filter) = &design.observer.filter else {
         return match study.estimate.smoothing {
             Some(_) => Err(Error::input("`smooth` and `lag` of [estimate] need a filter (\"ekf\", \"ukf\" or \"mhe\"): this observer has no covariance to smooth with").at(&study.file)),
@@ -262,7 +265,7 @@ pub(crate) fn course_of(
 ) -> Result<Course, Error> {
     let study = prepared.study();
     let settings = &study.estimate;
-    refuse_settings(study, design)?;
+    refuse_settings(prepared, design)?;
     if design.observer.filter.is_some() {
         return filter::run(prepared, design, samples, run, watch);
     }
@@ -346,56 +349,4 @@ pub(crate) fn run_settings(settings: &EstimateSettings) -> EstimatorSettings {
         },
         method: method(&settings.method),
     }
-}
-
-/// The headers of the columns that hold the derivatives of the inputs which an observer reads; they
-/// become inputs of its own, after the others.
-///
-/// # Errors
-/// A derivative for which the study names no column.
-fn derivatives(study: &Study, design: &mut Design) -> Result<Vec<String>, Error> {
-    refuse_stray_derivatives(study, design)?;
-    let given = &study.estimate.input_derivatives;
-    let header = |needed: &InputDerivative| {
-        let mut own = given.iter().filter(|(name, _)| name.text == needed.input);
-        own.next()?.1.get(needed.order - 1).cloned()
-    };
-    let needed = &design.observer.input_derivatives;
-    let Some(headers) = needed.iter().map(header).collect::<Option<Vec<_>>>() else {
-        refuse_derivatives(study, design)?;
-        return Ok(vec![]);
-    };
-    let needed = std::mem::take(&mut design.observer.input_derivatives);
-    let signals = needed.into_iter().map(|derivative| derivative.signal);
-    design.observer.inputs.extend(signals);
-    Ok(headers)
-}
-
-/// Columns of derivatives of what is no input of the observer.
-fn refuse_stray_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
-    let inputs = &design.observer.inputs;
-    let mut given = study.estimate.input_derivatives.iter();
-    let stray = given.find(|(name, _)| !inputs.iter().any(|input| input.name == name.text));
-    let Some((name, _)) = stray else {
-        return Ok(());
-    };
-    let names = inputs.iter().map(|input| input.name.as_str());
-    let message = format!("input_derivatives of [estimate]: no known input is called \"{name}\"");
-    Err(name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names))))
-}
-
-/// Samples have no derivatives of the inputs, unless the study says where they stand.
-pub(crate) fn refuse_derivatives(study: &Study, design: &Design) -> Result<(), Error> {
-    let Some(needed) = design.observer.input_derivatives.first() else {
-        return Ok(());
-    };
-    Err(Error::input(format!(
-        "this observer reads {}, the derivative of order {} of the input \"{}\", and nothing says where it stands",
-        needed.signal.name, needed.order, needed.input
-    ))
-    .at(&study.file)
-    .hint(format!(
-        "for a log, name its columns: input_derivatives = {{ {} = [\"…\"] }} under [estimate], one per order (they are never differences of samples); or set variant = \"practical\" in [observer], which estimates it",
-        needed.input
-    )))
 }

@@ -14,6 +14,7 @@ use crate::choice::Choice;
 use crate::estimate::at_readings;
 use crate::fixed_steps::{bends, hasty, stepped};
 use crate::headers::Headers;
+use crate::inputs::on_device;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
 use crate::study::BetweenSamples;
@@ -138,10 +139,11 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     }
     let prepared = Prepared::new(study, &plant)?;
     let is_tunable = options.tunable || matches!(options.to, Target::Fmu(_));
-    let design = match is_tunable {
+    let mut design = match is_tunable {
         true => tunable::design(&prepared)?,
         false => prepared.design()?,
     };
+    on_device(&prepared, &mut design)?;
     let choice = prepared.choice()?.filter(|choice| choice.ended.is_some());
     notes.extend(choice.map(Choice::notes).into_iter().flatten());
     let made = blueprint(&prepared, &design)?;

@@ -83,6 +83,7 @@ mod fmu;
 mod frozen;
 mod headers;
 mod incoming;
+mod inputs;
 pub mod interrupt;
 mod interval;
 mod judge;
@@ -112,6 +113,7 @@ mod spread;
 pub mod study;
 mod systems;
 pub mod table;
+mod thrifty;
 mod tunable;
 #[cfg(feature = "tune")]
 pub mod tune;
@@ -119,7 +121,7 @@ pub mod visible;
 mod words;
 
 pub use accuracy::{Accuracy, Coverage, Settling};
-pub use certify::{CertifyReport, Strays, certify};
+pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use checkpoint::Checkpoint;
 pub use choice::{Choice, Grounds};

@@ -4,13 +4,14 @@ use lynkeus_observers::Design;
 use lynkeus_run::{Blueprint, ErrorModel, Estimator};
 
 use crate::course::Samples;
-use crate::estimate::{refuse_derivatives, run_settings};
+use crate::estimate::run_settings;
+use crate::inputs::{on_device, refuse_derivatives};
 use crate::prepare::{self, Prepared};
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::{Error, Study, filter, sampled};
 
 /// The estimator of a study, waiting for its first sample: measured outputs, then known inputs, in
-/// the study's order. It runs on its own, as `[estimate]` says, and knows neither files nor graph.
+/// the study's order, then derivatives of inputs where the observer reads any. It runs on its own, as `[estimate]` says, and knows neither files nor graph.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -45,7 +46,8 @@ use crate::{Error, Study, filter, sampled};
 pub fn estimator(study: &Study) -> Result<Estimator, Error> {
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let design = prepared.design()?;
+    let mut design = prepared.design()?;
+    on_device(&prepared, &mut design)?;
     let blueprint = blueprint(&prepared, &design)?;
     blueprint.estimator().map_err(Error::from_source)
 }
@@ -56,7 +58,7 @@ pub fn estimator(study: &Study) -> Result<Estimator, Error> {
 /// As [`estimator`].
 pub(crate) fn blueprint(prepared: &Prepared<'_>, design: &Design) -> Result<Blueprint, Error> {
     let study = prepared.study();
-    refuse_derivatives(study, design)?;
+    refuse_derivatives(study, design, |_| true)?;
     refuse_looking_ahead(study, &study.estimate)?;
     let run = run_settings(&study.estimate);
     let none = Samples::default();

@@ -81,9 +81,16 @@ impl Rig {
     /// # Errors
     /// A study that cannot be run.
     pub fn new(prepared: &Prepared<'_>) -> Result<Self, Error> {
+        Self::of(prepared, prepared.design()?)
+    }
+
+    /// With an observer that was designed for the study.
+    ///
+    /// # Errors
+    /// A study that cannot be run.
+    pub fn of(prepared: &Prepared<'_>, design: Design) -> Result<Self, Error> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = settings(study)?;
-        let design = prepared.design()?;
         let mut simulation = open_loop(study, settings, plant)?;
         let observer = &design.observer;
         if observer.filter.is_some() {

@@ -34,7 +34,7 @@ pub(super) fn notes(
     if !derivatives.is_empty() {
         let names: Vec<&str> = derivatives.iter().map(|d| d.signal.name.as_str()).collect();
         notes.push(format!(
-            "the theoretical observer needs {} exactly, which a simulation has; a log needs columns of them (`input_derivatives` of [estimate]), or variant = \"practical\"",
+            "the theoretical observer needs {} exactly, which a simulation has; a log needs columns of them (`input_derivatives` of [estimate]) or the `generator` of the input, or variant = \"practical\"",
             names.join(", ")
         ));
     }

@@ -63,6 +63,7 @@ pub fn observer(extended: &Extended<'_>, K: &DMatrix<f64>) -> Observer {
             })
             .collect(),
         input_derivatives: vec![],
+        generated: vec![],
         measured,
         monitors: vec![],
         filter: None,

@@ -4,7 +4,7 @@ use lynkeus_observers::{Certificate, Check, UltimateBound};
 use lynkeus_structure::Verdict;
 use serde_json::{Map, Value, json};
 
-use super::CertifyReport;
+use super::{CertifyReport, Excited};
 use crate::check::point;
 use crate::interval::Intervals;
 
@@ -31,6 +31,7 @@ pub(crate) fn certificate(report: &CertifyReport) -> Value {
     object["hypotheses"] = json!(hypotheses);
     object["declared"] = report.declared.to_json();
     object["outside_box"] = report.strays.to_json();
+    object["excitation"] = json!(report.excited.as_ref().map(Excited::to_json));
     object["sampling"] = json!(report.sampling.map(sampling));
     let notes = report.theorem.iter().flat_map(|t| &t.notes);
     let strays = report.strays.words(false);

@@ -32,6 +32,9 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
         writeln!(f)?;
         certificate(f, report, theorem)?;
     }
+    if let Some(excited) = &report.excited {
+        write!(f, "\n{excited}")?;
+    }
     // where something is proved, the first line says it
     let strays = report.strays.words(false).filter(|_| !report.is_proved());
     let strays = strays.map(|words| format!("the study leaves the box: {words}"));

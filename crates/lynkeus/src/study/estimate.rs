@@ -1,9 +1,10 @@
 //! `[estimate]`: how a log is replayed.
 
 use super::Name;
+use super::generator::{self, Generator};
 use super::keys::{ESTIMATE, INTEGRATOR};
 use super::section::Entry;
-use super::simulate::{self, Method};
+use super::simulate::{self, Method, pairs};
 use crate::Error;
 
 /// How a log is replayed.
@@ -20,6 +21,8 @@ pub struct EstimateSettings {
     pub columns: Vec<(Name, String)>,
     /// Columns of the log that hold u', u'', … of known inputs.
     pub input_derivatives: Vec<(Name, Vec<String>)>,
+    /// What makes known inputs.
+    pub generator: Vec<(Name, Generator)>,
     /// A log with missing cells in a column that is read, or whose times do not increase, is refused.
     pub strict: bool,
     /// How much later than the row before it a row may come, in units of time.
@@ -75,7 +78,7 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
         .optional("smooth", Entry::boolean)?
         .unwrap_or_default();
     let lag = section.optional("lag", |e| e.whole(1))?;
-    Ok(EstimateSettings {
+    let settings = EstimateSettings {
         between_samples: section
             .optional("between_samples", |e| {
                 e.choice(&[
@@ -112,7 +115,25 @@ pub(super) fn read(entry: Entry<'_>) -> Result<EstimateSettings, Error> {
                     .collect()
             })?
             .unwrap_or_default(),
+        generator: pairs(section.take("generator"), generator::read)?,
         late: section.optional("late", Entry::positive)?,
         strict: section.optional("strict", Entry::boolean)?.unwrap_or(false),
-    })
+    };
+    refuse_two_origins(&settings)?;
+    Ok(settings)
+}
+
+/// Derivatives of an input come from columns or from its generator.
+fn refuse_two_origins(settings: &EstimateSettings) -> Result<(), Error> {
+    let columns = |name: &Name| {
+        let mut given = settings.input_derivatives.iter();
+        given.any(|(own, _)| own.text == name.text)
+    };
+    let mut generators = settings.generator.iter();
+    match generators.find(|(name, _)| columns(name)) {
+        None => Ok(()),
+        Some((name, _)) => Err(name.blame(Error::input(format!(
+            "[estimate]: derivatives of {name} come from columns (`input_derivatives`) and from its `generator`: keep one of the two"
+        )))),
+    }
 }

@@ -337,8 +337,54 @@ pub(super) const SIMULATE: [KeySpec; 8] = [
     },
 ];
 
+/// `{ re, im }` of a pole.
+pub(super) const PAIR: [KeySpec; 2] = [
+    KeySpec {
+        name: "re",
+        kind: "number < 0",
+        shape: Shape::Number,
+        default: REQUIRED,
+        meaning: "real part of both",
+    },
+    KeySpec {
+        name: "im",
+        kind: "number",
+        shape: Shape::Number,
+        default: REQUIRED,
+        meaning: "imaginary part of one of them",
+    },
+];
+
+/// A pole, or two conjugate ones.
+const POLE: Shape = Shape::Either(&[Shape::Number, Shape::Section(&[&PAIR])]);
+
+/// A filter under `generator` in `[estimate]`.
+pub(super) const GENERATOR: [KeySpec; 3] = [
+    KeySpec {
+        name: "poles",
+        kind: "negative number, or a list of them and of pairs `{ re, im }`",
+        shape: Shape::Either(&[POLE, Shape::List(&POLE)]),
+        default: REQUIRED,
+        meaning: "the filter's poles, as many as the observer reads of u, u', … or more; its gain is one",
+    },
+    KeySpec {
+        name: "initial",
+        kind: "number, or list of numbers",
+        shape: Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)]),
+        default: "the input's start value, then zeros",
+        meaning: "u, u', … at the first row",
+    },
+    KeySpec {
+        name: "command",
+        kind: "text",
+        shape: Shape::Text,
+        default: "`\"<input>_command\"`",
+        meaning: "the log's column of what the filter reads",
+    },
+];
+
 /// `[estimate]` without the integrator.
-pub(super) const ESTIMATE: [KeySpec; 10] = [
+pub(super) const ESTIMATE: [KeySpec; 11] = [
     KeySpec {
         name: "late",
         kind: "number > 0",
@@ -401,6 +447,13 @@ pub(super) const ESTIMATE: [KeySpec; 10] = [
         shape: Shape::Table(&Shape::Either(&[Shape::Text, Shape::NAMES])),
         default: "none",
         meaning: "the log's columns of u', u'', … of a known input, for an observer that reads them ([drift-observable](drift-observable.md), `variant = \"theoretical\"`)",
+    },
+    KeySpec {
+        name: "generator",
+        kind: "table: input = expression of `time`, or `{ poles, initial, command }`",
+        shape: Shape::Table(&Shape::Either(&[EXPRESSION, Shape::Section(&[&GENERATOR])])),
+        default: "none",
+        meaning: "what makes a known input, for an observer that reads u', u'', …: [see below](#what-makes-an-input)",
     },
     KeySpec {
         name: "strict",

@@ -23,6 +23,7 @@
 
 mod certify;
 mod estimate;
+mod generator;
 mod keys;
 mod observer;
 mod schema;
@@ -41,6 +42,7 @@ use toml::de::DeTable;
 
 pub use certify::{Box, CertifySettings};
 pub use estimate::{BetweenSamples, EstimateSettings, Smoothing};
+pub use generator::Generator;
 pub use observer::ObserverSettings;
 pub use schema::schema;
 pub use sensors::{Noise, Sensors};

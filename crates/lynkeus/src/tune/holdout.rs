@@ -65,9 +65,13 @@ fn predictions(plant: &Plant, observer: &Observer) -> Vec<Node> {
     map.extend(plant.inputs.iter().map(|input| (input.node, zero)));
     map.insert(plant.time, observer.time);
     for input in &plant.inputs {
-        let read = observer.inputs.iter().find(|s| s.name == input.name);
+        let states = observer.states.iter().map(|(signal, _)| signal);
+        // what a filter generates is a state
+        let mut known = observer.inputs.iter().chain(states);
+        let read = known.find(|s| s.name == input.name);
         map.extend(read.map(|signal| (input.node, signal.symbol)));
     }
+    map.extend(observer.generated.iter().copied());
     for estimate in &observer.estimates {
         map.insert(estimate.variable.node, estimate.node);
     }

@@ -1,15 +1,18 @@
 //! A log as every value of a sweep is judged on it.
 
+use std::borrow::Cow;
+
 use super::errors::rms;
 use super::holdout::{FEWER, Plan};
 use crate::columns::Log;
 use crate::course::Samples;
+use crate::inputs::{Source, are_logged};
 use crate::prepare::Prepared;
 use crate::study::BetweenSamples;
 use crate::{Error, Series, Table, lines};
 
 /// What is the same for all values.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Record<'t> {
     pub log: Log<'t>,
     pub plan: Plan,
@@ -22,7 +25,7 @@ pub(super) struct Record<'t> {
 }
 
 /// Samples for a switchable observer: the switch is the last of the inputs.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Replayed {
     pub samples: Samples,
     pub between: BetweenSamples,
@@ -78,6 +81,27 @@ impl<'t> Record<'t> {
             plan,
             notes,
         })
+    }
+
+    /// The same with the inputs as an observer reads them.
+    ///
+    /// # Errors
+    /// Columns that the log does not have, or not as numbers.
+    pub fn supplied(
+        &self,
+        prepared: &Prepared<'_>,
+        sources: &[Source],
+    ) -> Result<Cow<'_, Self>, Error> {
+        if are_logged(prepared, sources) {
+            return Ok(Cow::Borrowed(self));
+        }
+        let inputs = self.log.inputs(prepared, sources)?;
+        let mut record = self.clone();
+        for replayed in [&mut record.whole, &mut record.parts] {
+            let own = &mut replayed.samples.inputs;
+            own.splice(..own.len() - 1, inputs.iter().cloned());
+        }
+        Ok(Cow::Owned(record))
     }
 
     /// The readings of the measured outputs, by output.

@@ -12,7 +12,8 @@ use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::course::{Course, Samples};
 use crate::crew::{Watch, part};
-use crate::estimate::{course_of, refuse_derivatives, run_settings, start_at_readings};
+use crate::estimate::{course_of, run_settings, start_at_readings};
+use crate::inputs::supplied;
 use crate::outcome::interrupted_on;
 use crate::prepare::Prepared;
 use crate::series::steps;
@@ -30,7 +31,8 @@ pub(super) fn logged(
     mut row: Row,
     watch: &mut Watch<'_>,
 ) -> Result<Row, Error> {
-    refuse_derivatives(prepared.study(), &design)?;
+    let sources = supplied(prepared, &mut design)?;
+    let record = &record.supplied(prepared, &sources)?;
     start_at_readings(prepared, &record.log.samples, &mut design);
     let failure = if design.observer.filter.is_some() {
         filtered::held_out(prepared, &design, record, &mut row, watch)?

@@ -1,7 +1,7 @@
 //! One value of an observer in simulation.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Dynamics, Error as RunError, Method, Role, Simulation, Tolerances, Trajectory};
+use lynkeus_run::{Dynamics, Error as RunError, Role, Simulation, Trajectory};
 
 use super::Row;
 use super::disturbed::disturbed;
@@ -14,11 +14,7 @@ use crate::outcome::interrupted;
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
 use crate::systems::{self, monitor_column};
-
-/// Most steps of an adaptive method from one row to the next: so many over the whole run, in equal
-/// parts, but never fewer than the second number.
-const STEPS: f64 = 5e5;
-const STEPS_PER_ROW: f64 = 500.0;
+pub(super) use crate::thrifty::thrifty;
 
 /// Judges the tuning of a study; an estimate that diverges is a row without figures.
 ///
@@ -136,22 +132,6 @@ impl Trial<'_> {
             }
             Some(t)
         })
-    }
-}
-
-/// The method with fewer steps than it would take: an estimate on its way to infinity is then
-/// given up in time. What is left is enough for any observer worth having.
-pub(super) fn thrifty(method: Method, rows: f64) -> Method {
-    let most = (STEPS / rows.max(1.0)).max(STEPS_PER_ROW) as usize;
-    let fewer = |t: Tolerances| Tolerances {
-        budget: t.budget.min(most),
-        ..t
-    };
-    match method {
-        Method::Adaptive(t) => Method::Adaptive(fewer(t)),
-        Method::Explicit(t) => Method::Explicit(fewer(t)),
-        Method::Stiff(t) => Method::Stiff(fewer(t)),
-        fixed => fixed,
     }
 }
 

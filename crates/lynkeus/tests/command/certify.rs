@@ -3,6 +3,7 @@
 mod column;
 mod declared;
 mod errors;
+mod excited;
 mod moving;
 mod printed;
 

@@ -6,6 +6,7 @@ mod hidden;
 pub(super) mod javascript;
 mod names;
 mod rust;
+mod slopes;
 mod structured;
 
 use std::ops::ControlFlow;

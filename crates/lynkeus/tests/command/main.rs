@@ -17,6 +17,7 @@ mod fmu_names;
 mod fmu_parameters;
 mod fmu_slopes;
 mod fmu_states;
+mod generated;
 mod hostile;
 mod how_well;
 mod known;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::*;
 use crate::study::keys::{
-    CERTIFY, COMPARE, ESTIMATE, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE,
+    CERTIFY, COMPARE, ESTIMATE, GENERATOR, INTEGRATOR, KEYS, PLOT, SENSORS, SIMULATE, TUNE,
 };
 
 const HEADER: &str = "| key | type | default | meaning |\n|---|---|---|---|\n";
@@ -60,13 +60,14 @@ fn the_schema_is_the_committed_one() {
 fn the_page_of_studies_shows_the_keys() {
     let path = document("study.md");
     let mut page = fs::read_to_string(&path).unwrap();
-    let tables: [(&str, &[KeySpec]); 10] = [
+    let tables: [(&str, &[KeySpec]); 11] = [
         ("\n## Top level\n", &KEYS),
         ("\n## `[sensors]`\n", &SENSORS),
         ("\n## `[observer]`\n", &OBSERVER),
         ("\n## `[certify]`\n", &CERTIFY),
         ("\n## `[simulate]`\n", &SIMULATE),
         ("\n## `[estimate]`\n", &ESTIMATE),
+        ("\n### What makes an input\n", &GENERATOR),
         ("\n## The integrator\n", &INTEGRATOR),
         ("\n## `[tune]`\n", &TUNE),
         ("\n## `[compare]`\n", &COMPARE),
