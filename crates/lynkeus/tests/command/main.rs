@@ -31,6 +31,7 @@ mod normal;
 mod observability;
 mod outside;
 mod random;
+mod parquet_logs;
 mod reading;
 mod references;
 mod refused;
