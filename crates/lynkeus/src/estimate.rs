@@ -11,7 +11,7 @@ use crate::columns::{self, Log};
 use crate::course::{Course, Samples};
 use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
-use crate::outcome::{Raw, measurements, settle};
+use crate::outcome::{Raw, is_observers_answer, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::simulate::within;
@@ -98,7 +98,13 @@ fn watched(
     let run = run_settings(settings);
     let mut course = course_of(prepared, &design, samples, run, watch)?;
     let rows = course.estimates.first().map_or(0, Series::len);
-    settle(&mut course, rows, study, &log.table.place())?;
+    settle(
+        &mut course,
+        rows,
+        study,
+        &log.table.place(),
+        is_observers_answer,
+    )?;
     let intervals = interval::intervals(prepared, &design, samples, &course);
     let logged = |name: &str| {
         let values = columns::logged(&log.table, settings, &log.time, name)?;
