@@ -68,7 +68,6 @@ impl<'t> Log<'t> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
         let extended = prepared.extended();
-        refuse_stray_columns(plant, settings)?;
         let time = time_of(table, plant, settings, read(extended))?;
         refuse_seconds(study, table, &time)?;
         let ordered = match settings.strict {

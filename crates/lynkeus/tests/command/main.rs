@@ -24,14 +24,15 @@ mod limits;
 mod live;
 mod logs;
 mod long;
+mod mentioned;
 mod messages;
 mod names;
 #[path = "../normal/mod.rs"]
 mod normal;
 mod observability;
 mod outside;
-mod random;
 mod parquet_logs;
+mod random;
 mod reading;
 mod references;
 mod refused;
