@@ -23,7 +23,7 @@ use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::study::Name;
 use crate::words::conditions;
-use crate::{Error, ErrorKind, Study, calibrate, columns, estimate, prepare};
+use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
 pub(crate) use json::point;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 pub use next::Next;
@@ -94,6 +94,8 @@ const UNIFORMITY: f64 = 0.2;
 pub fn check(study: &Study, options: &CheckOptions) -> Result<Report, Error> {
     let symbolic = prepare::symbolic_plant(study, BTreeSet::new())?;
     Declared::new(study, &symbolic)?;
+    #[cfg(feature = "tune")]
+    crate::tune::refuse_strange_keys(study, true)?;
     let time = match study.budget.left() {
         Some(_) => study.budget.part(0.5),
         None => study.budget.within(OBSERVABILITY),
@@ -183,7 +185,6 @@ fn by_which(
 /// What [`estimate()`](crate::estimate()) would refuse whatever the log, in its words.
 fn refuse(prepared: &Prepared<'_>) -> Result<(), Error> {
     let study = prepared.study();
-    columns::refuse_stray_columns(prepared.plant(), &study.estimate)?;
     // a certified gain takes long to make; of the others what is at fault in the study counts, no answer of no
     if prepare::is_certified_gain(&study.observer.tuning) {
         return Ok(());

@@ -13,7 +13,7 @@ use crate::inputs::further_headers;
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::table::{APART, Lost, Ordered, Request, is_parquet};
-use crate::{Error, Series, Study, Table};
+use crate::{Error, Series, Study, Table, visible};
 
 /// The log of a study in a file (CSV, Parquet), read within the study's budget; of a Parquet file only what the
 /// study may ask for.
@@ -42,7 +42,9 @@ fn asked_for(study: &Study) -> Result<HashSet<String>, Error> {
         .chain(&plant.outputs);
     let headers = variables.map(|v| header(settings, &v.name).to_owned());
     let headers = headers.chain(further_headers(settings));
-    Ok(headers.chain([log_time(&plant, settings)]).collect())
+    let headers = headers.chain([log_time(&plant, settings)]);
+    let spelled = |name: String| [visible::line(&name).into_owned(), name];
+    Ok(headers.flat_map(spelled).collect())
 }
 
 /// A log in the order of time, and what the observers of a study read of it.
@@ -68,7 +70,6 @@ impl<'t> Log<'t> {
         let (study, plant) = (prepared.study(), prepared.plant());
         let settings = &study.estimate;
         let extended = prepared.extended();
-        refuse_stray_columns(plant, settings)?;
         let time = time_of(table, plant, settings, read(extended))?;
         refuse_seconds(study, table, &time)?;
         let ordered = match settings.strict {
@@ -276,8 +277,7 @@ pub(crate) fn logged<'t>(
     name: &str,
 ) -> Option<&'t Series> {
     let header = header(settings, name);
-    let mut named = table.names().filter(|name| *name == header);
-    let is_own = named.next().is_some() && named.next().is_none() && header != time;
+    let is_own = table.has_one(header) && header != time;
     let values = table
         .get(header)
         .filter(|_| is_own && table.origin(header).is_none())?;

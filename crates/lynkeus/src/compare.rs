@@ -161,9 +161,11 @@ fn run_all(
     Ok(rows)
 }
 
-/// The families asked for; else those that are not refuted, whose required keys are there or not,
-/// and the filters.
-fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Error> {
+/// The families asked for.
+///
+/// # Errors
+/// One that there is not.
+pub(crate) fn asked(study: &Study) -> Result<Option<Vec<&'static dyn Family>>, Error> {
     let find = |name: &Name| {
         let found = lynkeus_observers::find(&name.text);
         found.ok_or_else(|| {
@@ -172,8 +174,17 @@ fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Er
             name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names)))
         })
     };
-    if let Some(asked) = &study.compare {
-        return asked.iter().map(find).collect();
+    let names = study.compare.as_ref();
+    names
+        .map(|names| names.iter().map(find).collect())
+        .transpose()
+}
+
+/// The families asked for; else those that are not refuted, whose required keys are there or not,
+/// and the filters.
+fn families(study: &Study, plant: &Plant) -> Result<Vec<&'static dyn Family>, Error> {
+    if let Some(asked) = asked(study)? {
+        return Ok(asked);
     }
     let mut found = vec![];
     for &family in FAMILIES {

@@ -21,7 +21,6 @@ use settable::{Settled, settled};
 pub(crate) fn plant(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let valued = prepare::plant(study)?;
-    systems::check_inputs(study, &valued)?;
     let drawn = |plant: &Plant| plant_as(study, plant, version, options);
     if valued.parameters.is_empty() {
         return Ok(drawn(&valued)?.exported());
@@ -63,7 +62,6 @@ fn plant_as(
 pub(crate) fn observer(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let version = version(study, options)?;
     let plant = prepare::plant(study)?;
-    systems::check_inputs(study, &plant)?;
     let design = Prepared::new(study, &plant)?.design()?;
     if design.observer.filter.is_some() {
         return Err(filter(study, design.observer.family));

@@ -12,7 +12,7 @@ use crate::course::{Course, Samples};
 use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::inputs::{are_logged, refuse_strays, supplied};
-use crate::outcome::{Raw, measurements, settle};
+use crate::outcome::{Raw, is_observers_answer, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
 use crate::simulate::within;
@@ -107,7 +107,13 @@ fn watched(
         let beside = &mut |done| told(share * (1.0 + done));
         sampled::judge(prepared, &design, samples, run.method, beside, &mut course)?;
     }
-    settle(&mut course, rows, study, &log.table.place())?;
+    settle(
+        &mut course,
+        rows,
+        study,
+        &log.table.place(),
+        is_observers_answer,
+    )?;
     let intervals = interval::intervals(prepared, &design, samples, &course);
     let logged = |name: &str| {
         let values = columns::logged(&log.table, settings, &log.time, name)?;

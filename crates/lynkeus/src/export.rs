@@ -19,7 +19,7 @@ use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
 use crate::study::BetweenSamples;
 use crate::systems::hat;
-use crate::{Error, Study, continuous, fmu, systems, tunable};
+use crate::{Error, Study, continuous, fmu, tunable};
 
 mod head;
 
@@ -134,9 +134,6 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
-    if matches!(options.to, Target::Fmu(_)) {
-        systems::check_inputs(study, &plant)?;
-    }
     let prepared = Prepared::new(study, &plant)?;
     let is_tunable = options.tunable || matches!(options.to, Target::Fmu(_));
     let mut design = match is_tunable {

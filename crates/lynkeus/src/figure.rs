@@ -1,5 +1,6 @@
 //! The picture of an outcome.
 
+use crate::mentioned::not_drawn;
 use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel, Span};
 use crate::study::Name;
 use crate::{Error, Outcome, Quantity, Series};
@@ -63,15 +64,11 @@ pub(crate) fn compared(comparison: &crate::Comparison, time_unit: Option<&str>) 
 }
 
 fn find<'o>(outcome: &'o Outcome, name: &Name) -> Result<&'o Quantity, Error> {
-    outcome
-        .quantities
-        .iter()
-        .find(|q| q.name == name.text)
-        .ok_or_else(|| {
-            let names = outcome.quantities.iter().map(|q| q.name.as_str());
-            let refusal = Error::input(format!("`show` of [plot]: nothing is called \"{name}\""));
-            name.blame(refusal.hint(crate::near::suggest(&name.text, names)))
-        })
+    let mut quantities = outcome.quantities.iter();
+    quantities.find(|q| q.name == name.text).ok_or_else(|| {
+        let names = outcome.quantities.iter().map(|q| q.name.as_str());
+        not_drawn(name, "nothing", &names.collect::<Vec<_>>())
+    })
 }
 
 fn interesting(outcome: &Outcome) -> Vec<&Quantity> {

@@ -124,15 +124,19 @@ pub(crate) fn time_of<'s>(
     Ok(time)
 }
 
-/// Refuses dates where the study's time has another unit than the seconds that they become.
+/// Refuses dates and durations where the study's time has another unit than the seconds that they become.
 ///
 /// # Errors
 /// The unit, and what to do.
 pub(crate) fn refuse_seconds(study: &Study, table: &Table, time: &str) -> Result<(), Error> {
     let unit = study.time_unit.as_deref().filter(|unit| is_no_second(unit));
-    match (unit, table.origin(time)) {
-        (Some(unit), Some(date)) => Err(Error::input(format!(
-            "the times of the log are dates such as {date}, which count in seconds, but `time_unit` of [plot] says that the plant's are in {unit}"
+    let dates = table
+        .origin(time)
+        .map(|date| format!("dates such as {date}"));
+    let durations = || table.has_durations(time).then(|| "durations".to_owned());
+    match (unit, dates.or_else(durations)) {
+        (Some(unit), Some(found)) => Err(Error::input(format!(
+            "the times of the log are {found}, which count in seconds, but `time_unit` of [plot] says that the plant's are in {unit}"
         ))
         .at(table.place())
         .hint(format!("write them as numbers in {unit}, or the model in seconds"))),

@@ -89,6 +89,7 @@ mod interval;
 mod judge;
 mod lines;
 mod live;
+mod mentioned;
 mod modes;
 pub mod monte_carlo;
 mod near;

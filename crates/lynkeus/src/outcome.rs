@@ -515,7 +515,7 @@ fn alarms(watches: &[Watch]) -> Vec<String> {
 }
 
 /// What becomes of a run that ended before its last row: one that a limit ended is not whole,
-/// and an estimate that left every bound is an answer; both keep their rows.
+/// and an answer says something of the estimate; both keep their rows.
 ///
 /// # Errors
 /// Any other end, or one before the first row.
@@ -524,6 +524,7 @@ pub(crate) fn settle(
     rows: usize,
     study: &Study,
     place: &str,
+    is_answer: fn(&RunError) -> bool,
 ) -> Result<(), Error> {
     match (course.ended.take(), study.budget.marked()) {
         (None, _) => Ok(()),
@@ -547,8 +548,18 @@ fn not_whole(spent: Spent, error: &RunError) -> String {
     }
 }
 
+/// The same where the observer alone is integrated: readings, or its tuning, may take it to where no number
+/// of steps is enough.
+pub(crate) fn is_observers_answer(error: &RunError) -> bool {
+    let is_steep = matches!(
+        error,
+        RunError::StepBudget { .. } | RunError::TooStiff { .. }
+    );
+    is_steep || is_answer(error)
+}
+
 /// Whether the end of a run says something of the estimate, and not of the input.
-fn is_answer(error: &RunError) -> bool {
+pub(crate) fn is_answer(error: &RunError) -> bool {
     matches!(
         error,
         RunError::Diverged { .. }

@@ -11,19 +11,23 @@ use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, rang
 
 use crate::choice::{Choice, choose};
 use crate::declared::Declared;
+use crate::mentioned::{refuse_strangers, refuse_unknown_states};
 use crate::study::Name;
 use crate::{Error, Study, calibrate, filter, systems};
 
 /// The plant of a study, with the study's parameters.
 ///
 /// # Errors
-/// No plant, a file that cannot be read, or a model that is refused.
+/// No plant, a file that cannot be read, a model that is refused, or a name in the study that the plant does not have.
 pub fn plant(study: &Study) -> Result<Plant, Error> {
     let plant = load(study, None)?;
-    match calibrate::are_asked(study, &plant) {
-        true => calibrate::as_states(study, load(study, Some(BTreeSet::new()))?, true),
-        false => Ok(plant),
-    }
+    refuse_unknown_states(study, &plant)?;
+    let plant = match calibrate::are_asked(study, &plant) {
+        true => calibrate::as_states(study, load(study, Some(BTreeSet::new()))?, true)?,
+        false => plant,
+    };
+    refuse_strangers(study, &plant)?;
+    Ok(plant)
 }
 
 /// The plant with its parameters as symbols, also those without value, but for those that are to be `numbers`.
@@ -32,10 +36,13 @@ pub fn plant(study: &Study) -> Result<Plant, Error> {
 /// As [`plant`].
 pub(crate) fn symbolic_plant(study: &Study, numbers: BTreeSet<String>) -> Result<Plant, Error> {
     let plant = load(study, Some(numbers))?;
-    match calibrate::are_asked(study, &plant) {
-        true => calibrate::as_states(study, plant, false),
-        false => Ok(plant),
-    }
+    refuse_unknown_states(study, &plant)?;
+    let plant = match calibrate::are_asked(study, &plant) {
+        true => calibrate::as_states(study, plant, false)?,
+        false => plant,
+    };
+    refuse_strangers(study, &plant)?;
+    Ok(plant)
 }
 
 /// With the parameters as numbers, or as symbols but for those that are to be numbers.

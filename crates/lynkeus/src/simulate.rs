@@ -12,7 +12,7 @@ use lynkeus_run::{Role, Simulation};
 use crate::course::{Course, Samples};
 use crate::fixed_steps::unlocated;
 use crate::headers::log_time;
-use crate::outcome::{Raw, interrupted, measurements, settle};
+use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::spread::Spread;
@@ -168,7 +168,7 @@ impl Rig {
         let done = simulation.run_into(&mut |time, row| run.push(time, row), watch);
         let mut course = Course::of_run(&self.design.observer, &run);
         course.ended = done.err();
-        settle(&mut course, run.time.len(), study, &study.file)?;
+        settle(&mut course, run.time.len(), study, &study.file, is_answer)?;
         Ok(Ran { run, course })
     }
 }
@@ -196,7 +196,7 @@ fn sampled(
         watch(0.5 + 0.5 * done)
     })?;
     let rows = course.estimates.first().map_or(0, Series::len);
-    settle(&mut course, rows, study, &study.file)?;
+    settle(&mut course, rows, study, &study.file, is_answer)?;
     run.truncate(rows);
     Ok(Ran { run, course })
 }

@@ -173,10 +173,7 @@ pub(crate) fn of_time(plant: &Plant, outputs: &[(String, Node)]) -> Result<Syste
 ///
 /// # Errors
 /// A name that is no input, or an expression that is none.
-pub(crate) fn check_inputs(study: &Study, plant: &Plant) -> Result<(), Error> {
-    let Some(settings) = &study.simulate else {
-        return Ok(());
-    };
+pub(crate) fn check_inputs(plant: &Plant, settings: &SimulateSettings) -> Result<(), Error> {
     check_names(plant, settings)?;
     let mut given = settings.inputs.iter();
     given.try_for_each(|(_, given)| expression(plant, given).map(drop))

@@ -68,9 +68,37 @@ impl<'a> Evaluator<'a> {
         Ok(())
     }
 
+    /// The straight lines, which end in the last value itself: what is limited to the points stays there, and is
+    /// compared with it.
+    fn piecewise_linear(&self, x: &[Node], y: &[Node], u: Node) -> Node {
+        let graph = self.graph;
+        let lines = self.kinks(x, y, u);
+        let ([.., before, end], [.., last]) = (x, y) else {
+            return lines;
+        };
+        let known = |node: Node| graph.constant_value(node);
+        let found = known(self.kinks(x, y, *end));
+        let (Some(found), Some(last)) = (found, known(*last)) else {
+            return lines;
+        };
+        // what the sum loses to rounding up to the end, spread over the last piece
+        let lost = last - found;
+        if lost == 0.0 || !lost.is_finite() {
+            return lines;
+        }
+        let [before, end] = [*before, *end].map(|node| graph.expr(node));
+        let beyond = graph.expr(u) - before;
+        let beyond = match x.len() {
+            // one line has no kink
+            2 => beyond,
+            _ => beyond.max(graph.constant(0.0)),
+        };
+        (graph.expr(lines) + graph.constant(lost) * (beyond / (end - before))).node()
+    }
+
     /// y₁ + s₁(u − x₁) + Σ (sᵢ − sᵢ₋₁) max(u − xᵢ, 0), sᵢ the slopes: every kink is there
     /// once, so that the slope at a point of the table is that of one of its sides.
-    fn piecewise_linear(&self, x: &[Node], y: &[Node], u: Node) -> Node {
+    fn kinks(&self, x: &[Node], y: &[Node], u: Node) -> Node {
         let graph = self.graph;
         let expr = |node: Node| graph.expr(node);
         let u = expr(u);

@@ -174,3 +174,34 @@ proptest! {
         }
     }
 }
+
+/// Limited to its points, a table stays at its last value, and is compared with that.
+#[test]
+fn the_last_value_is_reached_to_the_bit() {
+    let table = Table::new("-1, 0.3, 2", "1, -2, 0.7", Tables::Linear);
+    assert_eq!([table.at(-1.0)[0], table.at(2.0)[0]], [1.0, 0.7]);
+    let mut seed = 1_u64;
+    let mut draw = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 40) as f64 / f64::from(1 << 24)
+    };
+    for count in [2, 3, 4, 9] {
+        for _ in 0..100 {
+            let mut x = 0.0;
+            let points: Vec<(f64, f64)> = (0..count)
+                .map(|_| {
+                    x += 0.01 + draw();
+                    (x, (200.0 * draw() - 100.0).round() / 100.0)
+                })
+                .collect();
+            let list = |numbers: Vec<f64>| {
+                let texts: Vec<String> = numbers.iter().map(|x| format!("{x:?}")).collect();
+                texts.join(", ")
+            };
+            let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+            let (end, last) = (x[count - 1], y[count - 1]);
+            let table = Table::new(&list(x), &list(y), Tables::Linear);
+            assert_eq!(table.at(end)[0], last);
+        }
+    }
+}

@@ -3,6 +3,7 @@
 use super::{MonteCarlo, Scattered};
 use crate::Error;
 use crate::figure::{PANELS, spread};
+use crate::mentioned::not_drawn;
 use crate::plot::{Band, Curve, Extent, Figure, Kind, Panel};
 use crate::study::Name;
 
@@ -39,9 +40,7 @@ impl MonteCarlo {
             let mut own = self.quantities.iter().filter(|q| q.name == name.text);
             own.next().ok_or_else(|| {
                 let names = self.quantities.iter().map(|q| q.name.as_str());
-                let message = format!("`show` of [plot]: nothing estimated is called \"{name}\"");
-                let hint = crate::near::suggest(&name.text, names);
-                name.blame(Error::input(message).hint(hint))
+                not_drawn(name, "nothing estimated", &names.collect::<Vec<_>>())
             })
         };
         names.iter().map(find).collect()

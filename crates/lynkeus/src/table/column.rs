@@ -52,6 +52,8 @@ pub(super) struct Column {
     pub faults: Vec<Fault>,
     pub refusal: Option<Refusal>,
     pub origin: Option<Origin>,
+    /// they are lengths of time, in seconds
+    pub is_durations: bool,
     marks: Marks,
     /// rows that say `1,234`, which waits for another cell to tell what that is
     open: Rows,
@@ -89,6 +91,13 @@ impl Column {
             }
         };
         self.values.push(value);
+    }
+
+    /// Takes the next row's length of time, in seconds.
+    #[cfg(feature = "parquet")]
+    pub(super) fn put_duration(&mut self, seconds: f64) {
+        self.is_durations = true;
+        self.values.push(seconds);
     }
 
     /// Takes a row that has no value.

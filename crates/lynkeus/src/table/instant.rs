@@ -21,14 +21,18 @@ impl Instant {
 
     /// From `origin` to here, rounded once where that is less than 104 days.
     pub(super) fn seconds_since(self, origin: Self) -> f64 {
-        let nanoseconds = self.nanoseconds - origin.nanoseconds;
-        match i64::try_from(nanoseconds) {
-            Ok(short) if short.unsigned_abs() < 1 << 53 => return short as f64 / SECOND as f64,
-            _ => {}
-        }
-        let part = nanoseconds.rem_euclid(SECOND) as f64 / SECOND as f64;
-        nanoseconds.div_euclid(SECOND) as f64 + part
+        seconds(self.nanoseconds - origin.nanoseconds)
     }
+}
+
+/// Nanoseconds in seconds, rounded once where they are less than 104 days.
+pub(super) fn seconds(nanoseconds: i128) -> f64 {
+    match i64::try_from(nanoseconds) {
+        Ok(short) if short.unsigned_abs() < 1 << 53 => return short as f64 / SECOND as f64,
+        _ => {}
+    }
+    let part = nanoseconds.rem_euclid(SECOND) as f64 / SECOND as f64;
+    nanoseconds.div_euclid(SECOND) as f64 + part
 }
 
 /// As RFC 3339 has it.
@@ -185,7 +189,7 @@ fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
 mod tests {
     use super::*;
 
-    fn seconds(text: &str) -> f64 {
+    fn since_1970(text: &str) -> f64 {
         let origin = Instant {
             nanoseconds: 0,
             zoned: false,
@@ -196,15 +200,18 @@ mod tests {
     #[test]
     fn epochs_of_known_times() {
         // GNU date -d … +%s
-        assert_eq!(seconds("1970-01-01"), 0.0);
-        assert_eq!(seconds("2000-02-29T12:00:00Z"), 951_825_600.0);
-        assert_eq!(seconds("2026-11-22T01:02:03.25+01:00"), 1_795_305_723.25);
-        assert_eq!(seconds("1969-12-31 23:59:59.5Z"), -0.5);
-        assert_eq!(seconds("2016-12-31T23:59:60Z"), seconds("2017-01-01"));
-        assert_eq!(seconds("2026-11-22 01:02"), seconds("2026-11-22t01:02:00z"));
+        assert_eq!(since_1970("1970-01-01"), 0.0);
+        assert_eq!(since_1970("2000-02-29T12:00:00Z"), 951_825_600.0);
+        assert_eq!(since_1970("2026-11-22T01:02:03.25+01:00"), 1_795_305_723.25);
+        assert_eq!(since_1970("1969-12-31 23:59:59.5Z"), -0.5);
+        assert_eq!(since_1970("2016-12-31T23:59:60Z"), since_1970("2017-01-01"));
         assert_eq!(
-            seconds("2026-11-22T01:02:03,5-0330"),
-            seconds("2026-11-22T04:32:03.5Z")
+            since_1970("2026-11-22 01:02"),
+            since_1970("2026-11-22t01:02:00z")
+        );
+        assert_eq!(
+            since_1970("2026-11-22T01:02:03,5-0330"),
+            since_1970("2026-11-22T04:32:03.5Z")
         );
     }
 

@@ -21,7 +21,7 @@ mod write;
 
 use crate::near::{list, nearest};
 use crate::series::Store;
-use crate::{Error, Series};
+use crate::{Error, Series, visible};
 use column::Column;
 use lines::Lines;
 
@@ -116,35 +116,56 @@ impl Table {
         }
     }
 
+    /// The columns of a name: under it, else as tables that are [written](visible) spell it.
+    fn called(&self, name: &str) -> impl Iterator<Item = &Column> {
+        let is_there = self.columns.iter().any(|c| c.name == name);
+        let header = match is_there {
+            true => name.to_owned(),
+            // headers are trimmed where they are read
+            false => visible::line(name).trim().to_owned(),
+        };
+        self.columns.iter().filter(move |c| c.name == header)
+    }
+
+    /// Whether one column is called so, and no other.
+    pub(crate) fn has_one(&self, name: &str) -> bool {
+        self.called(name).count() == 1
+    }
+
     /// A column if there is one of that name whose cells can be told; missing ones are NaN.
     pub fn get(&self, name: &str) -> Option<&Series> {
-        let column = self.columns.iter().find(|c| c.name == name)?;
+        let column = self.called(name).next()?;
         column.refusal.is_none().then_some(&column.values)
     }
 
     /// Why the cells of a column cannot be told, where that is so.
     pub fn refusal(&self, name: &str) -> Option<&str> {
-        let column = self.columns.iter().find(|c| c.name == name)?;
+        let column = self.called(name).next()?;
         column.refusal.as_ref().map(|r| r.message.as_str())
     }
 
     /// How many cells of a column are missing; 0 where there is no such column.
     pub fn missing(&self, name: &str) -> usize {
-        let column = self.columns.iter().find(|c| c.name == name);
+        let column = self.called(name).next();
         column.map_or(0, |c| c.missing)
     }
 
     /// The first few missing cells of a column, in order.
     pub fn faults(&self, name: &str) -> &[Fault] {
-        let column = self.columns.iter().find(|c| c.name == name);
+        let column = self.called(name).next();
         column.map_or(&[], |c| &c.faults)
     }
 
     /// What the log writes for zero where a column holds dates and times: it counts seconds since
     /// the first of them.
     pub fn origin(&self, name: &str) -> Option<&str> {
-        let column = self.columns.iter().find(|c| c.name == name)?;
+        let column = self.called(name).next()?;
         column.origin.as_ref().map(|origin| origin.text.as_str())
+    }
+
+    /// Whether a column holds lengths of time, which are counted in seconds.
+    pub(crate) fn has_durations(&self, name: &str) -> bool {
+        self.called(name).any(|c| c.is_durations)
     }
 
     /// A column of times, numbers or dates, in which cells may be missing: those are NaN.
@@ -246,7 +267,7 @@ impl Table {
     /// # Errors
     /// As [`Table::times`], a cell is missing, or a row's time is not after the one before it.
     pub fn time(&self, name: &str) -> Result<&Series, Error> {
-        if !self.names().any(|n| n == name) {
+        if self.called(name).next().is_none() {
             return Err(self.without_time(name));
         }
         let time = self.whole(name, self.times(name))?;
@@ -264,7 +285,7 @@ impl Table {
     }
 
     fn find(&self, name: &str) -> Result<&Column, Error> {
-        let mut matching = self.columns.iter().filter(|c| c.name == name);
+        let mut matching = self.called(name);
         let Some(column) = matching.next() else {
             return Err(self.absent(name));
         };

@@ -57,7 +57,7 @@ impl Table {
     /// There is no such column, or a row comes later than `late` (without it, than ten usual
     /// steps): its clock jumped.
     pub fn in_order(&self, time: &str, late: Option<f64>) -> Result<Option<Ordered>, Error> {
-        if !self.names().any(|n| n == time) {
+        if self.called(time).next().is_none() {
             return Err(self.without_time(time));
         }
         let times = self.times(time)?;

@@ -1,5 +1,8 @@
 //! Logs and estimates as Parquet files.
 
+mod arrow_schema;
+mod durations;
+mod flatbuffer;
 mod meaning;
 mod pages;
 mod quiet;
@@ -7,14 +10,16 @@ mod write;
 
 use std::fs::File;
 
+use ::parquet::basic::Compression;
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::{AsBytes, DataType};
 use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 
+use self::durations::Durations;
 use self::meaning::Meaning;
-use self::pages::{Range, Unread};
+use self::pages::{Pages, Range, Unread};
 use super::column::Column;
 use super::instant::Instant;
 use super::lines::Lines;
@@ -73,6 +78,7 @@ impl Loading<'_> {
         let metadata = reader.metadata();
         let rows = self.rows(metadata)?;
         let schema = metadata.file_metadata().schema_descr();
+        let durations = Durations::of(metadata.file_metadata());
         let mut columns = Vec::new();
         for (index, described) in schema.columns().iter().enumerate() {
             let header = described.path().string();
@@ -81,7 +87,7 @@ impl Loading<'_> {
                 continue;
             }
             let mut column = Column::new(&header, &self.store);
-            let meaning = Meaning::of(described);
+            let meaning = durations.meaning(described);
             match meaning {
                 Meaning::Other(what) => column.refuse(
                     0,
@@ -92,6 +98,7 @@ impl Loading<'_> {
                 _ => {
                     for group in 0..metadata.num_row_groups() {
                         let group = reader.get_row_group(group).map_err(broken)?;
+                        self.refuse_codec(group.metadata().column(index))?;
                         let largest = self.largest(&own, group.metadata().column(index))?;
                         let values = group.get_column_reader(index).map_err(broken)?;
                         let mut chunk = Chunk {
@@ -161,11 +168,32 @@ impl Loading<'_> {
             Some(Range { from, to })
         });
         let range = range.ok_or_else(|| self.damaged("a column lies outside of it"))?;
-        match pages::largest(file, range, &self.request.budget, self.name) {
+        let pages = Pages {
+            range,
+            codec: chunk.compression(),
+        };
+        match pages.largest(file, &self.request.budget, self.name) {
             Ok(largest) => Ok(largest),
             Err(Unread::Damaged(why)) => Err(self.damaged(why)),
             Err(Unread::Ended(error)) => Err(error),
         }
+    }
+
+    /// Refuses pages that nobody here takes apart.
+    fn refuse_codec(&self, chunk: &ColumnChunkMetaData) -> Result<(), Error> {
+        let codec = match chunk.compression() {
+            Compression::BROTLI(_) => "brotli",
+            Compression::LZO => "LZO",
+            Compression::LZ4 => "Hadoop's LZ4",
+            _ => return Ok(()),
+        };
+        let message = format!(
+            "cannot read the Parquet file: column \"{}\" is compressed by {codec}: expected zstd, snappy, gzip, LZ4_RAW or none",
+            chunk.column_path().string()
+        );
+        Err(Error::input(message)
+            .at(self.name)
+            .hint("write it with one of these"))
     }
 
     fn damaged(&self, why: &str) -> Error {

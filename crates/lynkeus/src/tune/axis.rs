@@ -211,17 +211,42 @@ pub(crate) fn grid(study: &Study, axes: &[Axis]) -> Result<Vec<(Vec<f64>, Study)
     Ok(grid)
 }
 
-fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
-    let refuse = |why: String| {
-        let refusal = Error::input(format!("`keys` of [tune]: {why}")).at(&study.file);
-        name.blame(refusal)
+/// Refuses keys to sweep that no family has; with `of_others` those, too, that none in question has.
+///
+/// # Errors
+/// The first of them.
+pub(crate) fn refuse_strange_keys(study: &Study, of_others: bool) -> Result<(), Error> {
+    let is_elsewhere = |name: &Name| {
+        let base = parsed(&name.text).map(|(base, _)| base);
+        base.is_some_and(|base| FAMILIES.iter().any(|family| family.owns(base)))
     };
+    let mut keys = study.tune.keys.iter().map(|(name, _)| name);
+    keys.try_for_each(|name| match is_elsewhere(name) && !of_others {
+        true => Ok(()),
+        false => key(study, name).map(drop),
+    })
+}
+
+/// The key of `[observer]` that a name means, and where within its value.
+fn key<'n>(study: &Study, name: &'n Name) -> Result<(&'n str, Vec<usize>), Error> {
     let (base, path) = parsed(&name.text).ok_or_else(|| {
-        refuse(format!(
-            "expected a key or an entry of one such as \"theta[1]\", found \"{name}\""
-        ))
+        let why =
+            format!("expected a key or an entry of one such as \"theta[1]\", found \"{name}\"");
+        refused(study, name, &why)
     })?;
-    known(study, base).map_err(|(why, hint)| refuse(why).hint(hint))?;
+    let known = known(study, base);
+    known.map_err(|(why, hint)| refused(study, name, &why).hint(hint))?;
+    Ok((base, path))
+}
+
+fn refused(study: &Study, name: &Name, why: &str) -> Error {
+    let refusal = Error::input(format!("`keys` of [tune]: {why}")).at(&study.file);
+    name.blame(refusal)
+}
+
+fn axis(study: &Study, name: &Name, values: &Values) -> Result<Axis, Error> {
+    let refuse = |why: String| refused(study, name, &why);
+    let (base, path) = key(study, name)?;
     let present = present(study, base, &path).map_err(&refuse)?;
     let is_factor = matches!(present, Some(Value::List(_)));
     let present = match present {

@@ -28,6 +28,7 @@ mod whiteness;
 use std::ops::ControlFlow;
 
 pub use axis::Axis;
+pub(crate) use axis::refuse_strange_keys;
 pub use measures::Measure;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;

@@ -7,14 +7,14 @@ use super::filtered;
 use super::holdout::{predicted, switchable};
 use super::record::{Record, Replayed, span};
 use super::speed::longest_step;
-use super::trial::{is_answer, thrifty};
+use super::trial::thrifty;
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
 use crate::course::{Course, Samples};
 use crate::crew::{Watch, part};
 use crate::estimate::{course_of, run_settings, start_at_readings};
 use crate::inputs::supplied;
-use crate::outcome::interrupted_on;
+use crate::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::series::steps;
 use crate::study::BetweenSamples;
@@ -77,7 +77,7 @@ pub(super) fn course(
     course.check()?;
     match course.ended.take() {
         None => Ok(Ok(course)),
-        Some(error) if is_answer(&error) => Ok(Err(error.to_string())),
+        Some(error) if is_observers_answer(&error) => Ok(Err(error.to_string())),
         Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
 }

@@ -1,7 +1,7 @@
 //! One value of an observer in simulation.
 
 use lynkeus_observers::Design;
-use lynkeus_run::{Dynamics, Error as RunError, Role, Simulation, Trajectory};
+use lynkeus_run::{Dynamics, Role, Simulation, Trajectory};
 
 use super::Row;
 use super::disturbed::disturbed;
@@ -10,7 +10,7 @@ use super::reference::Reference;
 use super::speed::{longest_step, transparent};
 use crate::Error;
 use crate::crew::Watch;
-use crate::outcome::interrupted;
+use crate::outcome::{interrupted, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::simulate::{open_loop, settings};
 use crate::systems::{self, monitor_column};
@@ -86,7 +86,7 @@ impl Runs for Trial<'_> {
         };
         match simulation.run_watched(watch) {
             Ok(run) => Ok(Ok(run)),
-            Err(error) if is_answer(&error.error) => Ok(Err(error.error.to_string())),
+            Err(error) if is_observers_answer(&error.error) => Ok(Err(error.error.to_string())),
             Err(error) => Err(interrupted(error.error, &study.file)),
         }
     }
@@ -133,17 +133,4 @@ impl Trial<'_> {
             Some(t)
         })
     }
-}
-
-/// Whether a run that ended early says something of the tuning.
-pub(super) fn is_answer(error: &RunError) -> bool {
-    matches!(
-        error,
-        RunError::Diverged { .. }
-            | RunError::NotFinite { .. }
-            | RunError::StepUnderflow { .. }
-            | RunError::StepBudget { .. }
-            | RunError::TooStiff { .. }
-            | RunError::Singular { .. }
-    )
 }

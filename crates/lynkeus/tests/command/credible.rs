@@ -215,3 +215,40 @@ fn readings_in_another_range_are_refused() {
     let refusals = levels(&ended, "refusal");
     assert!(refusals.contains(&"range x".to_owned()), "{refusals:?}");
 }
+
+/// Readings may take an observer to where no number of steps is enough: that is an answer, and the rows before are kept.
+#[test]
+fn a_log_that_takes_the_observer_where_steps_do_not_suffice_is_not_credible() {
+    let folder = Folder::empty();
+    let plant = "model M
+  Real p(start=1,min=-5,max=5);
+  Real v(start=0,min=-50,max=50);
+  output Real y = p;
+equation
+  der(p) = v;
+  der(v) = -p - 0.5*v - sin(p^3);
+end M;
+";
+    folder.write("m.mo", plant);
+    folder.write(
+        "s.toml",
+        "plant = \"m.mo\"\n[observer]\nfamily = \"triangular\"\ntheta = 3\n",
+    );
+    // from the hundredth row on in another unit
+    let row = |k: i32| {
+        let t = 0.05 * f64::from(k);
+        let unit = if k < 100 { 1.0 } else { 1000.0 };
+        format!("{t},{}\n", unit * t.cos())
+    };
+    let rows: String = (0..200).map(row).collect();
+    folder.write("log.csv", &format!("t,y\n{rows}"));
+    let ended = folder.run(&["estimate", "s.toml", "log.csv"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    for words in [
+        "the estimate is not credible: 100000 steps took the integration only to t = 5.0",
+        "it followed the readings of y (the 102 rows before are written)",
+    ] {
+        assert!(ended.err.contains(words), "{}", ended.err);
+    }
+    assert_eq!(ended.out.lines().count(), 103);
+}

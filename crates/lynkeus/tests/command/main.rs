@@ -25,12 +25,14 @@ mod limits;
 mod live;
 mod logs;
 mod long;
+mod mentioned;
 mod messages;
 mod names;
 #[path = "../normal/mod.rs"]
 mod normal;
 mod observability;
 mod outside;
+mod parquet_logs;
 mod random;
 mod reading;
 mod references;

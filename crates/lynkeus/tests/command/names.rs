@@ -335,3 +335,34 @@ fn the_horizon_gives_way_to_a_state_of_that_name() {
     let error = over["horizon"][last].as_f64().unwrap();
     assert!((error / rows[last][1] - 1.0).abs() < 1e-9, "{error}");
 }
+
+/// A table spells out what a terminal would obey; a log that is so written is read back.
+#[test]
+fn a_log_of_names_with_control_characters_is_read_back() {
+    let folder = Folder::empty();
+    let plant = "model M
+  input Real 'u\ttab'(start=0);
+  Real p(start=1,min=-5,max=5);
+  Real v(start=0,min=-5,max=5);
+  output Real 'y\t\u{1b}[31m' = p;
+equation
+  der(p) = v;
+  der(v) = -p - 0.5*v + 'u\ttab';
+end M;
+";
+    folder.write("m.mo", plant);
+    let study = "plant = \"m.mo\"\n[observer]\nfamily = \"ekf\"\n[simulate]\nuntil = 2\noutput_step = 0.1\n";
+    folder.write("s.toml", study);
+    for log in ["log.csv", "log.parquet"] {
+        let ended = folder.run(&["simulate", "s.toml", "--log", log, "-o", "out.csv"]);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        let ended = folder.run(&["estimate", "s.toml", log]);
+        assert_eq!(ended.code, 0, "{log}: {}", ended.err);
+        assert_eq!(ended.out.lines().count(), 22);
+    }
+    assert!(
+        folder
+            .read("log.csv")
+            .starts_with("t,y\\t\\u{1b}[31m,u\\ttab\n")
+    );
+}

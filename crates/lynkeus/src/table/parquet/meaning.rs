@@ -1,10 +1,11 @@
 //! What a column's values mean, by its physical and its logical type.
 
-use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
+use ::parquet::basic::{ConvertedType, LogicalType, Type as Physical};
 use ::parquet::schema::types::ColumnDescriptor;
 
 use super::super::column::Column;
-use super::super::instant::Instant;
+use super::super::instant::{self, Instant};
+use super::durations::nanoseconds;
 
 /// Nanoseconds of a day.
 const DAY: i64 = 86_400_000_000_000;
@@ -28,6 +29,10 @@ pub(super) enum Meaning {
     Time {
         unit: i64,
         zoned: bool,
+    },
+    /// a count of so many nanoseconds
+    Duration {
+        unit: i64,
     },
     Text,
     /// neither numbers nor dates; what they are
@@ -61,11 +66,7 @@ impl Meaning {
     fn of_logical(logical: &LogicalType) -> Self {
         match logical {
             LogicalType::Timestamp(t) => Self::Time {
-                unit: match t.unit {
-                    TimeUnit::MILLIS => 1_000_000,
-                    TimeUnit::MICROS => 1000,
-                    TimeUnit::NANOS => 1,
-                },
+                unit: nanoseconds(&t.unit),
                 zoned: t.is_adjusted_to_u_t_c,
             },
             LogicalType::Date => Self::Time {
@@ -109,6 +110,10 @@ impl Meaning {
             Self::Time { unit, zoned } => {
                 let nanoseconds = i128::from(value) * i128::from(unit);
                 column.put_instant(Instant::at(nanoseconds, zoned));
+            }
+            Self::Duration { unit } => {
+                let nanoseconds = i128::from(value) * i128::from(unit);
+                column.put_duration(instant::seconds(nanoseconds));
             }
             Self::Decimal(scale) => {
                 column.put(decimal(value.unsigned_abs().into(), value < 0, scale))

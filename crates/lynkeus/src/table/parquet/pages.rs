@@ -6,6 +6,7 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 
+use ::parquet::basic::Compression;
 use lynkeus_expr::Budget;
 
 use crate::Error;
@@ -37,46 +38,70 @@ pub(super) struct Range {
     pub to: u64,
 }
 
-/// The largest page of a column, in bytes, if there is room for each.
-pub(super) fn largest(
-    file: &File,
-    range: Range,
-    budget: &Budget,
-    name: &str,
-) -> Result<u64, Unread> {
-    let mut input = BufReader::with_capacity(4096, file.try_clone()?);
-    input.seek(SeekFrom::Start(range.from))?;
-    let mut at = range.from;
-    let mut largest = 0;
-    while at < range.to {
-        let mut scan = Scan {
-            input: &mut input,
-            read: 0,
-        };
-        let page = scan.page()?;
-        let (compressed, whole) = (size(page.compressed)?, size(page.uncompressed)?);
-        let values = size(page.values)?;
-        at = at.saturating_add(scan.read).saturating_add(compressed);
-        if at > range.to {
-            return Err(Unread::Damaged("a page is longer than its column"));
+/// The pages of a column within a group.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pages {
+    pub range: Range,
+    pub codec: Compression,
+}
+
+impl Pages {
+    /// The largest page, in bytes, if there is room for each.
+    pub fn largest(self, file: &File, budget: &Budget, name: &str) -> Result<u64, Unread> {
+        let (range, is_gzip) = (self.range, matches!(self.codec, Compression::GZIP(_)));
+        let mut input = BufReader::with_capacity(4096, file.try_clone()?);
+        input.seek(SeekFrom::Start(range.from))?;
+        let mut at = range.from;
+        let mut largest = 0;
+        while at < range.to {
+            let mut scan = Scan {
+                input: &mut input,
+                read: 0,
+            };
+            let page = scan.page()?;
+            let (compressed, whole) = (size(page.compressed)?, size(page.uncompressed)?);
+            let values = size(page.values)?;
+            at = at.saturating_add(scan.read).saturating_add(compressed);
+            if at > range.to {
+                return Err(Unread::Damaged("a page is longer than its column"));
+            }
+            // no value of a dictionary is shorter than a byte
+            if page.is_dictionary && values > whole {
+                return Err(Unread::Damaged("a dictionary has more values than bytes"));
+            }
+            let dictionary = if page.is_dictionary {
+                VALUE * values
+            } else {
+                0
+            };
+            let needed = usize::try_from(compressed + whole + dictionary).unwrap_or(usize::MAX);
+            if let (false, Some(spent)) = (budget.affords(needed), budget.spent()) {
+                return Err(Unread::Ended(ended(spent, name)));
+            }
+            largest = largest.max(whole);
+            let levels = page.levels()?;
+            // a page without values is not taken apart
+            if page.is_plain || whole <= levels || !is_gzip {
+                input.seek_relative(i64::try_from(compressed).unwrap_or(i64::MAX))?;
+                continue;
+            }
+            input.seek_relative(i64::try_from(levels).unwrap_or(i64::MAX))?;
+            let values = &mut input.by_ref().take(compressed.saturating_sub(levels));
+            Self::measure(values, whole - levels)?;
+            input.seek(SeekFrom::Start(at))?;
         }
-        // no value of a dictionary is shorter than a byte
-        if page.is_dictionary && values > whole {
-            return Err(Unread::Damaged("a dictionary has more values than bytes"));
-        }
-        let dictionary = if page.is_dictionary {
-            VALUE * values
-        } else {
-            0
-        };
-        let needed = usize::try_from(compressed + whole + dictionary).unwrap_or(usize::MAX);
-        if let (false, Some(spent)) = (budget.affords(needed), budget.spent()) {
-            return Err(Unread::Ended(ended(spent, name)));
-        }
-        largest = largest.max(whole);
-        input.seek_relative(i64::try_from(compressed).unwrap_or(i64::MAX))?;
+        Ok(largest)
     }
-    Ok(largest)
+
+    /// Takes a page of gzip apart without keeping it: the library would keep whatever it gives, however long it is.
+    fn measure(page: &mut dyn Read, whole: u64) -> Result<(), Unread> {
+        let parts = flate2::read::MultiGzDecoder::new(page);
+        match io::copy(&mut parts.take(whole + 1), &mut io::sink()) {
+            Ok(length) if length <= whole => Ok(()),
+            Ok(_) => Err(Unread::Damaged("a page is longer than it says")),
+            Err(_) => Err(Unread::Damaged("a page cannot be decompressed")),
+        }
+    }
 }
 
 /// A size or a count, which has 31 bits.
@@ -95,6 +120,17 @@ struct Page {
     compressed: i64,
     values: i64,
     is_dictionary: bool,
+    /// bytes of its levels where these are not compressed with the values
+    levels: [i64; 2],
+    /// its values stand as they are
+    is_plain: bool,
+}
+
+impl Page {
+    fn levels(&self) -> Result<u64, Unread> {
+        let [definition, repetition] = self.levels;
+        Ok(size(definition)? + size(repetition)?)
+    }
 }
 
 /// Reads Thrift's compact protocol and counts its bytes.
@@ -121,10 +157,25 @@ impl Scan<'_> {
                     page.is_dictionary = true;
                     page.values = self.dictionary()?;
                 }
+                (8, 12) => self.second(&mut page)?,
                 (_, kind) => self.skip(kind, DEEPEST)?,
             }
         }
         Ok(page)
+    }
+
+    /// The header of a page of the second version.
+    fn second(&mut self, page: &mut Page) -> Result<(), Unread> {
+        let mut last = 0;
+        while let Some(field) = self.field(&mut last)? {
+            match (field.id, field.kind) {
+                (id @ (5 | 6), 4..=6) => page.levels[usize::from(id == 6)] = self.number()?,
+                // a truth value is a kind of its own
+                (7, kind @ (1 | 2)) => page.is_plain = kind == 2,
+                (_, kind) => self.skip(kind, DEEPEST)?,
+            }
+        }
+        Ok(())
     }
 
     /// How many values a dictionary has.
