@@ -93,10 +93,11 @@ fn durations_are_seconds_whoever_wrote_them() {
         let expected = if unit == "s" { 39.0 } else { 1.95 };
         assert_eq!(last_time(&estimated(&folder)), expected, "{unit}");
     }
-    // fastparquet
-    let properties = saying("pandas", &pandas("ns"));
-    write(&folder, "(TIME(MICROS, true))", 1_000_000, properties);
-    assert_eq!(last_time(&estimated(&folder)), 1.95);
+    // fastparquet, by either kind of annotation
+    for time in ["(TIME(MICROS, true))", "(TIME_MICROS)"] {
+        write(&folder, time, 1_000_000, saying("pandas", &pandas("ns")));
+        assert_eq!(last_time(&estimated(&folder)), 1.95, "{time}");
+    }
     // neither numbers of nobody nor dates are durations
     write(&folder, "", 20, WriterProperties::builder().build());
     assert_eq!(last_time(&estimated(&folder)), 39.0);

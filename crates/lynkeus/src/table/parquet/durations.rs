@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use ::parquet::basic::{LogicalType, TimeUnit, Type as Physical};
+use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use ::parquet::file::metadata::FileMetaData;
 use ::parquet::schema::types::ColumnDescriptor;
 
@@ -51,6 +51,12 @@ impl Durations {
             // fastparquet calls a duration a time of the day, in a unit that is not the one of pandas
             (Physical::INT64, Some(LogicalType::Time(time))) if self.pandas.contains_key(&name) => {
                 Some(nanoseconds(&time.unit))
+            }
+            (Physical::INT64, None)
+                if described.converted_type() == ConvertedType::TIME_MICROS
+                    && self.pandas.contains_key(&name) =>
+            {
+                Some(nanoseconds(&TimeUnit::MICROS))
             }
             _ => None,
         };
