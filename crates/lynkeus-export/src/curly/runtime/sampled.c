@@ -69,8 +69,25 @@ static int update(STATE *s, double t, const real *signals)
     return 0;
 }
 
+//? judged
+/* Readings beside what is expected of them, which those that are held lag behind by as much as it has moved. */
+static void follow(STATE *s, const real *signals, const real *y)
+{
+    for (int i = 0; i < SENSORS; i++) {
+        const real expected = y[TOLD + i];
+        const real lag = s->started ? expected - s->expected[i] : R(0.0);
+        const real variance = noise_variance(i, expected) + lag * lag;
+        const real off = signals[i] - expected;
+        s->expected[i] = expected;
+        if (isfinite(off) && variance > R(0.0)) {
+            compare(s, i, off * off / variance);
+        }
+    }
+}
+
+//?
 /* The estimates, where all of them are numbers and none has run away. */
-static int report(STATE *s, double t, real *estimates)
+static int report(STATE *s, double t, const real *signals, real *estimates)
 {
     real y[OUTPUTS];
 //? deviations
@@ -115,5 +132,11 @@ static int report(STATE *s, double t, real *estimates)
     for (int i = ESTIMATED; i < TOLD; i++) {
         estimates[REPORTED - TOLD + i] = y[i];
     }
+//? judged
+    follow(s, signals, y);
+//?
+//? !judged
+    (void)signals;
+//?
     return 0;
 }
