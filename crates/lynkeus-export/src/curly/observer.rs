@@ -72,9 +72,18 @@ impl Machine {
                 "linearised"
             }
         };
-        if device.noises.iter().any(Option::is_some) {
-            self.followed(device.noises, observer.errors.is_some());
-            holds.push("judged");
+        let is_declared = device.noises.iter().any(Option::is_some);
+        match observer.errors.as_ref().map(ErrorModel::noise) {
+            // a density that is only supposed excuses nothing
+            Some(noise) if is_declared && noise.declared == noise.process => {
+                self.credible(m, By::ErrorSystem, false);
+                holds.push("weighed");
+            }
+            errors if is_declared => {
+                self.followed(device.noises, errors.is_some());
+                holds.push("judged");
+            }
+            _ => {}
         }
         self.tuned(device, observer.tuned.as_ref())?;
         let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };

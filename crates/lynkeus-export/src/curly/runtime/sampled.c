@@ -54,8 +54,21 @@ static int update(STATE *s, double t, const real *signals)
     }
     reading_slopes((real)t, s->x, s->inputs, c);
 //?
+//? weighed
+    real y[OUTPUTS];
+    real spread[STATES];
+    outputs((real)t, s->x, s->inputs, y);
+//?
     for (int i = 0; i < SENSORS; i++) {
         if (isfinite(signals[i])) {
+//? weighed
+            const real off = signals[i] - y[TOLD + i];
+            project(s->root, c, i, spread);
+            const real variance = dot(spread, 0, spread, 0, STATES) + noise_variance(i, y[TOLD + i]);
+            if (variance > R(0.0)) {
+                compare(s, i, off * off / variance);
+            }
+//?
             s->x[OWN + i] = signals[i];
 //? deviations
             reset(s->root, c, i, signals[i]);

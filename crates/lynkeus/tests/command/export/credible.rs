@@ -17,7 +17,7 @@ const TRIANGULAR: &str = "family = \"triangular\"\ntheta = 4";
 fn study(observer: &str) -> String {
     format!(
         "plant = \"m.mo\"\n[sensors]\nmeasured = [\"y\"]\nnoise = {{ y = 0.02 }}\n[process_noise]\nv = 1e-3\n\
-         [observer]\n{observer}\n[estimate]\nmethod = \"rk4\"\nstep = 0.05\n\
+         [observer]\n{observer}\n[estimate]\nmethod = \"rk4\"\nstep = 0.05\nsd = true\n\
          [simulate]\nuntil = 20\noutput_step = 0.05\nseed = 7\ninputs = {{ u = \"2*sin(1.3*time)\" }}\n"
     )
 }
@@ -202,6 +202,7 @@ fn without_a_noise_there_is_no_verdict() {
     let folder = Folder::empty();
     folder.write("m.mo", PENDULUM);
     let bare = study(TRIANGULAR).replace("noise = { y = 0.02 }\n", "");
+    let bare = bare.replace("sd = true\n", "");
     folder.write("s.toml", &bare);
     exported(&folder, "c");
     let header = folder.read("c/p.h");
