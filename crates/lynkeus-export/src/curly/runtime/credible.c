@@ -3,9 +3,11 @@
 static void turn(STATE *s, int i)
 {
     const int before = SENSORS + i;
-    int count = s->taken[i];
 //? gate
-    count += s->kept_out[i];
+    const int count = s->taken[i] + s->kept_out[i];
+//?
+//? !gate
+    const int count = s->taken[i];
 //?
     if (count >= s->block[i]) {
         s->taken[before] = s->taken[i];
