@@ -91,6 +91,7 @@ mod adaptive;
 mod batch;
 mod blueprint;
 mod closed_loop;
+pub mod credible;
 mod divergence;
 mod driven;
 mod dynamics;

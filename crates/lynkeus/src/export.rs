@@ -6,7 +6,7 @@ use lynkeus_export::curly::fmu::Version;
 use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust, structured};
 use lynkeus_model::Variable;
 use lynkeus_observers::Design;
-use lynkeus_run::Blueprint;
+use lynkeus_run::{Blueprint, Level};
 
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
@@ -217,6 +217,10 @@ pub(crate) fn printed<T>(
         })
         .collect();
     let study = prepared.study();
+    let declared = prepared.declared();
+    let measured = design.observer.measured.iter();
+    let noises = measured.map(|signal| declared.noise.of(&signal.name).map(|n| Level::from(*n)));
+    let noises: Vec<Option<Level>> = noises.collect();
     let device = Device {
         name: &prepared.plant().name,
         blueprint: made,
@@ -226,6 +230,7 @@ pub(crate) fn printed<T>(
         monitors: told.monitors,
         deviations: study.estimate.deviations,
         tunables: &told.tunables,
+        noises: &noises,
         words: &told.words,
         about,
     };

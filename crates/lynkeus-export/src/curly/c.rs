@@ -6,7 +6,7 @@ use super::language::{self, Language};
 use super::machine::{Field, Kind, Machine};
 use super::tables::number;
 use super::template::{chosen, exchanged};
-use super::words::{self, PATIENCE, READINGS};
+use super::words::{self, CREDIBLE, PATIENCE, READINGS};
 use crate::Refusal;
 use crate::hidden::is_hidden;
 
@@ -226,14 +226,38 @@ impl Frame<'_> {
              /* Goes to time t and takes the signals there; 0, or one of the codes above, and then the\n\
              \x20  state and the estimates are what they were. The first sample only updates the start. */\n\
              int {name}_push({name}_state *s, double t, const {real} *signals, {real} *estimates);\n\n\
-             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+             {verdict}#ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
             title = title(&format!("{name}.h"), self.device.about),
             signal_list = listed(signals),
             signal_count = signals.len(),
             tunables = self.tunables(),
+            verdict = self.verdict_declared(),
             estimate_list = listed(estimates),
             estimate_count = estimates.len(),
         )
+    }
+
+    /// The verdict in the header, where there is one.
+    fn verdict_declared(&self) -> String {
+        let name = &self.prefix;
+        match self.machine.is_judged() {
+            true => format!(
+                "/* 1: {CREDIBLE}; 0: the estimate is not credible. */\n\
+                 int {name}_credible(const {name}_state *s);\n\n"
+            ),
+            false => "/* Whether the estimate is credible cannot be said: no noise is declared for any sensor. */\n\n".to_owned(),
+        }
+    }
+
+    /// The verdict in the source.
+    fn verdict(&self) -> String {
+        let name = &self.prefix;
+        match self.machine.is_judged() {
+            true => format!(
+                "\nint {name}_credible(const {name}_state *s)\n{{\n    return is_credible(s);\n}}\n"
+            ),
+            false => String::new(),
+        }
     }
 
     /// What holds in pieces of the runtime.
@@ -318,7 +342,8 @@ impl Frame<'_> {
              \x20   const int code = take(s, t, signals, estimates);\n\
              \x20   if (code != 0) {{\n        *s = before;\n    }}\n\
              \x20   if (code == {capitals}_DIVERGED || code == {capitals}_NOT_FINITE) {{\n        s->refused++;\n\
-             \x20       if (s->refused >= {PATIENCE}) {{\n            {name}_init(s);\n{keeps}        }}\n    }}\n    return code;\n}}\n",
+             \x20       if (s->refused >= {PATIENCE}) {{\n            {name}_init(s);\n{keeps}        }}\n    }}\n    return code;\n}}\n{verdict}",
+            verdict = self.verdict(),
             keeps = match self.device.tunables {
                 [] => String::new(),
                 _ => format!(

@@ -1,6 +1,6 @@
 //! What an estimator for another machine is.
 
-use lynkeus_run::Blueprint;
+use lynkeus_run::{Blueprint, Level};
 
 use super::function::Entry;
 
@@ -25,6 +25,9 @@ pub struct Device<'a> {
     /// [`tuned`](lynkeus_run::SampledObserver::tuned), in its order; of a filter none, or a factor on
     /// its process noise
     pub tunables: &'a [Tunable],
+    /// of each measured output the noise that is declared, by which an observer that is no filter is
+    /// judged; a filter has its own
+    pub noises: &'a [Option<Level>],
     /// units and meanings of the model's names, where there are any
     pub words: &'a [Entry],
     /// lines for people: the study, the design, the certificate

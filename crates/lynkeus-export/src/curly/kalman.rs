@@ -1,5 +1,6 @@
 //! Kalman filters.
 
+use lynkeus_run::credible::By;
 use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
 use lynkeus_run::{BetweenSamples, Blueprint, Level};
 
@@ -69,6 +70,8 @@ impl Machine {
         ];
         let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
         self.measure(model, &arguments, &settings.kind)?;
+        let sensors = model.sensors().len();
+        self.credible(sensors, By::Filter, settings.gate.is_some());
         self.judge(model, settings, &holds);
         let free = Linear {
             flow: model.flow(),

@@ -7,6 +7,7 @@
 //! of an observer, are drafted likewise and become an [`Exchange`].
 
 pub mod c;
+mod credible;
 mod description;
 mod device;
 mod dialect;

@@ -1,6 +1,7 @@
 //! Observers whose sensors report when they do.
 
-use lynkeus_run::{ErrorModel, SampledObserver};
+use lynkeus_run::credible::By;
+use lynkeus_run::{ErrorModel, Level, SampledObserver};
 
 use super::device::Device;
 use super::function::{Arguments, Target, draft};
@@ -58,22 +59,49 @@ impl Machine {
             &[Target::all("y", system.outputs().len())],
         )?;
         self.add(&outputs);
-        let (field, holds): (&str, &[&str]) = match &observer.errors {
+        let mut holds = vec![];
+        let field = match &observer.errors {
             None => {
                 self.flow(system, &arguments)?;
                 self.integrate(n);
-                ("flow", &[])
+                "flow"
             }
             Some(errors) => {
                 self.spread(errors, &arguments)?;
-                ("linearised", &["deviations"])
+                holds.push("deviations");
+                "linearised"
             }
         };
+        let is_declared = device.noises.iter().any(Option::is_some);
+        match observer.errors.as_ref().map(ErrorModel::noise) {
+            // a density that is only supposed excuses nothing
+            Some(noise) if is_declared && noise.declared == noise.process => {
+                self.credible(m, By::ErrorSystem, false);
+                holds.push("weighed");
+            }
+            errors if is_declared => {
+                self.followed(device.noises, errors.is_some());
+                holds.push("judged");
+            }
+            _ => {}
+        }
         self.tuned(device, observer.tuned.as_ref())?;
         let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
-        let text = chosen(SAMPLED, holds).replace("FIELD", field);
+        let text = chosen(SAMPLED, &holds).replace("FIELD", field);
         self.add(&text.replace("FOLLOWS", follows));
         Ok(())
+    }
+
+    /// The verdict by the noise of the sensors, those without one aside.
+    fn followed(&mut self, noises: &[Option<Level>], has_tables: bool) {
+        let expected = vec![0.0; noises.len()];
+        let about = "what was expected of each sensor at the last sample";
+        self.field("expected", Kind::Real, about, expected);
+        if !has_tables {
+            let unknown = Level::Absolute(f64::INFINITY);
+            self.noises(noises.iter().map(|noise| noise.unwrap_or(unknown)));
+        }
+        self.credible(noises.len(), By::Noise, false);
     }
 
     /// The covariance of an observer's error.

@@ -48,6 +48,10 @@ pub(super) const READINGS: [(&str, &str); 4] = [
     ),
 ];
 
+/// What a verdict of 1, or true, says.
+pub(super) const CREDIBLE: &str =
+    "the last sample had an estimate, and the latest readings of no sensor contradict it";
+
 /// The number of a word of the draft, where it is one of these.
 pub(super) fn number(word: &str) -> Option<usize> {
     let is_it = |own: &(&str, &str)| own.0 == word;

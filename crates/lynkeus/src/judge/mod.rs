@@ -12,6 +12,7 @@ mod sensors;
 mod trace;
 
 use lynkeus_model::Variable;
+pub(crate) use lynkeus_run::credible::By;
 use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
@@ -20,7 +21,7 @@ pub(crate) use innovations::innovations;
 #[cfg_attr(not(feature = "tune"), allow(unused_imports))]
 pub(crate) use ranges::{RUN_AWAY, Screen};
 pub(crate) use residuals::residuals;
-pub(crate) use sensors::{By, Judged};
+pub(crate) use sensors::Judged;
 pub(crate) use trace::Trace;
 
 use crate::outside::percent;

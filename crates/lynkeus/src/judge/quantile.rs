@@ -1,7 +1,7 @@
 //! Exact quantiles of what right readings do.
 
-/// A right run exceeds each of the quantiles here with this probability.
-pub(super) const CHANCE: f64 = 1e-6;
+use lynkeus_run::credible::CHANCE;
+
 /// The normal deviate that is exceeded with that probability.
 const DEVIATE: f64 = 4.753_424;
 /// So many degrees of freedom are as good as infinitely many.

@@ -1,9 +1,10 @@
 //! Readings beside what was expected of them.
 
+use lynkeus_run::credible::{By, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::SensorHealth;
 
 use super::quantile::{largest_sum, smallest_sum};
-use super::trace::{CLIP, Stretch, Trace};
+use super::trace::{Stretch, Trace};
 use super::{Doubt, Kind, Level, times};
 use crate::outside::percent;
 use crate::words::instant;
@@ -14,8 +15,6 @@ const SUSPICIOUS: f64 = 2.0 / 3.0;
 const SHARE: f64 = 0.2;
 /// The gate's work is no contradiction up to this share.
 const REJECTED: f64 = 1.0 / 3.0;
-/// Readings on which a mean over the last half rests that no single reading spoils.
-const ENOUGH: usize = 20;
 /// A reading so many deviations off moves the estimate to where nobody expected it.
 const JUMP: f64 = 10.0;
 /// Innovations smaller than this share of what is declared contradict the noise.
@@ -38,39 +37,6 @@ pub(crate) struct Judged<'e> {
     pub is_declared: bool,
 }
 
-/// What says how large an innovation may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum By {
-    /// a filter's covariance
-    Filter,
-    /// an observer's linearised error system
-    ErrorSystem,
-    /// the same driven by the noises alone, from an exact start
-    Settled,
-    /// the sensor's noise alone
-    Noise,
-}
-
-impl By {
-    /// Innovations so many times larger than declared contradict the model.
-    fn limit(self) -> f64 {
-        match self {
-            Self::Filter => 3.0,
-            // linear, and with what held readings lag behind
-            Self::ErrorSystem => 2.5,
-            // it leaves out an estimate that still converges
-            Self::Settled => 5.0,
-            // and everything that the model does not know
-            Self::Noise => 10.0,
-        }
-    }
-
-    /// An observer with a theorem converges: its start is no contradiction.
-    fn converges(self) -> bool {
-        self != Self::Filter
-    }
-}
-
 impl Stretch {
     /// The ratio of its innovations to what is declared.
     fn ratio(&self) -> f64 {
@@ -82,7 +48,7 @@ impl Stretch {
     /// nothing of the others.
     fn exceeds(&self, limit: f64) -> bool {
         let (count, squares) = match self.taken {
-            0..5 => (self.taken, self.clipped),
+            0..FEW => (self.taken, self.clipped),
             taken => (taken - 1, self.clipped - self.largest.min(CLIP * CLIP)),
         };
         // the quantile last: it takes the longest

@@ -1,12 +1,10 @@
 //! Innovations over a run, in so little room that no run is too long.
 
+use lynkeus_run::credible::CLIP;
 use lynkeus_run::filter::Reading;
 
 /// Stretches that are kept; half as many at least where there are readings enough.
 const MOST: usize = 32;
-
-/// A reading that is farther off counts no more than one so many deviations off: glitches are few.
-pub(super) const CLIP: f64 = 30.0;
 
 /// A stretch of readings beside what was expected of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,7 @@
 //! `export`: what compilers make of it gives what `estimate` gives.
 
 mod corners;
+mod credible;
 mod glitch;
 mod hidden;
 pub(super) mod javascript;

@@ -29,12 +29,13 @@ const OWN: [(&str, &str); 3] = [
 
 /// A module: `signals` and `estimates` (names), `tunables` (names of the entries of `tuning` in the
 /// state, where there are any), `init()`, which gives a state, and `push(state, t, signals, estimates)`,
-/// which writes the estimates and gives 0 or a code as the C export has it.
+/// which writes the estimates and gives 0 or a code as the C export has it; where readings are judged
+/// `credible(state)`, true or false.
 ///
 /// # Errors
 /// What cannot run there, or cannot be written.
 pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
-    text(device, "export ")
+    text(device, &Machine::of(device)?, "export ")
 }
 
 /// An expression whose value is an object with what a [`module`] exports, so that several live in
@@ -43,21 +44,26 @@ pub fn module(device: &Device<'_>) -> Result<String, Refusal> {
 /// # Errors
 /// As [`module`].
 pub fn expression(device: &Device<'_>) -> Result<String, Refusal> {
-    let text = text(device, "")?;
+    let machine = Machine::of(device)?;
+    let text = text(device, &machine, "")?;
     // strings have no <, and in code and comments a blank after one changes nothing
     let text = text.replace("</", "< /").replace("<!", "< !");
     let tunables = match device.tunables {
         [] => "",
         _ => "tunables, ",
     };
+    let verdict = if machine.is_judged() {
+        ", credible"
+    } else {
+        ""
+    };
     Ok(format!(
-        "(function () {{\n\"use strict\";\n{text}return {{ signals, estimates, {tunables}init, push }};\n}})()"
+        "(function () {{\n\"use strict\";\n{text}return {{ signals, estimates, {tunables}init, push{verdict} }};\n}})()"
     ))
 }
 
 /// What a module exports, each with the word for it before.
-fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
-    let machine = Machine::of(device)?;
+fn text(device: &Device<'_>, machine: &Machine, export: &str) -> Result<String, Refusal> {
     let about: String = device
         .about
         .iter()
@@ -83,8 +89,12 @@ fn text(device: &Device<'_>, export: &str) -> Result<String, Refusal> {
         }
     };
     let source = printed(&format!("{}\n{}", machine.tables, machine.source), word)?;
+    let verdict = match machine.is_judged() {
+        true => format!("\n{export}{}", VERDICT.replace("CREDIBLE", words::CREDIBLE)),
+        false => String::new(),
+    };
     Ok(format!(
-        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n{tunables}\n{}\n{}{}\n{export}{}\n{export}{}",
+        "{about}\n{export}const signals = {};\n{export}const estimates = {};\n{tunables}\n{}\n{}{}\n{export}{}\n{export}{}{verdict}",
         names(device.signals.iter()),
         names(device.estimates.iter()),
         sizes.collect::<String>(),
@@ -131,6 +141,13 @@ const PUSH: &str = "function push(s, t, signals, estimates)
         }
     }
     return code;
+}
+";
+
+const VERDICT: &str = "function credible(s)
+{
+    // true: CREDIBLE
+    return Boolean(is_credible(s));
 }
 ";
 

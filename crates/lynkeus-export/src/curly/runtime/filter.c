@@ -60,10 +60,11 @@ static int update(STATE *s, double t, const real *signals)
 }
 
 /* The estimates, where all of them are numbers and none has run away. */
-static int report(STATE *s, double t, real *estimates)
+static int report(STATE *s, double t, const real *signals, real *estimates)
 {
     real deviations[STATES];
     (void)t;
+    (void)signals;
     for (int i = 0; i < STATES; i++) {
         if (!isfinite(s->x[i]) || !(fabs(s->x[i]) <= R(1e12) * s->scale)) {
             return DIVERGED;

@@ -32,11 +32,19 @@ static truth judge(STATE *s, int i, real reading, real predicted, real spread, r
     if (s->became[i] == REJECTED) {
         s->rejected[i]++;
         s->moved[i] += reading != s->last[i] ? 1 : 0;
+//? gate
+        turn(s, i);
+        s->kept_out[i]++;
+//?
     } else {
         s->moved[i] = 0;
     }
     if (s->became[i] == TAKEN) {
         s->rejected[i] = 0;
+        if (variance > R(0.0)) {
+            const real off = SHOWN_READING - predicted;
+            compare(s, i, off * off / variance);
+        }
     }
     s->last[i] = reading;
 //? relative

@@ -38,7 +38,7 @@ static int take(STATE *s, double t, const real *signals, real *estimates)
         code = update(s, t, signals);
     }
     if (code == 0) {
-        code = report(s, t, estimates);
+        code = report(s, t, signals, estimates);
     }
     s->time = t;
     s->started = 1;

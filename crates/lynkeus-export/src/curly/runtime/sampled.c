@@ -54,8 +54,21 @@ static int update(STATE *s, double t, const real *signals)
     }
     reading_slopes((real)t, s->x, s->inputs, c);
 //?
+//? weighed
+    real y[OUTPUTS];
+    real spread[STATES];
+    outputs((real)t, s->x, s->inputs, y);
+//?
     for (int i = 0; i < SENSORS; i++) {
         if (isfinite(signals[i])) {
+//? weighed
+            const real off = signals[i] - y[TOLD + i];
+            project(s->root, c, i, spread);
+            const real variance = dot(spread, 0, spread, 0, STATES) + noise_variance(i, y[TOLD + i]);
+            if (variance > R(0.0)) {
+                compare(s, i, off * off / variance);
+            }
+//?
             s->x[OWN + i] = signals[i];
 //? deviations
             reset(s->root, c, i, signals[i]);
@@ -69,8 +82,25 @@ static int update(STATE *s, double t, const real *signals)
     return 0;
 }
 
+//? judged
+/* Readings beside what is expected of them, which those that are held lag behind by as much as it has moved. */
+static void follow(STATE *s, const real *signals, const real *y)
+{
+    for (int i = 0; i < SENSORS; i++) {
+        const real expected = y[TOLD + i];
+        const real lag = s->started ? expected - s->expected[i] : R(0.0);
+        const real variance = noise_variance(i, expected) + lag * lag;
+        const real off = signals[i] - expected;
+        s->expected[i] = expected;
+        if (isfinite(off) && variance > R(0.0)) {
+            compare(s, i, off * off / variance);
+        }
+    }
+}
+
+//?
 /* The estimates, where all of them are numbers and none has run away. */
-static int report(STATE *s, double t, real *estimates)
+static int report(STATE *s, double t, const real *signals, real *estimates)
 {
     real y[OUTPUTS];
 //? deviations
@@ -115,5 +145,11 @@ static int report(STATE *s, double t, real *estimates)
     for (int i = ESTIMATED; i < TOLD; i++) {
         estimates[REPORTED - TOLD + i] = y[i];
     }
+//? judged
+    follow(s, signals, y);
+//?
+//? !judged
+    (void)signals;
+//?
     return 0;
 }

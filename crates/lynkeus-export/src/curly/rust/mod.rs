@@ -10,7 +10,7 @@ use super::device::Device;
 use super::function::Entry;
 use super::machine::{Field, Kind, Machine};
 use super::template::mentions;
-use super::words::{self, PATIENCE, READINGS};
+use super::words::{self, CREDIBLE, PATIENCE, READINGS};
 use crate::Refusal;
 use crate::hidden::seen;
 
@@ -123,7 +123,7 @@ impl Frame<'_> {
              \x20   /// Where an absurd reading that was taken is behind it, the next sample is the first.\n\
              \x20   fn give_up(&mut self, refused: Refused) {{\n\
              \x20       if matches!(refused, Refused::Diverged | Refused::NotFinite) {{\n            self.refused += 1;\n\
-             \x20           if self.refused >= {PATIENCE} {{\n{restart}            }}\n        }}\n    }}\n}}\n\n\
+             \x20           if self.refused >= {PATIENCE} {{\n{restart}            }}\n        }}\n    }}\n{verdict}}}\n\n\
              impl Default for State {{\n    fn default() -> Self {{\n        Self::new()\n    }}\n}}\n\n\
              // places are counted up to a million\nconst _: () = assert!(usize::BITS >= 32);\n\n\
              {own}{body}",
@@ -135,6 +135,12 @@ impl Frame<'_> {
             readings = self.readings(),
             state = self.state(),
             new = self.new_state(),
+            verdict = match self.machine.is_judged() {
+                true => format!(
+                    "\n    /// Whether {CREDIBLE}.\n    #[must_use]\n    pub fn is_credible(&self) -> bool {{\n        is_credible(self)\n    }}\n"
+                ),
+                false => String::new(),
+            },
             restart = match self.device.tunables {
                 [] => "                *self = Self::new();\n",
                 _ =>

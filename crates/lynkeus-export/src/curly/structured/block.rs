@@ -6,7 +6,7 @@ use super::print::{Made, Printer, comment, section};
 use super::{Frame, about};
 use crate::curly::function::Entry;
 use crate::curly::syntax::Type;
-use crate::curly::words::{self, PATIENCE, READINGS, codes};
+use crate::curly::words::{self, CREDIBLE, PATIENCE, READINGS, codes};
 
 /// The block, with its variables named.
 pub(super) struct Block<'a> {
@@ -17,6 +17,7 @@ pub(super) struct Block<'a> {
     estimates: Vec<String>,
     /// what became of readings
     readings: Vec<String>,
+    verdict: Option<Verdict>,
     /// types of the arrays that are handed over
     signals_type: String,
     estimates_type: String,
@@ -25,6 +26,13 @@ pub(super) struct Block<'a> {
 struct Signal {
     name: String,
     is_valid: String,
+}
+
+/// Whether the estimate is credible.
+struct Verdict {
+    /// of the variable
+    name: String,
+    function: Made,
 }
 
 /// Names that are not the model's.
@@ -54,7 +62,7 @@ pub(super) fn program(model: &str) -> String {
 const MISSING: &str = "3.0E38";
 
 impl<'a> Block<'a> {
-    pub fn of(frame: &'a Frame<'a>, printer: &mut Printer<'_>) -> Self {
+    pub fn of(frame: &'a Frame<'a>, verdict: Option<Made>, printer: &mut Printer<'_>) -> Self {
         let device = frame.device;
         let mut names = printer.identifiers().and_without(&OWN);
         let signals = device.signals.iter().map(|signal| {
@@ -79,6 +87,10 @@ impl<'a> Block<'a> {
             tunables: of(&tunables),
             estimates: of(device.estimates),
             readings: of(&readings),
+            verdict: verdict.map(|function| Verdict {
+                name: names.of("credible"),
+                function,
+            }),
             signals_type: printer.array(Type::Real, device.signals.len()),
             estimates_type: printer.array(Type::Real, device.estimates.len()),
         }
@@ -138,7 +150,10 @@ impl<'a> Block<'a> {
         let readings = self.readings.iter();
         let readings = readings.map(|name| format!("{name} : DINT; (* {meanings} *)"));
         let code = "code : DINT; (* 0, or why the sample was refused *)".to_owned();
-        estimates.chain(readings).chain([code]).collect()
+        let verdict = self.verdict.iter();
+        let verdict = verdict.map(|own| format!("{} : BOOL; (* {CREDIBLE} *)", own.name));
+        let all = estimates.chain(readings).chain(verdict);
+        all.chain([code]).collect()
     }
 
     fn variables(&self) -> Vec<String> {
@@ -199,6 +214,10 @@ impl<'a> Block<'a> {
             lines.push(format!("    {name} := s.became[{place}];"));
         }
         lines.push("END_IF;".to_owned());
+        if let Some(Verdict { name, function }) = &self.verdict {
+            let given = function.parameters.join("");
+            lines.push(format!("{name} := {}({given} := s);", function.name));
+        }
         lines.push("IF code = 0 OR NOT restart THEN".to_owned());
         lines.push("    restarted := restart;".to_owned());
         lines.push("END_IF;".to_owned());

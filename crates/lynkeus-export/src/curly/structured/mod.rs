@@ -74,6 +74,13 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
         sizes: vec![device.signals.len(), device.estimates.len()],
         fields: vec![],
     })?;
+    let verdict = match machine.is_judged() {
+        true => Some(printer.instance(Instance {
+            function: "is_credible".to_owned(),
+            ..Instance::default()
+        })?),
+        false => None,
+    };
     let frame = Frame {
         device,
         machine: &machine,
@@ -81,7 +88,7 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
         prefix: &prefix,
     };
     let state = frame.state(&mut printer);
-    let block = Block::of(&frame, &mut printer);
+    let block = Block::of(&frame, verdict, &mut printer);
     let file = |name: String, text: String| File { name, text };
     let arrays = printer.arrays.iter().map(|(kind, size)| {
         let name = array_type(&prefix, kind, *size);

@@ -92,8 +92,13 @@ fn ordered(log: &str, text: &str) -> String {
     rows.collect()
 }
 
-/// The text as a program with such a main function, and what that prints.
-fn ran(path: &Path, text: &str, main: &str, arguments: &[&str]) -> (String, bool) {
+/// The export with such a main function, as the program `st_replay`.
+pub(super) fn program(folder: &Folder, main: &str) {
+    made(folder.path.path(), &exported(folder, &[]), main);
+}
+
+/// The text as a program with such a main function.
+fn made(path: &Path, text: &str, main: &str) {
     std::fs::write(path.join("st.c"), compiled(text) + main).unwrap();
     let mut gcc = Command::new("gcc");
     gcc.args(["-O0", "-std=c11", "-ffp-contract=off"]);
@@ -104,6 +109,11 @@ fn ran(path: &Path, text: &str, main: &str, arguments: &[&str]) -> (String, bool
         "{}",
         String::from_utf8_lossy(&ended.stderr)
     );
+}
+
+/// What that prints.
+fn ran(path: &Path, text: &str, main: &str, arguments: &[&str]) -> (String, bool) {
+    made(path, text, main);
     let mut program = Command::new(path.join("st_replay"));
     let ended = program.args(arguments).current_dir(path).output().unwrap();
     let told = String::from_utf8_lossy(&ended.stderr);

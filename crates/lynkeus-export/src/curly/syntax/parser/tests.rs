@@ -1,8 +1,9 @@
 use super::*;
 use crate::curly::template::{chosen, parts};
 
-const RUNTIME: [(&str, &str); 14] = [
+const RUNTIME: [(&str, &str); 15] = [
     ("along", include_str!("../../runtime/along.c")),
+    ("credible", include_str!("../../runtime/credible.c")),
     ("extended", include_str!("../../runtime/extended.c")),
     ("filter", include_str!("../../runtime/filter.c")),
     ("integrate", include_str!("../../runtime/integrate.c")),

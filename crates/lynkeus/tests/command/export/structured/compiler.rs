@@ -383,7 +383,7 @@ impl<'t> Compiler<'t> {
         let outputs = of_kind(of_kind(node, "var_output")[0], "variable_declaration");
         for output in outputs {
             let name = self.name_of(output);
-            if name != "code" && !name.ends_with("_reading") {
+            if !["code", "credible"].contains(&name.as_str()) && !name.ends_with("_reading") {
                 write!(tell, "printf(\",%.17g\", (double)it.v_{name});").unwrap();
             }
         }
