@@ -276,18 +276,17 @@ impl Raw<'_> {
             frozen: &frozen,
             replayed,
         };
-        // what is told stands beside its readings, too: a density that was guessed excuses nothing, and
-        // errors that were followed beside the run are those of held readings
-        let follows = prepared.study().estimate.follows_errors();
-        let is_family = design.observer.filter.is_none();
-        let bare = match replayed && is_family && (!follows || sight.wander_is_guessed()) {
+        // what is told stands beside its readings, too: a start may explain what an error system sees
+        // for a whole log, and a density that was guessed everything
+        let is_excused = prepared.study().estimate.follows_errors() && sight.wander_is_guessed();
+        let bare = match replayed && design.observer.filter.is_none() {
             true => judge::residuals(
                 prepared.declared(),
                 plant,
                 &time,
                 &quantities,
                 &measurements,
-                !follows,
+                !is_excused,
             ),
             false => vec![],
         };
@@ -448,7 +447,8 @@ impl Sight<'_> {
             trace,
             late: None,
             by: By::Noise,
-            is_declared: true,
+            // a reading that an estimate follows is closer to it than its noise
+            is_declared: false,
         });
         let sensors = followed.chain(bare);
         let (extended, plant) = (self.prepared.extended(), self.prepared.plant());

@@ -73,17 +73,16 @@ impl Machine {
             }
         };
         let is_declared = device.noises.iter().any(Option::is_some);
-        match observer.errors.as_ref().map(ErrorModel::noise) {
-            // a density that is only supposed excuses nothing
-            Some(noise) if is_declared && noise.declared == noise.process => {
+        match &observer.errors {
+            _ if !is_declared => {}
+            Some(_) => {
                 self.credible(m, By::ErrorSystem, false);
                 holds.push("weighed");
             }
-            errors if is_declared => {
-                self.followed(device.noises, errors.is_some());
+            None => {
+                self.followed(device.noises);
                 holds.push("judged");
             }
-            _ => {}
         }
         self.tuned(device, observer.tuned.as_ref())?;
         let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
@@ -93,14 +92,12 @@ impl Machine {
     }
 
     /// The verdict by the noise of the sensors, those without one aside.
-    fn followed(&mut self, noises: &[Option<Level>], has_tables: bool) {
+    fn followed(&mut self, noises: &[Option<Level>]) {
         let expected = vec![0.0; noises.len()];
         let about = "what was expected of each sensor at the last sample";
         self.field("expected", Kind::Real, about, expected);
-        if !has_tables {
-            let unknown = Level::Absolute(f64::INFINITY);
-            self.noises(noises.iter().map(|noise| noise.unwrap_or(unknown)));
-        }
+        let unknown = Level::Absolute(f64::INFINITY);
+        self.noises(noises.iter().map(|noise| noise.unwrap_or(unknown)));
         self.credible(noises.len(), By::Noise, false);
     }
 
