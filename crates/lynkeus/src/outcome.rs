@@ -611,7 +611,10 @@ fn show_measurements(
         let state = plant.states.iter().find(|s| s.node == output.node);
         let shown = state.and_then(|s| quantities.iter_mut().find(|q| q.name == s.name));
         match shown {
-            Some(quantity) => quantity.measured = Some(values.clone()),
+            Some(quantity) => {
+                quantity.measured = Some(values.clone());
+                quantity.sensor = (quantity.name != *name).then(|| name.clone());
+            }
             None => quantities.push(Quantity {
                 name: output.name.clone(),
                 unit: output.unit.clone(),

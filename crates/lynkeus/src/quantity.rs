@@ -15,6 +15,8 @@ pub struct Quantity {
     pub truth: Option<Series>,
     /// what the sensor reads
     pub measured: Option<Series>,
+    /// the measured output that shows it, where that has another name
+    pub sensor: Option<String>,
     /// what the observer makes of it
     pub estimate: Option<Series>,
     /// what the estimate says of a measured output that is no state

@@ -327,12 +327,16 @@ fn misread(evidence: &Evidence<'_>, quantity: &Quantity) -> Option<Doubt> {
         farthest = farthest.max(beyond);
     }
     let is_elsewhere = rows > 0 && far as f64 >= NEARLY_ALL * rows as f64;
+    let name = quantity.sensor.as_ref().unwrap_or(&quantity.name);
+    let range = match &quantity.sensor {
+        Some(_) => format!("the declared range of {}", quantity.name),
+        None => "its declared range".to_owned(),
+    };
     (2 * count > rows).then(|| Doubt {
         kind: Kind::Range,
-        name: quantity.name.clone(),
+        name: name.clone(),
         text: format!(
-            "the readings of {} are outside of its declared range in {} of the rows, by up to {} times its width: is their unit the model's?",
-            quantity.name,
+            "the readings of {name} are outside of {range} in {} of the rows, by up to {} times its width: is their unit the model's?",
             percent(count as f64 / rows as f64),
             figures(farthest, 2)
         ),

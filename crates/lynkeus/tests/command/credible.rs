@@ -115,6 +115,22 @@ fn families_are_judged_by_their_own_sensors() {
     }
 }
 
+/// A constant that grows by five noises per row: an observer that follows it lags by as much, which its
+/// error system does not explain, whether or not deviations are told.
+#[test]
+fn families_are_judged_by_their_error_system() {
+    for sd in ["sd = true", "sd = false", "between_samples = \"linear\""] {
+        let study = format!(
+            "[observer]\nfamily = \"triangular\"\ntheta = 1\ninitial = {{ x = 1 }}\n[estimate]\n{sd}\n"
+        );
+        let y = |slope: f64| (0..80).map(move |k| 1.0 + slope * f64::from(k) + noise(k as usize));
+        let (_, wrong) = estimated(CONSTANT, &study, y(0.05));
+        assert_eq!(levels(&wrong, "refusal"), ["innovations y"], "{sd}");
+        let (_, right) = estimated(CONSTANT, &study, y(0.0));
+        assert_eq!(right.code, 0, "{sd}: {}", right.err);
+    }
+}
+
 /// A noise that is declared a hundred times too large is told, and refuses nothing.
 #[test]
 fn too_small_is_a_warning() {
@@ -213,7 +229,7 @@ fn readings_in_another_range_are_refused() {
     let ranged = CONSTANT.replace("start = 1", "start = 1, min = 0, max = 100");
     let (_, ended) = estimated(&ranged, &study, (0..40).map(|k| 300.0 + noise(k)));
     let refusals = levels(&ended, "refusal");
-    assert!(refusals.contains(&"range x".to_owned()), "{refusals:?}");
+    assert!(refusals.contains(&"range y".to_owned()), "{refusals:?}");
 }
 
 /// Readings may take an observer to where no number of steps is enough: that is an answer, and the rows before are kept.
