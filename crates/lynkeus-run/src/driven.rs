@@ -36,10 +36,11 @@ impl Driven {
         self.arrive();
     }
 
-    /// The sample at the end of the interval to come.
+    /// The sample at the end of the interval to come, of the first signals; others stay.
     pub(crate) fn aim(&mut self, from: f64, to: f64, signals: &[f64]) {
         (self.from, self.to) = (from, to);
-        self.next.copy_from_slice(signals);
+        self.next.copy_from_slice(&self.last);
+        self.next[..signals.len()].copy_from_slice(signals);
     }
 
     /// The signals at t.

@@ -123,7 +123,10 @@ impl Estimator {
         let mut systems = vec![system.clone()];
         systems.extend(observer.errors.iter().map(|e| e.flow().clone()));
         let noises = observer.errors.as_ref().map(|e| e.noises());
-        let mut settings = format!("{method:?} {} {noises:?}", observer.predict);
+        let mut settings = format!(
+            "{method:?} {} {:?} {noises:?}",
+            observer.predict, observer.inputs
+        );
         if let Some(tuned) = &observer.tuned {
             systems.push(tuned.system.clone());
             settings += &format!(" {:?}", tuned.values);

@@ -24,6 +24,8 @@ pub struct SampledObserver {
     pub sensors: Vec<String>,
     /// w follows the model also after a reading, not only where one is missing
     pub predict: bool,
+    /// what known inputs do between samples
+    pub inputs: BetweenSamples,
     /// how errors spread, where standard deviations are asked for
     pub errors: Option<ErrorModel>,
     /// numbers of the equations that may be changed while it runs elsewhere; here they stay
@@ -76,6 +78,7 @@ impl Sampled {
             system,
             sensors,
             predict,
+            inputs,
             errors,
             tuned,
         } = observer;
@@ -96,10 +99,12 @@ impl Sampled {
         }
         let mut signals = vec![0.0; system.signals().len().saturating_sub(tuned.len())];
         signals.extend(tuned);
-        let spread = errors.as_ref().map(|model| Spread::new(model, method));
+        let spread = errors
+            .as_ref()
+            .map(|model| Spread::new(model, *inputs, method));
         let judged = errors.as_ref().filter(|model| model.expects());
         Ok(Self {
-            driven: Driven::new(system, BetweenSamples::Hold),
+            driven: Driven::new(system, *inputs),
             integrator: Integrator::new(method, system.states().len())?,
             x: system.start().to_vec(),
             outputs: vec![0.0; system.outputs().len()],
@@ -180,6 +185,10 @@ impl Runner for Sampled {
     }
 
     fn advance(&mut self, from: f64, sample: &Sample<'_>) -> Result<(), Error> {
+        self.driven.aim(from, sample.t, sample.inputs);
+        if let Some(spread) = &mut self.spread {
+            spread.aim(from, sample.t, sample.inputs);
+        }
         let done = match &mut self.spread {
             Some(spread) => spread.advance(from, sample.t, &mut self.x),
             None => self
@@ -298,6 +307,7 @@ mod tests {
             system,
             sensors: vec!["y".to_string()],
             predict,
+            inputs: BetweenSamples::Hold,
             errors: None,
             tuned: None,
         }

@@ -348,11 +348,8 @@ impl Persist for Spread {
 }
 
 impl Spread {
-    pub fn new(model: &ErrorModel, method: Method) -> Result<Self, Error> {
-        let run = EstimatorSettings {
-            between: BetweenSamples::Hold,
-            method,
-        };
+    pub fn new(model: &ErrorModel, between: BetweenSamples, method: Method) -> Result<Self, Error> {
+        let run = EstimatorSettings { between, method };
         Ok(Self {
             engine: Extended::new(&model.flow, &model.flow_entries, &model.process_noise, run)?,
             belief: Belief {
@@ -377,6 +374,11 @@ impl Spread {
     /// The signals from here on.
     pub fn start(&mut self, signals: &[f64]) {
         self.engine.driven.start(signals);
+    }
+
+    /// The known inputs at the end of the interval to come.
+    pub fn aim(&mut self, from: f64, to: f64, inputs: &[f64]) {
+        self.engine.driven.aim(from, to, inputs);
     }
 
     /// State and covariance to a time.

@@ -49,6 +49,7 @@ fn sampled() -> Estimator {
         system: System::new(&g, time.node(), &states, &signals, &derivatives, &outputs).unwrap(),
         sensors: vec!["y".to_string()],
         predict: true,
+        inputs: BetweenSamples::Hold,
         errors: None,
         tuned: None,
     };

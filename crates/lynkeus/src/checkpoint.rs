@@ -31,6 +31,8 @@ pub struct Checkpoint {
     rows: usize,
     resumed: usize,
     told: Instant,
+    /// that of a run beside the first
+    beside: Option<Box<Checkpoint>>,
 }
 
 impl Checkpoint {
@@ -42,7 +44,15 @@ impl Checkpoint {
             rows: 0,
             resumed: 0,
             told: Instant::now(),
+            beside: None,
         }
+    }
+
+    /// That of a run which judges this one, in a file of its own.
+    pub(crate) fn beside(&mut self) -> &mut Self {
+        let mut path = self.path.clone().into_os_string();
+        path.push(".judged");
+        self.beside.get_or_insert_with(|| Box::new(Self::new(path)))
     }
 
     /// After how many rows the replay went on; 0 where it began anew.
@@ -55,6 +65,9 @@ impl Checkpoint {
     /// # Errors
     /// The file cannot be removed.
     pub fn remove(self) -> Result<(), Error> {
+        if let Some(beside) = self.beside {
+            beside.remove()?;
+        }
         match self.file {
             None => Ok(()),
             Some(_) => std::fs::remove_file(&self.path).map_err(|e| {

@@ -97,15 +97,19 @@ fn watched(
     let is_judged_beside = is_judged_beside(study, &design);
     let share = if is_judged_beside { 0.5 } else { 1.0 };
     let mut told = within(&study.budget, watch.watch);
+    let mut checkpoint = watch.checkpoint;
     let own = &mut Watch {
         watch: &mut |done| told(share * done),
-        checkpoint: watch.checkpoint,
+        checkpoint: checkpoint.as_deref_mut(),
     };
     let mut course = course_of(prepared, &design, samples, run, own)?;
     let rows = course.estimates.first().map_or(0, Series::len);
     if is_judged_beside && course.ended.is_none() {
-        let beside = &mut |done| told(share * (1.0 + done));
-        sampled::judge(prepared, &design, samples, run.method, beside, &mut course)?;
+        let beside = &mut Watch {
+            watch: &mut |done| told(share * (1.0 + done)),
+            checkpoint: checkpoint.map(Checkpoint::beside),
+        };
+        sampled::judge(prepared, &design, samples, run, beside, &mut course)?;
     }
     settle(
         &mut course,

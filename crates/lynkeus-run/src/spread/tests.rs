@@ -81,6 +81,7 @@ impl Plant {
             system: system.unwrap(),
             sensors: vec!["y".to_owned()],
             predict: self.predict,
+            inputs: BetweenSamples::Hold,
             errors: Some(ErrorModel::new(equations, noise).unwrap()),
             tuned: None,
         }

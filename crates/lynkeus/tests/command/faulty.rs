@@ -249,10 +249,11 @@ const FAULTS: [Fault; 11] = [
 ];
 
 /// Observers and faults that they cannot cope with, and say so: one with a theorem has no gate and follows every
-/// outlier; a sensor whose `limits` nobody declares hangs at 0.8.
-const NOT_CREDIBLE: [(&str, &str, &str); 3] = [
+/// outlier, and a sensor that hangs; one whose `limits` nobody declares hangs at 0.8.
+const NOT_CREDIBLE: [(&str, &str, &str); 4] = [
+    ("triangular", "frozen for 2 s", "the innovations of y"),
     ("triangular", "5 % outliers of ±3", "the innovations of y"),
-    ("triangular", "clipped at 0.8", "y hangs in"),
+    ("triangular", "clipped at 0.8", "the innovations of y"),
     ("ekf", "clipped at 0.8", "y hangs in"),
 ];
 

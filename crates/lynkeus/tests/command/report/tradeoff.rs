@@ -235,8 +235,9 @@ fn a_disturbance_counts_in_the_bound_of_a_filter() {
         assert_eq!(seen, 11);
     }
     folder.change("study.toml", "disturbance = { u", "disturbance = { v");
-    let page = page(&folder, &["study.toml"]);
-    assert!(page.contains("no input named &quot;v&quot;"), "{page}");
+    let ended = folder.run(&["report", "study.toml", "-o", "r.html"]);
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    assert!(ended.err.contains("no input named \"v\""), "{}", ended.err);
 }
 
 #[test]

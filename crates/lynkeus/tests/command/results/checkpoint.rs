@@ -8,6 +8,7 @@ use super::refused;
 use crate::Folder;
 
 const CHECKPOINT: &str = "run.checkpoint";
+const JUDGED: &str = "run.checkpoint.judged";
 const ARGUMENTS: [&str; 7] = [
     "estimate",
     "study.toml",
@@ -80,9 +81,12 @@ fn start(folder: &Folder) -> Child {
         .unwrap()
 }
 
+/// Of the checkpoint, and of that of the run which judges the first.
 fn size(folder: &Folder) -> u64 {
-    let path = folder.path.path().join(CHECKPOINT);
-    std::fs::metadata(path).map_or(0, |data| data.len())
+    let path = |name: &str| folder.path.path().join(name);
+    let files = [path(CHECKPOINT), path(JUDGED)];
+    let sizes = files.map(|file| std::fs::metadata(file).map_or(0, |data| data.len()));
+    sizes.iter().sum()
 }
 
 /// Starts a run and kills it `later` after its checkpoint has grown; false where it ended first.
@@ -121,7 +125,9 @@ fn goes_on(Slow { folder, whole, .. }: &Slow) {
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert!(ended.err.contains("went on after row"), "{}", ended.err);
     assert!(folder.read("e.csv") == *whole, "another result");
-    assert!(!folder.files().contains(&CHECKPOINT.to_owned()));
+    for file in [CHECKPOINT, JUDGED] {
+        assert!(!folder.files().contains(&file.to_owned()), "{file}");
+    }
 }
 
 const FILTER: &str =
