@@ -277,7 +277,8 @@ fn distances<'q>(
     from: usize,
 ) -> impl Iterator<Item = f64> + 'q {
     let of = |values: &'q Option<Series>| values.as_ref().map(|v| v.iter_from(from));
-    let mut known = [of(&quantity.truth), of(&quantity.measured)];
+    let known = [of(&quantity.truth), of(&quantity.measured)];
+    let mut known = known.map(|values| values.map(held));
     let estimate = of(&quantity.estimate).into_iter().flatten();
     estimate.map(move |x| {
         let known = known.iter_mut().flatten().filter_map(Iterator::next);
@@ -286,6 +287,16 @@ fn distances<'q>(
             (low.min(x), high.max(x))
         });
         (low - x).max(x - high)
+    })
+}
+
+/// Where a value is missing the plant is not far from the one before.
+fn held(values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    values.scan(f64::NAN, |last, x| {
+        if x.is_finite() {
+            *last = x;
+        }
+        Some(*last)
     })
 }
 
