@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::Extended;
 use crate::output_map::Rows;
-use crate::points::{inside, spread};
+use crate::region::{inside, spread};
 
 /// Points at which the rank of the rows is tried.
 const POINTS: usize = 5;

@@ -1,8 +1,10 @@
 //! Matrices of expressions that know their zeros.
 
-use lynkeus_expr::{Binary, Graph, Node, Unary, jacobian};
+use std::collections::{HashMap, VecDeque};
 
-use crate::polynomial;
+use lynkeus_expr::{Binary, Expr, Graph, Node, Unary, jacobian};
+
+use crate::zero::is_zero;
 
 /// A matrix of expressions, row by row; entries that vanish everywhere are left out.
 #[derive(Clone)]
@@ -24,7 +26,7 @@ impl<'g> Matrix<'g> {
     ) -> Self {
         let entry = |place: usize| {
             let node = entry(place / columns, place % columns)?;
-            (!polynomial::vanishes(graph, node)).then_some(node)
+            (!is_zero(graph, node)).then_some(node)
         };
         Self {
             rows,
@@ -178,36 +180,11 @@ impl<'g> Matrix<'g> {
         places.map(|(i, j)| self.node(i, j)).collect()
     }
 
-    /// The determinant by expansion along the rows; none where it is zero
-    /// everywhere. For small square matrices only: n! terms.
+    /// The [`determinant`]; none where it is zero everywhere. For small square matrices only.
     pub fn determinant(&self) -> Option<Node> {
-        let columns: Vec<usize> = (0..self.columns).collect();
-        let found = self.expanded(0, &columns)?;
-        (!polynomial::vanishes(self.graph, found)).then_some(found)
-    }
-
-    fn expanded(&self, row: usize, columns: &[usize]) -> Option<Node> {
-        if columns.is_empty() {
-            return Some(self.graph.constant(1.0).node());
-        }
-        let mut sum: Option<Node> = None;
-        for (place, &column) in columns.iter().enumerate() {
-            let Some(entry) = self.get(row, column) else {
-                continue;
-            };
-            let others: Vec<usize> = columns.iter().copied().filter(|&c| c != column).collect();
-            let Some(rest) = self.expanded(row + 1, &others) else {
-                continue;
-            };
-            let term = self.graph.binary(Binary::Mul, entry, rest);
-            sum = Some(match (sum, place % 2) {
-                (None, 0) => term,
-                (None, _) => self.graph.unary(Unary::Neg, term),
-                (Some(sum), 0) => self.graph.binary(Binary::Add, sum, term),
-                (Some(sum), _) => self.graph.binary(Binary::Sub, sum, term),
-            });
-        }
-        sum
+        let row = |i: usize| (0..self.columns).map(move |j| self.get(i, j)).collect();
+        let rows: Rows = (0..self.rows).map(row).collect();
+        determinant(self.graph, &rows).filter(|&found| !is_zero(self.graph, found))
     }
 }
 
@@ -220,10 +197,138 @@ impl std::fmt::Debug for Matrix<'_> {
     }
 }
 
+/// A matrix row by row; none where an entry is zero everywhere.
+pub type Rows = Vec<Vec<Option<Node>>>;
+
+/// ∂(functions)/∂(symbols)
+pub fn jacobian_rows(graph: &Graph, functions: &[Node], symbols: &[Node]) -> Rows {
+    let jacobian = jacobian::forward(graph, functions, symbols);
+    let row = |i| (0..symbols.len()).map(|j| jacobian.get(i, j)).collect();
+    (0..functions.len()).map(row).collect()
+}
+
+/// The determinant by Laplace expansion with shared minors: 2ⁿ of them at most, so
+/// only for small matrices. None where it is zero everywhere by its pattern.
+pub fn determinant(graph: &Graph, rows: &[Vec<Option<Node>>]) -> Option<Node> {
+    let mut minors: HashMap<u64, Option<Node>> = HashMap::new();
+    minor(graph, rows, 0, &mut minors)
+}
+
+/// The minor of the last rows without the columns in `used`.
+fn minor(
+    graph: &Graph,
+    rows: &[Vec<Option<Node>>],
+    used: u64,
+    minors: &mut HashMap<u64, Option<Node>>,
+) -> Option<Node> {
+    let row = used.count_ones() as usize;
+    let Some(entries) = rows.get(row) else {
+        return Some(graph.constant(1.0).node());
+    };
+    if let Some(&known) = minors.get(&used) {
+        return known;
+    }
+    let mut sum: Option<Expr<'_>> = None;
+    let free = (0..entries.len()).filter(|j| used >> j & 1 == 0);
+    for (place, j) in free.enumerate() {
+        let Some(entry) = entries[j] else { continue };
+        let Some(rest) = minor(graph, rows, used | 1 << j, minors) else {
+            continue;
+        };
+        let term = graph.expr(entry) * graph.expr(rest);
+        sum = Some(match (sum, place.is_multiple_of(2)) {
+            (None, true) => term,
+            (None, false) => -term,
+            (Some(sum), true) => sum + term,
+            (Some(sum), false) => sum - term,
+        });
+    }
+    let value = sum.map(Expr::node);
+    minors.insert(used, value);
+    value
+}
+
+/// The irreducible blocks on the diagonal of the block triangular form; none
+/// where no permutation has a diagonal without zeros.
+pub(crate) fn blocks<'g>(matrix: &Matrix<'g>) -> Option<Vec<Matrix<'g>>> {
+    let column_of = transversal(matrix)?;
+    let n = matrix.rows;
+    // i is followed by k where row i reads the column that belongs to row k
+    let follows = |i: usize, k: usize| matrix.get(i, column_of[k]).is_some();
+    let reached: Vec<Vec<bool>> = (0..n)
+        .map(|start| {
+            let mut seen = vec![false; n];
+            seen[start] = true;
+            let mut open = vec![start];
+            while let Some(i) = open.pop() {
+                for k in (0..n).filter(|&k| follows(i, k)) {
+                    if !std::mem::replace(&mut seen[k], true) {
+                        open.push(k);
+                    }
+                }
+            }
+            seen
+        })
+        .collect();
+    let together = |i: usize, k: usize| reached[i][k] && reached[k][i];
+    let heads = (0..n).filter(|&i| (0..i).all(|k| !together(i, k)));
+    let block = |head: usize| {
+        let rows: Vec<usize> = (0..n).filter(|&k| together(head, k)).collect();
+        Matrix::from_fn(matrix.graph(), (rows.len(), rows.len()), |i, j| {
+            matrix.get(rows[i], column_of[rows[j]])
+        })
+    };
+    Some(heads.map(block).collect())
+}
+
+/// A column for every row, all different, with entries that are not zero everywhere.
+fn transversal(matrix: &Matrix<'_>) -> Option<Vec<usize>> {
+    let n = matrix.rows;
+    if matrix.columns != n {
+        return None;
+    }
+    let mut row_of: Vec<Option<usize>> = vec![None; n];
+    for start in 0..n {
+        // breadth first: which row asked for the column
+        let mut asked: Vec<Option<usize>> = vec![None; n];
+        let mut open = VecDeque::from([start]);
+        let mut free = None;
+        while let Some(row) = open.pop_front() {
+            for column in (0..n).filter(|&j| matrix.get(row, j).is_some()) {
+                if asked[column].is_some() {
+                    continue;
+                }
+                asked[column] = Some(row);
+                match row_of[column] {
+                    None => free = free.or(Some(column)),
+                    Some(next) => open.push_back(next),
+                }
+            }
+        }
+        let mut column = free?;
+        // the rows along the way move on by one column
+        while let Some(row) = asked[column] {
+            let before = row_of.iter().position(|&r| r == Some(row));
+            row_of[column] = Some(row);
+            match before {
+                Some(left) if row != start => column = left,
+                _ => break,
+            }
+        }
+    }
+    let mut column_of = vec![0; n];
+    for (column, row) in row_of.into_iter().enumerate() {
+        column_of[row?] = column;
+    }
+    Some(column_of)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use lynkeus_expr::Tape;
+    use proptest::prelude::*;
+
+    use super::*;
 
     fn matrix<'g>(graph: &'g Graph, rows: &[&[f64]]) -> Matrix<'g> {
         Matrix::from_fn(graph, (rows.len(), rows[0].len()), |i, j| {
@@ -273,5 +378,19 @@ mod tests {
             Some(if i == 0 { 1.0 - x } else { x }.node())
         });
         assert_eq!(row.times(&column).get(0, 0), None);
+    }
+
+    proptest! {
+        #[test]
+        fn determinants_agree_with_elimination(a in prop::array::uniform16(-1.0..1.0f64), holes in any::<u16>()) {
+            let graph = Graph::new();
+            let hole = |k: usize| holes >> k & 1 == 1 && k.is_multiple_of(3);
+            let rows: Rows = (0..4)
+                .map(|i| (0..4).map(|j| (!hole(4 * i + j)).then(|| graph.constant(a[4 * i + j]).node())).collect())
+                .collect();
+            let matrix = nalgebra::Matrix4::from_fn(|i, j| if hole(4 * i + j) { 0.0 } else { a[4 * i + j] });
+            let found = determinant(&graph, &rows).map_or(0.0, |d| graph.constant_value(d).unwrap());
+            prop_assert!((found - matrix.determinant()).abs() < 1e-13);
+        }
     }
 }

@@ -12,10 +12,8 @@ use std::collections::HashMap;
 use lynkeus_expr::flow::{self, Flow, InputJet};
 use lynkeus_expr::{Expr, Graph, MissingInput, Node, jacobian};
 
+pub use crate::matrix::{Rows, jacobian_rows};
 use crate::{Extended, Region, Verdict, vanishes};
-
-/// A matrix row by row; none where an entry is zero everywhere.
-pub type Rows = Vec<Vec<Option<Node>>>;
 
 /// f and g of x' = f(x) + g(x)u.
 #[derive(Clone, Debug)]
@@ -138,13 +136,6 @@ fn along(
     flow::derivatives(extended.graph(), &flow, &outputs, order)
 }
 
-/// ∂(functions)/∂(symbols)
-pub fn jacobian_rows(graph: &Graph, functions: &[Node], symbols: &[Node]) -> Rows {
-    let jacobian = jacobian::forward(graph, functions, symbols);
-    let row = |i| (0..symbols.len()).map(|j| jacobian.get(i, j)).collect();
-    (0..functions.len()).map(row).collect()
-}
-
 /// L_g of a function with the gradient `row`.
 fn along_column(graph: &Graph, row: &[Option<Node>], column: &[Option<Node>]) -> Option<Node> {
     let pairs = row.iter().zip(column);
@@ -211,53 +202,11 @@ pub fn relative_degree(
     })
 }
 
-/// The determinant by Laplace expansion with shared minors: 2ⁿ of them at most, so
-/// only for small matrices. None where it is zero everywhere by its pattern.
-pub fn determinant(graph: &Graph, rows: &[Vec<Option<Node>>]) -> Option<Node> {
-    let mut minors: HashMap<u64, Option<Node>> = HashMap::new();
-    minor(graph, rows, 0, &mut minors)
-}
-
-/// The minor of the last rows without the columns in `used`.
-fn minor(
-    graph: &Graph,
-    rows: &[Vec<Option<Node>>],
-    used: u64,
-    minors: &mut HashMap<u64, Option<Node>>,
-) -> Option<Node> {
-    let row = used.count_ones() as usize;
-    let Some(entries) = rows.get(row) else {
-        return Some(graph.constant(1.0).node());
-    };
-    if let Some(&known) = minors.get(&used) {
-        return known;
-    }
-    let mut sum: Option<Expr<'_>> = None;
-    let free = (0..entries.len()).filter(|j| used >> j & 1 == 0);
-    for (place, j) in free.enumerate() {
-        let Some(entry) = entries[j] else { continue };
-        let Some(rest) = minor(graph, rows, used | 1 << j, minors) else {
-            continue;
-        };
-        let term = graph.expr(entry) * graph.expr(rest);
-        sum = Some(match (sum, place.is_multiple_of(2)) {
-            (None, true) => term,
-            (None, false) => -term,
-            (Some(sum), true) => sum + term,
-            (Some(sum), false) => sum - term,
-        });
-    }
-    let value = sum.map(Expr::node);
-    minors.insert(used, value);
-    value
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Sensors;
     use lynkeus_model::{LoadOptions, Plant};
-    use proptest::prelude::*;
 
     #[test]
     fn the_first_equation_that_is_not_affine_is_named() {
@@ -270,19 +219,5 @@ mod tests {
             why.contains("equation of b is not affine in the input u"),
             "{why}"
         );
-    }
-
-    proptest! {
-        #[test]
-        fn determinants_agree_with_elimination(a in prop::array::uniform16(-1.0..1.0f64), holes in any::<u16>()) {
-            let graph = Graph::new();
-            let hole = |k: usize| holes >> k & 1 == 1 && k.is_multiple_of(3);
-            let rows: Rows = (0..4)
-                .map(|i| (0..4).map(|j| (!hole(4 * i + j)).then(|| graph.constant(a[4 * i + j]).node())).collect())
-                .collect();
-            let matrix = nalgebra::Matrix4::from_fn(|i, j| if hole(4 * i + j) { 0.0 } else { a[4 * i + j] });
-            let found = determinant(&graph, &rows).map_or(0.0, |d| graph.constant_value(d).unwrap());
-            prop_assert!((found - matrix.determinant()).abs() < 1e-13);
-        }
     }
 }

@@ -1,11 +1,13 @@
 //! The range of an expression over a box, by interval branch and bound.
 
-mod search;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
-use lynkeus_expr::{Graph, Interval, MissingInput, Node};
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
-use crate::{Dimension, Place, Point, Region, Regularity};
-use search::{End, Search};
+use crate::region::{Cell, Question, highest_corner, lowest_corner};
+use crate::{Coordinate, Place, Point, Region, Regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -166,39 +168,6 @@ fn has_values(
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Glance(Question);
 
-/// What a search on a region depends on; the graph keeps the answers.
-#[derive(Clone, PartialEq, Eq, Hash)]
-pub(crate) struct Question {
-    node: Node,
-    sides: Vec<Side>,
-    budget: usize,
-}
-
-#[derive(Clone, PartialEq, Eq, Hash)]
-struct Side {
-    name: String,
-    symbol: Node,
-    /// bits of min and max
-    ends: [u64; 2],
-    integer: bool,
-}
-
-impl Question {
-    pub fn new(node: Node, region: &Region, budget: usize) -> Self {
-        let side = |side: &Dimension| Side {
-            name: side.name.clone(),
-            symbol: side.symbol,
-            ends: [side.min, side.max].map(f64::to_bits),
-            integer: side.integer,
-        };
-        Self {
-            node,
-            sides: region.dimensions.iter().map(side).collect(),
-            budget,
-        }
-    }
-}
-
 fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
     let lower = search.end(End::Lower);
     let upper = search.end(End::Upper);
@@ -211,9 +180,303 @@ fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
     }
 }
 
+/// Sides up to which every face of every cell is looked at.
+const FACES: usize = 3;
+/// Refinement stops when the outer bound is this close to a value attained.
+const TOLERANCE: f64 = 1e-3;
+/// Cells between two looks at the clock.
+const OFTEN: usize = 16;
+
+/// Which end of the range is sought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum End {
+    Lower,
+    Upper,
+}
+
+impl End {
+    /// A value seen from this end: less is further out.
+    fn sees(self, value: f64) -> f64 {
+        match self {
+            End::Lower => value,
+            End::Upper => -value,
+        }
+    }
+
+    /// A bound of what this end sees of some values.
+    fn bound(self, values: Interval) -> f64 {
+        match self {
+            _ if values.is_empty() => f64::INFINITY,
+            End::Lower => values.lo(),
+            End::Upper => -values.hi(),
+        }
+    }
+}
+
+/// What was found of one end.
+struct Found {
+    /// every value on the region is this or further in
+    bound: f64,
+    /// the cell with that bound
+    weakest: Place,
+}
+
+/// A cell that was bounded.
+struct Branch {
+    cell: Cell,
+    values: Interval,
+    /// the first of its two halves, the second behind it
+    halves: Option<usize>,
+    sampled: bool,
+    /// its extreme corner that is one of the cell that it is a half of
+    shared: Option<End>,
+}
+
+/// A value attained.
+struct Attained {
+    at: Vec<f64>,
+    value: f64,
+}
+
+/// A cell by its place in the tree, the one with the lowest bound first.
+struct Open {
+    bound: f64,
+    place: usize,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Open {}
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.bound.total_cmp(&self.bound)
+    }
+}
+
+struct Search<'a> {
+    graph: &'a Graph,
+    bounds: Evaluator<Intervals>,
+    evaluator: Evaluator,
+    region: &'a Region,
+    budget: usize,
+    tree: Vec<Branch>,
+    /// the smallest and the largest value attained
+    lowest: Option<Attained>,
+    highest: Option<Attained>,
+}
+
+impl<'a> Search<'a> {
+    /// With at most `budget` cells halved for each end.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where the node depends on a symbol outside the region.
+    fn new(
+        graph: &'a Graph,
+        node: Node,
+        region: &'a Region,
+        budget: usize,
+    ) -> Result<Self, MissingInput> {
+        let tape = Tape::new(graph, &region.symbols(), &[node])?;
+        let mut search = Self {
+            graph,
+            evaluator: tape.evaluator(),
+            bounds: tape.evaluator_in(Intervals),
+            region,
+            budget,
+            tree: vec![],
+            lowest: None,
+            highest: None,
+        };
+        search.add(region.cell(), None);
+        Ok(search)
+    }
+
+    /// The node has a value everywhere, as the whole region taken at once shows.
+    fn is_defined(&self) -> bool {
+        self.tree[0].values.is_defined()
+    }
+
+    /// The end of the range, as well as the budget allows.
+    fn end(&mut self, end: End) -> Found {
+        self.end_beyond(end, f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// A bound of the absolute values, as well as the budget allows. The end that values were
+    /// seen further out at is sought first; the other only as far as it is not nearer to zero.
+    fn magnitude(&mut self) -> f64 {
+        self.sample(0, true);
+        let size = |end: End| self.attained(end).map_or(0.0, f64::abs);
+        let (first, second) = match size(End::Lower) > size(End::Upper) {
+            true => (End::Lower, End::Upper),
+            false => (End::Upper, End::Lower),
+        };
+        let size = -self.end(first).bound;
+        size.max(-self.end_beyond(second, f64::NEG_INFINITY, -size).bound)
+    }
+
+    /// Whether no value is zero, as well as the budget allows: not once values of both signs were seen.
+    fn excludes_zero(&mut self) -> bool {
+        self.sample(0, true);
+        let keeps = |end: &End| self.attained(*end).is_some_and(|value| value > 0.0);
+        let Some(end) = [End::Lower, End::Upper].into_iter().find(keeps) else {
+            return false;
+        };
+        self.end_beyond(end, 0.0, f64::MIN_POSITIVE).bound > 0.0
+    }
+
+    /// The same where a bound of `enough` is as good as a better one, and none matters once a value of at
+    /// most `hopeless` was seen.
+    fn end_beyond(&mut self, end: End, hopeless: f64, enough: f64) -> Found {
+        self.sample(0, true);
+        let mut open = BinaryHeap::from([Open {
+            bound: end.bound(self.tree[0].values),
+            place: 0,
+        }]);
+        for step in 0..self.budget {
+            let Some(weakest) = open.peek() else { break };
+            let looks = step % OFTEN == 0;
+            let is_hopeless = self.attained(end).is_some_and(|best| best <= hopeless);
+            let done = is_hopeless || weakest.bound >= enough || self.is_close(weakest.bound, end);
+            if done || looks && self.graph.spent().is_some() {
+                break;
+            }
+            let Some(first) = self.halved(weakest.place) else {
+                break;
+            };
+            open.pop();
+            for place in [first, first + 1] {
+                let bound = end.bound(self.tree[place].values);
+                // where no value can be further out than one attained, none is tried
+                if self.attained(end).is_none_or(|best| bound < best) {
+                    self.sample(place, self.region.dimensions.len() <= FACES);
+                }
+                open.push(Open { bound, place });
+            }
+        }
+        // one cell stands there from the start, and two take the place of one
+        let (bound, place) = open
+            .peek()
+            .map_or((f64::INFINITY, 0), |o| (o.bound, o.place));
+        Found {
+            bound,
+            weakest: self.region.named(&self.tree[place].cell),
+        }
+    }
+
+    /// The point with the value furthest out, by names.
+    fn point(&self, end: End) -> Option<Point> {
+        let best = match end {
+            End::Lower => self.lowest.as_ref(),
+            End::Upper => self.highest.as_ref(),
+        }?;
+        let pairs = self.region.dimensions.iter().zip(&best.at);
+        Some(Point {
+            coordinates: pairs
+                .map(|(d, &x)| Coordinate::from((d.name.clone(), x)))
+                .collect(),
+            value: best.value,
+        })
+    }
+
+    fn add(&mut self, cell: Cell, shared: Option<End>) {
+        let mut values = [Interval::ENTIRE];
+        self.bounds.eval(&cell, &mut values);
+        self.tree.push(Branch {
+            cell,
+            values: values[0],
+            halves: None,
+            sampled: false,
+            shared,
+        });
+    }
+
+    /// The place of the first half of a cell; none where it has no halves.
+    fn halved(&mut self, place: usize) -> Option<usize> {
+        if let Some(first) = self.tree[place].halves {
+            return Some(first);
+        }
+        let (one, other) = self.region.split(&self.tree[place].cell)?;
+        let first = self.tree.len();
+        self.add(one, Some(End::Lower));
+        self.add(other, Some(End::Upper));
+        self.tree[place].halves = Some(first);
+        Some(first)
+    }
+
+    fn is_close(&self, bound: f64, end: End) -> bool {
+        self.attained(end).is_some_and(|best| {
+            // equal infinities are as close as can be
+            best == bound || best - bound <= TOLERANCE * best.abs()
+        })
+    }
+
+    /// The value furthest out, as the end sees it.
+    fn attained(&self, end: End) -> Option<f64> {
+        let best = match end {
+            End::Lower => self.lowest.as_ref(),
+            End::Upper => self.highest.as_ref(),
+        };
+        best.map(|best| end.sees(best.value))
+    }
+
+    /// Looks at the middle of a cell and its two extreme corners, and at the middles of its
+    /// faces where `faces` asks for them: these cost more than the cell's bound. Whoever halves
+    /// a cell has looked at its corners.
+    fn sample(&mut self, place: usize, faces: bool) {
+        if std::mem::replace(&mut self.tree[place].sampled, true) {
+            return;
+        }
+        let Branch { cell, shared, .. } = &self.tree[place];
+        let mut points = vec![self.region.middle_point(cell)];
+        if *shared != Some(End::Lower) {
+            points.push(lowest_corner(cell));
+        }
+        if *shared != Some(End::Upper) {
+            points.push(highest_corner(cell));
+        }
+        if faces {
+            points.extend(self.region.faces(cell));
+        }
+        for point in points {
+            self.look(point);
+        }
+    }
+
+    fn look(&mut self, at: Vec<f64>) {
+        if !(at.iter().all(|x| x.is_finite()) && self.region.reaches(&at)) {
+            return;
+        }
+        let mut out = [0.0];
+        self.evaluator.eval(&at, &mut out);
+        let [value] = out;
+        if value.is_nan() {
+            return;
+        }
+        let attained = || Attained {
+            at: at.clone(),
+            value,
+        };
+        if self.lowest.as_ref().is_none_or(|best| value < best.value) {
+            self.lowest = Some(attained());
+        }
+        if self.highest.as_ref().is_none_or(|best| value > best.value) {
+            self.highest = Some(attained());
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Dimension;
 
     /// Where it has values everywhere it is that of the search; beside a pole there is none, and
     /// a root that interval arithmetic loses only on the whole box is there all the same.
@@ -256,5 +519,40 @@ mod tests {
         let (quick, searched) = both((1.0 / (x - 0.5)).node());
         assert!(!quick.is_defined() && !searched.is_defined());
         assert_eq!(quick.magnitude(), f64::INFINITY);
+    }
+
+    /// The second end costs fewer cells than it does alone, and is the same.
+    #[test]
+    fn the_ends_share_their_cells() {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let f = (x * y - x * x + (x - y).sin() * y).node();
+        let side = |name: &str, symbol: Node| Dimension {
+            name: name.into(),
+            symbol,
+            min: -1.0,
+            max: 2.0,
+            integer: false,
+        };
+        let region = Region {
+            dimensions: vec![side("x", x.node()), side("y", y.node())],
+        };
+        let of = |ends: &[End]| {
+            let mut search = Search::new(&g, f, &region, 400).unwrap();
+            let found: Vec<f64> = ends.iter().map(|&end| search.end(end).bound).collect();
+            (found, search.tree.len())
+        };
+        let (both, cells) = of(&[End::Lower, End::Upper]);
+        let ((lower, first), (upper, second)) = (of(&[End::Lower]), of(&[End::Upper]));
+        assert!(cells < first + second - 1, "{cells} {first} {second}");
+        assert_eq!(both[0], lower[0]);
+        assert!((both[1] - upper[0]).abs() <= 2.0 * TOLERANCE * upper[0].abs());
+        for i in 0..=60 {
+            for j in 0..=60 {
+                let (x, y) = (-1.0 + 0.05 * f64::from(i), -1.0 + 0.05 * f64::from(j));
+                let value = x * y - x * x + (x - y).sin() * y;
+                assert!(both[0] <= value && value <= -both[1]);
+            }
+        }
     }
 }

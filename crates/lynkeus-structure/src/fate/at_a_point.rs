@@ -7,16 +7,14 @@
 
 use std::collections::HashSet;
 
-use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
+use lynkeus_expr::{Evaluator, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::spectrum;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::exact::{self, Shows};
-use super::modes::Modes;
-use super::rest::Rest;
-use super::subspace::{image, null_space, reached};
-use super::{Fate, Hidden, Told, clock, coupled};
-use crate::{Coordinate, Dimension, Region};
+use crate::fate::exact::{self, Shows};
+use crate::fate::hidden::{Fate, Hidden, Told};
+use crate::fate::modes::{Modes, image, null_space, reached};
+use crate::{Coordinate, Dimension, Extended, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
@@ -51,7 +49,7 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
     let tape = Tape::new(extended.graph(), &region.symbols(), &nodes)?;
     let mut evaluator = tape.evaluator();
     let clock = HashSet::from([extended.plant.time]);
-    let timed = clock::moved(hidden, &slopes, &clock);
+    let timed = moved(hidden, &slopes, &clock);
     let is_asked = |i: usize| hidden.told[i] == Told::Hidden;
     if (0..timed.len()).all(|i| timed[i] || !is_asked(i)) {
         return Ok(None);
@@ -84,8 +82,8 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             for (fate, _) in of.iter_mut().zip(&timed).filter(|(_, timed)| **timed) {
                 *fate = Fate::Undecided;
             }
-            coupled::weaken(hidden, &slopes, &sure, &mut of);
-            let moved = clock::moved(hidden, &slopes, &rest.moving(&point));
+            weaken(hidden, &slopes, &sure, &mut of);
+            let moved = moved(hidden, &slopes, &rest.moving(&point));
             for (fate, _) in of.iter_mut().zip(moved).filter(|(_, moved)| *moved) {
                 if matches!(fate, Fate::Decays { .. } | Fate::Grows { .. }) {
                     *fate = Fate::Undecided;
@@ -93,7 +91,7 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             }
             let sides = || region.dimensions.iter().zip(&point);
             let is_time = |d: &Dimension| d.symbol == extended.plant.time;
-            let is_read = clock::is_read(extended, &nodes);
+            let is_read = is_read(extended, &nodes);
             // first, as long points are told in part
             let time = sides().filter(|(d, _)| is_read && is_time(d));
             let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
@@ -274,4 +272,234 @@ fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
         None => above[(i, j)],
         Some(i) => below[(i, j)],
     })
+}
+
+/// Newton's steps.
+const STEPS: usize = 40;
+/// Derivatives below this share of their terms are zero.
+const STILL: f64 = 1e-10;
+/// Singular values below this share of the largest are not divided by.
+const SMALL: f64 = 1e-9;
+
+/// The states that the slopes of the hidden read, and those that these read.
+pub(super) struct Rest {
+    /// their symbols
+    states: Vec<Node>,
+    /// places in the region of the states, then of the unknown inputs: these may be what keeps the states at rest
+    places: Vec<usize>,
+    /// ends of their ranges
+    sides: Vec<(f64, f64)>,
+    /// per state what its derivative reads
+    reads: Vec<Vec<Node>>,
+    /// time, and the states that it drives
+    driven: HashSet<Node>,
+    /// their derivatives, then these by states and unknown inputs, row by row
+    evaluator: Evaluator,
+}
+
+impl Rest {
+    /// `slopes` are those of the equations, then the outputs, by the extended states.
+    pub fn new(
+        hidden: &Hidden<'_, '_>,
+        slopes: &jacobian::Jacobian,
+        region: &Region,
+    ) -> Result<Self, MissingInput> {
+        let extended = hidden.extended;
+        let graph = extended.graph();
+        let is_free = |entry: &&(usize, usize, Node)| hidden.told[entry.1] != Told::Determined;
+        let entries = slopes.entries.iter().filter(is_free);
+        let mut open: Vec<Node> = entries.map(|entry| entry.2).collect();
+        let mut found: Vec<usize> = vec![];
+        loop {
+            let read: HashSet<Node> = graph.symbols_of(&open).into_iter().collect();
+            let is_new = |place: &usize| {
+                read.contains(&extended.states[*place].node) && !found.contains(place)
+            };
+            let new: Vec<usize> = (0..extended.plant_states()).filter(is_new).collect();
+            if new.is_empty() {
+                break;
+            }
+            open.extend(new.iter().map(|&place| extended.derivatives[place]));
+            found.extend(new);
+        }
+        let states: Vec<Node> = found.iter().map(|&i| extended.states[i].node).collect();
+        let mut nodes: Vec<Node> = found.iter().map(|&i| extended.derivatives[i]).collect();
+        let reads: Vec<Vec<Node>> = nodes.iter().map(|f| graph.symbols_of(&[*f])).collect();
+        let signals = (0..extended.states.len()).filter(|&i| hidden.is_signal(i));
+        let free: Vec<usize> = found.iter().copied().chain(signals).collect();
+        let unknowns: Vec<Node> = free.iter().map(|&i| extended.states[i].node).collect();
+        let own = jacobian::forward(graph, &nodes, &unknowns);
+        let zero = graph.constant(0.0).node();
+        for i in 0..states.len() {
+            nodes.extend((0..unknowns.len()).map(|j| own.get(i, j).unwrap_or(zero)));
+        }
+        let symbols = region.symbols();
+        let place = |unknown: &Node| symbols.iter().position(|symbol| symbol == unknown);
+        let sides = free
+            .iter()
+            .map(|&i| (extended.states[i].min, extended.states[i].max));
+        Ok(Self {
+            places: unknowns.iter().filter_map(place).collect(),
+            sides: sides.collect(),
+            driven: behind(&states, &reads, HashSet::from([extended.plant.time])),
+            evaluator: Tape::new(graph, &symbols, &nodes)?.evaluator(),
+            states,
+            reads,
+        })
+    }
+
+    fn at(&mut self, point: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let (n, wide) = (self.states.len(), self.places.len());
+        let mut values = vec![0.0; n + n * wide];
+        self.evaluator.eval(point, &mut values);
+        (
+            DVector::from_column_slice(&values[..n]),
+            DMatrix::from_row_slice(n, wide, &values[n..]),
+        )
+    }
+
+    /// Time, and the states that move at this point, unknown inputs being constant, or are driven by some that do.
+    pub fn moving(&mut self, point: &[f64]) -> HashSet<Node> {
+        let (f, J) = self.at(point);
+        let width = |k: usize| {
+            let (min, max) = self.sides[k];
+            let width = max - min;
+            match width.is_finite() && width > 0.0 {
+                true => width,
+                false => point[self.places[k]].abs().max(1.0),
+            }
+        };
+        let is_moving = |&i: &usize| {
+            let terms = (0..J.ncols()).map(|j| J[(i, j)].abs() * width(j));
+            let rests = f[i].abs() <= STILL * terms.fold(0.0, f64::max);
+            !rests
+        };
+        let own = (0..f.len()).filter(is_moving).map(|i| self.states[i]);
+        let own = own.chain(self.driven.iter().copied()).collect();
+        behind(&self.states, &self.reads, own)
+    }
+
+    /// Whether nothing moves at this point but what time drives.
+    pub fn holds(&mut self, point: &[f64]) -> bool {
+        self.moving(point) == self.driven
+    }
+
+    /// This point or the nearest in the box where that holds, by unknown inputs alone where they can keep the states at
+    /// rest, else by moving both; none where Newton's method finds none.
+    pub fn near(&mut self, point: &[f64]) -> Option<Vec<f64>> {
+        if self.holds(point) {
+            return Some(point.to_vec());
+        }
+        let first = self.states.len();
+        self.solved(point, first).or_else(|| self.solved(point, 0))
+    }
+
+    /// Moves the unknowns from number `first` on.
+    fn solved(&mut self, point: &[f64], first: usize) -> Option<Vec<f64>> {
+        let mut point = point.to_vec();
+        if first == self.places.len() {
+            return None;
+        }
+        for _ in 0..STEPS {
+            if self.holds(&point) {
+                return Some(point);
+            }
+            let (mut f, J) = self.at(&point);
+            let mut J = J.columns(first, J.ncols() - first).into_owned();
+            for i in (0..f.len()).filter(|&i| self.driven.contains(&self.states[i])) {
+                f[i] = 0.0;
+                J.row_mut(i).fill(0.0);
+            }
+            let least = SMALL * J.amax();
+            let step = spectrum::singular(J, true, true)?.solve(&f, least).ok()?;
+            for (k, &place) in self.places.iter().enumerate().skip(first) {
+                let (min, max) = self.sides[k];
+                point[place] = (point[place] - step[k - first]).clamp(min, max);
+            }
+        }
+        self.holds(&point).then_some(point)
+    }
+}
+
+/// These symbols, and the states whose derivatives read one of them.
+fn behind(states: &[Node], reads: &[Vec<Node>], mut found: HashSet<Node>) -> HashSet<Node> {
+    loop {
+        let is_new = |k: &usize| {
+            !found.contains(&states[*k]) && reads[*k].iter().any(|symbol| found.contains(symbol))
+        };
+        match (0..states.len()).find(is_new) {
+            Some(k) => found.insert(states[k]),
+            None => return found,
+        };
+    }
+}
+
+/// Whether one of these expressions reads the time.
+pub(super) fn is_read(extended: &Extended<'_>, nodes: &[Node]) -> bool {
+    let symbols = extended.graph().symbols_of(nodes);
+    symbols.contains(&extended.plant.time)
+}
+
+/// Per extended state whether the error in it, if it is hidden, obeys an equation that reads one of these
+/// symbols. `slopes` are those of the equations, then the outputs, by the extended states.
+pub(super) fn moved(
+    hidden: &Hidden<'_, '_>,
+    slopes: &jacobian::Jacobian,
+    moving: &HashSet<Node>,
+) -> Vec<bool> {
+    let graph = hidden.extended.graph();
+    let reads = |slope: Node| {
+        graph
+            .symbols_of(&[slope])
+            .iter()
+            .any(|s| moving.contains(s))
+    };
+    let count = hidden.told.len();
+    let is_free = |i: usize| i < count && hidden.told[i] != Told::Determined;
+    let entries = slopes.entries.iter().filter(|entry| is_free(entry.1));
+    let entries: Vec<(usize, usize, bool)> = entries
+        .map(|(i, j, slope)| (*i, *j, reads(*slope)))
+        .collect();
+    let is_driven = (0..count).any(|i| is_free(i) && hidden.is_signal(i));
+    let mut moved = vec![false; count];
+    loop {
+        let is_new = |i: usize| !is_free(i) || !moved[i];
+        let next = entries
+            .iter()
+            .find(|&&(i, j, own)| is_new(i) && (own || moved[j]));
+        match next {
+            // what the outputs and the equations of what is known say couples all that is
+            // hidden, as do unknown inputs
+            Some(&(i, ..)) if is_driven || !is_free(i) => return vec![true; count],
+            Some(&(i, ..)) => moved[i] = true,
+            None => return moved,
+        }
+    }
+}
+
+/// Undecides what decays or stays, but reads what does not. `slopes` are those of the equations by the
+/// extended states; that the outputs may cancel what is read is not looked for. What is `sure` rests on no threshold.
+pub(super) fn weaken(
+    hidden: &Hidden<'_, '_>,
+    slopes: &jacobian::Jacobian,
+    sure: &[bool],
+    of: &mut [Fate],
+) {
+    let count = hidden.told.len();
+    let is_free = |i: usize| i < count && hidden.told[i] != Told::Determined;
+    let entries = slopes.entries.iter();
+    let is_coupled = |i: usize, j: usize| is_free(i) && is_free(j) && !sure[i];
+    let couplings = entries.filter(|entry| is_coupled(entry.0, entry.1));
+    let couplings: Vec<(usize, usize)> = couplings.map(|(i, j, _)| (*i, *j)).collect();
+    loop {
+        let doubted = couplings.iter().find(|(i, j)| match of[*i] {
+            Fate::Decays { .. } => !matches!(of[*j], Fate::Decays { .. }),
+            Fate::Stays => !matches!(of[*j], Fate::Decays { .. } | Fate::Stays),
+            _ => false,
+        });
+        match doubted {
+            Some((i, _)) => of[*i] = Fate::Undecided,
+            None => return,
+        }
+    }
 }

@@ -13,106 +13,16 @@
 //! `at_a_point` finds the modes of the linearisation, which hold near that point only.
 
 mod at_a_point;
-mod clock;
-mod constraints;
-mod coupled;
 mod exact;
-mod linearised;
+mod hidden;
 mod modes;
 mod on_the_box;
-mod rest;
-mod subspace;
 
 use lynkeus_expr::MissingInput;
 
-use crate::{Coordinate, Extended};
-
-/// What is known of an extended state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
-    /// the outputs determine it
-    Determined,
-    /// they do not
-    Hidden,
-    /// not decided, or its start is given: nothing is taken for granted
-    Open,
-}
-
-/// A question about hidden quantities.
-#[derive(Clone, Debug)]
-pub struct Hidden<'e, 'p> {
-    /// the plant
-    pub extended: &'e Extended<'p>,
-    /// per extended state
-    pub told: Vec<Told>,
-    /// unknown inputs are any functions of time; else they do not move
-    pub arbitrary: bool,
-    /// in how many independent directions the hidden quantities can change
-    pub directions: usize,
-}
-
-/// What the claim on an error rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ground {
-    /// proved for every solution in the box
-    Box,
-    /// the linearisation at one point
-    Point,
-}
-
-/// What becomes of the error of a hidden quantity.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fate {
-    /// it decays at least like e^(−rate·t)
-    Decays {
-        /// in 1/(unit of time)
-        rate: f64,
-        /// proved, or linearised
-        ground: Ground,
-    },
-    /// in the end it is below this bound, in its unit; proved on the box, unknown inputs staying in
-    /// their ranges
-    Bounded {
-        /// in the unit of the quantity
-        bound: f64,
-        /// linearised an unknown input keeps it alive; else it may decay
-        is_kept: bool,
-    },
-    /// linearised it stays as it is, or hardly moves
-    Stays,
-    /// linearised it grows like e^(rate·t)
-    Grows {
-        /// in 1/(unit of time)
-        rate: f64,
-    },
-    /// an unknown input moves it without a trace
-    Moved,
-    /// neither proved nor seen in the linearisation
-    Undecided,
-}
-
-/// The fates of hidden quantities.
-#[derive(Clone, Debug)]
-pub struct Fates {
-    /// per extended state; none where it is not hidden
-    pub of: Vec<Option<Fate>>,
-    /// where it was linearised; empty where it was not
-    pub point: Vec<Coordinate>,
-}
+pub use hidden::{Fate, Fates, Ground, Hidden, Told};
 
 impl Hidden<'_, '_> {
-    /// Places of what may differ between two solutions with the same outputs: states, then
-    /// unknown inputs that are any functions.
-    fn free(&self) -> (Vec<usize>, Vec<usize>) {
-        let places = (0..self.told.len()).filter(|&i| self.told[i] != Told::Determined);
-        places.partition(|&i| !self.is_signal(i))
-    }
-
-    /// Whether it is an unknown input without an equation.
-    fn is_signal(&self, place: usize) -> bool {
-        self.arbitrary && place >= self.extended.plant_states()
-    }
-
     /// Decides what becomes of the errors.
     ///
     /// # Errors

@@ -1,13 +1,12 @@
 //! Decay for every pair of solutions in the box, by intervals.
 
-use lynkeus_expr::{Budget, Interval, MissingInput};
+use lynkeus_expr::{Budget, Interval, MissingInput, Node, jacobian};
 use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
 
-use super::constraints::{Row, System, is_zero};
-use super::{Fate, Ground, Hidden, linearised};
-use crate::Verdict;
+use crate::fate::hidden::{Fate, Ground, Hidden, Told};
+use crate::{Region, Verdict, range_within};
 
 /// States that are hidden together, beyond which no proof is tried.
 const STATES: usize = 24;
@@ -30,7 +29,7 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Vec<Option<Fate>>, Missin
     }
     let width = |i: &usize| extended.states[*i].max - extended.states[*i].min;
     let cascade = Cascade {
-        system: linearised::enclosed(hidden)?.reduced(),
+        system: enclosed(hidden)?.reduced(),
         scales: states.iter().map(width).collect(),
         reach: inputs.iter().map(width).collect(),
         budget: extended.graph().budget(),
@@ -212,4 +211,203 @@ fn model(n: usize, entry: &dyn Fn(usize, usize) -> Interval) -> ErrorModel {
         }
     }
     ErrorModel { constant, sectors }
+}
+
+/// Cells examined per end of the range of an entry.
+const CELLS: usize = 400;
+
+/// Encloses the differences of any two solutions in the box: slopes averaged along the line
+/// between two points lie in the range of the slopes.
+pub(super) fn enclosed(hidden: &Hidden<'_, '_>) -> Result<System, MissingInput> {
+    let extended = hidden.extended;
+    let region = extended.region();
+    let (states, inputs) = hidden.free();
+    let equation = |&i: &usize| extended.derivatives[i];
+    let told = (0..hidden.told.len())
+        .filter(|&i| hidden.told[i] == Told::Determined && !hidden.is_signal(i));
+    let told: Vec<usize> = told.collect();
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = states
+        .iter()
+        .map(equation)
+        .chain(told.iter().map(equation))
+        .chain(outputs)
+        .collect();
+    let symbol = |&i: &usize| extended.states[i].node;
+    let symbols: Vec<Node> = states.iter().chain(&inputs).map(symbol).collect();
+    let slopes = jacobian::forward(extended.graph(), &functions, &symbols);
+    let mut rows = vec![];
+    for i in 0..functions.len() {
+        let mut all = vec![Interval::ZERO; symbols.len()];
+        for (j, slope) in slopes.row(i) {
+            all[j] = enclosure(hidden, slope, &region)?;
+        }
+        let b = all.split_off(states.len());
+        rows.push(Row { a: all, b });
+    }
+    let constraints = rows.split_off(states.len());
+    let is_said = |row: &Row| !row.a.iter().chain(&row.b).all(is_zero);
+    Ok(System {
+        flow: rows.into_iter().map(Some).collect(),
+        constraints: constraints.into_iter().filter(is_said).collect(),
+        followers: vec![],
+        inputs: vec![None; inputs.len()],
+    })
+}
+
+fn enclosure(
+    hidden: &Hidden<'_, '_>,
+    node: Node,
+    region: &Region,
+) -> Result<Interval, MissingInput> {
+    Ok(range_within(hidden.extended.graph(), node, region, CELLS)?.enclosure)
+}
+
+/// a·δη + b·δv with coefficients that enclose those between any two points of the box.
+#[derive(Clone, Debug)]
+pub(super) struct Row {
+    /// of states
+    pub a: Vec<Interval>,
+    /// of unknown inputs
+    pub b: Vec<Interval>,
+}
+
+/// Whether a coefficient is nothing at all.
+pub(super) fn is_zero(x: &Interval) -> bool {
+    x.lo() == 0.0 && x.hi() == 0.0
+}
+
+/// Whether it never vanishes.
+fn has_sign(x: &Interval) -> bool {
+    x.is_defined() && (x.lo() > 0.0 || x.hi() < 0.0)
+}
+
+/// factor·by added, where neither is nothing: 0·∞ shall be 0.
+fn add(to: &mut [Interval], factor: Interval, row: &[Interval]) {
+    for (x, y) in to.iter_mut().zip(row).filter(|(_, y)| !is_zero(y)) {
+        *x = *x + factor * *y;
+    }
+}
+
+impl Row {
+    /// The row with δv_u put in from 0 = `given`.
+    fn without_input(&mut self, u: usize, given: &Row) {
+        let factor = -self.b[u] / given.b[u];
+        if is_zero(&self.b[u]) {
+            return;
+        }
+        self.b[u] = Interval::ZERO;
+        add(&mut self.a, factor, &given.a);
+    }
+
+    /// The row with δη_p put in from 0 = `given`, which has no inputs.
+    fn without_state(&mut self, p: usize, given: &Row) {
+        let factor = -self.a[p] / given.a[p];
+        if is_zero(&self.a[p]) {
+            return;
+        }
+        let mut others = given.a.clone();
+        others[p] = Interval::ZERO;
+        self.a[p] = Interval::ZERO;
+        add(&mut self.a, factor, &others);
+    }
+
+    pub fn is_free_of_inputs(&self) -> bool {
+        self.b.iter().all(is_zero)
+    }
+}
+
+/// The differences of two solutions.
+#[derive(Clone, Debug)]
+pub(super) struct System {
+    /// δη' by state; none where the state follows from others
+    pub flow: Vec<Option<Row>>,
+    /// 0 = row
+    pub constraints: Vec<Row>,
+    /// δη of a state that was eliminated, by the others
+    pub followers: Vec<(usize, Row)>,
+    /// δv by states
+    pub inputs: Vec<Option<Row>>,
+}
+
+impl System {
+    /// Eliminates unknown inputs, then states, by the constraints.
+    pub fn reduced(mut self) -> Self {
+        for u in 0..self.inputs.len() {
+            self.solve_for_input(u);
+        }
+        for u in 0..self.inputs.len() {
+            if self.inputs[u].is_none() {
+                self.spend_equation(u);
+            }
+        }
+        while self.eliminate_state(None) {}
+        self
+    }
+
+    fn rows(&mut self) -> impl Iterator<Item = &mut Row> {
+        let flow = self.flow.iter_mut().flatten();
+        let inputs = self.inputs.iter_mut().flatten();
+        let followers = self.followers.iter_mut().map(|(_, row)| row);
+        flow.chain(&mut self.constraints)
+            .chain(inputs)
+            .chain(followers)
+    }
+
+    /// A constraint in which the input alone stands beside states tells it.
+    fn solve_for_input(&mut self, u: usize) {
+        let tells = |row: &Row| {
+            let mut others = row.b.iter().enumerate().filter(|(j, _)| *j != u);
+            has_sign(&row.b[u]) && others.all(|(_, x)| is_zero(x))
+        };
+        let Some(place) = self.constraints.iter().position(tells) else {
+            return;
+        };
+        let given = self.constraints.remove(place);
+        self.rows().for_each(|row| row.without_input(u, &given));
+        let mut own = Row {
+            a: vec![Interval::ZERO; given.a.len()],
+            b: given.b.iter().map(|_| Interval::ZERO).collect(),
+        };
+        own.b[u] = Interval::ONE;
+        own.without_input(u, &given);
+        self.inputs[u] = Some(own);
+    }
+
+    /// An input that acts on one state only: a constraint gives that state, and its equation
+    /// is what the input is for.
+    fn spend_equation(&mut self, u: usize) {
+        let acts = |row: &Option<Row>| row.as_ref().is_some_and(|row| !is_zero(&row.b[u]));
+        let mut driven = (0..self.flow.len()).filter(|&s| acts(&self.flow[s]));
+        if let (Some(p), None) = (driven.next(), driven.next()) {
+            self.eliminate_state(Some(p));
+        }
+    }
+
+    /// Eliminates one state, this one or any, by a constraint without inputs.
+    fn eliminate_state(&mut self, asked: Option<usize>) -> bool {
+        let states = 0..self.flow.len();
+        let mut pairs = self.constraints.iter().enumerate().flat_map(|(k, row)| {
+            let is_asked = move |s: &usize| asked.is_none_or(|asked| asked == *s);
+            let of_row = states.clone().filter(is_asked).map(move |s| (k, s));
+            of_row.filter(|_| row.is_free_of_inputs())
+        });
+        let fits = |&(k, s): &(usize, usize)| {
+            self.flow[s].is_some() && has_sign(&self.constraints[k].a[s])
+        };
+        let Some((k, p)) = pairs.find(fits) else {
+            return false;
+        };
+        let given = self.constraints.remove(k);
+        self.flow[p] = None;
+        self.rows().for_each(|row| row.without_state(p, &given));
+        let mut own = Row {
+            a: vec![Interval::ZERO; given.a.len()],
+            b: given.b.clone(),
+        };
+        own.a[p] = Interval::ONE;
+        own.without_state(p, &given);
+        self.followers.push((p, own));
+        true
+    }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::Sensors;
+use crate::{Extended, Sensors};
 use lynkeus_model::{LoadOptions, Plant};
 
 struct Case {

@@ -11,44 +11,21 @@
 //! matrices have full column rank, no two points of these boxes are confused; nor are any where the values of the map are disjoint.
 //! Pairs of boxes are cut until each is decided, or two points with equal values are found (`alike.rs`).
 
-mod alike;
 mod pairs;
 
 use std::collections::HashSet;
 
-use lynkeus_expr::{Graph, MissingInput, Node};
+use lynkeus_expr::{MissingInput, Node};
 
-use crate::{Finding, Matrix, Point, Region, Regularity, Verdict, Witness, range};
-use alike::Twins;
-use pairs::Pairs;
+use crate::{Finding, Matrix, Regularity, Verdict, Witness, range};
+pub use pairs::{Alike, Map};
+use pairs::{Pairs, Twins};
 
 /// States among which every set is looked at for one that its functions determine.
 const SETS: usize = 10;
 /// Sets of states whose pairs of boxes are cut.
 const TRIED: usize = 3;
 const ALONE: &str = "state by state, along slopes that keep their sign";
-
-/// A map of the states on a box. Whatever else it reads is the same at both points.
-#[derive(Clone, Copy, Debug)]
-pub struct Map<'a> {
-    /// holds the expressions
-    pub graph: &'a Graph,
-    /// its components
-    pub functions: &'a [Node],
-    /// symbols of the states
-    pub states: &'a [Node],
-    /// the box of everything that the functions read
-    pub region: &'a Region,
-}
-
-/// Two points of the box at which a map has the same values.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Alike {
-    /// the points, by the names of everything that the map reads, with the value of its first component
-    pub points: [Point; 2],
-    /// a point with exactly these values is proved to exist beside the second; else they agree to twelve digits
-    pub is_proved: bool,
-}
 
 /// What was found of a map.
 #[derive(Clone, Debug)]
@@ -77,10 +54,13 @@ impl Map<'_> {
             });
         }
         let functions = self.regular_functions()?;
-        let jacobian = Matrix::jacobian(self.graph, &functions, self.states);
-        let mut steps = Steps {
-            map: self,
+        let map = Map {
             functions: &functions,
+            ..*self
+        };
+        let jacobian = Matrix::jacobian(map.graph, map.functions, map.states);
+        let mut steps = Steps {
+            map,
             jacobian: &jacobian,
             known: known.to_vec(),
             tried: HashSet::new(),
@@ -94,8 +74,8 @@ impl Map<'_> {
             let next = steps.smallest().filter(|_| together && left > 0);
             let Some((states, rows)) = next else { break };
             left -= 1;
-            let pairs = Pairs::new(&steps, &states, &rows)?;
-            let seeker = Twins::new(&steps)?;
+            let pairs = Pairs::new(&map, &jacobian, &states, &rows)?;
+            let seeker = Twins::new(&map, &jacobian, &steps.known)?;
             let found = pairs.decide(&mut |points| {
                 twins = twins.take().or_else(|| seeker.find(points));
                 twins.is_some()
@@ -157,8 +137,8 @@ impl Map<'_> {
 
 /// How far it has come.
 struct Steps<'a> {
-    map: &'a Map<'a>,
-    functions: &'a [Node],
+    /// of the functions without jumps
+    map: Map<'a>,
     /// of the functions by the states
     jacobian: &'a Matrix<'a>,
     known: Vec<bool>,
@@ -177,8 +157,8 @@ impl Steps<'_> {
 
     /// Finds one more state that one function gives.
     fn one_alone(&mut self) -> Result<bool, MissingInput> {
-        let Map { graph, region, .. } = *self.map;
-        for row in 0..self.functions.len() {
+        let Map { graph, region, .. } = self.map;
+        for row in 0..self.map.functions.len() {
             let [state] = self.reads(row)[..] else {
                 continue;
             };
@@ -200,7 +180,7 @@ impl Steps<'_> {
     /// these.
     fn smallest(&self) -> Option<(Vec<usize>, Vec<usize>)> {
         let unknown: Vec<usize> = (0..self.known.len()).filter(|&j| !self.known[j]).collect();
-        let reads: Vec<Vec<usize>> = (0..self.functions.len())
+        let reads: Vec<Vec<usize>> = (0..self.map.functions.len())
             .map(|row| self.reads(row))
             .collect();
         let count = unknown.len();

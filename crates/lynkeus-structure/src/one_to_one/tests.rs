@@ -1,6 +1,7 @@
 use super::*;
 use crate::Dimension;
-use lynkeus_expr::Expr;
+use crate::Region;
+use lynkeus_expr::{Expr, Graph};
 
 fn region(sides: &[(Expr<'_>, f64, f64)]) -> Region {
     let side = |&(x, min, max): &(Expr<'_>, f64, f64)| Dimension {

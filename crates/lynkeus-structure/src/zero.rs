@@ -1,8 +1,65 @@
-//! Is an expression zero everywhere? Decided by expanding it into monomials.
+//! Is an expression identically zero? Decided on the box by intervals, or wherever it is defined by expanding it into
+//! monomials.
 
 use std::collections::{BTreeMap, HashMap};
 
-use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
+
+use crate::region::{inside, spread};
+use crate::{Coordinate, Point, Region, Verdict, Witness};
+
+/// Points tried beside those on the edges of the box.
+const POINTS: usize = 12;
+
+/// Decides whether `node` is zero on the whole region. Refuted by a point where the value
+/// cannot be a rounding error; undecided where it may be zero at every point tried.
+///
+/// # Errors
+/// [`MissingInput`] where the node depends on a symbol outside the region.
+pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, MissingInput> {
+    let region = region.restricted(&graph.symbols_of(&[node]));
+    let tape = Tape::new(graph, &region.symbols(), &[node])?;
+    let mut bounds = tape.evaluator_in(Intervals);
+    let mut value = |cell: &[Interval]| {
+        let mut values = [Interval::ENTIRE];
+        bounds.eval(cell, &mut values);
+        values[0]
+    };
+    let whole = region.cell();
+    let enclosure = value(&whole);
+    if enclosure.lo() == 0.0 && enclosure.hi() == 0.0 {
+        return Ok(Verdict::Proved);
+    }
+    let mut points: Vec<Vec<f64>> = (0..POINTS).map(|p| generic(&region, p)).collect();
+    points.extend(region.samples(&whole));
+    for point in points {
+        if graph.spent().is_some() {
+            break;
+        }
+        let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
+        let enclosure = value(&cell);
+        let sure = enclosure.is_positive() || enclosure.is_negative();
+        if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
+            let names = region.dimensions.iter().map(|d| d.name.clone());
+            return Ok(Verdict::Refuted(Witness::from(Point {
+                coordinates: names.zip(point).map(Coordinate::from).collect(),
+                value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
+            })));
+        }
+    }
+    Ok(Verdict::open())
+}
+
+/// A point inside the region on no particular surface.
+fn generic(region: &Region, point: usize) -> Vec<f64> {
+    let sides = region.dimensions.iter().enumerate();
+    let coordinate = |(i, d): (usize, &crate::Dimension)| {
+        let x = inside(d.min, d.max, spread(point, i));
+        if d.integer { x.round() } else { x }
+    };
+    sides.map(coordinate).collect()
+}
 
 /// Larger polynomials are not multiplied out.
 const MAX_TERMS: usize = 200;
@@ -16,7 +73,7 @@ type Polynomial = BTreeMap<Vec<(Node, u32)>, f64>;
 /// Whether the expression is zero wherever it is defined. Exact: a sum or product
 /// of coefficients that does not fit into a float is not carried out, so that
 /// rounding never makes a zero. `false` may also mean "not known".
-pub fn vanishes(graph: &Graph, node: Node) -> bool {
+pub fn is_zero(graph: &Graph, node: Node) -> bool {
     if let Some(value) = graph.constant_value(node) {
         return value == 0.0;
     }
@@ -120,12 +177,34 @@ fn exact_product(a: f64, b: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Dimension;
+
+    #[test]
+    fn zero_everywhere_somewhere_and_perhaps() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let region = Region {
+            dimensions: vec![Dimension {
+                name: "x".into(),
+                symbol: x.node(),
+                min: f64::NEG_INFINITY,
+                max: f64::INFINITY,
+                integer: false,
+            }],
+        };
+        let decide = |node| vanishes(&g, node, &region).unwrap();
+        assert_eq!(decide((0.0 * x).node()), Verdict::Proved);
+        // zero at the middle of the box, which is not enough
+        assert!(matches!(decide((x * x).node()), Verdict::Refuted(_)));
+        let one = x.sin().powi(2) + x.cos().powi(2) - 1.0;
+        assert_eq!(decide(one.node()), Verdict::open());
+    }
 
     #[test]
     fn identities_are_seen_and_near_misses_are_not() {
         let g = Graph::new();
         let (x, y) = (g.symbol("x"), g.symbol("y"));
-        let zero = |e: lynkeus_expr::Expr<'_>| vanishes(&g, e.node());
+        let zero = |e: lynkeus_expr::Expr<'_>| is_zero(&g, e.node());
         assert!(zero((x + y) * (x - y) - (x.powi(2) - y * y)));
         assert!(zero(
             x.sin() * (y + 1.0) - y * x.sin() + -(3.0 * x.sin() - 2.0 * x.sin())

@@ -9,14 +9,14 @@
 //! so some state of block k has to depend on it and it can be no shallower. Hence
 //! x¹ are the states in the outputs and x^{k+1} the new ones in the equations of x^k.
 
-mod constant;
-mod rank;
+use lynkeus_expr::{Graph, Interval, MissingInput, Node, Tape, jacobian};
+use lynkeus_proof::matrix::{IntervalMatrix, points, sum};
+use nalgebra::DMatrix;
 
-use lynkeus_expr::{Graph, Node, Tape, jacobian};
-
-use crate::Extended;
 use crate::chains::names;
-use crate::points::{inside, spread};
+use crate::rank::subsets;
+use crate::region::{inside, spread};
+use crate::{Extended, Finding, Matrix, Point, Region, Verdict, sign};
 
 /// One rectangular block: F_k.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -202,11 +202,221 @@ impl Factor {
     }
 }
 
+/// Larger minors are not expanded.
+const MAX_COLUMNS: usize = 5;
+/// More minors than this are left undecided.
+const MAX_MINORS: usize = 250;
+
+impl Factor {
+    /// Has F_k full column rank everywhere on the box? Then x^{k+1} shows in x^k
+    /// whatever the input. Refuted, with the direction ξ that F_k ξ = 0 hides,
+    /// only where F_k is a matrix of numbers: anything that moves may turn the
+    /// hidden direction, and the excitation decides.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an entry depends on a symbol outside the region.
+    pub fn column_rank(
+        &self,
+        extended: &Extended<'_>,
+        k: usize,
+        region: &Region,
+    ) -> Result<Finding, MissingInput> {
+        let graph = extended.graph();
+        let shape = format!("F_{k} is {}×{}", self.rows.len(), self.columns.len());
+        if let Some(F) = self.constant(graph) {
+            return Ok(self.constant_rank(extended, &F, &shape));
+        }
+        let entries: Vec<Node> = self.entries.iter().map(|&(.., node)| node).collect();
+        let used = region.restricted(&graph.symbols_of(&entries));
+        let sides = used.named(&used.cell());
+        let Some(minors) = self.minors(graph) else {
+            let detail = format!(
+                "{shape}: it shows these states only while its entries move, so convergence rests on the excitation (A4)"
+            );
+            return Ok(Finding {
+                verdict: Verdict::Undecided(sides),
+                detail,
+            });
+        };
+        let found = sign::keeps_sign(graph, minors, region)?.finding;
+        Ok(match found.verdict {
+            Verdict::Refuted(witness) => Finding {
+                detail: format!(
+                    "{shape} and loses rank (det F_{k}ᵀF_{k}: {witness}); convergence rests on inputs that do not stay there (A4)"
+                ),
+                verdict: Verdict::Undecided(sides),
+            },
+            verdict => Finding {
+                detail: format!("{shape}; det F_{k}ᵀF_{k} = {}", found.detail),
+                verdict,
+            },
+        })
+    }
+
+    /// The matrix, where all of its entries are numbers.
+    fn constant(&self, graph: &Graph) -> Option<DMatrix<f64>> {
+        let mut matrix = DMatrix::zeros(self.rows.len(), self.columns.len());
+        for &(i, j, node) in &self.entries {
+            let value = graph.constant_value(node)?;
+            matrix[(i, j)] = Some(value).filter(|x| x.is_finite())?;
+        }
+        Some(matrix)
+    }
+
+    /// [`Factor::column_rank`] of a matrix of numbers.
+    fn constant_rank(&self, extended: &Extended<'_>, F: &DMatrix<f64>, shape: &str) -> Finding {
+        let kernel = kernel(F);
+        let Kernel::Direction(ξ) = kernel else {
+            let (verdict, detail) = match kernel {
+                Kernel::Zero => (
+                    Verdict::Proved,
+                    format!(
+                        "{shape} and constant, its columns independent by elimination in interval arithmetic"
+                    ),
+                ),
+                _ => (
+                    Verdict::open(),
+                    format!(
+                        "{shape} and constant, so near to one that hides a direction that rounding errors keep from telling whether it does"
+                    ),
+                ),
+            };
+            return Finding { verdict, detail };
+        };
+        let component = |(&i, x): (&usize, f64)| (extended.states[i].name.clone(), x).into();
+        let direction = Point {
+            coordinates: self.columns.iter().zip(ξ).map(component).collect(),
+            value: 0.0,
+        };
+        let detail = format!(
+            "{shape} and constant: whatever the input, the layer before does not show this direction, so that this arrangement of the states does not fit; measure another output"
+        );
+        Finding::refuted(direction, detail)
+    }
+
+    /// det FᵀF as the sum of the squared minors (Cauchy and Binet); none where F
+    /// is wider than tall or the minors are too many.
+    fn minors(&self, graph: &Graph) -> Option<Node> {
+        let (rows, columns) = (self.rows.len(), self.columns.len());
+        if columns > rows || columns > MAX_COLUMNS {
+            return None;
+        }
+        let entry = |i: usize, j: usize| {
+            let found = self.entries.iter().find(|&&(k, l, _)| (k, l) == (i, j));
+            found.map(|&(.., node)| node)
+        };
+        let matrix = Matrix::from_fn(graph, (rows, columns), entry);
+        let squares = subsets(rows, columns, MAX_MINORS)?
+            .into_iter()
+            .filter_map(|rows| matrix.select_rows(&rows).determinant())
+            .map(|minor| graph.expr(minor).powi(2));
+        let zero = || graph.constant(0.0);
+        Some(squares.reduce(|a, b| a + b).unwrap_or_else(zero).node())
+    }
+}
+
+/// Components of a direction are rounded to multiples of its inverse.
+const GRID: f64 = 1_048_576.0;
+/// Components below this share of the largest are not taken for the unit of a direction.
+const SIGNIFICANT: f64 = 1e-6;
+
+/// What F ξ = 0 leaves of ξ.
+#[derive(Clone, Debug, PartialEq)]
+enum Kernel {
+    /// nothing but zero
+    Zero,
+    /// this direction, exactly; or near to this one where F is wider than tall
+    Direction(Vec<f64>),
+    /// rounding errors hide it
+    Unknown,
+}
+
+/// A column in which nothing but a one is left.
+struct Pivot {
+    row: usize,
+    column: usize,
+}
+
+/// The kernel of F.
+fn kernel(F: &DMatrix<f64>) -> Kernel {
+    let mut rows = points(F);
+    let mut pivots: Vec<Pivot> = vec![];
+    let mut free = vec![];
+    for column in 0..F.ncols() {
+        let unused = (0..F.nrows()).filter(|row| pivots.iter().all(|p| p.row != *row));
+        let size = |row: usize| rows[row][column].mignitude();
+        let largest = unused.max_by(|&i, &j| size(i).total_cmp(&size(j)));
+        match largest.filter(|&row| size(row) > 0.0) {
+            Some(row) => {
+                eliminate(&mut rows, row, column);
+                pivots.push(Pivot { row, column });
+            }
+            None => free.push(column),
+        }
+    }
+    if free.is_empty() {
+        return Kernel::Zero;
+    }
+    let directions = free.iter().map(|&column| {
+        let mut ξ = vec![0.0; F.ncols()];
+        ξ[column] = 1.0;
+        for pivot in &pivots {
+            ξ[pivot.column] = -rows[pivot.row][column].midpoint();
+        }
+        ξ
+    });
+    let directions: Vec<Vec<f64>> = directions.collect();
+    let exact = directions.iter().find_map(|ξ| exact(F, ξ));
+    // more unknowns than equations always leave a direction
+    let near = directions
+        .into_iter()
+        .next()
+        .filter(|ξ| F.ncols() > F.nrows() && ξ.iter().all(|x| x.is_finite()));
+    exact.or(near).map_or(Kernel::Unknown, Kernel::Direction)
+}
+
+/// Divides a row by its pivot and takes it from all others.
+fn eliminate(rows: &mut IntervalMatrix, row: usize, column: usize) {
+    let lead = rows[row][column];
+    let mut top: Vec<Interval> = rows[row].iter().map(|x| *x / lead).collect();
+    top[column] = Interval::ONE;
+    for (i, other) in rows.iter_mut().enumerate() {
+        let factor = other[column];
+        if i == row || factor.magnitude() == 0.0 {
+            continue;
+        }
+        for (x, above) in other.iter_mut().zip(&top) {
+            *x = *x - factor * *above;
+        }
+        other[column] = Interval::ZERO;
+    }
+    rows[row] = top;
+}
+
+/// A direction of few digits near to this one that F maps to zero without any rounding.
+fn exact(F: &DMatrix<f64>, ξ: &[f64]) -> Option<Vec<f64>> {
+    let largest = ξ.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let units = ξ.iter().filter(|x| x.abs() > SIGNIFICANT * largest);
+    let rounded = units.map(|unit| ξ.iter().map(move |x| (x / unit * GRID).round() / GRID));
+    rounded
+        .map(Iterator::collect)
+        .find(|ξ: &Vec<f64>| is_mapped_to_zero(F, ξ))
+}
+
+fn is_mapped_to_zero(F: &DMatrix<f64>, ξ: &[f64]) -> bool {
+    F.row_iter().all(|row| {
+        let terms = row.iter().zip(ξ);
+        let image = sum(terms.map(|(&f, &ξ)| Interval::point(f) * Interval::point(ξ)));
+        image.is_defined() && image.magnitude() == 0.0
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use lynkeus_model::{LoadOptions, Plant};
+
     use super::*;
     use crate::{Sensors, Verdict};
-    use lynkeus_model::{LoadOptions, Plant};
 
     fn examined<T>(text: &str, look: impl Fn(&Extended<'_>) -> T) -> T {
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
@@ -229,7 +439,7 @@ mod tests {
     #[test]
     fn blocks_are_found_in_any_order() {
         let text = "model P input Real u; Real d; Real a; Real c; Real b; output Real y = 2*a + u;
-          equation der(a) = u*b + a^2*c + sin(a); der(b) = b*c*d - c^3; der(c) = d - b; der(d) = d^2; end P;";
+      equation der(a) = u*b + a^2*c + sin(a); der(b) = b*c*d - c^3; der(c) = d - b; der(d) = d^2; end P;";
         assert_eq!(words(text).unwrap(), "(a) → (c, b) → (d)");
     }
 
@@ -278,7 +488,7 @@ mod tests {
         let plant = |d: &str| {
             format!(
                 "model P Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
-                 equation der(a) = c; der(b) = {d}; der(c) = -c; der(d) = -d; end P;"
+             equation der(a) = c; der(b) = {d}; der(c) = -c; der(d) = -d; end P;"
             )
         };
         for d in ["1e-14*d", "1e-200*d", "2*c + 1e-14*d"] {
@@ -286,7 +496,7 @@ mod tests {
         }
         let dependent =
             "model P Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
-             equation der(a) = 3*c + d; der(b) = 6*c + 2*d; der(c) = -c; der(d) = -d; end P;";
+         equation der(a) = 3*c + d; der(b) = 6*c + 2*d; der(c) = -c; der(d) = -d; end P;";
         let Verdict::Refuted(witness) = &verdicts(dependent)[1] else {
             panic!()
         };
@@ -298,9 +508,9 @@ mod tests {
     fn ranks_are_decided_on_the_box() {
         let plant = |low: f64| {
             format!(
-                "model P input Real u(min = {low}, max = 3); Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
-                 equation der(a) = u*c + d; der(b) = c + 5*d; der(c) = 0; der(d) = 0; end P;"
-            )
+            "model P input Real u(min = {low}, max = 3); Real a; Real b; Real c; Real d; output Real y = a; output Real z = b;
+             equation der(a) = u*c + d; der(b) = c + 5*d; der(c) = 0; der(d) = 0; end P;"
+        )
         };
         // det F_1 = 5u − 1
         let found = verdicts(&plant(0.3));
@@ -308,5 +518,37 @@ mod tests {
         assert!(matches!(verdicts(&plant(0.1))[1], Verdict::Undecided(_)));
         let wide = "model P input Real u; Real a; Real b; Real c; output Real y = a; equation der(a) = b + u*c; der(b) = 0; der(c) = 0; end P;";
         assert!(matches!(verdicts(wide)[1], Verdict::Undecided(_)));
+    }
+
+    fn of(rows: usize, columns: usize, entries: &[f64]) -> Kernel {
+        kernel(&DMatrix::from_row_slice(rows, columns, entries))
+    }
+
+    #[test]
+    fn small_numbers_are_no_zeros() {
+        assert_eq!(of(2, 2, &[1.0, 0.0, 0.0, 1e-14]), Kernel::Zero);
+        assert_eq!(of(2, 2, &[1.0, 0.0, 1e10, 1e-300]), Kernel::Zero);
+        assert_eq!(of(3, 1, &[0.0, 0.0, 5e-324]), Kernel::Zero);
+    }
+
+    #[test]
+    fn directions_are_exact() {
+        assert_eq!(
+            of(2, 2, &[3.0, 1.0, 6.0, 2.0]),
+            Kernel::Direction(vec![1.0, -3.0])
+        );
+        assert_eq!(of(2, 1, &[0.0, 0.0]), Kernel::Direction(vec![1.0]));
+        // a kernel of two directions
+        assert_eq!(of(3, 3, &[1.0; 9]), Kernel::Direction(vec![1.0, -1.0, 0.0]));
+        // 0.3 is not three times 0.1, and no number of few digits
+        assert_eq!(of(2, 2, &[0.1, 0.3, 0.2, 0.6]), Kernel::Unknown);
+    }
+
+    #[test]
+    fn what_is_wider_than_tall_has_a_direction() {
+        let Kernel::Direction(ξ) = of(1, 2, &[0.1, 0.3]) else {
+            panic!()
+        };
+        assert!((0.1 * ξ[0] + 0.3 * ξ[1]).abs() < 1e-15 && ξ[1] == 1.0);
     }
 }
