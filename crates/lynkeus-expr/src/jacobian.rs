@@ -1,15 +1,9 @@
 //! Sparse symbolic Jacobians.
 
-mod implicit;
-mod still;
-mod sums;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use std::collections::{BTreeMap, HashMap};
-
-use crate::partials::{Variation, variation};
-use crate::{Binary, Graph, Node, Op, Unary};
-
-use still::Still;
+use crate::partials::{Variation, is_steep, variation};
+use crate::{Binary, Graph, Node, Nodes, Op, Unary};
 
 /// A sparse matrix of expressions ∂(outputs)/∂(inputs).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,37 +38,38 @@ impl Jacobian {
 /// Derivative of one node with respect to each input it depends on.
 type Tangent = BTreeMap<usize, Node>;
 
-struct Builder<'g> {
-    graph: &'g Graph,
+fn times(graph: &Graph, a: Node, b: Node) -> Node {
+    graph.binary(Binary::Mul, a, b)
 }
 
-impl Builder<'_> {
-    fn times(&self, a: Node, b: Node) -> Node {
-        self.graph.binary(Binary::Mul, a, b)
+fn plus(graph: &Graph, a: Option<Node>, b: Node) -> Node {
+    match a {
+        Some(a) => graph.binary(Binary::Add, a, b),
+        None => b,
     }
+}
 
-    fn plus(&self, a: Option<Node>, b: Node) -> Node {
-        match a {
-            Some(a) => self.graph.binary(Binary::Add, a, b),
-            None => b,
-        }
+fn minus(graph: &Graph, a: Option<Node>, b: Node) -> Node {
+    match a {
+        Some(a) => graph.binary(Binary::Sub, a, b),
+        None => graph.unary(Unary::Neg, b),
     }
+}
 
-    fn minus(&self, a: Option<Node>, b: Node) -> Node {
-        match a {
-            Some(a) => self.graph.binary(Binary::Sub, a, b),
-            None => self.graph.unary(Unary::Neg, b),
-        }
-    }
+fn add_to<K: Ord>(graph: &Graph, sums: &mut BTreeMap<K, Node>, key: K, term: Node) {
+    let sum = plus(graph, sums.get(&key).copied(), term);
+    sums.insert(key, sum);
+}
 
-    fn add_to<K: Ord>(&self, sums: &mut BTreeMap<K, Node>, key: K, term: Node) {
-        let sum = self.plus(sums.get(&key).copied(), term);
-        sums.insert(key, sum);
-    }
+fn zero(graph: &Graph) -> Node {
+    graph.constant(0.0).node()
+}
 
-    fn zero(&self) -> Node {
-        self.graph.constant(0.0).node()
-    }
+/// Entries by their places among `n`, zero where there is none.
+fn dense(graph: &Graph, n: usize, entries: &BTreeMap<usize, Node>) -> Vec<Node> {
+    (0..n)
+        .map(|i| entries.get(&i).copied().unwrap_or_else(|| zero(graph)))
+        .collect()
 }
 
 /// The Jacobian by forward accumulation: cheap where each node depends on few
@@ -119,12 +114,11 @@ fn accumulated(
     mut tangents: HashMap<Node, Tangent>,
     mut still: Option<Still<'_>>,
 ) -> HashMap<Node, Tangent> {
-    let build = Builder { graph };
     let mut solved: HashMap<Node, BTreeMap<usize, Vec<Node>>> = HashMap::new();
     for node in graph.reachable(outputs) {
         let results = match graph.op(node) {
-            Op::Solve(_) => Some(solve_tangents(&build, node, &tangents)),
-            Op::Implicit(_) => Some(implicit::tangents(&build, node, &tangents)),
+            Op::Solve(_) => Some(solve_tangents(graph, node, &tangents)),
+            Op::Implicit(_) => Some(implicit_tangents(graph, node, &tangents)),
             _ => None,
         };
         if let Some(results) = results {
@@ -138,9 +132,9 @@ fn accumulated(
         let tangent = match variation {
             Variation::Sum(terms) => {
                 let op = graph.op(node);
-                sums::tangent(&build, op, &terms, &tangents, still.as_ref())
+                sum_tangent(graph, op, &terms, &tangents, still.as_ref())
             }
-            Variation::Choice(c, a, b) => choice_tangent(&build, c, a, b, &tangents),
+            Variation::Choice(c, a, b) => choice_tangent(graph, c, a, b, &tangents),
             Variation::Entry { system, entry } => solved[&system]
                 .iter()
                 .filter_map(|(&column, dx)| Some((column, *dx.get(entry as usize)?)))
@@ -154,7 +148,7 @@ fn accumulated(
 }
 
 fn choice_tangent(
-    build: &Builder<'_>,
+    graph: &Graph,
     condition: Node,
     a: Node,
     b: Node,
@@ -168,19 +162,19 @@ fn choice_tangent(
     let columns = da.keys().chain(db.keys());
     columns
         .map(|column| {
-            let side = |d: &Tangent| d.get(column).copied().unwrap_or_else(|| build.zero());
-            (*column, build.graph.select(condition, side(da), side(db)))
+            let side = |d: &Tangent| d.get(column).copied().unwrap_or_else(|| zero(graph));
+            (*column, graph.select(condition, side(da), side(db)))
         })
         .collect()
 }
 
 /// A dx = db − dA x, for each input that A or b depend on.
 fn solve_tangents(
-    build: &Builder<'_>,
+    graph: &Graph,
     node: Node,
     tangents: &HashMap<Node, Tangent>,
 ) -> BTreeMap<usize, Vec<Node>> {
-    let Some(system) = build.graph.system(node) else {
+    let Some(system) = graph.system(node) else {
         return BTreeMap::new();
     };
     let (n, a, b) = (system.size(), system.matrix(), system.right());
@@ -191,22 +185,16 @@ fn solve_tangents(
         }
     }
     for (place, entry) in a.iter().enumerate() {
-        let x = build.graph.entry(node, (place % n) as u32);
+        let x = graph.entry(node, (place % n) as u32);
         for (&column, &da) in tangents.get(entry).into_iter().flatten() {
             let row = right.entry(column).or_default();
-            let sum = build.minus(row.get(&(place / n)).copied(), build.times(da, x));
+            let sum = minus(graph, row.get(&(place / n)).copied(), times(graph, da, x));
             row.insert(place / n, sum);
         }
     }
-    let solve = |row: BTreeMap<usize, Node>| {
-        let b: Vec<Node> = (0..n)
-            .map(|i| row.get(&i).copied().unwrap_or_else(|| build.zero()))
-            .collect();
-        build.graph.solve(a, &b).x
-    };
     right
-        .into_iter()
-        .map(|(column, row)| (column, solve(row)))
+        .iter()
+        .map(|(&column, row)| (column, graph.solve(a, &dense(graph, n, row)).x))
         .collect()
 }
 
@@ -231,14 +219,13 @@ pub fn reverse(graph: &Graph, outputs: &[Node], inputs: &[Node]) -> Jacobian {
 /// ∂(output)/∂(node) for every node that the output depends on; inputs count as
 /// independent, also where they are expressions.
 fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node> {
-    let build = Builder { graph };
     let mut adjoints = BTreeMap::from([(output, graph.constant(1.0).node())]);
-    let mut results: HashMap<Node, BTreeMap<u32, Node>> = HashMap::new();
+    let mut results: HashMap<Node, BTreeMap<usize, Node>> = HashMap::new();
     for node in graph.reachable(&[output]).into_iter().rev() {
         if graph.op(node).is_system() {
             if let Some(entries) = results.get(&node) {
-                solve_adjoints(&build, node, entries, &mut adjoints);
-                implicit::adjoints(&build, node, entries, &mut adjoints);
+                solve_adjoints(graph, node, entries, &mut adjoints);
+                implicit_adjoints(graph, node, entries, &mut adjoints);
             }
             continue;
         }
@@ -251,16 +238,17 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
         match variation(graph, node) {
             Variation::Sum(terms) => {
                 for (argument, slope) in terms {
-                    build.add_to(&mut adjoints, argument, build.times(bar, slope));
+                    add_to(graph, &mut adjoints, argument, times(graph, bar, slope));
                 }
             }
             Variation::Choice(c, a, b) => {
-                let zero = build.zero();
-                build.add_to(&mut adjoints, a, graph.select(c, bar, zero));
-                build.add_to(&mut adjoints, b, graph.select(c, zero, bar));
+                let zero = zero(graph);
+                add_to(graph, &mut adjoints, a, graph.select(c, bar, zero));
+                add_to(graph, &mut adjoints, b, graph.select(c, zero, bar));
             }
             Variation::Entry { system, entry } => {
-                results.entry(system).or_default().insert(entry, bar);
+                let entries = results.entry(system).or_default();
+                entries.insert(entry as usize, bar);
             }
         }
     }
@@ -269,28 +257,26 @@ fn adjoints(graph: &Graph, output: Node, inputs: &[Node]) -> BTreeMap<Node, Node
 
 /// With Aᵀλ = x̄: b̄ += λ and Ā −= λ xᵀ.
 fn solve_adjoints(
-    build: &Builder<'_>,
+    graph: &Graph,
     node: Node,
-    results: &BTreeMap<u32, Node>,
+    results: &BTreeMap<usize, Node>,
     adjoints: &mut BTreeMap<Node, Node>,
 ) {
-    let Some(system) = build.graph.system(node) else {
+    let Some(system) = graph.system(node) else {
         return;
     };
     let n = system.size();
-    let bar: Vec<Node> = (0..n as u32)
-        .map(|i| results.get(&i).copied().unwrap_or_else(|| build.zero()))
-        .collect();
+    let bar = dense(graph, n, results);
     let transposed: Vec<Node> = (0..n * n)
         .map(|k| system.matrix()[k % n * n + k / n])
         .collect();
-    let λ = build.graph.solve(&transposed, &bar).x;
+    let λ = graph.solve(&transposed, &bar).x;
     for (i, &λi) in λ.iter().enumerate() {
-        build.add_to(adjoints, system.right()[i], λi);
+        add_to(graph, adjoints, system.right()[i], λi);
         for j in 0..n {
             let entry = system.matrix()[i * n + j];
-            let term = build.times(λi, build.graph.entry(node, j as u32));
-            let sum = build.minus(adjoints.get(&entry).copied(), term);
+            let term = times(graph, λi, graph.entry(node, j as u32));
+            let sum = minus(graph, adjoints.get(&entry).copied(), term);
             adjoints.insert(entry, sum);
         }
     }
@@ -362,6 +348,171 @@ fn local_symbols(graph: &Graph, root: Node) -> Vec<Node> {
         );
     }
     symbols
+}
+
+/// A derivative that is 0 where the guard holds, without that guard.
+fn unguarded(graph: &Graph, derivative: Node, guard: Option<Node>) -> Node {
+    match graph.op(derivative) {
+        Op::Select(condition, zero, moving)
+            if guard == Some(condition) && graph.constant_value(zero) == Some(0.0) =>
+        {
+            moving
+        }
+        _ => derivative,
+    }
+}
+
+/// Σ slope·d(argument) of an operation. Where it is known what is still, steep slopes stand behind that
+/// guard, and the same guard within is dropped: each question is asked once for all terms.
+fn sum_tangent(
+    graph: &Graph,
+    op: Op,
+    terms: &[(Node, Node)],
+    tangents: &HashMap<Node, Tangent>,
+    still: Option<&Still<'_>>,
+) -> Tangent {
+    let mut sums: BTreeMap<(usize, Option<Node>), Node> = BTreeMap::new();
+    for &(argument, slope) in terms {
+        let is_steep = is_steep(op) && graph.constant_value(slope).is_none();
+        let guard = still.filter(|_| is_steep);
+        let guard = guard.and_then(|still| still.condition(argument));
+        for (&column, &d) in tangents.get(&argument).into_iter().flatten() {
+            let d = unguarded(graph, d, guard);
+            add_to(graph, &mut sums, (column, guard), times(graph, slope, d));
+        }
+    }
+    let mut sum = Tangent::new();
+    for ((column, guard), term) in sums {
+        let term = guard.map_or(term, |is_still| graph.select(is_still, zero(graph), term));
+        add_to(graph, &mut sum, column, term);
+    }
+    sum
+}
+
+/// dz for each input that p depends on.
+fn implicit_tangents(
+    graph: &Graph,
+    node: Node,
+    tangents: &HashMap<Node, Tangent>,
+) -> BTreeMap<usize, Vec<Node>> {
+    let Some(call) = graph.implicit_call(node) else {
+        return BTreeMap::new();
+    };
+    if !call.arguments.iter().any(|p| tangents.contains_key(p)) {
+        return BTreeMap::new();
+    }
+    let at = call.at(graph, node);
+    let mut right: BTreeMap<usize, BTreeMap<usize, Node>> = BTreeMap::new();
+    for (row, place, slope) in call.function.sensitivities(graph, &at) {
+        for (&column, &dp) in tangents.get(&call.arguments[place]).into_iter().flatten() {
+            let sums = right.entry(column).or_default();
+            let sum = minus(graph, sums.get(&row).copied(), times(graph, slope, dp));
+            sums.insert(row, sum);
+        }
+    }
+    let matrix = call.function.matrix(&Nodes(graph), &at);
+    let n = call.function.size();
+    let solved = |sums| solve(graph, &matrix, &dense(graph, n, sums));
+    right
+        .iter()
+        .map(|(&column, sums)| (column, solved(sums)))
+        .collect()
+}
+
+/// With g_zᵀ λ = z̄: p̄ −= g_pᵀ λ.
+fn implicit_adjoints(
+    graph: &Graph,
+    node: Node,
+    results: &BTreeMap<usize, Node>,
+    adjoints: &mut BTreeMap<Node, Node>,
+) {
+    let Some(call) = graph.implicit_call(node) else {
+        return;
+    };
+    let (n, at) = (call.function.size(), call.at(graph, node));
+    let matrix = call.function.matrix(&Nodes(graph), &at);
+    let transposed: Vec<Node> = (0..n * n).map(|k| matrix[k % n * n + k / n]).collect();
+    let bar = dense(graph, n, results);
+    let λ = solve(graph, &transposed, &bar);
+    for (row, place, slope) in call.function.sensitivities(graph, &at) {
+        let argument = call.arguments[place];
+        let term = times(graph, λ[row], slope);
+        let sum = minus(graph, adjoints.get(&argument).copied(), term);
+        adjoints.insert(argument, sum);
+    }
+}
+
+/// A single unknown needs no factorisation.
+fn solve(graph: &Graph, matrix: &[Node], right: &[Node]) -> Vec<Node> {
+    match (matrix, right) {
+        (&[slope], &[right]) => vec![graph.binary(Binary::Div, right, slope)],
+        _ => graph.solve(matrix, right).x,
+    }
+}
+
+/// When each node stays what it is along a direction, whatever its slopes: where the direction has
+/// no part in anything that the node depends on there. (That a product with a slope is 0 is not
+/// enough: √(x²) has no derivative at 0, although that of x² is 0.)
+struct Still<'g> {
+    graph: &'g Graph,
+    /// by node, what has to hold; nodes that are left out never move
+    conditions: HashMap<Node, BTreeSet<Node>>,
+}
+
+impl<'g> Still<'g> {
+    /// Inputs are still where their entry of the direction is 0.
+    pub fn of(graph: &'g Graph, inputs: &[Node], direction: &[Node]) -> Self {
+        let zero = graph.constant(0.0).node();
+        let is_zero = |part: Node| BTreeSet::from([graph.binary(Binary::Equal, part, zero)]);
+        let pairs = inputs.iter().zip(direction);
+        Self {
+            graph,
+            conditions: pairs
+                .map(|(input, part)| (*input, is_zero(*part)))
+                .collect(),
+        }
+    }
+
+    /// The next node, after its arguments. An input stays one, also where it is an expression.
+    pub fn visit(&mut self, node: Node, variation: &Variation) {
+        let conditions = match variation {
+            Variation::Sum(terms) => self.all(terms.iter().map(|(argument, _)| argument)),
+            Variation::Choice(condition, a, b) => self.chosen(*condition, *a, *b),
+            Variation::Entry { system, .. } => self.all(&self.graph.arguments(*system)),
+        };
+        if !conditions.is_empty() {
+            self.conditions.entry(node).or_insert(conditions);
+        }
+    }
+
+    /// 1 where the node is still; none where it always is.
+    pub fn condition(&self, node: Node) -> Option<Node> {
+        let conditions = self.conditions.get(&node)?.iter().copied();
+        conditions.reduce(|a, b| self.graph.binary(Binary::And, a, b))
+    }
+
+    fn all<'n>(&self, nodes: impl IntoIterator<Item = &'n Node>) -> BTreeSet<Node> {
+        let conditions = nodes
+            .into_iter()
+            .filter_map(|node| self.conditions.get(node));
+        conditions.flatten().copied().collect()
+    }
+
+    /// Of a branch that is not taken nothing is asked.
+    fn chosen(&self, condition: Node, a: Node, b: Node) -> BTreeSet<Node> {
+        if self.conditions.get(&a) == self.conditions.get(&b) {
+            return self.all([&a]);
+        }
+        let and = |x, y| self.graph.binary(Binary::And, x, y);
+        let not = || self.graph.unary(Unary::Not, condition);
+        let (first, second) = match (self.condition(a), self.condition(b)) {
+            (Some(a), Some(b)) => (and(condition, a), and(not(), b)),
+            (Some(a), None) => (not(), a),
+            (None, Some(b)) => (condition, b),
+            (None, None) => return BTreeSet::new(),
+        };
+        BTreeSet::from([self.graph.binary(Binary::Or, first, second)])
+    }
 }
 
 #[cfg(test)]

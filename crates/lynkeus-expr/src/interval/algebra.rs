@@ -1,22 +1,9 @@
 //! Evaluation of tapes over intervals.
 
-use super::{Interval, implicit, solve};
+use super::implicit::enclose;
+use super::solve::solve;
+use super::{Interval, Intervals};
 use crate::{Algebra, Binary, Implicit, Unary};
-
-/// The algebra of [`Interval`]s: a tape evaluated over a box gives enclosures of the outputs on that box.
-///
-/// ```
-/// use lynkeus_expr::{Graph, Tape, interval::{Interval, Intervals}};
-///
-/// let graph = Graph::new();
-/// let x = graph.symbol("x");
-/// let tape = Tape::new(&graph, &[x.node()], &[(x * x + 1.0).ln().node()])?;
-/// let range = tape.eval_in(&Intervals, &[Interval::new(0.0, 1.0).expect("in order")])[0];
-/// assert!(range.is_defined() && range.contains(0.0) && range.hi() < 0.7);
-/// # Ok::<(), lynkeus_expr::MissingInput>(())
-/// ```
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Intervals;
 
 impl Algebra for Intervals {
     type Value = Interval;
@@ -81,6 +68,6 @@ impl Algebra for Intervals {
     }
 
     fn implicit(&self, function: &Implicit, p: &[Interval]) -> Vec<Interval> {
-        implicit::enclose(function, p)
+        enclose(function, p)
     }
 }

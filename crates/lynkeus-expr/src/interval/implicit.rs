@@ -9,8 +9,8 @@
 
 use std::collections::VecDeque;
 
-use super::solve::invert;
-use super::{Interval, Intervals, solve};
+use super::solve::{invert, solve};
+use super::{Interval, Intervals};
 use crate::Implicit;
 
 /// Newton steps on one box.

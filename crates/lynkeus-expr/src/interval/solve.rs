@@ -6,12 +6,8 @@
 //! 2. preconditioning with an approximate inverse R of the midpoint matrix: RA = I − E with a small E, which is regular
 //!    when |E|u < u for some positive vector u, and then Krawczyk's iteration x ← (Rb + Ex) ∩ x.
 
-mod elimination;
-mod preconditioned;
-
-pub(super) use preconditioned::invert;
-
 use super::Interval;
+use super::rounding::{add_up, div_up, mul_up};
 
 /// Encloses all solutions x of A x = b; `a` is n×n row by row, `b` has n entries.
 ///
@@ -41,12 +37,195 @@ fn enclose(a: &[Interval], b: &[Interval]) -> Option<Vec<Interval>> {
         // the quotients of all their numbers: no method has a smaller range
         return (!a.contains_zero()).then(|| vec![*b / *a]);
     }
-    let eliminated = elimination::solve(a, b);
-    let preconditioned = preconditioned::solve(a, b);
+    let eliminated = eliminated(a, b);
+    let preconditioned = preconditioned(a, b);
     match (eliminated, preconditioned) {
         (Some(x), Some(y)) => Some(x.iter().zip(&y).map(|(x, y)| x.intersection(*y)).collect()),
         (x, y) => x.or(y),
     }
+}
+
+/// Encloses the solutions by Gaussian elimination, or finds no pivot that excludes zero.
+fn eliminated(a: &[Interval], b: &[Interval]) -> Option<Vec<Interval>> {
+    let n = b.len();
+    let mut rows: Vec<Vec<Interval>> = (0..n)
+        .map(|i| {
+            let row = a.iter().skip(i * n).take(n);
+            row.chain(b.get(i)).copied().collect()
+        })
+        .collect();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| {
+            let size = |row: usize| rows[row][k].mignitude();
+            size(i).total_cmp(&size(j))
+        })?;
+        rows.swap(k, pivot);
+        if rows[k][k].contains_zero() {
+            return None;
+        }
+        let (above, below) = rows.split_at_mut(k + 1);
+        for row in below {
+            eliminate(&above[k], row, k);
+        }
+    }
+    Some(substitute_back(&rows))
+}
+
+/// Subtracts the multiple of `pivot` from `row` that makes entry `k` zero.
+fn eliminate(pivot: &[Interval], row: &mut [Interval], k: usize) {
+    let factor = row[k] / pivot[k];
+    if factor == Interval::ZERO {
+        return;
+    }
+    for (entry, &above) in row.iter_mut().zip(pivot).skip(k + 1) {
+        *entry = *entry - factor * above;
+    }
+    row[k] = Interval::ZERO;
+}
+
+fn substitute_back(rows: &[Vec<Interval>]) -> Vec<Interval> {
+    let n = rows.len();
+    let mut x = vec![Interval::ZERO; n];
+    for i in (0..n).rev() {
+        let row = &rows[i];
+        let known = (i + 1..n).fold(Interval::ZERO, |sum, j| sum + row[j] * x[j]);
+        x[i] = (row[n] - known) / row[i];
+    }
+    x
+}
+
+/// The iteration converges linearly; more steps would only polish the last digits of badly conditioned systems.
+const ITERATIONS: usize = 12;
+
+/// Encloses the solutions by Krawczyk's iteration on the system multiplied by an approximate inverse, or finds no proof
+/// that all matrices are regular.
+fn preconditioned(a: &[Interval], b: &[Interval]) -> Option<Vec<Interval>> {
+    let n = b.len();
+    let middle: Vec<f64> = a.iter().map(|entry| entry.midpoint()).collect();
+    let inverse = invert(&middle, n)?;
+    let r: Vec<Interval> = inverse
+        .iter()
+        .map(|&entry| Interval::point(entry))
+        .collect();
+    let z = times(&r, b, n);
+    let e = defect(&r, a, n);
+    let mut x = first_enclosure(&e, &z, n)?;
+    for _ in 0..ITERATIONS {
+        let image = times(&e, &x, n);
+        let next = z.iter().zip(image).map(|(&z, image)| z + image);
+        let next: Vec<Interval> = next
+            .zip(&x)
+            .map(|(next, x)| next.intersection(*x))
+            .collect();
+        if next == x {
+            break;
+        }
+        x = next;
+    }
+    Some(x)
+}
+
+/// M v for a matrix given row by row.
+fn times(m: &[Interval], v: &[Interval], n: usize) -> Vec<Interval> {
+    m.chunks(n.max(1))
+        .map(|row| {
+            let terms = row.iter().zip(v).map(|(&m, &v)| m * v);
+            terms.fold(Interval::ZERO, |sum, term| sum + term)
+        })
+        .collect()
+}
+
+/// E = I − R A.
+fn defect(r: &[Interval], a: &[Interval], n: usize) -> Vec<Interval> {
+    let mut e = Vec::with_capacity(n * n);
+    for i in 0..n {
+        for j in 0..n {
+            let unit = if i == j {
+                Interval::ONE
+            } else {
+                Interval::ZERO
+            };
+            e.push((0..n).fold(unit, |rest, k| rest - r[i * n + k] * a[k * n + j]));
+        }
+    }
+    e
+}
+
+/// |x| ≤ u·max|zᵢ|/uᵢ / (1 − max (|E|u)ᵢ/uᵢ) for a positive vector u with |E|u < u, which also proves that I − E, and
+/// so A, is regular.
+fn first_enclosure(e: &[Interval], z: &[Interval], n: usize) -> Option<Vec<Interval>> {
+    let size: Vec<f64> = e.iter().map(|entry| entry.magnitude()).collect();
+    let u = comparison_vector(&size, n)?;
+    let mut contraction = 0.0_f64;
+    let mut reach = 0.0_f64;
+    for i in 0..n {
+        let row = &size[i * n..(i + 1) * n];
+        let image = row
+            .iter()
+            .zip(&u)
+            .fold(0.0, |sum, (&e, &u)| add_up(sum, mul_up(e, u)));
+        contraction = contraction.max(div_up(image, u[i]));
+        reach = reach.max(div_up(z[i].magnitude(), u[i]));
+    }
+    let slack = -add_up(contraction, -1.0);
+    if !(slack > 0.0 && reach.is_finite()) {
+        return None;
+    }
+    let radius = div_up(reach, slack);
+    let bounds = u.iter().map(|&u| {
+        let bound = mul_up(radius, u);
+        Interval::raw(-bound, bound, true)
+    });
+    Some(bounds.collect())
+}
+
+/// u = (I − |E|)⁻¹ (1, …, 1), positive if the spectral radius of |E| is below 1. It need not be exact: what is concluded
+/// from it is verified.
+fn comparison_vector(size: &[f64], n: usize) -> Option<Vec<f64>> {
+    let mut m: Vec<f64> = size.iter().map(|entry| -entry).collect();
+    for i in 0..n {
+        m[i * n + i] += 1.0;
+    }
+    let inverse = invert(&m, n)?;
+    let u: Vec<f64> = inverse
+        .chunks(n.max(1))
+        .map(|row| row.iter().sum())
+        .collect();
+    u.iter()
+        .all(|u: &f64| u.is_finite() && *u > 0.0)
+        .then_some(u)
+}
+
+/// Approximate inverse by Gauss–Jordan elimination with row pivoting; none when a pivot vanishes or overflows.
+pub(super) fn invert(m: &[f64], n: usize) -> Option<Vec<f64>> {
+    let mut rows: Vec<Vec<f64>> = (0..n)
+        .map(|i| {
+            let unit = (0..n).map(|j| f64::from(u8::from(i == j)));
+            m[i * n..(i + 1) * n].iter().copied().chain(unit).collect()
+        })
+        .collect();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|&i, &j| rows[i][k].abs().total_cmp(&rows[j][k].abs()))?;
+        rows.swap(k, pivot);
+        let mut top = std::mem::take(&mut rows[k]);
+        let scale = top[k];
+        if !scale.is_normal() {
+            return None;
+        }
+        top.iter_mut().for_each(|entry| *entry /= scale);
+        for row in rows.iter_mut().filter(|row| !row.is_empty()) {
+            let factor = row[k];
+            for (entry, above) in row.iter_mut().zip(&top) {
+                *entry -= factor * above;
+            }
+        }
+        rows[k] = top;
+    }
+    let inverse: Vec<f64> = rows.iter().flat_map(|row| row[n..].to_vec()).collect();
+    inverse
+        .iter()
+        .all(|entry| entry.is_finite())
+        .then_some(inverse)
 }
 
 #[cfg(test)]

@@ -26,19 +26,13 @@
 
 mod circular;
 mod exponential;
-mod inverse;
-mod logarithm;
-mod portable;
 mod vector;
 
 use std::array::from_fn;
 
-pub use circular::{cos, sin, tan};
-pub use exponential::{cosh, exp, sinh, tanh};
-pub use inverse::{acos, asin, atan, atan2};
-pub use logarithm::{ln, pow};
-pub use portable::Portable;
-pub use vector::Vector;
+pub use circular::{acos, asin, atan, atan2, cos, sin, tan};
+pub use exponential::{cosh, exp, ln, pow, sinh, tanh};
+pub use vector::{Portable, Vector};
 
 use crate::{Algebra, Binary, Implicit, Reals, Unary};
 
