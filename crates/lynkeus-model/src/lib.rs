@@ -62,23 +62,19 @@
 
 mod balance;
 mod builder;
-mod choose;
 mod diagnostic;
 mod elaborate;
 mod flat;
-mod language;
 mod limits;
+mod load;
 mod names;
 mod ode_model;
 mod plant;
-mod study;
 mod syntax;
 mod units;
 
 pub use builder::{Attributes, Model, ModelError};
-pub use diagnostic::{Diagnostic, LoadError};
-pub use language::model_names;
+pub use diagnostic::{Diagnostic, LoadError, Span};
+pub use load::{model_names, parse_expression};
 pub use plant::{Assertion, LoadOptions, Parameter, Plant, Tables, Variable};
-pub use study::parse_expression;
-pub use syntax::Span;
 pub use units::BaseUnit;

@@ -3,7 +3,7 @@
 
 use std::cell::Cell;
 
-use crate::syntax::{Problem, Result, Span};
+use crate::diagnostic::{Problem, Result, Span};
 
 /// Largest source file in bytes.
 pub(crate) const MAX_SOURCE_BYTES: usize = 64 << 20;
@@ -82,6 +82,14 @@ pub(crate) fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// The budget of writing out one text.
+pub(crate) fn elaboration() -> Budget {
+    Budget::new(
+        MAX_ELABORATED,
+        "scalar operations when loops and arrays are written out",
+    )
 }
 
 #[cfg(test)]

@@ -1,13 +1,10 @@
 //! What a model means: states, derivatives, inputs and outputs over one expression graph.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use lynkeus_expr::{Budget, Graph, Node};
 
-use crate::language::Language;
-use crate::limits::MAX_SOURCE_BYTES;
-use crate::{Diagnostic, LoadError, elaborate, ode_model};
+use crate::Diagnostic;
 
 /// A plant x′ = f(t, x, u), y = h(t, x, u).
 ///
@@ -119,123 +116,4 @@ pub struct LoadOptions {
     pub tables: Tables,
     /// when to stop; the graph of the plant keeps it
     pub budget: Budget,
-}
-
-impl Plant {
-    /// Reads a Modelica text. `file_name` is what diagnostics call it.
-    ///
-    /// # Errors
-    /// The first thing in the text that is wrong or not supported.
-    ///
-    /// ```
-    /// use lynkeus_model::{LoadOptions, Plant};
-    ///
-    /// let text = "model Tank
-    ///   input Real inflow;
-    ///   Real level(start = 4, min = 0);
-    /// equation
-    ///   2*der(level) = inflow - sqrt(level);
-    /// end Tank;";
-    /// let plant = Plant::from_modelica(text, "tank.mo", &LoadOptions::default())?;
-    /// assert_eq!(plant.states[0].name, "level");
-    /// assert_eq!(plant.states[0].start, Some(4.0));
-    /// # Ok::<(), lynkeus_model::Diagnostic>(())
-    /// ```
-    pub fn from_modelica(
-        source: &str,
-        file_name: &str,
-        options: &LoadOptions,
-    ) -> Result<Self, Diagnostic> {
-        let (mut plant, warnings) = elaborate::plant(source, options)
-            .map_err(|problem| Diagnostic::new(problem, file_name, source))?;
-        let warnings = warnings.into_iter();
-        plant.warnings = warnings
-            .map(|problem| Diagnostic::warning(problem, file_name, source))
-            .collect();
-        Ok(plant)
-    }
-
-    /// Reads a text in the notation of `@ODEmodel`, as StructuralIdentifiability.jl has it.
-    /// `file_name` is what diagnostics call it; its stem is the name of a model without one.
-    ///
-    /// # Errors
-    /// The first thing in the model that is wrong or not supported.
-    ///
-    /// ```
-    /// use lynkeus_model::{LoadOptions, Plant};
-    ///
-    /// let text = "decay = @ODEmodel(
-    ///     x'(t) = -k*x(t) + u(t),
-    ///     y(t) = x(t)/2
-    /// )";
-    /// let symbolic = LoadOptions { symbolic_parameters: true, ..LoadOptions::default() };
-    /// let plant = Plant::from_ode_model(text, "decay.jl", &symbolic)?;
-    /// assert_eq!(plant.name, "decay");
-    /// assert_eq!((plant.states[0].name.as_str(), plant.inputs[0].name.as_str()), ("x", "u"));
-    /// assert_eq!(plant.parameters[0].variable.name, "k");
-    /// # Ok::<(), lynkeus_model::Diagnostic>(())
-    /// ```
-    pub fn from_ode_model(
-        source: &str,
-        file_name: &str,
-        options: &LoadOptions,
-    ) -> Result<Self, Diagnostic> {
-        ode_model::plant(source, file_name, options)
-            .map_err(|problem| Diagnostic::new(problem, file_name, source))
-    }
-
-    /// Reads a file: the notation of `@ODEmodel` where its name ends in `.jl`, else Modelica.
-    ///
-    /// # Errors
-    /// The file cannot be read, is not UTF-8, is larger than 64 MiB, or its text is refused.
-    pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, LoadError> {
-        let read_error = |source| LoadError::Read {
-            path: path.to_owned(),
-            source,
-        };
-        let bytes = std::fs::metadata(path).map_err(read_error)?.len();
-        let limit = MAX_SOURCE_BYTES as u64;
-        if bytes > limit {
-            return Err(LoadError::TooLarge {
-                path: path.to_owned(),
-                bytes,
-                limit,
-            });
-        }
-        let bytes = std::fs::read(path).map_err(read_error)?;
-        let source = std::str::from_utf8(&bytes).map_err(|error| {
-            let offset = error.valid_up_to();
-            let line = 1 + bytes
-                .iter()
-                .take(offset)
-                .filter(|&&byte| byte == b'\n')
-                .count();
-            LoadError::NotUtf8 {
-                path: path.to_owned(),
-                line,
-                offset,
-            }
-        })?;
-        Ok(Self::from_text(
-            source,
-            &path.display().to_string(),
-            options,
-        )?)
-    }
-
-    /// Reads a text in the language that `file_name` tells: the notation of `@ODEmodel` where it
-    /// ends in `.jl`, else Modelica.
-    ///
-    /// # Errors
-    /// The first thing in the text that is wrong or not supported.
-    pub fn from_text(
-        source: &str,
-        file_name: &str,
-        options: &LoadOptions,
-    ) -> Result<Self, Diagnostic> {
-        match Language::of(file_name) {
-            Language::Modelica => Self::from_modelica(source, file_name, options),
-            Language::OdeModel => Self::from_ode_model(source, file_name, options),
-        }
-    }
 }

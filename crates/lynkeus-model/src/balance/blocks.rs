@@ -4,15 +4,12 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary};
 
-use super::eliminate::{self, Core, Given};
-use super::incidence::{Incidence, arguments};
-use super::linear::Linear;
-use super::loops::Torn;
+use super::linear::{Core, Given, Linear, Row, Rows, core};
+use super::loops::{Torn, check_regular};
 use super::matching::Matching;
-use super::rows::{Row, Rows};
-use super::{FlatEquation, System, Unknown, listed, singular};
+use super::system::{FlatEquation, Incidence, System, Unknown, arguments, lines, listed};
+use crate::diagnostic::{Problem, Result};
 use crate::limits::{Budget, MAX_COUPLED, MAX_SOLVE_STEPS};
-use crate::syntax::{Problem, Result};
 
 pub(super) struct Solver<'a> {
     system: &'a System<'a>,
@@ -106,7 +103,7 @@ impl<'a> Solver<'a> {
         };
         let span = pairs.first().map(|(equation, _)| equation.span);
         let graph = self.system.graph;
-        let core = eliminate::core(graph, &self.budget, span.unwrap_or_default(), rows)?;
+        let core = core(graph, &self.budget, span.unwrap_or_default(), rows)?;
         if let Some((place, _)) = core.rows.iter().find(|(_, row)| row.len() == 0) {
             return Err(dependent(self.source, &pairs, *place));
         }
@@ -127,7 +124,7 @@ impl<'a> Solver<'a> {
         if torn.unknowns.len() > MAX_COUPLED {
             return Err(self.too_many_torn(block));
         }
-        singular::check(self.system.graph, &torn, self.source)?;
+        check_regular(self.system.graph, &torn, self.source)?;
         let roots = self.roots(&torn)?;
         let symbols = torn.unknowns.iter().map(|unknown| unknown.symbol);
         self.solution.extend(symbols.zip(roots));
@@ -328,7 +325,7 @@ fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) ->
         .collect();
     let more = if pairs.len() > 8 { ", …" } else { "" };
     let spans = pairs.iter().map(|(equation, _)| equation.span);
-    let lines = super::diagnose::lines(source, spans);
+    let lines = lines(source, spans);
     let message = format!(
         "these equations do not determine {}{more}",
         names.join(", ")

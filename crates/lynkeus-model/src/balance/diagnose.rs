@@ -2,10 +2,9 @@
 
 use lynkeus_expr::Node;
 
-use super::incidence::Incidence;
 use super::matching::Matching;
-use super::{FlatEquation, System, Unknown};
-use crate::syntax::{Problem, Result, Span};
+use super::system::{FlatEquation, Incidence, System, Unknown, lines, listed};
+use crate::diagnostic::{Problem, Result, Span};
 
 /// A system with a maximum matching, which shows what is wrong with its balance.
 pub(super) struct Balance<'a> {
@@ -148,7 +147,7 @@ impl Balance<'_> {
 
     fn listed(&self, unknowns: &[usize]) -> String {
         let unknowns = unknowns.iter();
-        super::listed(unknowns.filter_map(|&place| self.system.unknowns.get(place)))
+        listed(unknowns.filter_map(|&place| self.system.unknowns.get(place)))
     }
 
     fn reached_from_unknown(&self, start: usize) -> (Vec<usize>, Vec<usize>) {
@@ -200,17 +199,4 @@ pub(super) fn reached(
     here.sort_unstable();
     there.sort_unstable();
     (here, there)
-}
-
-/// "line 4" or "lines 4, 5 and 9".
-pub(super) fn lines(source: &str, spans: impl Iterator<Item = Span>) -> String {
-    let mut numbers: Vec<usize> = spans.take(8).map(|span| span.line(source)).collect();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
-    match words.split_last() {
-        None => "no line".to_owned(),
-        Some((only, [])) => format!("line {only}"),
-        Some((last, before)) => format!("lines {} and {last}", before.join(", ")),
-    }
 }

@@ -7,82 +7,21 @@
 
 mod blocks;
 mod diagnose;
-mod eliminate;
-mod incidence;
 mod linear;
 mod loops;
 mod matching;
 mod order;
 mod reduce;
-mod rows;
-mod singular;
+mod system;
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Interval, Node};
+use lynkeus_expr::Node;
 
-use crate::syntax::{Problem, Result, Span};
-use incidence::Incidence;
+pub(crate) use system::{FlatEquation, System, Unknown};
 
-/// An equation between two expressions.
-#[derive(Clone, Debug)]
-pub(crate) struct FlatEquation {
-    pub left: Node,
-    pub right: Node,
-    pub span: Span,
-    /// which element of an array equation this is, as `[2]`
-    pub element: Option<String>,
-}
-
-/// Something that the equations must determine.
-#[derive(Clone, Debug)]
-pub(crate) struct Unknown {
-    pub symbol: Node,
-    /// name of the variable; of the state, where the unknown is its derivative
-    pub name: String,
-    /// where the variable is declared
-    pub span: Span,
-    /// the state, where the unknown is its derivative
-    pub state: Option<Node>,
-    /// how much it is wanted as a state, where there is a choice
-    pub rank: i32,
-    /// where the search begins, if its equation has to be solved by one
-    pub start: f64,
-    /// where it may lie
-    pub range: Interval,
-}
-
-impl Unknown {
-    /// Whether something is known of where its value lies.
-    fn is_declared(&self) -> bool {
-        self.start != 0.0 || self.range.lo().is_finite() || self.range.hi().is_finite()
-    }
-
-    /// `` `x` `` or `` `der(x)` ``
-    fn quoted(&self) -> String {
-        match self.state {
-            Some(_) => format!("`der({})`", self.name),
-            None => format!("`{}`", self.name),
-        }
-    }
-}
-
-/// `` `a`, `b`, … ``
-fn listed<'a>(unknowns: impl Iterator<Item = &'a Unknown>) -> String {
-    let mut names: Vec<String> = unknowns.take(9).map(Unknown::quoted).collect();
-    let more = if names.len() > 8 { ", …" } else { "" };
-    names.truncate(8);
-    format!("{}{more}", names.join(", "))
-}
-
-/// The equations and what they must determine.
-pub(crate) struct System<'a> {
-    pub graph: &'a Graph,
-    pub equations: &'a [FlatEquation],
-    pub unknowns: &'a [Unknown],
-    pub inputs: &'a [Node],
-    pub time: Node,
-}
+use crate::diagnostic::{Problem, Result, Span};
+use system::Incidence;
 
 /// An expression for every unknown, free of unknowns.
 pub(crate) fn solve(system: &System<'_>, source: &str, model: Span) -> Result<HashMap<Node, Node>> {

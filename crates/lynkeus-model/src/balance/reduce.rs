@@ -11,10 +11,10 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Binary, Node, jacobian};
 
 use super::diagnose::reached;
-use super::incidence::Incidence;
-use super::matching::{self, Matching};
-use super::{FlatEquation, System, Unknown};
-use crate::syntax::{Problem, Result};
+use super::matching;
+use super::matching::Matching;
+use super::system::{FlatEquation, Incidence, System, Unknown};
+use crate::diagnostic::{Problem, Result};
 
 /// Most times that constraints are looked for.
 const MAX_PASSES: usize = 60;

@@ -1,11 +1,12 @@
 //! Operators on scalars, arrays and matrices.
 
+use super::value::unequal_sizes;
 use lynkeus_expr::{Binary, Node, Unary};
 
 use super::evaluate::Evaluator;
 use super::value::{Array, Scalar, Value, describe_dims};
+use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{BinaryOperator, Relation};
-use crate::syntax::{Problem, Result, Span};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
@@ -289,14 +290,6 @@ impl Evaluator<'_> {
 
 pub(super) fn overflow(span: Span) -> Problem {
     Problem::new(span, "this Integer does not fit in 64 bits").hint("use Real numbers")
-}
-
-pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
-    let (left, right) = (describe_dims(left), describe_dims(right));
-    Problem::new(
-        span,
-        format!("the sizes differ: left is {left}, right is {right}"),
-    )
 }
 
 fn no_product(left: &[usize], right: &[usize], span: Span) -> Problem {

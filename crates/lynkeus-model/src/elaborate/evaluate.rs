@@ -1,23 +1,19 @@
-//! Expressions of the syntax tree to values over the graph.
+//! Expressions of the syntax tree to values over the graph; what dotted and subscripted names lead to.
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
 use lynkeus_expr::{Graph, Node, Unary};
 
-use super::arithmetic::unequal_sizes;
-use super::branches::{Branches, OnPath};
-use super::execute::Claim;
-use super::frame::Frame;
-use super::scope::{Mode, Scope};
-use super::symbols::Context;
-use super::value::{Scalar, Value};
+use super::scope::{Context, Frame, Local, Mode, Named, Scope};
+use super::value::{Scalar, Value, describe_dims, unequal_sizes};
 use crate::Tables;
-use crate::flat::Classes;
+use crate::diagnostic::{Problem, Result, Span};
+use crate::flat::{Classes, constant};
 use crate::limits::{Budget, MAX_CALL_DEPTH};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, Relation, UnaryOperator};
-use crate::syntax::{Problem, Result, Span};
+use crate::syntax::ast::{Ast, BinaryOperator, ExprId, Kind, PathPart, Relation, UnaryOperator};
+use crate::syntax::{plain, shortened};
 
 /// Evaluates expressions of one text. Recursion is bounded by the nesting of the text.
 pub(crate) struct Evaluator<'a> {
@@ -169,7 +165,7 @@ impl<'a> Evaluator<'a> {
         match self.value(id)? {
             Value::Scalar(scalar) => Ok(scalar),
             Value::Array(array) => {
-                let found = super::value::describe_dims(&array.dims);
+                let found = describe_dims(&array.dims);
                 let message = format!("expected a scalar, found an array {found}");
                 Err(Problem::new(self.span(id), message))
             }
@@ -189,7 +185,7 @@ impl<'a> Evaluator<'a> {
         match self.structural(id)? {
             Value::Scalar(Scalar::Integer(value)) => Ok(value),
             Value::Array(array) => {
-                let found = super::value::describe_dims(&array.dims);
+                let found = describe_dims(&array.dims);
                 let message = format!("{what} must be an Integer, found an array {found}");
                 Err(Problem::new(self.span(id), message))
             }
@@ -241,7 +237,7 @@ impl<'a> Evaluator<'a> {
         if name == "time" {
             return self.varying(span);
         }
-        let message = format!("unknown name `{}`", crate::syntax::shortened(name));
+        let message = format!("unknown name `{}`", shortened(name));
         if name.contains('.') {
             let declared = self.scope.names();
             let hint = did_you_mean(name, declared.into_iter()).unwrap_or_else(|| {
@@ -325,4 +321,253 @@ impl<'a> Evaluator<'a> {
         }
         Ok(result)
     }
+}
+
+/// A condition of an `if` around, and whether it holds in the branch that is taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OnPath {
+    pub condition: Node,
+    pub holds: bool,
+}
+
+/// What a branch may hold, where that is not known before the variables are.
+pub(super) struct Branches<T> {
+    /// conditions that may hold, with their branches
+    pub open: Vec<(Node, T)>,
+    /// the branch where none of them does
+    pub last: T,
+}
+
+impl Evaluator<'_> {
+    /// A condition that is known takes its branch or leaves it unread, so that a loop may hold
+    /// `if i == 1 then … else x[i - 1]`.
+    pub(super) fn branches<T>(
+        &mut self,
+        branches: impl Iterator<Item = (ExprId, T)>,
+        otherwise: T,
+    ) -> Result<Branches<T>> {
+        let mut open = vec![];
+        for (condition, branch) in branches {
+            let node = self.condition(condition)?;
+            match self.graph.constant_value(node) {
+                Some(0.0) => {}
+                Some(_) => return Ok(Branches { open, last: branch }),
+                None => open.push((node, branch)),
+            }
+        }
+        Ok(Branches {
+            open,
+            last: otherwise,
+        })
+    }
+
+    /// Notes that none of the conditions holds; gives how many there were around.
+    pub(super) fn pass<T>(&mut self, branches: &Branches<T>) -> usize {
+        let around = self.conditions.len();
+        let passed = branches.open.iter().map(|&(condition, _)| OnPath {
+            condition,
+            holds: false,
+        });
+        self.conditions.extend(passed);
+        around
+    }
+
+    /// The last condition that was passed holds.
+    pub(super) fn enter(&mut self) {
+        if let Some(on_path) = self.conditions.last_mut() {
+            on_path.holds = true;
+        }
+    }
+}
+
+/// An `assert` that is not known to hold.
+#[derive(Clone, Debug)]
+pub(crate) struct Claim {
+    pub condition: Node,
+    pub message: String,
+    pub is_warning: bool,
+    pub span: Span,
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn name(&mut self, span: Span) -> Result<Value> {
+        let name = plain(self.text(span));
+        if let Some(scalar) = self.iterator(&name) {
+            return Ok(Value::Scalar(scalar));
+        }
+        match self.local(&name) {
+            Some(Ok(local)) => {
+                self.budget.charge(local.elements.len() as u64, span)?;
+                return local.value().ok_or_else(|| self.unassigned(&name, span));
+            }
+            Some(Err(())) => return self.outside_of_function(&name, span),
+            None => {}
+        }
+        match self.named(&name) {
+            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
+            Named::Array(dims, elements) => {
+                self.budget.charge(elements.len() as u64, span)?;
+                Ok(Value::new(dims.to_vec(), elements.to_vec()))
+            }
+            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            Named::Unknown => match self.builtin(&name) {
+                Some(scalar) => Ok(Value::Scalar(scalar)),
+                None => Err(self.unknown_name(span)),
+            },
+            Named::Varying => Err(self.varying(span)),
+            Named::Valueless => Err(self.without_value(span)),
+        }
+    }
+
+    pub(super) fn iterator(&self, name: &str) -> Option<Scalar> {
+        let mut loops = self.loops.iter().rev();
+        loops
+            .find(|(iterator, _)| plain(iterator) == name)
+            .map(|(_, value)| *value)
+    }
+
+    /// The scope's meaning of a name, in full or as an import shortens it.
+    pub(super) fn named(&self, name: &str) -> Named<'a> {
+        // The scope outlives this evaluator.
+        let scope = self.scope;
+        if !self.is_closed() {
+            match scope.named(name, self.mode) {
+                Named::Unknown => {}
+                found => return found,
+            }
+        }
+        let full = self.full_names(name).into_iter();
+        let mut found = full.map(|full| scope.constant(&full, self.mode));
+        found
+            .find(|found| !matches!(found, Named::Unknown))
+            .unwrap_or(Named::Unknown)
+    }
+
+    /// In a function the model's own names mean nothing.
+    pub(super) fn is_closed(&self) -> bool {
+        self.frame.as_ref().is_some_and(|frame| frame.is_function)
+    }
+
+    pub(super) fn full_names(&self, name: &str) -> Vec<String> {
+        match self.classes {
+            Some(classes) if !self.scopes.is_empty() => classes.full_names(name, &self.scopes),
+            _ => vec![],
+        }
+    }
+
+    /// Names in a function lead to its own variables, and to constants.
+    fn outside_of_function(&mut self, name: &str, span: Span) -> Result<Value> {
+        let mode = std::mem::replace(&mut self.mode, Mode::Structural);
+        let found = self.named(name);
+        self.mode = mode;
+        match found {
+            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
+            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            _ => match self.builtin(name) {
+                Some(scalar) => Ok(Value::Scalar(scalar)),
+                None if self.scope.dims(name).is_some() => {
+                    let message = format!("`{name}` is not a variable of this function");
+                    Err(Problem::new(span, message)
+                        .hint("functions read their own variables and constants: add an input"))
+                }
+                None => Err(self.unknown_name(span)),
+            },
+        }
+    }
+
+    fn builtin(&self, name: &str) -> Option<Scalar> {
+        if name == "time" {
+            return self.scope.time(self.mode).map(Scalar::Real);
+        }
+        if let Some(classes) = self.classes
+            && let Some(ordinal) = classes.literal(name, &self.scopes)
+        {
+            return Some(Scalar::Integer(ordinal));
+        }
+        let known = constant(name);
+        let known = known.or_else(|| self.full_names(name).iter().find_map(|full| constant(full)));
+        Some(Scalar::Real(self.graph.constant(known?).node()))
+    }
+
+    pub(super) fn unassigned(&self, name: &str, span: Span) -> Problem {
+        Problem::new(
+            span,
+            format!("`{name}` is read before it has a value in every case"),
+        )
+        .hint("assign it first, in each branch of an `if`")
+    }
+
+    /// `a[1].b[2].c`: a name as it is written, or the member `a.b.c` with all subscripts.
+    pub(super) fn path(&mut self, parts: &'a [PathPart], span: Span) -> Result<Value> {
+        let whole = plain(self.text(span));
+        if self.is_known(&whole) {
+            return self.name(span);
+        }
+        let (subscripts, named) = joined(parts, self.source);
+        let literal = self.with_numbers(parts);
+        if let Some(literal) = literal.filter(|literal| self.is_known(literal)) {
+            return self.value_named(&literal, span);
+        }
+        self.index_named(&named, &subscripts, span)
+    }
+
+    fn is_known(&self, name: &str) -> bool {
+        matches!(self.local(name), Some(Ok(_))) || !matches!(self.named(name), Named::Unknown)
+    }
+
+    /// `c[2].x` for `c[i].x` with i = 2; `None` where a subscript is a range.
+    fn with_numbers(&mut self, parts: &'a [PathPart]) -> Option<String> {
+        let mut name = String::new();
+        for part in parts {
+            if !name.is_empty() {
+                name.push('.');
+            }
+            name.push_str(&plain(self.text(part.name)));
+            let mut numbers = vec![];
+            for &subscript in &part.subscripts {
+                numbers.push(
+                    self.known_integer(subscript, "a subscript")
+                        .ok()?
+                        .to_string(),
+                );
+            }
+            if !numbers.is_empty() {
+                name.push_str(&format!("[{}]", numbers.join(",")));
+            }
+        }
+        Some(name)
+    }
+
+    pub(super) fn value_named(&mut self, name: &str, span: Span) -> Result<Value> {
+        if let Some(Ok(local)) = self.local(name) {
+            return local.value().ok_or_else(|| self.unassigned(name, span));
+        }
+        match self.named(name) {
+            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
+            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            Named::Varying => Err(self.varying(span)),
+            Named::Valueless => Err(self.without_value(span)),
+            Named::Unknown => Err(self.unknown_name(span)),
+        }
+    }
+
+    /// A variable of the function or algorithm around; `Err` where a function has none of that
+    /// name.
+    pub(super) fn local(&self, name: &str) -> Option<std::result::Result<&Local, ()>> {
+        let frame = self.frame.as_ref()?;
+        match frame.locals.get(name) {
+            Some(local) => Some(Ok(local)),
+            None if frame.is_function => Some(Err(())),
+            None => None,
+        }
+    }
+}
+
+/// The subscripts of all parts, and their names joined.
+pub(super) fn joined(parts: &[PathPart], source: &str) -> (Vec<ExprId>, String) {
+    let subscripts = parts
+        .iter()
+        .flat_map(|part| part.subscripts.iter().copied());
+    let names = parts.iter().map(|part| plain(part.name.text(source)));
+    (subscripts.collect(), names.collect::<Vec<_>>().join("."))
 }

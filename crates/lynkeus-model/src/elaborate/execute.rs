@@ -1,15 +1,14 @@
 //! Statements, carried out on expressions: what is left are the values of the variables.
 
-use lynkeus_expr::{Binary, Node, Unary};
+use super::evaluate::Claim;
+use lynkeus_expr::{Binary, Unary};
 
-use super::branches::Branches;
-use super::evaluate::Evaluator;
-use super::frame::{Frame, Local};
-use super::inline::Outcome;
-use super::names::joined;
-use super::value::{Array, Scalar, Value, describe_dims};
-use crate::syntax::ast::{Assert, ExprId, Iterator as Loop, Kind, Statement, StatementKind};
-use crate::syntax::{Problem, Result, Span, plain};
+use super::evaluate::{Branches, Evaluator, joined};
+use super::scope::{Frame, Local};
+use super::value::{Array, Outcome, Record, Scalar, Value, describe_dims};
+use crate::diagnostic::{Problem, Result, Span};
+use crate::syntax::ast::{Assert, Ast, ExprId, Iterator as Loop, Kind, Statement, StatementKind};
+use crate::syntax::plain;
 
 /// How a list of statements ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,22 +18,8 @@ pub(super) enum Ended {
     ByReturn,
 }
 
-/// An `assert` that is not known to hold.
-#[derive(Clone, Debug)]
-pub(crate) struct Claim {
-    pub condition: Node,
-    pub message: String,
-    pub is_warning: bool,
-    pub span: Span,
-}
-
 /// Names that statements give values to.
-pub(super) fn targets(
-    source: &str,
-    ast: &crate::syntax::ast::Ast,
-    statements: &[Statement],
-    into: &mut Vec<String>,
-) {
+pub(super) fn targets(source: &str, ast: &Ast, statements: &[Statement], into: &mut Vec<String>) {
     for statement in statements {
         match &statement.kind {
             StatementKind::Assign(targets, _) => {
@@ -56,7 +41,7 @@ pub(super) fn targets(
     }
 }
 
-fn target_name(source: &str, ast: &crate::syntax::ast::Ast, id: ExprId) -> String {
+fn target_name(source: &str, ast: &Ast, id: ExprId) -> String {
     let expression = ast.expression(id);
     match &expression.kind {
         Kind::Index(base, _) => target_name(source, ast, *base),
@@ -243,12 +228,7 @@ impl<'a> Evaluator<'a> {
         Ok(())
     }
 
-    fn assign_record(
-        &mut self,
-        target: ExprId,
-        record: super::records::Record,
-        span: Span,
-    ) -> Result<()> {
+    fn assign_record(&mut self, target: ExprId, record: Record, span: Span) -> Result<()> {
         let name = target_name(self.source, self.ast, target);
         for (member, value) in record.members {
             let full = format!("{name}.{member}");

@@ -2,20 +2,17 @@
 
 use lynkeus_expr::{Binary, Node};
 
-use super::branches::Branches;
-use super::evaluate::Evaluator;
-use super::execute::{self, Claim};
-use super::frame::{Frame, Local};
-use super::inline::Outcome;
-use super::records::Record;
-use super::scope::{Mode, Named};
-use super::symbols::{Context, Symbols};
-use super::value::{Scalar, Value, describe_dims, element_name};
+use super::evaluate::{Branches, Claim, Evaluator};
+use super::execute;
+use super::scope::{Context, Frame, Local, Mode, Named};
+use super::symbols::Symbols;
+use super::value::{Outcome, Record, Scalar, Value, describe_dims, element_name};
 use crate::balance::FlatEquation;
+use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{
     Declaration, Equation, EquationKind, ExprId, Iterator as Loop, Kind, Statement, Variability,
 };
-use crate::syntax::{Problem, Result, Span, plain};
+use crate::syntax::plain;
 
 /// A model written out.
 pub(super) struct Flat {

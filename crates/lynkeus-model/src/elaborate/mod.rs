@@ -2,29 +2,15 @@
 //! scalar equations, and these are solved for the derivatives and the algebraic variables.
 
 mod arithmetic;
-mod array_functions;
 mod arrays;
 mod assemble;
-mod attributes;
-mod branches;
-mod claims;
+mod calls;
+mod declare;
 mod evaluate;
 mod execute;
 mod flatten;
-mod frame;
 mod functions;
-mod inline;
-mod locals;
-mod monotone;
-mod names;
-mod operators;
-mod order;
-mod overrides;
-mod parameters;
-mod records;
 mod scope;
-mod starts;
-mod subscripts;
 mod symbols;
 mod tables;
 mod value;
@@ -34,25 +20,19 @@ use std::collections::{BTreeSet, HashSet};
 
 use lynkeus_expr::{Graph, Spent};
 
-pub(crate) use evaluate::Evaluator;
-pub(crate) use scope::{Mode, Named, Scope};
-pub(crate) use value::{Scalar, Value};
-
-use crate::choose::choose;
+use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{Classes, FlatModel, flat_model, title};
-use crate::limits::{Budget, MAX_ELABORATED};
+use crate::limits::elaboration;
+use crate::names::choose;
 use crate::syntax::ast::{Ast, Class, ClassKind};
-use crate::syntax::{Problem, Result, Span, parse_file};
+use crate::syntax::parse_file;
 use crate::{LoadOptions, Plant};
-use symbols::{Context, Symbols};
+use scope::Context;
+use symbols::Symbols;
 
-/// The budget of one text.
-pub(crate) fn budget() -> Budget {
-    Budget::new(
-        MAX_ELABORATED,
-        "scalar operations when loops and arrays are written out",
-    )
-}
+pub(crate) use evaluate::Evaluator;
+pub(crate) use scope::{GivenNames, Mode};
+pub(crate) use value::Value;
 
 /// The plant of a Modelica text, with what looks wrong in it.
 pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<Problem>)> {
@@ -63,7 +43,7 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
     let classes = Classes::new(source, &ast.classes);
     let graph = Graph::new();
     graph.set_budget(options.budget.clone());
-    let budget = budget();
+    let budget = elaboration();
     let context = Context {
         source,
         ast,

@@ -1,8 +1,16 @@
-//! What names mean where an expression stands.
+//! What names mean where an expression stands: in a model, and in a function or an algorithm whose
+//! statements are carried out.
 
-use lynkeus_expr::Node;
+use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
 
-use super::value::Scalar;
+use lynkeus_expr::{Graph, Node};
+
+use super::value::{Scalar, Value};
+use crate::LoadOptions;
+use crate::flat::{Classes, FlatModel};
+use crate::limits::Budget;
+use crate::syntax::ast::Ast;
 
 /// How much may be unknown in an expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,4 +64,153 @@ pub(crate) trait Scope {
 
     /// The symbol of time, where it has one.
     fn time(&self, mode: Mode) -> Option<Node>;
+}
+
+/// Names whose meaning a function gives; behind them `pi`, and `time` where nothing must be known.
+pub(crate) struct GivenNames<'a> {
+    pub graph: &'a Graph,
+    pub names: &'a dyn Fn(&str) -> Option<Node>,
+}
+
+impl Scope for GivenNames<'_> {
+    fn named(&self, name: &str, mode: Mode) -> Named<'_> {
+        let unquoted = || name.strip_prefix('\'')?.strip_suffix('\'');
+        let node = (self.names)(name).or_else(|| (self.names)(unquoted()?));
+        let node = node.or_else(|| {
+            let pi = || self.graph.constant(std::f64::consts::PI).node();
+            (name == "pi").then(pi)
+        });
+        match node {
+            Some(node) if mode != Mode::Continuous => match self.graph.constant_value(node) {
+                Some(_) => Named::Scalar(Scalar::Real(node)),
+                None => Named::Varying,
+            },
+            Some(node) => Named::Scalar(Scalar::Real(node)),
+            None => Named::Unknown,
+        }
+    }
+
+    fn dims(&self, _name: &str) -> Option<&[usize]> {
+        None
+    }
+
+    fn derivative(&self, _variable: Node) -> Option<Node> {
+        None
+    }
+
+    fn names(&self) -> Vec<&str> {
+        vec!["pi", "time"]
+    }
+
+    fn time(&self, mode: Mode) -> Option<Node> {
+        (mode == Mode::Continuous).then(|| self.graph.symbol("time").node())
+    }
+}
+
+/// What all parts of the elaboration share.
+pub(crate) struct Context<'a> {
+    pub source: &'a str,
+    pub ast: &'a Ast,
+    pub graph: &'a Graph,
+    pub budget: &'a Budget,
+    pub options: &'a LoadOptions,
+    pub model: &'a FlatModel,
+    pub classes: &'a Classes<'a>,
+    /// of which the points of tables are made, found on the way
+    pub table_points: &'a RefCell<BTreeSet<Node>>,
+}
+
+/// What the statements have given values to so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Frame {
+    pub locals: HashMap<String, Local>,
+    /// names of the members of its records
+    pub records: HashMap<String, Vec<String>>,
+    /// names outside of it are constants only
+    pub is_function: bool,
+}
+
+/// A variable; an element without value is `None`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Local {
+    pub dims: Vec<usize>,
+    pub elements: Vec<Option<Scalar>>,
+    pub is_integer: bool,
+}
+
+impl Local {
+    pub(super) fn without_value(dims: Vec<usize>, is_integer: bool) -> Self {
+        let count = dims.iter().product();
+        Self {
+            dims,
+            elements: vec![None; count],
+            is_integer,
+        }
+    }
+
+    /// A Real with this value.
+    pub(super) fn of(value: &Value) -> Self {
+        Self {
+            dims: value.dims().to_vec(),
+            elements: value.elements().iter().copied().map(Some).collect(),
+            is_integer: false,
+        }
+    }
+
+    /// All elements; `None` where one has no value.
+    pub(super) fn value(&self) -> Option<Value> {
+        let elements: Option<Vec<Scalar>> = self.elements.iter().copied().collect();
+        Some(Value::new(self.dims.clone(), elements?))
+    }
+
+    /// A value of this variable's type: what stands in a Real is a Real.
+    pub(super) fn converted(&self, scalar: Scalar, graph: &Graph) -> Scalar {
+        match scalar {
+            Scalar::Integer(_) if !self.is_integer => {
+                scalar.real(graph).map_or(scalar, Scalar::Real)
+            }
+            _ => scalar,
+        }
+    }
+}
+
+impl Frame {
+    /// Nothing has a value, and names outside of it are constants only.
+    pub(super) fn closed() -> Self {
+        Self {
+            is_function: true,
+            ..Self::default()
+        }
+    }
+
+    /// What a copy costs.
+    pub(super) fn size(&self) -> usize {
+        let elements = self.locals.values().map(|local| local.elements.len());
+        self.locals.len() + elements.sum::<usize>()
+    }
+
+    /// What holds behind an `if`: the values of one branch or the other.
+    pub(super) fn joined(condition: Node, yes: Frame, mut no: Frame, graph: &Graph) -> Frame {
+        for (name, local) in &mut no.locals {
+            let Some(other) = yes.locals.get(name) else {
+                continue;
+            };
+            for (b, a) in local.elements.iter_mut().zip(&other.elements) {
+                *b = either(condition, *a, *b, graph);
+            }
+        }
+        no
+    }
+}
+
+fn either(condition: Node, a: Option<Scalar>, b: Option<Scalar>, graph: &Graph) -> Option<Scalar> {
+    let (a, b) = (a?, b?);
+    if a == b {
+        return Some(a);
+    }
+    if let (Scalar::Boolean(a), Scalar::Boolean(b)) = (a, b) {
+        return Some(Scalar::Boolean(graph.select(condition, a, b)));
+    }
+    let (a, b) = (a.real(graph)?, b.real(graph)?);
+    Some(Scalar::Real(graph.select(condition, a, b)))
 }

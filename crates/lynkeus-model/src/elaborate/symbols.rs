@@ -1,21 +1,17 @@
 //! The declared names of a model, with sizes, symbols and values.
 
+use super::scope::Context;
 use std::cell::RefCell;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::{Graph, Node};
 
 use super::evaluate::Evaluator;
-use super::frame::Frame;
-use super::order::{Order, order};
-use super::overrides::Overrides;
-use super::scope::{Mode, Named, Scope};
-use super::value::{Scalar, element_count, element_name};
-use crate::LoadOptions;
-use crate::flat::{Classes, FlatModel, constant_label};
-use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
-use crate::syntax::ast::{Ast, Causality, Declaration, Kind, TypeName, Variability};
-use crate::syntax::{Problem, Result};
+use super::scope::{Frame, Mode, Named, Scope};
+use super::value::Scalar;
+use crate::flat::{FlatModel, constant_label};
+use crate::limits::MAX_RANK;
+use crate::syntax::ast::{Causality, Declaration, Variability};
 
 /// A declared name.
 #[derive(Debug)]
@@ -28,79 +24,24 @@ pub(crate) struct Component {
     pub is_known: bool,
 }
 
-/// What all parts of the elaboration share.
-pub(crate) struct Context<'a> {
-    pub source: &'a str,
-    pub ast: &'a Ast,
-    pub graph: &'a Graph,
-    pub budget: &'a Budget,
-    pub options: &'a LoadOptions,
-    pub model: &'a FlatModel,
-    pub classes: &'a Classes<'a>,
-    /// of which the points of tables are made, found on the way
-    pub table_points: &'a RefCell<BTreeSet<Node>>,
-}
-
 /// All declared names of a model.
 pub(crate) struct Symbols<'a> {
     pub declarations: &'a [Declaration],
-    by_name: HashMap<&'a str, usize>,
-    components: Vec<Option<Component>>,
+    pub(super) by_name: HashMap<&'a str, usize>,
+    pub(super) components: Vec<Option<Component>>,
     /// arrays whose elements are declared by themselves: `x` of `x[1]` and `x[2]`
-    gathered: HashMap<String, Component>,
+    pub(super) gathered: HashMap<String, Component>,
     /// symbols of parameters
-    parameters: HashSet<Node>,
-    model: &'a FlatModel,
+    pub(super) parameters: HashSet<Node>,
+    pub(super) model: &'a FlatModel,
     /// symbols that may stand in `der`, with the symbols of their derivatives once they do
-    derivatives: RefCell<HashMap<Node, Option<Node>>>,
+    pub(super) derivatives: RefCell<HashMap<Node, Option<Node>>>,
     pub time: Node,
-    graph: &'a Graph,
+    pub(super) graph: &'a Graph,
     pub dependent: Vec<bool>,
 }
 
 impl<'a> Symbols<'a> {
-    pub(crate) fn new(context: &Context<'a>) -> Result<Self> {
-        let model = context.model;
-        let by_name = index_names(context.source, &model.declarations)?;
-        let Order {
-            sequence,
-            dependent,
-        } = order(context, &by_name)?;
-        let overrides = Overrides::new(context, &by_name)?;
-        let mut symbols = Self {
-            declarations: &model.declarations,
-            by_name,
-            components: model.declarations.iter().map(|_| None).collect(),
-            gathered: HashMap::new(),
-            parameters: HashSet::new(),
-            model,
-            derivatives: RefCell::default(),
-            time: context.graph.symbol("time").node(),
-            graph: context.graph,
-            dependent,
-        };
-        let sizes = Sizes::new();
-        for place in sequence {
-            let component = symbols.component(context, &overrides, &sizes, place);
-            if component.is_err() && model.possible.contains(&model.declarations[place].label) {
-                continue;
-            }
-            let component = component?;
-            if component.is_known {
-                let elements = component
-                    .elements
-                    .iter()
-                    .filter_map(|e| e.real(context.graph));
-                symbols.parameters.extend(elements);
-            }
-            if let Some(slot) = symbols.components.get_mut(place) {
-                *slot = Some(component);
-            }
-        }
-        symbols.gathered = super::names::gathered(&symbols.by_name, &symbols.components);
-        Ok(symbols)
-    }
-
     /// Declarations with their components, in order of the text.
     pub(crate) fn all(&self) -> impl Iterator<Item = (&'a Declaration, &Component)> {
         self.placed()
@@ -162,113 +103,6 @@ impl<'a> Symbols<'a> {
     /// The symbol of the derivative of a state; `None` if it is no state.
     pub(crate) fn derivative_of(&self, variable: Node) -> Option<Node> {
         self.derivatives.borrow().get(&variable).copied().flatten()
-    }
-
-    fn component(
-        &self,
-        context: &Context<'a>,
-        overrides: &Overrides,
-        sizes: &Sizes,
-        place: usize,
-    ) -> Result<Component> {
-        let declaration = &self.declarations[place];
-        let name = declaration.label.as_str();
-        if declaration.prefix.variability != Variability::Continuous {
-            return self.parameter(context, overrides, sizes, place);
-        }
-        let dims = self.dims(context, declaration)?.into_iter();
-        let dims: Option<Vec<usize>> = dims.collect();
-        let dims = dims.ok_or_else(|| {
-            Problem::new(
-                declaration.name,
-                format!("the size of variable `{name}` must be given"),
-            )
-            .hint("write a number or a parameter instead of `:`")
-        })?;
-        sizes.charge(context, &dims, declaration)?;
-        let count: usize = dims.iter().product();
-        let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
-        if is_boolean && declaration.prefix.causality == Causality::Input {
-            let problem = Problem::new(declaration.name, "a Boolean input is not supported");
-            return Err(problem.hint("use a Real and compare it, as in `if u > 0.5 then …`"));
-        }
-        let may_have_derivative =
-            declaration.prefix.type_name == TypeName::Real && !is_outer_input(declaration);
-        let mut derivatives = self.derivatives.borrow_mut();
-        let symbol = |offset: usize| {
-            let symbol = self.graph.symbol(&element_name(name, &dims, offset)).node();
-            if may_have_derivative {
-                derivatives.insert(symbol, None);
-            }
-            match is_boolean {
-                true => Scalar::Boolean(symbol),
-                false => Scalar::Real(symbol),
-            }
-        };
-        let elements = (0..count).map(symbol).collect();
-        Ok(Component {
-            dims,
-            elements,
-            values: None,
-            is_known: false,
-        })
-    }
-
-    /// Sizes as declared; `None` for `:`.
-    pub(super) fn dims(
-        &self,
-        context: &Context<'a>,
-        declaration: &Declaration,
-    ) -> Result<Vec<Option<usize>>> {
-        let mut evaluator = self.evaluator_of(context, declaration, Mode::Structural);
-        let length = |&id| match context.ast.expression(id).kind {
-            Kind::All => Ok(None),
-            _ => evaluator.length(id).map(Some),
-        };
-        declaration.dimensions.iter().map(length).collect()
-    }
-}
-
-/// Budgets of what declarations are written out to.
-pub(super) struct Sizes {
-    scalars: Budget,
-    text: Budget,
-}
-
-impl Sizes {
-    fn new() -> Self {
-        Self {
-            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
-            text: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
-        }
-    }
-
-    pub(super) fn charge(
-        &self,
-        context: &Context<'_>,
-        dims: &[usize],
-        declaration: &Declaration,
-    ) -> Result<()> {
-        // A size beside a size of zero counts as well: slices walk along it.
-        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        let count = element_count(&walked).unwrap_or(u64::MAX);
-        self.scalars.charge(count, declaration.name)?;
-        let description = declaration.description.as_ref().map_or(0, String::len);
-        let is_text = |id| matches!(context.ast.expression(id).kind, Kind::Text);
-        let texts = declaration
-            .attributes
-            .iter()
-            .filter_map(|attribute| attribute.value);
-        let texts = texts
-            .filter(|&id| is_text(id))
-            .map(|id| context.ast.expression(id).span);
-        let length: u64 = texts
-            .chain([declaration.name])
-            .map(|span| u64::from(span.end.saturating_sub(span.start)))
-            .sum();
-        let each = length.saturating_add(description as u64);
-        self.text
-            .charge(count.saturating_mul(each), declaration.name)
     }
 }
 
@@ -353,39 +187,64 @@ pub(super) fn is_outer_input(declaration: &Declaration) -> bool {
         && !declaration.label.contains('.')
 }
 
-fn index_names<'a>(
-    source: &'a str,
-    declarations: &'a [Declaration],
-) -> Result<HashMap<&'a str, usize>> {
-    let reserved: HashSet<&str> = ["time"].into();
-    let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
-    for (place, declaration) in declarations.iter().enumerate() {
-        let name = declaration.label.as_str();
-        if reserved.contains(name) {
-            let message = format!("`{name}` is a word of the language");
-            return Err(Problem::new(declaration.name, message).hint("choose another name"));
-        }
-        if let Some(earlier) = by_name.insert(name, place) {
-            let line = declarations[earlier].name.line(source);
-            let message = format!("`{name}` is declared twice");
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("it is first declared on line {line}")));
-        }
-    }
-    for declaration in declarations {
-        // an element by itself beside the whole array would be two variables of one name
-        let base = declaration
-            .label
-            .strip_suffix(']')
-            .and_then(|name| name.rsplit_once('['));
-        if let Some((base, _)) = base
-            && let Some(&whole) = by_name.get(base)
+/// Arrays whose elements are declared one by one, as `x[1]` and `x[2]`.
+pub(super) fn gathered(
+    by_name: &HashMap<&str, usize>,
+    components: &[Option<Component>],
+) -> HashMap<String, Component> {
+    let mut groups: HashMap<&str, Vec<(Vec<usize>, &Component)>> = HashMap::new();
+    for (&name, &place) in by_name {
+        if let Some((base, subscripts)) = literal_subscripts(name)
+            && let Some(Some(component)) = components.get(place)
+            && component.dims.is_empty()
         {
-            let message = format!("`{}` is declared twice", declaration.label);
-            let line = declarations[whole].name.line(source);
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("`{base}` is declared as a whole on line {line}")));
+            groups
+                .entry(base)
+                .or_default()
+                .push((subscripts, component));
         }
     }
-    Ok(by_name)
+    let whole = groups
+        .into_iter()
+        .filter_map(|(base, elements)| Some((base.to_owned(), gather(elements)?)));
+    whole
+        .filter(|(base, _)| !by_name.contains_key(base.as_str()))
+        .collect()
+}
+
+/// `x` and 1, 2 of `x[1,2]`.
+fn literal_subscripts(name: &str) -> Option<(&str, Vec<usize>)> {
+    let (base, inside) = name.strip_suffix(']')?.rsplit_once('[')?;
+    let numbers = inside.split(',').map(|number| number.parse().ok());
+    let numbers: Vec<usize> = numbers.collect::<Option<_>>()?;
+    (numbers.len() <= MAX_RANK).then_some((base, numbers))
+}
+
+/// The array of all elements; `None` where some are missing.
+fn gather(mut elements: Vec<(Vec<usize>, &Component)>) -> Option<Component> {
+    elements.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let dims = elements.last()?.0.clone();
+    let count = dims.iter().try_fold(1usize, |n, &dim| n.checked_mul(dim))?;
+    let fits = |(subscripts, _): &(Vec<usize>, &Component)| {
+        let within = subscripts
+            .iter()
+            .zip(&dims)
+            .all(|(s, dim)| (1..=*dim).contains(s));
+        subscripts.len() == dims.len() && within
+    };
+    if count != elements.len() || !elements.iter().all(fits) {
+        return None;
+    }
+    let values = elements
+        .iter()
+        .map(|(_, c)| c.values.as_ref()?.first().copied());
+    Some(Component {
+        values: values.collect(),
+        is_known: elements.iter().all(|(_, component)| component.is_known),
+        elements: elements
+            .iter()
+            .filter_map(|(_, c)| c.elements.first().copied())
+            .collect(),
+        dims,
+    })
 }

@@ -2,6 +2,8 @@
 
 use lynkeus_expr::{Graph, Node};
 
+use crate::diagnostic::{Problem, Span};
+
 /// An Integer is always known; Real and Boolean values are expressions (truth is 1, else 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Scalar {
@@ -111,6 +113,45 @@ pub(crate) fn element_name(name: &str, dims: &[usize], offset: usize) -> String 
     }
     subscripts.reverse();
     format!("{name}[{}]", subscripts.join(","))
+}
+
+pub(super) fn unequal_sizes(left: &[usize], right: &[usize], span: Span) -> Problem {
+    let (left, right) = (describe_dims(left), describe_dims(right));
+    Problem::new(
+        span,
+        format!("the sizes differ: left is {left}, right is {right}"),
+    )
+}
+
+/// The members of a record, those of inner records by their names in full, as `z.re`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Record {
+    pub members: Vec<(String, Value)>,
+}
+
+impl Record {
+    pub(super) fn member(&self, name: &str) -> Option<&Value> {
+        let mut members = self.members.iter();
+        members
+            .find(|(member, _)| member == name)
+            .map(|(_, value)| value)
+    }
+
+    /// The members behind `prefix.`, where there are any.
+    pub(super) fn inner(&self, prefix: &str) -> Option<Record> {
+        let inner = |(name, value): &(String, Value)| {
+            let rest = name.strip_prefix(prefix)?.strip_prefix('.')?;
+            Some((rest.to_owned(), value.clone()))
+        };
+        let members: Vec<(String, Value)> = self.members.iter().filter_map(inner).collect();
+        (!members.is_empty()).then_some(Record { members })
+    }
+}
+
+/// What one output of a function gives.
+pub(super) enum Outcome {
+    Value(Value),
+    Record(Record),
 }
 
 #[cfg(test)]

@@ -1,29 +1,19 @@
 //! A text of classes to the one flat model that is meant: types, records and base classes are
 //! written out; components of other models are refused, with the commands that flatten them.
 
-mod classes;
-mod constants;
 mod library;
-mod members;
 
 use std::collections::{HashMap, HashSet};
 
+use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_SCALARS, grouped};
-
-pub(crate) use classes::Classes;
-pub(crate) use constants::label as constant_label;
-pub(crate) use library::{LibraryType, constant};
-
 use crate::syntax::ast::{
-    Ast, Attribute, Class, ClassKind, Declaration, Equation, ExprId, Kind, Statement, TypeName,
-    Variability,
+    Ast, Attribute, Class, ClassKind, Declaration, Equation, ExprId, Import, Kind, Statement,
+    TypeName, Variability,
 };
-use crate::syntax::{Problem, Result, Span, plain};
+use crate::syntax::{HOW_TO_FLATTEN, plain, shortened};
 
-/// What to do with a model that has connectors or components.
-pub(crate) const HOW_TO_FLATTEN: &str = "flatten it first: `omc -f -i=MODEL FILE.mo > flat.mo` \
-     (OpenModelica), or `python -c 'import rumoca; print(rumoca.Session().load(\"FILE.mo\", \
-     model=\"MODEL\").render(\"base-modelica\"))' > flat.mo`";
+pub(crate) use library::{LibraryType, constant};
 
 /// Most classes that one may be made from.
 const MAX_BASES: usize = 100;
@@ -118,7 +108,7 @@ impl<'a> Flattening<'a> {
         }
         for declaration in &class.declarations {
             let mut declaration = declaration.clone();
-            members::modify(self.source, &mut declaration, modification);
+            modify(self.source, &mut declaration, modification);
             self.declaration(declaration, &class.path)?;
         }
         self.model.equations.extend(class.equations.iter().cloned());
@@ -166,7 +156,7 @@ impl<'a> Flattening<'a> {
                 (_, Some(alias)) => {
                     declaration.prefix.type_name = alias.of;
                     declaration.dimensions.extend(&alias.dimensions);
-                    members::inherit(
+                    inherit(
                         self.source,
                         &mut declaration.attributes,
                         &alias.modification,
@@ -213,7 +203,7 @@ impl<'a> Flattening<'a> {
             declaration.prefix.type_name = TypeName::String;
             return self.scalar_or_array(declaration);
         }
-        let shown = crate::syntax::shortened(text);
+        let shown = shortened(text);
         let library = full.iter().any(|full| full.starts_with("Modelica."));
         let message = match library {
             true => format!("the library type `{shown}` is not known here"),
@@ -240,7 +230,7 @@ impl<'a> Flattening<'a> {
                 _ => Ok(()),
             };
         }
-        members::check_attributes(self.source, &declaration.attributes)?;
+        check_attributes(self.source, &declaration.attributes)?;
         if self.model.declarations.len() as u64 >= MAX_SCALARS {
             let limit = grouped(MAX_SCALARS);
             let message =
@@ -291,4 +281,345 @@ fn elements_by_themselves(source: &str, ast: &Ast, declarations: &mut [Declarati
         declaration.label = format!("{}[{}]", declaration.label, subscripts.join(","));
         declaration.dimensions.clear();
     }
+}
+
+/// Attributes that a number may have.
+const KNOWN: [&str; 10] = [
+    "start",
+    "min",
+    "max",
+    "nominal",
+    "unit",
+    "displayUnit",
+    "quantity",
+    "fixed",
+    "stateSelect",
+    "unbounded",
+];
+
+/// Most members of members of records.
+const MAX_DEPTH: usize = 20;
+
+impl Flattening<'_> {
+    /// The members of a record, each declared under its full name.
+    pub(super) fn record(&mut self, record: Declaration, class: &Class) -> Result<()> {
+        self.depth += 1;
+        let done = self.record_here(record, class);
+        self.depth -= 1;
+        done
+    }
+
+    fn record_here(&mut self, record: Declaration, class: &Class) -> Result<()> {
+        if self.depth > MAX_DEPTH {
+            let message = format!("the record `{}` holds itself", class.path);
+            return Err(Problem::new(record.name, message));
+        }
+        let mut members: Vec<(Declaration, String)> = vec![];
+        self.members(class, &mut members, 0)?;
+        let names = members
+            .iter()
+            .map(|(member, _)| member.label.clone())
+            .collect();
+        self.model.records.insert(record.label.clone(), names);
+        for (mut member, path) in members {
+            let name = member.label.clone();
+            let default = member.binding;
+            modify(self.source, &mut member, &record.attributes);
+            if record.binding.is_none() && member.binding == default {
+                self.check_default(&member, class)?;
+            }
+            member.label = format!("{}.{name}", record.label);
+            let sized = !record.dimensions.is_empty();
+            let mut dimensions = record.dimensions.clone();
+            dimensions.append(&mut member.dimensions);
+            member.dimensions = dimensions;
+            if let Some(value) = record.binding {
+                member.binding = Some(self.ast.member(value, name));
+            } else if sized {
+                member.binding = None;
+            }
+            if member.prefix.variability == Variability::Continuous {
+                member.prefix.variability = record.prefix.variability;
+            }
+            member.prefix.is_final |= record.prefix.is_final;
+            member.prefix.causality = record.prefix.causality;
+            member.name = record.name;
+            member.package.clone_from(&record.package);
+            if !self.declared.contains(&member.label) {
+                self.declaration(member, &path)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a default whose names would lead to the model instead of to the record.
+    fn check_default(&self, member: &Declaration, class: &Class) -> Result<()> {
+        let Some(default) = member.binding else {
+            return Ok(());
+        };
+        let is_sibling = |name: &str| class.declarations.iter().any(|d| d.label == name);
+        for part in self.ast.parts(default) {
+            let name = plain(part.span.text(self.source));
+            let first = name.split(['.', '[']).next().unwrap_or_default();
+            if matches!(part.kind, Kind::Name)
+                && (is_sibling(first) || self.declared.contains(first))
+            {
+                let (label, record) = (&member.label, &class.path);
+                let message = format!("the default of `{label}` in `{record}` needs `{first}`");
+                return Err(Problem::new(part.span, message).hint(format!(
+                    "give `{label}` a value where the record is declared: `r({label} = …)`"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Members of a record and of its bases, each with the class it stands in.
+    fn members(
+        &self,
+        class: &Class,
+        into: &mut Vec<(Declaration, String)>,
+        depth: usize,
+    ) -> Result<()> {
+        if depth > MAX_DEPTH {
+            let message = format!("`{}` is made from itself", class.path);
+            return Err(Problem::new(class.name, message).hint("remove the `extends`"));
+        }
+        for base in &class.bases {
+            let from = into.len();
+            self.members(self.base(class, base.name)?, into, depth + 1)?;
+            for (member, _) in into.iter_mut().skip(from) {
+                modify(self.source, member, &base.modification);
+            }
+        }
+        let own = class.declarations.iter().cloned();
+        into.extend(own.map(|member| (member, class.path.clone())));
+        Ok(())
+    }
+}
+
+/// Applies what modifications say of a declaration, if they do; outer ones stand first and win.
+pub(super) fn modify(source: &str, declaration: &mut Declaration, modification: &[Attribute]) {
+    for given in modification.iter().rev() {
+        if plain(given.name.text(source)) != declaration.label {
+            continue;
+        }
+        if given.value.is_some() {
+            declaration.binding = given.value;
+        }
+        let own = std::mem::replace(&mut declaration.attributes, given.nested.clone());
+        inherit(source, &mut declaration.attributes, &own);
+    }
+}
+
+/// Adds attributes that are not given yet.
+pub(super) fn inherit(source: &str, attributes: &mut Vec<Attribute>, from: &[Attribute]) {
+    for attribute in from {
+        let name = attribute.name.text(source);
+        if attributes
+            .iter()
+            .all(|given| given.name.text(source) != name)
+        {
+            attributes.push(attribute.clone());
+        }
+    }
+}
+
+/// Refuses attributes that numbers do not have.
+pub(super) fn check_attributes(source: &str, attributes: &[Attribute]) -> Result<()> {
+    let stranger = |attribute: &&Attribute| !KNOWN.contains(&attribute.name.text(source));
+    match attributes.iter().find(stranger) {
+        None => Ok(()),
+        Some(found) => {
+            let text = shortened(found.name.text(source));
+            let message = format!("unknown attribute `{text}`");
+            let hint = format!("the attributes are {}", KNOWN.join(", "));
+            Err(Problem::new(found.name, message).hint(hint))
+        }
+    }
+}
+
+/// The label of the constant of a package: its name in full behind a dot, as no name of a model
+/// is written, so that neither can be taken for the other.
+pub(crate) fn constant_label(full: &str) -> String {
+    format!(".{full}")
+}
+
+impl Flattening<'_> {
+    pub(super) fn constants(&mut self) -> Result<()> {
+        let named = self.names();
+        let classes = self.classes;
+        let packages = classes
+            .iter()
+            .filter(|class| class.kind == ClassKind::Package);
+        for package in packages {
+            for constant in &package.declarations {
+                let full = format!("{}.{}", package.path, constant.label);
+                let label = constant_label(&full);
+                let is_constant = constant.prefix.variability != Variability::Continuous;
+                let meaning = meaning(&named, &full);
+                if !is_constant || meaning == Meaning::None || self.declared.contains(&label) {
+                    continue;
+                }
+                let mut copy = constant.clone();
+                copy.label.clone_from(&label);
+                copy.package = Some(package.path.clone());
+                copy.prefix.variability = Variability::Constant;
+                let declared = self.declaration(copy, &package.path);
+                // what nobody may mean must not end the reading
+                if meaning == Meaning::Possible {
+                    self.model.possible.insert(label);
+                } else {
+                    declared?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Names in the expressions of the text, as they are written and as imports have them in
+    /// full; with those of what they may be members of.
+    fn names(&self) -> HashSet<String> {
+        let mut imported: HashMap<&str, Vec<&str>> = HashMap::new();
+        for import in self.classes.iter().flat_map(|class| &class.imports) {
+            if let Some(short) = &import.short {
+                imported.entry(short).or_default().push(&import.full);
+            }
+        }
+        let mut found = HashSet::new();
+        for expression in &self.ast.expressions {
+            if !matches!(expression.kind, Kind::Name | Kind::Path(_)) {
+                continue;
+            }
+            let name = plain(expression.span.text(self.source));
+            let first = name.split('.').next().unwrap_or_default();
+            for full in imported.get(first).into_iter().flatten() {
+                insert(&mut found, &format!("{full}{}", &name[first.len()..]));
+            }
+            insert(&mut found, &name);
+        }
+        found
+    }
+}
+
+/// A name and the names before each of its dots.
+fn insert(names: &mut HashSet<String>, name: &str) {
+    let mut rest = Some(name);
+    while let Some(name) = rest {
+        if !names.insert(name.to_owned()) {
+            return;
+        }
+        rest = name.rsplit_once('.').map(|(above, _)| above);
+    }
+}
+
+/// Whether a constant is meant by a name of the text.
+#[derive(Clone, Copy, PartialEq)]
+enum Meaning {
+    None,
+    /// its last part stands there alone, which may be the name of a variable
+    Possible,
+    Certain,
+}
+
+/// The meaning of a name in full that stands in the text as it is, or behind one of its dots.
+fn meaning(names: &HashSet<String>, full: &str) -> Meaning {
+    let mut rest = full;
+    while let Some((_, below)) = rest.split_once('.') {
+        if names.contains(rest) {
+            return Meaning::Certain;
+        }
+        rest = below;
+    }
+    match names.contains(rest) {
+        true => Meaning::Possible,
+        false => Meaning::None,
+    }
+}
+
+/// The classes of a text by their names in full.
+#[derive(Debug, Default)]
+pub(crate) struct Classes<'a> {
+    by_path: HashMap<&'a str, usize>,
+    imports: HashMap<&'a str, &'a [Import]>,
+    /// last parts of the names that lead to classes
+    last: HashSet<&'a str>,
+    /// ordinals of the literals of enumerations, from 1
+    literals: HashMap<String, i64>,
+}
+
+impl<'a> Classes<'a> {
+    pub(crate) fn new(source: &str, classes: &'a [Class]) -> Self {
+        let mut index = Self::default();
+        for (place, class) in classes.iter().enumerate() {
+            index.by_path.entry(&class.path).or_insert(place);
+            index.last.insert(last(&class.path));
+            let shorts = class.imports.iter().filter_map(|i| i.short.as_deref());
+            index.last.extend(shorts);
+            if !class.imports.is_empty() {
+                index.imports.insert(&class.path, &class.imports);
+            }
+            for (ordinal, literal) in (1..).zip(&class.literals) {
+                let literal = plain(literal.text(source));
+                let name = format!("{}.{literal}", class.path);
+                index.literals.insert(name, ordinal);
+            }
+        }
+        index
+    }
+
+    /// The class that a name means in the first of some scopes that know it.
+    pub(crate) fn class(&self, name: &str, scopes: &[&str]) -> Option<usize> {
+        if !self.last.contains(last(name)) {
+            return None;
+        }
+        let candidates = self.full_names(name, scopes);
+        let mut found = candidates
+            .iter()
+            .map(|full| self.by_path.get(full.as_str()));
+        found.find_map(|place| place.copied())
+    }
+
+    /// The ordinal of a literal of an enumeration.
+    pub(crate) fn literal(&self, name: &str, scopes: &[&str]) -> Option<i64> {
+        if self.literals.is_empty() || !name.contains('.') {
+            return None;
+        }
+        let candidates = self.full_names(name, scopes);
+        candidates
+            .iter()
+            .find_map(|full| self.literals.get(full).copied())
+    }
+
+    /// What a name may be in full, nearest first.
+    pub(crate) fn full_names(&self, name: &str, scopes: &[&str]) -> Vec<String> {
+        let mut found = vec![];
+        let (first, rest) = match name.split_once('.') {
+            Some((first, rest)) => (first, Some(rest)),
+            None => (name, None),
+        };
+        for scope in scopes {
+            let mut around = Some(*scope).filter(|scope| !scope.is_empty());
+            while let Some(path) = around {
+                found.push(format!("{path}.{name}"));
+                for import in self.imports.get(path).copied().unwrap_or_default() {
+                    match &import.short {
+                        Some(short) if short == first => found.push(match rest {
+                            Some(rest) => format!("{}.{rest}", import.full),
+                            None => import.full.clone(),
+                        }),
+                        None => found.push(format!("{}.{name}", import.full)),
+                        _ => {}
+                    }
+                }
+                around = path.rsplit_once('.').map(|(above, _)| above);
+            }
+        }
+        found.push(name.to_owned());
+        found
+    }
+}
+
+fn last(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
 }

@@ -1,15 +1,140 @@
-//! The plant of a parsed model.
+//! What the names of a parsed model are (states, outputs, inputs, parameters), and its plant.
 
 use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::Node;
 
-use super::parser::Model as Syntax;
-use super::roles::Roles;
-use crate::elaborate::{Evaluator, Mode, Named, Scalar, Scope, budget};
+use super::parser::{Equation, Mention, Model as Syntax, is_elementary};
+use crate::diagnostic::{Problem, Result, Span};
+use crate::elaborate::{Evaluator, GivenNames, Mode};
+use crate::limits::{Budget, MAX_SCALARS, elaboration};
 use crate::names::did_you_mean;
-use crate::syntax::{Problem, Result, Span};
 use crate::{Attributes, LoadOptions, Model, Plant};
+
+/// What a name is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    State,
+    Output,
+    Input,
+    Parameter,
+}
+
+/// The names that no equation defines, where they first stand.
+#[derive(Debug, Default)]
+pub(super) struct Roles {
+    pub inputs: Vec<Span>,
+    pub parameters: Vec<Span>,
+}
+
+/// Says what every name is.
+pub(super) fn roles(source: &str, model: &Syntax) -> Result<Roles> {
+    let mut names = Names {
+        source,
+        known: HashMap::new(),
+        budget: Budget::new(MAX_SCALARS, "variables and parameters"),
+    };
+    for equation in &model.equations {
+        names.define(equation)?;
+    }
+    let mut roles = Roles::default();
+    for mention in &model.mentions {
+        match names.mention(*mention)? {
+            Some(Role::Input) => roles.inputs.push(mention.name),
+            Some(_) => roles.parameters.push(mention.name),
+            None => {}
+        }
+    }
+    Ok(roles)
+}
+
+/// Every name so far, with its role and where it first stands.
+struct Names<'s> {
+    source: &'s str,
+    known: HashMap<&'s str, (Role, Span)>,
+    budget: Budget,
+}
+
+impl<'s> Names<'s> {
+    fn insert(&mut self, name: Span, role: Role) -> Result<()> {
+        let text = name.text(self.source);
+        if text == "time" {
+            let problem = Problem::new(name, "`time` cannot be the name of a variable");
+            return Err(problem.hint("the time is `t`; choose another name for anything else"));
+        }
+        self.budget.charge(1, name)?;
+        self.known.insert(text, (role, name));
+        Ok(())
+    }
+
+    /// The name on a left side.
+    fn define(&mut self, equation: &Equation) -> Result<()> {
+        let name = equation.name;
+        let text = name.text(self.source);
+        if text == "t" || is_elementary(text) {
+            let problem = Problem::new(name, format!("`{text}` cannot be the name of a variable"));
+            return Err(problem.hint("choose another name"));
+        }
+        let role = match equation.is_derivative {
+            true => Role::State,
+            false => Role::Output,
+        };
+        match self.known.get(text) {
+            None => self.insert(name, role),
+            Some(&(other, place)) => Err(self.twice(name, role, other, place)),
+        }
+    }
+
+    fn twice(&self, name: Span, role: Role, other: Role, place: Span) -> Problem {
+        let text = name.text(self.source);
+        let line = place.line(self.source);
+        let label = format!("the other equation is on line {line}");
+        if role == other {
+            let problem = Problem::new(name, format!("`{text}` has two equations"));
+            return problem.label(label).hint("remove one of the two");
+        }
+        let message = format!("`{text}` is both a state and an output");
+        Problem::new(name, message).label(label).hint(format!(
+            "give the output a name of its own, as in `y_{text}(t) = {text}(t)`"
+        ))
+    }
+
+    /// The role of a name on a right side, where it is new.
+    fn mention(&mut self, mention: Mention) -> Result<Option<Role>> {
+        let Mention { name, is_function } = mention;
+        let text = name.text(self.source);
+        let role = match is_function {
+            true => Role::Input,
+            false => Role::Parameter,
+        };
+        match self.known.get(text).copied() {
+            None if text == "t" => Err(Problem::new(name, "`t` is the time, not a function of it")),
+            None => self.insert(name, role).map(|()| Some(role)),
+            Some((Role::Output, _)) => Err(self.output_on_the_right(name)),
+            Some((known, place)) if is_function == (known == Role::Parameter) => {
+                Err(self.with_and_without_time(name, place))
+            }
+            Some(_) => Ok(None),
+        }
+    }
+
+    fn output_on_the_right(&self, name: Span) -> Problem {
+        let text = name.text(self.source);
+        let message = format!("the output `{text}` stands on a right side");
+        Problem::new(name, message).hint(format!(
+            "write what `{text}(t)` is equal to, in states, inputs and parameters"
+        ))
+    }
+
+    fn with_and_without_time(&self, name: Span, place: Span) -> Problem {
+        let text = name.text(self.source);
+        let message = format!("`{text}` stands with and without `(t)`");
+        let label = format!("the other one is on line {}", place.line(self.source));
+        Problem::new(name, message).label(label).hint(format!(
+            "write `{text}(t)` everywhere for a function of time, `{text}` for a parameter"
+        ))
+    }
+}
 
 /// Makes the plant.
 pub(super) fn plant(
@@ -21,19 +146,16 @@ pub(super) fn plant(
 ) -> Result<Plant> {
     check_given(source, syntax, roles, options)?;
     let model = Model::new(name);
-    let mut names = Names {
-        nodes: HashMap::new(),
-        time: model.time().node(),
-    };
+    let mut nodes: HashMap<&str, Node> = HashMap::from([("t", model.time().node())]);
     let states = syntax.equations.iter().filter(|e| e.is_derivative);
     for span in states.map(|equation| equation.name) {
         let text = span.text(source);
         let state = model.state(text, Attributes::default());
-        names.nodes.insert(text, state.node());
+        nodes.insert(text, state.node());
     }
     for text in roles.inputs.iter().map(|span| span.text(source)) {
         let input = model.input(text, Attributes::default());
-        names.nodes.insert(text, input.node());
+        nodes.insert(text, input.node());
     }
     for span in &roles.parameters {
         let text = span.text(source);
@@ -46,19 +168,26 @@ pub(super) fn plant(
             (Some(value), false) => model.graph().constant(value).node(),
             (None, false) => return Err(no_value(text, *span)),
         };
-        names.nodes.insert(text, node);
+        nodes.insert(text, node);
     }
-    equations(source, syntax, &model, &names)?;
+    equations(source, syntax, &model, &nodes)?;
     model
         .finish()
         .map_err(|error| Problem::new(syntax.head, error.to_string()))
 }
 
 /// Evaluates the right sides.
-fn equations(source: &str, syntax: &Syntax, model: &Model, names: &Names<'_>) -> Result<()> {
-    let (graph, budget) = (model.graph(), budget());
+fn equations(
+    source: &str,
+    syntax: &Syntax,
+    model: &Model,
+    nodes: &HashMap<&str, Node>,
+) -> Result<()> {
+    let (graph, budget) = (model.graph(), elaboration());
+    let names = &|name: &str| nodes.get(name).copied();
+    let names = GivenNames { graph, names };
     let mode = Mode::Continuous;
-    let mut evaluator = Evaluator::new(source, &syntax.ast, graph, &budget, names, mode);
+    let mut evaluator = Evaluator::new(source, &syntax.ast, graph, &budget, &names, mode);
     for equation in &syntax.equations {
         let text = equation.name.text(source);
         let value = evaluator.scalar(equation.right)?.real(graph);
@@ -102,36 +231,4 @@ fn check_given(source: &str, syntax: &Syntax, roles: &Roles, options: &LoadOptio
 fn no_value(name: &str, span: Span) -> Problem {
     Problem::new(span, format!("parameter `{name}` has no value"))
         .hint("this notation has no values: give them on loading")
-}
-
-/// What names mean on right sides.
-struct Names<'s> {
-    nodes: HashMap<&'s str, Node>,
-    time: Node,
-}
-
-impl Scope for Names<'_> {
-    fn named(&self, name: &str, _mode: Mode) -> Named<'_> {
-        let time = || (name == "t").then_some(self.time);
-        match self.nodes.get(name).copied().or_else(time) {
-            Some(node) => Named::Scalar(Scalar::Real(node)),
-            None => Named::Unknown,
-        }
-    }
-
-    fn dims(&self, _name: &str) -> Option<&[usize]> {
-        None
-    }
-
-    fn derivative(&self, _variable: Node) -> Option<Node> {
-        None
-    }
-
-    fn names(&self) -> Vec<&str> {
-        self.nodes.keys().copied().collect()
-    }
-
-    fn time(&self, _mode: Mode) -> Option<Node> {
-        Some(self.time)
-    }
 }

@@ -1,23 +1,20 @@
 //! Models in the notation of `@ODEmodel`, as StructuralIdentifiability.jl reads them.
 //!
-//! A file is a Julia script. [`scan`] finds where its models begin; one of them is parsed into
+//! A file is a Julia script. [`lexer`] finds where its models begin; one of them is parsed into
 //! the syntax tree that Modelica has as well, so that its expressions are evaluated by the same
-//! rules. [`roles`] says what its names are, [`build`] makes the plant.
+//! rules. [`build`] says what its names are and makes the plant.
 
 mod build;
-mod characters;
-mod expressions;
 mod lexer;
 mod parser;
-mod roles;
-mod scan;
 
 use std::path::Path;
 
-use crate::choose::choose;
-use crate::syntax::{Problem, Result, Span, check_length};
+use crate::diagnostic::{Problem, Result, Span};
+use crate::names::choose;
+use crate::syntax::check_length;
 use crate::{LoadOptions, Plant};
-use scan::Head;
+use lexer::Head;
 
 /// The plant of a text.
 pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Result<Plant> {
@@ -38,7 +35,7 @@ pub(crate) fn plant(source: &str, file_name: &str, options: &LoadOptions) -> Res
         return Err(Problem::new(*other, message).hint(hint));
     }
     let model = parser::parse(source, head)?;
-    let roles = roles::assign(source, &model)?;
+    let roles = build::roles(source, &model)?;
     build::plant(source, chosen, &model, &roles, options)
 }
 
@@ -51,7 +48,7 @@ pub(crate) fn names(source: &str, file_name: &str) -> Result<Vec<String>> {
 
 fn heads(source: &str) -> Result<Vec<Head>> {
     check_length(source)?;
-    scan::heads(source)
+    lexer::heads(source)
 }
 
 /// What a model without a name is called.

@@ -1,7 +1,7 @@
 //! The syntax tree. Expressions live in one arena: a chain of a million terms is flat,
 //! and nothing here needs deep recursion to be read or dropped.
 
-use super::Span;
+use crate::diagnostic::Span;
 
 /// Index of an expression in [`Ast::expressions`]; operands come before their users.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

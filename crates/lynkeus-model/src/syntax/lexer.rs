@@ -1,8 +1,111 @@
-//! Text to tokens, one at a time, so that memory does not grow with the text.
+//! Text to tokens, one at a time, so that memory does not grow with the text; and what the text
+//! of a token means.
 
-use super::token::{Keyword, Symbol, Token};
-use super::{Problem, Result, Span};
+use std::borrow::Cow;
+
+use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_NAME;
+
+/// One token; its text is the source under its span.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Token {
+    Identifier,
+    Integer,
+    Real,
+    Text,
+    Keyword(Keyword),
+    Symbol(Symbol),
+    /// the end of the text
+    End,
+}
+
+macro_rules! words {
+    ($(#[$doc:meta])* $kind:ident, $($name:ident = $text:literal),* $(,)?) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum $kind { $($name),* }
+
+        impl $kind {
+            /// How it is written.
+            pub(crate) fn text(self) -> &'static str {
+                match self { $(Self::$name => $text),* }
+            }
+
+            /// Every one, with how it is written.
+            pub(crate) const ALL: &[(&'static str, Self)] = &[$(($text, Self::$name)),*];
+        }
+    };
+}
+
+words! {
+    /// Reserved words.
+    Keyword,
+    Algorithm = "algorithm", And = "and", Annotation = "annotation", Block = "block",
+    Break = "break", Class = "class", Connect = "connect", Connector = "connector",
+    Constant = "constant", Constrainedby = "constrainedby", Der = "der", Discrete = "discrete",
+    Each = "each", Else = "else", Elseif = "elseif", Elsewhen = "elsewhen",
+    Encapsulated = "encapsulated", End = "end", Enumeration = "enumeration",
+    Equation = "equation", Expandable = "expandable", Extends = "extends",
+    External = "external", False = "false", Final = "final", Flow = "flow", For = "for",
+    Function = "function", If = "if", Import = "import", Impure = "impure", In = "in",
+    Initial = "initial", Inner = "inner", Input = "input", Loop = "loop", Model = "model",
+    Not = "not", Operator = "operator", Or = "or", Outer = "outer", Output = "output",
+    Package = "package", Parameter = "parameter", Partial = "partial", Protected = "protected",
+    Public = "public", Pure = "pure", Record = "record", Redeclare = "redeclare",
+    Replaceable = "replaceable", Return = "return", Stream = "stream", Then = "then",
+    True = "true", Type = "type", When = "when", While = "while", Within = "within",
+}
+
+words! {
+    /// Operators and punctuation; longer ones first.
+    Symbol,
+    ElementPlus = ".+", ElementMinus = ".-", ElementTimes = ".*", ElementOver = "./",
+    ElementPower = ".^", Assign = ":=", NotEqual = "<>", LessEqual = "<=",
+    GreaterEqual = ">=", EqualEqual = "==", Plus = "+", Minus = "-", Times = "*", Over = "/",
+    Power = "^", Equal = "=", Less = "<", Greater = ">", OpenParen = "(", CloseParen = ")",
+    OpenBracket = "[", CloseBracket = "]", OpenBrace = "{", CloseBrace = "}", Comma = ",",
+    Semicolon = ";", Colon = ":", Dot = ".",
+}
+
+impl Token {
+    /// How a message names it.
+    pub(crate) fn describe(self, text: &str) -> String {
+        match self {
+            Token::Identifier | Token::Integer | Token::Real => format!("`{}`", shortened(text)),
+            Token::Text => "a string".to_owned(),
+            Token::Keyword(keyword) => format!("`{}`", keyword.text()),
+            Token::Symbol(symbol) => format!("`{}`", symbol.text()),
+            Token::End => "the end of the text".to_owned(),
+        }
+    }
+}
+
+/// At most 40 characters of a text.
+pub(crate) fn shortened(text: &str) -> String {
+    match text.char_indices().nth(40) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// The text of a string token without quotes and escapes.
+pub(crate) fn unquoted(token: &str) -> String {
+    let inner = token.strip_prefix('"').unwrap_or(token);
+    let inner = inner.strip_suffix('"').unwrap_or(inner);
+    let mut text = String::with_capacity(inner.len());
+    let mut characters = inner.chars();
+    while let Some(character) = characters.next() {
+        match character {
+            '\\' => text.extend(characters.next().map(|escaped| match escaped {
+                'n' => '\n',
+                't' => '\t',
+                other => other,
+            })),
+            other => text.push(other),
+        }
+    }
+    text
+}
 
 /// Reads tokens from a text.
 #[derive(Clone)]
@@ -164,6 +267,42 @@ fn is_name_part(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'$'
 }
 
+/// A name without quotes, blanks and a leading dot: `'r1.p.v'`, `'r1'.'p'.v` and `r1.p.v` are
+/// one name.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    let is_plain = |byte: u8| byte != b'\'' && byte != b'/' && !byte.is_ascii_whitespace();
+    let text = text.strip_prefix('.').unwrap_or(text);
+    if text.bytes().all(is_plain) {
+        return Cow::Borrowed(text);
+    }
+    if let Some(inner) = text.strip_prefix('\'').and_then(|t| t.strip_suffix('\''))
+        && !inner.contains('\'')
+    {
+        return Cow::Borrowed(inner);
+    }
+    Cow::Owned(without_quotes(text))
+}
+
+fn without_quotes(text: &str) -> String {
+    let mut name = String::with_capacity(text.len());
+    let (mut quoted, mut comment) = (false, false);
+    let mut characters = text.chars().peekable();
+    while let Some(character) = characters.next() {
+        match character {
+            '\'' if !comment => quoted = !quoted,
+            _ if quoted => name.push(character),
+            '/' if !comment && characters.peek() == Some(&'*') => comment = true,
+            '*' if comment && characters.peek() == Some(&'/') => {
+                comment = false;
+                characters.next();
+            }
+            _ if comment || character.is_whitespace() => {}
+            _ => name.push(character),
+        }
+    }
+    name
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,5 +370,21 @@ mod tests {
         for text in ["\0", "θ", "#", "2x"] {
             assert!(Lexer::new(text).next().is_err(), "{text:?}");
         }
+    }
+
+    #[test]
+    fn quotes_blanks_and_comments_are_no_part_of_a_name() {
+        for text in [
+            "r1.p.v",
+            "'r1.p.v'",
+            "'r1'.'p'.'v'",
+            ".r1 . p.v",
+            "r1./* a */p.v",
+        ] {
+            assert_eq!(plain(text), "r1.p.v", "{text}");
+        }
+        assert_eq!(plain("'m[1].x'"), "m[1].x");
+        assert_eq!(plain("m[1] .x"), "m[1].x");
+        assert_eq!(plain("'a b'"), "a b");
     }
 }

@@ -1,9 +1,9 @@
 //! The parser's hands: the current token, what may come next, and the limits.
 
 use super::ast::{Ast, ExprId, Expression, Kind};
-use super::lexer::Lexer;
-use super::token::{Keyword, Symbol, Token};
-use super::{Problem, Result, Span};
+use super::lexer::unquoted;
+use super::lexer::{Keyword, Lexer, Symbol, Token};
+use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
 
 /// Recursive-descent parser with one token of lookahead.
@@ -281,23 +281,4 @@ impl<'s> Parser<'s> {
             }
         }
     }
-}
-
-/// The text of a string token without quotes and escapes.
-pub(crate) fn unquoted(token: &str) -> String {
-    let inner = token.strip_prefix('"').unwrap_or(token);
-    let inner = inner.strip_suffix('"').unwrap_or(inner);
-    let mut text = String::with_capacity(inner.len());
-    let mut characters = inner.chars();
-    while let Some(character) = characters.next() {
-        match character {
-            '\\' => text.extend(characters.next().map(|escaped| match escaped {
-                'n' => '\n',
-                't' => '\t',
-                other => other,
-            })),
-            other => text.push(other),
-        }
-    }
-    text
 }

@@ -1,11 +1,296 @@
-//! Walks equations and compares the units of what is added, equated or compared.
+//! Consistency of units where they are declared. What is not declared fits everything; nothing
+//! is ever converted.
 
 use std::collections::HashMap;
 
-use super::Unit;
+use crate::diagnostic::{Problem, Span};
 use crate::flat::FlatModel;
 use crate::syntax::ast::{Ast, BinaryOperator, Call, Equation, EquationKind, ExprId, Kind};
-use crate::syntax::{Problem, Span, plain, unquoted};
+use crate::syntax::{plain, unquoted};
+
+/// Powers of kg, m, s, A, K, mol and cd.
+const BASE: [&str; 7] = ["kg", "m", "s", "A", "K", "mol", "cd"];
+
+/// A unit in SI base units: `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseUnit {
+    /// powers of kg, m, s, A, K, mol and cd
+    pub powers: [i32; 7],
+    /// how many of the base unit one of it is
+    pub factor: f64,
+    /// where its zero lies, in the base unit
+    pub offset: f64,
+}
+
+impl BaseUnit {
+    /// A unit as Modelica writes it (`kg.m2/s`, `degC`); none where a part is not known.
+    pub fn of(text: &str) -> Option<Self> {
+        let unit = Unit::parse(text)?;
+        // the readers' powers are products of whole numbers
+        let powers = unit.powers.map(|power| power as i32);
+        Some(Self {
+            powers,
+            factor: unit.scale,
+            offset: if unit.has_offset { 273.15 } else { 0.0 },
+        })
+    }
+}
+
+/// A unit over the base units.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unit {
+    powers: [f64; 7],
+    /// how many of the base unit one of it is
+    scale: f64,
+    /// power of the model's own unit of time, which `der` divides by
+    ticks: f64,
+    /// counts from another zero: a degree Celsius
+    has_offset: bool,
+    /// as it is written, where it is
+    text: Option<String>,
+}
+
+impl Unit {
+    pub(super) fn one() -> Self {
+        Self {
+            powers: [0.0; 7],
+            scale: 1.0,
+            ticks: 0.0,
+            has_offset: false,
+            text: None,
+        }
+    }
+
+    /// A unit as Modelica writes it: `kg.m2/s`, `J/(kg.K)`; `None` where a part is not known.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let characters: Vec<char> = text.chars().filter(|c| !c.is_whitespace()).collect();
+        if characters.is_empty() {
+            return None;
+        }
+        let mut reader = Reader {
+            characters: &characters,
+            next: 0,
+            depth: 0,
+        };
+        let mut unit = reader.product()?;
+        if reader.next != characters.len() {
+            return None;
+        }
+        unit.text = Some(text.to_owned());
+        Some(unit)
+    }
+
+    pub(super) fn times(&self, other: &Self, power: f64) -> Option<Self> {
+        if self.has_offset || other.has_offset {
+            return None;
+        }
+        let mut product = Self {
+            scale: self.scale * other.scale.powf(power),
+            ticks: self.ticks + power * other.ticks,
+            ..Self::one()
+        };
+        for (place, slot) in product.powers.iter_mut().enumerate() {
+            *slot = self.powers[place] + power * other.powers[place];
+        }
+        Some(product)
+    }
+
+    /// A difference of degrees Celsius is one of kelvin.
+    pub(super) fn difference(&self) -> Self {
+        Self {
+            has_offset: false,
+            text: None,
+            ..self.clone()
+        }
+    }
+
+    /// A part of time, behind `der`.
+    pub(super) fn per_tick(&self) -> Option<Self> {
+        let mut rate = self.difference();
+        rate.ticks -= 1.0;
+        rate.powers[2] -= 1.0;
+        Some(rate)
+    }
+
+    pub(super) fn is_pure_number(&self) -> bool {
+        self.powers.iter().all(|power| power.abs() < 1e-9)
+    }
+
+    fn same_dimension(&self, other: &Self) -> bool {
+        let pairs = self.powers.iter().zip(&other.powers);
+        pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9)
+    }
+
+    pub(super) fn describe(&self) -> String {
+        if let Some(text) = &self.text {
+            return text.clone();
+        }
+        let mut parts = vec![];
+        for (name, power) in BASE.iter().zip(&self.powers) {
+            if power.abs() > 1e-9 {
+                parts.push(match *power == 1.0 {
+                    true => (*name).to_owned(),
+                    false => format!("{name}{power}"),
+                });
+            }
+        }
+        let product = match parts.is_empty() {
+            true => "1".to_owned(),
+            false => parts.join("."),
+        };
+        match (self.scale - 1.0).abs() < 1e-12 {
+            true => product,
+            false => format!("{} {product}", self.scale),
+        }
+    }
+}
+
+struct Reader<'c> {
+    characters: &'c [char],
+    next: usize,
+    depth: usize,
+}
+
+impl Reader<'_> {
+    fn peek(&self) -> Option<char> {
+        self.characters.get(self.next).copied()
+    }
+
+    fn product(&mut self) -> Option<Unit> {
+        let mut unit = self.factor()?;
+        while let Some(operator) = self.peek() {
+            let power = match operator {
+                '.' | '*' => 1.0,
+                '/' => -1.0,
+                _ => break,
+            };
+            self.next += 1;
+            unit = unit.times(&self.factor()?, power)?;
+        }
+        Some(unit)
+    }
+
+    fn factor(&mut self) -> Option<Unit> {
+        if self.peek() == Some('(') {
+            self.depth += 1;
+            if self.depth > 20 {
+                return None;
+            }
+            self.next += 1;
+            let inner = self.product()?;
+            self.depth -= 1;
+            if self.peek() != Some(')') {
+                return None;
+            }
+            self.next += 1;
+            return Some(inner);
+        }
+        if self.peek() == Some('1') {
+            self.next += 1;
+            return Some(Unit::one());
+        }
+        let start = self.next;
+        while self.peek().is_some_and(char::is_alphabetic) {
+            self.next += 1;
+        }
+        let name: String = self.characters[start..self.next].iter().collect();
+        let unit = symbol(&name)?;
+        match self.exponent()? {
+            1.0 => Some(unit),
+            power => Unit::one().times(&unit, power),
+        }
+    }
+
+    /// `2`, `-1` or `^2`; 1 where there is none.
+    fn exponent(&mut self) -> Option<f64> {
+        if self.peek() == Some('^') {
+            self.next += 1;
+        }
+        let start = self.next;
+        if matches!(self.peek(), Some('-' | '+')) {
+            self.next += 1;
+        }
+        while self.peek().is_some_and(|c| c.is_ascii_digit()) {
+            self.next += 1;
+        }
+        let text: String = self.characters[start..self.next].iter().collect();
+        match text.is_empty() {
+            true => Some(1.0),
+            false => text.parse().ok().filter(|power: &f64| power.abs() < 20.0),
+        }
+    }
+}
+
+/// Symbols with their powers and their size in base units.
+const SYMBOLS: [(&str, [i8; 7], f64); 33] = [
+    ("g", [1, 0, 0, 0, 0, 0, 0], 1e-3),
+    ("m", [0, 1, 0, 0, 0, 0, 0], 1.0),
+    ("s", [0, 0, 1, 0, 0, 0, 0], 1.0),
+    ("A", [0, 0, 0, 1, 0, 0, 0], 1.0),
+    ("K", [0, 0, 0, 0, 1, 0, 0], 1.0),
+    ("mol", [0, 0, 0, 0, 0, 1, 0], 1.0),
+    ("cd", [0, 0, 0, 0, 0, 0, 1], 1.0),
+    ("rad", [0; 7], 1.0),
+    ("deg", [0; 7], std::f64::consts::PI / 180.0),
+    ("sr", [0; 7], 1.0),
+    ("min", [0, 0, 1, 0, 0, 0, 0], 60.0),
+    ("h", [0, 0, 1, 0, 0, 0, 0], 3600.0),
+    ("d", [0, 0, 1, 0, 0, 0, 0], 86400.0),
+    ("Hz", [0, 0, -1, 0, 0, 0, 0], 1.0),
+    ("N", [1, 1, -2, 0, 0, 0, 0], 1.0),
+    ("Pa", [1, -1, -2, 0, 0, 0, 0], 1.0),
+    ("bar", [1, -1, -2, 0, 0, 0, 0], 1e5),
+    ("J", [1, 2, -2, 0, 0, 0, 0], 1.0),
+    ("Wh", [1, 2, -2, 0, 0, 0, 0], 3600.0),
+    ("W", [1, 2, -3, 0, 0, 0, 0], 1.0),
+    ("C", [0, 0, 1, 1, 0, 0, 0], 1.0),
+    ("Ah", [0, 0, 1, 1, 0, 0, 0], 3600.0),
+    ("V", [1, 2, -3, -1, 0, 0, 0], 1.0),
+    ("F", [-1, -2, 4, 2, 0, 0, 0], 1.0),
+    ("Ohm", [1, 2, -3, -2, 0, 0, 0], 1.0),
+    ("S", [-1, -2, 3, 2, 0, 0, 0], 1.0),
+    ("Wb", [1, 2, -2, -1, 0, 0, 0], 1.0),
+    ("T", [1, 0, -2, -1, 0, 0, 0], 1.0),
+    ("H", [1, 2, -2, -2, 0, 0, 0], 1.0),
+    ("l", [0, 3, 0, 0, 0, 0, 0], 1e-3),
+    ("L", [0, 3, 0, 0, 0, 0, 0], 1e-3),
+    ("t", [1, 0, 0, 0, 0, 0, 0], 1e3),
+    ("Bq", [0, 0, -1, 0, 0, 0, 0], 1.0),
+];
+
+const PREFIXES: [(&str, f64); 11] = [
+    ("da", 1e1),
+    ("T", 1e12),
+    ("G", 1e9),
+    ("M", 1e6),
+    ("k", 1e3),
+    ("d", 1e-1),
+    ("c", 1e-2),
+    ("m", 1e-3),
+    ("u", 1e-6),
+    ("n", 1e-9),
+    ("p", 1e-12),
+];
+
+fn symbol(name: &str) -> Option<Unit> {
+    if name == "degC" {
+        let mut celsius = symbol("K")?;
+        celsius.has_offset = true;
+        return Some(celsius);
+    }
+    let whole = |name: &str, factor: f64| {
+        let (_, powers, scale) = SYMBOLS.iter().find(|(symbol, ..)| *symbol == name)?;
+        Some(Unit {
+            powers: powers.map(f64::from),
+            scale: scale * factor,
+            ..Unit::one()
+        })
+    };
+    whole(name, 1.0).or_else(|| {
+        let mut prefixes = PREFIXES.iter();
+        prefixes.find_map(|(prefix, factor)| whole(name.strip_prefix(prefix)?, *factor))
+    })
+}
 
 /// Most warnings of one text.
 const MOST: usize = 20;
@@ -269,6 +554,53 @@ impl Walk<'_> {
                 None
             }
             _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base_units_of_texts() {
+        let celsius = BaseUnit::of("degC").unwrap();
+        assert_eq!((celsius.factor, celsius.offset), (1.0, 273.15));
+        let flow = BaseUnit::of("l/min").unwrap();
+        assert_eq!(flow.powers, [0, 3, -1, 0, 0, 0, 0]);
+        assert!((flow.factor - 1e-3 / 60.0).abs() < 1e-18 && flow.offset == 0.0);
+        assert_eq!(BaseUnit::of("cells"), None);
+    }
+
+    #[test]
+    fn units_over_the_base_units() {
+        for (text, same, scale) in [
+            ("N", "kg.m/s2", 1.0),
+            ("J/(kg.K)", "m2.s-2/K", 1.0),
+            ("kW.h", "J", 3.6e6),
+            ("mV", "W/A", 1e-3),
+            ("rad/s", "1/s", 1.0),
+            ("km/h", "m/s", 1.0 / 3.6),
+            ("Ohm.F", "s", 1.0),
+            ("V.s", "Wb", 1.0),
+        ] {
+            let (one, other) = (Unit::parse(text).unwrap(), Unit::parse(same).unwrap());
+            assert!(one.same_dimension(&other), "{text} {same}");
+            assert!(
+                (one.scale / other.scale - scale).abs() < 1e-12 * scale,
+                "{text} {same}"
+            );
+        }
+        for text in [
+            "cells",
+            "%",
+            "kg.",
+            "/s",
+            "m/(s",
+            "",
+            "((((((((((((((((((((((((s",
+        ] {
+            assert_eq!(Unit::parse(text), None, "{text}");
         }
     }
 }

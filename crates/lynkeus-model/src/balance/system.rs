@@ -1,10 +1,83 @@
-//! Which unknowns each equation contains.
+//! Equations, what they must determine, and which unknowns each of them contains.
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Node, Op};
+use lynkeus_expr::{Graph, Interval, Node, Op};
 
-use super::System;
+use crate::diagnostic::Span;
+
+/// An equation between two expressions.
+#[derive(Clone, Debug)]
+pub(crate) struct FlatEquation {
+    pub left: Node,
+    pub right: Node,
+    pub span: Span,
+    /// which element of an array equation this is, as `[2]`
+    pub element: Option<String>,
+}
+
+/// Something that the equations must determine.
+#[derive(Clone, Debug)]
+pub(crate) struct Unknown {
+    pub symbol: Node,
+    /// name of the variable; of the state, where the unknown is its derivative
+    pub name: String,
+    /// where the variable is declared
+    pub span: Span,
+    /// the state, where the unknown is its derivative
+    pub state: Option<Node>,
+    /// how much it is wanted as a state, where there is a choice
+    pub rank: i32,
+    /// where the search begins, if its equation has to be solved by one
+    pub start: f64,
+    /// where it may lie
+    pub range: Interval,
+}
+
+impl Unknown {
+    /// Whether something is known of where its value lies.
+    pub(super) fn is_declared(&self) -> bool {
+        self.start != 0.0 || self.range.lo().is_finite() || self.range.hi().is_finite()
+    }
+
+    /// `` `x` `` or `` `der(x)` ``
+    pub(super) fn quoted(&self) -> String {
+        match self.state {
+            Some(_) => format!("`der({})`", self.name),
+            None => format!("`{}`", self.name),
+        }
+    }
+}
+
+/// `` `a`, `b`, … ``
+pub(super) fn listed<'a>(unknowns: impl Iterator<Item = &'a Unknown>) -> String {
+    let mut names: Vec<String> = unknowns.take(9).map(Unknown::quoted).collect();
+    let more = if names.len() > 8 { ", …" } else { "" };
+    names.truncate(8);
+    format!("{}{more}", names.join(", "))
+}
+
+/// The equations and what they must determine.
+pub(crate) struct System<'a> {
+    pub graph: &'a Graph,
+    pub equations: &'a [FlatEquation],
+    pub unknowns: &'a [Unknown],
+    pub inputs: &'a [Node],
+    pub time: Node,
+}
+
+/// "line 4" or "lines 4, 5 and 9".
+pub(super) fn lines(source: &str, spans: impl Iterator<Item = Span>) -> String {
+    let mut numbers: Vec<usize> = spans.take(8).map(|span| span.line(source)).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let words: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    match words.split_last() {
+        None => "no line".to_owned(),
+        Some((only, [])) => format!("line {only}"),
+        Some((last, before)) => format!("lines {} and {last}", before.join(", ")),
+    }
+}
 
 /// The pattern of a system.
 pub(super) struct Incidence {
