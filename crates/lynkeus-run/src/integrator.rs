@@ -1,6 +1,7 @@
 //! One integrator for every method, stopping at every switch.
 
-use crate::adaptive::{Adaptive, Choice, resolution};
+use crate::adaptive::Adaptive;
+use crate::method::resolution;
 use crate::relays::{Sides, Switched};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Method, Rk4, Step, spectral_radius};
@@ -81,12 +82,12 @@ impl Integrator {
     /// [`Error::Setting`] if a number of the method is impossible.
     pub fn new(method: Method, dimension: usize) -> Result<Self, Error> {
         method.check()?;
-        let adaptive =
-            |choice, tolerances| Stepper::Adaptive(Box::new(Adaptive::new(choice, tolerances)));
         let stepper = match method {
-            Method::Adaptive(tolerances) => adaptive(Choice::Auto, tolerances),
-            Method::Explicit(tolerances) => adaptive(Choice::Explicit, tolerances),
-            Method::Stiff(tolerances) => adaptive(Choice::Stiff, tolerances),
+            Method::Adaptive(tolerances)
+            | Method::Explicit(tolerances)
+            | Method::Stiff(tolerances) => {
+                Stepper::Adaptive(Box::new(Adaptive::new(method, tolerances)))
+            }
             Method::Rk4(step) => Stepper::Fixed(Fixed {
                 step,
                 rk4: Rk4::new(dimension),

@@ -12,8 +12,8 @@ use super::Belief;
 use super::nodes::{FINE, Lobatto, ODD, meets};
 use super::spanned::Entry;
 use super::taylor::{Moments, Series};
-use crate::adaptive::resolution;
 use crate::driven::Driven;
+use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::{Dynamics, Error, Integrator, Method};
 

@@ -5,7 +5,7 @@ use super::guard::{Along, Guard, Guards, Input};
 use super::path::{Path, Poly, Stretch};
 use super::{REACHED, Switched};
 use crate::Dynamics;
-use crate::adaptive::resolution;
+use crate::method::resolution;
 
 /// The solution between two points, as the step found it.
 pub(crate) struct Span<'a> {
