@@ -13,8 +13,8 @@ use super::nodes::{FINE, Lobatto, ODD, meets};
 use super::spanned::Entry;
 use super::taylor::{Moments, Series};
 use crate::adaptive::resolution;
-use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Dynamics, Error, Integrator, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.

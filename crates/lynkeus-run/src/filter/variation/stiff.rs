@@ -2,9 +2,9 @@
 
 use super::{Piece, Variation};
 use crate::adaptive::resolution;
-use crate::driven::Driven;
 use crate::filter::doubling::Dense;
 use crate::filter::taylor::Moments;
+use crate::system::Driven;
 use crate::{Dynamics, Error};
 
 /// What the covariance of a stiff flow may be wrong by at least.
