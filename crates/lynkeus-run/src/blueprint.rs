@@ -2,7 +2,7 @@
 
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
-use crate::spectral::fastest;
+use crate::jacobian::fastest;
 use crate::system::Evaluation;
 use crate::{
     Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,

@@ -1,6 +1,7 @@
-//! When an estimate counts as diverged.
+//! Runs of an observer that end: an estimate that diverges, a matrix that is singular.
 
 use crate::Error;
+use crate::error::{digits, state_text};
 use crate::snapshot::{Damaged, Persist, Walk};
 
 /// An estimate this many times larger than anything seen is no estimate.
@@ -67,5 +68,109 @@ pub(crate) fn deviation_diverged(time: f64, name: &str, value: f64) -> Error {
 impl Persist for Bound {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.number(&mut self.scale)
+    }
+}
+
+/// An output of a system that says how far a matrix is from singular: its reciprocal condition
+/// number, which a run that cannot go on is judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Margin {
+    /// its place among the outputs
+    pub output: usize,
+    /// what people call it
+    pub name: String,
+    /// what the matrix is called
+    pub matrix: String,
+    /// below this it is close to singular
+    pub below: f64,
+    /// what that means, and what to do
+    pub meaning: String,
+}
+
+/// An estimate so many times larger than all that was seen is on its way to infinity, whatever ends
+/// the run.
+const RUN_AWAY: f64 = 1e6;
+
+/// Where a run of an observer ended.
+pub(crate) struct Place<'a> {
+    /// names of the observer's states
+    pub names: &'a [String],
+    /// its state there
+    pub x: &'a [f64],
+    /// the largest number among starts and signals
+    pub scale: f64,
+    /// the margins with their values there
+    pub margins: &'a [(&'a Margin, f64)],
+}
+
+impl Place<'_> {
+    /// The margin that is furthest below its limit.
+    fn closest(&self) -> Option<&(&Margin, f64)> {
+        let low = self.margins.iter().filter(|(m, value)| *value < m.below);
+        low.min_by(|a, b| (a.1 / a.0.below).total_cmp(&(b.1 / b.0.below)))
+    }
+
+    /// An integration that could not go on, by its cause: an estimate on its way to infinity, or
+    /// a matrix that is singular at the estimate. Other errors stay.
+    pub fn explained(&self, error: Error) -> Error {
+        let time = match &error {
+            Error::StepBudget { time, .. }
+            | Error::StepUnderflow { time, .. }
+            | Error::TooStiff { time, .. } => *time,
+            Error::Diverged { .. } => return self.with_hint(error),
+            _ => return error,
+        };
+        let far = RUN_AWAY * self.scale;
+        let largest =
+            (0..self.x.len()).max_by(|&i, &j| self.x[i].abs().total_cmp(&self.x[j].abs()));
+        let away = largest.filter(|&i| self.x[i].abs() > far);
+        if let Some(i) = away {
+            let name = self.names.get(i).cloned().unwrap_or_default();
+            return self.with_hint(Error::Diverged {
+                time,
+                name,
+                value: self.x[i],
+                hint: String::new(),
+            });
+        }
+        match self.closest() {
+            None => error,
+            Some((margin, value)) => Error::Singular {
+                time,
+                matrix: margin.matrix.clone(),
+                name: margin.name.clone(),
+                value: *value,
+                below: margin.below,
+                meaning: margin.meaning.clone(),
+                state: state_text(self.names, self.x),
+            },
+        }
+    }
+
+    /// A divergence beside a singular matrix says so.
+    fn with_hint(&self, error: Error) -> Error {
+        match (error, self.closest()) {
+            (
+                Error::Diverged {
+                    time,
+                    name,
+                    value,
+                    hint,
+                },
+                Some((margin, at)),
+            ) => Error::Diverged {
+                time,
+                name,
+                value,
+                hint: format!(
+                    "{hint}; {} is close to singular there ({} = {}): {}",
+                    margin.matrix,
+                    margin.name,
+                    digits(*at),
+                    margin.meaning
+                ),
+            },
+            (error, _) => error,
+        }
     }
 }

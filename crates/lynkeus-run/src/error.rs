@@ -160,19 +160,6 @@ pub enum Error {
         time: f64,
     },
 
-    /// Times of a log do not increase.
-    #[error(
-        "data row {row}: the time {time} does not come after {previous} of the row before; sort the log and drop repeated times"
-    )]
-    TimeOrder {
-        /// data row, from 1
-        row: usize,
-        /// time of the row before
-        previous: f64,
-        /// time of this row
-        time: f64,
-    },
-
     /// A sample from before where an estimator is.
     #[error(
         "the time {time} is before {reached}, where the estimator is: expected samples in the order of their times"
@@ -190,17 +177,6 @@ pub enum Error {
         /// `t`, or the name of the input
         signal: String,
         /// what was given
-        value: f64,
-    },
-
-    /// A cell that is no finite number.
-    #[error("data row {row}, column '{column}': expected a finite number, found {value}")]
-    NotANumber {
-        /// data row, from 1
-        row: usize,
-        /// name of the column
-        column: String,
-        /// what stands there
         value: f64,
     },
 

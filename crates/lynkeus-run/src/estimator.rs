@@ -1,43 +1,14 @@
-//! The one incremental core: any observer, fed sample by sample.
+//! Any observer, fed sample by sample.
+
+use std::fmt::Write;
+use std::sync::OnceLock;
 
 use crate::filter::{Filter, FilterModel, FilterSettings, Health, Innovation, Smoothed};
 use crate::flow::Flow;
-use crate::intake::Intake;
-use crate::runner::{Core, Program};
+use crate::runner::{Runner, Sample};
 use crate::sampled::{Sampled, SampledObserver};
-use crate::snapshot::{self, Damaged, Persist, Walk};
-use crate::{Error, Method, SnapshotFault, Step, StepAdvice, System};
-
-/// What a signal is between two samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BetweenSamples {
-    /// the value of the last sample: causal, late by half a sample on average
-    #[default]
-    Hold,
-    /// the straight line between the samples. The estimate at a sample's time uses
-    /// no later sample, but the path towards it is integrated with the sample at
-    /// its end, so an estimate between samples would look ahead by one sample.
-    Linear,
-}
-
-/// How an [`Estimator`] goes from sample to sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EstimatorSettings {
-    /// the signals between samples
-    pub between: BetweenSamples,
-    /// how the observer is integrated; adaptive methods start anew at each sample
-    pub method: Method,
-}
-
-impl Default for EstimatorSettings {
-    /// Held signals and Runge–Kutta steps that are small enough for the observer.
-    fn default() -> Self {
-        Self {
-            between: BetweenSamples::default(),
-            method: Method::Rk4(Step::Auto),
-        }
-    }
-}
+use crate::snapshot::{self, Damaged, Digest, Persist, Walk};
+use crate::{Error, EstimatorSettings, Method, SnapshotFault, StepAdvice, System};
 
 /// Any observer, one sample after the other, live or from a log.
 ///
@@ -48,8 +19,8 @@ impl Default for EstimatorSettings {
 /// observer made of a [`System`] alone knows of no sensors: all its signals are inputs.
 ///
 /// A call that fails changes nothing: the estimator stays at the
-/// last good sample and the next call goes on from there. With [`Step::Substeps`] or
-/// [`Step::AtMost`] neither a system nor a sampled observer nor the extended filter of up to eight
+/// last good sample and the next call goes on from there. With [`Step::Substeps`](crate::Step::Substeps) or
+/// [`Step::AtMost`](crate::Step::AtMost) neither a system nor a sampled observer nor the extended filter of up to eight
 /// states without history allocates once its equations have become machine code.
 ///
 /// ```
@@ -192,7 +163,7 @@ impl Estimator {
 
     /// Goes to `t` and takes the signals there, in the order of [`Estimator::signals`]. The
     /// first sample sets the time; one at the time of the sample before only updates. With
-    /// [`BetweenSamples::Linear`] the way to `t` is along the line to these inputs, else this is
+    /// [`BetweenSamples::Linear`](crate::BetweenSamples::Linear) the way to `t` is along the line to these inputs, else this is
     /// the same as [`predict`](Self::predict), then [`update`](Self::update).
     ///
     /// # Errors
@@ -306,11 +277,11 @@ impl Estimator {
     /// # Errors
     /// [`Error::Snapshot`]: damaged, of another version, or of another observer.
     pub fn restore(&mut self, snapshot: &[u8]) -> Result<(), Error> {
-        let state = snapshot::opened(snapshot, self.fingerprint())?;
+        let refused = |fault| Error::Snapshot { fault };
+        let state = snapshot::opened(snapshot, self.fingerprint()).map_err(refused)?;
         let mut restored = self.clone();
-        snapshot::load(&mut Whole(&mut restored), state).map_err(|_| Error::Snapshot {
-            fault: SnapshotFault::Damaged,
-        })?;
+        snapshot::load(&mut Whole(&mut restored), state)
+            .map_err(|_| refused(SnapshotFault::Damaged))?;
         *self = restored;
         Ok(())
     }
@@ -373,5 +344,182 @@ impl Persist for Whole<'_> {
             Core::Filter(filter) => filter.walk_history(walk),
             _ => Ok(()),
         }
+    }
+}
+
+/// The samples so far, and whether the next one may follow them.
+#[derive(Clone, Debug)]
+pub(crate) struct Intake {
+    /// of the sensors, then of the known inputs
+    names: Vec<String>,
+    sensors: usize,
+    time: Option<f64>,
+    values: Vec<f64>,
+    held: usize,
+}
+
+impl Intake {
+    pub fn new(names: Vec<String>, sensors: usize) -> Self {
+        Self {
+            values: vec![0.0; names.len()],
+            names,
+            sensors,
+            time: None,
+            held: 0,
+        }
+    }
+
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub fn sensors(&self) -> usize {
+        self.sensors
+    }
+
+    pub fn time(&self) -> Option<f64> {
+        self.time
+    }
+
+    /// The sample taken last.
+    pub fn sample(&self) -> Sample<'_> {
+        let (readings, inputs) = self.values.split_at(self.sensors);
+        Sample {
+            t: self.time.unwrap_or_default(),
+            readings,
+            inputs,
+            held: self.held,
+        }
+    }
+
+    /// Takes a sample, or nothing where one is refused.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a wrong number of signals, [`Error::NoNumber`] for a time or the
+    /// first value of an input, [`Error::TimeBefore`].
+    pub fn take(&mut self, t: f64, signals: &[f64]) -> Result<(), Error> {
+        if signals.len() != self.names.len() {
+            let expected = format!("{}: {}", self.names.len(), self.names.join(", "));
+            return Err(Error::setting("number of signals", expected, signals.len()));
+        }
+        self.check_time(t)?;
+        let inputs = self.sensors..self.names.len();
+        let missing = |i: &usize| !signals[*i].is_finite();
+        if let (None, Some(i)) = (self.time, inputs.clone().find(missing)) {
+            return Err(no_number(&self.names[i], signals[i]));
+        }
+        self.values[..self.sensors].copy_from_slice(&signals[..self.sensors]);
+        self.held = inputs.clone().filter(missing).count();
+        for i in inputs.filter(|i| signals[*i].is_finite()) {
+            self.values[i] = signals[i];
+        }
+        self.time = Some(t);
+        Ok(())
+    }
+
+    /// Goes to a time at which nothing reports.
+    ///
+    /// # Errors
+    /// As [`Intake::take`], and before the first sample.
+    pub fn wait(&mut self, t: f64) -> Result<(), Error> {
+        self.started()?;
+        self.check_time(t)?;
+        self.values[..self.sensors].fill(f64::NAN);
+        self.held = 0;
+        self.time = Some(t);
+        Ok(())
+    }
+
+    /// The time of the last sample.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] where there is none.
+    pub fn started(&self) -> Result<f64, Error> {
+        let none = || Error::setting("samples so far", "one, which sets the time", 0);
+        self.time.ok_or_else(none)
+    }
+
+    fn check_time(&self, t: f64) -> Result<(), Error> {
+        if !t.is_finite() {
+            return Err(no_number("t", t));
+        }
+        match self.time {
+            Some(reached) if t < reached => Err(Error::TimeBefore { reached, time: t }),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn no_number(signal: &str, value: f64) -> Error {
+    Error::NoNumber {
+        signal: signal.to_owned(),
+        value,
+    }
+}
+
+impl Persist for Intake {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.optional(&mut self.time, Walk::number)?;
+        walk.numbers(&mut self.values)?;
+        walk.count(&mut self.held)
+    }
+}
+
+/// An observer of any kind.
+#[derive(Clone, Debug)]
+pub(crate) enum Core {
+    Flow(Box<Flow>),
+    Sampled(Box<Sampled>),
+    Filter(Box<Filter>),
+}
+
+impl Core {
+    pub fn runner(&self) -> &dyn Runner {
+        match self {
+            Self::Flow(flow) => &**flow,
+            Self::Sampled(sampled) => &**sampled,
+            Self::Filter(filter) => &**filter,
+        }
+    }
+
+    pub fn runner_mut(&mut self) -> &mut dyn Runner {
+        match self {
+            Self::Flow(flow) => &mut **flow,
+            Self::Sampled(sampled) => &mut **sampled,
+            Self::Filter(filter) => &mut **filter,
+        }
+    }
+}
+
+/// What an estimator's numbers follow from, to tell one from another.
+#[derive(Clone, Debug)]
+pub(crate) struct Program {
+    systems: Vec<System>,
+    settings: String,
+    fingerprint: OnceLock<u64>,
+}
+
+impl Program {
+    pub fn new(systems: Vec<System>, settings: String) -> Self {
+        Self {
+            systems,
+            settings,
+            fingerprint: OnceLock::new(),
+        }
+    }
+
+    /// A number that differs for other programs; computed once.
+    pub fn fingerprint(&self, signals: &[String]) -> u64 {
+        *self.fingerprint.get_or_init(|| self.digest(signals))
+    }
+
+    fn digest(&self, signals: &[String]) -> u64 {
+        let mut digest = Digest::default();
+        // a digest takes any text
+        let _ = write!(digest, "{signals:?} {}", self.settings);
+        for system in &self.systems {
+            system.tell(&mut digest);
+        }
+        digest.value()
     }
 }

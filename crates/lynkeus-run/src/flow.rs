@@ -1,11 +1,10 @@
 //! An observer whose signals are all known at every sample.
 
 use crate::divergence::Bound;
-use crate::driven::Driven;
 use crate::filter::Health;
-use crate::intake::Sample;
-use crate::runner::Runner;
+use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Dynamics, Error, EstimatorSettings, Integrator, StepAdvice, System};
 
 #[derive(Clone, Debug)]

@@ -3,11 +3,10 @@
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape};
+use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape, jacobian};
 use lynkeus_native::Function;
 
-use crate::Slopes;
-use crate::slopes::Differentiated;
+use crate::{Place, Slopes};
 
 /// What evaluates systems. All give the same values to the bit, so that it is a matter of speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -225,5 +224,68 @@ impl Runner {
         step.eval(inputs.as_chunks().0, next.as_chunks_mut().0);
         inputs.pop();
         true
+    }
+}
+
+/// Derivatives that are written down without asking whether they pay.
+const FEW: usize = 50_000;
+
+/// More than these are written down where differences would take so many times as many operations.
+const SAVED: usize = 20;
+
+/// The derivatives of a routine by its states.
+#[derive(Debug)]
+pub(crate) struct Differentiated {
+    pub places: Arc<[Place]>,
+    /// of the same inputs, the values at the places
+    pub routine: Arc<Routine>,
+}
+
+impl Differentiated {
+    /// Of a tape whose inputs are time, so many states, and what is constant. None where the
+    /// derivatives written down would be too many for what they save.
+    pub fn new(tape: &Tape, states: usize) -> Option<Self> {
+        let g = Graph::new();
+        let inputs: Vec<Node> = (0..tape.inputs()).map(|_| g.fresh("w").node()).collect();
+        let outputs = tape.eval_in(&Nodes(&g), &inputs);
+        let x = &inputs[1..=states];
+        let most = FEW.max(tape.len().saturating_mul(states) / SAVED);
+        jacobian::size(&g, &outputs, x, most)?;
+        let entries = jacobian::forward(&g, &outputs, x).entries;
+        let nodes: Vec<Node> = entries.iter().map(|&(.., node)| node).collect();
+        let places = entries
+            .iter()
+            .map(|&(row, column, _)| Place { row, column });
+        Some(Self {
+            places: places.collect(),
+            routine: Routine::new(Tape::new(&g, &inputs, &nodes).ok()?),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A state that all others read is one column; a dense right-hand side of many operations is
+    /// left to differences.
+    #[test]
+    fn derivatives_are_not_written_down_at_any_price() {
+        let tape = |n: usize, dense: bool| {
+            let g = Graph::new();
+            let t = g.symbol("t").node();
+            let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
+            let sum = x.iter().copied().reduce(|a, b| a + b.sin()).unwrap();
+            let read = if dense { sum } else { x[0] };
+            let dx: Vec<Node> = (0..n)
+                .map(|i| (x[i] * read + i as f64).exp().node())
+                .collect();
+            let inputs: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
+            Tape::new(&g, &inputs, &dx).unwrap()
+        };
+        let sparse = Differentiated::new(&tape(400, false), 400).unwrap();
+        assert_eq!(sparse.places.len(), 799);
+        assert!(Differentiated::new(&tape(400, true), 400).is_none());
+        assert!(Differentiated::new(&tape(40, true), 40).is_some());
     }
 }

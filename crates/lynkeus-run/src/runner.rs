@@ -1,14 +1,20 @@
-//! What the kinds of observers have in common, and what tells one from another.
+//! What an estimator asks of an observer under way.
 
-use std::fmt::Write;
-use std::sync::OnceLock;
+use crate::Error;
+use crate::filter::{Health, Innovation};
+use crate::snapshot::Persist;
 
-use crate::filter::{Filter, Health, Innovation};
-use crate::flow::Flow;
-use crate::intake::Sample;
-use crate::sampled::Sampled;
-use crate::snapshot::{Digest, Persist};
-use crate::{Error, System};
+/// A sample as an observer takes it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample<'a> {
+    pub t: f64,
+    /// by sensor; not finite where it did not report
+    pub readings: &'a [f64],
+    /// by known input; the last value where there was none
+    pub inputs: &'a [f64],
+    /// inputs of which the last value holds
+    pub held: usize,
+}
 
 /// What the kinds of observers differ in. Any of the steps may fail half-way: the estimator
 /// then goes back to where it was.
@@ -36,63 +42,4 @@ pub(crate) trait Runner: Persist {
     }
 
     fn health(&self) -> &Health;
-}
-
-/// An observer of any kind.
-#[derive(Clone, Debug)]
-pub(crate) enum Core {
-    Flow(Box<Flow>),
-    Sampled(Box<Sampled>),
-    Filter(Box<Filter>),
-}
-
-impl Core {
-    pub fn runner(&self) -> &dyn Runner {
-        match self {
-            Self::Flow(flow) => &**flow,
-            Self::Sampled(sampled) => &**sampled,
-            Self::Filter(filter) => &**filter,
-        }
-    }
-
-    pub fn runner_mut(&mut self) -> &mut dyn Runner {
-        match self {
-            Self::Flow(flow) => &mut **flow,
-            Self::Sampled(sampled) => &mut **sampled,
-            Self::Filter(filter) => &mut **filter,
-        }
-    }
-}
-
-/// What an estimator's numbers follow from, to tell one from another.
-#[derive(Clone, Debug)]
-pub(crate) struct Program {
-    systems: Vec<System>,
-    settings: String,
-    fingerprint: OnceLock<u64>,
-}
-
-impl Program {
-    pub fn new(systems: Vec<System>, settings: String) -> Self {
-        Self {
-            systems,
-            settings,
-            fingerprint: OnceLock::new(),
-        }
-    }
-
-    /// A number that differs for other programs; computed once.
-    pub fn fingerprint(&self, signals: &[String]) -> u64 {
-        *self.fingerprint.get_or_init(|| self.digest(signals))
-    }
-
-    fn digest(&self, signals: &[String]) -> u64 {
-        let mut digest = Digest::default();
-        // a digest takes any text
-        let _ = write!(digest, "{signals:?} {}", self.settings);
-        for system in &self.systems {
-            system.tell(&mut digest);
-        }
-        digest.value()
-    }
 }

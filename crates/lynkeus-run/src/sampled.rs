@@ -1,12 +1,11 @@
 //! Observers whose sensors report when they do.
 
 use crate::divergence::{Bound, deviation_diverged};
-use crate::driven::Driven;
 use crate::filter::{Health, Innovation, Reading};
-use crate::intake::Sample;
-use crate::runner::Runner;
+use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
+use crate::system::Driven;
 use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a

@@ -4,8 +4,6 @@
 
 use std::fmt;
 
-use crate::Error;
-
 /// What a snapshot starts with.
 const MAGIC: &[u8; 8] = b"LYNKSNAP";
 /// Raised whenever what is saved changes.
@@ -229,27 +227,26 @@ fn checksum(bytes: &[u8]) -> u64 {
 /// The state in a snapshot.
 ///
 /// # Errors
-/// [`Error::Snapshot`].
-pub(crate) fn opened(bytes: &[u8], fingerprint: u64) -> Result<&[u8], Error> {
-    let fault = |fault| Err(Error::Snapshot { fault });
+/// Why it cannot be restored.
+pub(crate) fn opened(bytes: &[u8], fingerprint: u64) -> Result<&[u8], SnapshotFault> {
     let word = |at: usize| {
         let bytes = bytes.get(at..at + 8).and_then(|b| b.try_into().ok());
         bytes.map_or(0, u64::from_le_bytes)
     };
     if !bytes.starts_with(MAGIC) {
-        return fault(SnapshotFault::NotOne);
+        return Err(SnapshotFault::NotOne);
     }
     if bytes.len() >= 16 && word(8) != VERSION {
-        return fault(SnapshotFault::Version { found: word(8) });
+        return Err(SnapshotFault::Version { found: word(8) });
     }
     let Some(end) = bytes.len().checked_sub(TAIL).filter(|end| *end >= HEAD) else {
-        return fault(SnapshotFault::Damaged);
+        return Err(SnapshotFault::Damaged);
     };
     if word(24) != (end - HEAD) as u64 || word(end) != checksum(&bytes[..end]) {
-        return fault(SnapshotFault::Damaged);
+        return Err(SnapshotFault::Damaged);
     }
     if word(16) != fingerprint {
-        return fault(SnapshotFault::OtherObserver);
+        return Err(SnapshotFault::OtherObserver);
     }
     Ok(&bytes[HEAD..end])
 }
@@ -301,10 +298,7 @@ mod tests {
     #[test]
     fn every_change_and_every_cut_is_found() {
         let bytes = seal(42, &mut state());
-        let fault = |bytes: &[u8], fingerprint| match opened(bytes, fingerprint) {
-            Err(Error::Snapshot { fault }) => fault,
-            other => panic!("{other:?}"),
-        };
+        let fault = |bytes: &[u8], fingerprint| opened(bytes, fingerprint).unwrap_err();
         for place in 0..bytes.len() {
             let mut changed = bytes.clone();
             changed[place] ^= 1 << (place % 8);

@@ -1,18 +1,17 @@
-//! Systems compiled for evaluation.
-
-mod evaluation;
+//! Systems compiled for evaluation, and at work.
 
 use std::fmt::Write;
 use std::sync::{Arc, Mutex};
 
-use lynkeus_expr::{Graph, Node, Tape};
+use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
+use crate::divergence::Place;
+use crate::error::state_text;
 use crate::relays::{Guards, Held, Taken, Watched, bends, take};
-use crate::routine::Routine;
-use crate::snapshot::Digest;
+use crate::routine::{Routine, Runner};
+use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
-use crate::{Error, Margin};
-pub use evaluation::Evaluation;
+use crate::{BetweenSamples, Dynamics, Error, Margin, Slopes};
 
 /// A compiled system x' = f(t, x, w), y = h(t, x, w): a plant, an observer, or
 /// (without states) inputs as functions of time.
@@ -282,10 +281,403 @@ impl System {
     }
 }
 
+/// Evaluates a system on known sides of the surfaces on which it jumps.
+#[derive(Clone, Debug)]
+struct HeldEvaluation {
+    derivatives: Runner,
+    outputs: Runner,
+    surfaces: Evaluator,
+    modes: Vec<f64>,
+    /// those of the system, then the modes
+    inputs: Vec<f64>,
+    is_held: bool,
+}
+
+impl HeldEvaluation {
+    fn place(&mut self, inputs: &[f64]) {
+        self.inputs.clear();
+        self.inputs.extend_from_slice(inputs);
+        self.inputs.extend_from_slice(&self.modes);
+    }
+}
+
+/// Evaluates one [`System`] without allocating; holds the values of its signals.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    system: System,
+    derivatives: Runner,
+    outputs: Runner,
+    switches: Switches,
+    /// t, x, w, modes
+    inputs: Vec<f64>,
+    held: Option<HeldEvaluation>,
+}
+
+impl Evaluation {
+    fn new(system: &System) -> Self {
+        let code = &system.code;
+        let fixed = 1 + code.states.len() + code.signals.len();
+        Self {
+            derivatives: code.derivatives_at.runner(),
+            outputs: code.outputs_at.runner(),
+            switches: code.switches.clone(),
+            inputs: vec![0.0; fixed + code.modes],
+            held: code.held.as_ref().map(|held| HeldEvaluation {
+                derivatives: held.derivatives_at.runner(),
+                outputs: held.outputs_at.runner(),
+                surfaces: held.held.surfaces.evaluator(),
+                modes: vec![0.0; held.modes],
+                inputs: vec![],
+                is_held: false,
+            }),
+            system: system.clone(),
+        }
+    }
+
+    /// The system.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// The signals' values, in the order of [`System::signals`], to write to.
+    pub fn signals_mut(&mut self) -> &mut [f64] {
+        let from = 1 + self.system.states().len();
+        let to = from + self.system.signals().len();
+        &mut self.inputs[from..to]
+    }
+
+    /// The signals' values.
+    pub fn signals(&self) -> &[f64] {
+        let from = 1 + self.system.states().len();
+        &self.inputs[from..from + self.system.signals().len()]
+    }
+
+    /// Writes the outputs at (t, x) to `y`, in the order of [`System::outputs`].
+    ///
+    /// Modes are those of the last [`Dynamics::enter`].
+    pub fn outputs(&mut self, t: f64, x: &[f64], y: &mut [f64]) {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.outputs.eval(&held.inputs, y);
+            }
+            _ => self.outputs.eval(&self.inputs, y),
+        }
+    }
+
+    /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
+    pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.outputs.slopes(&held.inputs, x.len(), slopes)
+            }
+            _ => self.outputs.slopes(&self.inputs, x.len(), slopes),
+        }
+    }
+
+    /// Writes what an observer reports at (t, x), in the order of
+    /// [`System::estimates`].
+    pub fn estimates(&mut self, t: f64, x: &[f64], estimates: &mut [f64]) {
+        if self.system.outputs().is_empty() {
+            estimates.copy_from_slice(x);
+        } else {
+            self.outputs(t, x, estimates);
+        }
+    }
+
+    /// An error that ended a run at `x`, by its cause where a matrix of the system is singular
+    /// there or the state is far beyond `scale`, the largest number among starts and signals.
+    pub(crate) fn explained(&mut self, error: Error, x: &[f64], scale: f64) -> Error {
+        let Some(time) = error.time() else {
+            return error;
+        };
+        let system = self.system.clone();
+        let mut values = vec![0.0; system.outputs().len()];
+        if !system.margins.is_empty() {
+            self.outputs(time, x, &mut values);
+        }
+        let value = |margin: &Margin| values.get(margin.output).copied();
+        let margins = system.margins.iter();
+        let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
+        Place {
+            names: system.states(),
+            x,
+            scale,
+            margins: &margins,
+        }
+        .explained(error)
+    }
+
+    /// Values of the switches at the last [`Dynamics::enter`].
+    pub(crate) fn modes(&self) -> &[f64] {
+        &self.inputs[self.inputs.len() - self.system.code.modes..]
+    }
+
+    /// Values of the operations that jump with the state, on the sides that are held.
+    pub(crate) fn held_modes(&self) -> &[f64] {
+        self.held.as_ref().map_or(&[], |held| &held.modes)
+    }
+
+    fn place(&mut self, t: f64, x: &[f64]) {
+        self.inputs[0] = t;
+        self.inputs[1..=x.len()].copy_from_slice(x);
+    }
+}
+
+impl Persist for Evaluation {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        walk.numbers(self.signals_mut())?;
+        self.switches.walk(walk)
+    }
+}
+
+impl Dynamics for Evaluation {
+    fn dimension(&self) -> usize {
+        self.system.states().len()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.derivatives.eval(&held.inputs, dx);
+            }
+            _ => self.derivatives.eval(&self.inputs, dx),
+        }
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.place(t, x);
+        match &mut self.held {
+            Some(held) if held.is_held => {
+                held.place(&self.inputs);
+                held.derivatives.slopes(&held.inputs, x.len(), slopes)
+            }
+            _ => self.derivatives.slopes(&self.inputs, x.len(), slopes),
+        }
+    }
+
+    fn surfaces(&self) -> usize {
+        let held = self.system.code.held.as_ref();
+        held.map_or(0, |held| held.held.names.len())
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        let held = self.system.code.held.as_ref();
+        held.map_or_else(Vec::new, |held| held.held.names.clone())
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.place(t, x);
+        if let Some(held) = &mut self.held {
+            held.place(&self.inputs);
+            held.surfaces.eval(&held.inputs, values);
+        }
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
+            return;
+        };
+        evaluation.is_held = sides.is_some();
+        if let Some(sides) = sides {
+            code.held.modes(sides, &mut evaluation.modes);
+        }
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.system.code.guards.clone()
+    }
+
+    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
+        let first = 1 + self.system.states().len();
+        let held = self.held_modes();
+        values.clear();
+        values.extend(self.inputs[first..].iter().chain(held).map(|&v| [v, 0.0]));
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        if self.held.as_ref().is_some_and(|held| held.is_held) {
+            return false;
+        }
+        self.place(t, x);
+        self.derivatives.step(&mut self.inputs, h, next)
+    }
+
+    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.switches.between(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        let first = self.inputs.len() - self.system.code.modes;
+        self.switches.modes_at(t, &mut self.inputs[first..]);
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.system.states().to_vec()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.place(t, x);
+        let code = &self.system.code;
+        let graph = code.graph.lock().unwrap_or_else(|e| e.into_inner());
+        let named = code
+            .derivatives_at
+            .tape()
+            .first_nonfinite(&graph, &self.inputs)
+            .or_else(|| code.outputs_at.tape().first_nonfinite(&graph, &self.inputs));
+        Error::NotFinite {
+            time: t,
+            operation: named.unwrap_or_else(|| "a value overflows".to_owned()),
+            state: state_text(self.system.states(), x),
+        }
+    }
+}
+
+/// A system with its signals between two samples.
+#[derive(Clone, Debug)]
+pub(crate) struct Driven {
+    pub(crate) evaluation: Evaluation,
+    between: BetweenSamples,
+    from: f64,
+    to: f64,
+    last: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl Driven {
+    pub(crate) fn new(system: &System, between: BetweenSamples) -> Self {
+        let count = system.signals().len();
+        Self {
+            evaluation: system.evaluation(),
+            between,
+            from: 0.0,
+            to: 1.0,
+            last: vec![0.0; count],
+            next: vec![0.0; count],
+        }
+    }
+
+    /// The first sample.
+    pub(crate) fn start(&mut self, signals: &[f64]) {
+        self.next.copy_from_slice(signals);
+        self.arrive();
+    }
+
+    /// The sample at the end of the interval to come, of the first signals; others stay.
+    pub(crate) fn aim(&mut self, from: f64, to: f64, signals: &[f64]) {
+        (self.from, self.to) = (from, to);
+        self.next.copy_from_slice(&self.last);
+        self.next[..signals.len()].copy_from_slice(signals);
+    }
+
+    /// The signals at t.
+    fn read_signals(&mut self, t: f64) {
+        if self.between == BetweenSamples::Linear {
+            let s = (t - self.from) / (self.to - self.from);
+            let ends = self.last.iter().zip(&self.next);
+            for (signal, (last, next)) in self.evaluation.signals_mut().iter_mut().zip(ends) {
+                *signal = last + s * (next - last);
+            }
+        }
+    }
+
+    /// Writes the derivatives of the outputs by the states at (t, x), where they are known.
+    pub(crate) fn output_slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.read_signals(t);
+        self.evaluation.output_slopes(t, x, slopes)
+    }
+
+    /// The interval is over: its last sample is the present one.
+    pub(crate) fn arrive(&mut self) {
+        self.last.copy_from_slice(&self.next);
+        self.evaluation.signals_mut().copy_from_slice(&self.last);
+    }
+}
+
+impl Persist for Driven {
+    fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
+        self.evaluation.walk(walk)?;
+        walk.numbers(&mut self.last)?;
+        walk.numbers(&mut self.next)
+    }
+}
+
+impl Dynamics for Driven {
+    fn dimension(&self) -> usize {
+        self.evaluation.dimension()
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
+        self.read_signals(t);
+        self.evaluation.derivatives(t, x, dx);
+    }
+
+    fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
+        self.read_signals(t);
+        self.evaluation.slopes(t, x, slopes)
+    }
+
+    fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
+        self.between == BetweenSamples::Hold && self.evaluation.step(t, h, x, next)
+    }
+
+    fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
+        self.evaluation.switches(from, to, times)
+    }
+
+    fn enter(&mut self, t: f64) {
+        self.evaluation.enter(t);
+    }
+
+    fn surfaces(&self) -> usize {
+        self.evaluation.surfaces()
+    }
+
+    fn surface_names(&self) -> Vec<String> {
+        self.evaluation.surface_names()
+    }
+
+    fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.read_signals(t);
+        self.evaluation.read_surfaces(t, x, values);
+    }
+
+    fn hold(&mut self, sides: Option<&[f64]>) {
+        self.evaluation.hold(sides);
+    }
+
+    fn guards(&self) -> Option<Arc<Guards>> {
+        self.evaluation.guards()
+    }
+
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.read_signals(t);
+        self.evaluation.beside(t, values);
+        if self.between == BetweenSamples::Linear {
+            let ends = self.last.iter().zip(&self.next);
+            for ([_, speed], (last, next)) in values.iter_mut().zip(ends) {
+                *speed = (next - last) / (self.to - self.from);
+            }
+        }
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.evaluation.names()
+    }
+
+    fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
+        self.evaluation.not_finite(t, x)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Dynamics;
 
     fn build(graph: &Graph, derivatives: &[Node]) -> Result<System, Error> {
         let [time, x] = ["time", "x"].map(|name| graph.symbol(name).node());

@@ -4,9 +4,8 @@ use std::ops::ControlFlow;
 
 use lynkeus_native::Buffer;
 
-use super::code::Runner;
+use super::code::{LANES, Lane, Runner};
 use super::plan::{Event, Program};
-use super::{Ended, LANES, Lane};
 use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
@@ -43,6 +42,15 @@ pub(crate) fn groups(program: &Program, runs: usize, threads: usize) -> usize {
     let most = most_groups(program);
     let own = runs.div_ceil(LANES).div_ceil(threads.max(1));
     own.clamp(FEW.min(most), most)
+}
+
+/// A run that did not go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// its place among the members
+    pub run: usize,
+    /// why: at the row where it was seen
+    pub error: Error,
 }
 
 /// The working memory of a thread.
@@ -377,7 +385,7 @@ mod tests {
         let inputs = System::new(&g, time.node(), &[], &[], &[], &[]).unwrap();
         let mut simulation = Simulation::new(plant, inputs, 1.0, 0.5);
         simulation.method = Method::Rk4(Step::AtMost(0.1));
-        let (_, program) = super::super::Plan::new(&simulation).unwrap().unwrap();
+        let (_, program) = super::super::plan::Plan::new(&simulation).unwrap().unwrap();
         for (runs, threads, expected) in [
             (0, 1, 4),
             (1, 8, 4),

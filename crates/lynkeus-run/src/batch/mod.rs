@@ -10,7 +10,6 @@
 mod block;
 mod code;
 mod plan;
-mod split;
 
 use std::num::NonZero;
 use std::ops::ControlFlow;
@@ -19,13 +18,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, available_parallelism};
 
 use crate::{Column, Error, Simulation};
+pub use block::Ended;
+
 use block::{Block, Desk, IsOver, groups};
+use code::LANES;
 use plan::{Event, Plan, Program};
-
-/// Trajectories in a register.
-const LANES: usize = 4;
-
-type Lane = [f64; LANES];
 
 /// What one run of a batch has of its own.
 #[derive(Clone, Debug)]
@@ -34,15 +31,6 @@ pub struct Member {
     pub seed: u64,
     /// start values of the plant's states
     pub start: Vec<f64>,
-}
-
-/// A run that did not go on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ended {
-    /// its place among the members
-    pub run: usize,
-    /// why: at the row where it was seen
-    pub error: Error,
 }
 
 /// Many runs of one [`Simulation`] with [`Method::Rk4`](crate::Method::Rk4) and steps that do not

@@ -1,12 +1,11 @@
 //! What a batch does, worked out once for all trajectories.
 
-use super::code::Code;
-use super::split::Divided;
+use super::code::{Code, Divided};
 use crate::closed_loop::Loop;
 use crate::integrator::{check_interval, fixed_steps, pieces};
-use crate::itinerary::{Itinerary, Stop};
 use crate::noise::Sensors;
 use crate::routine::{LARGEST_STEP, classical_step};
+use crate::run::{Itinerary, Stop};
 use crate::{Column, Dynamics, Error, Method, Simulation, Step};
 
 /// What all trajectories do next.

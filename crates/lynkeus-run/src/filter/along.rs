@@ -6,8 +6,8 @@ use super::flow::Joint;
 use super::spanned::Spanned;
 use super::taylor::Moments;
 use super::variation::Variation;
-use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Error, Method, Step, System};
 
 /// Up to so many states x̂, Φ and W are integrated together, and wherever steps are given: these are

@@ -9,8 +9,8 @@ use super::sensing::{Believed, Sensing};
 use super::smooth::Correction;
 use super::spanned::Rows;
 use super::stage::Stage;
-use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Error, EstimatorSettings, System};
 
 #[derive(Clone, Debug)]

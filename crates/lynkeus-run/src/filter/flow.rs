@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::curvature::{Curvature, Layout};
 use super::taylor::Moments;
-use crate::driven::Driven;
 use crate::relays::Guards;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Dynamics, Error, Integrator, Method, Slopes};
 
 /// x̂, Φ and W by one integration, for flows with few states.

@@ -66,9 +66,8 @@ pub use smooth::Smoothed;
 pub use unscented::{SigmaPoints, Weights};
 
 use crate::divergence::{Bound, deviation_diverged};
-use crate::driven::Driven;
-use crate::intake::Sample;
-use crate::runner::Runner;
+use crate::runner::{Runner, Sample};
+use crate::system::Driven;
 use crate::{Error, EstimatorSettings};
 use extended::Extended;
 use horizon::Horizon;

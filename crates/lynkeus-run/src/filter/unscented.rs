@@ -8,8 +8,8 @@ use super::root::{Root, dot};
 use super::sensing::{Believed, Sensing};
 use super::smooth::Correction;
 use super::spanned::{Rows, Spanned};
-use crate::driven::Driven;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Error, EstimatorSettings, Integrator};
 
 /// Images of two points that differ by no more than this share of their size do not differ.

@@ -12,9 +12,9 @@ use super::Belief;
 use super::nodes::{FINE, Lobatto, ODD, meets};
 use super::spanned::Entry;
 use super::taylor::{Moments, Series};
-use crate::driven::Driven;
 use crate::method::resolution;
 use crate::snapshot::{Damaged, Persist, Walk};
+use crate::system::Driven;
 use crate::{Dynamics, Error, Integrator, Method};
 
 /// Tolerance with fixed steps, whose error nobody states.

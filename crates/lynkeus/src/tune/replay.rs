@@ -184,12 +184,12 @@ mod tests {
     use std::ops::ControlFlow;
     use std::path::Path;
 
-    use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, Role};
+    use lynkeus_run::{BetweenSamples, Estimator, EstimatorSettings};
 
     use super::*;
     use crate::{Study, Table, prepare};
 
-    /// The runner's own replay of a log knows nothing of gaps, nor of files.
+    /// An estimator that takes the rows one by one knows nothing of gaps, nor of files.
     #[test]
     fn a_log_without_gaps_is_replayed_to_the_bit() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/two-tanks");
@@ -211,17 +211,23 @@ mod tests {
             (&record.parts, BetweenSamples::Linear),
         ] {
             let samples = &replayed.samples;
-            let columns = samples.columns().map(Series::to_vec).collect();
-            let log = Log::new(system.signals().to_vec(), samples.time.to_vec(), columns).unwrap();
             let settings = EstimatorSettings {
                 between,
                 ..run_settings(&study.estimate)
             };
-            let expected = lynkeus_run::estimate(&system, &log, settings).unwrap();
+            let mut estimator = Estimator::new(&system, settings).unwrap();
+            let columns: Vec<Vec<f64>> = samples.columns().map(Series::to_vec).collect();
+            let rows = samples.time.to_vec().into_iter().enumerate();
+            let expected: Vec<Vec<f64>> = rows
+                .map(|(k, t)| {
+                    let signals: Vec<f64> = columns.iter().map(|column| column[k]).collect();
+                    estimator.push(t, &signals).unwrap().to_vec()
+                })
+                .collect();
             let watch = &mut |_| ControlFlow::Continue(());
             let run = replay.run(replayed, watch).unwrap().unwrap();
             for (i, column) in run.estimates.iter().chain(&run.monitors).enumerate() {
-                let expected = expected.trajectory.column(Role::Estimate.at(i)).unwrap();
+                let expected: Vec<f64> = expected.iter().map(|row| row[i]).collect();
                 assert_eq!(column.to_vec(), expected, "{between:?} {i}");
             }
         }

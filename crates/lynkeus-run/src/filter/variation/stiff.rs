@@ -1,10 +1,10 @@
 //! Stiff flows.
 
 use super::{Piece, Variation};
-use crate::driven::Driven;
 use crate::filter::doubling::Dense;
 use crate::filter::taylor::Moments;
 use crate::method::resolution;
+use crate::system::Driven;
 use crate::{Dynamics, Error};
 
 /// What the covariance of a stiff flow may be wrong by at least.

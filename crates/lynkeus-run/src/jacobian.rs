@@ -1,8 +1,8 @@
-//! How fast a system's fastest mode is.
+//! The Jacobian of a right-hand side at a point, and how fast its fastest mode is.
 
 use nalgebra::DMatrix;
 
-use crate::{Dynamics, Slopes};
+use crate::{Dynamics, Place, Slopes};
 
 /// Squarings of the Jacobian: the norm of its 2^8-th power has forgotten all
 /// but 1/256 of the logarithm of its departure from normality.
@@ -16,6 +16,61 @@ const SECANT: f64 = 0.01;
 
 /// Steps of the power method, and how many at the end are averaged.
 const ITERATIONS: (usize, usize) = (40, 16);
+
+impl Slopes {
+    /// Looks at f: at its own derivatives where it knows them and they have values, else at
+    /// differences. Not finite where f is not.
+    pub(crate) fn look(&mut self, f: &mut impl Dynamics, t: f64, x: &[f64]) {
+        if !(f.slopes(t, x, self) && self.are_finite()) {
+            let size = |k: usize| f64::EPSILON.sqrt() * x[k].abs().max(1e-3);
+            self.differences(f, t, x, size);
+        }
+    }
+
+    /// One-sided differences over such a size of each state, every entry: forward, or backward where f
+    /// has no value ahead.
+    pub(crate) fn differences(
+        &mut self,
+        f: &mut impl Dynamics,
+        t: f64,
+        x: &[f64],
+        size: impl Fn(usize) -> f64,
+    ) {
+        let n = x.len();
+        // as many places as there are in all are all of them
+        let places = match self.places().len() == n * n {
+            true => self.places().clone(),
+            false => (0..n)
+                .flat_map(|column| (0..n).map(move |row| Place { row, column }))
+                .collect(),
+        };
+        let mut base = vec![0.0; n];
+        f.derivatives(t, x, &mut base);
+        let mut moved = x.to_vec();
+        let mut image = vec![0.0; n];
+        let mut columns = DMatrix::zeros(n, n);
+        for (k, mut column) in columns.column_iter_mut().enumerate() {
+            let size = size(k);
+            for ahead in [size, -size] {
+                moved[k] = x[k] + ahead;
+                // the difference that the rounded sum really makes
+                let step = moved[k] - x[k];
+                f.derivatives(t, &moved, &mut image);
+                for (entry, (moved, base)) in column.iter_mut().zip(image.iter().zip(&base)) {
+                    *entry = (moved - base) / step;
+                }
+                if column.iter().all(|entry| entry.is_finite()) {
+                    break;
+                }
+            }
+            moved[k] = x[k];
+        }
+        let values = self.at(&places);
+        for (value, at) in values.iter_mut().zip(&*places) {
+            *value = columns[(at.row, at.column)];
+        }
+    }
+}
 
 /// Estimates the spectral radius of ∂f/∂x at (t, x), in 1/(unit of time).
 ///
@@ -126,7 +181,8 @@ fn norm(v: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Function;
+    use crate::{Function, System};
+    use lynkeus_expr::Graph;
 
     fn radius(n: usize, f: impl FnMut(f64, &[f64], &mut [f64])) -> f64 {
         spectral_radius(&mut Function::new(n, f), 0.0, &vec![0.5; n])
@@ -158,5 +214,66 @@ mod tests {
             }
         });
         assert!((chain / 200.0 - 1.0).abs() < 0.05, "{chain}");
+    }
+
+    /// x₁' = sin(w x₁) + x₂², x₂' = √x₃, x₃' = −x₃: the entries of the graph against the formulas
+    /// by hand, and against differences where a root has no slope.
+    #[test]
+    fn a_system_knows_its_slopes() {
+        let g = Graph::new();
+        let [time, w, x1, x2, x3] = ["time", "w", "x1", "x2", "x3"].map(|name| g.symbol(name));
+        let states = [("x1", x1), ("x2", x2), ("x3", x3)].map(|(s, x)| (s.into(), x.node(), 1.0));
+        let dx = [(w * x1).sin() + x2.powi(2), x3.sqrt(), -x3].map(|dx| dx.node());
+        let signals = [("w".to_owned(), w.node())];
+        let system = System::new(&g, time.node(), &states, &signals, &dx, &[]).unwrap();
+        let mut f = system.evaluation();
+        f.signals_mut()[0] = 3.0;
+        let mut slopes = Slopes::default();
+        assert!(f.slopes(0.0, &[0.2, 0.7, 0.25], &mut slopes));
+        let expected = DMatrix::from_row_slice(
+            3,
+            3,
+            &[3.0 * 0.6f64.cos(), 1.4, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0],
+        );
+        assert_eq!(slopes.values().len(), 4);
+        assert!((slopes.dense(3) - expected).norm() < 1e-15);
+        // at 0 the root is as steep as differences say
+        slopes.look(&mut f, 0.0, &[0.2, 0.7, 0.0]);
+        assert_eq!(slopes.values().len(), 9);
+        assert!(slopes.are_finite() && slopes.dense(3)[(1, 2)] > 1e3);
+    }
+
+    /// √(1 − x₁) has no value ahead of x₁ = 1, where its slope is −∞; the column of x₂ is as ever.
+    #[test]
+    fn where_nothing_is_ahead_differences_look_back() {
+        let mut f = Function::new(2, |_, x: &[f64], dx: &mut [f64]| {
+            dx[0] = (1.0 - x[0]).sqrt() + 3.0 * x[1];
+            dx[1] = -x[0];
+        });
+        let mut slopes = Slopes::default();
+        slopes.look(&mut f, 0.0, &[1.0, 0.5]);
+        let found = slopes.dense(2);
+        // √h/h for the step h = √ε
+        assert!(
+            (found[(0, 0)] / -f64::EPSILON.powf(-0.25) - 1.0).abs() < 1e-6,
+            "{found}"
+        );
+        assert!((found[(1, 0)] + 1.0).abs() < 1e-7);
+        assert!((found[(0, 1)] - 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_knows_no_slopes_is_looked_at_by_differences() {
+        let mut f = Function::new(2, |_, x: &[f64], dx: &mut [f64]| {
+            dx[0] = x[0] * x[1];
+            dx[1] = -3.0 * x[0];
+        });
+        let mut slopes = Slopes::default();
+        slopes.look(&mut f, 0.0, &[2.0, 5.0]);
+        let expected = DMatrix::from_row_slice(2, 2, &[5.0, 2.0, -3.0, 0.0]);
+        assert!((slopes.dense(2) - expected).norm() < 1e-6);
+        let mut product = [0.0; 2];
+        slopes.times(&[1.0, -1.0], &mut product);
+        assert!((product[0] - 3.0).abs() < 1e-6 && (product[1] + 3.0).abs() < 1e-6);
     }
 }

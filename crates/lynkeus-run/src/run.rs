@@ -1,0 +1,427 @@
+//! A plant and its observer, simulated together.
+
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+
+use crate::closed_loop::{Loop, table};
+use crate::divergence::Bound;
+use crate::noise::Sensors;
+use crate::{Dynamics, Error, Integrator, Interrupted, Simulation, Trajectory, process_draws};
+
+impl Simulation {
+    /// Runs to the end.
+    ///
+    /// The columns are the plant's states, its inputs, its outputs if recorded
+    /// ([`Role::Output`], [`Role::Measured`]), and what the observer reports
+    /// ([`System::estimates`]), each in the order of its system.
+    ///
+    /// [`Role::Output`]: crate::Role::Output
+    /// [`Role::Measured`]: crate::Role::Measured
+    ///
+    /// # Errors
+    /// With the rows made before: any of [`Error`]'s settings, integration and
+    /// divergence errors.
+    pub fn run(&self) -> Result<Trajectory, Box<Interrupted>> {
+        self.run_watched(&mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Simulation::run`]; `watch` is told the fraction done after every row
+    /// and may stop the run.
+    ///
+    /// # Errors
+    /// As [`Simulation::run`], and [`Error::Cancelled`].
+    pub fn run_watched(
+        &self,
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<Trajectory, Box<Interrupted>> {
+        let mut partial = self.table();
+        match self.run_into(&mut |time, row| partial.push(time, row), watch) {
+            Ok(()) => Ok(partial),
+            Err(error) => Err(Box::new(Interrupted { error, partial })),
+        }
+    }
+
+    /// As [`Simulation::run_watched`], but every row, its time and its values, is handed on as
+    /// soon as it is made: nothing is kept, however many there are.
+    ///
+    /// # Errors
+    /// As [`Simulation::run_watched`].
+    pub fn run_into(
+        &self,
+        take: &mut dyn FnMut(f64, &[f64]),
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        Run::new(self)?.rows(take, watch)
+    }
+
+    /// The table of a run before its first row.
+    pub fn table(&self) -> Trajectory {
+        table(&self.plant, self.observer.as_ref(), self.record_outputs)
+    }
+}
+
+/// A simulation under way.
+struct Run {
+    itinerary: Itinerary,
+    integrator: Integrator,
+    system: Loop,
+    x: Vec<f64>,
+    row: Vec<f64>,
+    bound: Bound,
+}
+
+impl Run {
+    fn new(simulation: &Simulation) -> Result<Self, Error> {
+        let itinerary = Itinerary::new(simulation)?;
+        let plant = &simulation.plant;
+        let sensors = Sensors::new(
+            &simulation.noise,
+            plant.outputs(),
+            plant.states(),
+            itinerary.hold(),
+        )?;
+        let system = Loop::new(simulation, sensors)?;
+        let x = system.start();
+        Ok(Self {
+            itinerary: itinerary.exact(system.is_exact()),
+            integrator: Integrator::new(simulation.method, x.len())?,
+            row: vec![],
+            bound: Bound::new(&x),
+            system,
+            x,
+        })
+    }
+
+    fn rows(
+        &mut self,
+        take: &mut dyn FnMut(f64, &[f64]),
+        watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        let all = self.itinerary.intervals() as f64;
+        let mut made = 0_usize;
+        while let Some(stop) = self.itinerary.next() {
+            match stop {
+                Stop::Draw => self.system.draw(),
+                Stop::Stir => self.system.stir(),
+                Stop::Advance { from, to } => {
+                    let done = self
+                        .integrator
+                        .advance(&mut self.system, from, to, &mut self.x);
+                    let scale = self.bound.scale();
+                    done.map_err(|error| self.system.explained(error, &self.x, scale))?;
+                }
+                Stop::Row(time) => {
+                    take(time, self.record(time)?);
+                    if made > 0 && watch(made as f64 / all).is_break() {
+                        return Err(Error::Cancelled { time });
+                    }
+                    made += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn record(&mut self, t: f64) -> Result<&[f64], Error> {
+        self.row.clear();
+        self.system.enter(t);
+        self.system.row(t, &self.x, &mut self.row)?;
+        let (names, estimate) = self.system.estimate(&self.x);
+        self.bound.see(&self.row[..self.system.known_columns()]);
+        let inside = self
+            .bound
+            .check(t, names, estimate, || self.integrator.hint());
+        let scale = self.bound.scale();
+        inside.map_err(|error| self.system.explained(error, &self.x, scale))?;
+        Ok(&self.row)
+    }
+}
+
+/// Most cells of a trajectory (8 bytes each).
+const MOST_CELLS: f64 = 4e8;
+
+/// What a simulation does next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stop {
+    /// the next noise sample is drawn
+    Draw,
+    /// what moves the states is drawn anew, between two samples
+    Stir,
+    /// time goes on
+    Advance { from: f64, to: f64 },
+    /// a row is recorded
+    Row(f64),
+}
+
+/// The rows and samples of a simulation, in order.
+#[derive(Clone, Debug)]
+pub(crate) struct Itinerary {
+    grid: Grid,
+    start: f64,
+    until: f64,
+    intervals: usize,
+    sample_step: f64,
+    /// draws of process noise from one sample to the next
+    draws: usize,
+    is_exact: bool,
+    /// draws so far, those of samples and those in between
+    drawn: usize,
+    /// the next row
+    row: usize,
+    /// the time of the last stop
+    reached: f64,
+    planned: VecDeque<Stop>,
+}
+
+impl Itinerary {
+    /// Of a simulation; without noise nothing but the first sample is drawn.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for times and steps that cannot be.
+    pub fn new(simulation: &Simulation) -> Result<Self, Error> {
+        let intervals = intervals(simulation)?;
+        let sample_step = sample_step(simulation)?;
+        Ok(Self {
+            grid: Grid::new(simulation.start, simulation.output_step),
+            start: simulation.start,
+            until: simulation.until,
+            intervals,
+            sample_step,
+            draws: draws(simulation)?,
+            is_exact: false,
+            drawn: 0,
+            row: 0,
+            reached: simulation.start,
+            planned: VecDeque::new(),
+        })
+    }
+
+    /// Without samples between the rows.
+    pub fn exact(mut self, is_exact: bool) -> Self {
+        self.is_exact = is_exact;
+        self
+    }
+
+    /// The time for which process noise is held.
+    pub fn hold(&self) -> f64 {
+        self.sample_step / self.draws as f64
+    }
+
+    /// Number of intervals between rows.
+    pub fn intervals(&self) -> usize {
+        self.intervals
+    }
+
+    /// Time of row k.
+    pub fn time(&self, k: usize) -> f64 {
+        if k == self.intervals {
+            self.until
+        } else {
+            self.grid.time(k)
+        }
+    }
+
+    /// Plans up to the next draw or row; a draw due at a row is made there.
+    fn plan(&mut self) {
+        let Some(before) = self.row.checked_sub(1) else {
+            self.draw();
+            return self.arrive(self.start);
+        };
+        let (from, to) = (self.time(before), self.time(self.row));
+        // a draw and a row at the same time may differ by rounding
+        let same = 1e-9 * (to - from).min(self.hold());
+        let due = self.start + self.due();
+        if self.is_exact || due > to + same {
+            self.advance(to);
+            return self.arrive(to);
+        }
+        self.advance(if due > to - same { to } else { due });
+        self.draw();
+    }
+
+    /// How long after the start the next draw is.
+    fn due(&self) -> f64 {
+        let (samples, rest) = (self.drawn / self.draws, self.drawn % self.draws);
+        (samples as f64 + rest as f64 / self.draws as f64) * self.sample_step
+    }
+
+    fn draw(&mut self) {
+        let is_sample = self.drawn.is_multiple_of(self.draws);
+        let stop = if is_sample { Stop::Draw } else { Stop::Stir };
+        self.planned.push_back(stop);
+        self.drawn += 1;
+    }
+
+    fn arrive(&mut self, t: f64) {
+        self.planned.push_back(Stop::Row(t));
+        self.row += 1;
+    }
+
+    fn advance(&mut self, to: f64) {
+        let from = self.reached;
+        if to > from {
+            self.planned.push_back(Stop::Advance { from, to });
+            self.reached = to;
+        }
+    }
+}
+
+impl Iterator for Itinerary {
+    type Item = Stop;
+
+    fn next(&mut self) -> Option<Stop> {
+        if self.planned.is_empty() && self.row <= self.intervals {
+            self.plan();
+        }
+        self.planned.pop_front()
+    }
+}
+
+/// Number of intervals between rows.
+fn intervals(simulation: &Simulation) -> Result<usize, Error> {
+    let Simulation {
+        start,
+        until,
+        output_step,
+        ..
+    } = simulation;
+    if !start.is_finite() {
+        return Err(Error::setting("start", "a finite time", start));
+    }
+    if !(until.is_finite() && until > start) {
+        let expected = format!("a finite time after the start {start}");
+        return Err(Error::setting("until", expected, until));
+    }
+    if !(*output_step > 0.0 && output_step.is_finite()) {
+        return Err(Error::setting(
+            "output_step",
+            "a finite time above 0",
+            output_step,
+        ));
+    }
+    let intervals = ((until - start) / output_step * (1.0 - 1e-12))
+        .ceil()
+        .max(1.0);
+    let cells = intervals * (1 + simulation.plant.states().len()) as f64;
+    if cells > MOST_CELLS {
+        let expected = format!("a step that makes fewer than {MOST_CELLS:e} values");
+        let found = format!("{output_step}, which makes {cells:e}");
+        return Err(Error::setting("output_step", expected, found));
+    }
+    Ok(intervals as usize)
+}
+
+/// Draws of process noise from one sample to the next.
+fn draws(simulation: &Simulation) -> Result<usize, Error> {
+    match simulation.noise.process_draws {
+        Some(0) => Err(Error::setting("process_draws", "at least 1 per sample", 0)),
+        Some(draws) => Ok(draws),
+        None => Ok(process_draws(simulation).per_sample),
+    }
+}
+
+fn sample_step(simulation: &Simulation) -> Result<f64, Error> {
+    let sample_step = simulation
+        .noise
+        .sample_step
+        .unwrap_or(simulation.output_step);
+    if !(sample_step > 0.0 && sample_step.is_finite()) {
+        let expected = "a finite time above 0";
+        return Err(Error::setting("sample_step", expected, sample_step));
+    }
+    let samples = (simulation.until - simulation.start) / sample_step;
+    if samples > MOST_CELLS {
+        let expected = format!("a step that makes fewer than {MOST_CELLS:e} samples");
+        return Err(Error::setting("sample_step", expected, sample_step));
+    }
+    Ok(sample_step)
+}
+
+/// Whole numbers up to here are exact.
+const EXACT: i64 = 1 << 53;
+
+/// Most decimals of a start and a step that count as decimal numbers.
+const DECIMALS: i32 = 15;
+
+/// The times start + k·step. Where both are decimal numbers, as 0.05, each time is the number
+/// nearest to the decimal one: the third is 0.15 and not 0.15000000000000002.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grid {
+    start: f64,
+    step: f64,
+    decimal: Option<Decimal>,
+}
+
+/// Start and step in units of 1/scale.
+#[derive(Clone, Copy, Debug)]
+struct Decimal {
+    start: i64,
+    step: i64,
+    scale: i64,
+}
+
+impl Grid {
+    pub(crate) fn new(start: f64, step: f64) -> Self {
+        let scales = (0..=DECIMALS).map(|e| 10_i64.pow(e.unsigned_abs()));
+        let units = |scale: i64| {
+            Some(Decimal {
+                start: whole(start, scale)?,
+                step: whole(step, scale)?,
+                scale,
+            })
+        };
+        Self {
+            start,
+            step,
+            decimal: scales.into_iter().find_map(units),
+        }
+    }
+
+    /// Time `k`.
+    pub(crate) fn time(&self, k: usize) -> f64 {
+        let decimal = |d: Decimal| {
+            let steps = i64::try_from(k).ok()?.checked_mul(d.step)?;
+            let units = steps.checked_add(d.start)?;
+            // both are exact, so the quotient is rounded once
+            (units.abs() < EXACT).then(|| units as f64 / d.scale as f64)
+        };
+        let exact = self.decimal.and_then(decimal);
+        exact.unwrap_or(self.start + k as f64 * self.step)
+    }
+}
+
+/// How many 1/scale are `x`, if that is a whole number.
+fn whole(x: f64, scale: i64) -> Option<i64> {
+    let units = (x * scale as f64).round();
+    let fits = units.abs() < EXACT as f64 && units / scale as f64 == x;
+    fits.then_some(units as i64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_the_decimal_numbers() {
+        for (start, step, text) in [(0, 5, 0.05), (17_i32, 3_i64, 0.03), (-40, 7, 0.07)] {
+            let grid = Grid::new(f64::from(start) / 100.0, text);
+            for k in 0..5000_i32 {
+                let units = i64::from(start) + i64::from(k) * step;
+                let sign = if units < 0 { "-" } else { "" };
+                let units = units.abs();
+                let decimal = format!("{sign}{}.{:02}", units / 100, units % 100);
+                assert_eq!(Ok(grid.time(k as usize)), decimal.parse::<f64>());
+            }
+        }
+        assert_eq!(Grid::new(1.7e9, 1e-3).time(7), 1_700_000_000.007);
+    }
+
+    #[test]
+    fn other_steps_are_multiples() {
+        let third = 1.0 / 3.0;
+        let grid = Grid::new(0.5, third);
+        assert_eq!(grid.time(10), 0.5 + 10.0 * third);
+        assert_eq!(Grid::new(0.0, 1e-300).time(3), 3e-300);
+        assert_eq!(Grid::new(1e300, 1e290).time(2), 1e300 + 2e290);
+    }
+}
