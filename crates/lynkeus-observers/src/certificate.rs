@@ -4,8 +4,8 @@ use lynkeus_expr::{Interval, MissingInput, Spent};
 use lynkeus_structure::{Dimension, Extended, Measurement, Region, Side, Standing, range, short};
 use nalgebra::DMatrix;
 
-use crate::Check;
-use crate::statement::{Statement, proved, standing, sufficient, undecided};
+use crate::statement::{proved, standing, sufficient, undecided};
+use crate::{Check, Statement};
 
 /// What a guarantee may take for granted beside the plant's equations.
 #[derive(Clone, Debug)]
@@ -380,3 +380,7 @@ impl Certificate {
         self.hypotheses.iter().find(|check| !check.is_proved())
     }
 }
+
+/// Why nothing is certified of a filter.
+pub(crate) const NO_THEOREM: &str =
+    "its gain depends on the run: no theorem holds on the whole box, however good it is on a log";

@@ -1,13 +1,29 @@
 //! What every family does alike: the copy of the plant that runs on the estimate.
+//!
+//! The papers' prolongation of f outside of the box (Remark 2 of Hammouri, Targui and
+//! Armanet; Remark 1 of Lee, Yee and Park).
+//!
+//! With P the projection on the box of the declared ranges and, for each row j of a chain, a
+//! number ā_j within the bounds [α₁, α₂] of its partial, sign included,
+//!
+//! f̃_j(x) = f_j(Px) + ā_j (x_{j+1} − Px_{j+1}).
+//!
+//! In x_{j+1} the slope of f̃_j is that of f_j at Px inside of the range and ā_j outside of
+//! it, hence in [α₁, α₂] everywhere; in every other variable it is that of f_j at Px or zero.
+//! So all bounds that hold on the box hold everywhere, and f̃ = f on the box. A slope that
+//! follows Px would not do: times a distance without bound, its own change has none.
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node};
+use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_model::Variable;
-use lynkeus_structure::{Extended, Measurement};
+use lynkeus_structure::{Extended, Measurement, Region};
 
-use crate::kalman::is_or_has;
-use crate::{Estimate, Initial, Observer, Signal, Tunables, Tuning, TuningError, prolongation};
+use crate::conditions::{Partial, nominal};
+use crate::tuning::is_or_has;
+use crate::{
+    Estimate, Initial, KeySpec, Observer, Shape, Signal, Tunable, Tunables, Tuning, TuningError,
+};
 
 /// The keys of every observer, read.
 pub struct Common {
@@ -25,14 +41,14 @@ impl Common {
         Ok(Self {
             initial: tuning.initial.clone(),
             clamp: tuning.clamp,
-            prolong: tuning.flag(prolongation::PROLONG.name)?,
+            prolong: tuning.flag(PROLONG.name)?,
             tunable: tuning.tunable,
         })
     }
 }
 
 /// The plant's expressions over the estimate.
-pub(crate) struct Copy<'e, 'p> {
+pub(crate) struct PlantCopy<'e, 'p> {
     pub extended: &'e Extended<'p>,
     /// x̂, one per extended state
     pub hats: Vec<Signal>,
@@ -43,7 +59,7 @@ pub(crate) struct Copy<'e, 'p> {
     pub common: &'e Common,
 }
 
-impl<'e, 'p> Copy<'e, 'p> {
+impl<'e, 'p> PlantCopy<'e, 'p> {
     pub fn new(extended: &'e Extended<'p>, common: &'e Common) -> Self {
         let graph = extended.graph();
         let hat = |state: &Variable| Signal::fresh(graph, "estimate of", &state.name);
@@ -121,7 +137,7 @@ impl<'e, 'p> Copy<'e, 'p> {
     }
 }
 
-impl Copy<'_, '_> {
+impl PlantCopy<'_, '_> {
     /// The measured value of the state that output `i` shows: y = slope·x + offset
     /// solved for x. None where the output is no affine function of one state.
     pub fn measured_state(&self, i: usize) -> Option<(usize, Node)> {
@@ -183,4 +199,202 @@ pub(crate) fn limited(graph: &Graph, hat: Node, variable: &Variable) -> Node {
 pub(crate) fn middle(variable: &Variable) -> f64 {
     let middle = variable.min + (variable.max - variable.min) / 2.0;
     if middle.is_finite() { middle } else { 0.0 }
+}
+
+/// The study's key.
+pub(crate) const PROLONG: KeySpec = KeySpec {
+    name: "prolong",
+    kind: "true, false",
+    shape: Shape::Flag,
+    default: "false",
+    meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",
+};
+
+/// One equation of a chain.
+pub(crate) struct Continued {
+    /// j
+    pub row: usize,
+    /// j + 1
+    pub next: usize,
+    /// of the partial ∂f_row/∂x_next
+    pub sign: f64,
+    /// (α₁, α₂) of its size
+    pub bounds: (f64, f64),
+}
+
+impl Continued {
+    /// The equations of a chain.
+    pub fn along(states: &[usize], partials: &[Partial]) -> impl Iterator<Item = Self> {
+        let rows = states.windows(2).zip(partials);
+        rows.map(|(pair, partial)| Self {
+            row: pair[0],
+            next: pair[1],
+            sign: partial.sign,
+            bounds: partial.bounds,
+        })
+    }
+}
+
+/// Adds ā (x̂_next − Px̂_next) to the equations of the chains, if the study asks for it; `copy`
+/// then evaluates everything else at Px̂.
+///
+/// # Errors
+/// A partial without bounds.
+pub(crate) fn prolong(
+    copy: &PlantCopy<'_, '_>,
+    rows: impl IntoIterator<Item = Continued>,
+    derivatives: &mut [Node],
+) -> Result<(), TuningError> {
+    if !copy.common.prolong {
+        return Ok(());
+    }
+    let graph = copy.extended.graph();
+    for Continued {
+        row,
+        next,
+        sign,
+        bounds,
+    } in rows
+    {
+        let variable = &copy.extended.states[next];
+        let Some(slope) = nominal(sign, bounds) else {
+            let expected = format!(
+                "∂f({})/∂{} with known bounds away from zero, to continue with; declare min and max",
+                copy.extended.states[row].name, variable.name
+            );
+            let found = format!("bounds {} and {}", bounds.0, bounds.1);
+            return Err(TuningError::new(PROLONG.name, expected, found));
+        };
+        let hat = copy.hats[next].symbol;
+        let outside = graph.expr(hat) - graph.expr(limited(graph, hat, variable));
+        derivatives[row] = (graph.expr(derivatives[row]) + slope * outside).node();
+    }
+    Ok(())
+}
+
+/// Refuses the key where an observer has no such form.
+pub(crate) fn refuse(common: &Common, observer: &str) -> Result<(), TuningError> {
+    match common.prolong {
+        true => Err(TuningError::new(
+            PROLONG.name,
+            format!("no prolongation with {observer}"),
+            "true",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Where the estimate may be for the guarantee to hold.
+///
+/// Everywhere only where the box of the proof is the one that the observer projects on and
+/// takes its slopes from: a smaller one of states (`tube`) or of inputs has other bounds.
+pub(crate) fn note(common: &Common, extended: &Extended<'_>, region: &Region) -> String {
+    let whole = |variable: &Variable| {
+        let mut sides = region.dimensions.iter();
+        let side = sides.find(|d| d.symbol == variable.node);
+        side.is_none_or(|d| d.min <= variable.min && d.max >= variable.max)
+    };
+    let declared = extended.plant.states.iter().chain(&extended.plant.inputs);
+    match (common.prolong, declared.into_iter().all(whole)) {
+        (true, true) => "The guarantee holds for every start of the estimate, while the plant stays in the box: outside of it the functions are prolonged with the same bounds of their slopes ('prolong').".into(),
+        (true, false) => "The guarantee holds while plant and estimate stay in the box, which is smaller than the declared one that the functions are prolonged from ('prolong'): on the declared box it would hold for every start of the estimate.".into(),
+        (false, _) => box_note(common.clamp),
+    }
+}
+
+/// A speed that gains are powers of.
+#[derive(Clone, Debug)]
+pub(crate) struct Speed {
+    /// the study's value
+    value: f64,
+    /// its symbol, where it may be changed
+    symbol: Option<Node>,
+    name: String,
+    meaning: String,
+}
+
+impl Speed {
+    pub fn new(
+        copy: &PlantCopy<'_, '_>,
+        name: impl Into<String>,
+        value: f64,
+        meaning: String,
+    ) -> Self {
+        let name = name.into();
+        let graph = copy.extended.graph();
+        Self {
+            value,
+            symbol: copy
+                .common
+                .tunable
+                .then(|| graph.fresh(name.as_str()).node()),
+            name,
+            meaning,
+        }
+    }
+
+    /// θ of each chain, in the order of the measured outputs.
+    pub fn of_chains(copy: &PlantCopy<'_, '_>, θ: &[f64]) -> Vec<Self> {
+        let outputs = copy.extended.outputs.iter();
+        let each = outputs.zip(θ).enumerate().map(|(i, (output, value))| {
+            let output = &output.variable.name;
+            match θ {
+                [_] => Self::new(copy, "theta", *value, format!("θ of the gain of {output}")),
+                _ => {
+                    let meaning = format!("θ of the chain of {output}");
+                    Self::new(copy, format!("theta[{}]", i + 1), *value, meaning)
+                }
+            }
+        });
+        each.collect()
+    }
+
+    /// The study's value.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// The speed.
+    pub fn expr<'g>(&self, graph: &'g Graph) -> Expr<'g> {
+        match self.symbol {
+            Some(symbol) => graph.expr(symbol),
+            None => graph.constant(self.value),
+        }
+    }
+
+    /// A gain that is `gain` at the study's value and grows like a power of the speed.
+    pub fn scaled<'g>(&self, graph: &'g Graph, gain: f64, exponent: f64) -> Expr<'g> {
+        let gain = graph.constant(gain);
+        match self.symbol {
+            Some(symbol) => {
+                let ratio = graph.expr(symbol) / graph.constant(self.value);
+                gain * ratio.pow(graph.constant(exponent))
+            }
+            None => gain,
+        }
+    }
+}
+
+impl Observer {
+    /// The same, of which these may be changed where the tuning asks for that.
+    pub(crate) fn tuned_by<'s>(mut self, speeds: impl IntoIterator<Item = &'s Speed>) -> Self {
+        let numbers = speeds.into_iter().filter_map(|speed| {
+            Some(Tunable {
+                name: speed.name.clone(),
+                symbol: speed.symbol?,
+                value: speed.value,
+                meaning: speed.meaning.clone(),
+            })
+        });
+        self.tunables.numbers.extend(numbers);
+        self
+    }
+}
+
+/// What the box means for the guarantee.
+pub(crate) fn box_note(clamp: bool) -> String {
+    match clamp {
+        true => "The guarantee holds while plant and estimate stay in the box. Limiting what the functions see ('clamp') is no prolongation as the paper's: where an estimate is outside of its range, the functions do not react to it any more and the proof does not cover that time.".into(),
+        false => "The guarantee holds while plant and estimate stay in the box, or the functions are prolonged outside of it with the same bounds of their partial derivatives.".into(),
+    }
 }

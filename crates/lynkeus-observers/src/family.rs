@@ -1,39 +1,179 @@
-//! What a family is, and the list of them.
+//! What a family is: settings read once, the form found, the design and the theorem
+//! from both. What the [`Family`] trait offers is made of these stages, the same for all.
 
-use crate::Check;
-use crate::statement::{Statement, standing};
-use lynkeus_expr::{MissingInput, Spent};
-use lynkeus_structure::Standing;
-use lynkeus_structure::{Extended, Region};
+use lynkeus_structure::{Extended, Region, Standing};
 
+use crate::design::{Found, Searched};
 use crate::{
-    Assumptions, Certificate, KeySpec, Observer, Tuning, TuningError,
-    block_triangular::BlockTriangular,
-    drift_observable::DriftObservable,
-    kalman::{Ekf, Mhe, Ukf},
-    state_affine::StateAffine,
-    triangular::Triangular,
-    unknown_input::UnknownInput,
+    Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
 
-/// Every family, in the order in which `auto` tries them.
-pub const FAMILIES: &[&dyn Family] = &[
-    &Triangular,
-    &BlockTriangular,
-    &StateAffine,
-    &UnknownInput,
-    &DriftObservable,
-    &Ekf,
-    &Ukf,
-    &Mhe,
-];
+/// On which box the form of a theorem is sought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FormBox {
+    /// The declared one, for its conditions choose the observer. The theorem decides its
+    /// hypotheses on the box of its assumptions, whatever the form's conditions said.
+    Declared,
+    /// That of the assumptions: a refuted condition ends the proof.
+    Assumed,
+}
 
-/// The family of that name.
-pub fn find(name: &str) -> Option<&'static dyn Family> {
-    FAMILIES
-        .iter()
-        .copied()
-        .find(|family| family.name() == name)
+/// A published observer design, stage by stage.
+pub trait Stages: Sync {
+    /// the keys, read
+    type Settings;
+    /// the canonical form in a plant
+    type Form<'e, 'p: 'e>;
+    /// name in studies
+    const NAME: &'static str;
+    /// where it was published
+    const PAPER: &'static str;
+    /// the theorem, in words
+    const BASIS: &'static str;
+    /// on which box the theorem's form is sought
+    const FORM_BOX: FormBox;
+    /// its keys, in groups
+    const KEYS: &'static [&'static [KeySpec]];
+    /// how the entries of `theta` stand to one another where it has to be a list
+    const SPEEDS: &'static [f64] = &[];
+    /// whether it takes any plant, without a theorem
+    const IS_FILTER: bool = false;
+
+    /// The settings of a study.
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self::Settings, TuningError>;
+
+    /// The keys whose wrong values `read` leaves to later stages.
+    ///
+    /// # Errors
+    /// The first wrong value.
+    fn late(_settings: &Self::Settings) -> Result<(), TuningError> {
+        Ok(())
+    }
+
+    /// The form with its conditions on `region`.
+    fn form<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        region: &Region,
+    ) -> Searched<Self::Form<'e, 'p>>;
+
+    /// The observer; no condition of the form is refuted.
+    fn design<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        found: Found<Self::Form<'e, 'p>>,
+    ) -> Result<Design, DesignError>;
+
+    /// What the theorem guarantees.
+    fn theorem<'e, 'p>(
+        extended: &'e Extended<'p>,
+        settings: &Self::Settings,
+        found: Found<Self::Form<'e, 'p>>,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError>;
+}
+
+/// Work whose result counts only where the budget lasted.
+fn lasting<T>(
+    extended: &Extended<'_>,
+    work: impl FnOnce() -> Result<T, DesignError>,
+) -> Result<T, DesignError> {
+    let graph = extended.graph();
+    graph.budgeted(graph.budget().part(1.0), work)?
+}
+
+impl<S: Stages> Family for S {
+    fn name(&self) -> &'static str {
+        S::NAME
+    }
+
+    fn paper(&self) -> &'static str {
+        S::PAPER
+    }
+
+    fn speeds(&self) -> &'static [f64] {
+        S::SPEEDS
+    }
+
+    fn is_filter(&self) -> bool {
+        S::IS_FILTER
+    }
+
+    fn keys(&self) -> Vec<&'static KeySpec> {
+        S::KEYS.iter().copied().flatten().collect()
+    }
+
+    fn verify(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<(), TuningError> {
+        S::late(&S::read(extended, tuning)?)
+    }
+
+    fn examine(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+    ) -> Result<Examination, DesignError> {
+        let settings = S::read(extended, tuning)?;
+        let examined = lasting(extended, || {
+            Ok(match S::form(extended, &settings, &extended.region())? {
+                Ok(Found { examination, .. }) | Err(examination) => examination,
+            })
+        });
+        match examined {
+            Err(DesignError::Spent(spent)) => Ok(Examination::ended(S::NAME, spent)),
+            examined => examined,
+        }
+    }
+
+    fn design(&self, extended: &Extended<'_>, tuning: &Tuning) -> Result<Design, DesignError> {
+        let settings = S::read(extended, tuning)?;
+        match lasting(extended, || {
+            S::form(extended, &settings, &extended.region())
+        })? {
+            Ok(found) if found.examination.fit() != Standing::Refuted => {
+                lasting(extended, || S::design(extended, &settings, found))
+            }
+            Ok(Found { examination, .. }) | Err(examination) => {
+                Err(DesignError::Refused(Box::new(examination)))
+            }
+        }
+    }
+
+    fn theorem(
+        &self,
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        match theorem::<S>(extended, tuning, assumptions) {
+            Err(DesignError::Spent(spent)) => Ok(Certificate::ended(S::BASIS, assumptions, spent)),
+            found => found.map(|certificate| certificate.under(assumptions)),
+        }
+    }
+}
+
+fn theorem<S: Stages>(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    assumptions: &Assumptions,
+) -> Result<Certificate, DesignError> {
+    let settings = S::read(extended, tuning)?;
+    let (region, ends) = match S::FORM_BOX {
+        FormBox::Declared => (extended.region(), false),
+        FormBox::Assumed => (assumptions.region.clone(), true),
+    };
+    match lasting(extended, || S::form(extended, &settings, &region))? {
+        Ok(found) if !(ends && found.examination.fit() == Standing::Refuted) => {
+            lasting(extended, || {
+                S::theorem(extended, &settings, found, assumptions)
+            })
+        }
+        Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
+            Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
+        }
+        Ok(Found { examination, .. }) | Err(examination) => {
+            Err(DesignError::Refused(Box::new(examination)))
+        }
+    }
 }
 
 /// A published observer design.
@@ -82,200 +222,4 @@ pub trait Family: Sync {
         tuning: &Tuning,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError>;
-}
-
-/// Whether a family fits, in the words of reports: it does where every condition is proved, and
-/// does not where the form is another or a condition is refuted.
-pub fn fit_word(fit: Standing) -> &'static str {
-    match fit {
-        Standing::Proved => "fits",
-        Standing::Undecided => "undecided",
-        Standing::Refuted => "does not fit",
-    }
-}
-
-/// What a family finds in a plant.
-#[derive(Clone, Debug)]
-pub struct Examination {
-    /// name of the family
-    pub family: &'static str,
-    /// what was found, in one or two sentences: the chains, or what breaks the form
-    pub summary: String,
-    /// names of the states of each chain, where the form was found
-    pub chains: Vec<Vec<String>>,
-    /// every condition of the family with its verdict
-    pub checks: Vec<Check>,
-    plant: PlantFit,
-}
-
-/// What a family makes of the plant before its own conditions.
-#[derive(Clone, Debug)]
-enum PlantFit {
-    /// the form is another
-    Unfit,
-    /// it has the form; f and h have values and do not jump, or not
-    Form(Check),
-    /// any plant will do
-    Any,
-    /// a limit ended the examination before its end
-    Ended(Spent),
-}
-
-impl Examination {
-    /// What a family finds in a plant that has its form. The fit is that of the
-    /// conditions, of which the first is always that the plant is [regular](
-    /// Extended::regularity) on the box.
-    pub(crate) fn new(
-        extended: &Extended<'_>,
-        region: &Region,
-        family: &'static str,
-        form: Form,
-        checks: Vec<Check>,
-    ) -> Result<Self, MissingInput> {
-        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
-        Ok(Self {
-            family,
-            summary: form.summary,
-            chains: form.chains,
-            checks,
-            plant: PlantFit::Form(regularity),
-        })
-    }
-
-    /// The plant does not have the form, or a condition ends the search for one.
-    pub(crate) fn unfit(family: &'static str, summary: String, checks: Vec<Check>) -> Self {
-        Self {
-            family,
-            summary,
-            chains: vec![],
-            checks,
-            plant: PlantFit::Unfit,
-        }
-    }
-
-    /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, form: Form) -> Self {
-        Self {
-            family,
-            summary: form.summary,
-            chains: form.chains,
-            checks: vec![],
-            plant: PlantFit::Any,
-        }
-    }
-
-    /// A limit ended the examination: whether the family fits is not known.
-    pub(crate) fn ended(family: &'static str, spent: Spent) -> Self {
-        Self {
-            plant: PlantFit::Ended(spent),
-            ..Self::unfit(family, format!("undecided: {spent}"), vec![])
-        }
-    }
-
-    /// Whether a theorem stands behind the family, whose conditions are told here.
-    pub fn has_theorem(&self) -> bool {
-        !matches!(self.plant, PlantFit::Any)
-    }
-
-    /// What ended the examination before anything was decided.
-    pub fn spent(&self) -> Option<Spent> {
-        match self.plant {
-            PlantFit::Ended(spent) => Some(spent),
-            _ => None,
-        }
-    }
-
-    /// Whether the family fits: proved where every condition is, refuted where the form is
-    /// another or a required condition is refuted.
-    pub fn fit(&self) -> Standing {
-        match self.plant {
-            PlantFit::Unfit => Standing::Refuted,
-            PlantFit::Ended(_) => Standing::Undecided,
-            PlantFit::Form(_) | PlantFit::Any => standing(self.conditions()),
-        }
-    }
-
-    /// Every condition: that the plant is regular on the box, then those of the family.
-    pub fn conditions(&self) -> impl Iterator<Item = &Check> {
-        let regularity = match &self.plant {
-            PlantFit::Form(regularity) => Some(regularity),
-            PlantFit::Unfit | PlantFit::Any | PlantFit::Ended(_) => None,
-        };
-        regularity.into_iter().chain(&self.checks)
-    }
-
-    /// The first condition whose refutation refutes the whole.
-    pub fn refuted(&self) -> Option<&Check> {
-        self.conditions()
-            .find(|check| check.standing() == Standing::Refuted)
-    }
-}
-
-/// The form that a family found.
-pub(crate) struct Form {
-    /// the chains, in one or two sentences
-    pub summary: String,
-    /// names of the states of each chain
-    pub chains: Vec<Vec<String>>,
-}
-
-/// The constant gain on the error ŷ − y of one output: x̂' = f(x̂, u) − K (ŷ − y).
-#[derive(Clone, Debug, PartialEq)]
-pub struct ChainGain {
-    /// name of the measured output
-    pub output: String,
-    /// (state, gain; before the division by partials where that is asked for)
-    pub entries: Vec<(String, f64)>,
-}
-
-/// An observer with everything that led to it.
-#[derive(Clone, Debug)]
-pub struct Design {
-    /// the observer
-    pub observer: Observer,
-    /// what was found in the plant
-    pub examination: Examination,
-    /// gains, one per chain
-    pub gains: Vec<ChainGain>,
-    /// numbers that the tool chose or was given, for the reader: (name, value)
-    pub parameters: Vec<(String, String)>,
-    /// what the user should know
-    pub notes: Vec<String>,
-}
-
-/// Why there is no observer.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum DesignError {
-    /// the family does not fit
-    #[error("{}", refusal(.0))]
-    Refused(Box<Examination>),
-    /// a key of the study
-    #[error(transparent)]
-    Tuning(#[from] TuningError),
-    /// no gain of the kind asked for exists, or none is proved
-    #[error("{reason}")]
-    NoGain {
-        /// the key that asks for too much
-        key: &'static str,
-        /// what blocks it and what to do
-        reason: String,
-    },
-    /// the plant has parameters without value
-    #[error(transparent)]
-    MissingInput(#[from] MissingInput),
-    /// a limit ended the work
-    #[error("undecided: {0}")]
-    Spent(#[from] Spent),
-}
-
-fn refusal(examination: &Examination) -> String {
-    let (family, summary) = (examination.family, &examination.summary);
-    let mut text = match examination.spent() {
-        Some(_) => format!("whether the family '{family}' fits is {summary}"),
-        None => format!("the family '{family}' does not fit: {summary}"),
-    };
-    if let Some(check) = examination.refuted() {
-        text += &format!("\n  {check}");
-    }
-    text
 }

@@ -7,8 +7,8 @@
 //! ∏(s − λᵢ) = sᵐ + k₁ sᵐ⁻¹ + … + k_m. Its states *are* u, u', …, u^(m−1), exact whatever the command does:
 //! with m ≥ n − r of them (4.1) has all it reads, and nothing is differenced.
 
-use lynkeus_expr::flow::{self, Flow};
-use lynkeus_expr::{Graph, MissingInput, Node};
+use lynkeus_expr::flow::Flow;
+use lynkeus_expr::{Graph, MissingInput, Node, flow};
 use lynkeus_gain::vandermonde::{Pole, place_all};
 
 use crate::{Observer, Signal};
@@ -163,9 +163,9 @@ impl Observer {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use lynkeus_expr::Tape;
 
-    use super::*;
     use crate::{InputDerivative, Tunables};
 
     /// x' = u + u', nothing measured.

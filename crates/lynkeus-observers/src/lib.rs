@@ -1,4 +1,4 @@
-//! Observer families, one file each.
+//! Observer families, one folder each.
 //!
 //! A [`Family`] takes the plant as an observer sees it
 //! ([`Extended`](lynkeus_structure::Extended)) and a [`Tuning`], and returns a
@@ -14,38 +14,58 @@
 pub mod block_triangular;
 mod certificate;
 mod conditions;
-mod correction;
+mod design;
 pub mod drift_observable;
-mod enclosure;
 mod estimate;
 mod family;
 mod generator;
 mod guarantee;
 pub mod kalman;
-mod keys;
-mod matrices;
 mod observer;
 mod peaking;
-mod prolongation;
-mod proof;
-mod sampled;
-mod stability;
-mod stages;
+mod printed;
 pub mod state_affine;
 mod statement;
+mod theorem;
 pub mod triangular;
-mod tunable;
 mod tuning;
 pub mod unknown_input;
 
 pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound};
-pub use family::{ChainGain, Design, DesignError, Examination, FAMILIES, Family, find, fit_word};
+pub use design::{ChainGain, Design, DesignError, Examination, fit_word};
+pub use family::Family;
 pub use generator::{Generator, GeneratorError, Prefilter};
 pub use guarantee::{Claim, Correction, Injection, certify};
-pub use keys::{KeySpec, REQUIRED, Shape};
 pub use lynkeus_gain::vandermonde::Pole;
-pub use observer::{Estimate, FilterTuning, InputDerivative, Monitor, Observer, Signal};
-pub use sampled::Sampled;
+pub use observer::{
+    Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
+};
 pub use statement::{Check, Farza, Germani, Hammouri, Inequality, Lee, Ltaief, Statement, Weight};
-pub use tunable::{Tunable, Tunables};
-pub use tuning::{Initial, Tuning, TuningError, Value};
+pub use tuning::{Initial, KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
+
+use block_triangular::BlockTriangular;
+use drift_observable::DriftObservable;
+use kalman::{Ekf, Mhe, Ukf};
+use state_affine::StateAffine;
+use triangular::Triangular;
+use unknown_input::UnknownInput;
+
+/// Every family, in the order in which `auto` tries them.
+pub const FAMILIES: &[&dyn Family] = &[
+    &Triangular,
+    &BlockTriangular,
+    &StateAffine,
+    &UnknownInput,
+    &DriftObservable,
+    &Ekf,
+    &Ukf,
+    &Mhe,
+];
+
+/// The family of that name.
+pub fn find(name: &str) -> Option<&'static dyn Family> {
+    FAMILIES
+        .iter()
+        .copied()
+        .find(|family| family.name() == name)
+}

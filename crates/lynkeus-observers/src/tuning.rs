@@ -1,4 +1,6 @@
-//! Tuning keys, read by the family they belong to.
+//! Keys of a study: how a key is declared (name, type, default and meaning in one place, from
+//! which messages, the tables of the documentation and the schema for editors come), and the
+//! values that a family reads.
 
 use std::collections::BTreeMap;
 
@@ -287,3 +289,97 @@ fn numbers(key: &str, value: &Value) -> Result<Vec<f64>, TuningError> {
         one => Ok(vec![number(one)?]),
     }
 }
+
+/// A key: everything that messages, documentation and editors say of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeySpec {
+    /// the key
+    pub name: &'static str,
+    /// what may stand there, in words
+    pub kind: &'static str,
+    /// the same for programs
+    pub shape: Shape,
+    /// what holds where it is absent
+    pub default: &'static str,
+    /// what it does
+    pub meaning: &'static str,
+}
+
+/// What may stand under a key, as far as it does not depend on the plant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// any finite number
+    Number,
+    /// a number > 0
+    Positive,
+    /// a number ≥ 0
+    NotNegative,
+    /// a number in (0, 1)
+    Share,
+    /// a number in [least, most]
+    Between {
+        /// the least
+        least: f64,
+        /// the most
+        most: f64,
+    },
+    /// a whole number of at least this
+    Whole(u32),
+    /// true or false
+    Flag,
+    /// any text
+    Text,
+    /// one of these texts
+    Word(&'static [&'static str]),
+    /// a list
+    List(&'static Shape),
+    /// values of one shape under names of the plant
+    Table(&'static Shape),
+    /// values under keys of their own, in groups; those that are [`REQUIRED`] have to be there
+    Section(&'static [&'static [KeySpec]]),
+    /// one of several shapes
+    Either(&'static [Shape]),
+}
+
+impl Shape {
+    /// A number > 0, or one per chain or output.
+    pub const POSITIVES: Self = Self::Either(&[Self::Positive, Self::List(&Self::Positive)]);
+    /// A list of names.
+    pub const NAMES: Self = Self::List(&Self::Text);
+    /// A list of lists of numbers.
+    pub const ROWS: Self = Self::List(&Self::List(&Self::Number));
+}
+
+/// The default of a key that has none.
+pub const REQUIRED: &str = "required";
+
+impl KeySpec {
+    /// The error that `found` stands under this key.
+    pub fn wrong(&self, found: impl ToString) -> TuningError {
+        TuningError::new(self.name, self.kind, found)
+    }
+
+    /// The key as a row of a table of keys.
+    #[must_use]
+    pub fn row(&self) -> String {
+        let Self {
+            name,
+            kind,
+            default,
+            meaning,
+            ..
+        } = self;
+        format!("| `{name}` | {kind} | {default} | {meaning} |")
+    }
+}
+
+/// Whether a name is that of a variable, or of the array it is an element of.
+pub(crate) fn is_or_has(name: &str, variable: &str) -> bool {
+    let element = variable.strip_prefix(name);
+    element.is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+}
+
+/// A key whose wrong value is told by the stage that needs it: another family may own a key
+/// of that name with another shape, and `auto` examines a plant for both. Where the study names
+/// the family, [`Family::verify`] tells it at once.
+pub(crate) type Late<T> = Result<T, TuningError>;

@@ -14,37 +14,24 @@
 //! lengths it asks for 1 ≤ θ_i and θ_{i−1}^{n_{i−1}} ≤ θ_i. The rule between
 //! neighbours suffices: θ_k^{n_k} ≤ θ_{k+1} ≤ θ_{k+1}^{n_{k+1}} ≤ θ_{k+2} ≤ ….
 
-mod figures;
 mod form;
-mod gains;
-mod lee;
-mod low_power;
+mod observer;
 mod settings;
-mod stable;
 mod theorem;
 mod transformed;
 
-use std::collections::HashMap;
+use lynkeus_structure::{Extended, Region};
 
-use lynkeus_expr::Node;
-use lynkeus_structure::{Blocks, Extended, Region};
-
-use crate::correction::{self, Start};
-use crate::estimate::Copy;
-use crate::peaking::{Remedies, Transient, transient};
-use crate::prolongation::{Continued, prolong};
-use crate::stages::{FormBox, Found, Searched, Stages};
-use crate::tunable::Speed;
+use crate::design::{Found, Searched};
+use crate::family::{FormBox, Stages};
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
 };
-use form::Form;
-use lee::{lee, transformation};
-use settings::{Correction, Settings};
-
-const NAME: &str = "block-triangular";
-const BASIS: &str = "Theorem 1 of Lee, Yee and Park";
+use form::{Form, NAME};
+use observer::observer;
+use settings::Settings;
+use theorem::BASIS;
 
 /// The family `block-triangular`.
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +57,7 @@ impl Stages for BlockTriangular {
     fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
         match settings.impossible() {
             true => {
-                let summary = low_power::ONLY_CLASSICAL.to_owned();
+                let summary = observer::ONLY_CLASSICAL.to_owned();
                 Ok(Err(Examination::unfit(NAME, summary, vec![])))
             }
             false => form::form(extended, settings, region),
@@ -87,7 +74,7 @@ impl Stages for BlockTriangular {
                 let examination = found.examination;
                 guarantee::design_lmi(extended, &settings.common, lmi, NAME, examination)
             }
-            (None, true) => low_power::assemble(extended, settings, found),
+            (None, true) => observer::assemble(extended, settings, found),
             (None, false) => observer(extended, settings, found),
         }
     }
@@ -100,116 +87,4 @@ impl Stages for BlockTriangular {
     ) -> Result<Certificate, DesignError> {
         theorem::certificate(extended, settings, &found.form.blocks, assumptions)
     }
-}
-
-/// Observer (7) or (3).
-fn observer(
-    extended: &Extended<'_>,
-    settings: &Settings,
-    Found { form, examination }: Found<Form>,
-) -> Result<Design, DesignError> {
-    let graph = extended.graph();
-    let copy = Copy::new(extended, &settings.common);
-    let blocks = &form.blocks;
-    let Remedies {
-        limit, transient, ..
-    } = &settings.remedies;
-    let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
-    let correction = settings.correction;
-    let start = Start::new(&copy)?;
-    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    let mut parameters = vec![("θ".to_owned(), text(&θ))];
-    parameters.extend(transient.as_ref().map(Transient::parameter));
-    let coefficients = K.iter().enumerate();
-    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
-    let mut derivatives = copy.at_estimate(&extended.derivatives);
-    let mut gains = vec![];
-    let speeds = Speed::of_chains(&copy, &θ);
-    for (place, (output, chain)) in blocks.order.iter().enumerate() {
-        let injected = injected(&copy, blocks, place);
-        let Some(innovation) = limit.innovation(&copy, *output) else {
-            continue;
-        };
-        let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
-        let steady: Vec<(f64, f64)> = K[*output].iter().enumerate().map(power).collect();
-        let timed = transient::gains(
-            transient.as_ref(),
-            &copy,
-            *output,
-            &speeds[*output],
-            &steady,
-        );
-        let gain = match correction {
-            Correction::Classical => timed,
-            Correction::Lee => lee(extended, chain, &timed),
-        };
-        let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
-        let f: Vec<Node> = chain
-            .states
-            .iter()
-            .map(|&i| extended.derivatives[i])
-            .collect();
-        let f = copy.at_estimate(&graph.substitute(&f, &injected));
-        for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
-            derivatives[state] =
-                (graph.expr(f) - graph.expr(*gain) * graph.expr(innovation)).node();
-        }
-        let printed = correction::Correction {
-            output: *output,
-            states: &chain.states,
-            factors: &gain,
-            limited: limit.is_set(),
-        };
-        match printed.constant(extended) {
-            Some(constant) => gains.push(constant),
-            None => {
-                if correction == Correction::Lee {
-                    let found = transformation(extended, chain);
-                    let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
-                    parameters.push((format!("M{}", output + 1), start.table(&found.M)));
-                    parameters.push((format!("L{}", output + 1), start.table(&L)));
-                }
-                let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
-                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
-                parameters.extend(printed.expressions(&start));
-            }
-        }
-    }
-    prolong(&copy, continued(&form), &mut derivatives)?;
-    Ok(Design {
-        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
-        notes: chain_rule(blocks, &θ).into_iter().collect(),
-        examination,
-        gains,
-        parameters,
-    })
-}
-
-/// The equations of the chains, for their prolongation.
-fn continued(form: &Form) -> impl Iterator<Item = Continued> {
-    let blocks = form.blocks.order.iter().zip(&form.partials);
-    blocks.flat_map(|((_, chain), partials)| Continued::along(&chain.states, partials))
-}
-
-/// y_{i+1}, …, y_p in place of the states they show.
-fn injected(copy: &Copy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<Node, Node> {
-    let later = blocks.order[place + 1..].iter();
-    later
-        .filter_map(|(output, _)| copy.measured_state(*output))
-        .map(|(state, y)| (copy.extended.states[state].node, y))
-        .collect()
-}
-
-/// Lemma 2's condition on θ.
-fn chain_rule(blocks: &Blocks, θ: &[f64]) -> Option<String> {
-    blocks.order.windows(2).find_map(|pair| {
-        let ((before, chain), (after, _)) = (&pair[0], &pair[1]);
-        let needed = θ[*before].powi(chain.states.len() as i32);
-        (needed > θ[*after]).then(|| {
-            format!(
-                "theta: {} for the later chain is below {needed} = {}^{} of the chain before it; the proof of Theorem 1 needs at least that",
-                θ[*after], θ[*before], chain.states.len()
-            )
-        })
-    })
 }

@@ -1,15 +1,13 @@
-//! The study's keys.
+//! The study's keys, and K: given, or by its eigenvalues.
 
 use lynkeus_structure::{ChainRequest, Extended};
 
-use super::gains::{number_lists, placed};
 use crate::conditions::{CHAINS, chain_request};
-use crate::estimate::Common;
+use crate::estimate::{Common, PROLONG};
 use crate::guarantee::{LMI_KEYS, Lmi};
-use crate::peaking::{self, Remedies};
-use crate::prolongation::PROLONG;
-use crate::stages::Late;
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError};
+use crate::peaking::Remedies;
+use crate::tuning::Late;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",
@@ -181,4 +179,41 @@ fn order(extended: &Extended<'_>, tuning: &Tuning) -> Result<Option<Vec<usize>>,
         let expected = format!("every measured output once ({})", outputs.join(", "));
         TuningError::new(ORDER.name, expected, &tuning.values[ORDER.name])
     })
+}
+
+/// K with the eigenvalues of A − KC at the poles: the coefficients of Π(s − pole).
+pub(super) fn placed(poles: &[f64]) -> Vec<f64> {
+    let mut coefficients = vec![1.0];
+    for pole in poles {
+        let shifted = coefficients.iter().map(|c| -pole * c);
+        let mut next: Vec<f64> = coefficients.iter().copied().chain([0.0]).collect();
+        for (sum, term) in next[1..].iter_mut().zip(shifted) {
+            *sum += term;
+        }
+        coefficients = next;
+    }
+    coefficients.split_off(1)
+}
+
+/// Lists of numbers, one per chain.
+pub(super) fn number_lists(
+    tuning: &Tuning,
+    key: &str,
+) -> Result<Option<Vec<Vec<f64>>>, TuningError> {
+    let Some(value) = tuning.values.get(key) else {
+        return Ok(None);
+    };
+    let wrong = || TuningError::new(key, "a list of lists of numbers, one per chain", value);
+    let Value::List(rows) = value else {
+        return Err(wrong());
+    };
+    let number = |x: &Value| match x {
+        Value::Number(x) if x.is_finite() => Ok(*x),
+        _ => Err(wrong()),
+    };
+    let row = |row: &Value| match row {
+        Value::List(row) => row.iter().map(number).collect(),
+        _ => Err(wrong()),
+    };
+    rows.iter().map(row).collect::<Result<_, _>>().map(Some)
 }

@@ -18,8 +18,8 @@ use lynkeus_proof::magnitude::{plus, product, times};
 use lynkeus_proof::matrix::sum;
 use lynkeus_structure::{Blocks, Chain, Extended, Matrix, range};
 
-use super::lee::{Sparse, own_jacobian, transformation};
-use crate::proof::slopes::magnitude;
+use super::observer::{Sparse, own_jacobian, transformation};
+use crate::theorem::magnitude;
 use crate::{Assumptions, DesignError};
 
 /// A table of upper bounds, row by row.

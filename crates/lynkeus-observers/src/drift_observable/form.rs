@@ -1,19 +1,34 @@
-//! The form of the paper in a plant: the map Φ̄ with its Jacobians, and the conditions on it.
+//! The form of the paper in a plant: the map Φ̄ with its Jacobians, which derivative of which
+//! output an input enters, and the conditions: Q and Q̄ are regular on the box.
 
-use crate::statement::Statement;
-use crate::{Check, Germani};
-use lynkeus_expr::Node;
-use lynkeus_structure::output_map::{self, AffineForm, Rows};
-use lynkeus_structure::{Extended, Region, Regularity};
+use std::collections::HashMap;
 
-use super::conditions::{self, Inputs};
-use super::settings::Settings;
-use super::variant::Variant;
-use super::{NAME, degrees, derivative_name, size};
+use lynkeus_expr::{Binary, Graph, Node, Op, Spent};
+use lynkeus_structure::output_map::{AffineForm, Degree, Rows};
+use lynkeus_structure::{
+    Dimension, Extended, Matrix, Region, Regularity, Verdict, output_map, short,
+};
+
+use super::settings::{Settings, Variant};
 use crate::conditions::{lasts, lipschitz, names};
-use crate::family;
-use crate::stages::Found;
-use crate::{DesignError, Examination};
+use crate::design::Found;
+use crate::statement::{sufficient, undecided};
+use crate::{Check, DesignError, Examination, Germani, Statement, design};
+
+pub(super) const NAME: &str = "drift-observable";
+
+/// Operations of the map that a second is enough for, with what is decided of them: measured on
+/// chains of 20 to 100 states, generously.
+const PER_SECOND: f64 = 400_000.0;
+
+/// Bytes per operation, measured likewise.
+const BYTES: f64 = 100.0;
+
+/// Halvings, on a logarithmic scale, of the search for Ū.
+const HALVINGS: usize = 14;
+
+/// Ū beyond which inputs are taken for as large as one likes.
+const ANY: f64 = 1e6;
 
 /// What does not depend on how many derivatives of which output count.
 pub(super) struct Map<'s> {
@@ -40,7 +55,7 @@ impl<'s> Map<'s> {
             Ok(affine) => affine,
             Err(why) => return Ok(Err(unfit(why))),
         };
-        size::affordable(extended, &affine)?;
+        affordable(extended, &affine)?;
         let order = extended.states.len().saturating_sub(1);
         let lie = output_map::lie_derivatives(extended, &affine, order)?;
         let gradients = output_map::lie_gradients(extended, &affine, order)?;
@@ -49,7 +64,7 @@ impl<'s> Map<'s> {
             affine,
             gradients,
             lie,
-            slopes: degrees::slopes(extended),
+            slopes: slopes(extended),
             lipschitz: lipschitz(extended, region)?,
             settings,
         }))
@@ -119,8 +134,8 @@ impl Form {
         indices: Vec<usize>,
         region: &Region,
     ) -> Result<Found<Self>, DesignError> {
-        let degrees = degrees::degrees(extended, map, &indices, region)?;
-        let U = degrees::input_symbols(extended, map, &indices, &degrees);
+        let degrees = degrees(extended, map, &indices, region)?;
+        let U = input_symbols(extended, map, &indices, &degrees);
         let variant = map.settings.variant.unwrap_or_else(|| Variant::suited(&U));
         let rows: Vec<(usize, usize)> = indices
             .iter()
@@ -132,10 +147,10 @@ impl Form {
             .map(|&(i, k)| map.gradients[i][k].clone())
             .collect();
         lasts(extended)?;
-        let regular = conditions::regular(extended, Germani::Regular, &Q, region)?;
+        let regular = regular(extended, Germani::Regular, &Q, region)?;
         lasts(extended)?;
         let Φ: Vec<Node> = rows.iter().map(|&(i, k)| map.lie[i][k]).collect();
-        let one_to_one = conditions::one_to_one(extended, &Φ, &regular, region)?;
+        let one_to_one = one_to_one(extended, &Φ, &regular, region)?;
         lasts(extended)?;
         let (Φ, Q, Q_a) = match variant {
             Variant::Bounded => (Φ, Q, vec![]),
@@ -143,7 +158,7 @@ impl Form {
         };
         // the map is followed along the plant: as states, inputs and time move
         let slopes = map.settings.known_slopes(extended, &U);
-        let moving = degrees::with_slopes(extended, &U, &slopes, region);
+        let moving = with_slopes(extended, &U, &slopes, region);
         let continuous = Regularity::of(extended.graph(), &Φ, &moving.symbols(), &moving)?;
         let reads = U.iter().any(|jet| !jet.is_empty());
         let inputs = Inputs {
@@ -154,7 +169,7 @@ impl Form {
             region,
         };
         let checks = Checks {
-            degree: degrees::known(extended, &indices, &degrees),
+            degree: known(extended, &indices, &degrees),
             regular,
             one_to_one,
             lipschitz: map.lipschitz.clone(),
@@ -165,7 +180,7 @@ impl Form {
             },
         };
         let every: Vec<usize> = (0..extended.states.len()).collect();
-        let found = family::Form {
+        let found = design::Form {
             summary: summary(extended, variant, &rows, &U),
             chains: vec![names(extended, &every)],
         };
@@ -230,4 +245,318 @@ fn summary(
         map.join(", "),
         variant.word()
     )
+}
+
+/// r_ij of output i with respect to input j, for indices μ.
+pub(super) fn degrees(
+    extended: &Extended<'_>,
+    map: &Map<'_>,
+    μ: &[usize],
+    region: &Region,
+) -> Result<Vec<Vec<Degree>>, DesignError> {
+    let of = |gradients: &[Rows], region: &Region| -> Result<Vec<Vec<Degree>>, DesignError> {
+        let mut all = vec![];
+        for (rows, &μ) in gradients.iter().zip(μ) {
+            let rows = &rows[..μ];
+            let of_input = |j| output_map::relative_degree(extended, rows, &map.affine, j, region);
+            let row: Result<Vec<Degree>, _> = (0..extended.inputs.len()).map(of_input).collect();
+            all.push(row?);
+        }
+        Ok(all)
+    };
+    let found = of(&map.gradients, region)?;
+    let early = found
+        .iter()
+        .zip(μ)
+        .any(|(row, &μ)| row.iter().any(|d| d.r < μ));
+    if extended.inputs.len() < 2 || !early {
+        return Ok(found);
+    }
+    // an input that enters early may bring another one along
+    let order = μ.iter().copied().max().unwrap_or(0);
+    let orders = vec![order; extended.inputs.len()];
+    let U = jets(extended, map, &orders);
+    let y = output_map::output_derivatives(extended, &U, order.saturating_sub(1))?;
+    let x = extended.symbols();
+    let gradients: Vec<Rows> = y
+        .iter()
+        .map(|y| output_map::jacobian_rows(extended.graph(), y, &x))
+        .collect();
+    of(
+        &gradients,
+        &with_slopes(extended, &U, &extended.input_derivatives, region),
+    )
+}
+
+/// u_j, u_j', …, as many as Φ̄ depends on: for one output n − r.
+pub(super) fn input_symbols(
+    extended: &Extended<'_>,
+    map: &Map<'_>,
+    indices: &[usize],
+    degrees: &[Vec<Degree>],
+) -> Vec<Vec<Node>> {
+    let needed = |j: usize| {
+        let pairs = indices.iter().zip(degrees);
+        let orders = pairs.map(|(μ, d)| μ.saturating_sub(d[j].r));
+        orders.max().unwrap_or(0)
+    };
+    let orders: Vec<usize> = (0..extended.inputs.len()).map(needed).collect();
+    jets(extended, map, &orders)
+}
+
+/// The symbols of u_j, u_j', …, so many of each input.
+fn jets(extended: &Extended<'_>, map: &Map<'_>, orders: &[usize]) -> Vec<Vec<Node>> {
+    let whole = extended.inputs.iter().zip(&map.slopes);
+    let whole = whole.map(|(input, slopes)| std::iter::once(input.node).chain(slopes.clone()));
+    whole
+        .zip(orders)
+        .map(|(jet, &order)| jet.take(order).collect())
+        .collect()
+}
+
+/// Symbols of u_j', u_j'', …, as many as there are states, for each known input.
+pub(super) fn slopes(extended: &Extended<'_>) -> Vec<Vec<Node>> {
+    let graph = extended.graph();
+    let symbol = |name: &str, k: usize| graph.fresh(format!("derivative {k} of {name}")).node();
+    let orders = 1..=extended.states.len();
+    let one =
+        |input: &lynkeus_model::Variable| orders.clone().map(|k| symbol(&input.name, k)).collect();
+    extended.inputs.iter().map(one).collect()
+}
+
+/// The box with u', u'', … within their bounds, which are those of each input's own list, and free
+/// beyond its end.
+pub(super) fn with_slopes(
+    extended: &Extended<'_>,
+    U: &[Vec<Node>],
+    bounds: &[Vec<f64>],
+    region: &Region,
+) -> Region {
+    let mut region = region.clone();
+    for ((input, jet), bounds) in extended.inputs.iter().zip(U).zip(bounds) {
+        let further = jet.iter().enumerate().skip(1).map(|(k, &symbol)| {
+            let bound = bounds.get(k - 1).copied().unwrap_or(f64::INFINITY);
+            Dimension {
+                name: derivative_name(&input.name, k),
+                symbol,
+                min: -bound,
+                max: bound,
+                integer: false,
+            }
+        });
+        region.dimensions.extend(further);
+    }
+    region
+}
+
+/// Definition 2.2, with the zeros proved or not.
+pub(super) fn known(extended: &Extended<'_>, indices: &[usize], degrees: &[Vec<Degree>]) -> Check {
+    let mut found = vec![];
+    let mut proved = true;
+    for (i, row) in degrees.iter().enumerate().filter(|(i, _)| indices[*i] > 0) {
+        let y = &extended.outputs[i].variable.name;
+        for degree in row {
+            proved &= degree.proved;
+            found.push(format!("{y}: r = {}, {}", degree.r, degree.detail));
+        }
+    }
+    if found.is_empty() {
+        found.push("no known input".to_owned());
+    }
+    if !proved {
+        found.push("zeros before r are found at points, not proved".to_owned());
+    }
+    sufficient(Germani::Degree, proved, found.join("; "))
+}
+
+/// Refuses a map that the budget is not enough for.
+///
+/// # Errors
+/// How many operations it would have.
+pub(super) fn affordable(extended: &Extended<'_>, form: &AffineForm) -> Result<(), DesignError> {
+    let budget = extended.graph().budget();
+    let operations = operations(extended, form);
+    let time = budget.left().map(|left| left.as_secs_f64() * PER_SECOND);
+    let room = budget.room().map(|room| room as f64 / BYTES);
+    match time.into_iter().chain(room).all(|most| operations <= most) {
+        true => Ok(()),
+        false => Err(DesignError::Spent(Spent::Size(operations as u64))),
+    }
+}
+
+/// Of n derivatives of the outputs with their slopes by n states: the k-th coefficient of a
+/// product of series has k products.
+fn operations(extended: &Extended<'_>, form: &AffineForm) -> f64 {
+    let n = extended.states.len() as f64;
+    let graph = extended.graph();
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let roots: Vec<Node> = form.drift.iter().copied().chain(outputs).collect();
+    let cost = |node: &Node| match graph.op(*node) {
+        Op::Constant(_) | Op::Symbol(_) => 0.0,
+        op if is_linear(graph, op) => n,
+        _ => 0.5 * n * n,
+    };
+    n * graph.reachable(&roots).iter().map(cost).sum::<f64>()
+}
+
+/// Whether a coefficient of the result costs the same at every order.
+fn is_linear(graph: &Graph, op: Op) -> bool {
+    let is_number = |node: Node| matches!(graph.op(node), Op::Constant(_));
+    match op {
+        Op::Unary(lynkeus_expr::Unary::Neg, _) => true,
+        Op::Binary(Binary::Add | Binary::Sub, ..) => true,
+        Op::Binary(Binary::Mul, a, b) => is_number(a) || is_number(b),
+        Op::Binary(Binary::Div, _, b) => is_number(b),
+        _ => false,
+    }
+}
+
+/// Whether a square matrix is regular on the whole region.
+pub(super) fn regular(
+    extended: &Extended<'_>,
+    statement: Germani,
+    Q: &Rows,
+    region: &Region,
+) -> Result<Check, DesignError> {
+    let n = Q.len();
+    let Q = Matrix::from_fn(extended.graph(), (n, n), |i, j| {
+        Q.get(i).and_then(|row| *row.get(j)?)
+    });
+    Ok(Statement::from(statement).with(lynkeus_structure::regular::regular(&Q, region)?))
+}
+
+/// Whether Φ, whose Jacobian was found `regular` or not, is one-to-one on the whole region.
+pub(super) fn one_to_one(
+    extended: &Extended<'_>,
+    Φ: &[Node],
+    regular: &Check,
+    region: &Region,
+) -> Result<Check, DesignError> {
+    let states = extended.symbols();
+    let map = lynkeus_structure::one_to_one::Map {
+        graph: extended.graph(),
+        functions: Φ,
+        states: &states,
+        region,
+    };
+    let found = map.one_to_one(&vec![false; states.len()], regular.is_proved())?;
+    Ok(Statement::from(Germani::OneToOne).with(found.finding))
+}
+
+/// The map where it reads inputs.
+pub(super) struct Inputs<'a, 'p> {
+    pub extended: &'a Extended<'p>,
+    pub U: &'a [Vec<Node>],
+    /// bounds of |u'|, |u''|, … per input, as far as they are declared
+    pub slopes: &'a [Vec<f64>],
+    pub Q̄: &'a Rows,
+    pub region: &'a Region,
+}
+
+impl Inputs<'_, '_> {
+    /// What the observer needs of the input where r < n.
+    pub fn check(&self, variant: Variant) -> Result<Check, DesignError> {
+        if variant == Variant::Bounded {
+            return Ok(undecided(
+                Germani::SmallInput,
+                "the input appears before the n-th derivative of the output and (3.1) takes no account of it: it converges for u_M ≤ β λ_min(P) only; variant = \"theoretical\" or \"practical\" does not need that",
+            ));
+        }
+        let name = || Germani::UniformlyObservable;
+        // a singular point for a constant input is the better witness
+        let still = self.still();
+        let mut check = regular(self.extended, name(), &self.at_rest(&still), self.region)?;
+        if !matches!(check.verdict, Verdict::Refuted(_)) && !still.is_empty() {
+            let wider = with_slopes(self.extended, self.U, self.slopes, self.region);
+            let declared = self.declared();
+            let statement = match declared.is_empty() {
+                true => name(),
+                false => Germani::RegularWithin,
+            };
+            check = regular(self.extended, statement, self.Q̄, &wider)?;
+            if !declared.is_empty() {
+                check.detail += &format!("; for {declared}, as `input_derivatives` bounds them");
+            }
+        }
+        if !check.is_proved() {
+            check.detail += "; small and slow inputs keep it regular (Theorem 2.4), the column rcond and its flag tell";
+        }
+        Ok(check)
+    }
+
+    /// The bounds of the derivatives that Q̄ reads, in words.
+    fn declared(&self) -> String {
+        let jets = self.extended.inputs.iter().zip(self.U).zip(self.slopes);
+        let each = jets.flat_map(|((input, jet), bounds)| {
+            let read = jet.len().saturating_sub(1);
+            let each = bounds.iter().take(read).enumerate();
+            each.map(|(k, bound)| {
+                format!(
+                    "|{}| ≤ {}",
+                    derivative_name(&input.name, k + 1),
+                    short(*bound)
+                )
+            })
+        });
+        each.collect::<Vec<_>>().join(", ")
+    }
+
+    /// Ū of Theorem 2.4: the largest radius, to a few thousandths of its size, for which Q̄ is proved regular on
+    /// the box of the states for all |u|, |u'|, … ≤ Ū; none where even the smallest inputs leave it undecided.
+    pub fn largest(&self) -> Result<Option<f64>, DesignError> {
+        let holds = |radius: f64| -> Result<bool, DesignError> {
+            let mut region = self.region.clone();
+            let is_input = |symbol: Node| self.extended.inputs.iter().any(|u| u.node == symbol);
+            for side in region
+                .dimensions
+                .iter_mut()
+                .filter(|side| is_input(side.symbol))
+            {
+                (side.min, side.max) = (-radius, radius);
+            }
+            let orders = self.U.iter().map(|jet| vec![radius; jet.len()]);
+            let region = with_slopes(self.extended, self.U, &orders.collect::<Vec<_>>(), &region);
+            Ok(regular(self.extended, Germani::RegularWithin, self.Q̄, &region)?.is_proved())
+        };
+        let (mut low, mut high) = (1e-6, ANY);
+        if !holds(low)? {
+            return Ok(None);
+        }
+        if holds(high)? {
+            return Ok(Some(f64::INFINITY));
+        }
+        for _ in 0..HALVINGS {
+            let middle = f64::sqrt(low * high);
+            match holds(middle)? {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        Ok(Some(low))
+    }
+
+    /// u', u'', … ↦ 0
+    fn still(&self) -> HashMap<Node, Node> {
+        let zero = self.extended.graph().constant(0.0).node();
+        let slopes = self.U.iter().flat_map(|jet| jet.iter().skip(1));
+        slopes.map(|&symbol| (symbol, zero)).collect()
+    }
+
+    /// Q̄ for constant inputs.
+    fn at_rest(&self, still: &HashMap<Node, Node>) -> Rows {
+        let graph = self.extended.graph();
+        let constant = |row: &Vec<Option<Node>>| {
+            let entry = |e: &Option<Node>| Some(graph.substitute(&[(*e)?], still)[0]);
+            row.iter().map(entry).collect()
+        };
+        self.Q̄.iter().map(constant).collect()
+    }
+}
+
+/// y, y', y'', y^(3), …
+pub(super) fn derivative_name(name: &str, order: usize) -> String {
+    match order {
+        0..=2 => format!("{name}{}", "'".repeat(order)),
+        _ => format!("{name}^({order})"),
+    }
 }

@@ -14,20 +14,16 @@
 //! ẑ' = Aẑ + Bm̄(ẑ, x̂_a) + K₁(y − h(x̂)) without w, whatever (4.23) says: there only m̄ is
 //! compared, and n̄(x, x_a)w is left over as a force that does not vanish with the error.
 
-use crate::statement::Statement;
-use crate::{Check, Germani};
 use std::collections::HashMap;
 
 use lynkeus_expr::{MissingInput, Node};
 use lynkeus_proof::magnitude::{length, norm, plus, product, times};
 use lynkeus_structure::{Extended, Matrix, Region, Regularity, output_map};
 
-use super::conditions::regular;
-use super::derivative_name;
-use super::form::Form;
-use super::variant::Variant;
-use crate::DesignError;
-use crate::enclosure::Enclosure;
+use super::form::{Form, derivative_name, regular};
+use super::settings::Variant;
+use crate::theorem::Enclosure;
+use crate::{Check, DesignError, Germani, Statement};
 
 /// Bounds on the box.
 pub(super) struct Lipschitz {

@@ -16,32 +16,21 @@
 //! Beyond the print: several inputs, each with a filter of its own order, and
 //! several outputs with the indices of Krener and Respondek.
 
-mod assembly;
-mod blind;
-mod choice;
-mod conditions;
-mod degrees;
 mod form;
-mod gains;
-mod guarantee;
-mod keys;
+mod indices;
 mod lipschitz;
-mod poles;
-mod proof;
-mod report;
+mod observer;
 mod settings;
-mod size;
 mod theorem;
-mod variant;
 
 use lynkeus_structure::{Extended, Region};
 
-use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::design::{Found, Searched};
+use crate::family::{FormBox, Stages};
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
-use form::Form;
+use form::{Form, NAME};
 use settings::Settings;
 
-const NAME: &str = "drift-observable";
 const PAPER: &str = "Germani, Manes 1999, http://dml.cz/dmlcz/135297";
 
 /// The family `drift-observable`.
@@ -62,7 +51,7 @@ impl Stages for DriftObservable {
     }
 
     fn form(extended: &Extended<'_>, settings: &Settings, region: &Region) -> Searched<Form> {
-        choice::form(extended, settings, region)
+        indices::form(extended, settings, region)
     }
 
     fn design(
@@ -70,8 +59,8 @@ impl Stages for DriftObservable {
         settings: &Settings,
         found: Found<Form>,
     ) -> Result<Design, DesignError> {
-        let gains = gains::Gains::new(extended, settings, &found.form)?;
-        assembly::design(extended, &settings.common, found, gains)
+        let gains = observer::Gains::new(extended, settings, &found.form)?;
+        observer::design(extended, &settings.common, found, gains)
     }
 
     fn theorem(
@@ -81,13 +70,5 @@ impl Stages for DriftObservable {
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
         theorem::certificate(extended, settings, &found.form, assumptions)
-    }
-}
-
-/// y, y', y'', y^(3), …
-fn derivative_name(name: &str, order: usize) -> String {
-    match order {
-        0..=2 => format!("{name}{}", "'".repeat(order)),
-        _ => format!("{name}^({order})"),
     }
 }

@@ -1,18 +1,20 @@
-//! The study's keys.
+//! The study's keys: which of the three observers, indices, poles, filters, bounds of slopes.
+//! What depends on the form is kept as it stands until the indices are known.
 
 use lynkeus_expr::Node;
+use lynkeus_gain::vandermonde;
 use lynkeus_gain::vandermonde::{Lemma32, Pole};
 use lynkeus_structure::Extended;
 
-use super::keys::{self, Asked, Needed};
-use super::variant::Variant;
 use crate::estimate::Common;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 /// Numbers, or a single one.
 const SPEEDS: Shape = Shape::Either(&[Shape::Number, Shape::List(&Shape::Number)]);
+
 /// The same for one input, or for several by their names.
 const PER_INPUT: Shape = Shape::Either(&[SPEEDS, Shape::Table(&SPEEDS)]);
+
 const BESIDE_ALPHA: &str = "poles by Lemma 3.2 instead, with `alpha`, see below";
 
 const VARIANT: KeySpec = KeySpec {
@@ -126,7 +128,7 @@ impl Settings {
         Ok(Self {
             common: Common::read(tuning)?,
             variant: Variant::read(tuning, VARIANT.name)?,
-            asked: keys::indices(extended, tuning, poles.as_ref())?,
+            asked: indices(extended, tuning, poles.as_ref())?,
             poles,
             α: tuning.positive(ALPHA.name)?,
             β: tuning.positive(BETA.name)?,
@@ -142,20 +144,66 @@ impl Settings {
         self.poles.is_some() || self.α.is_some()
     }
 
-    /// The poles of each output with its μ, if they are listed.
+    /// `poles`: for one output its n poles; for several a list or the slowest pole of each. A single
+    /// number is the slowest pole of every output. None where they are not listed.
     pub fn poles(&self, μ: &[usize]) -> Result<Option<Vec<Vec<Pole>>>, TuningError> {
-        let poles = self.poles.as_ref();
-        poles.map(|value| keys::poles(value, μ)).transpose()
+        let Some(value) = &self.poles else {
+            return Ok(None);
+        };
+        let given = per_output(value, μ.len())?;
+        let pairs = given.iter().zip(μ);
+        let lists: Option<Vec<Vec<Pole>>> = pairs.map(|(poles, &μ)| poles.of_length(μ)).collect();
+        let lengths: Vec<String> = μ.iter().map(usize::to_string).collect();
+        let expected = match μ {
+            [n] => format!("{n} negative numbers, one per state"),
+            _ => format!(
+                "a list of negative numbers per measured output, of lengths {}, or the slowest pole of each",
+                lengths.join(", ")
+            ),
+        };
+        lists
+            .map(Some)
+            .ok_or_else(|| TuningError::new(POLES.name, expected, value))
     }
 
-    /// Lemma 3.2 for each output that is used.
+    /// Lemma 3.2 with `alpha`, `beta`, `gamma`; none for an output that is not used.
     pub fn lemma(&self, μ: &[usize]) -> Result<Vec<Option<Lemma32>>, TuningError> {
-        keys::lemma(self, μ)
+        let Some(α) = self.α else {
+            let expected = "the eigenvalues of the error, negative numbers, or alpha, beta and gamma for Lemma 3.2 to choose them";
+            return Err(TuningError::absent(POLES.name, expected));
+        };
+        let missing = || {
+            TuningError::absent(
+                GAMMA.name,
+                "the Lipschitz constant for Lemma 3.2, a positive number",
+            )
+        };
+        let γ = self.γ.ok_or_else(missing)?;
+        // (4.7) has β = 1
+        let β = self.β.unwrap_or(1.0);
+        let of = |&μ: &usize| match μ {
+            0 => Ok(None),
+            _ => vandermonde::lemma_3_2(μ, α, β, γ)
+                .map(Some)
+                .map_err(|error| {
+                    TuningError::new(ALPHA.name, "numbers Lemma 3.2 can be used with", error)
+                }),
+        };
+        μ.iter().map(of).collect()
     }
 
-    /// The eigenvalues of the filter per input.
+    /// `filter_poles`: the eigenvalues of the filter per input.
     pub fn filter_poles(&self, needed: &Needed<'_>) -> Result<Vec<Option<Vec<Pole>>>, TuningError> {
-        keys::filter_poles(self.filter_poles.as_ref(), needed)
+        let entries = PerInput::read(
+            self.filter_poles.as_ref(),
+            FILTER_POLES,
+            "numbers for the filter of",
+            needed,
+        )?;
+        entries.map(|value, order| {
+            let poles = Poles::read(FILTER_POLES.name, value)?;
+            Ok(poles.and_then(|poles| poles.of_length(order)))
+        })
     }
 
     /// x̂ₐ(0) per input.
@@ -164,7 +212,7 @@ impl Settings {
         needed: &Needed<'_>,
     ) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
         let what = "numbers for the filter of";
-        keys::numbers_per_input(self.filter_initial.as_ref(), FILTER_INITIAL, what, needed)
+        numbers_per_input(self.filter_initial.as_ref(), FILTER_INITIAL, what, needed)
     }
 
     /// Bounds of |u'|, |u''|, … per input as far as any are declared: the family's key, else those of the plant. A
@@ -179,8 +227,323 @@ impl Settings {
             .collect()
     }
 
-    /// Bounds of |u'|, |u''|, … per input.
+    /// `input_derivatives`: per input bounds of |u'|, |u''|, …, one more than the observer
+    /// reads; for guarantees only. None where they are left out.
     pub fn slopes(&self, needed: &Needed<'_>) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
-        keys::slopes(self.slopes.as_ref(), needed)
+        let found = numbers_per_input(
+            self.slopes.as_ref(),
+            SLOPES,
+            "bounds of the derivatives of",
+            needed,
+        )?;
+        match found.iter().flatten().flatten().find(|x| **x < 0.0) {
+            Some(x) => Err(TuningError::new(
+                SLOPES.name,
+                "bounds, no negative numbers",
+                x,
+            )),
+            None => Ok(found),
+        }
     }
+}
+
+/// Which of the three observers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// (3.1)
+    Bounded,
+    /// (4.1)
+    Theoretical,
+    /// (4.22)
+    Practical,
+}
+
+impl Variant {
+    const ALL: [Self; 3] = [Self::Bounded, Self::Theoretical, Self::Practical];
+
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bounded => "bounded",
+            Self::Theoretical => "theoretical",
+            Self::Practical => "practical",
+        }
+    }
+
+    /// The least demanding one that takes account of the inputs: with r = n the
+    /// three coincide, with r = n − 1 no derivative is needed (Remark 4.2).
+    pub fn suited(U: &[Vec<Node>]) -> Self {
+        match U.iter().map(Vec::len).max().unwrap_or(0) {
+            0 => Self::Bounded,
+            1 => Self::Theoretical,
+            _ => Self::Practical,
+        }
+    }
+
+    /// The one that stands under a key.
+    pub fn read(tuning: &Tuning, key: &str) -> Result<Option<Self>, TuningError> {
+        let words = Self::ALL.map(Self::word);
+        let word = tuning.choice(key, &words)?;
+        Ok(word.and_then(|word| Self::ALL.into_iter().find(|v| v.word() == word)))
+    }
+}
+
+/// What is asked for of the known inputs: (name, how many numbers), in their order.
+pub struct Needed<'a> {
+    pub names: Vec<&'a str>,
+    pub orders: Vec<usize>,
+}
+
+impl<'a> Needed<'a> {
+    pub fn new(extended: &'a Extended<'_>, orders: Vec<usize>) -> Self {
+        let names = extended.inputs.iter().map(|i| i.name.as_str()).collect();
+        Self { names, orders }
+    }
+}
+
+/// How many derivatives of which output the study asks for.
+#[derive(Clone)]
+pub enum Asked {
+    /// the key `indices`, or as many poles for every output
+    Indices(Vec<usize>),
+    /// per output, where its poles are listed
+    Lengths(Vec<Option<usize>>),
+}
+
+/// `indices`: one whole number per measured output, n in sum; else the lengths of the lists
+/// under `poles`.
+pub(super) fn indices(
+    extended: &Extended<'_>,
+    tuning: &Tuning,
+    poles: Option<&Value>,
+) -> Result<Asked, TuningError> {
+    let (p, n) = (extended.outputs.len(), extended.states.len());
+    if let Some(found) = tuning.numbers(INDICES.name)? {
+        let whole = |x: &f64| *x >= 0.0 && x.fract() == 0.0 && *x <= n as f64;
+        if found.len() != p || !found.iter().all(whole) || found.iter().sum::<f64>() != n as f64 {
+            let expected = format!(
+                "one whole number per measured output ({p}), the number of states ({n}) in sum"
+            );
+            let found: Vec<String> = found.iter().map(f64::to_string).collect();
+            return Err(TuningError::new(INDICES.name, expected, found.join(", ")));
+        }
+        return Ok(Asked::Indices(found.iter().map(|&x| x as usize).collect()));
+    }
+    // one output has n derivatives whatever the list says
+    let Some(value) = poles.filter(|_| p > 1) else {
+        return Ok(Asked::Lengths(vec![None; p]));
+    };
+    let given = per_output(value, p)?;
+    let lengths: Vec<Option<usize>> = given.iter().map(Poles::count).collect();
+    let all: Option<Vec<usize>> = lengths.iter().copied().collect();
+    match all {
+        Some(indices) if indices.iter().sum::<usize>() == n => Ok(Asked::Indices(indices)),
+        Some(_) => {
+            let expected = format!("as many poles as states ({n}) in all");
+            Err(TuningError::new(POLES.name, expected, value))
+        }
+        None => Ok(Asked::Lengths(lengths)),
+    }
+}
+
+/// The poles of each of p outputs.
+fn per_output(value: &Value, p: usize) -> Result<Vec<Poles>, TuningError> {
+    let wrong = || {
+        let expected = match p {
+            1 => "negative numbers, one per state".to_owned(),
+            _ => format!(
+                "a list of negative numbers, or the slowest pole, for each measured output ({p})"
+            ),
+        };
+        TuningError::new(POLES.name, expected, value)
+    };
+    let of = |value: &Value| Poles::read(POLES.name, value)?.ok_or_else(wrong);
+    match value {
+        Value::Number(_) => Ok(vec![of(value)?; p]),
+        Value::List(entries) => {
+            let nested = entries.iter().any(|e| matches!(e, Value::List(_)));
+            if p == 1 && !nested {
+                return Ok(vec![of(value)?]);
+            }
+            if entries.len() != p {
+                return Err(wrong());
+            }
+            entries.iter().map(of).collect()
+        }
+        _ => Err(wrong()),
+    }
+}
+
+/// Numbers for each input that takes some; none where they are left out.
+pub(super) fn numbers_per_input(
+    value: Option<&Value>,
+    key: KeySpec,
+    what: &str,
+    needed: &Needed<'_>,
+) -> Result<Vec<Option<Vec<f64>>>, TuningError> {
+    let entries = PerInput::read(value, key, what, needed)?;
+    entries.map(|value, order| Ok(numbers(value).filter(|numbers| numbers.len() == order)))
+}
+
+/// A value for the only input that takes one, or a table of them by the inputs' names.
+struct PerInput<'a> {
+    key: &'static str,
+    /// per input its value and how many numbers it takes
+    entries: Vec<Option<(&'a Value, usize)>>,
+    /// the key's value
+    all: Option<&'a Value>,
+    expected: String,
+}
+
+impl<'a> PerInput<'a> {
+    fn read(
+        all: Option<&'a Value>,
+        key: KeySpec,
+        what: &str,
+        needed: &Needed<'_>,
+    ) -> Result<Self, TuningError> {
+        let Needed { names, orders } = needed;
+        let some: Vec<usize> = (0..names.len()).filter(|&j| orders[j] > 0).collect();
+        let expected = match some[..] {
+            [] => "no such key: this observer has no filter and reads no derivative".to_owned(),
+            [j] => format!("{} {what} {}", orders[j], names[j]),
+            _ => {
+                let one = |&j: &usize| format!("{} = {} numbers", names[j], orders[j]);
+                let all: Vec<String> = some.iter().map(one).collect();
+                format!("a table {{ {} }}", all.join(", "))
+            }
+        };
+        let mut found = Self {
+            key: key.name,
+            entries: vec![None; names.len()],
+            all,
+            expected,
+        };
+        match (found.all, &some[..]) {
+            (None, _) => {}
+            (Some(Value::Table(table)), _) => {
+                for (name, value) in table {
+                    let j = some.iter().copied().find(|&j| names[j] == name.as_str());
+                    let j = j.ok_or_else(|| found.wrong())?;
+                    found.entries[j] = Some((value, orders[j]));
+                }
+            }
+            (Some(value), &[j]) => found.entries[j] = Some((value, orders[j])),
+            _ => return Err(found.wrong()),
+        }
+        Ok(found)
+    }
+
+    fn wrong(&self) -> TuningError {
+        let found = self.all.map_or_else(String::new, Value::to_string);
+        TuningError::new(self.key, self.expected.clone(), found)
+    }
+
+    fn map<T>(
+        &self,
+        read: impl Fn(&Value, usize) -> Result<Option<T>, TuningError>,
+    ) -> Result<Vec<Option<T>>, TuningError> {
+        let one = |entry: &Option<(&Value, usize)>| match entry {
+            None => Ok(None),
+            Some((value, order)) => read(value, *order)?.map(Some).ok_or_else(|| self.wrong()),
+        };
+        self.entries.iter().map(one).collect()
+    }
+}
+
+fn numbers(value: &Value) -> Option<Vec<f64>> {
+    let number = |value: &Value| match value {
+        Value::Number(x) if x.is_finite() => Some(*x),
+        _ => None,
+    };
+    match value {
+        Value::List(values) => values.iter().map(number).collect(),
+        one => Some(vec![number(one)?]),
+    }
+}
+
+/// Ratio of each pole to the one before where only the slowest is given: that of the
+/// paper's example.
+pub(super) const RATIO: f64 = 1.2;
+
+/// The poles of one chain or filter.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Poles {
+    /// the slowest one, each further one 1.2 times as fast as the one before
+    Slowest(f64),
+    /// all of them
+    All(Vec<Pole>),
+}
+
+impl Poles {
+    /// A number, or a list of numbers and of tables { re, im } for conjugate pairs. None
+    /// where the value is neither.
+    pub fn read(key: &str, value: &Value) -> Result<Option<Self>, TuningError> {
+        match value {
+            Value::Number(x) => Ok(Some(Self::Slowest(negative(key, *x)?))),
+            Value::List(entries) => {
+                let poles: Result<Option<Vec<Pole>>, _> =
+                    entries.iter().map(|e| pole(key, e)).collect();
+                Ok(poles?.map(Self::All))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// How many eigenvalues, where that is said.
+    pub fn count(&self) -> Option<usize> {
+        match self {
+            Self::Slowest(_) => None,
+            Self::All(poles) => Some(poles.iter().map(|p| p.count()).sum()),
+        }
+    }
+
+    /// For a chain of length `n`; none where these are more or fewer.
+    pub fn of_length(&self, n: usize) -> Option<Vec<Pole>> {
+        match self {
+            Self::Slowest(λ) => Some(spaced(*λ, n)),
+            Self::All(poles) => (self.count() == Some(n)).then(|| poles.clone()),
+        }
+    }
+}
+
+/// n real poles from the slowest on.
+pub(super) fn spaced(slowest: f64, n: usize) -> Vec<Pole> {
+    let pole = |k: usize| Pole::Real(slowest * RATIO.powi(k as i32));
+    (0..n).map(pole).collect()
+}
+
+fn pole(key: &str, value: &Value) -> Result<Option<Pole>, TuningError> {
+    match value {
+        Value::Number(λ) => Ok(Some(Pole::Real(negative(key, *λ)?))),
+        Value::Table(parts) => {
+            let part = |name: &str| match parts.get(name) {
+                Some(Value::Number(x)) if x.is_finite() => Some(*x),
+                _ => None,
+            };
+            let (Some(re), Some(im), 2) = (part("re"), part("im"), parts.len()) else {
+                let expected = "a conjugate pair as { re = number, im = number }";
+                return Err(TuningError::new(key, expected, value));
+            };
+            let re = negative(key, re)?;
+            if im == 0.0 {
+                let expected = "im ≠ 0 in a conjugate pair; a real pole is a number";
+                return Err(TuningError::new(key, expected, value));
+            }
+            Ok(Some(Pole::Pair { re, im }))
+        }
+        _ => Ok(None),
+    }
+}
+
+fn negative(key: &str, pole: f64) -> Result<f64, TuningError> {
+    match pole < 0.0 && pole.is_finite() {
+        true => Ok(pole),
+        false => Err(TuningError::new(key, "negative numbers", pole)),
+    }
+}
+
+/// Poles for a message or a table.
+pub(super) fn list(poles: &[Pole]) -> String {
+    let poles: Vec<String> = poles.iter().map(Pole::to_string).collect();
+    poles.join(", ")
 }

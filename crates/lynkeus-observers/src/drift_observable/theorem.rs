@@ -8,25 +8,39 @@
 //!
 //! e_a is the error of the filter, zero for (3.1) and (4.1). P is sought for the study's K,
 //! not K for a P: the theorems only ask that there is one.
+//!
+//! In (4.39) the print drops γ²_Φ̄⁻¹|e_a|², in (4.40) c₃ lacks the factor γ and c₂ has √γ for γ.
+//! (4.23) gives the observer a term n̄(ẑ, x̂_a)w that (4.22) does not have, so that n̄(z, x_a)w drives the
+//! error. With P for E = (√m g_k e_k) and γ = 1, so that γ/β of the print is one, (4.35) becomes
+//!
+//! ν' ≤ −2α₁ν + |e_a|² + 2φ√ν,  φ² ≥ (B n̄ w)ᵀP⁻¹(B n̄ w),
+//!
+//! hence √ν ≤ √p + q for p' = −2α₁p + |e_a|², q' = −α₁q + φ, and
+//!
+//! |e_x| ≤ c₁ e^(−α₁t)|e_x(0)| + (c₁ e^(−α₁t) + c₂ √ε + c₄ e^(−α₂t)) |e_a(0)| + c₃,
+//! c₁ = γ_Φ̄ γ_Φ̄⁻¹ √cn(P),  c₂ = γ_Φ̄⁻¹ √(‖P‖ cn(P_a)),  c₄ = γ_Φ̄⁻¹ √cn(P_a),
+//! c₃ = γ_Φ̄⁻¹ √(‖P‖ (a/√(2α₁) + φ/α₁)² + a²),  a² = ‖P_a‖ w_M²/(2α₂).
+//!
+//! As t → ∞ the fixed point of ν' says less than c₃: √ν → (φ + √(φ² + 2α₁a²))/(2α₁). There any P of (4.33)
+//! will do, also one with a smaller α₁, and the states are bounded one by one.
+//! P is that for the study's gain.
 
-use crate::statement::{sufficient, undecided};
-use crate::{Check, Germani};
+use lynkeus_expr::Interval;
 use lynkeus_gain::vandermonde;
-use lynkeus_proof::magnitude::length;
-use lynkeus_structure::Extended;
-use lynkeus_structure::Verdict;
+use lynkeus_gain::vandermonde::Pole;
+use lynkeus_proof::magnitude::{length, plus, size, times, total};
+use lynkeus_proof::riccati::Riccati;
+use lynkeus_structure::{Extended, Verdict, short};
 
-use super::conditions::Inputs;
-use super::form::Form;
-use super::gains::{Gains, closed_loop, slowest};
-use super::guarantee;
-use super::keys::Needed;
-use super::lipschitz::{self, Lipschitz};
-use super::proof::{Proof, SLOW};
-use super::settings::{SLOPES, Settings};
-use super::variant::Variant;
-use crate::enclosure::figures;
-use crate::{Assumptions, Certificate, Constant, DesignError, TuningError};
+use super::form::{Form, Inputs};
+use super::lipschitz;
+use super::lipschitz::{Lipschitz, Share};
+use super::observer::{Gains, closed_loop, slowest, spread};
+use super::settings::{Needed, SLOPES, Settings, Variant};
+use crate::statement::{sufficient, undecided};
+use crate::{
+    Assumptions, Certificate, Check, Constant, DesignError, Germani, TuningError, UltimateBound,
+};
 
 pub(super) fn certificate(
     extended: &Extended<'_>,
@@ -86,7 +100,7 @@ pub(super) fn certificate(
     certificate.constants = constants;
     certificate.notes = notes(extended, form, assumptions);
     if let Some((proof, P)) = found.filter(|_| certificate.weakest().is_none()) {
-        guarantee::conclude(&proof, &P, assumptions, &mut certificate);
+        conclude(&proof, &P, assumptions, &mut certificate);
     }
     Ok(certificate)
 }
@@ -215,8 +229,8 @@ fn of_the_map(
     let detail = match found.inverse.is_finite() {
         true => format!(
             "γ_Φ = {}, γ_Φ⁻¹ = {}",
-            figures(found.map),
-            figures(found.inverse)
+            short(found.map),
+            short(found.inverse)
         ),
         false => format!(
             "the means of its Jacobian over lines in the box are not known to be regular: {}",
@@ -230,7 +244,7 @@ fn of_the_map(
     ));
     let γ = length(&found.drift) + length(&found.input);
     let detail = match γ.is_finite() {
-        true => format!("γ = {}", figures(length(&found.drift))),
+        true => format!("γ = {}", short(length(&found.drift))),
         false => open_or(found, "the inverse has no bound"),
     };
     checks.push(sufficient(Germani::LastRows, γ.is_finite(), detail));
@@ -275,4 +289,353 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
     finite
         .map(|(name, value, meaning)| Constant::new(name, value, meaning))
         .collect()
+}
+
+/// Shares of the filter's slowest pole tried for α₂.
+const FILTER_SHARES: [f64; 4] = [0.5, 0.65, 0.8, 0.9];
+
+/// The filter: α₂, √cn(P_a), and a bound of |e_a| as t → ∞.
+struct Filter {
+    α: f64,
+    peak: f64,
+    rest: f64,
+}
+
+pub(super) fn conclude(
+    proof: &Proof<'_, '_>,
+    solutions: &Solutions,
+    assumptions: &Assumptions,
+    found: &mut Certificate,
+) {
+    let P = &solutions.fastest;
+    let filtered = proof.form.variant == Variant::Practical && proof.w.iter().any(|&w| w > 0.0)
+        || proof.gains.K2.iter().any(|K| !K.is_empty());
+    let filter = match filtered {
+        true => match filter(proof) {
+            Some(filter) => Some(filter),
+            None => {
+                let detail = "no P_a was found for the filter's poles";
+                found.hypotheses.push(undecided(Germani::Filter, detail));
+                return;
+            }
+        },
+        false => None,
+    };
+    let peak = P.peak();
+    let α = filter.as_ref().map_or(P.α, |f| P.α.min(f.α));
+    found.rate = Some(α);
+    let φ = of_rows(P, &proof.lipschitz.unseen);
+    let parts = filter.as_ref().zip(Some(φ));
+    let μ = times(times(peak, proof.lipschitz.map), proof.lipschitz.inverse);
+    // with a filter the error peaks by what the filter's leaves as well
+    found.overshoot = filter.is_none().then_some(μ);
+    print(proof, P, μ, parts, &mut found.constants);
+    let a = filter.map_or(0.0, |f| f.rest);
+    let left = std::iter::once(P)
+        .chain(&solutions.slower)
+        .map(|P| Left::of(proof, P, a, assumptions));
+    if let Some(left) = left.min_by(|x, y| x.whole.total_cmp(&y.whole)) {
+        let names = proof.extended.states.iter().map(|x| x.name.clone());
+        found.ultimate_bound = Some(left.whole);
+        found.ultimate = names.zip(left.each).map(UltimateBound::from).collect();
+    }
+}
+
+/// Bounds as t → ∞.
+struct Left {
+    /// of every state's error
+    each: Vec<f64>,
+    /// of the length of the error
+    whole: f64,
+}
+
+impl Left {
+    /// By P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and |e_z,j| ≤ √(P_jj ν).
+    fn of(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Self {
+        let f = size(of_rows(P, &proof.lipschitz.unseen)) + size(forces(proof, P, assumptions));
+        let twice = Interval::point(2.0) * Interval::point(P.α);
+        let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
+        let e_z = Interval::point(P.largest).sqrt() * root_ν;
+        let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
+        let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+        let e_z = e_z.hi();
+        let of_state = |share: &Share| {
+            let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
+            let together = times(length(&share.z), e_z);
+            plus(one_by_one.min(together), times(share.through, a))
+        };
+        let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
+        let whole = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
+        Self { each, whole }
+    }
+}
+
+/// The P_a of (4.27) with the smallest bound of the filter's error.
+fn filter(proof: &Proof<'_, '_>) -> Option<Filter> {
+    let gains = proof.gains;
+    let mut w = vec![];
+    for (K, &bound) in gains.K2.iter().zip(&proof.w) {
+        w.extend((0..K.len()).map(|k| if k + 1 == K.len() { bound } else { 0.0 }));
+    }
+    let driven = w.iter().any(|&w| w > 0.0);
+    let limit = slowest(&gains.filter_λ);
+    let A = closed_loop(&gains.K2);
+    let one = |share: f64| {
+        let P = Riccati::solve(&A, &spread(&w), share * limit, 0.0)?;
+        let twice = Interval::point(2.0) * Interval::point(P.α);
+        let rest = (Interval::point(P.largest) / twice).sqrt().hi();
+        Some(Filter {
+            α: P.α,
+            peak: P.peak(),
+            rest: if driven { rest } else { 0.0 },
+        })
+    };
+    let found = FILTER_SHARES.into_iter().filter_map(one);
+    found.min_by(|a, b| a.rest.total_cmp(&b.rest))
+}
+
+/// √(fᵀP⁻¹f) for every f with |f_k| ≤ `size[k]`.
+fn of_rows(P: &Riccati, size: &[f64]) -> f64 {
+    let unit = |k: usize| {
+        let entry = |i: usize| f64::from(u8::from(i == k));
+        (0..size.len()).map(entry).collect::<Vec<_>>()
+    };
+    let each = size.iter().enumerate().filter(|(_, size)| **size > 0.0);
+    let one_by_one = total(each.map(|(k, size)| times(P.weight(&unit(k)), *size)));
+    one_by_one.min(P.weight_of_length(length(size)))
+}
+
+/// √(fᵀP⁻¹f) for the disturbances, as the map sees them, and the noise.
+fn forces(proof: &Proof<'_, '_>, P: &Riccati, assumptions: &Assumptions) -> f64 {
+    let n = proof.A.len();
+    let pushed = |row: &Vec<f64>| {
+        let terms = row.iter().zip(&assumptions.drift);
+        total(terms.map(|(q, d)| times(*q, *d)))
+    };
+    let q: Vec<f64> = proof.lipschitz.Q.iter().map(pushed).collect();
+    let mut sum = of_rows(P, &q);
+    let mut start = 0;
+    for (i, K) in proof.gains.K.iter().enumerate() {
+        let noise = assumptions.noise.get(i).copied().unwrap_or(0.0);
+        let mut column = vec![0.0; n];
+        column[start..start + K.len()].copy_from_slice(K);
+        if noise > 0.0 && !K.is_empty() {
+            sum = plus(sum, times(P.weight(&column), noise));
+        }
+        start += K.len();
+    }
+    sum
+}
+
+fn print(
+    proof: &Proof<'_, '_>,
+    P: &Riccati,
+    μ: f64,
+    filter: Option<(&Filter, f64)>,
+    constants: &mut Vec<Constant>,
+) {
+    let inverse = proof.lipschitz.inverse;
+    let mut add = |name: &str, value: f64, meaning: &str| {
+        constants.push(Constant::new(name, value, meaning));
+    };
+    for (output, K) in proof.extended.outputs.iter().zip(&proof.gains.K) {
+        for (k, gain) in K.iter().enumerate() {
+            let meaning = format!("gain of {}", output.variable.name);
+            add(&format!("K{}", k + 1), *gain, &meaning);
+        }
+    }
+    for lemma in &proof.gains.lemma {
+        add(
+            "σ",
+            lemma.σ,
+            "of Lemma 3.2, for the study's alpha, beta and gamma",
+        );
+    }
+    add("‖P‖", P.largest, "largest eigenvalue of P");
+    add("λmin(P)", P.smallest, "smallest eigenvalue of P");
+    add("α", P.α, "the rate that P proves");
+    let Some((filter, φ)) = filter else {
+        add(
+            "μ",
+            μ,
+            "√cn(P) γ_Φ γ_Φ⁻¹: the factor by which the error may peak",
+        );
+        return;
+    };
+    let (root, α) = (Interval::point(P.largest).sqrt(), Interval::point(P.α));
+    let spreading = (root * size(filter.peak)).hi();
+    let left = size(filter.rest) / (Interval::point(2.0) * α).sqrt();
+    let e_z = (root * (left + size(φ) / α)).hi();
+    let n̄ = length(&proof.lipschitz.unseen);
+    add("α2", filter.α, "the rate of the filter");
+    add("c1", μ, "of (4.30): the factor of the initial errors");
+    add(
+        "c2",
+        times(inverse, spreading),
+        "of (4.30): the factor of √ε and the filter's initial error",
+    );
+    add(
+        "c3",
+        times(inverse, length(&[e_z, filter.rest])),
+        "of (4.30), corrected: what the filter and n̄w leave",
+    );
+    add(
+        "|n̄w|",
+        n̄,
+        "missing in (4.25): the part of the last derivatives that (4.22) lacks",
+    );
+    add(
+        "c4",
+        times(inverse, filter.peak),
+        "missing in (4.30): the filter's initial error as x sees it",
+    );
+}
+
+/// Steps of a bisection on a logarithmic scale.
+const STEPS: usize = 40;
+
+/// Shares of the largest α tried for the bounds as t → ∞.
+const SHARES: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 0.9];
+
+/// α of the question whether there is any, as a share of the slowest pole.
+pub(super) const SLOW: f64 = 1e-6;
+
+/// Everything the conclusions are drawn from.
+pub(super) struct Proof<'a, 'p> {
+    pub extended: &'a Extended<'p>,
+    pub form: &'a Form,
+    pub gains: &'a Gains,
+    pub lipschitz: &'a Lipschitz,
+    /// A − KC
+    pub A: Vec<Vec<f64>>,
+    /// the slowest pole's absolute value
+    pub slowest: f64,
+    /// per input: the bound of the derivative that drives the filter
+    pub w: Vec<f64>,
+}
+
+/// Solutions of the Riccati inequality; any of them proves something.
+pub(super) struct Solutions {
+    /// with the largest α
+    pub fastest: Riccati,
+    /// with smaller α, which may leave smaller bounds as t → ∞
+    pub slower: Vec<Riccati>,
+}
+
+impl Proof<'_, '_> {
+    /// P for the study's gain, and hypothesis 4 with both numbers.
+    pub fn riccati(
+        &self,
+        u_M: f64,
+        constants: &mut Vec<Constant>,
+    ) -> (Option<Solutions>, Vec<Check>) {
+        let mut checks = vec![];
+        let drift = &self.lipschitz.drift;
+        let with_input = |u: f64| -> Vec<f64> {
+            let pairs = drift.iter().zip(&self.lipschitz.input);
+            pairs
+                .map(|(γ, H)| {
+                    if *H > 0.0 {
+                        plus(*γ, times(u, *H))
+                    } else {
+                        *γ
+                    }
+                })
+                .collect()
+        };
+        let γ = length(drift);
+        let limit = self.largest(|s| drift.iter().map(|g| g * s).collect()) * γ;
+        let name = || Germani::Riccati;
+        let holds = limit >= γ;
+        if limit.is_finite() && γ.is_finite() && γ > 0.0 {
+            constants.push(Constant::new("γ*", limit, "what these poles can bear"));
+            let word = if holds { "≤" } else { ">" };
+            let detail = format!("{} {word} {}", short(γ), short(limit));
+            checks.push(sufficient(name(), holds, detail));
+            constants.extend(self.scale());
+        } else if !γ.is_finite() {
+            checks.push(undecided(name(), "γ has no bound"));
+        }
+        if !γ.is_finite() || (γ > 0.0 && !holds) {
+            return (None, checks);
+        }
+        if length(&self.lipschitz.input) > 0.0 {
+            let limit = self.largest(with_input);
+            if limit.is_finite() {
+                let meaning = "the largest |u| that these poles can bear";
+                constants.push(Constant::new("u_M", limit, meaning));
+            }
+            let word = if u_M <= limit { "≤" } else { ">" };
+            let detail = format!("{} {word} {}", short(u_M), short(limit));
+            checks.push(sufficient(Germani::Input, u_M <= limit, detail));
+        }
+        let g = with_input(u_M);
+        if !g.iter().all(|g| g.is_finite()) {
+            return (None, checks);
+        }
+        let E = spread(&g);
+        let P = Riccati::fastest(&self.A, &E, 1.0, self.slowest).map(|fastest| {
+            let at = |share: &f64| Riccati::solve(&self.A, &E, share * fastest.α, 1.0);
+            Solutions {
+                slower: SHARES.iter().filter_map(at).collect(),
+                fastest,
+            }
+        });
+        if P.is_none() && checks.iter().all(Check::is_proved) {
+            checks.push(undecided(name(), "no P was found for these poles"));
+        }
+        (P, checks)
+    }
+
+    /// The largest s for which g(s) can be borne; 0 where none can, infinite
+    /// where all can.
+    fn largest(&self, g: impl Fn(f64) -> Vec<f64>) -> f64 {
+        let bears = |s: f64| self.bears(&self.A, &g(s), self.slowest);
+        edge(|s| !bears(s)).map_or(
+            f64::INFINITY,
+            |s| if bears(s / 1.01) { s / 1.01 } else { 0.0 },
+        )
+    }
+
+    fn bears(&self, A: &[Vec<f64>], g: &[f64], slowest: f64) -> bool {
+        g.iter().all(|g| g.is_finite())
+            && Riccati::solve(A, &spread(g), SLOW * slowest, 1.0).is_some()
+    }
+
+    /// The smallest factor of all poles that the proof allows.
+    fn scale(&self) -> Option<Constant> {
+        let bears = |s: f64| {
+            let scaled = |λ: &Vec<Pole>| -> Vec<f64> {
+                let faster: Vec<Pole> = λ.iter().map(|λ| λ.scaled(s)).collect();
+                vandermonde::place_all(&faster)
+            };
+            let K: Vec<Vec<f64>> = self.gains.λ.iter().map(scaled).collect();
+            self.bears(&closed_loop(&K), &self.lipschitz.drift, s * self.slowest)
+        };
+        let s = edge(bears)?;
+        let meaning = "the proof allows these poles times this factor, without input";
+        Some(Constant::new("s0", s, meaning))
+    }
+}
+
+/// The smallest s > 0 from which on `holds`, to a thousandth, rounded up; none up to 10⁶.
+fn edge(holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let (mut low, mut high) = (1e-9f64, 1.0f64);
+    while !holds(high) {
+        (low, high) = (high, high * 4.0);
+        if high > 1e6 {
+            return None;
+        }
+    }
+    for _ in 0..STEPS {
+        let middle = (low * high).sqrt();
+        match holds(middle) {
+            true => high = middle,
+            false => low = middle,
+        }
+        if high < low * 1.001 {
+            break;
+        }
+    }
+    Some(high)
 }

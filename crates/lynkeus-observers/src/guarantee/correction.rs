@@ -6,12 +6,13 @@ use lynkeus_expr::{MissingInput, Node, Tape, jacobian};
 use lynkeus_structure::Extended;
 use nalgebra::DMatrix;
 
-use super::edges::edges;
+use super::error_system::edges;
 use super::refute::{Side, spread};
 use crate::Observer;
 
 /// Points at which the copy of the plant is recognised.
 const POINTS: usize = 24;
+
 /// Rounding of the terms that cancel there, relative to their size.
 const ROUNDING: f64 = 1e-9;
 

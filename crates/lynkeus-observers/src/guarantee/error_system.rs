@@ -1,20 +1,23 @@
-//! The error system of an observer on a box.
+//! The error system of an observer on a box: its slopes, the innovations x̂_s − x_s that
+//! it reads (of outputs that each show one state s), and where it may have no derivative
+//! (kinks, steps and singular ends).
 
-use crate::statement::{Statement, proved};
-use crate::{Check, Inequality};
-use lynkeus_structure::{Finding, Verdict};
 use std::collections::HashMap;
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
+use lynkeus_expr::{
+    Binary, Evaluator, Graph, Interval, MissingInput, Node, Nodes, Op, Tape, Unary, jacobian,
+};
+use lynkeus_proof::decay;
 use lynkeus_proof::decay::ErrorModel;
 use lynkeus_proof::matrix::IntervalMatrix;
-use lynkeus_structure::{Dimension, Extended, Region, Slopes, counted, range, range_within};
+use lynkeus_structure::{
+    Dimension, Extended, Finding, Innovation, Region, Slopes, Verdict, counted, range, range_within,
+};
 use nalgebra::DMatrix;
 
-use super::edges::edges;
-use super::{expanded, innovation};
-use crate::{Assumptions, InputDerivative, Observer};
+use crate::statement::proved;
+use crate::{Assumptions, Check, Inequality, InputDerivative, Observer, Statement};
 
 /// Cells examined per end of the range of an injection.
 const CELLS: usize = 200;
@@ -171,7 +174,7 @@ fn around_innovations(
     symbols: &[Node],
     region: &Region,
 ) -> Result<Slopes, MissingInput> {
-    let found = innovation::of(extended, observer, region)?;
+    let found = of(extended, observer, region)?;
     let graph = extended.graph();
     let derivatives = graph.substitute(&observer.derivatives, &found.images);
     let innovations = &found.innovations;
@@ -291,4 +294,141 @@ fn size(variable: &lynkeus_model::Variable) -> f64 {
         .filter(usable)
         .or(variable.start.filter(usable));
     typical.map_or(1.0, f64::abs)
+}
+
+/// The innovations of an observer.
+pub(super) struct Innovations {
+    pub innovations: Vec<Innovation>,
+    /// the nodes that are innovations, over the symbols that stand for them
+    pub images: HashMap<Node, Node>,
+    /// with a side for each of the symbols
+    pub region: Region,
+}
+
+/// Finds h(x̂) − y and x̂_s − x_s(y), in either order.
+pub(super) fn of(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    region: &Region,
+) -> Result<Innovations, MissingInput> {
+    let graph = extended.graph();
+    let hats = extended.states.iter().zip(&observer.states);
+    let hats: HashMap<Node, Node> = hats
+        .map(|(state, (hat, _))| (state.node, hat.symbol))
+        .collect();
+    let mut found = Innovations {
+        innovations: vec![],
+        images: HashMap::new(),
+        region: region.clone(),
+    };
+    for (output, signal) in extended.outputs.iter().zip(&observer.measured) {
+        let Some((state, slope, offset)) = output.state else {
+            continue;
+        };
+        let name = format!("error of {}", extended.states[state].name);
+        let symbol = graph.fresh(&name);
+        let (y, slope, offset) = (
+            graph.expr(signal.symbol),
+            graph.expr(slope),
+            graph.expr(offset),
+        );
+        let hat = observer.states[state].0.symbol;
+        let seen = graph.substitute(&[output.variable.node], &hats)[0];
+        let shown = ((y - offset) / slope).node();
+        let pairs = [
+            (seen, signal.symbol, (slope * symbol).node()),
+            (hat, shown, symbol.node()),
+        ];
+        for (estimate, measured, error) in pairs {
+            let forth = graph.binary(Binary::Sub, estimate, measured);
+            let back = graph.binary(Binary::Sub, measured, estimate);
+            found.images.insert(forth, error);
+            found.images.insert(back, graph.unary(Unary::Neg, error));
+        }
+        // a second sensor of the same state reads the same error
+        if found.innovations.iter().any(|i| i.state == state) {
+            continue;
+        }
+        found.innovations.push(Innovation {
+            symbol: symbol.node(),
+            state,
+        });
+        let values = range(graph, hat, region)?.enclosure;
+        let size = (Interval::point(values.hi()) - Interval::point(values.lo())).magnitude();
+        let size = if size.is_finite() {
+            size
+        } else {
+            f64::INFINITY
+        };
+        found.region.dimensions.push(Dimension {
+            name,
+            symbol: symbol.node(),
+            min: -size,
+            max: size,
+            integer: false,
+        });
+    }
+    Ok(found)
+}
+
+/// Expressions over `moving` that vanish wherever one of the roots may have a kink, a step
+/// or an infinite slope in it; where none does, the roots are as smooth as their poles
+/// allow. None for roots without such operations.
+pub(super) fn edges(graph: &Graph, roots: &[Node], moving: &[Node]) -> Vec<Node> {
+    let found = graph.reachable(&graph.with_residuals(roots)).into_iter();
+    let found = found.filter_map(|node| edge(graph, node));
+    let mut found: Vec<Node> = found
+        .filter(|edge| {
+            let read = graph.symbols_of(&[*edge]);
+            moving.iter().any(|symbol| read.contains(symbol))
+        })
+        .collect();
+    found.sort();
+    found.dedup();
+    found
+}
+
+fn edge(graph: &Graph, node: Node) -> Option<Node> {
+    let expr = |node: Node| graph.expr(node);
+    match graph.op(node) {
+        Op::Unary(Unary::Abs | Unary::Sign | Unary::Sqrt, a) => Some(a),
+        Op::Unary(Unary::Floor, a) => Some((expr(a) - expr(node)).node()),
+        Op::Binary(op, a, b) => match op {
+            Binary::Min | Binary::Max | Binary::Less | Binary::LessEq | Binary::Equal => {
+                Some((expr(a) - expr(b)).node())
+            }
+            Binary::Pow => match graph.constant_value(b) {
+                Some(power) if power >= 0.0 && power.fract() == 0.0 => None,
+                _ => Some(a),
+            },
+            // the cut: y = 0 with x ≤ 0
+            Binary::Atan2 => {
+                let (y, x) = (expr(a), expr(b));
+                Some((x + (x * x + y * y).sqrt()).node())
+            }
+            _ => None,
+        },
+        // where the equations of a loop do not determine it
+        Op::Implicit(_) => {
+            let call = graph.implicit_call(node)?;
+            let matrix = call.function.matrix(&Nodes(graph), &call.at(graph, node));
+            match matrix[..] {
+                [slope] => Some(slope),
+                _ => {
+                    let zero = graph.constant(0.0).node();
+                    let right = vec![zero; call.function.size()];
+                    Some(graph.solve(&matrix, &right).rcond)
+                }
+            }
+        }
+        _ => None,
+    }
+}
+
+/// Vertices up to which slopes are taken by their ends instead of by multipliers.
+const VERTICES: usize = 32;
+
+/// The models by their vertices where these are few.
+pub(super) fn expanded(models: &[ErrorModel]) -> Vec<ErrorModel> {
+    decay::expanded(models, VERTICES)
 }

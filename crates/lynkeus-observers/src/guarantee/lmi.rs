@@ -1,25 +1,28 @@
 //! `gain = "lmi"`: a constant gain that comes with a proof.
 //!
 //! x̂' = f(x̂, u) − K (Cx̂ − y) with a full K: every output corrects every state. The
-//! form of the equations does not matter, only the slopes of their nonlinear terms.
+//! form of the equations does not matter, only the slopes of their nonlinear terms. Where
+//! there is no gain, or no proof, the range that stands in the way is named.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
-use lynkeus_expr::MissingInput;
-use lynkeus_proof::decay::{self, Aim, Gain, NoGain, Request};
-use lynkeus_structure::{Extended, Measurement, range};
+use lynkeus_expr::{Budget, MissingInput};
+use lynkeus_proof::decay;
+use lynkeus_proof::decay::{Aim, ErrorModel, Gain, NoGain, Request};
+use lynkeus_structure::{Extended, Measurement, Slopes, range, short};
 
-use super::blocking;
-use super::error_system::ErrorSystem;
+use super::error_system::{ErrorSystem, expanded};
 use crate::conditions::on_output;
-use crate::estimate::{Common, Copy};
+use crate::estimate::{Common, PlantCopy};
 use crate::{
-    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, prolongation,
+    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, estimate,
 };
 
 /// Why nothing of such an observer may be changed.
 const NO_SPEED: &str =
     "a gain by linear matrix inequalities has no θ: it is made, and proved, as a whole";
+
 /// Bisections of the rate where only the gain is limited.
 const HALVINGS: usize = 9;
 
@@ -48,7 +51,7 @@ const MINIMISE: KeySpec = KeySpec {
 };
 
 /// The keys of this gain, for every family that has it.
-pub(crate) const KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];
+pub(crate) const LMI_KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];
 
 /// The gain that the study asks for.
 #[derive(Clone, Debug)]
@@ -70,7 +73,7 @@ impl Lmi {
         let words: Vec<&str> = others.iter().copied().chain(["lmi"]).collect();
         let asked = tuning.choice("gain", &words)?.as_deref() == Some("lmi");
         let given = |key: &&KeySpec| tuning.values.contains_key(key.name);
-        match (asked, KEYS.iter().find(given)) {
+        match (asked, LMI_KEYS.iter().find(given)) {
             (false, Some(key)) => {
                 let expected = "this key only with gain = \"lmi\"";
                 Err(TuningError::new(key.name, expected, "another gain"))
@@ -87,15 +90,15 @@ impl Lmi {
 }
 
 /// The observer with a certified gain, under the name of the family that asked.
-pub(crate) fn design(
+pub(crate) fn design_lmi(
     extended: &Extended<'_>,
     common: &Common,
     asked: Lmi,
     family: &'static str,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    prolongation::refuse(common, "gain = \"lmi\"")?;
-    let copy = Copy::new(extended, common);
+    estimate::refuse(common, "gain = \"lmi\"")?;
+    let copy = PlantCopy::new(extended, common);
     let Shown { measured, slopes } = shown(extended, &copy)?;
     let system = ErrorSystem::open_loop(extended, &extended.region())?;
     if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
@@ -141,7 +144,7 @@ struct Shown {
     slopes: Vec<f64>,
 }
 
-fn shown(extended: &Extended<'_>, copy: &Copy<'_, '_>) -> Result<Shown, DesignError> {
+fn shown(extended: &Extended<'_>, copy: &PlantCopy<'_, '_>) -> Result<Shown, DesignError> {
     let (mut measured, mut slopes) = (vec![], vec![]);
     for (i, output) in extended.outputs.iter().enumerate() {
         let wrong = |expected: &str| {
@@ -215,7 +218,7 @@ fn refusal(system: &ErrorSystem, request: &Request, error: NoGain) -> DesignErro
             reason: format!(
                 "no gain is proved to reach {} on the box: {}",
                 request.rate,
-                blocking::reason(system, request)
+                reason(system, request)
             ),
         },
     }
@@ -265,7 +268,7 @@ fn middles(model: &lynkeus_proof::decay::ErrorModel) -> Vec<f64> {
 
 fn assemble(
     extended: &Extended<'_>,
-    copy: &Copy<'_, '_>,
+    copy: &PlantCopy<'_, '_>,
     family: &'static str,
     examination: Examination,
     request: &Request,
@@ -308,4 +311,97 @@ fn assemble(
         parameters,
         notes: vec![],
     })
+}
+
+/// Bisections of the share of the ranges.
+const SHARE_HALVINGS: usize = 6;
+
+/// The smallest share tried.
+const LEAST: f64 = 0.01;
+
+/// Slopes up to which each is tried alone.
+const SINGLES: usize = 12;
+
+/// What an explanation may take.
+const EXPLAINING: Duration = Duration::from_secs(15);
+
+/// The models with every slope's range cut by a factor that may depend on the slope.
+fn cut(slopes: &Slopes, factor: impl Fn(usize) -> f64 + Copy) -> Vec<ErrorModel> {
+    let cut: Vec<ErrorModel> = slopes.models.iter().map(|m| m.shrunk(factor)).collect();
+    expanded(&cut)
+}
+
+/// The largest share of every range, about its middle, for which `works`; none where
+/// not even a hundredth works.
+fn share(slopes: &Slopes, works: impl Fn(&[ErrorModel]) -> bool) -> Option<f64> {
+    let at = |share: f64| works(&cut(slopes, |_| share));
+    let (mut low, mut high) = (LEAST, 1.0);
+    if !at(low) {
+        return None;
+    }
+    for _ in 0..SHARE_HALVINGS {
+        let middle = f64::midpoint(low, high);
+        match at(middle) {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    Some(low)
+}
+
+/// The share of the ranges for which some decay of the observer is proved.
+///
+/// None where the budget ends.
+pub(super) fn provable_share(system: &ErrorSystem, budget: &Budget) -> Option<f64> {
+    let share = share(&system.slopes, |models| {
+        decay::prove(models, &system.scale, 0.0, budget).is_some()
+    });
+    share.filter(|_| budget.marked().is_none())
+}
+
+/// In words: what keeps every gain from a proof of the requested rate.
+pub(super) fn reason(system: &ErrorSystem, request: &Request) -> String {
+    let slopes = &system.slopes;
+    let request = &Request {
+        budget: request.budget.within(EXPLAINING),
+        ..request.clone()
+    };
+    let works = |models: &[ErrorModel]| decay::is_reachable(models, request, true);
+    // that there is none at all is said of a thorough look only
+    let least = || decay::is_reachable(&cut(slopes, |_| LEAST), request, false);
+    let share = share(slopes, works).or_else(|| least().then_some(LEAST));
+    if request.budget.marked().is_some() {
+        return "which range stands in the way takes longer to find out: narrow the box or lower the rate".into();
+    }
+    let Some(share) = share else {
+        return "not even the linearisation in the middle of the box reaches it: a state leaves too weak a trace in the outputs, or the rate is beyond what they allow".into();
+    };
+    let range = |k: usize| {
+        let slope = &slopes.slopes[k];
+        format!(
+            "the slope of {} in [{}, {}]{}",
+            slope.term,
+            short(slope.range.lo()),
+            short(slope.range.hi()),
+            match slope.variables.is_empty() {
+                true => String::new(),
+                false => format!(" (over the range of {})", slope.variables.join(", ")),
+            }
+        )
+    };
+    // one inequality per slope is affordable only for few
+    let tried = match slopes.slopes.len() {
+        few if few <= SINGLES => few,
+        _ => 0,
+    };
+    let mut blocking =
+        (0..tried).filter(|&only| works(&cut(slopes, |k| if k == only { 0.0 } else { 1.0 })));
+    let blocked = match blocking.next() {
+        Some(k) => format!("{} alone blocks it; ", range(k)),
+        None => String::new(),
+    };
+    format!(
+        "{blocked}with every slope's range cut to {:.0} % about its middle there is a gain: narrow the box",
+        100.0 * share
+    )
 }

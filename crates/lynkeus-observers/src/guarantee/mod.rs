@@ -10,35 +10,44 @@
 //! common Lyapunov function eᵀPe for every θ on the box proves the decay, whatever
 //! family the observer is of. Linear matrix inequalities find P
 //! ([`lynkeus_proof::decay`]); interval arithmetic accepts or rejects it.
+//!
+//! What is left of the error as t → ∞ when something acts on the plant that the
+//! observer does not know, and when the measurements err.
+//!
+//! With e' = A e + w − Eν, |w_i| ≤ drift_i and |ν_j| ≤ noise_j, V = eᵀPe obeys
+//! (√V)' ≤ −rate·√V + √(wᵀPw), so in the end √V ≤ r = max √(wᵀPw)/rate, |e| ≤ r/√λ_min(P)
+//! and |e_i| ≤ r·√(P⁻¹)_ii.
+//!
+//! Process noise, white with the densities Q on x', adds tr(PQ) to (E V)'; then √(E V) settles where
+//! rate·E V = √(wᵀPw)·√(E V) + tr(PQ)/2, and √(E e_i²) obeys what |e_i| did.
 
-mod blocking;
 mod correction;
-mod edges;
-mod equilibrium;
 mod error_system;
-mod innovation;
 mod lmi;
 mod refute;
-mod ultimate;
 
-use crate::kalman::NO_THEOREM;
-use crate::statement::{Statement, proved, undecided};
-use crate::{Check, Inequality};
-use lynkeus_expr::Budget;
-use lynkeus_proof::decay::{self, ErrorModel, Proof};
-use lynkeus_structure::Standing;
-use lynkeus_structure::{Extended, short};
-
-use crate::{Assumptions, Certificate, Constant, DesignError, Observer};
 pub use correction::{Correction, Injection};
+pub(crate) use lmi::{LMI_KEYS, Lmi, design_lmi};
+use lynkeus_expr::{Budget, Interval};
+use lynkeus_proof::chain::settled;
+use lynkeus_proof::decay::Proof;
+use lynkeus_proof::definite::is_below;
+use lynkeus_proof::magnitude::times;
+use lynkeus_proof::matrix::sum;
+use lynkeus_proof::{decay, spectrum};
+use lynkeus_structure::{Extended, Standing, short};
+use nalgebra::DMatrix;
+
+use crate::certificate::NO_THEOREM;
+use crate::statement::{proved, undecided};
+use crate::{
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer, Statement,
+};
 use error_system::ErrorSystem;
-pub(crate) use lmi::Lmi;
-pub(crate) use lmi::{KEYS as LMI_KEYS, design as design_lmi};
 use refute::Sample;
 
 const BASIS: &str = "linear matrix inequality, checked by interval arithmetic";
-/// Vertices up to which slopes are taken by their ends instead of by multipliers.
-const VERTICES: usize = 32;
+
 /// The share of the time that is left in which a Lyapunov function is sought.
 const SEARCH: f64 = 0.8;
 
@@ -113,7 +122,7 @@ fn certified(
             fill(&mut certificate, extended, &system, &proof, assumptions);
             if assumptions.is_moved() && certificate.verdict() == Standing::Proved {
                 certificate.mean_square =
-                    ultimate::mean_square(extended, &system, &proof, assumptions, &search);
+                    mean_square(extended, &system, &proof, assumptions, &search);
             }
             let faster = |spent| format!("a faster rate was sought: {spent}");
             certificate.notes.extend(spent.map(faster));
@@ -170,7 +179,7 @@ fn still_said(system: &ErrorSystem, sample: &Sample, search: &Budget) -> Vec<Str
         ));
     }
     if system.is_bounded()
-        && let Some(share) = blocking::provable_share(system, search)
+        && let Some(share) = lmi::provable_share(system, search)
     {
         notes.push(format!(
             "the inequality holds once every slope's range is cut to {:.0} % about its middle: a smaller box would do",
@@ -198,7 +207,7 @@ fn fill(
         proof.rate,
         "V' ≤ −2·rate·V for V = eᵀPe",
     )];
-    if let Some(spread) = ultimate::spread(&proof.P) {
+    if let Some(spread) = spread(&proof.P) {
         certificate.overshoot = Some(spread);
         certificate.constants.push(Constant::new(
             "√cond(P)",
@@ -206,7 +215,7 @@ fn fill(
             "|e(t)| is at most this times e^(−rate·t)·|e(0)|",
         ));
     }
-    match ultimate::bounds(extended, system, proof, assumptions) {
+    match bounds(extended, system, proof, assumptions) {
         Some(bounds) => {
             certificate.ultimate_bound = Some(bounds.norm);
             certificate.ultimate = bounds.states;
@@ -220,7 +229,126 @@ fn fill(
     );
 }
 
-/// The models by their vertices where these are few.
-fn expanded(models: &[ErrorModel]) -> Vec<ErrorModel> {
-    decay::expanded(models, VERTICES)
+/// A guessed bound of a quadratic form is raised by this before it is tried.
+const RESERVE: f64 = 1e-6;
+
+/// How often it is raised further.
+const TRIES: usize = 40;
+
+/// Slower rates whose P may leave a smaller mean square, as shares of the fastest.
+const SLOWER: [f64; 3] = [0.85, 0.6, 0.35];
+
+/// What the error ends within without process noise; none where an assumed size is infinite.
+fn bounds(
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+) -> Option<Bounds> {
+    of(extended, system, proof, assumptions, Interval::ZERO)
+}
+
+/// What the root of its mean square ends within with process noise, by the P of the proof and those of
+/// slower rates: each of the bounds holds.
+fn mean_square(
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+    budget: &Budget,
+) -> Option<Bounds> {
+    let slower = SLOWER.iter().filter_map(|share| {
+        decay::prove(&system.models, &system.scale, share * proof.rate, budget)
+    });
+    let each = std::iter::once(proof.clone()).chain(slower);
+    let each = each.filter_map(|proof| {
+        let densities = assumptions.process_noise.iter().enumerate();
+        let trace =
+            sum(densities.map(|(i, q)| Interval::point(proof.P[(i, i)]) * Interval::point(*q)));
+        of(extended, system, &proof, assumptions, trace)
+    });
+    each.reduce(|a, b| Bounds {
+        norm: a.norm.min(b.norm),
+        states: a
+            .states
+            .into_iter()
+            .zip(b.states)
+            .map(|(a, b)| if a.value <= b.value { a } else { b })
+            .collect(),
+    })
+}
+
+fn of(
+    extended: &Extended<'_>,
+    system: &ErrorSystem,
+    proof: &Proof,
+    assumptions: &Assumptions,
+    trace: Interval,
+) -> Option<Bounds> {
+    let n = extended.states.len();
+    let through = |i: usize| {
+        let columns = system.injection[i].iter().zip(&assumptions.noise);
+        sum(columns.map(|(e, ν)| match times(*e, *ν) == 0.0 {
+            true => Interval::ZERO,
+            false => Interval::point(*e) * Interval::point(*ν),
+        }))
+    };
+    let drift = |i: usize| assumptions.drift.get(i).copied().unwrap_or(0.0);
+    let w: Vec<Interval> = (0..n)
+        .map(|i| Interval::point(drift(i)) + through(i))
+        .collect();
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+    for w in &w {
+        finite(w.hi())?;
+    }
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let square = sum(pairs.map(|(i, j)| Interval::point(proof.P[(i, j)]).abs() * w[i] * w[j]));
+    let r = settled(proof.rate, square.sqrt(), trace);
+    let state = |i: usize| {
+        let mut unit = DMatrix::zeros(n, n);
+        unit[(i, i)] = 1.0;
+        let bound = finite((r * width(&proof.P, &unit)?).hi())?;
+        Some((extended.states[i].name.clone(), bound).into())
+    };
+    Some(Bounds {
+        norm: finite((r * width(&proof.P, &DMatrix::identity(n, n))?).hi())?,
+        states: (0..n).map(state).collect::<Option<_>>()?,
+    })
+}
+
+/// √cond(P), not below it: computed eigenvalues of a matrix in units of very different
+/// size may have no correct digit at the lower end.
+fn spread(P: &DMatrix<f64>) -> Option<f64> {
+    let n = P.nrows();
+    let unit = DMatrix::identity(n, n);
+    let largest = spectrum::symmetric(P.clone())?.eigenvalues.max();
+    let largest = raised(largest, |α| {
+        is_below(P, 1.0, &(&unit * α)).then(|| Interval::point(α).sqrt())
+    })?;
+    Some((largest * width(P, &unit)?).hi())
+}
+
+/// The smallest β, to six digits, that is proved to satisfy |Q^½ e| ≤ β·√(eᵀPe) for a
+/// projection Q.
+fn width(P: &DMatrix<f64>, Q: &DMatrix<f64>) -> Option<Interval> {
+    // the largest eigenvalue of P^−½ Q P^−½ is that of QP⁻¹Q
+    let inverse = P.clone().cholesky()?.inverse();
+    let projected = Q * inverse * Q;
+    let largest = spectrum::symmetric(projected)?.eigenvalues.max();
+    raised(largest, |β| {
+        let share = 1.0 / β;
+        is_below(Q, share, P).then(|| (Interval::ONE / Interval::point(share)).sqrt())
+    })
+}
+
+/// What is proved of the smallest number above a guess for which there is a proof.
+fn raised(guess: f64, proved: impl Fn(f64) -> Option<Interval>) -> Option<Interval> {
+    let mut bound = guess * (1.0 + RESERVE);
+    for _ in 0..TRIES {
+        if let Some(found) = proved(bound) {
+            return Some(found);
+        }
+        bound *= 1.1;
+    }
+    None
 }

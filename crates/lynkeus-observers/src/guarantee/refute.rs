@@ -5,24 +5,36 @@
 //! That alone makes no error grow: along a trajectory A changes, and neither do stable
 //! instants make a stable whole, nor unstable ones an unstable one. The error grows for
 //! certain where A is the same whatever the plant does, and where the plant can rest.
+//!
+//! Where the plant rests at x* under constant inputs, a small error obeys
+//! e' = A e + o(|e|) with a constant A: an eigenvalue with a positive real part takes
+//! errors that start as small as one likes to a distance that does not depend on their
+//! start. That x* exists is proved: by values of f that are exactly 0, or by Krawczyk's test
+//! (Krawczyk 1969), in which as many coordinates as there are equations move and the
+//! others, inputs among them, are numbers.
 
-use super::edges::edges;
-use super::equilibrium;
-use super::error_system::ErrorSystem;
-use crate::Observer;
-use crate::statement::refuted;
-use crate::{Check, Inequality};
-use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node};
+use std::cmp::Ordering;
+
+use lynkeus_expr::interval::Intervals;
+use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use lynkeus_proof::decay::is_unstable;
 use lynkeus_proof::spectrum;
 use lynkeus_structure::{Coordinate, Dimension, Extended, Point};
+use nalgebra::{DMatrix, DVector};
+
+use super::error_system::{ErrorSystem, edges};
+use crate::statement::refuted;
+use crate::{Check, Inequality, Observer};
 
 /// Points tried before the search climbs from the best of them.
 const POINTS: usize = 400;
+
 /// Halvings of the step while climbing.
 const HALVINGS: usize = 12;
+
 /// Distance from the ends, relative to a side, where slopes may have kinks there.
 const INSET: f64 = 1e-4;
+
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What the search found.
@@ -100,7 +112,7 @@ pub(super) fn growing(
             detail,
         )));
     }
-    let found = equilibrium::repelling(extended, observer, system)?;
+    let found = repelling(extended, observer, system)?;
     Ok(found.map(|point| {
         let detail = "the plant can rest at this point, with these inputs, and there the error's Jacobian has an eigenvalue with a positive real part, both by interval arithmetic: the estimate leaves the plant, however close it starts";
         refuted(Inequality::SmallErrorsDecay, point, detail)
@@ -221,4 +233,369 @@ impl Search<'_> {
         }
         (point, highest)
     }
+}
+
+/// Points from which an equilibrium is sought.
+const STARTS: usize = 120;
+
+/// Equilibria whose existence is examined.
+const EXAMINED: usize = 6;
+
+/// Steps of Newton's method.
+const STEPS: usize = 40;
+
+/// A step below this, relative to the sides, ends it.
+const STILL: f64 = 1e-10;
+
+/// Halvings of the step along the equilibria.
+const EQUILIBRIUM_HALVINGS: usize = 6;
+
+/// Distance of an equilibrium from the ends of the box, relative to a side.
+const EQUILIBRIUM_INSET: f64 = 1e-3;
+
+/// Radii of Krawczyk's test, relative to the sides.
+const RADII: [f64; 4] = [1e-11, 1e-9, 1e-7, 1e-5];
+
+/// Singular values below this share of the largest count as none.
+const RANK: f64 = 1e-11;
+
+/// An equilibrium inside the box that is proved to exist and to repel the estimate; the
+/// value is the largest real part of an eigenvalue of A there, in floating point.
+pub(super) fn repelling(
+    extended: &Extended<'_>,
+    observer: &Observer,
+    system: &ErrorSystem,
+) -> Result<Option<Point>, MissingInput> {
+    let Some(mut search) = EquilibriumSearch::new(extended, observer, system)? else {
+        return Ok(None);
+    };
+    let starts = (0..STARTS).map(|index| spread(&search.sides, index));
+    let starts: Vec<Vec<f64>> = starts.collect();
+    let mut found: Vec<(f64, Vec<f64>)> = vec![];
+    for start in starts {
+        found.extend(search.settled(start));
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    if let Some(best) = found.first().cloned()
+        && best.0 <= 0.0
+    {
+        found.insert(0, search.climbed(best));
+    }
+    let growing = found.iter().filter(|(value, _)| *value > 0.0);
+    let confirmed = growing
+        .take(EXAMINED)
+        .find_map(|(_, z)| search.confirmed(z));
+    Ok(confirmed)
+}
+
+struct EquilibriumSearch<'a> {
+    system: &'a ErrorSystem,
+    right: Evaluator,
+    /// f, without the equations that are 0 everywhere, over states and inputs
+    plant: Tape,
+    /// its Jacobian, row by row
+    slopes: Tape,
+    /// what must not vanish, then what must be defined, over the sides of the system
+    smooth: Tape,
+    edges: usize,
+    sides: Vec<Side>,
+    states: usize,
+}
+
+/// A box around an equilibrium.
+struct Around {
+    /// f has no other zero in it
+    tested: Vec<Interval>,
+    /// holds the equilibrium
+    cell: Vec<Interval>,
+}
+
+impl<'a> EquilibriumSearch<'a> {
+    /// None where something moves with time, or a state cannot move at all.
+    fn new(
+        extended: &Extended<'_>,
+        observer: &Observer,
+        system: &'a ErrorSystem,
+    ) -> Result<Option<Self>, MissingInput> {
+        let graph = extended.graph();
+        let states = extended.states.len();
+        let mut symbols = extended.symbols();
+        symbols.extend(extended.inputs.iter().map(|u| u.node));
+        let mut equations = extended.derivatives.clone();
+        equations.sort();
+        equations.dedup();
+        equations.retain(|f| graph.constant_value(*f) != Some(0.0));
+        let moved = graph.symbols_of(&[&equations[..], system.corrected()].concat());
+        let still = !moved.contains(&extended.plant.time) && !moved.contains(&observer.time);
+        let sides = sides(system, symbols.len());
+        let wide = sides
+            .iter()
+            .take(states)
+            .all(|s| s.high > s.low && !s.whole);
+        if !still || !wide || sides.len() != symbols.len() {
+            return Ok(None);
+        }
+        let jacobian = jacobian::forward(graph, &equations, &symbols);
+        let zero = graph.constant(0.0).node();
+        let entry = |k: usize| {
+            let place = (k / symbols.len(), k % symbols.len());
+            jacobian.get(place.0, place.1).unwrap_or(zero)
+        };
+        let entries: Vec<Node> = (0..equations.len() * symbols.len()).map(entry).collect();
+        let hats: Vec<Node> = observer.states.iter().map(|(s, _)| s.symbol).collect();
+        let pairs = extended.symbols().into_iter().zip(hats.iter().copied());
+        let mut values = graph.substitute(&equations, &pairs.collect());
+        values.extend(system.corrected());
+        let mut smooth = edges(graph, &values, &hats);
+        let edges = smooth.len();
+        smooth.extend(values);
+        Ok(Some(Self {
+            system,
+            right: system.evaluator(),
+            plant: Tape::new(graph, &symbols, &equations)?,
+            slopes: Tape::new(graph, &symbols, &entries)?,
+            smooth: Tape::new(graph, &system.sides.symbols(), &smooth)?,
+            edges,
+            sides,
+            states,
+        }))
+    }
+
+    fn width(&self, i: usize) -> f64 {
+        self.sides[i].high - self.sides[i].low
+    }
+
+    /// A point of the sides of the system: derivatives of the inputs are 0.
+    fn full<T: Copy>(&self, z: &[T], zero: T) -> Vec<T> {
+        let mut full = z.to_vec();
+        full.resize(self.system.sides.dimensions.len(), zero);
+        full
+    }
+
+    /// The largest real part of an eigenvalue at an equilibrium near `z` inside the box,
+    /// found by Newton's method, and the equilibrium.
+    fn settled(&mut self, mut z: Vec<f64>) -> Option<(f64, Vec<f64>)> {
+        let (rows, columns) = (self.plant.outputs(), z.len());
+        let (mut plant, mut slopes) = (self.plant.evaluator(), self.slopes.evaluator());
+        let (mut f, mut J) = (vec![0.0; rows], vec![0.0; rows * columns]);
+        let mut step = 0.0;
+        for _ in 0..if rows == 0 { 0 } else { STEPS } {
+            plant.eval(&z, &mut f);
+            slopes.eval(&z, &mut J);
+            if !f.iter().chain(&J).all(|x| x.is_finite()) {
+                return None;
+            }
+            let widths = |j: usize| match self.sides[j].whole {
+                true => 0.0,
+                false => self.width(j),
+            };
+            let scaled = DMatrix::from_fn(rows, columns, |i, j| J[i * columns + j] * widths(j));
+            let norms: Vec<f64> = (0..rows)
+                .map(|i| scaled.row(i).norm().max(f64::MIN_POSITIVE))
+                .collect();
+            let scaled = DMatrix::from_fn(rows, columns, |i, j| scaled[(i, j)] / norms[i]);
+            let right = DVector::from_fn(rows, |i, _| f[i] / norms[i]);
+            // beside a pole values may overflow
+            if !right.iter().all(|x| x.is_finite()) {
+                return None;
+            }
+            let svd = spectrum::singular(scaled, true, true)?;
+            let least = RANK * svd.singular_values.max();
+            let found = svd.solve(&right, least).ok()?;
+            step = found.amax();
+            for j in 0..columns {
+                let next = z[j] - widths(j) * found[j];
+                z[j] = next.clamp(self.sides[j].low, self.sides[j].high);
+            }
+            if step < STILL * 1e-4 {
+                break;
+            }
+        }
+        let value = self.abscissa(&z)?;
+        (step < STILL).then_some((value, z))
+    }
+
+    fn abscissa(&mut self, z: &[f64]) -> Option<f64> {
+        let full = self.full(z, 0.0);
+        spectrum::abscissa(self.system.at(&mut self.right, &full))
+    }
+
+    /// Along the equilibria to one that repels more.
+    fn climbed(&mut self, mut best: (f64, Vec<f64>)) -> (f64, Vec<f64>) {
+        let mut share = 0.5;
+        for _ in 0..EQUILIBRIUM_HALVINGS {
+            for i in 0..self.sides.len() {
+                for direction in [-share, share] {
+                    let mut z = best.1.clone();
+                    let side = &self.sides[i];
+                    z[i] = (z[i] + direction * self.width(i)).clamp(side.low, side.high);
+                    if side.whole {
+                        z[i] = z[i].round();
+                    }
+                    if let Some(next) = self.settled(z)
+                        && next.0 > best.0
+                    {
+                        best = next;
+                    }
+                }
+            }
+            share *= 0.5;
+        }
+        best
+    }
+
+    /// The equilibrium near z, if it is proved to exist, inside the box, with a smooth
+    /// right-hand side around it and an eigenvalue to the right of the axis.
+    fn confirmed(&mut self, z: &[f64]) -> Option<Point> {
+        let Around { tested, cell } = self.exact(z).or_else(|| self.enclosed(z))?;
+        let inside = |i: usize| {
+            let side = &self.system.sides.dimensions[i];
+            let strict = i < self.states;
+            let (low, high) = (tested[i].lo(), tested[i].hi());
+            match strict {
+                true => side.min < low && high < side.max,
+                false => side.min <= low && high <= side.max,
+            }
+        };
+        let A = self.system.enclosed_at(&self.full(&cell, Interval::ZERO));
+        let sure = (0..cell.len()).all(inside) && self.is_smooth(&tested) && is_unstable(&A);
+        if !sure {
+            return None;
+        }
+        let middle: Vec<f64> = cell.iter().map(|x| x.midpoint()).collect();
+        let value = self.abscissa(&middle)?;
+        let sides = self.system.sides.dimensions.iter();
+        let named = sides.zip(self.full(&middle, 0.0));
+        Some(Point {
+            coordinates: named.map(|(d, x)| (d.name.clone(), x).into()).collect(),
+            value,
+        })
+    }
+
+    fn is_smooth(&self, cell: &[Interval]) -> bool {
+        let cell = self.full(cell, Interval::ZERO);
+        let values = self.smooth.eval_in(&Intervals, &cell);
+        let defined = |x: &Interval| x.is_defined() && x.magnitude().is_finite();
+        let (edges, _) = values.split_at(self.edges);
+        values.iter().all(defined) && !edges.iter().any(|x| x.contains_zero())
+    }
+
+    /// A point of few digits where f is exactly 0.
+    fn exact(&self, z: &[f64]) -> Option<Around> {
+        let rounded = |i: usize| {
+            let width = self.width(i);
+            let digits = 10f64.powf(6.0 - width.log10().floor());
+            let x = (z[i] * digits).round() / digits;
+            match x.is_finite() && !self.sides[i].whole {
+                true => x.clamp(self.sides[i].low, self.sides[i].high),
+                false => z[i],
+            }
+        };
+        let point: Vec<f64> = (0..z.len()).map(rounded).collect();
+        let cell: Vec<Interval> = point.iter().map(|&x| Interval::point(x)).collect();
+        let f = self.plant.eval_in(&Intervals, &cell);
+        let zero = |f: &Interval| f.is_defined() && f.lo() == 0.0 && f.hi() == 0.0;
+        let around = |i: usize| match i < self.states {
+            true => cell[i].inflate(RADII[0] * self.width(i)),
+            false => cell[i],
+        };
+        let tested = (0..z.len()).map(around).collect();
+        f.iter().all(zero).then_some(Around { tested, cell })
+    }
+
+    /// Krawczyk's test around z.
+    fn enclosed(&self, z: &[f64]) -> Option<Around> {
+        let (rows, columns) = (self.plant.outputs(), z.len());
+        let mut J = vec![0.0; rows * columns];
+        self.slopes.evaluator().eval(z, &mut J);
+        let J = DMatrix::from_row_slice(rows, columns, &J);
+        let movable = |j: usize| match self.sides[j].whole {
+            true => 0.0,
+            false => self.width(j),
+        };
+        let places = pivots(DMatrix::from_fn(rows, columns, |i, j| {
+            J[(i, j)] * movable(j)
+        }))?;
+        let R = J.select_columns(&places).try_inverse()?;
+        let point: Vec<Interval> = z.iter().map(|&x| Interval::point(x)).collect();
+        let f = self.plant.eval_in(&Intervals, &point);
+        RADII.iter().find_map(|radius| {
+            let mut tested = point.clone();
+            for &j in &places {
+                tested[j] = point[j].inflate(radius * self.width(j));
+            }
+            let slopes = self.slopes.eval_in(&Intervals, &tested);
+            let slope = |i: usize, b: usize| slopes[i * columns + places[b]];
+            let mut cell = point.clone();
+            for (a, &j) in places.iter().enumerate() {
+                let weight = |b: usize| Interval::point(R[(a, b)]);
+                let mut image = (0..rows).fold(point[j], |sum, b| sum - weight(b) * f[b]);
+                for (b, &k) in places.iter().enumerate() {
+                    let unit = if a == b {
+                        Interval::ONE
+                    } else {
+                        Interval::ZERO
+                    };
+                    let rest = (0..rows).fold(unit, |sum, i| sum - weight(i) * slope(i, b));
+                    image = image + rest * (tested[k] - point[k]);
+                }
+                let inside = tested[j].lo() < image.lo() && image.hi() < tested[j].hi();
+                if !inside || !image.is_defined() {
+                    return None;
+                }
+                cell[j] = image;
+            }
+            Some(Around { tested, cell })
+        })
+    }
+}
+
+/// States, a little inside of the box, and inputs.
+fn sides(system: &ErrorSystem, count: usize) -> Vec<Side> {
+    let dimensions = system.sides.dimensions.iter().take(count);
+    let states = system.scale.len();
+    let sides = dimensions.map(Side::finite).enumerate();
+    sides
+        .map(|(i, side)| {
+            let cut = match i < states {
+                true => EQUILIBRIUM_INSET * (side.high - side.low),
+                false => 0.0,
+            };
+            Side {
+                low: side.low + cut,
+                high: side.high - cut,
+                whole: side.whole,
+            }
+        })
+        .collect()
+}
+
+/// As many columns as there are rows, those of a well conditioned square matrix, by
+/// elimination with complete pivoting; none where the rows depend on one another.
+fn pivots(mut J: DMatrix<f64>) -> Option<Vec<usize>> {
+    let mut places = vec![];
+    let mut rows: Vec<usize> = (0..J.nrows()).collect();
+    let size = J.amax();
+    while !rows.is_empty() {
+        let entries = rows.iter().enumerate();
+        let entries = entries.flat_map(|(k, &i)| (0..J.ncols()).map(move |j| (k, i, j)));
+        let (k, row, column) = entries.max_by(|a, b| {
+            let size = |place: &(usize, usize, usize)| J[(place.1, place.2)].abs();
+            size(a).total_cmp(&size(b))
+        })?;
+        let lead = J[(row, column)];
+        if lead.abs().partial_cmp(&(RANK * size)) != Some(Ordering::Greater) {
+            return None;
+        }
+        rows.swap_remove(k);
+        places.push(column);
+        let top = J.row(row).into_owned();
+        for &i in &rows {
+            let factor = J[(i, column)] / lead;
+            let next = J.row(i) - &top * factor;
+            J.set_row(i, &next);
+            J[(i, column)] = 0.0;
+        }
+    }
+    Some(places)
 }

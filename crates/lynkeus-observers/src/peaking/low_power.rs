@@ -21,11 +21,12 @@
 //! peaking-free high-gain observers*, Automatica 98 (2018) 169–179.
 
 use lynkeus_expr::{Graph, Node};
-use lynkeus_gain::low_power::{self, Coefficients};
+use lynkeus_gain::low_power;
+use lynkeus_gain::low_power::Coefficients;
 
-use super::transient::{self, Transient};
-use crate::estimate::Copy;
-use crate::tunable::Speed;
+use super::transient;
+use super::transient::Transient;
+use crate::estimate::{PlantCopy, Speed};
 use crate::{KeySpec, Observer, Shape, Signal, Tuning, TuningError, Value};
 
 /// Eigenvalues of M.
@@ -103,6 +104,7 @@ impl LowPower {
 
 /// What the lists under the two keys hold, in words.
 const PAIRS: &str = "one list per chain of a pair [k1, k2] per state but the last";
+
 const NUMBERS: &str = "one list per chain of 2n − 2 negative numbers, n being its states";
 
 /// Lists of pairs (k_i1, k_i2), one list per chain.
@@ -213,13 +215,6 @@ fn rows<'v>(
     }
 }
 
-/// The partial that a constant gain is made for: with the sign that is proved, between
-/// its bounds in the middle of ratios.
-pub(crate) fn nominal(sign: f64, bounds: (f64, f64)) -> Option<f64> {
-    let middle = (bounds.0 * bounds.1).sqrt();
-    (middle > 0.0 && middle.is_finite()).then_some(sign * middle)
-}
-
 /// A chain to be put in this form.
 pub(crate) struct Part<'a> {
     /// places of its states, sensor end first
@@ -241,7 +236,7 @@ pub(crate) struct Part<'a> {
 
 /// The observer while its chains are added.
 pub(crate) struct Run<'c, 'e, 'p> {
-    copy: &'c Copy<'e, 'p>,
+    copy: &'c PlantCopy<'e, 'p>,
     transient: Option<&'c Transient>,
     starts: Vec<f64>,
     derivatives: Vec<Node>,
@@ -251,7 +246,7 @@ pub(crate) struct Run<'c, 'e, 'p> {
 
 impl<'c, 'e, 'p> Run<'c, 'e, 'p> {
     pub fn new(
-        copy: &'c Copy<'e, 'p>,
+        copy: &'c PlantCopy<'e, 'p>,
         transient: Option<&'c Transient>,
     ) -> Result<Self, TuningError> {
         let starts = copy.states()?.into_iter().map(|(_, start)| start);

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::Node;
 
-use crate::estimate::Copy;
-use crate::tunable::Speed;
+use crate::estimate::{PlantCopy, Speed};
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 /// The study's key.
@@ -82,7 +81,7 @@ impl Transient {
     /// The gains of chain `i` that grow like θ^exponent: `(gain, exponent)` at the study's steady θ.
     pub(crate) fn gains(
         &self,
-        copy: &Copy<'_, '_>,
+        copy: &PlantCopy<'_, '_>,
         i: usize,
         θ: &Speed,
         steady: &[(f64, f64)],
@@ -123,7 +122,7 @@ impl Transient {
 /// The gains of chain `i`, with or without a transient.
 pub(crate) fn gains(
     transient: Option<&Transient>,
-    copy: &Copy<'_, '_>,
+    copy: &PlantCopy<'_, '_>,
     i: usize,
     θ: &Speed,
     steady: &[(f64, f64)],

@@ -3,9 +3,8 @@
 use lynkeus_gain::UnitFactor;
 use lynkeus_structure::Extended;
 
-use crate::estimate::Common;
-use crate::prolongation::PROLONG;
-use crate::stages::Late;
+use crate::estimate::{Common, PROLONG};
+use crate::tuning::Late;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {

@@ -1,15 +1,17 @@
-//! The triangular form: chains, the partials along them, condition H3.
+//! The triangular form and its constant gain: Δ_θ, S by Lemma 1 or given, r, and the window
+//! of Theorem 2.
 
-use lynkeus_structure::Standing;
-use lynkeus_structure::{Assignment, Extended, Region, chains};
+use lynkeus_expr::Node;
+use lynkeus_gain::{Bounds, Tridiagonal, lemma1};
+use lynkeus_structure::Assignment;
 
-use super::gains::Window;
 use super::settings::Settings;
-use super::{NAME, damping};
-use crate::conditions::{Partial, lipschitz, names, output_slope, partials};
-use crate::family;
-use crate::stages::{Found, Searched};
-use crate::{DesignError, Examination, TuningError};
+use crate::conditions::Partial;
+use crate::estimate::{PlantCopy, Speed};
+use crate::peaking::Transient;
+use crate::{TuningError, peaking};
+
+pub(super) const NAME: &str = "triangular";
 
 /// The triangular form of a plant with the facts about its partials.
 pub struct Form {
@@ -18,109 +20,182 @@ pub struct Form {
     pub(crate) partials: Vec<Vec<Partial>>,
 }
 
-/// The first assignment whose conditions are proved, else the first that no condition
-/// refutes, else the first with its refusal; or the examination that says why there is none.
-pub(super) fn form(
-    extended: &Extended<'_>,
-    settings: &Settings,
-    region: &Region,
-) -> Searched<Form> {
-    let refusal = |summary: String| Examination::unfit(NAME, summary, vec![]);
-    let mut assignments = match chains::find(extended, &settings.request) {
-        Ok(assignments) => assignments,
-        Err(summary) => return Ok(Err(refusal(summary))),
-    };
-    if let Some(leading) = settings.leading {
-        assignments.retain(|a| a.leads.contains(&leading));
-        assignments.iter_mut().for_each(|a| a.leading = leading);
-        if assignments.is_empty() {
-            let summary = "the chain that 'leading' names cannot lead: beside its last equation it reads another chain's hidden states";
-            return Ok(Err(refusal(summary.into())));
-        }
-    } else if let Some(δ) = &settings.δ {
-        assignments
-            .iter_mut()
-            .for_each(|a| lead_within_window(a, δ));
-    }
-    let choices = assignments.len();
-    let mut best: Option<Found<Form>> = None;
-    for assignment in assignments {
-        let form = examined(extended, settings, region, assignment, choices)?;
-        match form.examination.fit() {
-            Standing::Proved => return Ok(Ok(form)),
-            Standing::Undecided
-                if best
-                    .as_ref()
-                    .is_none_or(|b| b.examination.fit() == Standing::Refuted) =>
-            {
-                best = Some(form);
-            }
-            _ => {
-                best.get_or_insert(form);
-            }
-        }
-    }
-    // chains::find never returns an empty list
-    best.map(Ok)
-        .ok_or_else(|| TuningError::new("chains", "a chain", "none").into())
+/// The numbers of the gain.
+pub(super) struct Gains<'s> {
+    pub θ: Vec<f64>,
+    pub δ: Vec<f64>,
+    pub r: Vec<f64>,
+    pub S: Vec<Tridiagonal>,
+    pub divided: bool,
+    pub transient: Option<&'s Transient>,
+    pub notes: Vec<String>,
 }
 
-/// Where several chains can lead, the first for which the given exponents lie in the window.
-fn lead_within_window(assignment: &mut Assignment, δ: &[f64]) {
-    let lengths = assignment.lengths();
-    let holds = |lead: &usize| Window::all(&lengths, *lead, δ).iter().all(Window::holds);
-    if !holds(&assignment.leading)
-        && let Some(lead) = assignment.leads.iter().copied().find(holds)
-    {
-        assignment.leading = lead;
-    }
-}
-
-/// Condition H3 for one assignment.
-fn examined(
-    extended: &Extended<'_>,
-    settings: &Settings,
-    region: &Region,
-    assignment: Assignment,
-    choices: usize,
-) -> Result<Found<Form>, DesignError> {
-    let (mut checks, mut all) = (vec![], vec![]);
-    for (i, chain) in assignment.chains.iter().enumerate() {
-        checks.extend(output_slope(extended, i, region)?);
-        let (found, signs) = partials(extended, &chain.states, region)?;
-        checks.extend(signs);
-        all.push(found);
-    }
-    checks.push(lipschitz(extended, region)?);
-    let chains = assignment
-        .chains
-        .iter()
-        .map(|c| names(extended, &c.states))
-        .collect();
-    let mut summary = chains::describe(extended, &assignment);
-    if choices > 1 {
-        summary += &format!(
-            ", the most balanced of {choices} assignments that the equations allow; the key 'chains' decides otherwise"
-        );
-    }
-    if assignment.leads.len() > 1 {
-        let leading = &extended.outputs[assignment.leading].variable.name;
-        let which = match assignment.leads.len() {
-            count if count < assignment.chains.len() => format!("{count} of the chains"),
-            2 => "either chain".to_owned(),
-            _ => "any chain".to_owned(),
+impl<'s> Gains<'s> {
+    pub fn new(form: &Form, settings: &'s Settings) -> Result<Self, TuningError> {
+        let count = form.assignment.chains.len();
+        let θ = settings.θ()?;
+        let divided = settings.divided;
+        let (S, ρ) = match &settings.S {
+            Some(S) => (S.clone(), None),
+            None => lemma1_matrices(form, divided)?,
         };
-        summary += &format!(
-            "; {which} can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
-        );
+        let r = match &settings.r {
+            Some(r) => r.clone(),
+            // (9) with r = ρ/2; an explicit S comes without its ρ: the example's r = 1
+            None => vec![ρ.map_or(1.0, |ρ| ρ / 2.0); count],
+        };
+        let mut gains = Self {
+            θ,
+            δ: exponents(form, settings),
+            r,
+            S,
+            divided,
+            transient: settings.remedies.transient.as_ref(),
+            notes: vec![],
+        };
+        let windows = Window::of(&form.assignment, &gains.δ);
+        gains.notes.extend(windows.iter().filter_map(Window::note));
+        Ok(gains)
     }
-    let found = family::Form { summary, chains };
-    let examination = Examination::new(extended, region, NAME, found, checks)?;
-    let form = Form {
-        assignment,
-        partials: all,
+
+    /// r Δ_θ S⁻¹Cᵀ of chain i.
+    pub fn chain(&self, i: usize) -> Vec<f64> {
+        let power = |j: usize| self.θ[i].powf(self.δ[i] * (j + 1) as f64);
+        let column = self.S[i].gain().into_iter().enumerate();
+        column.map(|(j, s)| self.r[i] * power(j) * s).collect()
+    }
+
+    /// The same at time t, for the chain's θ.
+    pub fn timed(&self, copy: &PlantCopy<'_, '_>, i: usize, θ: &Speed) -> Vec<Node> {
+        let exponent = |j: usize| self.δ[i] * (j + 1) as f64;
+        let constants = self.chain(i).into_iter().enumerate();
+        let steady: Vec<(f64, f64)> = constants.map(|(j, gain)| (gain, exponent(j))).collect();
+        peaking::gains(self.transient, copy, i, θ, &steady)
+    }
+
+    /// The numbers, for the reader.
+    pub fn parameters(&self) -> Vec<(String, String)> {
+        let list = |values: &[f64]| {
+            let values: Vec<String> = values.iter().map(|x| format!("{x}")).collect();
+            values.join(", ")
+        };
+        let mut rows = vec![
+            ("θ".to_owned(), list(&self.θ)),
+            ("δ".to_owned(), list(&self.δ)),
+            ("r".to_owned(), list(&self.r)),
+        ];
+        rows.extend(self.transient.map(Transient::parameter));
+        for (i, s) in self.S.iter().enumerate() {
+            rows.push((format!("S{} diagonal", i + 1), list(s.diagonal())));
+            rows.push((format!("S{} beside it", i + 1), list(s.off_diagonal())));
+        }
+        rows
+    }
+}
+
+fn lemma1_matrices(
+    form: &Form,
+    divided: bool,
+) -> Result<(Vec<Tridiagonal>, Option<f64>), TuningError> {
+    let mut ρ = None;
+    let mut matrix = |chain: &Vec<Partial>| {
+        let bounds = |p: &Partial| match divided {
+            // dividing by the partials leaves a chain of integrators
+            true => Bounds {
+                lower: 1.0,
+                upper: 1.0,
+            },
+            false => Bounds {
+                lower: p.bounds.0,
+                upper: p.bounds.1,
+            },
+        };
+        let bounds: Vec<Bounds> = chain.iter().map(bounds).collect();
+        let found = lemma1::construct(&bounds).map_err(|error| {
+            let expected = "partial derivatives with known positive bounds for Lemma 1; declare min and max in the model, give S, or set partials = true";
+            TuningError::new("gain", expected, error)
+        })?;
+        ρ = Some(found.ρ);
+        Ok(found.S)
     };
-    let mut found = Found { form, examination };
-    damping::settle(&mut found, extended, settings, region)?;
-    Ok(found)
+    let S = form
+        .partials
+        .iter()
+        .map(&mut matrix)
+        .collect::<Result<_, _>>()?;
+    Ok((S, ρ))
+}
+
+/// δ: given, or δ = 1 for the leading chain and 2n₁/(2nᵢ−1) for another, the middle of Theorem 2's window. Two of
+/// these then are in theirs: |nᵢδᵢ − nₖδₖ| = |δᵢ − δₖ|/2.
+pub(super) fn exponents(form: &Form, settings: &Settings) -> Vec<f64> {
+    if let Some(δ) = &settings.δ {
+        return δ.clone();
+    }
+    let lengths = form.assignment.lengths();
+    let lead = form.assignment.leading;
+    let exponent = |i: usize| match i == lead {
+        true => 1.0,
+        false => 2.0 * lengths[lead] as f64 / (2.0 * lengths[i] as f64 - 1.0),
+    };
+    (0..lengths.len()).map(exponent).collect()
+}
+
+/// Theorem 2: (2n₁−1)/(2n₂−1) δ₁ < δ₂ < (2n₁+1)/(2n₂−1) δ₁, where the second chain follows the first.
+///
+/// Two chains that follow another one meet at their last equations alone: |nᵢδᵢ − nₖδₖ| < (δᵢ + δₖ)/2, which is
+/// (2nᵢ−1)/(2nₖ+1) δᵢ < δₖ < (2nᵢ+1)/(2nₖ−1) δᵢ.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Window {
+    /// the chains i and k
+    pub pair: [usize; 2],
+    /// whether the first one leads
+    pub leads: bool,
+    pub low: f64,
+    pub high: f64,
+    /// δₖ/δᵢ
+    pub ratio: f64,
+}
+
+impl Window {
+    /// Of every two chains; none of one chain.
+    pub fn of(assignment: &Assignment, δ: &[f64]) -> Vec<Self> {
+        Self::all(&assignment.lengths(), assignment.leading, δ)
+    }
+
+    /// The same by the chains' lengths.
+    pub fn all(lengths: &[usize], lead: usize, δ: &[f64]) -> Vec<Self> {
+        let others = (0..lengths.len()).filter(|&i| i != lead);
+        let order: Vec<usize> = std::iter::once(lead).chain(others).collect();
+        let mut found = vec![];
+        for (place, &i) in order.iter().enumerate() {
+            for &k in &order[place + 1..] {
+                let [first, second] = [i, k].map(|chain| 2.0 * lengths[chain] as f64);
+                let leads = i == lead;
+                found.push(Self {
+                    pair: [i, k],
+                    leads,
+                    low: (first - 1.0) / if leads { second - 1.0 } else { second + 1.0 },
+                    high: (first + 1.0) / (second - 1.0),
+                    ratio: δ[k] / δ[i],
+                });
+            }
+        }
+        found
+    }
+
+    pub fn holds(&self) -> bool {
+        self.low < self.ratio && self.ratio < self.high
+    }
+
+    /// What the reader should know of an observer outside of it.
+    pub fn note(&self) -> Option<String> {
+        let Self {
+            low, high, ratio, ..
+        } = self;
+        (!self.holds()).then(|| {
+            format!("delta: the ratio {ratio:.4} lies outside ({low:.4}, {high:.4}), the window of Theorem 2; its proof does not cover this observer")
+        })
+    }
 }

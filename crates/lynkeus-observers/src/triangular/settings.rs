@@ -4,12 +4,11 @@ use lynkeus_gain::Tridiagonal;
 use lynkeus_structure::{ChainRequest, Extended};
 
 use crate::conditions::{CHAINS, chain_request};
-use crate::estimate::Common;
+use crate::estimate::{Common, PROLONG};
 use crate::guarantee::{LMI_KEYS, Lmi};
-use crate::peaking::{self, Remedies};
-use crate::prolongation::PROLONG;
-use crate::stages::Late;
-use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError};
+use crate::peaking::Remedies;
+use crate::tuning::Late;
+use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
 
 const THETA: KeySpec = KeySpec {
     name: "theta",

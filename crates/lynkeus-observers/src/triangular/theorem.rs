@@ -1,35 +1,35 @@
 //! Theorems 1 and 2: what they guarantee for a plant and a tuning.
 //!
 //! The hypotheses are decided on the box of the assumptions; the inequalities stand
-//! in [`proof`](crate::proof), with s_j = θ^{jδ} in the coordinates of Remark 2, or
+//! in [`lynkeus_proof::chain`], with s_j = θ^{jδ} in the coordinates of Remark 2, or
 //! divided by the partials where those are numbers. In ε scaled by θ^{δ_i/2} as in
 //! the paper every entry of the comparison matrix beside −μ carries a power of θ:
 //! −δ_i(1 + j − k) ≤ −δ_i inside a chain, at most n₂δ₂ − n₁δ₁ − (δ₁ + δ₂)/2 and
 //! n₁δ₁ − (n₂ − 1)δ₂ − (δ₁ + δ₂)/2 between the chains. Both are negative exactly in
 //! the window of Theorem 2 (of more than two chains each pair has one, `Window`). So its largest eigenvalue falls with θ, and from the
 //! first θ0 for which it is negative on the decay is proved, θ < 1 included.
+//!
+//! For each chain Lemma 1 asks whether its S satisfies (17), with which ρ and η.
 
-use crate::statement::{proved, standing, undecided};
-use crate::{Check, Hammouri};
-use lynkeus_expr::Interval;
-use lynkeus_proof::chain::{Chain, Comparison, Disturbance, ultimate};
+use lynkeus_expr::{Graph, Interval};
+use lynkeus_gain::lemma1::{Breaking, Kernel};
+use lynkeus_gain::{Tridiagonal, lemma1};
+use lynkeus_proof::chain::{Chain, Comparison, Disturbance, Slope, ultimate};
+use lynkeus_proof::matrix::sum;
 use lynkeus_proof::search::{first, lightest};
-use lynkeus_structure::Extended;
-use lynkeus_structure::Standing;
+use lynkeus_structure::{Coordinate, Extended, Point, Region, Standing, short};
 
-use super::facts::{Facts, remainder, without_bounds};
-use super::form::Form;
-use super::gains::{Gains, Window};
-use super::lemma::verify;
+use super::form::{Form, Gains, Window};
+use super::observer::observer;
 use super::settings::Settings;
-use super::{BASIS, observer};
-use crate::conditions::names;
+use crate::conditions::{names, output_slope, partials};
+use crate::design::Found;
 use crate::peaking::Departure;
-use crate::prolongation;
-use crate::proof::threshold::reached;
-use crate::proof::words::{conclude, shown, state_noise};
-use crate::stages::Found;
-use crate::{Assumptions, Certificate, Constant, DesignError};
+use crate::statement::{proved, refuted, standing, undecided};
+use crate::theorem::{conclude, reached, slopes, state_noise, undeclared};
+use crate::{Assumptions, Certificate, Check, Constant, DesignError, Hammouri, estimate};
+
+pub(super) const BASIS: &str = "Theorem 2 of Hammouri, Targui and Armanet (one chain: Theorem 1)";
 
 /// How much the gain may differ from the computed one, relatively: rounding of
 /// the powers of θ in the observer.
@@ -128,7 +128,7 @@ impl Study<'_> {
         };
         let mut certificate = Certificate::new(self.basis, self.assumptions, checks);
         certificate.constants = constants;
-        let place = prolongation::note(
+        let place = estimate::note(
             &self.settings.common,
             self.extended,
             &self.assumptions.region,
@@ -316,7 +316,7 @@ fn windowed(window: &Window, count: usize, constants: &mut Vec<Constant>) -> Che
         ),
     ]);
     let name = Hammouri::Window;
-    let text = format!("{} in ({}, {})", shown(ratio), shown(low), shown(high));
+    let text = format!("{} in ({}, {})", short(ratio), short(low), short(high));
     match window.holds() {
         true => proved(name, text),
         false => undecided(
@@ -337,5 +337,279 @@ fn at_these(holds: bool) -> Check {
             name,
             "it is not; the theorem is sufficient, not necessary: try a larger θ, the same for all chains",
         ),
+    }
+}
+
+/// What is known of the plant on the box of the assumptions.
+pub(super) struct Facts {
+    pub checks: Vec<Check>,
+    /// per chain (α₁, α₂) of every partial
+    pub bounds: Vec<Vec<(f64, f64)>>,
+    pub slopes: Vec<Slope>,
+}
+
+impl Facts {
+    pub fn new(extended: &Extended<'_>, form: &Form, region: &Region) -> Result<Self, DesignError> {
+        let (mut checks, mut bounds) = (vec![], vec![]);
+        let chains = &form.assignment.chains;
+        for (i, chain) in chains.iter().enumerate() {
+            checks.extend(output_slope(extended, i, region)?);
+            let (found, signs) = partials(extended, &chain.states, region)?;
+            checks.extend(signs);
+            bounds.push(
+                found
+                    .iter()
+                    .map(|partial| partial.bounds)
+                    .collect::<Vec<_>>(),
+            );
+        }
+        let along = |a: usize, b: usize| {
+            chains
+                .iter()
+                .any(|c| c.states.windows(2).any(|p| p == [a, b]))
+        };
+        let (slopes, check) = slopes(extended, region, along)?;
+        checks.push(check);
+        Ok(Self {
+            checks,
+            bounds,
+            slopes,
+        })
+    }
+}
+
+/// Partials without bounds: Lemma 1 has nothing to start from.
+pub(super) fn without_bounds(
+    extended: &Extended<'_>,
+    form: &Form,
+    facts: &Facts,
+    region: &Region,
+) -> Option<Check> {
+    let partials = form
+        .partials
+        .iter()
+        .flatten()
+        .zip(facts.bounds.iter().flatten());
+    let open = partials.filter(|(_, (low, high))| !(*low > 0.0 && high.is_finite()));
+    let nodes: Vec<_> = open.map(|(partial, _)| partial.node).collect();
+    let first = nodes.first()?;
+    let graph: &Graph = extended.graph();
+    let missing = undeclared(graph, &nodes, region);
+    let advice = match missing.is_empty() {
+        true => "narrow min and max so that it keeps away from zero and infinity".to_owned(),
+        false => format!("declare min and max of {}", missing.join(", ")),
+    };
+    let detail = format!(
+        "{} has no positive lower and finite upper bound on the box: {advice}",
+        graph.render(*first, 60)
+    );
+    Some(undecided(Hammouri::PartialsAreBounded, detail))
+}
+
+pub(super) fn remainder(facts: &Facts) -> String {
+    let all = facts.bounds.iter().flatten().count();
+    let known = facts
+        .bounds
+        .iter()
+        .flatten()
+        .filter(|(l, h)| *l > 0.0 && h.is_finite())
+        .count();
+    format!(
+        "Known so far: {known} of {all} partials along the chains have bounds; without the others there is no S by Lemma 1 and no θ0."
+    )
+}
+
+/// What Lemma 1 says of a chain.
+pub(super) struct Verified {
+    pub check: Check,
+    /// AᵀS + SA − ρCᵀC ≤ −μ·diag(S) with ρ = 2r; none where it is not proved
+    pub μ: Option<f64>,
+    /// S satisfies it for no ρ
+    pub broken: bool,
+    pub constants: Vec<Constant>,
+}
+
+/// Checks (17) with ρ = 2r. `names`: the states of the chain; `suffix` tells the
+/// constants of several chains apart.
+pub(super) fn verify(
+    chain: &Chain,
+    S: &Tridiagonal,
+    r: f64,
+    names: &[String],
+    suffix: &str,
+) -> Verified {
+    let title = Hammouri::Lemma1 {
+        states: names.to_vec(),
+        ρ: 2.0 * r,
+    };
+    let open = |check: Check| Verified {
+        check,
+        μ: None,
+        broken: false,
+        constants: vec![],
+    };
+    let bounds = &chain.partials;
+    let least = match lemma1::kernel(S, bounds) {
+        Ok(Kernel::Holds { ρ }) => ρ,
+        Ok(Kernel::Breaks(found)) => {
+            let (check, broken) = breaks(title, S, &found, names);
+            return Verified {
+                broken,
+                ..open(check)
+            };
+        }
+        Err(error) => return open(undecided(title, error.to_string())),
+    };
+    let Some(μ) = chain.decay() else {
+        let detail = match 2.0 * r > least {
+            true => {
+                "it holds in floating point, but with less than the rounding errors to spare".into()
+            }
+            false => format!(
+                "this S satisfies it for ρ > {} only; choose r > {}",
+                short(least),
+                short(least / 2.0)
+            ),
+        };
+        return open(undecided(title, detail));
+    };
+    let smallest = S.diagonal().iter().copied().fold(f64::INFINITY, f64::min);
+    let η = (Interval::point(μ) * Interval::point(smallest)).lo();
+    let constants = constants(chain, suffix, [least, 2.0 * r, η, μ]);
+    let detail = format!(
+        "with η = {}; it holds for every ρ above {}",
+        short(η),
+        short(least)
+    );
+    Verified {
+        check: proved(title, detail),
+        μ: Some(μ),
+        broken: false,
+        constants,
+    }
+}
+
+fn constants(chain: &Chain, suffix: &str, [least, ρ, η, μ]: [f64; 4]) -> Vec<Constant> {
+    let (lower, upper) = chain
+        .partials
+        .iter()
+        .fold((f64::INFINITY, 0.0f64), |(l, u), b| {
+            (l.min(b.lower), u.max(b.upper))
+        });
+    let mut list = vec![];
+    let mut add = |name: &str, value: f64, meaning: &str| {
+        list.push(Constant::new(format!("{name}{suffix}"), value, meaning));
+    };
+    if upper > 0.0 {
+        add("α1", lower, "lower bound of the partials along the chain");
+        add("α2", upper, "upper bound of the partials along the chain");
+    }
+    add(
+        "ρ_min",
+        least,
+        "Lemma 1 holds for every ρ above it (floating point)",
+    );
+    add("ρ", ρ, "2r, the ρ of the proof");
+    add("η", η, "Lemma 1: AᵀS + SA − ρCᵀC ≤ −ηI");
+    add(
+        "μ",
+        μ,
+        "the same weighed by S: AᵀS + SA − ρCᵀC ≤ −μ·diag(S)",
+    );
+    list
+}
+
+/// The refutation, and whether it is one: at a vertex of the bounds, in a direction that C does not see.
+fn breaks(title: Hammouri, S: &Tridiagonal, found: &Breaking, names: &[String]) -> (Check, bool) {
+    let value = quotient(S, found);
+    let direction: Vec<String> = names
+        .iter()
+        .zip(&found.direction)
+        .filter(|(_, v)| v.abs() > 5e-4)
+        .map(|(name, v)| format!("{v:+.3}·{name}"))
+        .collect();
+    let direction = direction.join(" ");
+    let size = short(found.eigenvalue);
+    if !value.is_positive() {
+        let detail = format!(
+            "in the direction {direction}, which the sensor does not see, AᵀS + SA is {size} whatever ρ is, too near to zero for rounding errors to tell its sign (a_j: the partials along the chain)"
+        );
+        return (undecided(title, detail), false);
+    }
+    let detail = format!(
+        "this S satisfies it for no ρ: in the direction {direction}, which the sensor does not see, AᵀS + SA is +{size} there (a_j: the partials along the chain), whatever ρ is"
+    );
+    let name = |j: usize| format!("a{}", j + 1);
+    let coordinates = found.a.iter().enumerate().map(|(j, &a)| (name(j), a));
+    let point = Point {
+        coordinates: coordinates.map(Coordinate::from).collect(),
+        value: found.eigenvalue,
+    };
+    (refuted(title, point, detail), true)
+}
+
+/// vᵀ(AᵀS + SA)v, rounding included: a proof that the form is positive somewhere.
+fn quotient(S: &Tridiagonal, found: &Breaking) -> Interval {
+    let v = |i: usize| Interval::point(found.direction[i]);
+    let n = S.size();
+    let pairs = (0..n).flat_map(|i| (1..n).map(move |j| (i, j)));
+    let terms = pairs.map(|(i, j)| {
+        let SA = Interval::point(S.get(i, j - 1)) * Interval::point(found.a[j - 1]);
+        Interval::point(2.0) * v(i) * SA * v(j)
+    });
+    sum(terms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lynkeus_structure::Verdict;
+
+    fn title() -> Hammouri {
+        Hammouri::Lemma1 {
+            states: vec!["x".into(), "z".into()],
+            ρ: 2.0,
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_overflows_is_no_refutation() {
+        let S = Tridiagonal::new(vec![1.0, 1e300], vec![-1e100]).unwrap();
+        let chain = Chain {
+            states: vec![0, 1],
+            speed: Interval::ONE,
+            scales: vec![Interval::ONE; 2],
+            S: vec![
+                vec![Interval::ONE, Interval::point(-1e100)],
+                vec![Interval::point(-1e100), Interval::point(1e300)],
+            ],
+            g: vec![Interval::ONE; 2],
+            partials: vec![(1e250, 1e250).into()],
+        };
+        let found = verify(&chain, &S, 1.0, &["x".into(), "z".into()], "");
+        assert!(!found.broken && found.μ.is_none());
+        assert!(matches!(found.check.verdict, Verdict::Undecided(_)));
+        assert!(
+            found.check.detail.contains("no value"),
+            "{}",
+            found.check.detail
+        );
+    }
+
+    /// AᵀS + SA = 0 on the kernel of C: that rounding does not tell its sign says nothing of ρ.
+    #[test]
+    fn what_rounding_hides_is_no_refutation() {
+        let S = Tridiagonal::new(vec![1.0, 3.0], vec![0.0]).unwrap();
+        for eigenvalue in [0.0, -1e-17] {
+            let found = Breaking {
+                a: vec![1.0],
+                eigenvalue,
+                direction: vec![0.0, 1.0],
+            };
+            let (check, is_refuted) = breaks(title(), &S, &found, &["x".into(), "z".into()]);
+            assert!(!is_refuted && matches!(check.verdict, Verdict::Undecided(_)));
+            let said = &check.detail;
+            assert!(!said.contains("for no ρ") && !said.contains("+-"), "{said}");
+        }
     }
 }

@@ -18,24 +18,19 @@
 //! (ii) holds, ∂f̄₁²/∂x² = 0. So (11) is a condition of its own here; together with (i)
 //! it implies (ii).
 
-mod assemble;
-mod blocks;
-mod bound;
 mod constants;
 mod form;
-mod matrices;
-mod norms;
-mod partition;
+mod observer;
 mod settings;
 mod theorem;
 
 use lynkeus_structure::{Extended, Region};
 
-use crate::stages::{FormBox, Found, Searched, Stages};
+use crate::design::{Found, Searched};
+use crate::family::{FormBox, Stages};
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
+use form::NAME;
 use settings::Settings;
-
-const NAME: &str = "unknown-input";
 
 /// The family `unknown-input`.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +60,7 @@ impl Stages for UnknownInput {
         settings: &Settings,
         region: &Region,
     ) -> Searched<form::Form<'e, 'p>> {
-        partition::search(extended, settings, region)
+        form::search(extended, settings, region)
     }
 
     fn design<'e, 'p>(
@@ -73,7 +68,7 @@ impl Stages for UnknownInput {
         settings: &Settings,
         found: Found<form::Form<'e, 'p>>,
     ) -> Result<Design, DesignError> {
-        assemble::design(extended, settings, &found.form, found.examination)
+        observer::design(extended, settings, &found.form, found.examination)
     }
 
     fn theorem<'e, 'p>(

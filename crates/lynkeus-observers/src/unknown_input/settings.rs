@@ -3,7 +3,7 @@
 use lynkeus_structure::Extended;
 
 use crate::estimate::Common;
-use crate::stages::Late;
+use crate::tuning::Late;
 use crate::{KeySpec, Shape, Tuning, TuningError, Value};
 
 const THETA: KeySpec = KeySpec {

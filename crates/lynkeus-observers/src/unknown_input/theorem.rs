@@ -8,23 +8,23 @@
 //! quadratic form is at most −λ V, λ > 0 where θ₂ > c₄ and
 //! θ₁ > c₁ + (c₂ + c₅)²θ₂²/(4(θ₂ − c₄)), so √V falls at the rate λ/2 down to 2|δ|/λ.
 
-use crate::statement::{sufficient, undecided};
-use crate::{Check, Farza};
 use lynkeus_expr::Interval;
 use lynkeus_gain::integrators::Chain;
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::matrix::sum;
-use lynkeus_structure::Verdict;
+use lynkeus_structure::{Verdict, short};
 
-use super::bound;
-use super::constants;
+use super::constants::{Constants, Norms, in_S};
 use super::form::Form;
-use super::norms::{Constants, Norms, in_S};
 use super::settings::{Settings, Thetas};
-use crate::enclosure::figures;
-use crate::{Assumptions, Certificate, Constant, DesignError, Examination, UltimateBound};
+use super::{constants, observer};
+use crate::statement::{sufficient, undecided};
+use crate::{
+    Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, UltimateBound,
+};
 
 pub(super) const BASIS: &str = "Theorem 1 of Farza, M'Saad, Liu and Targui";
+
 /// Numbers that have to be exceeded are by this factor at least.
 const CLEAR: f64 = 1.0 + 1e-9;
 
@@ -37,7 +37,7 @@ pub(super) fn certificate(
     let given = settings.thetas.clone()?;
     let norms = constants::norms(form, assumptions)?;
     let c = norms.constants();
-    let chosen = || bound::thetas(form).ok().map(|choice| choice.thetas);
+    let chosen = || observer::thetas(form).ok().map(|choice| choice.thetas);
     let thetas = given.or_else(chosen);
     let proof = Proof { form, norms, c };
     let mut hypotheses = examination.checks;
@@ -92,7 +92,7 @@ impl Proof<'_, '_, '_> {
         let detail = match (ε == 0.0, constant.is_empty()) {
             (true, false) => "assumed constant".to_owned(),
             (true, true) => "assumed constant but for its process noise".to_owned(),
-            (false, _) => format!("assumed: |v'| ≤ {}", figures(ε)),
+            (false, _) => format!("assumed: |v'| ≤ {}", short(ε)),
         };
         sufficient(Farza::H5, ε.is_finite(), detail)
     }
@@ -104,8 +104,8 @@ impl Proof<'_, '_, '_> {
             let detail = match first.is_finite() {
                 true => format!(
                     "no theta is given; the proof asks for one like [{}, {}]",
-                    figures(first * 1.1),
-                    figures(second)
+                    short(first * 1.1),
+                    short(second)
                 ),
                 false => "no theta is given, and the proof gives none on this box".to_owned(),
             };
@@ -118,7 +118,7 @@ impl Proof<'_, '_, '_> {
         let first = self.first(θ2) * CLEAR;
         let against = |found: f64, least: f64| {
             let word = if found >= least { "≥" } else { "<" };
-            format!("{} {word} {}", figures(found), figures(least))
+            format!("{} {word} {}", short(found), short(least))
         };
         let mut checks = vec![sufficient(Farza::Theta2, θ2 >= second, against(θ2, second))];
         if θ2 >= second {
@@ -189,7 +189,7 @@ impl Proof<'_, '_, '_> {
         let λ = self.λ(θ);
         if λ.is_nan() || λ <= 0.0 {
             // θ₁ exceeds θ₁* by less than rounding
-            found.hypotheses.push(undecided(Farza::Rate, figures(λ)));
+            found.hypotheses.push(undecided(Farza::Rate, short(λ)));
             return Ok(());
         }
         found.rate = Some(λ / 2.0);
@@ -317,7 +317,7 @@ impl Proof<'_, '_, '_> {
     fn noise(&self, assumptions: &Assumptions) -> Result<[f64; 2], DesignError> {
         let extended = self.form.extended;
         let graph = extended.graph();
-        let box_ = crate::enclosure::Enclosure::new(graph, &assumptions.region);
+        let box_ = crate::theorem::Enclosure::new(graph, &assumptions.region);
         let one = |i: &usize| -> Result<f64, DesignError> {
             let noise = assumptions.noise.get(*i).copied().unwrap_or(0.0);
             let Some((_, slope, _)) = extended.outputs[*i].state.filter(|_| noise > 0.0) else {

@@ -3,22 +3,25 @@
 //! Those of Krener and Respondek are taken where all is proved with them. Else others
 //! are examined, on the box of the states and the declared ranges of the inputs, so that a
 //! certificate on a smaller range of the inputs is about the same observer.
+//!
+//! Why the derivatives of the outputs do not determine the state is decided in exact arithmetic:
+//! floating point loses a digit with each derivative.
 
-use crate::fit_word;
+use lynkeus_expr::Spent;
+use lynkeus_model::{Plant, Variable};
+use lynkeus_observability::{Answer, Question, analyse};
 use lynkeus_structure::indices::Codistribution;
-use lynkeus_structure::{Extended, Region};
-use lynkeus_structure::{Standing, Verdict};
+use lynkeus_structure::{Extended, Region, Standing, Verdict};
 
-use super::blind::blind;
-use super::form::{Form, Map};
-use super::keys::Asked;
-use super::settings::{POLES, Settings};
+use super::form::{Form, Map, unfit};
+use super::settings::{Asked, POLES, Settings};
 use crate::conditions::lasts;
-use crate::stages::{Found, Searched};
-use crate::{DesignError, TuningError};
+use crate::design::{Found, Searched};
+use crate::{DesignError, Examination, TuningError, fit_word};
 
 /// Further index vectors that are examined.
 const EXAMINED: usize = 6;
+
 /// Further index vectors that are told.
 const TOLD: usize = 4;
 
@@ -192,4 +195,77 @@ fn told(chosen: &[usize], others: &[Other]) -> String {
         shown.push(format!("{} more", others.len() - TOLD));
     }
     format!("; indices {chosen:?} (others: {})", shown.join(", "))
+}
+
+/// The share of the time for the names of what is not seen.
+const WORDS: f64 = 0.5;
+
+/// What hides the state, where that is so.
+///
+/// # Errors
+/// Only rounding hides it, or a limit ended the search for it.
+pub(super) fn blind(extended: &Extended<'_>) -> Result<Examination, DesignError> {
+    lasts(extended)?;
+    let names = |of: &[Variable]| of.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
+    let drift = answer(extended, names(&extended.inputs))?;
+    if drift.is_complete() {
+        return Err(DesignError::Spent(Spent::Digits));
+    }
+    let mut hidden = hidden(&drift);
+    if hidden.is_empty() {
+        lasts(extended)?;
+        return Err(DesignError::Spent(Spent::Digits));
+    }
+    if !extended.inputs.is_empty() {
+        hidden = self::hidden(&answer(extended, vec![])?);
+    }
+    let advice = match hidden.is_empty() {
+        true => "the rest shows only where the inputs are not zero; write the model around an operating point, u = u0 + du with the input du".to_owned(),
+        false => format!("no measured output feels {}; measure more", hidden.join(", ")),
+    };
+    Ok(unfit(format!(
+        "with u = 0 the outputs and their derivatives determine {} of {} combinations of states: {advice}",
+        drift.rank,
+        extended.states.len()
+    )))
+}
+
+/// States that no derivative of an output tells.
+fn hidden(answer: &Answer) -> Vec<String> {
+    let quantities = answer.quantities.iter();
+    let hidden = quantities
+        .filter(|(asked, _)| asked.verdict == lynkeus_observability::Verdict::Unobservable);
+    hidden.map(|(asked, _)| asked.name.clone()).collect()
+}
+
+/// What can be known of the extended states, with these inputs at zero.
+fn answer(extended: &Extended<'_>, zero: Vec<String>) -> Result<Answer, DesignError> {
+    let question = Question {
+        disturbances: zero,
+        budget: extended.graph().budget().part(WORDS),
+        ..Question::default()
+    };
+    let answer = analyse(&plant(extended), &question);
+    // the names are the plant's own
+    answer.map_err(|_| DesignError::Spent(Spent::Digits))
+}
+
+/// The extended plant as a plant of its own: unknown inputs are states, starts are not known.
+fn plant(extended: &Extended<'_>) -> Plant {
+    let state = |state: &Variable| Variable {
+        fixed: false,
+        start_node: None,
+        ..state.clone()
+    };
+    Plant {
+        states: extended.states.iter().map(state).collect(),
+        derivatives: extended.derivatives.clone(),
+        inputs: extended.inputs.clone(),
+        outputs: extended
+            .outputs
+            .iter()
+            .map(|o| o.variable.clone())
+            .collect(),
+        ..extended.plant.clone()
+    }
 }

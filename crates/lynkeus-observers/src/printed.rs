@@ -1,19 +1,19 @@
-//! A correction as the reader sees it: numbers where the observer is
-//! x̂' = f(x̂, u) − K (ŷ − y) with a constant K, else expressions.
+//! The gains and matrices of a design as its reader sees them: numbers where they are
+//! constant, else expressions with their values at the start.
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Node};
-use lynkeus_structure::Extended;
+use lynkeus_expr::{Graph, MissingInput, Node, Tape};
+use lynkeus_structure::{Extended, Matrix};
 
-use crate::estimate::Copy;
+use crate::estimate::{PlantCopy, middle};
 use crate::{ChainGain, TuningError};
 
 /// Longest expression that is printed, in characters.
 const LONGEST: usize = 120;
 
 /// What corrects the states of one chain.
-pub(crate) struct Correction<'a> {
+pub(crate) struct ChainCorrection<'a> {
     /// place of the measured output
     pub output: usize,
     /// the states that are corrected
@@ -25,7 +25,7 @@ pub(crate) struct Correction<'a> {
     pub limited: bool,
 }
 
-impl Correction<'_> {
+impl ChainCorrection<'_> {
     /// The factors of ŷ − y.
     fn on_output(&self, extended: &Extended<'_>) -> Vec<Node> {
         let graph = extended.graph();
@@ -53,7 +53,7 @@ impl Correction<'_> {
     }
 
     /// The factors of ŷ − y as parameters: expressions, and their values at the start.
-    pub fn expressions(&self, start: &Start<'_>) -> Vec<(String, String)> {
+    pub fn expressions(&self, start: &AtStart<'_>) -> Vec<(String, String)> {
         let extended = start.extended;
         let output = &extended.outputs[self.output].variable.name;
         let named = self.states.iter().zip(self.on_output(extended));
@@ -71,15 +71,15 @@ impl Correction<'_> {
 }
 
 /// Where the estimate starts, for the values of expressions there.
-pub(crate) struct Start<'a> {
+pub(crate) struct AtStart<'a> {
     extended: &'a Extended<'a>,
     images: HashMap<Node, Node>,
 }
 
-impl<'a> Start<'a> {
+impl<'a> AtStart<'a> {
     /// Estimates at their starts, the outputs as they are there, inputs at their declared
     /// starts, time 0.
-    pub fn new(copy: &Copy<'a, '_>) -> Result<Self, TuningError> {
+    pub fn new(copy: &PlantCopy<'a, '_>) -> Result<Self, TuningError> {
         let extended = copy.extended;
         let graph = extended.graph();
         let mut images = HashMap::new();
@@ -125,4 +125,89 @@ impl<'a> Start<'a> {
         let rows: Vec<String> = rows.iter().map(row).collect();
         rows.join(", ")
     }
+}
+
+/// Characters of an entry that are shown.
+const SHOWN: usize = 60;
+
+/// The point at which a run starts: the estimate where it starts, known inputs at their
+/// start values (else the middle of their ranges, else 0), time 0.
+pub(crate) struct StartPoint<'g> {
+    graph: &'g Graph,
+    symbols: Vec<Node>,
+    values: Vec<f64>,
+}
+
+impl<'g> StartPoint<'g> {
+    pub fn new(copy: &PlantCopy<'_, 'g>) -> Result<Self, TuningError> {
+        let extended: &Extended<'g> = copy.extended;
+        let (mut symbols, mut values) = (vec![extended.plant.time], vec![0.0]);
+        for input in &extended.inputs {
+            symbols.push(input.node);
+            values.push(input.start.unwrap_or_else(|| middle(input)));
+        }
+        symbols.extend(extended.symbols());
+        values.extend(copy.states()?.iter().map(|(_, start)| start));
+        Ok(Self {
+            graph: extended.graph(),
+            symbols,
+            values,
+        })
+    }
+
+    /// The entries of a matrix of the plant's symbols, row by row.
+    pub fn values(&self, A: &Matrix<'_>) -> Result<Vec<Vec<f64>>, MissingInput> {
+        let dense = A.dense();
+        let tape = Tape::new(self.graph, &self.symbols, &dense)?;
+        let mut found = vec![0.0; dense.len()];
+        tape.evaluator().eval(&self.values, &mut found);
+        Ok(found
+            .chunks(A.columns.max(1))
+            .map(<[f64]>::to_vec)
+            .collect())
+    }
+
+    /// The same in words: `[[1, 0], [0, 0.5]]`.
+    pub fn shown(&self, A: &Matrix<'_>) -> Result<String, MissingInput> {
+        Ok(numbers(&self.values(A)?))
+    }
+}
+
+/// Whether every entry is a number.
+pub(crate) fn is_constant(A: &Matrix<'_>) -> bool {
+    A.graph().symbols_of(&A.nonzero()).is_empty()
+}
+
+/// `[[x1, 0], [0, 2]]`
+pub(crate) fn expressions(A: &Matrix<'_>) -> String {
+    let entry = |i, j| match A.get(i, j) {
+        Some(node) => A.graph().render(node, SHOWN),
+        None => "0".to_owned(),
+    };
+    let row = |i| (0..A.columns).map(|j| entry(i, j)).collect();
+    rows((0..A.rows).map(row).collect())
+}
+
+/// Numbers row by row, with six digits; a dash where there is none.
+pub(crate) fn numbers(A: &[Vec<f64>]) -> String {
+    let number = |x: &f64| {
+        if x.is_nan() {
+            return "–".to_owned();
+        }
+        let short: f64 = format!("{x:.5e}").parse().unwrap_or(*x);
+        short.to_string()
+    };
+    rows(
+        A.iter()
+            .map(|row| row.iter().map(number).collect())
+            .collect(),
+    )
+}
+
+fn rows(A: Vec<Vec<String>>) -> String {
+    let rows: Vec<String> = A
+        .iter()
+        .map(|row| format!("[{}]", row.join(", ")))
+        .collect();
+    format!("[{}]", rows.join(", "))
 }

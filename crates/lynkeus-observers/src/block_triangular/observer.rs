@@ -1,0 +1,365 @@
+//! The observers (7) and (3), the latter also in the low-power form: chains of dimension
+//! 2n − 2 with gains of at most θ².
+
+use std::collections::HashMap;
+
+use lynkeus_expr::{Expr, Graph, Node, jacobian};
+use lynkeus_structure::{Blocks, Chain, Extended};
+
+use super::form::{Form, NAME, chain_rule};
+use super::settings::{Correction, Settings};
+use crate::conditions::{Partial, nominal};
+use crate::design::Found;
+use crate::estimate::{Continued, PlantCopy, Speed, prolong};
+use crate::peaking::{Part, Remedies, Run, Transient, factor_rows, variation};
+use crate::printed::AtStart;
+use crate::{Design, DesignError, TuningError, estimate, peaking, printed};
+
+/// Why there is no such form of the default observer.
+pub(super) const ONLY_CLASSICAL: &str =
+    "correction = \"classical\" with form = \"low-power\": observer (7) has no such form";
+
+/// Observer (7) or (3).
+pub(super) fn observer(
+    extended: &Extended<'_>,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
+) -> Result<Design, DesignError> {
+    let graph = extended.graph();
+    let copy = PlantCopy::new(extended, &settings.common);
+    let blocks = &form.blocks;
+    let Remedies {
+        limit, transient, ..
+    } = &settings.remedies;
+    let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
+    let correction = settings.correction;
+    let start = AtStart::new(&copy)?;
+    let text = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let mut parameters = vec![("θ".to_owned(), text(&θ))];
+    parameters.extend(transient.as_ref().map(Transient::parameter));
+    let coefficients = K.iter().enumerate();
+    parameters.extend(coefficients.map(|(i, k)| (format!("K{}", i + 1), text(k))));
+    let mut derivatives = copy.at_estimate(&extended.derivatives);
+    let mut gains = vec![];
+    let speeds = Speed::of_chains(&copy, &θ);
+    for (place, (output, chain)) in blocks.order.iter().enumerate() {
+        let injected = injected(&copy, blocks, place);
+        let Some(innovation) = limit.innovation(&copy, *output) else {
+            continue;
+        };
+        let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
+        let steady: Vec<(f64, f64)> = K[*output].iter().enumerate().map(power).collect();
+        let timed = peaking::gains(
+            transient.as_ref(),
+            &copy,
+            *output,
+            &speeds[*output],
+            &steady,
+        );
+        let gain = match correction {
+            Correction::Classical => timed,
+            Correction::Lee => lee(extended, chain, &timed),
+        };
+        let gain = copy.at_estimate(&graph.substitute(&gain, &injected));
+        let f: Vec<Node> = chain
+            .states
+            .iter()
+            .map(|&i| extended.derivatives[i])
+            .collect();
+        let f = copy.at_estimate(&graph.substitute(&f, &injected));
+        for ((&state, f), gain) in chain.states.iter().zip(f).zip(&gain) {
+            derivatives[state] =
+                (graph.expr(f) - graph.expr(*gain) * graph.expr(innovation)).node();
+        }
+        let printed = printed::ChainCorrection {
+            output: *output,
+            states: &chain.states,
+            factors: &gain,
+            limited: limit.is_set(),
+        };
+        match printed.constant(extended) {
+            Some(constant) => gains.push(constant),
+            None => {
+                if correction == Correction::Lee {
+                    let found = transformation(extended, chain);
+                    let L: Vec<_> = found.L.into_iter().map(|l| vec![l]).collect();
+                    parameters.push((format!("M{}", output + 1), start.table(&found.M)));
+                    parameters.push((format!("L{}", output + 1), start.table(&L)));
+                }
+                let constants: Vec<f64> = steady.iter().map(|gain| gain.0).collect();
+                parameters.push((format!("Δ⁻¹K{}", output + 1), text(&constants)));
+                parameters.extend(printed.expressions(&start));
+            }
+        }
+    }
+    prolong(&copy, continued(&form), &mut derivatives)?;
+    Ok(Design {
+        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
+        notes: chain_rule(blocks, &θ).into_iter().collect(),
+        examination,
+        gains,
+        parameters,
+    })
+}
+
+/// The equations of the chains, for their prolongation.
+fn continued(form: &Form) -> impl Iterator<Item = Continued> {
+    let blocks = form.blocks.order.iter().zip(&form.partials);
+    blocks.flat_map(|((_, chain), partials)| Continued::along(&chain.states, partials))
+}
+
+/// y_{i+1}, …, y_p in place of the states they show.
+fn injected(copy: &PlantCopy<'_, '_>, blocks: &Blocks, place: usize) -> HashMap<Node, Node> {
+    let later = blocks.order[place + 1..].iter();
+    later
+        .filter_map(|(output, _)| copy.measured_state(*output))
+        .map(|(state, y)| (copy.extended.states[state].node, y))
+        .collect()
+}
+
+pub(super) fn assemble(
+    extended: &Extended<'_>,
+    settings: &Settings,
+    Found { form, examination }: Found<Form>,
+) -> Result<Design, DesignError> {
+    let Settings {
+        common, remedies, ..
+    } = settings;
+    estimate::refuse(common, "form = \"low-power\"")?;
+    let blocks = &form.blocks;
+    let graph = extended.graph();
+    let copy = PlantCopy::new(extended, common);
+    let θ = settings.θ()?;
+    let transient = remedies.transient.as_ref();
+    let coefficients = remedies.coefficients(&blocks.lengths())?;
+    let mut run = Run::new(&copy, transient)?;
+    let speeds = Speed::of_chains(&copy, &θ);
+    let (mut notes, mut factors) = (vec![], vec![]);
+    for (place, (output, chain)) in blocks.order.iter().enumerate() {
+        let Some(innovation) = remedies.limit.innovation(&copy, *output) else {
+            continue;
+        };
+        let derivative = |&state: &usize| extended.derivatives[state];
+        let f: Vec<Node> = chain.states.iter().map(derivative).collect();
+        let output_name = &extended.outputs[*output].variable.name;
+        let found = &form.partials[place];
+        notes.extend(variation(
+            output_name,
+            &bounds(found),
+            &coefficients.K[*output],
+        ));
+        let added = run.add(&Part {
+            states: &chain.states,
+            f: &graph.substitute(&f, &injected(&copy, blocks, place)),
+            divisors: &divisors(extended, found)?,
+            innovation,
+            K: &coefficients.K[*output],
+            θ: &speeds[*output],
+            δ: 1.0,
+            number: *output,
+        });
+        factors.extend(factor_rows(output_name, added));
+    }
+    let text: Vec<String> = θ.iter().map(f64::to_string).collect();
+    let mut parameters = vec![("θ".to_owned(), text.join(", "))];
+    parameters.extend(transient.map(Transient::parameter));
+    parameters.extend(coefficients.parameters());
+    parameters.extend(factors);
+    notes.extend(chain_rule(blocks, &θ));
+    Ok(Design {
+        observer: run.finish(NAME)?.tuned_by(&speeds),
+        notes,
+        examination,
+        gains: vec![],
+        parameters,
+    })
+}
+
+/// The constant that stands for each partial along a chain; 1 in the paper's form (2).
+fn divisors(extended: &Extended<'_>, partials: &[Partial]) -> Result<Vec<Node>, DesignError> {
+    let mut found = vec![];
+    for partial in partials {
+        let Some(middle) = nominal(partial.sign, partial.bounds) else {
+            let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model";
+            let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
+            return Err(TuningError::new("form", expected, bounds).into());
+        };
+        found.push(extended.graph().constant(middle).node());
+    }
+    Ok(found)
+}
+
+fn bounds(partials: &[Partial]) -> Vec<(f64, f64)> {
+    partials.iter().map(|partial| partial.bounds).collect()
+}
+
+/// M̄, L and W of the five steps.
+struct Steps {
+    M̄: Vec<Vec<Sparse>>,
+    L: Vec<Sparse>,
+    W: Vec<Vec<Sparse>>,
+}
+
+impl Steps {
+    fn new(extended: &Extended<'_>, chain: &Chain) -> Self {
+        let graph = extended.graph();
+        let n = chain.states.len();
+        let F = own_jacobian(extended, chain);
+        // Step 1: M̄ = (C; CF; …; CF^{n−1}), lower triangular, and the next power CFⁿ
+        let mut rows = vec![unit(graph, n)];
+        for k in 0..n {
+            rows.push(times(graph, &rows[k], &F));
+        }
+        let next = rows.pop().unwrap_or_default();
+        let M̄ = rows;
+        // Steps 2 and 3: the last row q of M̄FM̄⁻¹ − A solves q M̄ = CFⁿ; L_j = q_{n−j+1}
+        let q = solve_left(graph, &M̄, next);
+        let L: Vec<Sparse> = q.into_iter().rev().collect();
+        // Step 4: W = (C; C(A + LC); …)
+        let Ā = |row: &[Sparse]| -> Vec<Sparse> {
+            (0..n)
+                .map(|j| match j {
+                    0 => dot(graph, row, &L),
+                    _ => row[j - 1],
+                })
+                .collect()
+        };
+        let mut W = vec![unit(graph, n)];
+        for k in 1..n {
+            W.push(Ā(&W[k - 1]));
+        }
+        Self { M̄, L, W }
+    }
+}
+
+/// M⁻¹(L + Δ⁻¹K) by the five steps. Since M = W⁻¹M̄, it is M̄⁻¹W(L + Δ⁻¹K): one
+/// triangular solve.
+pub(super) fn lee(extended: &Extended<'_>, chain: &Chain, gains: &[Node]) -> Vec<Node> {
+    let graph = extended.graph();
+    let Steps { M̄, L, W } = Steps::new(extended, chain);
+    // Step 5, multiplied out
+    let v: Vec<Sparse> = L
+        .iter()
+        .zip(gains)
+        .map(|(&l, &k)| sum(graph, l, Some(k)))
+        .collect();
+    let right: Vec<Sparse> = W.iter().map(|row| dot(graph, row, &v)).collect();
+    let zero = graph.constant(0.0).node();
+    let gain = solve_lower(graph, &M̄, right);
+    gain.into_iter().map(|g| g.unwrap_or(zero)).collect()
+}
+
+/// The similarity transformation of the error, row by row.
+pub(super) struct Transformation {
+    /// M = W⁻¹M̄
+    pub M: Vec<Vec<Sparse>>,
+    /// M⁻¹ = M̄⁻¹W
+    pub inverse: Vec<Vec<Sparse>>,
+    /// L
+    pub L: Vec<Sparse>,
+}
+
+/// M, M⁻¹ and L of Step 5, for the proof; the observer needs none of them.
+pub(super) fn transformation(extended: &Extended<'_>, chain: &Chain) -> Transformation {
+    let graph = extended.graph();
+    let Steps { M̄, L, W } = Steps::new(extended, chain);
+    let solved = |A: &[Vec<Sparse>], B: &[Vec<Sparse>]| {
+        let n = A.len();
+        let column = |j: usize| solve_lower(graph, A, B.iter().map(|row| row[j]).collect());
+        let columns: Vec<Vec<Sparse>> = (0..n).map(column).collect();
+        let row = |i: usize| columns.iter().map(|c| c[i]).collect();
+        (0..n).map(row).collect()
+    };
+    Transformation {
+        M: solved(&W, &M̄),
+        inverse: solved(&M̄, &W),
+        L,
+    }
+}
+
+/// An entry that may be zero everywhere.
+pub(super) type Sparse = Option<Node>;
+
+/// F_i = ∂f_i/∂x_i, row by row.
+pub(super) fn own_jacobian(extended: &Extended<'_>, chain: &Chain) -> Vec<Vec<Sparse>> {
+    let f: Vec<Node> = chain
+        .states
+        .iter()
+        .map(|&i| extended.derivatives[i])
+        .collect();
+    let x: Vec<Node> = chain
+        .states
+        .iter()
+        .map(|&i| extended.states[i].node)
+        .collect();
+    let jacobian = jacobian::forward(extended.graph(), &f, &x);
+    let n = f.len();
+    (0..n)
+        .map(|i| (0..n).map(|j| jacobian.get(i, j)).collect())
+        .collect()
+}
+
+/// C = (1, 0, …, 0)
+fn unit(graph: &Graph, n: usize) -> Vec<Sparse> {
+    let one = graph.constant(1.0).node();
+    (0..n).map(|j| (j == 0).then_some(one)).collect()
+}
+
+fn sum(graph: &Graph, a: Sparse, b: Sparse) -> Sparse {
+    match (a, b) {
+        (Some(a), Some(b)) => Some((graph.expr(a) + graph.expr(b)).node()),
+        (a, b) => a.or(b),
+    }
+}
+
+fn product<'g>(graph: &'g Graph, a: Sparse, b: Sparse) -> Option<Expr<'g>> {
+    Some(graph.expr(a?) * graph.expr(b?))
+}
+
+fn dot(graph: &Graph, a: &[Sparse], b: &[Sparse]) -> Sparse {
+    let terms = a.iter().zip(b).filter_map(|(&a, &b)| product(graph, a, b));
+    terms.reduce(|a, b| a + b).map(Expr::node)
+}
+
+fn times(graph: &Graph, row: &[Sparse], F: &[Vec<Sparse>]) -> Vec<Sparse> {
+    let column = |j: usize| F.iter().map(|r| r[j]).collect::<Vec<_>>();
+    (0..row.len())
+        .map(|j| dot(graph, row, &column(j)))
+        .collect()
+}
+
+/// (right − known)/pivot
+fn eliminated(graph: &Graph, right: Sparse, known: Sparse, pivot: Sparse) -> Sparse {
+    let numerator = match (right, known) {
+        (Some(r), Some(k)) => graph.expr(r) - graph.expr(k),
+        (Some(r), None) => graph.expr(r),
+        (None, Some(k)) => -graph.expr(k),
+        (None, None) => return None,
+    };
+    Some(match pivot {
+        Some(pivot) => (numerator / graph.expr(pivot)).node(),
+        None => numerator.node(),
+    })
+}
+
+/// x with M x = b for a lower triangular M.
+fn solve_lower(graph: &Graph, M: &[Vec<Sparse>], b: Vec<Sparse>) -> Vec<Sparse> {
+    let mut x: Vec<Sparse> = vec![];
+    for (i, right) in b.into_iter().enumerate() {
+        let known = dot(graph, &M[i][..i], &x);
+        x.push(eliminated(graph, right, known, M[i][i]));
+    }
+    x
+}
+
+/// q with q M = c for a lower triangular M.
+fn solve_left(graph: &Graph, M: &[Vec<Sparse>], c: Vec<Sparse>) -> Vec<Sparse> {
+    let n = c.len();
+    let mut q: Vec<Sparse> = vec![None; n];
+    for j in (0..n).rev() {
+        let column: Vec<Sparse> = M.iter().map(|row| row[j]).collect();
+        let known = dot(graph, &q[j + 1..], &column[j + 1..]);
+        q[j] = eliminated(graph, c[j], known, M[j][j]);
+    }
+    q
+}

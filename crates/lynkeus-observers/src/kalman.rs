@@ -1,0 +1,362 @@
+//! Kalman filters, for any plant: x' = f(t, x, u) + w, y = h(t, x, u) + v with white noises.
+//!
+//! The observer's flow is the plant itself, x̂' = f(t, x̂, u); the measurements correct the
+//! estimate when they are taken, by the gain that follows from the noises
+//! ([`lynkeus_run::filter`]). Unknown inputs are states with derivative 0 that wander.
+//!
+//! `ekf`: the extended Kalman filter, continuous-discrete (Jazwinski, *Stochastic Processes and
+//! Filtering Theory*, 1970). `ukf`: the unscented Kalman filter (Julier and Uhlmann 1997; with
+//! its default weights the cubature filter of Arasaratnam and Haykin 2009).
+//!
+//! `mhe`: moving-horizon estimation (Rao, Rawlings and Mayne, *IEEE Transactions on Automatic
+//! Control* 48 (2003) 246–258), whose states stay within their declared ranges.
+//!
+//! Nothing is required of the plant, and nothing is proved of the error.
+
+use lynkeus_model::Variable;
+use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
+use lynkeus_structure::{Extended, Region, Standing};
+
+use crate::certificate::NO_THEOREM;
+use crate::design::{Form, Found, Searched};
+use crate::estimate::{Common, PlantCopy, Speed, limited};
+use crate::family::{FormBox, Stages};
+use crate::statement::undecided;
+use crate::tuning::is_or_has;
+use crate::{
+    Assumptions, Certificate, Design, DesignError, Examination, FilterTuning, KeySpec, Shape,
+    Signal, Statement, Tuning, TuningError, Value,
+};
+
+/// The tunable number of a filter: no equation reads it, the noises are the study's.
+const NOISE_SCALE: &str = "process_noise_scale";
+
+const NOISE_MEANING: &str = "multiplies the densities of process noise";
+
+/// The family `ekf`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ekf;
+
+/// The family `ukf`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ukf;
+
+/// The family `mhe`.
+#[derive(Clone, Copy, Debug)]
+pub struct Mhe;
+
+/// What each has of its own.
+trait Kalman: Sync {
+    const NAME: &'static str;
+    const PAPER: &'static str;
+    const WORDS: &'static str;
+    const KEYS: &'static [&'static [KeySpec]];
+
+    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError>;
+}
+
+impl Kalman for Ekf {
+    const NAME: &'static str = "ekf";
+    const PAPER: &'static str = "Jazwinski 1970, the extended Kalman filter, continuous-discrete";
+    const WORDS: &'static str = "extended Kalman filter";
+    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS];
+
+    fn kind(_: &Extended<'_>, _: &Tuning) -> Result<FilterKind, TuningError> {
+        Ok(FilterKind::Extended)
+    }
+}
+
+impl Kalman for Ukf {
+    const NAME: &'static str = "ukf";
+    const PAPER: &'static str = "Julier and Uhlmann 1997, the unscented Kalman filter";
+    const WORDS: &'static str = "unscented Kalman filter";
+    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &BOUNDS, &POINTS];
+
+    fn kind(_: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+        let SigmaPoints { alpha, beta, kappa } = SigmaPoints::default();
+        let [own_alpha, own_beta, own_kappa] = &POINTS;
+        Ok(FilterKind::Unscented(SigmaPoints {
+            alpha: tuning.positive(own_alpha.name)?.unwrap_or(alpha),
+            beta: number(tuning, own_beta)?.unwrap_or(beta),
+            kappa: number(tuning, own_kappa)?.unwrap_or(kappa),
+        }))
+    }
+}
+
+impl Kalman for Mhe {
+    const NAME: &'static str = "mhe";
+    const PAPER: &'static str = "Rao, Rawlings and Mayne 2003, moving-horizon estimation";
+    const WORDS: &'static str = "moving-horizon estimator";
+    const KEYS: &'static [&'static [KeySpec]] = &[&KEYS, &WINDOW];
+
+    fn kind(extended: &Extended<'_>, tuning: &Tuning) -> Result<FilterKind, TuningError> {
+        let [horizon] = &WINDOW;
+        let length = match number(tuning, horizon)? {
+            None => HORIZON,
+            Some(x) if x >= 1.0 && x.fract() == 0.0 && x <= 1e4 => x as usize,
+            Some(x) => return Err(horizon.wrong(x)),
+        };
+        Ok(FilterKind::MovingHorizon(length, ranges(extended)))
+    }
+}
+
+/// The declared range of each state.
+fn ranges(extended: &Extended<'_>) -> Vec<Bounds> {
+    let bounds = extended.states.iter().map(|state| Bounds {
+        low: state.min,
+        high: state.max,
+    });
+    bounds.collect()
+}
+
+impl<K: Kalman> Stages for K {
+    type Settings = Settings;
+    type Form<'e, 'p: 'e> = ();
+    const NAME: &'static str = K::NAME;
+    const PAPER: &'static str = K::PAPER;
+    const BASIS: &'static str = "no theorem";
+    const FORM_BOX: FormBox = FormBox::Declared;
+    const IS_FILTER: bool = true;
+    const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
+
+    fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
+        Settings::read(extended, tuning, K::kind(extended, tuning)?)
+    }
+
+    fn form(extended: &Extended<'_>, _: &Settings, region: &Region) -> Searched<()> {
+        let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
+        let jumps = match regularity.standing() {
+            Standing::Refuted => format!(
+                "; {}: the filter linearises beside such places",
+                regularity.detail
+            ),
+            _ => String::new(),
+        };
+        let summary = format!(
+            "the {} runs on any plant; no theorem bounds its error{jumps}",
+            K::WORDS
+        );
+        let form = Form {
+            summary,
+            chains: vec![],
+        };
+        let examination = Examination::of_any_plant(K::NAME, form);
+        Ok(Ok(Found {
+            form: (),
+            examination,
+        }))
+    }
+
+    fn design(
+        extended: &Extended<'_>,
+        settings: &Settings,
+        found: Found<()>,
+    ) -> Result<Design, DesignError> {
+        let copy = PlantCopy::new(extended, &settings.common);
+        let derivatives = copy.at_estimate(&extended.derivatives);
+        let outputs: Vec<_> = extended.outputs.iter().map(|o| o.variable.node).collect();
+        let limits = copy.hats.iter().zip(&extended.states);
+        let limits =
+            limits.map(|(hat, state)| (hat.symbol, limited(extended.graph(), hat.symbol, state)));
+        let confined = extended.graph().substitute(&derivatives, &limits.collect());
+        let mut observer = copy.observer(K::NAME, derivatives)?;
+        let scale = Speed::new(&copy, NOISE_SCALE, 1.0, NOISE_MEANING.to_owned());
+        observer = observer.tuned_by([&scale]);
+        let variance = settings.variances(extended, &observer.states);
+        observer.filter = Some(FilterTuning {
+            kind: settings.kind.clone(),
+            gate: settings.gate,
+            bounds: settings.projects.then(|| ranges(extended)),
+            outputs: copy.at_estimate(&outputs),
+            confined,
+            initial_variance: variance.iter().map(|v| v.value).collect(),
+        });
+        let parameters = variance.iter().zip(&extended.states).map(|(v, state)| {
+            let from = if v.given { "" } else { " (from its range)" };
+            (
+                format!("initial variance of {}", state.name),
+                format!("{}{from}", v.value),
+            )
+        });
+        Ok(Design {
+            observer,
+            examination: found.examination,
+            gains: vec![],
+            parameters: parameters.collect(),
+            notes: vec![],
+        })
+    }
+
+    fn theorem(
+        _: &Extended<'_>,
+        _: &Settings,
+        _: Found<()>,
+        assumptions: &Assumptions,
+    ) -> Result<Certificate, DesignError> {
+        let check = undecided(Statement::FilterConverges, NO_THEOREM);
+        Ok(Certificate::new(Self::BASIS, assumptions, vec![check]))
+    }
+}
+
+const VARIANCE: KeySpec = KeySpec {
+    name: "initial_variance",
+    kind: "table: name = number ≥ 0, and `default`",
+    shape: Shape::Table(&Shape::NotNegative),
+    default: "the square of a quarter of the declared range (without a range: of the start value, or 1)",
+    meaning: "how uncertain the first estimate is: the variance of each state and unknown input; `default` holds for everything not listed",
+};
+
+const GATE: KeySpec = KeySpec {
+    name: "gate",
+    kind: "number > 0",
+    shape: Shape::Positive,
+    default: "none",
+    meaning: "a reading whose innovation exceeds so many of its standard deviations is rejected and counted; after ten in a row the next is believed",
+};
+
+/// Those of every filter.
+pub(super) const KEYS: [KeySpec; 2] = [VARIANCE, GATE];
+
+/// That of the filters that may go anywhere.
+pub(super) const BOUNDS: [KeySpec; 1] = [KeySpec {
+    name: "bounds",
+    kind: "\"project\"",
+    shape: Shape::Word(&["project"]),
+    default: "none",
+    meaning: "\"project\": the estimate is kept in the declared ranges `[min, max]`: after each prediction and correction it is put to the nearest place inside by the covariance's metric, so that what is correlated moves along; the covariance stays",
+}];
+
+/// Those of the unscented filter.
+pub(super) const POINTS: [KeySpec; 3] = [
+    KeySpec {
+        name: "alpha",
+        kind: "number > 0",
+        shape: Shape::Positive,
+        default: "1",
+        meaning: "α, the spread of the sigma points: λ = α²(n + κ) − n",
+    },
+    KeySpec {
+        name: "beta",
+        kind: "number",
+        shape: Shape::Number,
+        default: "0",
+        meaning: "β, what the first weight of the covariance gets on top",
+    },
+    KeySpec {
+        name: "kappa",
+        kind: "number",
+        shape: Shape::Number,
+        default: "0",
+        meaning: "κ, with n + κ above 0; the defaults make the cubature filter",
+    },
+];
+
+/// Samples in the window where the study does not say.
+pub(super) const HORIZON: usize = 10;
+
+/// That of the moving-horizon estimator.
+pub(super) const WINDOW: [KeySpec; 1] = [KeySpec {
+    name: "horizon",
+    kind: "whole number ≥ 1",
+    shape: Shape::Whole(1),
+    default: "10",
+    meaning: "samples over which the states are estimated anew at each sample, within `[min, max]`",
+}];
+
+/// The keys, read.
+pub(crate) struct Settings {
+    pub common: Common,
+    pub kind: FilterKind,
+    pub gate: Option<f64>,
+    /// the estimate is kept in the declared ranges
+    pub projects: bool,
+    /// as given, by extended state
+    variance: Vec<Option<f64>>,
+}
+
+/// A variance of the first estimate.
+pub(crate) struct Variance {
+    pub value: f64,
+    /// by the study
+    pub given: bool,
+}
+
+impl Settings {
+    pub fn read(
+        extended: &Extended<'_>,
+        tuning: &Tuning,
+        kind: FilterKind,
+    ) -> Result<Self, TuningError> {
+        Ok(Self {
+            common: Common::read(tuning)?,
+            kind,
+            gate: tuning.positive(GATE.name)?,
+            projects: tuning.choice(BOUNDS[0].name, &["project"])?.is_some(),
+            variance: variances(extended, tuning)?,
+        })
+    }
+
+    /// The variances given, and those that follow from the declared ranges.
+    pub fn variances(&self, extended: &Extended<'_>, starts: &[(Signal, f64)]) -> Vec<Variance> {
+        let states = extended.states.iter().zip(starts).zip(&self.variance);
+        states
+            .map(|((state, (_, start)), given)| Variance {
+                value: given.unwrap_or_else(|| prior_variance(state, *start)),
+                given: given.is_some(),
+            })
+            .collect()
+    }
+}
+
+/// The square of a quarter of the range: two standard deviations reach its ends. Without a range, that of
+/// the start value, or 1.
+pub fn prior_variance(state: &Variable, start: f64) -> f64 {
+    let width = state.max - state.min;
+    match width.is_finite() && width > 0.0 {
+        true => (width / 4.0).powi(2),
+        false => start.powi(2).max(1.0),
+    }
+}
+
+fn variances(extended: &Extended<'_>, tuning: &Tuning) -> Result<Vec<Option<f64>>, TuningError> {
+    let table = match tuning.values.get(VARIANCE.name) {
+        None => return Ok(vec![None; extended.states.len()]),
+        Some(Value::Table(table)) => table,
+        Some(other) => return Err(VARIANCE.wrong(other)),
+    };
+    let variance = |name: &str, value: &Value| match value {
+        Value::Number(x) if *x >= 0.0 && x.is_finite() => Ok(*x),
+        other => Err(VARIANCE.wrong(format!("{name} = {other}"))),
+    };
+    let default = table.get("default").map(|value| variance("default", value));
+    let mut found = vec![default.transpose()?; extended.states.len()];
+    for (name, value) in table.iter().filter(|(name, _)| *name != "default") {
+        let value = variance(name, value)?;
+        let mut meant = 0;
+        for (state, found) in extended.states.iter().zip(&mut found) {
+            if is_or_has(name, &state.name) {
+                *found = Some(value);
+                meant += 1;
+            }
+        }
+        if meant == 0 {
+            let names: Vec<&str> = extended.states.iter().map(|s| s.name.as_str()).collect();
+            let expected = format!("names of estimated quantities ({})", names.join(", "));
+            return Err(TuningError::new(
+                VARIANCE.name,
+                expected,
+                format!("\"{name}\""),
+            ));
+        }
+    }
+    Ok(found)
+}
+
+/// A number under a key.
+pub(super) fn number(tuning: &Tuning, key: &KeySpec) -> Result<Option<f64>, TuningError> {
+    match tuning.values.get(key.name) {
+        None => Ok(None),
+        Some(Value::Number(x)) => Ok(Some(*x)),
+        Some(other) => Err(key.wrong(other)),
+    }
+}
