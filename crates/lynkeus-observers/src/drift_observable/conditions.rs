@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use lynkeus_expr::Node;
 use lynkeus_structure::output_map::Rows;
 use lynkeus_structure::{Extended, Matrix, Region};
-use lynkeus_structure::{one_to_one, regular};
+use lynkeus_structure::{one_to_one, rank};
 
 use super::degrees::with_slopes;
 use super::derivative_name;
@@ -27,7 +27,7 @@ pub(super) fn regular(
     let Q = Matrix::from_fn(extended.graph(), (n, n), |i, j| {
         Q.get(i).and_then(|row| *row.get(j)?)
     });
-    Ok(Statement::from(statement).with(regular::regular(&Q, region)?))
+    Ok(Statement::from(statement).with(rank::regular(&Q, region)?))
 }
 
 /// Whether Φ, whose Jacobian was found `regular` or not, is one-to-one on the whole region.
