@@ -4,16 +4,13 @@ use lynkeus_expr::{Budget, Node};
 use lynkeus_model::Plant;
 
 use crate::branches::{Branches, Choices, Reference};
-use crate::expansion::Columns;
+use crate::expansion::{Affine, Columns, Start};
 use crate::field::Modular;
-use crate::hidden::{Hidden, beside, joined, steady_from};
+use crate::hidden::{Hidden, Twin, beside, joined, steady_from, symmetries};
 use crate::model::{Model, Refused, measured};
 use crate::search::Search;
 use crate::series::Stop;
-use crate::start::{Affine, Start};
-use crate::symmetry::{Twin, symmetries};
-use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict};
-use crate::{hull, lie, place};
+use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
@@ -33,7 +30,7 @@ const ORDERS: usize = 1000;
 pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionError> {
     let outputs = measured(plant, question)?;
     let choices = Choices::of(plant, &outputs);
-    let own = in_branch(plant, question, &View::default())?;
+    let own = in_branch(plant, question, None, &[])?;
     if choices.is_empty() {
         return Ok(own);
     }
@@ -41,15 +38,6 @@ pub fn analyse(plant: &Plant, question: &Question) -> Result<Answer, QuestionErr
         Some(branches) => combined(plant, question, own, &choices, &branches),
         None => Ok(own),
     }
-}
-
-/// Which branch is analysed, and what is measured beside the outputs.
-#[derive(Default)]
-pub(crate) struct View<'a> {
-    /// a point in it; the model's own values where there is none
-    pub reference: Option<&'a Reference>,
-    /// the guards of choices, or nothing
-    pub guards: &'a [Node],
 }
 
 /// The answers of all branches in one.
@@ -72,14 +60,13 @@ fn combined(
     let mut guarded = vec![];
     for (k, branch) in branches.found.iter().enumerate() {
         let reference = Some(&branch.reference).filter(|_| k > 0);
-        let view = |guards| View { reference, guards };
         let answer = match k {
             0 => own.clone(),
-            _ => in_branch(plant, question, &view(&[]))?,
+            _ => in_branch(plant, question, reference, &[])?,
         };
         // what is seen without the guards is seen with them
         guarded.push(match is_hidden(&answer) {
-            true => Some(in_branch(plant, question, &view(&choices.guards))?),
+            true => Some(in_branch(plant, question, reference, &choices.guards)?),
             false => None,
         });
         answers.push(answer);
@@ -168,8 +155,16 @@ fn named(plant: &Plant, choices: &Choices, reference: &Reference) -> Vec<(String
 }
 
 /// Decides what can be known in one branch.
-fn in_branch(plant: &Plant, question: &Question, view: &View<'_>) -> Result<Answer, QuestionError> {
-    let model = match Model::new(plant, question, view)? {
+///
+/// `reference` is a point in it, the model's own values where there is none; what `guards` choices is
+/// measured beside the outputs.
+fn in_branch(
+    plant: &Plant,
+    question: &Question,
+    reference: Option<&Reference>,
+    guards: &[Node],
+) -> Result<Answer, QuestionError> {
+    let model = match Model::new(plant, question, reference, guards)? {
         Ok(model) => model,
         Err(Refused { named, reason }) => return Ok(undecided(&named, question, &reason)),
     };
@@ -248,7 +243,7 @@ struct Analysis<'a> {
 
 impl<'a> Analysis<'a> {
     fn find(&self, start: Start) -> Result<Start, Stop> {
-        place::find(self.model, start, self.budget)
+        hull::find(self.model, start, self.budget)
     }
 
     fn search<'s>(&self, start: &'s Start, columns: Columns) -> Search<'s>

@@ -12,7 +12,6 @@ use lynkeus_expr::{Binary, Graph, Node, Op, Tape, Unary};
 use lynkeus_model::{Plant, Variable};
 
 use crate::field::Random;
-use crate::point;
 
 /// Points at which branches are looked for.
 const POINTS: usize = 256;
@@ -115,7 +114,7 @@ impl Choices {
     /// The branches at the model's own values and at points of the box; none where the choices have no value.
     pub fn branches(&self, plant: &Plant) -> Option<Branches> {
         let mut random = Random::new(SEED);
-        let own = point::reference(plant, &mut Random::new(1));
+        let own = reference(plant, &mut Random::new(1));
         let mut seen: Vec<(Vec<u64>, Branch)> = vec![];
         let symbols: Vec<Node> = own.keys().copied().collect();
         let mut evaluator = Tape::new(&plant.graph, &symbols, &self.marks)
@@ -167,13 +166,16 @@ fn spread(plant: &Plant, own: &Reference, random: &mut Random) -> Reference {
         .chain(&plant.inputs)
         .filter(|v| !v.fixed)
     {
-        point.insert(variable.node, inside(variable, own[&variable.node], random));
+        point.insert(
+            variable.node,
+            in_range(variable, own[&variable.node], random),
+        );
     }
     point
 }
 
 /// A value in the range; around the model's own where that has no end.
-fn inside(variable: &Variable, own: f64, random: &mut Random) -> f64 {
+fn in_range(variable: &Variable, own: f64, random: &mut Random) -> f64 {
     let reach = 2.0 * own.abs().max(1.0);
     let (low, high) = match (variable.min.is_finite(), variable.max.is_finite()) {
         (true, true) => (variable.min, variable.max),
@@ -187,4 +189,56 @@ fn inside(variable: &Variable, own: f64, random: &mut Random) -> f64 {
     } else {
         value
     }
+}
+
+/// How far beside zero a known start is looked at.
+const BESIDE: f64 = 1e-6;
+
+/// Values of every symbol: the model's own where it gives them, else inside the range.
+pub(crate) fn reference(plant: &Plant, random: &mut Random) -> HashMap<Node, f64> {
+    let mut values = HashMap::new();
+    for variable in plant.states.iter().chain(&plant.inputs) {
+        values.insert(variable.node, inside(variable, None, random));
+    }
+    for parameter in &plant.parameters {
+        values.insert(
+            parameter.variable.node,
+            inside(&parameter.variable, parameter.value, random),
+        );
+    }
+    values.insert(plant.time, 0.1 + random.unit());
+    values
+}
+
+fn inside(variable: &Variable, value: Option<f64>, random: &mut Random) -> f64 {
+    // a known start at zero is no point of its own: beside it, so that thresholds are told apart
+    let start = match variable.fixed && variable.start.unwrap_or(0.0) == 0.0 {
+        true => Some(BESIDE),
+        false => variable.start.filter(|x| *x != 0.0),
+    };
+    let given = value.or(start);
+    if let Some(given) = given {
+        return given;
+    }
+    let low = if variable.min.is_finite() {
+        variable.min
+    } else {
+        0.0
+    };
+    let high = if variable.max.is_finite() {
+        variable.max.max(low)
+    } else {
+        low + 2.0
+    };
+    low + (0.1 + 0.8 * random.unit()) * (high - low)
+}
+
+/// The value of a node there, where it is finite.
+pub(crate) fn value(graph: &Graph, node: Node, values: &HashMap<Node, f64>) -> Option<f64> {
+    let symbols = graph.symbols_of(&[node]);
+    let inputs: Option<Vec<f64>> = symbols.iter().map(|s| values.get(s).copied()).collect();
+    let tape = Tape::new(graph, &symbols, &[node]).ok()?;
+    let mut out = [0.0];
+    tape.evaluator().eval(&inputs?, &mut out);
+    out[0].is_finite().then_some(out[0])
 }

@@ -31,7 +31,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod analysis;
-mod answer;
 mod branches;
 mod echelon;
 mod expansion;
@@ -40,16 +39,10 @@ mod hidden;
 mod hull;
 mod lie;
 mod model;
-mod place;
-mod point;
 pub mod precision;
 mod question;
 mod search;
 mod series;
-mod start;
-mod succession;
-mod symmetry;
 
 pub use analysis::analyse;
-pub use answer::{Answer, Asked, Partial, Quantity, Symmetry, Verdict};
-pub use question::{Question, QuestionError};
+pub use question::{Answer, Asked, Partial, Quantity, Question, QuestionError, Symmetry, Verdict};

@@ -9,13 +9,11 @@
 use lynkeus_expr::Budget;
 
 use crate::echelon::Echelon;
-use crate::expansion::{Columns, Expansion};
+use crate::expansion::{Affine, Columns, Expansion, Start};
 use crate::field::Modular;
 use crate::hull;
 use crate::model::{Model, Role};
-use crate::place;
 use crate::series::Stop;
-use crate::start::{Affine, Start};
 
 /// Seed of the points.
 const FIRST: u64 = 70_001;
@@ -63,7 +61,7 @@ pub(crate) fn directions(setting: &Setting<'_>, start: &Start) -> Result<Vec<Vec
         seed += 1;
         let anywhere = Start::new(setting.model, seed).at_zero(setting.at_zero);
         let anywhere = anywhere.within(setting.model, setting.set);
-        let found = place::find(setting.model, anywhere, setting.budget);
+        let found = hull::find(setting.model, anywhere, setting.budget);
         let place = match found.and_then(|start| setting.visit(&start)) {
             Ok(place) => place,
             Err(Stop::Point(_)) => return Ok(vec![]),

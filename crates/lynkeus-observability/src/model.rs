@@ -3,10 +3,10 @@
 use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 
-use crate::analysis::View;
+use crate::branches::Reference;
 use crate::field::{Modular, Random};
 use crate::series::{Program, Unsupported};
-use crate::{Quantity, Question, QuestionError, point};
+use crate::{Quantity, Question, QuestionError, branches};
 
 /// What role a symbol plays in the series.
 #[derive(Clone, Copy, Debug)]
@@ -72,11 +72,12 @@ impl Model {
     pub fn new(
         plant: &Plant,
         question: &Question,
-        view: &View<'_>,
+        reference: Option<&Reference>,
+        guards: &[Node],
     ) -> Result<Result<Self, Refused>, QuestionError> {
         let about = expressions(plant, question)?;
         let mut outputs = measured(plant, question)?;
-        outputs.extend(view.guards);
+        outputs.extend(guards);
         for name in question.unknown.iter().chain(&question.disturbances) {
             find("input", &plant.inputs, name)?;
         }
@@ -92,12 +93,12 @@ impl Model {
         roots.extend(&outputs);
         roots.extend(&about);
         let nodes: Vec<Node> = symbols.iter().map(|s| s.node).collect();
-        let own = || point::reference(plant, &mut Random::new(1));
-        let reference = view.reference.cloned().unwrap_or_else(own);
+        let own = || branches::reference(plant, &mut Random::new(1));
+        let reference = reference.cloned().unwrap_or_else(own);
         for symbol in &mut symbols {
             symbol.negative = reference.get(&symbol.node).is_some_and(|x| *x < 0.0);
         }
-        let branch = |node: Node| point::value(&plant.graph, node, &reference);
+        let branch = |node: Node| branches::value(&plant.graph, node, &reference);
         let compiled = |roots: &[Node]| Program::new(&plant.graph, &nodes, roots, &branch);
         let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
         let (program, starts) = match programs {

@@ -1,4 +1,4 @@
-//! What is asked.
+//! What is asked, and the answer.
 
 use lynkeus_expr::Budget;
 
@@ -43,4 +43,108 @@ pub enum QuestionError {
     /// an expression that cannot be read
     #[error("{0}")]
     Expression(String),
+}
+
+/// Whether a quantity can be known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// locally: near a generic point no other value gives the same outputs
+    Observable,
+    /// other values give the same outputs
+    Unobservable,
+    /// a limit struck, or the model has no series here
+    Undecided,
+}
+
+impl Verdict {
+    /// One word: `observable`, `unobservable` or `undecided`.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Observable => "observable",
+            Verdict::Unobservable => "unobservable",
+            Verdict::Undecided => "undecided",
+        }
+    }
+}
+
+/// What a quantity is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// the state at the start
+    State,
+    /// a constant of the model
+    Parameter,
+    /// an input that nobody measures, at the start
+    UnknownInput,
+}
+
+/// Quantities that can change together without a trace in the outputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Symmetry {
+    /// names of the quantities that it moves
+    pub moves: Vec<String>,
+    /// in how many independent ways they can change
+    pub directions: usize,
+    /// in words: what it does, and which combinations it leaves alone
+    pub words: String,
+    /// combinations that are known nevertheless, as Modelica expressions
+    pub invariants: Vec<String>,
+}
+
+/// A quantity that the outputs tell in some branches of the model only.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Partial {
+    /// its name
+    pub name: String,
+    /// the share of the box in branches where they do not, estimated at points spread over it
+    pub share: f64,
+    /// one of these points: what the choices read, by name
+    pub at: Vec<(String, f64)>,
+}
+
+/// A quantity or an expression that was asked about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// its name, or the expression as written
+    pub name: String,
+    /// the verdict
+    pub verdict: Verdict,
+}
+
+/// What can be known.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// every quantity with what it is and the verdict
+    pub quantities: Vec<(Asked, Quantity)>,
+    /// the expressions asked about
+    pub about: Vec<Asked>,
+    /// what is observable in some of the model's branches only
+    pub partial: Vec<Partial>,
+    /// what hides the unobservable quantities
+    pub symmetries: Vec<Symmetry>,
+    /// derivatives of the outputs that were used
+    pub order: usize,
+    /// rank of the sensitivities, of as many as there are unknowns
+    pub rank: usize,
+    /// number of unknowns, derivatives of unknown inputs included
+    pub unknowns: usize,
+    /// how it was decided, and what limits it
+    pub notes: Vec<String>,
+}
+
+impl Answer {
+    /// The verdict on a quantity.
+    pub fn verdict(&self, name: &str) -> Option<Verdict> {
+        let mut quantities = self.quantities.iter();
+        quantities
+            .find(|(q, _)| q.name == name)
+            .map(|(q, _)| q.verdict)
+    }
+
+    /// Whether every quantity is observable.
+    pub fn is_complete(&self) -> bool {
+        self.quantities
+            .iter()
+            .all(|(q, _)| q.verdict == Verdict::Observable)
+    }
 }

@@ -1,14 +1,14 @@
 //! The rank of the outputs' coefficients at one start, order by order.
 
+use std::collections::{BTreeSet, VecDeque};
+
 use lynkeus_expr::Budget;
 
 use crate::echelon::Echelon;
-use crate::expansion::{Columns, Expansion};
+use crate::expansion::{Columns, Expansion, Start};
 use crate::field::Modular;
-use crate::model::Model;
+use crate::model::{Model, Role};
 use crate::series::Stop;
-use crate::start::Start;
-use crate::succession::{Succession, succession};
 
 /// Products of coefficients, with a sensitivity each, that cost little.
 const WORK: usize = 100_000_000;
@@ -188,6 +188,110 @@ impl<'a> Search<'a> {
     }
 }
 
+/// What follows, and from how much.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Succession {
+    /// places of the symbols, in the order in which they are found
+    pub places: Vec<usize>,
+    /// derivatives of the outputs that they are found from
+    pub order: usize,
+}
+
+/// What follows at a start, where `gradient` has the sensitivities of a root's first
+/// coefficient.
+pub(crate) fn succession(model: &Model, gradient: &dyn Fn(usize) -> Vec<Modular>) -> Succession {
+    let mut followed = Followed::new(model);
+    for output in model.states..model.states + model.outputs {
+        followed.know(output, 0);
+    }
+    while let Some(root) = followed.ready.pop_front() {
+        let Some(place) = followed.missing[root].first().copied() else {
+            continue;
+        };
+        let column = model.symbols[place].column;
+        let gives = |column: usize| gradient(root).get(column).is_some_and(|x| !x.is_zero());
+        if column.is_some_and(gives) {
+            followed.find(place, root);
+        }
+    }
+    followed.found
+}
+
+struct Followed<'a> {
+    model: &'a Model,
+    /// of each root the places of symbols that are not known so far
+    missing: Vec<BTreeSet<usize>>,
+    /// of each place the roots that depend on it
+    readers: Vec<Vec<usize>>,
+    /// known roots, by how many derivatives of the outputs
+    known: Vec<Option<usize>>,
+    /// known roots that miss one symbol
+    ready: VecDeque<usize>,
+    found: Succession,
+}
+
+impl<'a> Followed<'a> {
+    fn new(model: &'a Model) -> Self {
+        let is_unknown = |place: &usize| {
+            let symbol = &model.symbols[*place];
+            // a given start says nothing of later values
+            symbol.column.is_some() || matches!(symbol.role, Role::State(_))
+        };
+        let roots = model.states + model.outputs;
+        let missing: Vec<BTreeSet<usize>> = (0..roots)
+            .map(|root| {
+                model
+                    .program
+                    .inputs(root)
+                    .into_iter()
+                    .filter(is_unknown)
+                    .collect()
+            })
+            .collect();
+        let mut readers = vec![vec![]; model.symbols.len()];
+        for (root, places) in missing.iter().enumerate() {
+            places.iter().for_each(|&place| readers[place].push(root));
+        }
+        Self {
+            known: vec![None; roots],
+            ready: VecDeque::new(),
+            found: Succession::default(),
+            missing,
+            readers,
+            model,
+        }
+    }
+
+    /// A root is known from so many derivatives of the outputs.
+    fn know(&mut self, root: usize, order: usize) {
+        self.known[root] = Some(order);
+        self.look(root);
+    }
+
+    fn look(&mut self, root: usize) {
+        if self.known[root].is_some() && self.missing[root].len() == 1 {
+            self.ready.push_back(root);
+        }
+    }
+
+    /// A symbol is known from a root.
+    fn find(&mut self, place: usize, root: usize) {
+        self.found.places.push(place);
+        let order = self.known[root].unwrap_or_default();
+        self.found.order = self.found.order.max(order);
+        for reader in std::mem::take(&mut self.readers[place]) {
+            self.missing[reader].remove(&place);
+            // what it is found from next is known no earlier than this
+            self.known[reader] = self.known[reader].map(|known| known.max(order));
+            self.look(reader);
+        }
+        if let Role::State(state) = self.model.symbols[place].role {
+            let latest = self.known[state].unwrap_or_default();
+            self.know(state, latest.max(order + 1));
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use lynkeus_model::{LoadOptions, Plant};
@@ -203,12 +307,12 @@ mod tests {
             ..LoadOptions::default()
         };
         let plant = Plant::from_modelica(text, "p.mo", &options).unwrap();
-        let model = Model::new(&plant, question, &crate::analysis::View::default())
+        let model = Model::new(&plant, question, None, &[])
             .unwrap()
             .ok()
             .unwrap();
         let budget = Budget::default();
-        let start = crate::place::find(&model, Start::new(&model, 1), &budget).unwrap();
+        let start = crate::hull::find(&model, Start::new(&model, 1), &budget).unwrap();
         let columns = Columns::new(&model, model.depth);
         let mut search = Search::new(&model, &start, columns, &budget);
         search.advance().unwrap();
@@ -231,7 +335,7 @@ mod tests {
     #[test]
     fn chains_follow_state_by_state() {
         let text = "model P Real a; Real b; Real c; output Real y = a^3;
-          equation der(a) = a*sin(b); der(b) = exp(c) + a; der(c) = -b*c; end P;";
+      equation der(a) = a*sin(b); der(b) = exp(c) + a; der(c) = -b*c; end P;";
         let found = followed(text, &Question::default());
         assert_eq!(found, (names(&["a", "b", "c"]), 2));
     }
@@ -239,7 +343,7 @@ mod tests {
     #[test]
     fn unknown_inputs_and_parameters_follow_too() {
         let text = "model P parameter Real k = 2; input Real u; Real a; Real b; output Real y = a; output Real z = b;
-          equation der(a) = -k*a; der(b) = a*u - b; end P;";
+      equation der(a) = -k*a; der(b) = a*u - b; end P;";
         let question = Question {
             unknown: names(&["u"]),
             parameters: true,
@@ -253,7 +357,7 @@ mod tests {
     #[test]
     fn two_unknowns_in_one_equation_do_not_follow() {
         let text = "model P Real a; Real b; Real c; Real d; output Real y = a;
-          equation der(a) = b + c; der(b) = -b; der(c) = -2*c; der(d) = a; end P;";
+      equation der(a) = b + c; der(b) = -b; der(c) = -2*c; der(d) = a; end P;";
         assert_eq!(followed(text, &Question::default()).0, names(&["a"]));
     }
 
@@ -261,7 +365,7 @@ mod tests {
     #[test]
     fn a_given_start_is_not_a_known_course() {
         let text = "model P Real a; Real b(start = 1, fixed = true); Real c; output Real y = a;
-          equation der(a) = b*c; der(b) = -c*b; der(c) = -c; end P;";
+      equation der(a) = b*c; der(b) = -c*b; der(c) = -c; end P;";
         assert_eq!(followed(text, &Question::default()).0, names(&["a"]));
     }
 }

@@ -3,9 +3,6 @@
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
-use super::information::Information;
-use super::orthogonal::{Singular, singular};
-
 /// An error as large as a range counts as forgotten once less than this share of a range is left.
 const FORGOTTEN: f64 = 1e-6;
 
@@ -196,5 +193,174 @@ fn decide(values: &[f64], accuracy: f64) -> Rank {
         weakest_seen: seen().fold(f64::INFINITY, f64::min),
         strongest_unseen: unseen.fold(0.0, f64::max),
         threshold,
+    }
+}
+
+/// Rows wait until there are this many times the columns, then they are worked in together.
+const BLOCK: usize = 2;
+
+/// A triangle R with RᵀR = Σ rowᵀ·row, gathered by orthogonal transformations.
+#[derive(Clone, Debug)]
+pub(super) struct Information {
+    columns: usize,
+    triangle: DMatrix<f64>,
+    /// rows not yet worked in, one after the other
+    pending: Vec<f64>,
+    /// per column Σ over the rows of the square of what its terms would be without cancelling
+    gross: Vec<f64>,
+}
+
+impl Information {
+    pub fn new(columns: usize) -> Self {
+        Self {
+            columns,
+            triangle: DMatrix::zeros(0, columns),
+            pending: vec![],
+            gross: vec![0.0; columns],
+        }
+    }
+
+    /// The information of several independent sources.
+    pub fn joined<'a>(columns: usize, parts: impl Iterator<Item = &'a Self>) -> Self {
+        let mut joined = Self::new(columns);
+        for part in parts {
+            for row in part.triangle.row_iter() {
+                joined.pending.extend(row.iter());
+            }
+            joined.pending.extend(&part.pending);
+            for (sum, term) in joined.gross.iter_mut().zip(&part.gross) {
+                *sum += term;
+            }
+        }
+        joined.settle();
+        joined
+    }
+
+    /// Adds a row; `gross` are its entries with every term taken as positive.
+    pub fn push(&mut self, row: impl Iterator<Item = f64>, gross: impl Iterator<Item = f64>) {
+        self.pending.extend(row);
+        for (sum, entry) in self.gross.iter_mut().zip(gross) {
+            *sum += entry * entry;
+        }
+        if self.pending.len() >= BLOCK * self.columns * self.columns.max(1) {
+            self.settle();
+        }
+    }
+
+    /// Works all rows into the triangle.
+    pub fn settle(&mut self) {
+        if self.pending.is_empty() || self.columns == 0 {
+            return;
+        }
+        let old = self.triangle.nrows();
+        let rows = old + self.pending.len() / self.columns;
+        let stacked = DMatrix::from_fn(rows, self.columns, |i, j| match i.checked_sub(old) {
+            None => self.triangle[(i, j)],
+            Some(i) => self.pending[i * self.columns + j],
+        });
+        self.triangle = stacked.qr().r();
+        self.pending.clear();
+    }
+
+    /// R, once everything is [settled](Self::settle).
+    pub fn triangle(&self) -> &DMatrix<f64> {
+        &self.triangle
+    }
+
+    /// Norms of the columns, had nothing cancelled within a row.
+    pub fn gross(&self) -> impl Iterator<Item = f64> + '_ {
+        self.gross.iter().map(|sum| sum.sqrt())
+    }
+}
+
+/// Sweeps over all pairs of columns; a handful suffices.
+const SWEEPS: usize = 60;
+
+/// Columns count as orthogonal below this cosine.
+const COSINE: f64 = 4.0 * f64::EPSILON;
+
+/// A·V has orthogonal columns whose norms are the singular values.
+pub(super) struct Singular {
+    /// not sorted
+    pub values: Vec<f64>,
+    /// the directions V, one per column
+    pub directions: DMatrix<f64>,
+}
+
+/// The singular values and right singular vectors of `a`; none where the budget is spent.
+pub(super) fn singular(mut a: DMatrix<f64>, budget: &Budget) -> Option<Singular> {
+    let columns = a.ncols();
+    let mut v = DMatrix::identity(columns, columns);
+    for _ in 0..SWEEPS {
+        let mut is_done = true;
+        for p in 0..columns {
+            if budget.spent().is_some() {
+                return None;
+            }
+            for q in p + 1..columns {
+                if let Some((c, s)) = rotation(&a, p, q) {
+                    is_done = false;
+                    rotate(&mut a, p, q, c, s);
+                    rotate(&mut v, p, q, c, s);
+                }
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    Some(Singular {
+        values: a.column_iter().map(|column| column.norm()).collect(),
+        directions: v,
+    })
+}
+
+/// Cosine and sine that make two columns orthogonal; none where they are.
+fn rotation(a: &DMatrix<f64>, p: usize, q: usize) -> Option<(f64, f64)> {
+    let (alpha, beta) = (a.column(p).norm_squared(), a.column(q).norm_squared());
+    let gamma = a.column(p).dot(&a.column(q));
+    if gamma.abs() <= COSINE * (alpha * beta).sqrt() {
+        return None;
+    }
+    let zeta = (beta - alpha) / (2.0 * gamma);
+    let tangent = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+    let cosine = 1.0 / tangent.hypot(1.0);
+    (tangent != 0.0 && tangent.is_finite()).then_some((cosine, cosine * tangent))
+}
+
+fn rotate(a: &mut DMatrix<f64>, p: usize, q: usize, c: f64, s: f64) {
+    for i in 0..a.nrows() {
+        let (x, y) = (a[(i, p)], a[(i, q)]);
+        a[(i, p)] = c * x - s * y;
+        a[(i, q)] = s * x + c * y;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_singular_values_keep_their_digits() {
+        // columns nearly parallel: singular values √2 and ε/√2
+        let epsilon = 1e-9;
+        let a = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 0.0, epsilon]);
+        let mut found = singular(a, &Budget::default()).unwrap().values;
+        found.sort_by(f64::total_cmp);
+        assert!(
+            (found[0] / (epsilon / 2.0_f64.sqrt()) - 1.0).abs() < 1e-6,
+            "{found:?}"
+        );
+        assert!((found[1] - 2.0_f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn fewer_rows_than_columns_leave_zeros() {
+        let a = DMatrix::from_row_slice(1, 3, &[3.0, 0.0, 4.0]);
+        let found = singular(a.clone(), &Budget::default());
+        let Singular { values, directions } = found.unwrap();
+        assert!((values.iter().copied().fold(0.0, f64::max) - 5.0).abs() < 1e-12);
+        assert_eq!(values.iter().filter(|s| **s < 1e-12).count(), 2);
+        assert!((&directions * directions.transpose() - DMatrix::identity(3, 3)).norm() < 1e-12);
     }
 }

@@ -9,7 +9,7 @@
 use lynkeus_expr::Budget;
 use nalgebra::DMatrix;
 
-use super::orthogonal::{Singular, singular};
+use super::deviations::{Singular, singular};
 
 /// What is seen must stand out from errors by this factor.
 const MARGIN: f64 = 10.0;

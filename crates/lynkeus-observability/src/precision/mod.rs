@@ -42,8 +42,6 @@
 
 mod deviations;
 mod forward;
-mod information;
-mod orthogonal;
 mod sets;
 mod tangent;
 
@@ -54,9 +52,9 @@ use lynkeus_run::{Error, Method};
 pub use deviations::{Deviations, Rank};
 pub use sets::{Advice, SensorSet};
 
+use deviations::Information;
 use deviations::Judged;
 use forward::Forward;
-use information::Information;
 use nalgebra::DMatrix;
 
 /// Most cells (8 bytes each) of the information that is kept.

@@ -7,8 +7,8 @@ use lynkeus_expr::{Budget, Node, jacobian};
 use lynkeus_run::{Error, Method, System};
 use nalgebra::DMatrix;
 
+use super::deviations::Information;
 use super::forward::{Forward, WIDE};
-use super::information::Information;
 use super::{Checkpoint, Experiment, Precision};
 use batch::{Batch, Piece};
 

@@ -9,7 +9,6 @@
 
 mod functions;
 mod program;
-mod rows;
 mod run;
 
 pub(crate) use functions::Functions;

@@ -422,7 +422,7 @@ pub(super) fn regular(
     let Q = Matrix::from_fn(extended.graph(), (n, n), |i, j| {
         Q.get(i).and_then(|row| *row.get(j)?)
     });
-    Ok(Statement::from(statement).with(lynkeus_structure::regular::regular(&Q, region)?))
+    Ok(Statement::from(statement).with(lynkeus_structure::rank::regular(&Q, region)?))
 }
 
 /// Whether Φ, whose Jacobian was found `regular` or not, is one-to-one on the whole region.
