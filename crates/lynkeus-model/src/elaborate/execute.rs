@@ -1,6 +1,6 @@
 //! Statements, carried out on expressions: what is left are the values of the variables.
 
-use super::evaluate::Claim;
+use crate::Assertion;
 use lynkeus_expr::{Binary, Unary};
 
 use super::evaluate::{Branches, Evaluator, joined};
@@ -96,12 +96,13 @@ impl<'a> Evaluator<'a> {
             }
             Some(value) if value != 0.0 => Ok(()),
             _ => {
-                self.claims.push(Claim {
+                let claim = Assertion {
                     condition,
                     message: assert.message.clone(),
+                    line: span.line(self.source),
                     is_warning: assert.is_warning,
-                    span,
-                });
+                };
+                self.claims.push((claim, span));
                 Ok(())
             }
         }

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::Node;
 
-use super::parser::{Equation, Mention, Model as Syntax, is_elementary};
+use super::lexer::Mention;
+use super::parser::{Equation, Model as Syntax, is_elementary};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::elaborate::{Evaluator, GivenNames, Mode};
 use crate::limits::{Budget, MAX_SCALARS, elaboration};
