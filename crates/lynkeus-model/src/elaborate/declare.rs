@@ -10,7 +10,7 @@ use super::value::{Array, Scalar, describe_dims, element_count, element_name};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{FlatModel, constant_label};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
-use crate::names::did_you_mean;
+use crate::names::{did_you_mean, listed};
 use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::plain;
 
@@ -714,18 +714,13 @@ fn unknown(model: &FlatModel, name: &str) -> Problem {
         .map(|declaration| declaration.label.as_str())
         .collect();
     let model_name = &model.title;
-    let hint = did_you_mean(name, names.iter().copied()).or_else(|| {
-        let listed: Vec<&str> = names.iter().copied().take(12).collect();
-        let more = if names.len() > 12 { ", …" } else { "" };
-        let some = format!("its parameters are {}{more}", listed.join(", "));
-        Some(if names.is_empty() {
-            "it has no parameters".to_owned()
-        } else {
-            some
-        })
-    });
+    let hint =
+        did_you_mean(name, names.iter().copied()).unwrap_or_else(|| match names.is_empty() {
+            true => "it has no parameters".to_owned(),
+            false => listed("parameters", &names),
+        });
     let message = format!("model `{model_name}` has no parameter `{name}`");
-    Problem::new(model.name, message).maybe_hint(hint)
+    Problem::new(model.name, message).hint(hint)
 }
 
 /// `H[3]` as `H` and 3.

@@ -11,7 +11,7 @@ use super::value::{Outcome, Record, Scalar, Value, describe_dims, element_name};
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{
-    Declaration, Equation, EquationKind, ExprId, Iterator as Loop, Kind, Statement, Variability,
+    Declaration, Equation, EquationKind, ExprId, ForIndex, Kind, Statement, Variability,
 };
 use crate::syntax::plain;
 
@@ -201,7 +201,7 @@ impl<'a> Flattener<'a> {
         Ok(())
     }
 
-    fn repeat(&mut self, iterators: &'a [Loop], body: &'a [Equation]) -> Result<()> {
+    fn repeat(&mut self, iterators: &'a [ForIndex], body: &'a [Equation]) -> Result<()> {
         let Some((first, rest)) = iterators.split_first() else {
             return self.all(body);
         };

@@ -7,7 +7,7 @@ use crate::syntax::ast::{Ast, BinaryOperator, Call, ExprId, Kind, UnaryOperator}
 use crate::syntax::{Parser, Symbol, Token, shortened};
 
 /// A parsed model.
-pub(super) struct Model {
+pub(super) struct ParsedModel {
     /// the word `@ODEmodel`
     pub head: Span,
     pub equations: Vec<Equation>,
@@ -24,11 +24,11 @@ pub(super) struct Equation {
 }
 
 /// Parses the model that begins with the word at `head`.
-pub(super) fn parse(source: &str, head: Span) -> Result<Model> {
+pub(super) fn parse(source: &str, head: Span) -> Result<ParsedModel> {
     let mut parser = Parser::behind(head, source, Lexer::new(source, head));
     parser.opening()?;
     let equations = parser.equations(head)?;
-    Ok(Model {
+    Ok(ParsedModel {
         head,
         equations,
         mentions: parser.lexer.mentions,

@@ -1,6 +1,6 @@
 //! What stands in the sections `equation` and `algorithm`.
 
-use super::ast::{Assert, Equation, EquationKind, ExprId, Iterator, Statement, StatementKind};
+use super::ast::{Assert, Equation, EquationKind, ExprId, ForIndex, Statement, StatementKind};
 use super::classes::HOW_TO_FLATTEN;
 use super::lexer::{Keyword, Symbol, Token};
 use super::parser::Parser;
@@ -151,7 +151,7 @@ impl Parser<'_> {
     }
 
     /// The iterators and the body of a loop, behind `for`.
-    fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<Iterator>, Vec<T>)> {
+    fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<ForIndex>, Vec<T>)> {
         self.advance()?;
         let iterators = self.iterators()?;
         self.expect_word(Keyword::Loop)?;
@@ -181,8 +181,8 @@ impl Parser<'_> {
     }
 
     /// `i in 1:N, j in 1:M`
-    pub(super) fn iterators(&mut self) -> Result<Vec<Iterator>> {
-        let mut iterators: Vec<Iterator> = vec![];
+    pub(super) fn iterators(&mut self) -> Result<Vec<ForIndex>> {
+        let mut iterators: Vec<ForIndex> = vec![];
         loop {
             let name = self.identifier("the name of an iterator")?;
             if iterators.len() >= MAX_ITERATORS {
@@ -198,14 +198,14 @@ impl Parser<'_> {
             }
             self.advance()?;
             let range = self.expression()?;
-            iterators.push(Iterator { name, range });
+            iterators.push(ForIndex { name, range });
             if !self.accept(Symbol::Comma)? {
                 return Ok(iterators);
             }
         }
     }
 
-    fn refuse_repeated(&self, iterators: &[Iterator], name: Span) -> Result<()> {
+    fn refuse_repeated(&self, iterators: &[ForIndex], name: Span) -> Result<()> {
         let text = name.text(self.source);
         if iterators
             .iter()
