@@ -150,8 +150,7 @@ impl Diagnostic {
         let line_end = source[start..]
             .find('\n')
             .map_or(source.len(), |i| start + i);
-        let before = &source.as_bytes()[..line_start];
-        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        let line = problem.span.line(source);
         let column = 1 + source[line_start..start].chars().count();
         Self {
             file: file.to_owned(),

@@ -122,29 +122,17 @@ impl Plant {
         file_name: &str,
         options: &LoadOptions,
     ) -> Result<Self, Diagnostic> {
-        match Language::of(file_name) {
-            Language::Modelica => Self::from_modelica(source, file_name, options),
-            Language::OdeModel => Self::from_ode_model(source, file_name, options),
+        match is_ode_model(file_name) {
+            false => Self::from_modelica(source, file_name, options),
+            true => Self::from_ode_model(source, file_name, options),
         }
     }
 }
 
-/// A language of models.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Language {
-    Modelica,
-    OdeModel,
-}
-
-impl Language {
-    /// The language of a file.
-    pub(crate) fn of(file_name: &str) -> Self {
-        let extension = Path::new(file_name).extension();
-        match extension.is_some_and(|end| end.eq_ignore_ascii_case("jl")) {
-            true => Self::OdeModel,
-            false => Self::Modelica,
-        }
-    }
+/// Whether a file holds the notation of `@ODEmodel`: its name ends in `.jl`.
+fn is_ode_model(file_name: &str) -> bool {
+    let extension = Path::new(file_name).extension();
+    extension.is_some_and(|end| end.eq_ignore_ascii_case("jl"))
 }
 
 /// The names of the models of a text, in its order. The text is taken as an `@ODEmodel` text
@@ -159,9 +147,9 @@ impl Language {
 /// # Ok::<(), lynkeus_model::Diagnostic>(())
 /// ```
 pub fn model_names(source: &str, file_name: &str) -> Result<Vec<String>, Diagnostic> {
-    let names = match Language::of(file_name) {
-        Language::Modelica => elaborate::names(source),
-        Language::OdeModel => ode_model::names(source, file_name),
+    let names = match is_ode_model(file_name) {
+        false => elaborate::names(source),
+        true => ode_model::names(source, file_name),
     };
     names.map_err(|problem| Diagnostic::new(problem, file_name, source))
 }

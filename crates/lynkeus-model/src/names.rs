@@ -51,6 +51,7 @@ pub(crate) fn choose(
     wanted: Option<&str>,
     none: impl FnOnce() -> Problem,
 ) -> Result<usize> {
+    let names: Vec<&str> = models.iter().map(|(name, _)| *name).collect();
     let Some(wanted) = wanted else {
         return match models {
             [_] => Ok(0),
@@ -58,24 +59,24 @@ pub(crate) fn choose(
             [_, (_, second), ..] => {
                 let count = models.len();
                 let message = format!("the text holds {count} models; say which one to take");
-                Err(Problem::new(*second, message).hint(listed(models)))
+                Err(Problem::new(*second, message).hint(listed("models", &names)))
             }
         };
     };
     let found = models.iter().position(|(name, _)| *name == wanted);
     found.ok_or_else(|| {
         let place = models.first().map(|(_, span)| *span).unwrap_or_default();
-        let names = models.iter().map(|(name, _)| *name);
-        let hint = did_you_mean(wanted, names).unwrap_or_else(|| listed(models));
+        let known = names.iter().copied();
+        let hint = did_you_mean(wanted, known).unwrap_or_else(|| listed("models", &names));
         Problem::new(place, format!("the text holds no model `{wanted}`")).hint(hint)
     })
 }
 
-fn listed(models: &[(&str, Span)]) -> String {
-    let names = models.iter().map(|(name, _)| *name);
-    let shown: Vec<&str> = names.take(LISTED).collect();
-    let more = if models.len() > LISTED { ", …" } else { "" };
-    format!("its models are {}{more}", shown.join(", "))
+/// ``its models are a, b, …``
+pub(crate) fn listed(what: &str, names: &[&str]) -> String {
+    let shown = &names[..names.len().min(LISTED)];
+    let more = if names.len() > LISTED { ", …" } else { "" };
+    format!("its {what} are {}{more}", shown.join(", "))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use lynkeus_expr::{Binary, Implicit, ImplicitUnknown, Node, Unary};
 
-use super::linear::{Core, Given, Linear, Row, Rows, core};
+use super::linear::{Core, Given, Linear, Row, core};
 use super::loops::{Torn, check_regular};
 use super::matching::Matching;
 use super::system::{FlatEquation, Incidence, System, Unknown, arguments, lines, listed};
@@ -156,16 +156,11 @@ impl<'a> Solver<'a> {
     fn rows(&self, pairs: &[(&FlatEquation, &Unknown)]) -> Result<Option<Vec<Row>>> {
         let graph = self.system.graph;
         let symbols = pairs.iter().map(|(_, unknown)| unknown.symbol);
-        let rows = Rows {
-            linear: self.linear(),
-            place: symbols
-                .enumerate()
-                .map(|(place, symbol)| (symbol, place))
-                .collect(),
-        };
+        let places = symbols.enumerate().map(|(place, symbol)| (symbol, place));
+        let (linear, places) = (self.linear(), places.collect());
         let row = |(equation, _): &(&FlatEquation, &Unknown)| {
             let residual = graph.binary(Binary::Sub, equation.left, equation.right);
-            rows.row(residual, equation.span)
+            linear.row(residual, &places, equation.span)
         };
         pairs.iter().map(row).collect()
     }

@@ -184,23 +184,23 @@ impl Row {
     }
 }
 
-/// Takes residuals apart.
-pub(super) struct Rows<'a> {
-    pub linear: Linear<'a>,
-    /// places of the unknowns of the block
-    pub place: HashMap<Node, usize>,
-}
-
-impl Rows<'_> {
+impl Linear<'_> {
     /// The row of a residual, in one walk from the root to the unknowns: every node passes its
     /// factor on. None where it is not linear.
-    pub(super) fn row(&self, residual: Node, span: Span) -> Result<Option<Row>> {
-        let graph = self.linear.graph;
-        let below = self.linear.below(residual, span)?;
+    ///
+    /// `place`: places of the unknowns of the block.
+    pub(super) fn row(
+        &self,
+        residual: Node,
+        place: &HashMap<Node, usize>,
+        span: Span,
+    ) -> Result<Option<Row>> {
+        let graph = self.graph;
+        let below = self.below(residual, span)?;
         let mut holds: HashSet<Node> = HashSet::new();
         for &node in &below {
             let below = arguments(graph.op(node)).any(|argument| holds.contains(&argument));
-            if below || self.place.contains_key(&node) {
+            if below || place.contains_key(&node) {
                 holds.insert(node);
             }
         }
@@ -215,7 +215,7 @@ impl Rows<'_> {
             let Some(passed) = walk.passed.remove(&node) else {
                 continue;
             };
-            match self.place.get(&node) {
+            match place.get(&node) {
                 Some(&place) => {
                     let coefficient = passed.guarded(graph, passed.factor);
                     walk.row.coefficients.insert(place, coefficient);

@@ -227,51 +227,31 @@ pub(super) fn check_regular(graph: &Graph, torn: &Torn<'_>, source: &str) -> Res
         let values = tape.eval_in(&lynkeus_expr::Reals, &point(torn, &symbols, turn));
         let places = slopes.entries.iter().map(|&(i, j, _)| (i, j));
         let are_finite = values.iter().all(|value| value.is_finite());
-        are_finite.then(|| rank(unknowns.len(), places.zip(values)))
+        are_finite.then(|| dependent_rows(matrix(unknowns.len(), places.zip(values))))
     };
-    let mut dependent = None;
-    for rank in (1..=POINTS).filter_map(look) {
-        match rank {
-            Rank::Full => return Ok(()),
-            Rank::Dependent(rows) => dependent = Some(rows),
+    let mut dependent = vec![];
+    for rows in (1..=POINTS).filter_map(look) {
+        if rows.is_empty() {
+            return Ok(());
         }
+        dependent = rows;
     }
-    let Some(rows) = dependent else {
+    if dependent.is_empty() {
         return Ok(());
-    };
+    }
     let nodes = graph.reachable(&entries).into_iter();
     let may_jump = nodes.into_iter().any(|node| graph.jumps(node));
     let mut far = (POINTS + 1..=POINTS + FAR).filter_map(look);
-    let reach = match may_jump && far.any(|rank| rank == Rank::Full) {
-        true => Reach::NearTheStart,
-        false => Reach::Everywhere,
-    };
-    Err(undetermined(torn, &rows, reach, source))
+    let only_near_starts = may_jump && far.any(|rows| rows.is_empty());
+    Err(undetermined(torn, &dependent, only_near_starts, source))
 }
 
-/// Where equations are singular.
-#[derive(Clone, Copy)]
-enum Reach {
-    /// as far as they were looked at
-    Everywhere,
-    /// on this side of a threshold
-    NearTheStart,
-}
-
-/// Of a square matrix.
-#[derive(Debug, PartialEq)]
-enum Rank {
-    Full,
-    /// the rows of which a combination vanishes
-    Dependent(Vec<usize>),
-}
-
-fn rank(n: usize, entries: impl Iterator<Item = ((usize, usize), f64)>) -> Rank {
+fn matrix(n: usize, entries: impl Iterator<Item = ((usize, usize), f64)>) -> Vec<Vec<f64>> {
     let mut matrix = vec![vec![0.0; n]; n];
     for ((i, j), value) in entries {
         matrix[i][j] = value;
     }
-    dependent_rows(matrix).map_or(Rank::Full, Rank::Dependent)
+    matrix
 }
 
 /// Numbers in which no relation hides: multiples of √2, √3, … modulo 1, off zero; of the unknowns
@@ -313,13 +293,13 @@ fn point(torn: &Torn<'_>, symbols: &[Node], turn: usize) -> Vec<f64> {
 }
 
 /// The rows of which a combination vanishes; none where the matrix is regular.
-fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Option<Vec<usize>> {
+fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Vec<usize> {
     let n = rows.len();
     // each row with what it is made of
     for (i, row) in rows.iter_mut().enumerate() {
         let size = row.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
         if size == 0.0 {
-            return Some(vec![i]);
+            return vec![i];
         }
         row.iter_mut().for_each(|x| *x /= size);
         row.extend((0..n).map(|j| f64::from(u8::from(i == j))));
@@ -327,11 +307,12 @@ fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Option<Vec<usize>> {
     for k in 0..n {
         let largest = |row: &Vec<f64>| row[k..n].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         if let Some(row) = rows[k..].iter().find(|row| largest(row) < TINY) {
-            return Some((0..n).filter(|&j| row[n + j].abs() > TINY).collect());
+            return (0..n).filter(|&j| row[n + j].abs() > TINY).collect();
         }
         let places = (k..n).flat_map(|i| (k..n).map(move |j| (i, j)));
         let size = |&(i, j): &(usize, usize)| rows[i][j].abs();
-        let pivot = places.max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let largest = places.max_by(|a, b| size(a).total_cmp(&size(b)));
+        let pivot = largest.unwrap_or((k, k));
         rows.swap(k, pivot.0);
         rows.iter_mut().for_each(|row| row.swap(k, pivot.1));
         let top = rows[k].clone();
@@ -342,10 +323,11 @@ fn dependent_rows(mut rows: Vec<Vec<f64>>) -> Option<Vec<usize>> {
                 .for_each(|(x, top)| *x -= factor * top);
         }
     }
-    None
+    vec![]
 }
 
-fn undetermined(torn: &Torn<'_>, rows: &[usize], reach: Reach, source: &str) -> Problem {
+/// `only_near_starts`: on this side of a threshold, beyond which they are regular.
+fn undetermined(torn: &Torn<'_>, rows: &[usize], only_near_starts: bool, source: &str) -> Problem {
     let dependent = rows.iter().map(|&i| torn.equations[i].span);
     let span = dependent
         .clone()
@@ -354,13 +336,13 @@ fn undetermined(torn: &Torn<'_>, rows: &[usize], reach: Reach, source: &str) -> 
     let mut spans: Vec<Span> = dependent.chain(torn.used.iter().map(|e| e.span)).collect();
     spans.sort_by_key(|span| span.start);
     let names = listed(torn.all.iter().copied());
-    let (place, hint) = match reach {
-        Reach::Everywhere => (
+    let (place, hint) = match only_near_starts {
+        false => (
             "everywhere",
             "one equation repeats others, or is a constraint between states or inputs (index \
              above 1): leave it out, or replace it by its derivative with respect to time",
         ),
-        Reach::NearTheStart => (
+        true => (
             "where these start, and determine them elsewhere only",
             "give a start, or min and max, on the side of the threshold on which they are",
         ),
@@ -381,15 +363,15 @@ mod tests {
     #[test]
     fn the_rows_that_depend_on_each_other_are_found() {
         let regular = vec![vec![1.0, 2.0], vec![3.0, 4.0]];
-        assert_eq!(dependent_rows(regular), None);
+        assert!(dependent_rows(regular).is_empty());
         let repeated = vec![
             vec![1.0, 2.0, 0.0],
             vec![0.0, 1.0, 1.0],
             vec![2.0, 4.0, 0.0],
         ];
-        assert_eq!(dependent_rows(repeated), Some(vec![0, 2]));
+        assert_eq!(dependent_rows(repeated), [0, 2]);
         let scaled = vec![vec![1e-9, 0.0], vec![0.0, 1e9]];
-        assert_eq!(dependent_rows(scaled), None);
-        assert_eq!(dependent_rows(vec![vec![0.0]]), Some(vec![0]));
+        assert!(dependent_rows(scaled).is_empty());
+        assert_eq!(dependent_rows(vec![vec![0.0]]), [0]);
     }
 }

@@ -20,21 +20,18 @@ use lynkeus_expr::Node;
 
 pub(crate) use system::{FlatEquation, System, Unknown};
 
-use crate::diagnostic::{Problem, Result, Span};
+use crate::diagnostic::{Result, Span};
+use matching::Matching;
 use system::Incidence;
 
 /// An expression for every unknown, free of unknowns.
 pub(crate) fn solve(system: &System<'_>, source: &str, model: Span) -> Result<HashMap<Node, Node>> {
-    let found = solved(system, source, model);
-    let is_balanced = system.equations.len() == system.unknowns.len();
-    let Err(Unsolved {
-        problem,
-        is_singular: true,
-    }) = found
-    else {
-        return found.map_err(|unsolved| unsolved.problem);
+    let incidence = Incidence::new(system);
+    let problem = match matched(system, &incidence, source, model) {
+        Ok(matching) => return in_order(system, &incidence, &matching, source),
+        Err(problem) => problem,
     };
-    if !is_balanced {
+    if system.equations.len() != system.unknowns.len() {
         return Err(problem);
     }
     // As many equations as unknowns, but some say only how states hang together.
@@ -46,36 +43,36 @@ pub(crate) fn solve(system: &System<'_>, source: &str, model: Span) -> Result<Ha
         unknowns: &reduced.unknowns,
         ..*system
     };
-    solved(&system, source, model).map_err(|unsolved| unsolved.problem)
+    let incidence = Incidence::new(&system);
+    let matching = matched(&system, &incidence, source, model)?;
+    in_order(&system, &incidence, &matching, source)
 }
 
-struct Unsolved {
-    problem: Problem,
-    /// some equation has no unknown of its own
-    is_singular: bool,
-}
-
-fn solved(
+/// The matching that gives each equation an unknown of its own.
+fn matched(
     system: &System<'_>,
+    incidence: &Incidence,
     source: &str,
     model: Span,
-) -> std::result::Result<HashMap<Node, Node>, Unsolved> {
-    let incidence = Incidence::new(system);
+) -> Result<Matching> {
     let matching = matching::maximum(system, &incidence.of_equation);
-    let matched = diagnose::Balance {
+    let balance = diagnose::Balance {
         system,
-        incidence: &incidence,
+        incidence,
         matching: &matching,
         source,
     };
-    let unsolved = |is_singular| {
-        move |problem| Unsolved {
-            problem,
-            is_singular,
-        }
-    };
-    matched.check(model).map_err(unsolved(true))?;
-    let blocks = order::blocks(&incidence.of_equation, &matching);
-    let solver = blocks::Solver::new(system, &incidence, source);
-    solver.solve(&blocks, &matching).map_err(unsolved(false))
+    balance.check(model)?;
+    Ok(matching)
+}
+
+/// Solves blocks of equations that need each other, each behind those it needs.
+fn in_order(
+    system: &System<'_>,
+    incidence: &Incidence,
+    matching: &Matching,
+    source: &str,
+) -> Result<HashMap<Node, Node>> {
+    let blocks = order::blocks(&incidence.of_equation, matching);
+    blocks::Solver::new(system, incidence, source).solve(&blocks, matching)
 }

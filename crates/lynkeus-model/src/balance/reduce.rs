@@ -19,15 +19,9 @@ use crate::diagnostic::{Problem, Result};
 /// Most times that constraints are looked for.
 const MAX_PASSES: usize = 60;
 
-/// Equations and unknowns in which constraints have been differentiated.
-pub(super) struct Reduced {
-    pub equations: Vec<FlatEquation>,
-    pub unknowns: Vec<Unknown>,
-}
-
 /// The system without constraints among its states; `None` where it has none, or where they
 /// cannot be resolved.
-pub(super) fn reduced(system: &System<'_>) -> Result<Option<Reduced>> {
+pub(super) fn reduced<'a>(system: &'a System<'a>) -> Result<Option<Reduction<'a>>> {
     let states = system
         .unknowns
         .iter()
@@ -40,39 +34,36 @@ pub(super) fn reduced(system: &System<'_>) -> Result<Option<Reduced>> {
         differentiated: HashSet::new(),
     };
     for _ in 0..MAX_PASSES {
-        match reduction.pass()? {
-            Pass::Regular => {
-                return Ok(Some(Reduced {
-                    equations: reduction.equations,
-                    unknowns: reduction.unknowns,
-                }));
-            }
-            Pass::Stuck => return Ok(None),
-            Pass::Differentiated => {}
+        let constraints = reduction.constraints();
+        if constraints.is_empty() {
+            return Ok(Some(reduction));
+        }
+        let mut is_stuck = true;
+        for (equations, unknowns) in constraints {
+            is_stuck &= !reduction.resolve(&equations, &unknowns)?;
+        }
+        if is_stuck {
+            break;
         }
     }
     Ok(None)
 }
 
-enum Pass {
-    /// every equation has its unknown
-    Regular,
-    Differentiated,
-    Stuck,
-}
-
-struct Reduction<'a> {
+/// Equations and unknowns in which constraints are differentiated.
+pub(super) struct Reduction<'a> {
     system: &'a System<'a>,
     /// symbols of derivatives by what they are the derivatives of
     derivative: HashMap<Node, Node>,
-    equations: Vec<FlatEquation>,
-    unknowns: Vec<Unknown>,
+    pub equations: Vec<FlatEquation>,
+    pub unknowns: Vec<Unknown>,
     /// equations whose derivative is among the equations
     differentiated: HashSet<usize>,
 }
 
 impl Reduction<'_> {
-    fn pass(&mut self) -> Result<Pass> {
+    /// Sets of equations with fewer unknowns than equations, each with the places of these
+    /// unknowns; none where every equation has its unknown.
+    fn constraints(&self) -> Vec<(Vec<usize>, Vec<usize>)> {
         let System {
             graph,
             inputs,
@@ -88,13 +79,9 @@ impl Reduction<'_> {
         };
         let incidence = Incidence::new(&now);
         let matching = matching::maximum(&now, &incidence.of_equation);
-        let open: Vec<usize> = free(&matching);
-        if open.is_empty() {
-            return Ok(Pass::Regular);
-        }
         let mut used: HashSet<usize> = HashSet::new();
         let mut found = vec![];
-        for start in open {
+        for start in free(&matching) {
             let (equations, unknowns) =
                 reached(start, &incidence.of_equation, &matching.of_unknown);
             if equations.iter().any(|equation| used.contains(equation)) {
@@ -103,13 +90,7 @@ impl Reduction<'_> {
             used.extend(&equations);
             found.push((equations, unknowns));
         }
-        let mut pass = Pass::Stuck;
-        for (equations, unknowns) in found {
-            if self.resolve(&equations, &unknowns)? {
-                pass = Pass::Differentiated;
-            }
-        }
-        Ok(pass)
+        found
     }
 
     /// Differentiates a set of equations and gives up one of its states.

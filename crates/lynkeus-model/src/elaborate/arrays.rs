@@ -7,7 +7,7 @@ use super::scope::Named;
 use super::value::{Array, Scalar, Value, describe_dims, element_count, unequal_sizes};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_RANK;
-use crate::syntax::ast::{BinaryOperator, Call, ExprId, Iterator as Loop, Kind};
+use crate::syntax::ast::{BinaryOperator, Call, ExprId, ForIndex, Kind};
 use crate::syntax::{plain, too_many_dimensions};
 
 impl<'a> Evaluator<'a> {
@@ -91,7 +91,7 @@ impl<'a> Evaluator<'a> {
     pub(super) fn comprehension(
         &mut self,
         body: ExprId,
-        iterators: &'a [Loop],
+        iterators: &'a [ForIndex],
         span: Span,
     ) -> Result<Value> {
         let Some((outer, inner)) = iterators.split_last() else {
@@ -109,14 +109,17 @@ impl<'a> Evaluator<'a> {
     }
 
     /// The values an iterator takes.
-    pub(crate) fn turns(&mut self, iterator: &'a Loop) -> Result<Vec<Scalar>> {
+    pub(crate) fn turns(&mut self, iterator: &'a ForIndex) -> Result<Vec<Scalar>> {
         let value = self.structural(iterator.range)?;
+        self.range_elements(value, self.span(iterator.range))
+    }
+
+    /// The elements of what a loop goes over.
+    pub(super) fn range_elements(&self, value: Value, span: Span) -> Result<Vec<Scalar>> {
         if value.dims().len() != 1 {
             let found = describe_dims(value.dims());
             let message = format!("expected a range, found {found}");
-            return Err(
-                Problem::new(self.span(iterator.range), message).hint("write `for i in 1:N`")
-            );
+            return Err(Problem::new(span, message).hint("write `for i in 1:N`"));
         }
         Ok(value.into_array().elements)
     }

@@ -5,67 +5,35 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 
 use lynkeus_expr::{Binary, Graph, Interval, Node, Tape, Unary, jacobian};
 
-use super::evaluate::Claim;
 use super::flatten::Flat;
 use super::scope::{Context, Mode};
 use super::symbols::{Component, Symbols, is_outer_input};
-use super::value::{Scalar, Value, describe_dims, element_name};
+use super::value::{Scalar, describe_dims, element_name};
 use crate::balance::{FlatEquation, System, Unknown};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Attribute, Causality, Declaration, ExprId, Kind, TypeName, Variability};
+use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::{plain, unquoted};
 use crate::{Assertion, Parameter, Plant, Variable, balance};
 
-/// A plant that has not taken the graph yet.
-pub(super) struct Parts {
-    name: String,
-    time: Node,
-    states: Vec<Variable>,
-    derivatives: Vec<Node>,
-    inputs: Vec<Variable>,
-    outputs: Vec<Variable>,
-    algebraics: Vec<Variable>,
-    parameters: Vec<Parameter>,
-    table_points: BTreeSet<Node>,
-    assertions: Vec<Assertion>,
-    pub(super) warnings: Vec<Problem>,
-}
-
-impl Parts {
-    pub(super) fn with_graph(self, graph: Graph) -> Plant {
-        Plant {
-            table_points: self.table_points,
-            assertions: self.assertions,
-            warnings: vec![],
-            name: self.name,
-            graph,
-            time: self.time,
-            states: self.states,
-            derivatives: self.derivatives,
-            inputs: self.inputs,
-            outputs: self.outputs,
-            algebraics: self.algebraics,
-            parameters: self.parameters,
-        }
-    }
-}
-
-pub(super) fn parts<'a>(
+/// The plant, with what looks wrong in it. Its graph is still the caller's: this one is empty.
+pub(super) fn plant<'a>(
     context: &Context<'a>,
     symbols: &Symbols<'a>,
-    flat: &Flat,
-) -> Result<Parts> {
+    flat: Flat,
+) -> Result<(Plant, Vec<Problem>)> {
     let (unknowns, inputs) = unknowns(context, symbols, &flat.equations)?;
+    let graph = context.graph;
     let system = System {
-        graph: context.graph,
+        graph,
         equations: &flat.equations,
         unknowns: &unknowns,
         inputs: &inputs,
         time: symbols.time,
     };
     let solution = balance::solve(&system, context.source, context.model.name)?;
-    let mut parts = Parts {
+    let mut plant = Plant {
         name: context.model.title.clone(),
+        graph: Graph::new(),
         time: symbols.time,
         states: vec![],
         derivatives: vec![],
@@ -83,30 +51,19 @@ pub(super) fn parts<'a>(
             continue;
         }
         let attributes = Attributes::new(context, symbols, declaration, component)?;
-        let sorter = Sorter {
-            context,
-            symbols,
-            declaration,
-            component,
-            attributes,
-            inputs: &inputs,
-        };
         if declaration.prefix.variability == Variability::Continuous {
-            sorter.variables(&solution, &mut parts);
-        } else {
-            let dependent = symbols.dependent.get(place).copied().unwrap_or_default();
-            sorter.parameters(dependent, &mut parts);
+            variables(symbols, &attributes, &inputs, &solution, &mut plant);
+        } else if !symbols.dependent.get(place).copied().unwrap_or_default() {
+            parameters(graph, &attributes, &mut plant);
         }
     }
-    let graph = context.graph;
-    parts.warnings = fix_starts(graph, symbols, flat, &solution, &mut parts.states);
-    let found = assertions(context, &flat.claims, &solution);
-    let variables: Vec<&Variable> = parts.states.iter().chain(&parts.inputs).collect();
-    let failing = failing_at_start(graph, symbols, &found, &variables);
-    parts.warnings.extend(failing);
-    parts.table_points = context.table_points.take();
-    parts.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
-    Ok(parts)
+    let mut warnings = fix_starts(graph, symbols, &flat, &solution, &mut plant.states);
+    let found = assertions(context, flat.claims, &solution);
+    let variables: Vec<&Variable> = plant.states.iter().chain(&plant.inputs).collect();
+    warnings.extend(failing_at_start(graph, symbols, &found, &variables));
+    plant.table_points = context.table_points.take();
+    plant.assertions = found.into_iter().map(|(assertion, _)| assertion).collect();
+    Ok((plant, warnings))
 }
 
 /// Derivatives of the states and all other variables, and the inputs apart.
@@ -182,129 +139,107 @@ fn nodes(component: &Component) -> impl Iterator<Item = Node> {
         })
 }
 
-/// Puts the elements of one declaration where they belong.
-struct Sorter<'s, 'a> {
-    context: &'s Context<'a>,
-    symbols: &'s Symbols<'a>,
+/// Puts the elements of a declared variable where they belong.
+fn variables(
+    symbols: &Symbols<'_>,
+    attributes: &Attributes<'_>,
+    inputs: &HashSet<Node>,
+    solution: &HashMap<Node, Node>,
+    plant: &mut Plant,
+) {
+    let causality = attributes.declaration.prefix.causality;
+    for (offset, symbol) in nodes(attributes.component).enumerate() {
+        if inputs.contains(&symbol) {
+            plant.inputs.push(attributes.variable(offset, symbol));
+            continue;
+        }
+        let derivative = symbols.derivative_of(symbol);
+        let derivative = derivative.and_then(|symbol| solution.get(&symbol).copied());
+        // what was under `der` and follows from other states is none itself
+        let derivative = derivative.filter(|_| !solution.contains_key(&symbol));
+        let is_state = derivative.is_some();
+        if let Some(derivative) = derivative {
+            plant.states.push(attributes.variable(offset, symbol));
+            plant.derivatives.push(derivative);
+        }
+        let value = solution.get(&symbol).copied().unwrap_or(symbol);
+        if causality == Causality::Output {
+            plant.outputs.push(attributes.variable(offset, value));
+        } else if !is_state {
+            plant.algebraics.push(attributes.variable(offset, value));
+        }
+    }
+}
+
+/// The elements of a declared parameter, where a caller may set them.
+fn parameters(graph: &Graph, attributes: &Attributes<'_>, plant: &mut Plant) {
+    let Attributes {
+        declaration,
+        component,
+        ..
+    } = attributes;
+    let prefix = &declaration.prefix;
+    let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
+    if is_fixed || prefix.type_name == TypeName::Boolean {
+        return;
+    }
+    for offset in 0..component.elements.len() {
+        let full = element_name(&declaration.label, &component.dims, offset);
+        let values = component.values.as_ref();
+        let value = values.and_then(|values| values.get(offset));
+        plant.parameters.push(Parameter {
+            variable: attributes.variable(offset, graph.symbol(&full).node()),
+            value: value.and_then(|value| value.number(graph)),
+        });
+    }
+}
+
+/// What a declaration says of all its elements. Numbers are one for all elements or one for each;
+/// none where nothing is given.
+struct Attributes<'s> {
     declaration: &'s Declaration,
     component: &'s Component,
-    attributes: Attributes,
-    inputs: &'s HashSet<Node>,
-}
-
-impl Sorter<'_, '_> {
-    fn variable(&self, offset: usize, node: Node) -> Variable {
-        let Self {
-            declaration,
-            component,
-            ..
-        } = self;
-        self.attributes
-            .variable(declaration, &component.dims, offset, node)
-    }
-
-    fn variables(&self, solution: &HashMap<Node, Node>, parts: &mut Parts) {
-        for (offset, symbol) in nodes(self.component).enumerate() {
-            let causality = self.declaration.prefix.causality;
-            if self.inputs.contains(&symbol) {
-                parts.inputs.push(self.variable(offset, symbol));
-                continue;
-            }
-            let derivative = self.symbols.derivative_of(symbol);
-            let derivative = derivative.and_then(|symbol| solution.get(&symbol).copied());
-            // what was under `der` and follows from other states is none itself
-            let derivative = derivative.filter(|_| !solution.contains_key(&symbol));
-            let is_state = derivative.is_some();
-            if let Some(derivative) = derivative {
-                parts.states.push(self.variable(offset, symbol));
-                parts.derivatives.push(derivative);
-            }
-            let value = solution.get(&symbol).copied().unwrap_or(symbol);
-            if causality == Causality::Output {
-                parts.outputs.push(self.variable(offset, value));
-            } else if !is_state {
-                parts.algebraics.push(self.variable(offset, value));
-            }
-        }
-    }
-
-    fn parameters(&self, dependent: bool, parts: &mut Parts) {
-        let prefix = &self.declaration.prefix;
-        let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
-        if is_fixed || dependent || prefix.type_name == TypeName::Boolean {
-            return;
-        }
-        let graph = self.context.graph;
-        let name = &self.declaration.label;
-        for offset in 0..self.component.elements.len() {
-            let full = element_name(name, &self.component.dims, offset);
-            let value = self
-                .component
-                .values
-                .as_ref()
-                .and_then(|values| values.get(offset));
-            parts.parameters.push(Parameter {
-                variable: self.variable(offset, graph.symbol(&full).node()),
-                value: value.and_then(|value| value.number(graph)),
-            });
-        }
-    }
-}
-
-/// What a declaration says of all its elements.
-pub(super) struct Attributes {
-    start: Option<Numbers>,
-    /// the start as expressions, one for all elements or one for each
+    start: Vec<f64>,
+    /// the start as expressions
     start_nodes: Vec<Node>,
-    min: Option<Numbers>,
-    max: Option<Numbers>,
-    nominal: Option<Numbers>,
+    min: Vec<f64>,
+    max: Vec<f64>,
+    nominal: Vec<f64>,
     /// 1 for true
-    fixed: Option<Numbers>,
+    fixed: Vec<f64>,
     unit: Option<String>,
 }
 
-/// One number for all elements, or one for each.
-enum Numbers {
-    Same(f64),
-    Each(Vec<f64>),
-}
-
-impl Numbers {
-    fn at(&self, offset: usize) -> Option<f64> {
-        match self {
-            Numbers::Same(value) => Some(*value),
-            Numbers::Each(values) => values.get(offset).copied(),
-        }
+/// The one for all elements, or that of an element.
+fn at<T: Copy>(values: &[T], offset: usize) -> Option<T> {
+    match values {
+        [one] => Some(*one),
+        _ => values.get(offset).copied(),
     }
 }
 
-impl Attributes {
-    pub(super) fn new<'a>(
+impl<'s> Attributes<'s> {
+    fn new<'a>(
         context: &Context<'a>,
         symbols: &Symbols<'a>,
-        declaration: &Declaration,
-        component: &Component,
+        declaration: &'s Declaration,
+        component: &'s Component,
     ) -> Result<Self> {
-        let reader = Reader {
-            context,
-            symbols,
-            component,
-            is_boolean: declaration.prefix.type_name == TypeName::Boolean,
-        };
+        let library = context.model.library.get(&declaration.label);
         let mut attributes = Self {
-            start: None,
+            declaration,
+            component,
+            start: vec![],
             start_nodes: vec![],
-            min: None,
-            max: None,
-            nominal: None,
-            fixed: None,
-            unit: None,
+            min: library
+                .and_then(|library| library.min)
+                .into_iter()
+                .collect(),
+            max: vec![],
+            nominal: vec![],
+            fixed: vec![],
+            unit: library.map(|library| library.unit.to_owned()),
         };
-        if let Some(library) = context.model.library.get(&declaration.label) {
-            attributes.unit = Some(library.unit.to_owned());
-            attributes.min = library.min.map(Numbers::Same);
-        }
         let mut given: Vec<&str> = vec![];
         for attribute in &declaration.attributes {
             let name = attribute.name.text(context.source);
@@ -314,172 +249,141 @@ impl Attributes {
             }
             given.push(name);
             let Some(value) = attribute.value else {
-                return Err(Problem::new(
-                    attribute.name,
-                    format!("expected a value for `{name}`"),
-                ));
+                let message = format!("expected a value for `{name}`");
+                return Err(Problem::new(attribute.name, message));
             };
-            let slot = match name {
-                "start" => &mut attributes.start,
-                "min" => &mut attributes.min,
-                "max" => &mut attributes.max,
-                "nominal" => &mut attributes.nominal,
-                "fixed" => &mut attributes.fixed,
-                "unit" => {
-                    attributes.unit = Some(reader.text(value)?);
-                    continue;
-                }
-                _ => continue,
-            };
-            *slot = reader.numbers(name, value)?;
+            if name == "unit" {
+                attributes.unit = Some(text(context, value)?);
+            } else if let Some(slot) = attributes.numbers_of(name) {
+                *slot = numbers(context, symbols, declaration, component, name, value)?;
+            }
             if name == "start" {
-                attributes.start_nodes = reader.symbolic(value)?;
+                attributes.start_nodes = symbolic(context, symbols, value)?;
             }
         }
         // A start that cannot be computed from parameters is not known, however fixed.
-        let is_start = |attribute: &Attribute| attribute.name.text(context.source) == "start";
-        let unknown = attributes.start.is_none() && attributes.start_nodes.is_empty();
-        if unknown && declaration.attributes.iter().any(is_start) {
-            attributes.fixed = None;
+        let unknown = attributes.start.is_empty() && attributes.start_nodes.is_empty();
+        if unknown && given.contains(&"start") {
+            attributes.fixed.clear();
         }
-        attributes.check_range(declaration, component)?;
+        attributes.check_range()?;
         Ok(attributes)
     }
 
-    fn check_range(&self, declaration: &Declaration, component: &Component) -> Result<()> {
-        for offset in 0..component.elements.len() {
-            let bound = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
-            if let (Some(min), Some(max)) = (bound(&self.min), bound(&self.max))
+    fn numbers_of(&mut self, name: &str) -> Option<&mut Vec<f64>> {
+        match name {
+            "start" => Some(&mut self.start),
+            "min" => Some(&mut self.min),
+            "max" => Some(&mut self.max),
+            "nominal" => Some(&mut self.nominal),
+            "fixed" => Some(&mut self.fixed),
+            _ => None,
+        }
+    }
+
+    fn check_range(&self) -> Result<()> {
+        for offset in 0..self.component.elements.len() {
+            if let (Some(min), Some(max)) = (at(&self.min, offset), at(&self.max, offset))
                 && min > max
             {
-                let name = declaration.label.as_str();
-                let name = element_name(name, &component.dims, offset);
+                let name = self.name(offset);
                 let message = format!("the range of `{name}` is empty: min {min} > max {max}");
-                return Err(Problem::new(declaration.name, message));
+                return Err(Problem::new(self.declaration.name, message));
             }
         }
         Ok(())
     }
 
+    fn name(&self, offset: usize) -> String {
+        element_name(&self.declaration.label, &self.component.dims, offset)
+    }
+
     /// Where the search for an element begins that a loop determines, and where it may end.
-    pub(super) fn search(&self, offset: usize) -> (f64, Interval) {
-        let at = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
-        let low = at(&self.min).unwrap_or(f64::NEG_INFINITY);
-        let high = at(&self.max).unwrap_or(f64::INFINITY);
+    fn search(&self, offset: usize) -> (f64, Interval) {
+        let low = at(&self.min, offset).unwrap_or(f64::NEG_INFINITY);
+        let high = at(&self.max, offset).unwrap_or(f64::INFINITY);
         let range = Interval::new(low, high).unwrap_or(Interval::ENTIRE);
-        (
-            at(&self.start).unwrap_or(0.0).clamp(range.lo(), range.hi()),
-            range,
-        )
+        let start = at(&self.start, offset).unwrap_or(0.0);
+        (start.clamp(range.lo(), range.hi()), range)
     }
 
     /// One element as a variable of the plant.
-    pub(super) fn variable(
-        &self,
-        declaration: &Declaration,
-        dims: &[usize],
-        offset: usize,
-        node: Node,
-    ) -> Variable {
-        let at = |numbers: &Option<Numbers>| numbers.as_ref()?.at(offset);
+    fn variable(&self, offset: usize, node: Node) -> Variable {
         Variable {
-            name: element_name(&declaration.label, dims, offset),
+            name: self.name(offset),
             node,
             unit: self.unit.clone(),
-            description: declaration.description.clone(),
-            start: at(&self.start),
-            start_node: match &self.start_nodes[..] {
-                [one] => Some(*one),
-                nodes => nodes.get(offset).copied(),
-            },
-            min: at(&self.min).unwrap_or(f64::NEG_INFINITY),
-            max: at(&self.max).unwrap_or(f64::INFINITY),
-            nominal: at(&self.nominal),
-            integer: declaration.prefix.is_integer(),
-            fixed: at(&self.fixed) == Some(1.0),
+            description: self.declaration.description.clone(),
+            start: at(&self.start, offset),
+            start_node: at(&self.start_nodes, offset),
+            min: at(&self.min, offset).unwrap_or(f64::NEG_INFINITY),
+            max: at(&self.max, offset).unwrap_or(f64::INFINITY),
+            nominal: at(&self.nominal, offset),
+            integer: self.declaration.prefix.is_integer(),
+            fixed: at(&self.fixed, offset) == Some(1.0),
         }
     }
 }
 
-struct Reader<'r, 'a> {
-    context: &'r Context<'a>,
-    symbols: &'r Symbols<'a>,
-    component: &'r Component,
-    is_boolean: bool,
+fn text(context: &Context<'_>, value: ExprId) -> Result<String> {
+    let expression = context.ast.expression(value);
+    match expression.kind {
+        Kind::Text => Ok(unquoted(expression.span.text(context.source))),
+        _ => Err(Problem::new(expression.span, "expected a string")
+            .hint("write units as in `unit = \"m/s\"`")),
+    }
 }
 
-impl Reader<'_, '_> {
-    fn text(&self, value: ExprId) -> Result<String> {
-        let expression = self.context.ast.expression(value);
-        match expression.kind {
-            Kind::Text => Ok(unquoted(expression.span.text(self.context.source))),
-            _ => Err(Problem::new(expression.span, "expected a string")
-                .hint("write units as in `unit = \"m/s\"`")),
-        }
+/// The value of an attribute as expressions, where it depends on parameters that are symbols.
+fn symbolic<'a>(context: &Context<'a>, symbols: &Symbols<'a>, value: ExprId) -> Result<Vec<Node>> {
+    let graph = context.graph;
+    if !context.options.symbolic_parameters {
+        return Ok(vec![]);
     }
+    let value = symbols.evaluator(context, Mode::Parametric).value(value)?;
+    let nodes = value.elements().iter().map(|scalar| scalar.real(graph));
+    let nodes: Vec<Node> = nodes.collect::<Option<_>>().unwrap_or_default();
+    match graph.symbols_of(&nodes).is_empty() {
+        true => Ok(vec![]),
+        false => Ok(nodes),
+    }
+}
 
-    /// The value as expressions, where it depends on parameters that are symbols.
-    fn symbolic(&self, value: ExprId) -> Result<Vec<Node>> {
-        let graph = self.context.graph;
-        if !self.context.options.symbolic_parameters {
-            return Ok(vec![]);
-        }
-        let mut evaluator = self.symbols.evaluator(self.context, Mode::Parametric);
-        let elements = match evaluator.value(value)? {
-            Value::Scalar(scalar) => vec![scalar],
-            Value::Array(array) => array.elements,
+/// The numbers of an attribute; none where it needs a parameter that has no value.
+fn numbers<'a>(
+    context: &Context<'a>,
+    symbols: &Symbols<'a>,
+    declaration: &Declaration,
+    component: &Component,
+    name: &str,
+    id: ExprId,
+) -> Result<Vec<f64>> {
+    let is_truth = name == "fixed";
+    let is_boolean = declaration.prefix.type_name == TypeName::Boolean;
+    let mut evaluator = symbols.evaluator(context, Mode::Structural);
+    let span = context.ast.expression(id).span;
+    let value = match evaluator.value(id) {
+        Ok(value) => value,
+        Err(_) if evaluator.valueless && context.options.symbolic_parameters => return Ok(vec![]),
+        Err(problem) => return Err(problem),
+    };
+    let graph = context.graph;
+    let number = |&scalar: &Scalar| {
+        let (value, expected) = match (scalar, is_truth) {
+            (Scalar::Boolean(node), _) if is_truth || is_boolean => {
+                (graph.constant_value(node), "expected `true` or `false`")
+            }
+            (_, true) => (None, "expected `true` or `false`"),
+            _ => (scalar.number(graph), "expected a finite number"),
         };
-        let nodes = elements.into_iter().map(|scalar| scalar.real(graph));
-        let nodes: Vec<Node> = nodes.collect::<Option<_>>().unwrap_or_default();
-        match graph.symbols_of(&nodes).is_empty() {
-            true => Ok(vec![]),
-            false => Ok(nodes),
-        }
+        value.ok_or_else(|| Problem::new(span, expected))
+    };
+    if !value.dims().is_empty() && value.dims() != component.dims {
+        let (has, found) = (describe_dims(&component.dims), describe_dims(value.dims()));
+        let message = format!("the attribute has the size {found}, its variable has {has}");
+        return Err(Problem::new(span, message));
     }
-
-    /// `None` where the value needs a parameter that has none.
-    fn numbers(&self, name: &str, id: ExprId) -> Result<Option<Numbers>> {
-        let is_truth = name == "fixed";
-        let mut evaluator = self.symbols.evaluator(self.context, Mode::Structural);
-        let span = self.context.ast.expression(id).span;
-        let value = match evaluator.value(id) {
-            Ok(value) => value,
-            Err(_) if evaluator.valueless && self.context.options.symbolic_parameters => {
-                return Ok(None);
-            }
-            Err(problem) => return Err(problem),
-        };
-        let graph = self.context.graph;
-        let number = |scalar: Scalar| {
-            let (value, expected) = match (scalar, is_truth) {
-                (Scalar::Boolean(node), _) if is_truth || self.is_boolean => {
-                    (graph.constant_value(node), "expected `true` or `false`")
-                }
-                (_, true) => (None, "expected `true` or `false`"),
-                _ => (scalar.number(graph), "expected a finite number"),
-            };
-            value.ok_or_else(|| Problem::new(span, expected))
-        };
-        match value {
-            Value::Scalar(scalar) => Ok(Some(Numbers::Same(number(scalar)?))),
-            Value::Array(array) if array.dims == self.component.dims => {
-                let numbers = array
-                    .elements
-                    .into_iter()
-                    .map(number)
-                    .collect::<Result<_>>()?;
-                Ok(Some(Numbers::Each(numbers)))
-            }
-            Value::Array(array) => {
-                let (has, found) = (
-                    describe_dims(&self.component.dims),
-                    describe_dims(&array.dims),
-                );
-                let message = format!("the attribute has the size {found}, its variable has {has}");
-                Err(Problem::new(span, message))
-            }
-        }
-    }
+    value.elements().iter().map(number).collect()
 }
 
 /// Sets the start of each state that an initial equation fixes; a warning for every other.
@@ -608,35 +512,26 @@ fn does_not_fix(equation: &FlatEquation) -> Problem {
         .hint("starts are taken from `start = …` and from initial equations as `x = …`")
 }
 
-/// What is to hold along a run; what holds whatever happens is left out.
+/// What is to hold along a run, over states and inputs; what holds whatever happens is left out.
 fn assertions(
     context: &Context<'_>,
-    claims: &[Claim],
+    claims: Vec<(Assertion, Span)>,
     solution: &HashMap<Node, Node>,
-) -> Vec<(Assertion, Claim)> {
-    let conditions: Vec<Node> = claims.iter().map(|claim| claim.condition).collect();
-    let conditions = context.graph.substitute(&conditions, solution);
-    let pairs = claims.iter().zip(conditions);
-    let open = pairs.filter(|(_, condition)| {
-        !matches!(context.graph.constant_value(*condition), Some(value) if value != 0.0)
-    });
-    open.map(|(claim, condition)| {
-        let assertion = Assertion {
-            condition,
-            message: claim.message.clone(),
-            line: claim.span.line(context.source),
-            is_warning: claim.is_warning,
-        };
-        (assertion, claim.clone())
-    })
-    .collect()
+) -> Vec<(Assertion, Span)> {
+    let graph = context.graph;
+    let conditions: Vec<Node> = claims.iter().map(|(claim, _)| claim.condition).collect();
+    let conditions = graph.substitute(&conditions, solution);
+    let pairs = claims.into_iter().zip(conditions);
+    let solved = pairs.map(|((claim, span), condition)| (Assertion { condition, ..claim }, span));
+    let holds = |claim: &Assertion| graph.constant_value(claim.condition).unwrap_or(0.0) != 0.0;
+    solved.filter(|(claim, _)| !holds(claim)).collect()
 }
 
 /// A warning for each assertion that fails at the declared starts.
 fn failing_at_start(
     graph: &Graph,
     symbols: &Symbols<'_>,
-    assertions: &[(Assertion, Claim)],
+    assertions: &[(Assertion, Span)],
     variables: &[&Variable],
 ) -> Vec<Problem> {
     let mut known: HashMap<Node, f64> = HashMap::from([(symbols.time, 0.0)]);
@@ -656,9 +551,9 @@ fn failing_at_start(
     };
     let failing = assertions.iter().filter(|(assertion, _)| fails(assertion));
     failing
-        .map(|(assertion, claim)| {
+        .map(|(assertion, span)| {
             let message = format!("this assertion fails at the start: {}", assertion.message);
-            Problem::new(claim.span, message)
+            Problem::new(*span, message)
                 .hint("change the start values, or the parameters that it is about")
         })
         .collect()

@@ -10,12 +10,12 @@ use super::value::{Array, Scalar, describe_dims, element_count, element_name};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{FlatModel, constant_label};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
-use crate::names::did_you_mean;
+use crate::names::{did_you_mean, listed};
 use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::plain;
 
 /// Budgets of what declarations are written out to.
-pub(super) struct Sizes {
+struct Sizes {
     scalars: Budget,
     text: Budget,
 }
@@ -28,7 +28,7 @@ impl Sizes {
         }
     }
 
-    pub(super) fn charge(
+    fn charge(
         &self,
         context: &Context<'_>,
         dims: &[usize],
@@ -98,13 +98,14 @@ impl<'a> Symbols<'a> {
     pub(crate) fn new(context: &Context<'a>) -> Result<Self> {
         let model = context.model;
         let by_name = index_names(context.source, &model.declarations)?;
-        let Order {
-            sequence,
-            dependent,
-        } = order(context, &by_name)?;
-        let overrides = Overrides::new(context, &by_name)?;
+        let declarations = &model.declarations;
+        let needs = declarations.iter().map(|d| needs(context, d, &by_name));
+        let needs: Vec<Vec<usize>> = needs.collect();
+        let sequence = sort(declarations, &needs)?;
+        let dependent = dependent(declarations, &needs, &sequence);
+        let overrides = overrides(context, &by_name)?;
         let mut symbols = Self {
-            declarations: &model.declarations,
+            declarations,
             by_name,
             components: model.declarations.iter().map(|_| None).collect(),
             gathered: HashMap::new(),
@@ -140,7 +141,7 @@ impl<'a> Symbols<'a> {
     fn component(
         &self,
         context: &Context<'a>,
-        overrides: &Overrides,
+        overrides: &HashMap<usize, Vec<Override>>,
         sizes: &Sizes,
         place: usize,
     ) -> Result<Component> {
@@ -188,11 +189,7 @@ impl<'a> Symbols<'a> {
     }
 
     /// Sizes as declared; `None` for `:`.
-    pub(super) fn dims(
-        &self,
-        context: &Context<'a>,
-        declaration: &Declaration,
-    ) -> Result<Vec<Option<usize>>> {
+    fn dims(&self, context: &Context<'a>, declaration: &Declaration) -> Result<Vec<Option<usize>>> {
         let mut evaluator = self.evaluator_of(context, declaration, Mode::Structural);
         let length = |&id| match context.ast.expression(id).kind {
             Kind::All => Ok(None),
@@ -202,23 +199,11 @@ impl<'a> Symbols<'a> {
     }
 }
 
-/// What the declarations need of each other.
-pub(super) struct Order {
-    /// every declaration once, each behind those it needs
-    pub sequence: Vec<usize>,
-    /// true where the value of a parameter is made from other parameters of type Real
-    pub dependent: Vec<bool>,
-}
-
-pub(super) fn order(context: &Context<'_>, by_name: &HashMap<&str, usize>) -> Result<Order> {
-    let declarations = &context.model.declarations;
-    let needs: Vec<Vec<usize>> = declarations
-        .iter()
-        .map(|declaration| needs(context, declaration, by_name))
-        .collect();
-    let sequence = sort(declarations, &needs)?;
+/// Of each declaration: true where the value of a parameter is made from other parameters of type
+/// Real. `needs`: places of the declarations that each one reads; `sequence`: each behind these.
+fn dependent(declarations: &[Declaration], needs: &[Vec<usize>], sequence: &[usize]) -> Vec<bool> {
     let mut dependent = vec![false; declarations.len()];
-    for &place in &sequence {
+    for &place in sequence {
         let depends = |&need: &usize| {
             let prefix = &declarations[need].prefix;
             let settable = prefix.variability == Variability::Parameter && !prefix.is_final;
@@ -226,10 +211,7 @@ pub(super) fn order(context: &Context<'_>, by_name: &HashMap<&str, usize>) -> Re
         };
         dependent[place] = needs[place].iter().any(depends);
     }
-    Ok(Order {
-        sequence,
-        dependent,
-    })
+    dependent
 }
 
 /// Declarations whose size or value this one reads.
@@ -373,10 +355,10 @@ fn cycle(declarations: &[Declaration], path: &[(usize, usize)], closing: usize) 
 
 impl<'a> Symbols<'a> {
     /// A parameter: its value as sizes see it and its symbols as equations see it.
-    pub(super) fn parameter(
+    fn parameter(
         &self,
         context: &Context<'a>,
-        overrides: &Overrides,
+        overrides: &HashMap<usize, Vec<Override>>,
         sizes: &Sizes,
         place: usize,
     ) -> Result<Component> {
@@ -394,7 +376,8 @@ impl<'a> Symbols<'a> {
         let known = self.binding(context, declaration, Mode::Structural)?;
         let dims = self.parameter_dims(context, declaration, known.as_ref())?;
         sizes.charge(context, &dims, declaration)?;
-        let given = overrides.of(place, name, &dims, declaration.name)?;
+        let given = overrides.get(&place).map_or(&[][..], Vec::as_slice);
+        let given = by_offset(given, name, &dims, declaration.name)?;
         let parts = Parts {
             context,
             declaration,
@@ -644,75 +627,70 @@ fn expected_number(span: Span) -> Problem {
     Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 
-/// Values by declaration.
-pub(super) struct Overrides {
-    by_place: HashMap<usize, Vec<Override>>,
-}
-
+/// A value that the caller gives to a parameter, or to an element of one.
 struct Override {
     subscripts: Vec<usize>,
     value: f64,
 }
 
-impl Overrides {
-    pub(super) fn new(context: &Context<'_>, by_name: &HashMap<&str, usize>) -> Result<Self> {
-        let model = context.model;
-        let mut by_place: HashMap<usize, Vec<Override>> = HashMap::new();
-        for (key, &value) in &context.options.parameters {
-            let (name, subscripts) = split(key).ok_or_else(|| {
-                Problem::new(
-                    model.name,
-                    format!("`{key}` is not the name of a parameter"),
-                )
-                .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
-            })?;
-            // an element may be declared by itself: `x[3]`
-            let (name, subscripts) = match by_name.contains_key(key.trim()) {
-                true => (key.trim(), vec![]),
-                false => (name, subscripts),
-            };
-            let Some((&place, declaration)) = by_name
-                .get(name)
-                .and_then(|place| Some((place, model.declarations.get(*place)?)))
-            else {
-                return Err(unknown(model, name));
-            };
-            check_settable(name, declaration)?;
-            if !value.is_finite() {
-                let message = format!("parameter `{key}` is given the value {value}");
-                return Err(Problem::new(declaration.name, message).hint("give a finite number"));
-            }
-            by_place
-                .entry(place)
-                .or_default()
-                .push(Override { subscripts, value });
-        }
-        Ok(Self { by_place })
-    }
-
-    /// The values given to a declaration, by offset of its elements.
-    pub(super) fn of(
-        &self,
-        place: usize,
-        name: &str,
-        dims: &[usize],
-        span: Span,
-    ) -> Result<Vec<(usize, f64)>> {
-        let given = self.by_place.get(&place).map_or(&[][..], Vec::as_slice);
-        let offset = |given: &Override| {
-            let offset = offset(&given.subscripts, dims).ok_or_else(|| {
-                let size = describe_dims(dims);
-                let subscripts = describe_dims(&given.subscripts);
-                let message = format!(
-                    "a value is given for `{name}` {subscripts}, which has the size {size}"
-                );
-                Problem::new(span, message)
-                    .hint("give values to elements, such as `H[3]`, with subscripts from 1")
-            })?;
-            Ok((offset, given.value))
+/// The values that the caller gives, by place of the declaration.
+fn overrides(
+    context: &Context<'_>,
+    by_name: &HashMap<&str, usize>,
+) -> Result<HashMap<usize, Vec<Override>>> {
+    let model = context.model;
+    let mut by_place: HashMap<usize, Vec<Override>> = HashMap::new();
+    for (key, &value) in &context.options.parameters {
+        let (name, subscripts) = split(key).ok_or_else(|| {
+            Problem::new(
+                model.name,
+                format!("`{key}` is not the name of a parameter"),
+            )
+            .hint("names of parameters read `k`, `H[3]` or `A[1,2]`")
+        })?;
+        // an element may be declared by itself: `x[3]`
+        let (name, subscripts) = match by_name.contains_key(key.trim()) {
+            true => (key.trim(), vec![]),
+            false => (name, subscripts),
         };
-        given.iter().map(offset).collect()
+        let Some((&place, declaration)) = by_name
+            .get(name)
+            .and_then(|place| Some((place, model.declarations.get(*place)?)))
+        else {
+            return Err(unknown(model, name));
+        };
+        check_settable(name, declaration)?;
+        if !value.is_finite() {
+            let message = format!("parameter `{key}` is given the value {value}");
+            return Err(Problem::new(declaration.name, message).hint("give a finite number"));
+        }
+        by_place
+            .entry(place)
+            .or_default()
+            .push(Override { subscripts, value });
     }
+    Ok(by_place)
+}
+
+/// The values given to a declaration, by offset of its elements.
+fn by_offset(
+    given: &[Override],
+    name: &str,
+    dims: &[usize],
+    span: Span,
+) -> Result<Vec<(usize, f64)>> {
+    let offset = |given: &Override| {
+        let offset = offset(&given.subscripts, dims).ok_or_else(|| {
+            let size = describe_dims(dims);
+            let subscripts = describe_dims(&given.subscripts);
+            let message =
+                format!("a value is given for `{name}` {subscripts}, which has the size {size}");
+            Problem::new(span, message)
+                .hint("give values to elements, such as `H[3]`, with subscripts from 1")
+        })?;
+        Ok((offset, given.value))
+    };
+    given.iter().map(offset).collect()
 }
 
 fn check_settable(name: &str, declaration: &Declaration) -> Result<()> {
@@ -736,18 +714,13 @@ fn unknown(model: &FlatModel, name: &str) -> Problem {
         .map(|declaration| declaration.label.as_str())
         .collect();
     let model_name = &model.title;
-    let hint = did_you_mean(name, names.iter().copied()).or_else(|| {
-        let listed: Vec<&str> = names.iter().copied().take(12).collect();
-        let more = if names.len() > 12 { ", …" } else { "" };
-        let some = format!("its parameters are {}{more}", listed.join(", "));
-        Some(if names.is_empty() {
-            "it has no parameters".to_owned()
-        } else {
-            some
-        })
-    });
+    let hint =
+        did_you_mean(name, names.iter().copied()).unwrap_or_else(|| match names.is_empty() {
+            true => "it has no parameters".to_owned(),
+            false => listed("parameters", &names),
+        });
     let message = format!("model `{model_name}` has no parameter `{name}`");
-    Problem::new(model.name, message).maybe_hint(hint)
+    Problem::new(model.name, message).hint(hint)
 }
 
 /// `H[3]` as `H` and 3.

@@ -1,5 +1,6 @@
 //! Expressions of the syntax tree to values over the graph; what dotted and subscripted names lead to.
 
+use crate::Assertion;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
@@ -42,7 +43,7 @@ pub(crate) struct Evaluator<'a> {
     /// conditions of the `if`s around
     pub(super) conditions: Vec<OnPath>,
     /// what is to hold along a run
-    pub(super) claims: Vec<Claim>,
+    pub(super) claims: Vec<(Assertion, Span)>,
     /// what tables are between their points
     pub(super) tables: Tables,
     /// where it is told of what the points of tables are made
@@ -378,15 +379,6 @@ impl Evaluator<'_> {
             on_path.holds = true;
         }
     }
-}
-
-/// An `assert` that is not known to hold.
-#[derive(Clone, Debug)]
-pub(crate) struct Claim {
-    pub condition: Node,
-    pub message: String,
-    pub is_warning: bool,
-    pub span: Span,
 }
 
 impl<'a> Evaluator<'a> {

@@ -1,13 +1,13 @@
 //! Statements, carried out on expressions: what is left are the values of the variables.
 
-use super::evaluate::Claim;
+use crate::Assertion;
 use lynkeus_expr::{Binary, Unary};
 
 use super::evaluate::{Branches, Evaluator, joined};
 use super::scope::{Frame, Local};
 use super::value::{Array, Outcome, Record, Scalar, Value, describe_dims};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::syntax::ast::{Assert, Ast, ExprId, Iterator as Loop, Kind, Statement, StatementKind};
+use crate::syntax::ast::{Assert, Ast, ExprId, ForIndex, Kind, Statement, StatementKind};
 use crate::syntax::plain;
 
 /// How a list of statements ended.
@@ -96,29 +96,24 @@ impl<'a> Evaluator<'a> {
             }
             Some(value) if value != 0.0 => Ok(()),
             _ => {
-                self.claims.push(Claim {
+                let claim = Assertion {
                     condition,
                     message: assert.message.clone(),
+                    line: span.line(self.source),
                     is_warning: assert.is_warning,
-                    span,
-                });
+                };
+                self.claims.push((claim, span));
                 Ok(())
             }
         }
     }
 
-    fn repeated(&mut self, iterators: &'a [Loop], body: &'a [Statement]) -> Result<Ended> {
+    fn repeated(&mut self, iterators: &'a [ForIndex], body: &'a [Statement]) -> Result<Ended> {
         let Some((first, rest)) = iterators.split_first() else {
             return self.execute(body);
         };
         let value = self.value(first.range)?;
-        if value.dims().len() != 1 {
-            let found = describe_dims(value.dims());
-            let message = format!("expected a range, found {found}");
-            let problem = Problem::new(self.span(first.range), message);
-            return Err(problem.hint("write `for i in 1:N`"));
-        }
-        for turn in value.into_array().elements {
+        for turn in self.range_elements(value, self.span(first.range))? {
             self.budget.charge(1, first.name)?;
             self.loops.push((self.text(first.name), turn));
             let ended = self.repeated(rest, body);

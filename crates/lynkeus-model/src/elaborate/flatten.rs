@@ -1,8 +1,9 @@
 //! Equations of the text to scalar equations over the graph.
 
+use crate::Assertion;
 use lynkeus_expr::{Binary, Node};
 
-use super::evaluate::{Branches, Claim, Evaluator};
+use super::evaluate::{Branches, Evaluator};
 use super::execute;
 use super::scope::{Context, Frame, Local, Mode, Named};
 use super::symbols::Symbols;
@@ -10,7 +11,7 @@ use super::value::{Outcome, Record, Scalar, Value, describe_dims, element_name};
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{
-    Declaration, Equation, EquationKind, ExprId, Iterator as Loop, Kind, Statement, Variability,
+    Declaration, Equation, EquationKind, ExprId, ForIndex, Kind, Statement, Variability,
 };
 use crate::syntax::plain;
 
@@ -20,7 +21,8 @@ pub(super) struct Flat {
     /// of the section `initial equation`; with the places of those that are not read
     pub initial: Vec<FlatEquation>,
     pub initial_unread: Vec<Span>,
-    pub claims: Vec<Claim>,
+    /// what is to hold along a run, and where that stands
+    pub claims: Vec<(Assertion, Span)>,
 }
 
 /// All scalar equations of a model, declaration equations first.
@@ -199,7 +201,7 @@ impl<'a> Flattener<'a> {
         Ok(())
     }
 
-    fn repeat(&mut self, iterators: &'a [Loop], body: &'a [Equation]) -> Result<()> {
+    fn repeat(&mut self, iterators: &'a [ForIndex], body: &'a [Equation]) -> Result<()> {
         let Some((first, rest)) = iterators.split_first() else {
             return self.all(body);
         };

@@ -54,15 +54,14 @@ pub(crate) fn plant(source: &str, options: &LoadOptions) -> Result<(Plant, Vec<P
         options,
         table_points: &RefCell::new(BTreeSet::new()),
     };
-    let parts = graph.budgeted(options.budget.clone(), || {
+    let done = graph.budgeted(options.budget.clone(), || {
         let symbols = Symbols::new(&context)?;
         let flat = flatten::flatten(&context, &symbols)?;
-        assemble::parts(&context, &symbols, &flat)
+        assemble::plant(&context, &symbols, flat)
     });
-    let mut parts = parts.map_err(|spent| ended(model, spent))??;
-    let mut warnings = std::mem::take(&mut parts.warnings);
+    let (plant, mut warnings) = done.map_err(|spent| ended(model, spent))??;
     warnings.extend(crate::units::check(source, ast, model));
-    Ok((parts.with_graph(graph), warnings))
+    Ok((Plant { graph, ..plant }, warnings))
 }
 
 /// A limit ended the reading.

@@ -121,14 +121,6 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// The piece between two points.
-struct Piece<'g> {
-    left: End<'g>,
-    right: End<'g>,
-    /// what is added to the left value for the right one
-    rise: Expr<'g>,
-}
-
 /// A point of the table with the slope there.
 #[derive(Clone, Copy)]
 struct End<'g> {
@@ -143,19 +135,18 @@ impl<'g> End<'g> {
     }
 }
 
-impl<'g> Piece<'g> {
-    /// Hermite's cubic. Written so that at both ends the value, and what the rules of
-    /// differentiation make of the slope, are those of the ends to the bit: neighbours meet
-    /// without a jump, and what looks for jumps sees that they do.
-    fn cubic(&self, u: Expr<'g>) -> Expr<'g> {
-        let (from, to) = (u - self.left.x, self.right.x - u);
-        let width = self.right.x - self.left.x;
-        let (share, rest) = (from / width, to / width);
-        let rise = self.rise * (share * share * (3.0 - 2.0 * share));
-        let left = self.left.slope * (from * (rest * rest));
-        let right = self.right.slope * (to * (share * share));
-        self.left.y + rise + (left - right)
-    }
+/// Hermite's cubic between two points; `rise` is added to the left value for the right one. Written
+/// so that at both ends the value, and what the rules of differentiation make of the slope, are
+/// those of the ends to the bit: neighbours meet without a jump, and what looks for jumps sees
+/// that they do.
+fn cubic<'g>(left: End<'g>, right: End<'g>, rise: Expr<'g>, u: Expr<'g>) -> Expr<'g> {
+    let (from, to) = (u - left.x, right.x - u);
+    let width = right.x - left.x;
+    let (share, rest) = (from / width, to / width);
+    let rise = rise * (share * share * (3.0 - 2.0 * share));
+    let at_left = left.slope * (from * (rest * rest));
+    let at_right = right.slope * (to * (share * share));
+    left.y + rise + (at_left - at_right)
 }
 
 /// The cubic through the points (x[i], y[i]) at u, and along its tangents outside of them.
@@ -178,7 +169,7 @@ pub(super) fn monotone_cubic(graph: &Graph, x: &[Node], y: &[Node], u: Node) -> 
     // the pieces from −∞ to ∞, each with where it ends
     let inner = ends.windows(2).zip(&rises).map(|(pair, &rise)| {
         let [left, right] = [pair[0], pair[1]];
-        (Piece { left, right, rise }.cubic(u), right.x)
+        (cubic(left, right, rise, u), right.x)
     });
     let pieces: Vec<(Expr<'_>, Expr<'_>)> = std::iter::once((first.tangent(u), first.x))
         .chain(inner)

@@ -457,8 +457,10 @@ impl Flattening<'_> {
                 let full = format!("{}.{}", package.path, constant.label);
                 let label = constant_label(&full);
                 let is_constant = constant.prefix.variability != Variability::Continuous;
-                let meaning = meaning(&named, &full);
-                if !is_constant || meaning == Meaning::None || self.declared.contains(&label) {
+                let is_meant = is_meant(&named, &full);
+                // its last part alone may be the name of a variable
+                let may_be_meant = is_meant || named.contains(last(&full));
+                if !is_constant || !may_be_meant || self.declared.contains(&label) {
                     continue;
                 }
                 let mut copy = constant.clone();
@@ -467,10 +469,10 @@ impl Flattening<'_> {
                 copy.prefix.variability = Variability::Constant;
                 let declared = self.declaration(copy, &package.path);
                 // what nobody may mean must not end the reading
-                if meaning == Meaning::Possible {
-                    self.model.possible.insert(label);
-                } else {
+                if is_meant {
                     declared?;
+                } else {
+                    self.model.possible.insert(label);
                 }
             }
         }
@@ -513,28 +515,16 @@ fn insert(names: &mut HashSet<String>, name: &str) {
     }
 }
 
-/// Whether a constant is meant by a name of the text.
-#[derive(Clone, Copy, PartialEq)]
-enum Meaning {
-    None,
-    /// its last part stands there alone, which may be the name of a variable
-    Possible,
-    Certain,
-}
-
-/// The meaning of a name in full that stands in the text as it is, or behind one of its dots.
-fn meaning(names: &HashSet<String>, full: &str) -> Meaning {
+/// Whether a name in full stands in the text as it is, or behind one of its dots.
+fn is_meant(names: &HashSet<String>, full: &str) -> bool {
     let mut rest = full;
     while let Some((_, below)) = rest.split_once('.') {
         if names.contains(rest) {
-            return Meaning::Certain;
+            return true;
         }
         rest = below;
     }
-    match names.contains(rest) {
-        true => Meaning::Possible,
-        false => Meaning::None,
-    }
+    false
 }
 
 /// The classes of a text by their names in full.

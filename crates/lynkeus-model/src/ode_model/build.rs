@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, HashMap};
 
 use lynkeus_expr::Node;
 
-use super::parser::{Equation, Mention, Model as Syntax, is_elementary};
+use super::lexer::Mention;
+use super::parser::{Equation, ParsedModel, is_elementary};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::elaborate::{Evaluator, GivenNames, Mode};
 use crate::limits::{Budget, MAX_SCALARS, elaboration};
@@ -20,42 +21,36 @@ enum Role {
     Parameter,
 }
 
-/// The names that no equation defines, where they first stand.
-#[derive(Debug, Default)]
-pub(super) struct Roles {
-    pub inputs: Vec<Span>,
-    pub parameters: Vec<Span>,
+/// What the names of a model are.
+pub(super) struct Roles<'s> {
+    source: &'s str,
+    /// every name so far, with its role and where it first stands
+    known: HashMap<&'s str, (Role, Span)>,
+    budget: Budget,
+    /// names that no equation defines, where they first stand
+    inputs: Vec<Span>,
+    parameters: Vec<Span>,
 }
 
 /// Says what every name is.
-pub(super) fn roles(source: &str, model: &Syntax) -> Result<Roles> {
-    let mut names = Names {
+pub(super) fn roles<'s>(source: &'s str, model: &ParsedModel) -> Result<Roles<'s>> {
+    let mut roles = Roles {
         source,
         known: HashMap::new(),
         budget: Budget::new(MAX_SCALARS, "variables and parameters"),
+        inputs: vec![],
+        parameters: vec![],
     };
     for equation in &model.equations {
-        names.define(equation)?;
+        roles.define(equation)?;
     }
-    let mut roles = Roles::default();
     for mention in &model.mentions {
-        match names.mention(*mention)? {
-            Some(Role::Input) => roles.inputs.push(mention.name),
-            Some(_) => roles.parameters.push(mention.name),
-            None => {}
-        }
+        roles.mention(*mention)?;
     }
     Ok(roles)
 }
 
-/// Every name so far, with its role and where it first stands.
-struct Names<'s> {
-    source: &'s str,
-    known: HashMap<&'s str, (Role, Span)>,
-    budget: Budget,
-}
-
-impl<'s> Names<'s> {
+impl<'s> Roles<'s> {
     fn insert(&mut self, name: Span, role: Role) -> Result<()> {
         let text = name.text(self.source);
         if text == "time" {
@@ -99,8 +94,8 @@ impl<'s> Names<'s> {
         ))
     }
 
-    /// The role of a name on a right side, where it is new.
-    fn mention(&mut self, mention: Mention) -> Result<Option<Role>> {
+    /// A name on a right side.
+    fn mention(&mut self, mention: Mention) -> Result<()> {
         let Mention { name, is_function } = mention;
         let text = name.text(self.source);
         let role = match is_function {
@@ -109,12 +104,19 @@ impl<'s> Names<'s> {
         };
         match self.known.get(text).copied() {
             None if text == "t" => Err(Problem::new(name, "`t` is the time, not a function of it")),
-            None => self.insert(name, role).map(|()| Some(role)),
+            None => {
+                self.insert(name, role)?;
+                match is_function {
+                    true => self.inputs.push(name),
+                    false => self.parameters.push(name),
+                }
+                Ok(())
+            }
             Some((Role::Output, _)) => Err(self.output_on_the_right(name)),
             Some((known, place)) if is_function == (known == Role::Parameter) => {
                 Err(self.with_and_without_time(name, place))
             }
-            Some(_) => Ok(None),
+            Some(_) => Ok(()),
         }
     }
 
@@ -140,8 +142,8 @@ impl<'s> Names<'s> {
 pub(super) fn plant(
     source: &str,
     name: &str,
-    syntax: &Syntax,
-    roles: &Roles,
+    syntax: &ParsedModel,
+    roles: &Roles<'_>,
     options: &LoadOptions,
 ) -> Result<Plant> {
     check_given(source, syntax, roles, options)?;
@@ -179,7 +181,7 @@ pub(super) fn plant(
 /// Evaluates the right sides.
 fn equations(
     source: &str,
-    syntax: &Syntax,
+    syntax: &ParsedModel,
     model: &Model,
     nodes: &HashMap<&str, Node>,
 ) -> Result<()> {
@@ -205,7 +207,12 @@ fn equations(
 }
 
 /// Refuses values for what is no parameter, and values that are no numbers.
-fn check_given(source: &str, syntax: &Syntax, roles: &Roles, options: &LoadOptions) -> Result<()> {
+fn check_given(
+    source: &str,
+    syntax: &ParsedModel,
+    roles: &Roles<'_>,
+    options: &LoadOptions,
+) -> Result<()> {
     if options.parameters.is_empty() {
         return Ok(());
     }

@@ -4,8 +4,7 @@
 //! only comments and strings have to be known, as they may speak of models.
 
 use crate::diagnostic::{Problem, Result, Span};
-use crate::limits::MAX_NAME;
-use crate::syntax::shortened;
+use crate::syntax::{Language, Symbol, Token, check_name};
 
 /// Whether a name may begin so.
 pub(super) fn starts_name(character: char) -> bool {
@@ -146,18 +145,20 @@ fn assigned_name(source: &str, at: usize) -> Option<Span> {
     is_name.then(|| Span::new(start, before.len()))
 }
 
-/// One token; its text is the source under its span.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Token {
-    Name,
-    Number,
-    Symbol(&'static str),
-    /// the end of the text
-    End,
-}
-
 /// Operators and punctuation; longer ones first.
-const SYMBOLS: [&str; 11] = ["//", "+", "-", "*", "/", "^", "=", "(", ")", ",", "'"];
+const SYMBOLS: [Symbol; 11] = [
+    Symbol::Rational,
+    Symbol::Plus,
+    Symbol::Minus,
+    Symbol::Times,
+    Symbol::Over,
+    Symbol::Power,
+    Symbol::Equal,
+    Symbol::OpenParen,
+    Symbol::CloseParen,
+    Symbol::Comma,
+    Symbol::Prime,
+];
 
 /// Words of Julia that cannot be names.
 const RESERVED: [&str; 16] = [
@@ -165,30 +166,28 @@ const RESERVED: [&str; 16] = [
     "true", "false", "const", "in", "isa",
 ];
 
-impl Token {
-    /// How a message names it.
-    pub(super) fn describe(self, text: &str) -> String {
-        match self {
-            Token::Name | Token::Number => format!("`{}`", shortened(text)),
-            Token::Symbol(symbol) => format!("`{symbol}`"),
-            Token::End => "the end of the text".to_owned(),
-        }
-    }
-}
-
-/// Reads tokens from a text.
+/// A model while it is read: where the next token begins, and what was found so far.
 pub(super) struct Lexer<'s> {
     source: &'s str,
     position: usize,
+    /// the word `@ODEmodel`
+    head: Span,
+    /// names on the right sides, in order
+    pub mentions: Vec<Mention>,
 }
 
-impl<'s> Lexer<'s> {
-    pub(super) fn new(source: &'s str, position: usize) -> Self {
-        Self { source, position }
-    }
+/// A name on a right side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mention {
+    pub name: Span,
+    /// `x(t)` and not `x`
+    pub is_function: bool,
+}
 
-    /// The next token; `Token::End` from the end of the text on.
-    pub(super) fn next(&mut self) -> Result<(Token, Span)> {
+impl Language for Lexer<'_> {
+    const NESTED: &'static str = "write it with fewer parentheses";
+
+    fn next(&mut self) -> Result<(Token, Span)> {
         self.skip_blank()?;
         let start = self.position;
         let token = match self.rest().chars().next() {
@@ -199,6 +198,28 @@ impl<'s> Lexer<'s> {
             Some(character) => self.symbol(character)?,
         };
         Ok((token, Span::new(start, self.position)))
+    }
+
+    fn too_large(&self, limit: &str, span: Span) -> Problem {
+        let message = format!("the model has more than {limit} operands and operators");
+        Problem::new(span, message)
+    }
+
+    fn hint_at_end(&self) -> Option<String> {
+        let line = self.head.line(self.source);
+        Some(format!("close the model of line {line} with `)`"))
+    }
+}
+
+impl<'s> Lexer<'s> {
+    /// Reads the model that begins with the word at `head`.
+    pub(super) fn new(source: &'s str, head: Span) -> Self {
+        Self {
+            source,
+            position: head.end as usize,
+            head,
+            mentions: vec![],
+        }
     }
 
     fn rest(&self) -> &'s str {
@@ -229,16 +250,13 @@ impl<'s> Lexer<'s> {
         self.position = name_end(self.source, start);
         let span = Span::new(start, self.position);
         let name = span.text(self.source);
-        if name.len() > MAX_NAME {
-            let message = format!("this name is longer than {MAX_NAME} characters");
-            return Err(Problem::new(span, message).hint("choose a shorter name"));
-        }
+        check_name(span)?;
         if RESERVED.contains(&name) {
             let message = format!("`{name}` is not supported in a model");
             let hint = "a model holds equations such as `x'(t) = …` only";
             return Err(Problem::new(span, message).hint(hint));
         }
-        Ok(Token::Name)
+        Ok(Token::Identifier)
     }
 
     /// `1`, `1_000`, `1.5`, `.5`, `2.`, `1.0e-3`.
@@ -264,7 +282,7 @@ impl<'s> Lexer<'s> {
         }
         match is_prefixed {
             true => Err(self.strange_number(start)),
-            false => Ok(Token::Number),
+            false => Ok(Token::Real),
         }
     }
 
@@ -288,9 +306,9 @@ impl<'s> Lexer<'s> {
 
     fn symbol(&mut self, found: char) -> Result<Token> {
         let rest = self.rest();
-        if let Some(symbol) = SYMBOLS.iter().find(|symbol| rest.starts_with(**symbol)) {
-            self.position += symbol.len();
-            return Ok(Token::Symbol(symbol));
+        if let Some(symbol) = SYMBOLS.iter().find(|s| rest.starts_with(s.text())) {
+            self.position += symbol.text().len();
+            return Ok(Token::Symbol(*symbol));
         }
         let span = Span::new(self.position, self.position + found.len_utf8());
         let problem = Problem::new(span, format!("unexpected character {found:?}"));
@@ -365,7 +383,7 @@ mod tests {
     }
 
     fn tokens(text: &str) -> Vec<(Token, &str)> {
-        let mut lexer = Lexer::new(text, 0);
+        let mut lexer = Lexer::new(text, Span::default());
         let mut all = vec![];
         loop {
             let (token, span) = lexer.next().unwrap();
@@ -379,11 +397,11 @@ mod tests {
     #[test]
     fn numbers() {
         for text in ["1", "1_000", "1.5", ".5", "2.", "1.0e-3", "1e6", "2E+3"] {
-            assert_eq!(tokens(text), [(Token::Number, text)]);
+            assert_eq!(tokens(text), [(Token::Real, text)]);
         }
-        assert_eq!(tokens("2e"), [(Token::Number, "2"), (Token::Name, "e")]);
+        assert_eq!(tokens("2e"), [(Token::Real, "2"), (Token::Identifier, "e")]);
         for text in ["1f0", "0x1f", "0b1", "0o7"] {
-            assert!(Lexer::new(text, 0).next().is_err(), "{text}");
+            assert!(Lexer::new(text, Span::default()).next().is_err(), "{text}");
         }
     }
 
@@ -391,7 +409,7 @@ mod tests {
     fn names_and_comments() {
         let names = ["β", "x₁", "_a", "ẋ", "x\u{302}", "In", "δₜ"];
         for name in names {
-            assert_eq!(tokens(name), [(Token::Name, name)]);
+            assert_eq!(tokens(name), [(Token::Identifier, name)]);
         }
         assert_eq!(tokens("a # b\n #= c #= d =# =# e").len(), 2);
     }
@@ -399,7 +417,7 @@ mod tests {
     #[test]
     fn refuses_strange_characters() {
         for text in ["\0", "[", "!", "\"", "2.*x", "begin", "#=", ";"] {
-            let mut lexer = Lexer::new(text, 0);
+            let mut lexer = Lexer::new(text, Span::default());
             let first = lexer.next();
             assert!(first.and_then(|_| lexer.next()).is_err(), "{text:?}");
         }

@@ -1,14 +1,13 @@
 //! A model's equations to a syntax tree; expressions have the precedence they have in Julia.
 
-use super::lexer::{Lexer, Token};
+use super::lexer::{Lexer, Mention};
 use crate::diagnostic::{Problem, Result, Span};
-use crate::limits::{MAX_NESTING, MAX_SYNTAX_NODES, grouped};
 use crate::names::did_you_mean;
-use crate::syntax::ast::{Ast, BinaryOperator, Call, ExprId, Expression, Kind, UnaryOperator};
-use crate::syntax::shortened;
+use crate::syntax::ast::{Ast, BinaryOperator, Call, ExprId, Kind, UnaryOperator};
+use crate::syntax::{Parser, Symbol, Token, shortened};
 
 /// A parsed model.
-pub(super) struct Model {
+pub(super) struct ParsedModel {
     /// the word `@ODEmodel`
     pub head: Span,
     pub equations: Vec<Equation>,
@@ -24,50 +23,20 @@ pub(super) struct Equation {
     pub right: ExprId,
 }
 
-/// A name on a right side.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Mention {
-    pub name: Span,
-    /// `x(t)` and not `x`
-    pub is_function: bool,
-}
-
-/// Recursive-descent parser with one token of lookahead.
-pub(super) struct Parser<'s> {
-    pub(super) source: &'s str,
-    lexer: Lexer<'s>,
-    pub(super) token: Token,
-    pub(super) span: Span,
-    /// the token before the current one
-    pub(super) last: Span,
-    depth: usize,
-    nodes: usize,
-    pub(super) model: Model,
-}
-
 /// Parses the model that begins with the word at `head`.
-pub(super) fn parse(source: &str, head: Span) -> Result<Model> {
-    let mut parser = Parser {
-        source,
-        lexer: Lexer::new(source, head.end as usize),
-        token: Token::End,
-        span: head,
-        last: head,
-        depth: 0,
-        nodes: 0,
-        model: Model {
-            head,
-            equations: vec![],
-            mentions: vec![],
-            ast: Ast::default(),
-        },
-    };
+pub(super) fn parse(source: &str, head: Span) -> Result<ParsedModel> {
+    let mut parser = Parser::behind(head, source, Lexer::new(source, head));
     parser.opening()?;
-    parser.equations()?;
-    Ok(parser.model)
+    let equations = parser.equations(head)?;
+    Ok(ParsedModel {
+        head,
+        equations,
+        mentions: parser.lexer.mentions,
+        ast: parser.ast,
+    })
 }
 
-impl Parser<'_> {
+impl Parser<'_, Lexer<'_>> {
     /// The parenthesis behind `@ODEmodel`.
     fn opening(&mut self) -> Result<()> {
         let rest = self
@@ -83,10 +52,11 @@ impl Parser<'_> {
         Ok(())
     }
 
-    fn equations(&mut self) -> Result<()> {
-        while !self.at(")") {
-            self.equation()?;
-            if self.at(")") || self.accept(",")? {
+    fn equations(&mut self, head: Span) -> Result<Vec<Equation>> {
+        let mut equations = vec![];
+        while !self.at(Symbol::CloseParen) {
+            equations.push(self.equation()?);
+            if self.at(Symbol::CloseParen) || self.accept(Symbol::Comma)? {
                 continue;
             }
             let between = Span::new(self.last.end as usize, self.span.start as usize);
@@ -95,46 +65,45 @@ impl Parser<'_> {
                 return Err(self.unexpected("an operator, `,` or `)`"));
             }
         }
-        if self.model.equations.is_empty() {
-            let problem = Problem::new(self.model.head, "the model has no equations");
+        if equations.is_empty() {
+            let problem = Problem::new(head, "the model has no equations");
             return Err(problem.hint("write `x'(t) = …` for states and `y(t) = …` for outputs"));
         }
-        Ok(())
+        Ok(equations)
     }
 
-    fn equation(&mut self) -> Result<()> {
+    fn equation(&mut self) -> Result<Equation> {
         let name = self.left_name()?;
-        let is_derivative = self.accept("'")?;
-        if is_derivative && self.at("'") {
+        let is_derivative = self.accept(Symbol::Prime)?;
+        if is_derivative && self.at(Symbol::Prime) {
             return Err(self.second_derivative(name));
         }
-        if self.at("=") {
+        if self.at(Symbol::Equal) {
             let text = name.text(self.source);
             let prime = if is_derivative { "'" } else { "" };
             let problem = self.unexpected(&format!("`(t)` behind `{text}{prime}`"));
             let hint = format!("write `{text}'(t) = …` for a state, `{text}(t) = …` for an output");
             return Err(problem.hint(hint));
         }
-        self.expect("(")?;
+        self.expect(Symbol::OpenParen)?;
         self.time_argument(name)?;
-        if self.at("'") {
+        if self.at(Symbol::Prime) {
             let text = name.text(self.source);
             let problem = self.unexpected("`=`");
             return Err(problem.hint(format!("a derivative reads `{text}'(t)`")));
         }
-        self.expect("=")?;
+        self.expect(Symbol::Equal)?;
         let right = self.expression()?;
         self.count(1)?;
-        self.model.equations.push(Equation {
+        Ok(Equation {
             name,
             is_derivative,
             right,
-        });
-        Ok(())
+        })
     }
 
     fn left_name(&mut self) -> Result<Span> {
-        if self.token == Token::Name {
+        if self.token == Token::Identifier {
             return self.advance();
         }
         let problem = self.unexpected("an equation or `)`");
@@ -157,7 +126,7 @@ impl Parser<'_> {
     pub(super) fn time_argument(&mut self, name: Span) -> Result<()> {
         if self.at_time() {
             self.advance()?;
-            if self.accept(")")? {
+            if self.accept(Symbol::CloseParen)? {
                 return Ok(());
             }
         }
@@ -168,87 +137,7 @@ impl Parser<'_> {
     }
 
     pub(super) fn at_time(&self) -> bool {
-        self.token == Token::Name && self.span.text(self.source) == "t"
-    }
-
-    /// Moves to the next token; returns the span of the one left behind.
-    pub(super) fn advance(&mut self) -> Result<Span> {
-        self.last = self.span;
-        (self.token, self.span) = self.lexer.next()?;
-        Ok(self.last)
-    }
-
-    pub(super) fn at(&self, symbol: &'static str) -> bool {
-        self.token == Token::Symbol(symbol)
-    }
-
-    pub(super) fn accept(&mut self, symbol: &'static str) -> Result<bool> {
-        let found = self.at(symbol);
-        if found {
-            self.advance()?;
-        }
-        Ok(found)
-    }
-
-    pub(super) fn expect(&mut self, symbol: &'static str) -> Result<Span> {
-        match self.at(symbol) {
-            true => self.advance(),
-            false => Err(self.unexpected(&format!("`{symbol}`"))),
-        }
-    }
-
-    /// "expected …, found …" at the current token.
-    pub(super) fn unexpected(&self, expected: &str) -> Problem {
-        let found = self.token.describe(self.span.text(self.source));
-        let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
-        if self.token != Token::End {
-            return problem;
-        }
-        let line = self.model.head.line(self.source);
-        problem.hint(format!("close the model of line {line} with `)`"))
-    }
-
-    /// Runs a part of the grammar one level deeper.
-    pub(super) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
-        if self.depth >= MAX_NESTING {
-            let message = format!("nested more than {MAX_NESTING} levels deep");
-            return Err(Problem::new(self.span, message).hint("write it with fewer parentheses"));
-        }
-        self.depth += 1;
-        let result = parse(self);
-        self.depth -= 1;
-        result
-    }
-
-    /// Counts parts of the syntax tree.
-    pub(super) fn count(&mut self, weight: usize) -> Result<()> {
-        self.nodes += weight;
-        if self.nodes > MAX_SYNTAX_NODES {
-            let limit = grouped(MAX_SYNTAX_NODES as u64);
-            let message = format!("the model has more than {limit} operands and operators");
-            return Err(Problem::new(self.span, message));
-        }
-        Ok(())
-    }
-
-    /// The id the next expression will get.
-    pub(super) fn next_id(&self) -> ExprId {
-        ExprId(self.model.ast.expressions.len() as u32)
-    }
-
-    /// Adds an expression that spans from `start` to the last token.
-    pub(super) fn push(&mut self, kind: Kind, start: Span, first: ExprId) -> Result<ExprId> {
-        let span = start.to(self.last);
-        self.push_at(kind, span, first)
-    }
-
-    /// Adds an expression with a span of its own.
-    pub(super) fn push_at(&mut self, kind: Kind, span: Span, first: ExprId) -> Result<ExprId> {
-        self.count(1)?;
-        let id = self.next_id();
-        let expression = Expression { kind, span, first };
-        self.model.ast.expressions.push(expression);
-        Ok(id)
+        self.token == Token::Identifier && self.span.text(self.source) == "t"
     }
 }
 
@@ -268,7 +157,7 @@ pub(super) fn is_elementary(name: &str) -> bool {
     FUNCTIONS.contains(&name)
 }
 
-impl Parser<'_> {
+impl Parser<'_, Lexer<'_>> {
     /// Any expression.
     pub(super) fn expression(&mut self) -> Result<ExprId> {
         self.operators(SUM)
@@ -299,8 +188,8 @@ impl Parser<'_> {
     /// A power with signs before it: `-x^2` is −(x²).
     fn operand(&mut self) -> Result<ExprId> {
         let operator = match self.token {
-            Token::Symbol("-") => UnaryOperator::Minus,
-            Token::Symbol("+") => UnaryOperator::Plus,
+            Token::Symbol(Symbol::Minus) => UnaryOperator::Minus,
+            Token::Symbol(Symbol::Plus) => UnaryOperator::Plus,
             _ => return self.power(),
         };
         let (start, first) = (self.advance()?, self.next_id());
@@ -312,15 +201,18 @@ impl Parser<'_> {
     /// any operator but the power: `1/2x^2` is 1/(2x²).
     fn power(&mut self) -> Result<ExprId> {
         let (start, first) = (self.span, self.next_id());
-        let is_number = self.token == Token::Number;
+        let is_number = self.token == Token::Real;
         let base = self.primary()?;
         let is_adjacent = self.last.end == self.span.start;
-        if is_number && is_adjacent && (self.token == Token::Name || self.at("(")) {
+        if is_number
+            && is_adjacent
+            && (self.token == Token::Identifier || self.at(Symbol::OpenParen))
+        {
             let factor = self.nested(Self::power)?;
             let product = vec![(BinaryOperator::Multiply, factor)];
             return self.push(Kind::Chain(base, product), start, first);
         }
-        if !self.accept("^")? {
+        if !self.accept(Symbol::Power)? {
             return Ok(base);
         }
         let exponent = self.nested(Self::operand)?;
@@ -329,15 +221,15 @@ impl Parser<'_> {
 
     fn primary(&mut self) -> Result<ExprId> {
         match self.token {
-            Token::Number => self.number(),
-            Token::Name => self.name(),
-            Token::Symbol("(") => {
+            Token::Real => self.number(),
+            Token::Identifier => self.name(),
+            Token::Symbol(Symbol::OpenParen) => {
                 self.advance()?;
                 let inner = self.expression()?;
-                self.expect(")")?;
+                self.expect(Symbol::CloseParen)?;
                 Ok(inner)
             }
-            Token::Symbol("=") => {
+            Token::Symbol(Symbol::Equal) => {
                 let problem = self.unexpected("an operand");
                 Err(problem.hint("an equation has one `=`"))
             }
@@ -347,17 +239,9 @@ impl Parser<'_> {
 
     fn number(&mut self) -> Result<ExprId> {
         let (span, first) = (self.span, self.next_id());
-        let text = span.text(self.source);
-        match text.replace('_', "").parse::<f64>() {
-            Ok(value) if value.is_finite() => {
-                self.advance()?;
-                self.push(Kind::Real(value), span, first)
-            }
-            _ => {
-                let message = format!("the number {} is too large", shortened(text));
-                Err(Problem::new(span, message))
-            }
-        }
+        let value = self.real_value()?;
+        self.advance()?;
+        self.push(Kind::Real(value), span, first)
     }
 
     /// `a`, `x(t)`, `exp(…)`.
@@ -365,10 +249,10 @@ impl Parser<'_> {
         let first = self.next_id();
         let is_time = self.at_time();
         let name = self.advance()?;
-        if self.at("'") {
+        if self.at(Symbol::Prime) {
             return Err(self.derivative(name));
         }
-        let is_function = self.at("(");
+        let is_function = self.at(Symbol::OpenParen);
         if is_function && is_elementary(name.text(self.source)) {
             return self.call(name, first);
         }
@@ -378,13 +262,13 @@ impl Parser<'_> {
                 return Err(self.unknown_function(name));
             }
             self.time_argument(name)?;
-            if self.at("'") {
+            if self.at(Symbol::Prime) {
                 return Err(self.derivative(name));
             }
         }
         if is_function || !is_time {
             let mention = Mention { name, is_function };
-            self.model.mentions.push(mention);
+            self.lexer.mentions.push(mention);
         }
         self.push_at(Kind::Name, name, first)
     }
@@ -392,13 +276,13 @@ impl Parser<'_> {
     fn call(&mut self, function: Span, first: ExprId) -> Result<ExprId> {
         self.advance()?;
         let mut arguments = vec![];
-        while !self.at(")") {
+        while !self.at(Symbol::CloseParen) {
             arguments.push(self.expression()?);
-            if !self.accept(",")? {
+            if !self.accept(Symbol::Comma)? {
                 break;
             }
         }
-        self.expect(")")?;
+        self.expect(Symbol::CloseParen)?;
         let call = Call {
             named: vec![],
             function,
@@ -432,11 +316,11 @@ fn infix(token: Token) -> Option<(BinaryOperator, u8)> {
         return None;
     };
     match symbol {
-        "+" => Some((BinaryOperator::Add, SUM)),
-        "-" => Some((BinaryOperator::Subtract, SUM)),
-        "*" => Some((BinaryOperator::Multiply, PRODUCT)),
-        "/" => Some((BinaryOperator::Divide, PRODUCT)),
-        "//" => Some((BinaryOperator::Divide, RATIONAL)),
+        Symbol::Plus => Some((BinaryOperator::Add, SUM)),
+        Symbol::Minus => Some((BinaryOperator::Subtract, SUM)),
+        Symbol::Times => Some((BinaryOperator::Multiply, PRODUCT)),
+        Symbol::Over => Some((BinaryOperator::Divide, PRODUCT)),
+        Symbol::Rational => Some((BinaryOperator::Divide, RATIONAL)),
         _ => None,
     }
 }

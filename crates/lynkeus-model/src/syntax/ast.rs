@@ -21,12 +21,12 @@ impl Ast {
     }
 
     /// The expressions that an expression is made of, itself included.
-    pub(crate) fn parts(&self, root: ExprId) -> impl std::iter::Iterator<Item = &Expression> {
+    pub(crate) fn parts(&self, root: ExprId) -> impl Iterator<Item = &Expression> {
         self.ids(root).map(|id| self.expression(id))
     }
 
     /// Their ids, operands before their users.
-    pub(crate) fn ids(&self, root: ExprId) -> impl std::iter::Iterator<Item = ExprId> + use<> {
+    pub(crate) fn ids(&self, root: ExprId) -> impl Iterator<Item = ExprId> + use<> {
         // The parts of an expression lie side by side in the arena; what was added to a record
         // later stands behind them.
         let root = match self.expression(root).kind {
@@ -78,7 +78,7 @@ pub(crate) enum Kind {
     /// `[a, b; c, d]`
     Matrix(Vec<Vec<ExprId>>),
     /// `{e for i in r}`
-    Comprehension(ExprId, Vec<Iterator>),
+    Comprehension(ExprId, Vec<ForIndex>),
     Unary(UnaryOperator, ExprId),
     /// operators of one precedence, from the left
     Chain(ExprId, Vec<(BinaryOperator, ExprId)>),
@@ -105,7 +105,7 @@ pub(crate) struct Call {
     /// arguments given by name, behind the others
     pub named: Vec<(Span, ExprId)>,
     /// of `sum(e for i in r)`
-    pub iterators: Vec<Iterator>,
+    pub iterators: Vec<ForIndex>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +141,7 @@ pub(crate) enum Relation {
 
 /// `name in range`
 #[derive(Clone, Debug)]
-pub(crate) struct Iterator {
+pub(crate) struct ForIndex {
     pub name: Span,
     pub range: ExprId,
 }
@@ -268,18 +268,22 @@ pub(crate) struct Attribute {
     pub nested: Vec<Attribute>,
 }
 
+/// An equation or a statement, and where it stands.
 #[derive(Clone, Debug)]
-pub(crate) struct Equation {
-    pub kind: EquationKind,
+pub(crate) struct Placed<K> {
+    pub kind: K,
     pub span: Span,
 }
+
+pub(crate) type Equation = Placed<EquationKind>;
+pub(crate) type Statement = Placed<StatementKind>;
 
 #[derive(Clone, Debug)]
 pub(crate) enum EquationKind {
     Equality(ExprId, ExprId),
     /// `(a, , b) = f(x)`
     Several(Vec<Option<ExprId>>, ExprId),
-    For(Vec<Iterator>, Vec<Equation>),
+    For(Vec<ForIndex>, Vec<Equation>),
     /// conditions with equations, and those of `else`
     If(Vec<(ExprId, Vec<Equation>)>, Vec<Equation>),
     Assert(Assert),
@@ -295,16 +299,10 @@ pub(crate) struct Assert {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Statement {
-    pub kind: StatementKind,
-    pub span: Span,
-}
-
-#[derive(Clone, Debug)]
 pub(crate) enum StatementKind {
     /// `a := e` and `(a, , b) := f(x)`
     Assign(Vec<Option<ExprId>>, ExprId),
-    For(Vec<Iterator>, Vec<Statement>),
+    For(Vec<ForIndex>, Vec<Statement>),
     While(ExprId, Vec<Statement>),
     If(Vec<(ExprId, Vec<Statement>)>, Vec<Statement>),
     Assert(Assert),

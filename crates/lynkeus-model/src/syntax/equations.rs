@@ -1,6 +1,6 @@
 //! What stands in the sections `equation` and `algorithm`.
 
-use super::ast::{Assert, Equation, EquationKind, ExprId, Iterator, Statement, StatementKind};
+use super::ast::{Assert, Equation, EquationKind, ExprId, ForIndex, Statement, StatementKind};
 use super::classes::HOW_TO_FLATTEN;
 use super::lexer::{Keyword, Symbol, Token};
 use super::parser::Parser;
@@ -8,21 +8,7 @@ use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
-/// What begins with a parenthesis on the left of an equation.
-enum Listed {
-    One(ExprId),
-    Several(Vec<Option<ExprId>>),
-}
-
 impl Parser<'_> {
-    /// `(a, , b)`, or an expression that begins with a parenthesis.
-    fn list_or_expression(&mut self) -> Result<Listed> {
-        match self.is_list() {
-            true => Ok(Listed::Several(self.targets()?)),
-            false => Ok(Listed::One(self.expression()?)),
-        }
-    }
-
     pub(super) fn equation(&mut self) -> Result<Equation> {
         self.nested(|parser| parser.equation_here())
     }
@@ -32,8 +18,14 @@ impl Parser<'_> {
         let start = self.span;
         self.refuse_unsupported_equation()?;
         let kind = match self.token {
-            Token::Keyword(Keyword::For) => self.for_equation()?,
-            Token::Keyword(Keyword::If) => self.if_equation()?,
+            Token::Keyword(Keyword::For) => {
+                let (iterators, body) = self.repeated(Self::equation)?;
+                EquationKind::For(iterators, body)
+            }
+            Token::Keyword(Keyword::If) => {
+                let (branches, otherwise) = self.branches(Self::equation)?;
+                EquationKind::If(branches, otherwise)
+            }
             _ => self.equality()?,
         };
         let span = start.to(self.last);
@@ -72,16 +64,12 @@ impl Parser<'_> {
         if let Some(assert) = self.assert_call()? {
             return Ok(EquationKind::Assert(assert));
         }
-        let left = match self.at(Symbol::OpenParen) {
-            true => match self.list_or_expression()? {
-                Listed::One(left) => left,
-                Listed::Several(targets) => {
-                    self.expect(Symbol::Equal)?;
-                    return Ok(EquationKind::Several(targets, self.expression()?));
-                }
-            },
-            false => self.expression()?,
-        };
+        if self.at(Symbol::OpenParen) && self.is_list() {
+            let targets = self.targets()?;
+            self.expect(Symbol::Equal)?;
+            return Ok(EquationKind::Several(targets, self.expression()?));
+        }
+        let left = self.expression()?;
         if self.at(Symbol::Equal) {
             self.advance()?;
             let right = self.expression()?;
@@ -139,43 +127,49 @@ impl Parser<'_> {
         }))
     }
 
-    fn for_equation(&mut self) -> Result<EquationKind> {
-        self.advance()?;
-        let iterators = self.iterators()?;
-        self.expect_word(Keyword::Loop)?;
-        let body = self.equations_until_end()?;
-        self.end_of(Keyword::For)?;
-        Ok(EquationKind::For(iterators, body))
-    }
-
-    fn if_equation(&mut self) -> Result<EquationKind> {
+    /// Conditions with what holds under them, and what holds under none, behind `if`.
+    fn branches<T>(
+        &mut self,
+        one: fn(&mut Self) -> Result<T>,
+    ) -> Result<(Vec<(ExprId, Vec<T>)>, Vec<T>)> {
         self.advance()?;
         let mut branches = vec![];
         loop {
             let condition = self.expression()?;
             self.expect_word(Keyword::Then)?;
-            branches.push((condition, self.equations_until_end()?));
+            branches.push((condition, self.until_end(one)?));
             if !self.accept_word(Keyword::Elseif)? {
                 break;
             }
         }
         let mut otherwise = vec![];
         if self.accept_word(Keyword::Else)? {
-            otherwise = self.equations_until_end()?;
+            otherwise = self.until_end(one)?;
         }
         self.end_of(Keyword::If)?;
-        Ok(EquationKind::If(branches, otherwise))
+        Ok((branches, otherwise))
     }
 
-    fn equations_until_end(&mut self) -> Result<Vec<Equation>> {
-        let mut equations = vec![];
+    /// The iterators and the body of a loop, behind `for`.
+    fn repeated<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<(Vec<ForIndex>, Vec<T>)> {
+        self.advance()?;
+        let iterators = self.iterators()?;
+        self.expect_word(Keyword::Loop)?;
+        let body = self.until_end(one)?;
+        self.end_of(Keyword::For)?;
+        Ok((iterators, body))
+    }
+
+    /// Equations or statements.
+    fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
+        let mut found = vec![];
         while !matches!(
             self.token,
             Token::Keyword(Keyword::End | Keyword::Else | Keyword::Elseif) | Token::End
         ) {
-            equations.push(self.equation()?);
+            found.push(one(self)?);
         }
-        Ok(equations)
+        Ok(found)
     }
 
     pub(super) fn end_of(&mut self, keyword: Keyword) -> Result<()> {
@@ -187,8 +181,8 @@ impl Parser<'_> {
     }
 
     /// `i in 1:N, j in 1:M`
-    pub(super) fn iterators(&mut self) -> Result<Vec<Iterator>> {
-        let mut iterators: Vec<Iterator> = vec![];
+    pub(super) fn iterators(&mut self) -> Result<Vec<ForIndex>> {
+        let mut iterators: Vec<ForIndex> = vec![];
         loop {
             let name = self.identifier("the name of an iterator")?;
             if iterators.len() >= MAX_ITERATORS {
@@ -204,14 +198,14 @@ impl Parser<'_> {
             }
             self.advance()?;
             let range = self.expression()?;
-            iterators.push(Iterator { name, range });
+            iterators.push(ForIndex { name, range });
             if !self.accept(Symbol::Comma)? {
                 return Ok(iterators);
             }
         }
     }
 
-    fn refuse_repeated(&self, iterators: &[Iterator], name: Span) -> Result<()> {
+    fn refuse_repeated(&self, iterators: &[ForIndex], name: Span) -> Result<()> {
         let text = name.text(self.source);
         if iterators
             .iter()
@@ -236,22 +230,21 @@ impl Parser<'_> {
         let start = self.span;
         let kind = match self.token {
             Token::Keyword(Keyword::For) => {
-                self.advance()?;
-                let iterators = self.iterators()?;
-                self.expect_word(Keyword::Loop)?;
-                let body = self.statements()?;
-                self.end_of(Keyword::For)?;
+                let (iterators, body) = self.repeated(Self::statement)?;
                 StatementKind::For(iterators, body)
             }
             Token::Keyword(Keyword::While) => {
                 self.advance()?;
                 let condition = self.expression()?;
                 self.expect_word(Keyword::Loop)?;
-                let body = self.statements()?;
+                let body = self.until_end(Self::statement)?;
                 self.end_of(Keyword::While)?;
                 StatementKind::While(condition, body)
             }
-            Token::Keyword(Keyword::If) => self.if_statement()?,
+            Token::Keyword(Keyword::If) => {
+                let (branches, otherwise) = self.branches(Self::statement)?;
+                StatementKind::If(branches, otherwise)
+            }
             Token::Keyword(Keyword::Break) => {
                 self.advance()?;
                 StatementKind::Break
@@ -272,36 +265,6 @@ impl Parser<'_> {
         self.comment()?;
         self.expect(Symbol::Semicolon)?;
         Ok(Statement { kind, span })
-    }
-
-    fn if_statement(&mut self) -> Result<StatementKind> {
-        self.advance()?;
-        let mut branches = vec![];
-        loop {
-            let condition = self.expression()?;
-            self.expect_word(Keyword::Then)?;
-            branches.push((condition, self.statements()?));
-            if !self.accept_word(Keyword::Elseif)? {
-                break;
-            }
-        }
-        let mut otherwise = vec![];
-        if self.accept_word(Keyword::Else)? {
-            otherwise = self.statements()?;
-        }
-        self.end_of(Keyword::If)?;
-        Ok(StatementKind::If(branches, otherwise))
-    }
-
-    fn statements(&mut self) -> Result<Vec<Statement>> {
-        let mut statements = vec![];
-        while !matches!(
-            self.token,
-            Token::Keyword(Keyword::End | Keyword::Else | Keyword::Elseif) | Token::End
-        ) {
-            statements.push(self.statement()?);
-        }
-        Ok(statements)
     }
 
     fn assignment(&mut self) -> Result<StatementKind> {

@@ -207,17 +207,6 @@ impl Parser<'_> {
         })
     }
 
-    fn real_value(&self) -> Result<f64> {
-        let text = self.span.text(self.source);
-        match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(Problem::new(
-                self.span,
-                format!("the number {} is too large", shortened(text)),
-            )),
-        }
-    }
-
     fn parenthesised(&mut self) -> Result<ExprId> {
         self.advance()?;
         let inner = self.expression()?;

@@ -65,6 +65,23 @@ words! {
     Power = "^", Equal = "=", Less = "<", Greater = ">", OpenParen = "(", CloseParen = ")",
     OpenBracket = "[", CloseBracket = "]", OpenBrace = "{", CloseBrace = "}", Comma = ",",
     Semicolon = ";", Colon = ":", Dot = ".",
+    // of `@ODEmodel` texts alone; in Modelica they begin comments and quoted names
+    Rational = "//", Prime = "'",
+}
+
+/// What the parser asks of a language.
+pub(crate) trait Language {
+    /// What to do about parts that are nested too deep.
+    const NESTED: &'static str;
+
+    /// The next token; `Token::End` from the end of the text on.
+    fn next(&mut self) -> Result<(Token, Span)>;
+
+    /// The refusal of more than so many parts.
+    fn too_large(&self, limit: &str, span: Span) -> Problem;
+
+    /// What to do where the text ends too early.
+    fn hint_at_end(&self) -> Option<String>;
 }
 
 impl Token {
@@ -86,6 +103,15 @@ pub(crate) fn shortened(text: &str) -> String {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
     }
+}
+
+/// Refuses names beyond the limit.
+pub(crate) fn check_name(span: Span) -> Result<()> {
+    if (span.end - span.start) as usize <= MAX_NAME {
+        return Ok(());
+    }
+    let message = format!("this name is longer than {MAX_NAME} characters");
+    Err(Problem::new(span, message).hint("choose a shorter name"))
 }
 
 /// The text of a string token without quotes and escapes.
@@ -119,26 +145,6 @@ impl<'s> Lexer<'s> {
         // A byte order mark is not part of the text.
         let position = if source.starts_with('\u{feff}') { 3 } else { 0 };
         Self { source, position }
-    }
-
-    /// The next token; `Token::End` from the end of the text on.
-    pub(crate) fn next(&mut self) -> Result<(Token, Span)> {
-        self.skip_blank()?;
-        let start = self.position;
-        let token = match self.peek(0) {
-            None => Token::End,
-            Some(byte) if is_name_start(byte) => self.word(),
-            Some(byte) if byte.is_ascii_digit() => self.number()?,
-            Some(b'"') => self.quoted(b'"', "string", Token::Text)?,
-            Some(b'\'') => self.quoted(b'\'', "quoted name", Token::Identifier)?,
-            Some(_) => self.symbol()?,
-        };
-        if token == Token::Identifier && self.position - start > MAX_NAME {
-            let span = Span::new(start, self.position);
-            let message = format!("this name is longer than {MAX_NAME} characters");
-            return Err(Problem::new(span, message).hint("choose a shorter name"));
-        }
-        Ok((token, Span::new(start, self.position)))
     }
 
     fn peek(&self, ahead: usize) -> Option<u8> {
@@ -240,6 +246,37 @@ impl<'s> Lexer<'s> {
         let span = Span::new(self.position, self.position + found.len_utf8());
         let problem = Problem::new(span, format!("unexpected character {found:?}"));
         Err(problem.maybe_hint(character_hint(found)))
+    }
+}
+
+impl Language for Lexer<'_> {
+    const NESTED: &'static str = "name the inner parts with variables of their own";
+
+    fn next(&mut self) -> Result<(Token, Span)> {
+        self.skip_blank()?;
+        let start = self.position;
+        let token = match self.peek(0) {
+            None => Token::End,
+            Some(byte) if is_name_start(byte) => self.word(),
+            Some(byte) if byte.is_ascii_digit() => self.number()?,
+            Some(b'"') => self.quoted(b'"', "string", Token::Text)?,
+            Some(b'\'') => self.quoted(b'\'', "quoted name", Token::Identifier)?,
+            Some(_) => self.symbol()?,
+        };
+        let span = Span::new(start, self.position);
+        if token == Token::Identifier {
+            check_name(span)?;
+        }
+        Ok((token, span))
+    }
+
+    fn too_large(&self, limit: &str, span: Span) -> Problem {
+        let message = format!("the text has more than {limit} operands and operators");
+        Problem::new(span, message).hint("write repetition as `for` loops")
+    }
+
+    fn hint_at_end(&self) -> Option<String> {
+        None
     }
 }
 

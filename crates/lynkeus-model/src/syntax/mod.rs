@@ -9,5 +9,5 @@ mod parser;
 
 pub(crate) use classes::HOW_TO_FLATTEN;
 pub(crate) use expressions::too_many_dimensions;
-pub(crate) use lexer::{plain, shortened, unquoted};
-pub(crate) use parser::{check_length, parse_file, parse_single_expression};
+pub(crate) use lexer::{Language, Symbol, Token, check_name, plain, shortened, unquoted};
+pub(crate) use parser::{Parser, check_length, parse_file, parse_single_expression};

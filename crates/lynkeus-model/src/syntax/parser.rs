@@ -1,22 +1,21 @@
 //! The parser's hands: the current token, what may come next, and the limits.
 
 use super::ast::{Ast, ExprId, Expression, Kind};
-use super::lexer::unquoted;
-use super::lexer::{Keyword, Lexer, Symbol, Token};
+use super::lexer::{Keyword, Language, Lexer, Symbol, Token, shortened, unquoted};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::{MAX_NESTING, MAX_SOURCE_BYTES, MAX_SYNTAX_NODES, grouped};
 
 /// Recursive-descent parser with one token of lookahead.
-pub(super) struct Parser<'s> {
-    pub(super) source: &'s str,
-    lexer: Lexer<'s>,
-    pub(super) token: Token,
-    pub(super) span: Span,
+pub(crate) struct Parser<'s, L = Lexer<'s>> {
+    pub(crate) source: &'s str,
+    pub(crate) lexer: L,
+    pub(crate) token: Token,
+    pub(crate) span: Span,
     /// the token before the current one
-    pub(super) last: Span,
+    pub(crate) last: Span,
     depth: usize,
     nodes: usize,
-    pub(super) ast: Ast,
+    pub(crate) ast: Ast,
 }
 
 /// Refuses texts whose positions would not fit a [`Span`].
@@ -31,7 +30,7 @@ pub(crate) fn check_length(source: &str) -> Result<()> {
 
 /// Parses a whole file.
 pub(crate) fn parse_file(source: &str) -> Result<Ast> {
-    let mut parser = Parser::new(source)?;
+    let mut parser = modelica(source)?;
     parser.within_clause()?;
     while parser.token != Token::End {
         parser.class("")?;
@@ -41,7 +40,7 @@ pub(crate) fn parse_file(source: &str) -> Result<Ast> {
 
 /// Parses a text that is one expression.
 pub(crate) fn parse_single_expression(source: &str) -> Result<(Ast, ExprId)> {
-    let mut parser = Parser::new(source)?;
+    let mut parser = modelica(source)?;
     let root = parser.expression()?;
     if parser.token != Token::End {
         return Err(parser.unexpected("an operator or the end of the expression"));
@@ -49,30 +48,145 @@ pub(crate) fn parse_single_expression(source: &str) -> Result<(Ast, ExprId)> {
     Ok((parser.ast, root))
 }
 
-impl<'s> Parser<'s> {
-    fn new(source: &'s str) -> Result<Self> {
-        check_length(source)?;
-        let mut parser = Self {
+fn modelica(source: &str) -> Result<Parser<'_>> {
+    check_length(source)?;
+    let mut parser = Parser::behind(Span::default(), source, Lexer::new(source));
+    parser.advance()?;
+    Ok(parser)
+}
+
+impl<'s, L: Language> Parser<'s, L> {
+    /// A parser whose first token is behind `place`.
+    pub(crate) fn behind(place: Span, source: &'s str, lexer: L) -> Self {
+        Self {
             source,
-            lexer: Lexer::new(source),
+            lexer,
             token: Token::End,
-            span: Span::default(),
-            last: Span::default(),
+            span: place,
+            last: place,
             depth: 0,
             nodes: 0,
             ast: Ast::default(),
-        };
-        parser.advance()?;
-        Ok(parser)
+        }
     }
 
     /// Moves to the next token; returns the span of the one left behind.
-    pub(super) fn advance(&mut self) -> Result<Span> {
+    pub(crate) fn advance(&mut self) -> Result<Span> {
         self.last = self.span;
         (self.token, self.span) = self.lexer.next()?;
         Ok(self.last)
     }
 
+    pub(crate) fn at(&self, symbol: Symbol) -> bool {
+        self.token == Token::Symbol(symbol)
+    }
+
+    pub(crate) fn accept(&mut self, symbol: Symbol) -> Result<bool> {
+        self.accept_token(Token::Symbol(symbol))
+    }
+
+    fn accept_token(&mut self, token: Token) -> Result<bool> {
+        let found = self.token == token;
+        if found {
+            self.advance()?;
+        }
+        Ok(found)
+    }
+
+    pub(crate) fn expect(&mut self, symbol: Symbol) -> Result<Span> {
+        if self.at(symbol) {
+            return self.advance();
+        }
+        let expected = format!("`{}`", symbol.text());
+        Err(match symbol {
+            Symbol::Semicolon => self.missing_semicolon(),
+            _ => self.unexpected(&expected),
+        })
+    }
+
+    pub(crate) fn identifier(&mut self, what: &str) -> Result<Span> {
+        if self.token == Token::Identifier {
+            return self.advance();
+        }
+        Err(self.unexpected(what))
+    }
+
+    /// Points behind the last token when `;` is missing at the end of its line.
+    fn missing_semicolon(&self) -> Problem {
+        let between = Span::new(self.last.end as usize, self.span.start as usize);
+        if !between.text(self.source).contains('\n') && self.token != Token::End {
+            return self.unexpected("`;`");
+        }
+        let end = self.last.end as usize;
+        Problem::new(
+            Span::new(end.saturating_sub(1), end),
+            "expected `;` after this",
+        )
+        .hint("every declaration and every equation ends with `;`")
+    }
+
+    /// "expected …, found …" at the current token.
+    pub(crate) fn unexpected(&self, expected: &str) -> Problem {
+        let found = self.token.describe(self.span.text(self.source));
+        let problem = Problem::new(self.span, format!("expected {expected}, found {found}"));
+        let is_end = self.token == Token::End;
+        problem.maybe_hint(is_end.then(|| self.lexer.hint_at_end()).flatten())
+    }
+
+    /// Runs a part of the grammar one level deeper.
+    pub(crate) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.depth >= MAX_NESTING {
+            let message = format!("nested more than {MAX_NESTING} levels deep");
+            return Err(Problem::new(self.span, message).hint(L::NESTED));
+        }
+        self.depth += 1;
+        let result = parse(self);
+        self.depth -= 1;
+        result
+    }
+
+    /// Counts one more part of the syntax tree, as many as its memory weighs.
+    pub(crate) fn count(&mut self, weight: usize) -> Result<()> {
+        self.nodes += weight;
+        if self.nodes > MAX_SYNTAX_NODES {
+            let limit = grouped(MAX_SYNTAX_NODES as u64);
+            return Err(self.lexer.too_large(&limit, self.span));
+        }
+        Ok(())
+    }
+
+    /// Adds an expression that spans from `start` to the last token.
+    pub(crate) fn push(&mut self, kind: Kind, start: Span, first: ExprId) -> Result<ExprId> {
+        self.push_at(kind, start.to(self.last), first)
+    }
+
+    /// Adds an expression with a span of its own.
+    pub(crate) fn push_at(&mut self, kind: Kind, span: Span, first: ExprId) -> Result<ExprId> {
+        self.count(1)?;
+        let id = self.next_id();
+        self.ast.expressions.push(Expression { kind, span, first });
+        Ok(id)
+    }
+
+    /// The id the next expression will get.
+    pub(crate) fn next_id(&self) -> ExprId {
+        ExprId(self.ast.expressions.len() as u32)
+    }
+
+    /// The value of a number, at its token.
+    pub(crate) fn real_value(&self) -> Result<f64> {
+        let text = self.span.text(self.source);
+        match text.replace('_', "").parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => {
+                let message = format!("the number {} is too large", shortened(text));
+                Err(Problem::new(self.span, message))
+            }
+        }
+    }
+}
+
+impl Parser<'_> {
     /// At an opening parenthesis: true where a comma stands between it and the one that closes
     /// it, outside of other brackets. Looks at a line's worth of tokens at most.
     pub(super) fn is_list(&self) -> bool {
@@ -114,39 +228,12 @@ impl<'s> Parser<'s> {
         false
     }
 
-    pub(super) fn at(&self, symbol: Symbol) -> bool {
-        self.token == Token::Symbol(symbol)
-    }
-
     pub(super) fn at_word(&self, keyword: Keyword) -> bool {
         self.token == Token::Keyword(keyword)
     }
 
-    pub(super) fn accept(&mut self, symbol: Symbol) -> Result<bool> {
-        self.accept_token(Token::Symbol(symbol))
-    }
-
     pub(super) fn accept_word(&mut self, keyword: Keyword) -> Result<bool> {
         self.accept_token(Token::Keyword(keyword))
-    }
-
-    fn accept_token(&mut self, token: Token) -> Result<bool> {
-        let found = self.token == token;
-        if found {
-            self.advance()?;
-        }
-        Ok(found)
-    }
-
-    pub(super) fn expect(&mut self, symbol: Symbol) -> Result<Span> {
-        if self.at(symbol) {
-            return self.advance();
-        }
-        let expected = format!("`{}`", symbol.text());
-        Err(match symbol {
-            Symbol::Semicolon => self.missing_semicolon(),
-            _ => self.unexpected(&expected),
-        })
     }
 
     pub(super) fn expect_word(&mut self, keyword: Keyword) -> Result<Span> {
@@ -154,71 +241,6 @@ impl<'s> Parser<'s> {
             return self.advance();
         }
         Err(self.unexpected(&format!("`{}`", keyword.text())))
-    }
-
-    pub(super) fn identifier(&mut self, what: &str) -> Result<Span> {
-        if self.token == Token::Identifier {
-            return self.advance();
-        }
-        Err(self.unexpected(what))
-    }
-
-    /// Points behind the last token when `;` is missing at the end of its line.
-    fn missing_semicolon(&self) -> Problem {
-        let between = Span::new(self.last.end as usize, self.span.start as usize);
-        if !between.text(self.source).contains('\n') && self.token != Token::End {
-            return self.unexpected("`;`");
-        }
-        let end = self.last.end as usize;
-        Problem::new(
-            Span::new(end.saturating_sub(1), end),
-            "expected `;` after this",
-        )
-        .hint("every declaration and every equation ends with `;`")
-    }
-
-    /// "expected …, found …" at the current token.
-    pub(super) fn unexpected(&self, expected: &str) -> Problem {
-        let found = self.token.describe(self.span.text(self.source));
-        Problem::new(self.span, format!("expected {expected}, found {found}"))
-    }
-
-    /// Runs a part of the grammar one level deeper.
-    pub(super) fn nested<T>(&mut self, parse: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
-        if self.depth >= MAX_NESTING {
-            let message = format!("nested more than {MAX_NESTING} levels deep");
-            return Err(Problem::new(self.span, message)
-                .hint("name the inner parts with variables of their own"));
-        }
-        self.depth += 1;
-        let result = parse(self);
-        self.depth -= 1;
-        result
-    }
-
-    /// Counts one more part of the syntax tree, as many as its memory weighs.
-    pub(super) fn count(&mut self, weight: usize) -> Result<()> {
-        self.nodes += weight;
-        if self.nodes > MAX_SYNTAX_NODES {
-            let limit = grouped(MAX_SYNTAX_NODES as u64);
-            let message = format!("the text has more than {limit} operands and operators");
-            return Err(Problem::new(self.span, message).hint("write repetition as `for` loops"));
-        }
-        Ok(())
-    }
-
-    /// Adds an expression that spans from `start` to the last token.
-    pub(super) fn push(&mut self, kind: Kind, start: Span, first: ExprId) -> Result<ExprId> {
-        self.count(1)?;
-        let id = self.next_id();
-        let span = start.to(self.last);
-        self.ast.expressions.push(Expression { kind, span, first });
-        Ok(id)
-    }
-
-    /// The id the next expression will get.
-    pub(super) fn next_id(&self) -> ExprId {
-        ExprId(self.ast.expressions.len() as u32)
     }
 
     /// "… is not supported" at the current token.
