@@ -24,7 +24,7 @@ use lynkeus_expr::Interval;
 use crate::definite::{is_positive_definite, least_eigenvalue};
 use crate::elimination::{columns, positive};
 use crate::magnitude::Magnitudes;
-use crate::matrix::{IntervalMatrix, square, sum, upper};
+use crate::matrix::{IntervalMatrix, dot, square, sum, upper};
 use crate::search::largest;
 use crate::vertices::{Bounds, varying, vertices};
 use crate::{inverse, metzler};
@@ -118,8 +118,7 @@ impl Chain {
 
     /// Sg
     fn pushed(&self) -> Vec<Interval> {
-        let products = |row: &Vec<Interval>| sum(row.iter().zip(&self.g).map(|(s, g)| *s * *g));
-        self.S.iter().map(products).collect()
+        self.S.iter().map(|row| dot(row, &self.g)).collect()
     }
 
     /// D_j, the weight of ε_j.
