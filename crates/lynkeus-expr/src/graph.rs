@@ -1,30 +1,22 @@
 //! The hash-consed arena: an expression built twice is one node.
 
-mod limits;
-mod reach;
+mod operators;
 mod systems;
 
+use std::any::{Any, TypeId};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::hash::Hash;
+use std::sync::Arc;
 
-pub use systems::{ImplicitCall, LinearSystem, Solution};
+use crate::{Binary, Budget, Implicit, Node, Op, Spent, Unary, real};
 
-use crate::facts::Facts;
-use crate::{Binary, Budget, Expr, Op, Unary, real};
-use reach::Marks;
-
-/// A node of a [`Graph`]: cheap to copy, meaningful only with its graph.
-/// Arguments of a node are always smaller than the node itself.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
-pub struct Node(pub(crate) u32);
-
-impl Node {
-    /// Position of the node in the order of construction.
-    pub fn index(self) -> usize {
-        self.0 as usize
-    }
-}
+/// Nodes between two looks at the clock.
+const OFTEN: u32 = 64;
+/// Bytes that a node takes, in the arena and in the table that finds it.
+const NODE: usize = size_of::<Op>() + 2 * (size_of::<Key>() + size_of::<Node>());
+/// Most answers of one kind that are kept; later ones are not.
+const MOST: usize = 20_000;
 
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Key {
@@ -70,6 +62,128 @@ impl Inner {
         self.known.insert(key, node);
         node
     }
+
+    /// Whether no more nodes are made.
+    fn is_spent(&mut self) -> bool {
+        self.made = self.made.wrapping_add(1);
+        // the arena and its table double when they are full
+        if self.ops.len() == self.ops.capacity() {
+            return !self.budget.affords(self.ops.len() * NODE);
+        }
+        match self.made.is_multiple_of(OFTEN) {
+            true => self.budget.spent().is_some(),
+            false => self.budget.marked().is_some(),
+        }
+    }
+
+    /// What stands for every node that is not made any more. Its value is none.
+    fn nothing(&mut self) -> Node {
+        let none = f64::NAN;
+        self.intern(Key::Constant(none.to_bits()), Op::Constant(none))
+    }
+
+    /// Hands over the arguments of a node.
+    fn each_argument(&self, node: Node, mut give: impl FnMut(Node)) {
+        match self.ops[node.index()] {
+            Op::Constant(_) | Op::Symbol(_) => {}
+            Op::Unary(_, a) | Op::Powi(a, _) | Op::Entry(a, _) => give(a),
+            Op::Binary(_, a, b) => {
+                give(a);
+                give(b);
+            }
+            Op::Select(c, a, b) => {
+                give(c);
+                give(a);
+                give(b);
+            }
+            Op::Solve(system) => {
+                let arguments = &self.systems[system as usize].arguments;
+                arguments.iter().copied().for_each(give);
+            }
+            Op::Implicit(call) => {
+                let arguments = &self.implicits[call as usize].arguments;
+                arguments.iter().copied().for_each(give);
+            }
+        }
+    }
+}
+
+/// Nodes that were met in a walk: those with the stamp of that walk, so that no walk has to
+/// clear what another one left.
+#[derive(Clone, Default)]
+struct Marks {
+    walk: u32,
+    stamps: Vec<u32>,
+}
+
+impl Marks {
+    fn begin(&mut self, nodes: usize) {
+        self.walk = self.walk.wrapping_add(1);
+        if self.walk == 0 {
+            self.stamps.clear();
+            self.walk = 1;
+        }
+        if self.stamps.len() < nodes {
+            self.stamps.resize(nodes, 0);
+        }
+    }
+
+    /// Whether the node is met for the first time.
+    fn meet(&mut self, node: Node) -> bool {
+        let stamp = &mut self.stamps[node.index()];
+        let first = *stamp != self.walk;
+        *stamp = self.walk;
+        first
+    }
+}
+
+/// What was found out about nodes, by the types of question and answer. A clone shares the answers
+/// until either learns more.
+type Facts = HashMap<TypeId, Arc<dyn Any + Send + Sync>>;
+
+/// The linear system A x = b of an [`Op::Solve`] node.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct LinearSystem {
+    /// A row by row (n²), then b (n)
+    arguments: Vec<Node>,
+    n: usize,
+}
+
+impl LinearSystem {
+    /// Number of unknowns n.
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
+    /// A, n×n, row by row.
+    pub fn matrix(&self) -> &[Node] {
+        &self.arguments[..self.n * self.n]
+    }
+
+    /// b, n entries.
+    pub fn right(&self) -> &[Node] {
+        &self.arguments[self.n * self.n..]
+    }
+}
+
+/// The result of [`Graph::solve`].
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// the n components of x with A x = b
+    pub x: Vec<Node>,
+    /// estimate of 1/cond(A) in [0, 1]; near 0 where A is close to singular and
+    /// `x` is the bounded answer of a truncated factorisation. Its derivative
+    /// is taken as zero: it is a diagnostic, not part of the solution.
+    pub rcond: Node,
+}
+
+/// The implicit function of an [`Op::Implicit`] node, and where it is taken.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct ImplicitCall {
+    /// z as a function of p
+    pub function: Implicit,
+    /// p
+    pub arguments: Vec<Node>,
 }
 
 /// A growing set of expressions in which equal expressions are one node.
@@ -193,7 +307,10 @@ impl Graph {
         K: Eq + Hash + Send + Sync + 'static,
         V: Clone + Send + Sync + 'static,
     {
-        self.facts.borrow().get(question)
+        let facts = self.facts.borrow();
+        let kind = facts.get(&TypeId::of::<(K, V)>())?;
+        let answers: &HashMap<K, V> = kind.downcast_ref()?;
+        answers.get(question).cloned()
     }
 
     /// Keeps the answer to a question about nodes, such as a range on a box, with the graph
@@ -204,9 +321,18 @@ impl Graph {
         V: Clone + Send + Sync + 'static,
     {
         // what was found after a limit struck need not be true
-        if !self.is_spent() {
-            self.facts.borrow_mut().insert(question, answer);
+        if self.is_spent() {
+            return;
         }
+        let kind = TypeId::of::<(K, V)>();
+        let mut facts = self.facts.borrow_mut();
+        let known = facts.remove(&kind);
+        let known = known.and_then(|kind| kind.downcast::<HashMap<K, V>>().ok());
+        let mut answers = known.unwrap_or_default();
+        if answers.len() < MOST {
+            Arc::make_mut(&mut answers).insert(question, answer);
+        }
+        facts.insert(kind, answers);
     }
 
     /// A function of one node.
@@ -306,11 +432,111 @@ impl Graph {
             .intern(Key::Select(condition, a, b), Op::Select(condition, a, b))
     }
 
+    /// Every node that the roots need, arguments before their users. The work is that of what
+    /// they need, not of the whole graph.
+    pub fn reachable(&self, roots: &[Node]) -> Vec<Node> {
+        let inner = self.inner.borrow();
+        let mut marks = self.marks.borrow_mut();
+        marks.begin(inner.ops.len());
+        let mut found: Vec<Node> = vec![];
+        for &root in roots {
+            if marks.meet(root) {
+                found.push(root);
+            }
+        }
+        let mut next = 0;
+        while let Some(&node) = found.get(next) {
+            next += 1;
+            inner.each_argument(node, |argument| {
+                if marks.meet(argument) {
+                    found.push(argument);
+                }
+            });
+        }
+        found.sort_unstable();
+        found
+    }
+
     /// The symbols that the roots depend on, in order of creation.
     pub fn symbols_of(&self, roots: &[Node]) -> Vec<Node> {
         let mut symbols = self.reachable(roots);
         symbols.retain(|&node| matches!(self.op(node), Op::Symbol(_)));
         symbols
+    }
+}
+
+/// A graph under a budget of time and memory.
+impl Graph {
+    /// Puts the work on this graph, and on clones made from now on, under a budget.
+    pub fn set_budget(&self, budget: Budget) {
+        self.inner.borrow_mut().budget = budget;
+    }
+
+    /// The budget of the work on this graph.
+    pub fn budget(&self) -> Budget {
+        self.inner.borrow().budget.clone()
+    }
+
+    /// Whether the budget is spent, looking at the clock: ask it in every long loop. After
+    /// that no nodes are made, nothing is [noted](Graph::note), and results do not count.
+    pub fn spent(&self) -> Option<Spent> {
+        self.inner.borrow().budget.spent()
+    }
+
+    /// Whether somebody noticed that the budget is spent.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.inner.borrow().budget.marked().is_some()
+    }
+
+    /// Works under a budget of its own. What was found counts only where the budget lasted:
+    /// a graph whose budget is spent makes no more nodes, and something else stands for them.
+    ///
+    /// # Errors
+    /// What ended the work.
+    pub fn budgeted<T>(&self, budget: Budget, work: impl FnOnce() -> T) -> Result<T, Spent> {
+        let before = self.budget();
+        self.set_budget(budget.clone());
+        let done = match budget.spent() {
+            Some(spent) => Err(spent),
+            None => Ok(work()),
+        };
+        self.set_budget(before);
+        match budget.marked() {
+            Some(spent) => Err(spent),
+            None => done,
+        }
+    }
+}
+
+/// A node together with its graph.
+///
+/// # Panics
+/// Operators panic where the two sides come from different graphs.
+#[derive(Clone, Copy)]
+pub struct Expr<'g> {
+    graph: &'g Graph,
+    node: Node,
+}
+
+impl std::fmt::Debug for Expr<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.graph.render(self.node, 200))
+    }
+}
+
+impl<'g> Expr<'g> {
+    pub(crate) fn new(graph: &'g Graph, node: Node) -> Self {
+        Self { graph, node }
+    }
+
+    /// The node.
+    pub fn node(self) -> Node {
+        self.node
+    }
+
+    /// The graph the node lives in.
+    pub fn graph(self) -> &'g Graph {
+        self.graph
     }
 }
 
@@ -321,6 +547,8 @@ fn whole(exponent: f64) -> Option<i32> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
@@ -371,5 +599,69 @@ mod tests {
         let g = Graph::new();
         let [a, b] = ["a", "b"].map(|name| g.symbol(name).node());
         assert_eq!(g.solve(&[a], &[b]).x, g.solve(&[a], &[b]).x);
+    }
+
+    #[test]
+    fn arguments_come_first_and_nothing_else_comes() {
+        let g = Graph::new();
+        let [x, y] = ["x", "y"].map(|name| g.symbol(name));
+        let aside = (x * y).cos();
+        let solution = g.solve(&[(x + 2.0).node()], &[y.node()]);
+        let root = (g.expr(solution.x[0]) * x).sin();
+        for _ in 0..3 {
+            let found = g.reachable(&[root.node(), x.node()]);
+            assert!(found.is_sorted() && found.contains(&y.node()));
+            assert!(!found.contains(&aside.node()));
+            // x, y, 2, x + 2, the system, its entry, the product, the sine
+            assert_eq!(found.len(), 8);
+        }
+        assert_eq!(g.reachable(&[]), []);
+    }
+
+    #[test]
+    fn nothing_is_made_or_noted_after_the_end_and_everything_again_later() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let sum = (x + 1.0).node();
+        let budget = Budget::new(Some(Duration::from_secs(60)), None);
+        let found = g.budgeted(budget.clone(), || {
+            budget.cancel();
+            let made = (x * 3.0).sin().node();
+            g.note(sum, 1.0_f64);
+            assert!(g.constant_value(made).is_some_and(f64::is_nan));
+            assert_eq!((x + 1.0).node(), sum);
+            let b = (x * 7.0).node();
+            let solved = g.solve(&[b], &[b]);
+            assert_eq!(solved.x, [solved.rcond]);
+        });
+        assert_eq!(found, Err(Spent::Cancelled));
+        assert_eq!(g.noted::<Node, f64>(&sum), None);
+        assert!(matches!(g.op((x * 3.0).node()), Op::Binary(..)));
+    }
+
+    #[test]
+    fn a_graph_that_grows_ends_in_time() {
+        let g = Graph::new();
+        let started = std::time::Instant::now();
+        let grown = g.budgeted(Budget::default().within(Duration::from_millis(20)), || {
+            let mut sum = g.symbol("x");
+            while g.spent().is_none() {
+                for _ in 0..10_000 {
+                    sum = (sum + 1.5).sin();
+                }
+            }
+        });
+        assert!(grown.is_err());
+        assert!(started.elapsed() < Duration::from_secs(5));
+    }
+
+    #[test]
+    fn a_clone_shares_the_budget() {
+        let g = Graph::new();
+        let budget = Budget::new(None, None);
+        g.set_budget(budget.clone());
+        let copy = g.clone();
+        budget.cancel();
+        assert_eq!(copy.spent(), Some(Spent::Cancelled));
     }
 }

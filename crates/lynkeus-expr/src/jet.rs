@@ -65,6 +65,16 @@ impl<A: Algebra> Jets<'_, A> {
         Some(self.two(Binary::Div, &sum, &self.inner.constant(k as f64)))
     }
 
+    /// x − y, where what is none is zero.
+    fn less(&self, x: Option<&A::Value>, y: Option<A::Value>) -> A::Value {
+        match (x, y) {
+            (Some(x), None) => x.clone(),
+            (Some(x), Some(y)) => self.two(Binary::Sub, x, &y),
+            (None, Some(y)) => self.neg(&y),
+            (None, None) => self.inner.constant(0.0),
+        }
+    }
+
     fn or_zero(&self, value: Option<A::Value>) -> A::Value {
         value.unwrap_or_else(|| self.inner.constant(0.0))
     }
@@ -105,12 +115,7 @@ impl<A: Algebra> Jets<'_, A> {
                 0 => None,
                 _ => self.convolution(y, &q, k, 1, k),
             };
-            let numerator = match (x.get(k), known) {
-                (Some(x), None) => x.clone(),
-                (Some(x), Some(known)) => self.two(Binary::Sub, x, &known),
-                (None, Some(known)) => self.neg(&known),
-                (None, None) => self.inner.constant(0.0),
-            };
+            let numerator = self.less(x.get(k), known);
             q.push(self.two(Binary::Div, &numerator, &y[0]));
         }
         q
@@ -124,12 +129,7 @@ impl<A: Algebra> Jets<'_, A> {
             let known = (k > 1)
                 .then(|| self.convolution(&s, &s, k, 1, k - 1))
                 .flatten();
-            let numerator = match (x.get(k), known) {
-                (Some(x), None) => x.clone(),
-                (Some(x), Some(known)) => self.two(Binary::Sub, x, &known),
-                (None, Some(known)) => self.neg(&known),
-                (None, None) => self.inner.constant(0.0),
-            };
+            let numerator = self.less(x.get(k), known);
             s.push(self.two(Binary::Div, &numerator, &twice));
         }
         s
@@ -241,6 +241,37 @@ impl<A: Algebra> Jets<'_, A> {
             })
             .collect()
     }
+
+    /// The series of an implicit function's z from those of p, order by order. With z known below
+    /// order k, the k-th coefficient of g(z, p) lacks only g_z·z_k, whose matrix is that of the base
+    /// point: g_z z_k = −(what is there).
+    fn root(&self, function: &Implicit, p: &[Jet<A::Value>]) -> Vec<Jet<A::Value>> {
+        let inner = self.inner;
+        let base: Vec<A::Value> = p.iter().map(|jet| jet[0].clone()).collect();
+        let z = inner.implicit(function, &base);
+        let mut at: Vec<Jet<A::Value>> = z.iter().map(|z| vec![z.clone()]).collect();
+        if self.is_spent() || p.iter().all(|jet| jet.len() == 1) {
+            return at;
+        }
+        let matrix = function.matrix(inner, &[z, base].concat());
+        at.extend(p.iter().cloned());
+        for order in 1..=self.order {
+            for (short, jet) in at[function.size()..].iter_mut().zip(p) {
+                *short = jet[..jet.len().min(order + 1)].to_vec();
+            }
+            let g = function.residual(&Jets { inner, order }, &at);
+            let right: Vec<A::Value> = g
+                .iter()
+                .map(|g| self.less(None, g.get(order).cloned()))
+                .collect();
+            let (next, _) = inner.solve(&matrix, &right);
+            for (jet, value) in at.iter_mut().zip(next) {
+                jet.push(value);
+            }
+        }
+        at.truncate(function.size());
+        at
+    }
 }
 
 impl<A: Algebra> Algebra for Jets<'_, A> {
@@ -340,7 +371,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
     }
 
     fn implicit(&self, function: &Implicit, p: &[Self::Value]) -> Vec<Self::Value> {
-        function.series(self, p)
+        self.root(function, p)
     }
 
     /// A₀ xₖ = bₖ − Σ_{j≥1} Aⱼ x_{k−j}.
@@ -356,12 +387,7 @@ impl<A: Algebra> Algebra for Jets<'_, A> {
                     let known = (1..=k).flat_map(|j| (0..n).map(move |l| (j, l)));
                     let terms = known
                         .filter_map(|(j, l)| Some(self.mul(a[i * n + l].get(j)?, &x[l][k - j])));
-                    match (b[i].get(k), self.sum(terms)) {
-                        (Some(b), None) => b.clone(),
-                        (Some(b), Some(known)) => self.two(Binary::Sub, b, &known),
-                        (None, Some(known)) => self.neg(&known),
-                        (None, None) => self.inner.constant(0.0),
-                    }
+                    self.less(b[i].get(k), self.sum(terms))
                 })
                 .collect();
             let (xk, estimate) = self.inner.solve(&a0, &right);

@@ -26,8 +26,7 @@
 
 mod algebra;
 mod budget;
-mod expr;
-mod facts;
+mod code;
 pub mod flow;
 mod graph;
 mod implicit;
@@ -45,11 +44,11 @@ mod tape;
 
 pub use algebra::{Algebra, Nodes, Reals};
 pub use budget::{Budget, Memory, Spent};
-pub use expr::Expr;
-pub use graph::{Graph, ImplicitCall, LinearSystem, Node, Solution};
-pub use implicit::{Implicit, ImplicitUnknown};
+pub use code::{Implicit, Tape};
+pub use graph::{Expr, Graph, ImplicitCall, LinearSystem, Solution};
+pub use implicit::ImplicitUnknown;
 pub use interval::Interval;
 pub use jet::{Jet, Jets};
-pub use op::{Binary, Op, Unary};
+pub use op::{Binary, Node, Op, Unary};
 pub use rebuild::{Hoisted, HoistedPart};
-pub use tape::{Evaluator, MissingInput, Tape};
+pub use tape::{Evaluator, MissingInput};

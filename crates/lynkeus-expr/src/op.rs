@@ -1,6 +1,16 @@
-//! The operations a graph is made of.
+//! Nodes, and the operations that they stand for.
 
-use crate::Node;
+/// A node of a [`Graph`](crate::Graph): cheap to copy, meaningful only with its graph.
+/// Arguments of a node are always smaller than the node itself.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub struct Node(pub(crate) u32);
+
+impl Node {
+    /// Position of the node in the order of construction.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// Operations of one argument.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]

@@ -13,6 +13,18 @@ pub fn sign(x: f64) -> f64 {
     }
 }
 
+/// The number with so many significant digits that is nearest to `x`, for text.
+///
+/// ```
+/// use lynkeus_expr::real::rounded;
+/// assert_eq!(rounded(0.1 + 0.2, 6), 0.3);
+/// assert_eq!(rounded(31_415.9, 2), 31_000.0);
+/// ```
+pub fn rounded(x: f64, digits: usize) -> f64 {
+    let text = format!("{x:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(x)
+}
+
 fn truth(holds: bool) -> f64 {
     f64::from(u8::from(holds))
 }

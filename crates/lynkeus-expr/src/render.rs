@@ -1,9 +1,11 @@
 //! Expressions as text, for messages.
 
-use crate::{Binary, Graph, Node, Op, Unary};
+use crate::{Binary, Graph, Node, Op, Unary, real};
 
 /// Deeper expressions are cut: messages need no more.
 const DEPTH: usize = 40;
+/// Significant digits of a number.
+const DIGITS: usize = 6;
 /// Linear systems up to this size are spelled out.
 const SPELLED: usize = 3;
 /// Symbols named of others.
@@ -46,7 +48,8 @@ impl Renderer<'_> {
             Op::Constant(value) => {
                 let negative = value.is_sign_negative();
                 self.grouped(outer > 2 && negative, text, |text| {
-                    text.push_str(&brief(value))
+                    // 0.65 for the sum that is 0.6499999999999999
+                    text.push_str(&real::rounded(value, DIGITS).to_string())
                 });
             }
             Op::Symbol(_) => text.push_str(&self.graph.symbol_name(node).unwrap_or_default()),
@@ -177,13 +180,6 @@ impl Renderer<'_> {
             self.write(node, 0, depth, text);
         }
     }
-}
-
-/// Six significant digits: 0.65 for the sum that is 0.6499999999999999.
-fn brief(value: f64) -> String {
-    let rounded = format!("{value:.5e}").parse().unwrap_or(value);
-    let value: f64 = if value.is_finite() { rounded } else { value };
-    value.to_string()
 }
 
 fn infix(op: Binary) -> Option<(&'static str, u8)> {

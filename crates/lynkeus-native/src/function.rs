@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use lynkeus_expr::Tape;
 
-use crate::Buffer;
 use crate::record::Program;
 
 #[cfg(target_arch = "x86_64")]
-use crate::emit::Shape;
+use crate::emit::emit;
 #[cfg(target_arch = "x86_64")]
-use crate::memory::{Executable, Places};
+use crate::memory::Executable;
 
 /// Most instructions of a tape that is compiled.
 const LARGEST: usize = 1_000_000;
@@ -109,7 +108,7 @@ impl Compiled {
         shared: usize,
         spacing: Option<usize>,
     ) -> Option<Self> {
-        let emitted = crate::emit::emit::<LANES>(program, Shape { shared, spacing });
+        let emitted = emit::<LANES>(program, shared, spacing);
         let outputs = spacing.unwrap_or(program.outputs.len());
         let places = [program.inputs, outputs, emitted.frame + 1];
         if places
@@ -166,13 +165,8 @@ impl<const LANES: usize> Evaluator<LANES> {
         // frame, of LANES numbers each, for one group and nothing shared, and the lengths were
         // compared
         unsafe {
-            compiled.code.run(Places {
-                inputs: inputs.as_ptr().cast(),
-                outputs: outputs.as_mut_ptr().cast(),
-                frame: self.frame.values_mut().as_mut_ptr().cast(),
-                shared: std::ptr::null(),
-                groups: 1,
-            });
+            let frame = self.frame.values_mut();
+            compiled.code.run(inputs, outputs, frame, &[], 1);
         }
     }
 }
@@ -210,13 +204,57 @@ impl<const LANES: usize> Sweeper<LANES> {
         // SAFETY: the code was emitted for these numbers of inputs, outputs and places of the
         // frame, of LANES numbers each, and there is room for so many groups
         unsafe {
-            compiled.code.run(Places {
-                inputs: inputs.as_ptr().cast(),
-                outputs: outputs.as_mut_ptr().cast(),
-                frame: self.frame.values_mut().as_mut_ptr().cast(),
-                shared: shared.as_ptr().cast(),
-                groups,
-            });
+            let frame = self.frame.values_mut();
+            compiled.code.run(inputs, outputs, frame, shared, groups);
         }
+    }
+}
+
+/// Bytes of a cache line.
+const LINE: usize = 64;
+
+/// A run of values of `LANES` numbers that begins with a cache line, so that none of them lies
+/// across two.
+#[derive(Debug, Default)]
+pub struct Buffer<const LANES: usize> {
+    numbers: Vec<f64>,
+    first: usize,
+    len: usize,
+}
+
+impl<const LANES: usize> Buffer<LANES> {
+    /// `len` values, all zero.
+    #[must_use]
+    pub fn new(len: usize) -> Self {
+        let spare = LINE / size_of::<f64>();
+        let numbers = vec![0.0; len * LANES + spare];
+        let first = numbers.as_ptr().align_offset(LINE).min(spare);
+        Self {
+            numbers,
+            first,
+            len,
+        }
+    }
+
+    /// The values.
+    #[must_use]
+    pub fn values(&self) -> &[[f64; LANES]] {
+        let numbers = &self.numbers[self.first..];
+        &numbers.as_chunks().0[..self.len]
+    }
+
+    /// The values, to write to.
+    pub fn values_mut(&mut self) -> &mut [[f64; LANES]] {
+        let numbers = &mut self.numbers[self.first..];
+        &mut numbers.as_chunks_mut().0[..self.len]
+    }
+}
+
+/// A copy begins with a cache line of its own.
+impl<const LANES: usize> Clone for Buffer<LANES> {
+    fn clone(&self) -> Self {
+        let mut copy = Self::new(self.len);
+        copy.values_mut().copy_from_slice(self.values());
+        copy
     }
 }

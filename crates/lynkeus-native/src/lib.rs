@@ -30,24 +30,18 @@
 //! # Ok::<(), lynkeus_expr::MissingInput>(())
 //! ```
 
-mod buffer;
 mod function;
 mod record;
 
 #[cfg(target_arch = "x86_64")]
 mod assemble;
 #[cfg(target_arch = "x86_64")]
-mod avx;
-#[cfg(target_arch = "x86_64")]
 mod emit;
-#[cfg(target_arch = "x86_64")]
-mod frame;
 #[cfg(target_arch = "x86_64")]
 mod library;
 #[cfg(target_arch = "x86_64")]
 mod memory;
 #[cfg(target_arch = "x86_64")]
-mod operations;
+mod registers;
 
-pub use buffer::Buffer;
-pub use function::{Evaluator, Function, Sweep, Sweeper};
+pub use function::{Buffer, Evaluator, Function, Sweep, Sweeper};

@@ -1,24 +1,11 @@
 //! What compiled code calls: the functions that the interpreter calls, too, over `Reals` for one
 //! lane and over `Lanes` for four.
 
-use std::arch::x86_64::__m256d;
+use std::arch::x86_64::*;
+use std::ops::{Add, Div, Mul, Sub};
 
-use lynkeus_expr::lanes;
-use lynkeus_expr::{Algebra, Binary, Reals, Unary};
-
-use crate::avx::Avx;
-
-/// A function of numbers, and of four of them side by side.
-struct Pair {
-    scalar: usize,
-    lanes: usize,
-}
-
-impl Pair {
-    fn address<const LANES: usize>(&self) -> usize {
-        if LANES == 1 { self.scalar } else { self.lanes }
-    }
-}
+use lynkeus_expr::lanes::Vector;
+use lynkeus_expr::{Algebra, Binary, Reals, Unary, lanes};
 
 /// The library's functions and those of lanes, by a macro because each has to be a function of
 /// its own. Arguments and result go by vector registers, one number or four in each.
@@ -26,7 +13,7 @@ macro_rules! unary {
     ($($op:ident $function:ident),*) => {
         /// The address of a function of one value; none where code is emitted for it.
         pub(crate) fn unary<const LANES: usize>(op: Unary) -> Option<usize> {
-            let pair = match op {
+            Some(match op {
                 $(Unary::$op => {
                     extern "sysv64" fn scalar(x: f64) -> f64 {
                         Reals.unary(Unary::$op, &x)
@@ -37,15 +24,14 @@ macro_rules! unary {
                     extern "sysv64" fn side_by_side(x: __m256d) -> __m256d {
                         lanes::$function(Avx(x)).0
                     }
-                    Pair {
-                        scalar: scalar as extern "sysv64" fn(f64) -> f64 as usize,
-                        lanes: side_by_side as unsafe extern "sysv64" fn(__m256d) -> __m256d
-                            as usize,
+                    if LANES == 1 {
+                        scalar as extern "sysv64" fn(f64) -> f64 as usize
+                    } else {
+                        side_by_side as unsafe extern "sysv64" fn(__m256d) -> __m256d as usize
                     }
                 })*
                 _ => return None,
-            };
-            Some(pair.address::<LANES>())
+            })
         }
     };
 }
@@ -54,7 +40,7 @@ macro_rules! binary {
     ($($op:ident $function:ident),*) => {
         /// The address of a function of two values; none where code is emitted for it.
         pub(crate) fn binary<const LANES: usize>(op: Binary) -> Option<usize> {
-            let pair = match op {
+            Some(match op {
                 $(Binary::$op => {
                     extern "sysv64" fn scalar(x: f64, y: f64) -> f64 {
                         Reals.binary(Binary::$op, &x, &y)
@@ -65,16 +51,15 @@ macro_rules! binary {
                     extern "sysv64" fn side_by_side(x: __m256d, y: __m256d) -> __m256d {
                         lanes::$function(Avx(x), Avx(y)).0
                     }
-                    Pair {
-                        scalar: scalar as extern "sysv64" fn(f64, f64) -> f64 as usize,
-                        lanes: side_by_side
-                            as unsafe extern "sysv64" fn(__m256d, __m256d) -> __m256d
-                            as usize,
+                    if LANES == 1 {
+                        scalar as extern "sysv64" fn(f64, f64) -> f64 as usize
+                    } else {
+                        side_by_side
+                            as unsafe extern "sysv64" fn(__m256d, __m256d) -> __m256d as usize
                     }
                 })*
                 _ => return None,
-            };
-            Some(pair.address::<LANES>())
+            })
         }
     };
 }
@@ -118,4 +103,138 @@ unsafe extern "sysv64" fn solve<const LANES: usize>(system: *mut [f64; LANES], n
 /// The address of the solver of linear systems.
 pub(crate) fn solver<const LANES: usize>() -> usize {
     solve::<LANES> as unsafe extern "sysv64" fn(*mut [f64; LANES], u32) as usize
+}
+
+/// To be used where the processor has AVX2 and FMA: by functions that are only called from code that was
+/// compiled for it. Everything is inlined there.
+#[derive(Clone, Copy)]
+struct Avx(__m256d);
+
+macro_rules! arithmetic {
+    ($($trait:ident $name:ident $instruction:ident),*) => {
+        $(impl $trait for Avx {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                // SAFETY: the processor has AVX2
+                Self(unsafe { $instruction(self.0, other.0) })
+            }
+        })*
+    };
+}
+
+arithmetic!(Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd);
+
+macro_rules! bitwise {
+    ($($name:ident $instruction:ident),*) => {
+        $(#[inline(always)]
+        fn $name(self, other: Self) -> Self {
+            // SAFETY: the processor has AVX2
+            Self(unsafe { $instruction(self.0, other.0) })
+        })*
+    };
+}
+
+impl Vector for Avx {
+    bitwise!(and _mm256_and_pd, or _mm256_or_pd, xor _mm256_xor_pd);
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        // SAFETY: the processor has FMA
+        Self(unsafe { _mm256_fmadd_pd(self.0, factor.0, term.0) })
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, factor: Self, term: Self) -> Self {
+        // SAFETY: the processor has FMA
+        Self(unsafe { _mm256_fmsub_pd(self.0, factor.0, term.0) })
+    }
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_set1_pd(x) })
+    }
+
+    #[inline(always)]
+    fn below(self, other: Self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn at_most(self, other: Self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_cmp_pd::<_CMP_LE_OQ>(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn choose(mask: Self, yes: Self, no: Self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_blendv_pd(no.0, yes.0, mask.0) })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_sqrt_pd(self.0) })
+    }
+
+    #[inline(always)]
+    fn plus_bits(self, other: Self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe {
+            let [x, y] = [self.0, other.0].map(|x| _mm256_castpd_si256(x));
+            _mm256_castsi256_pd(_mm256_add_epi64(x, y))
+        })
+    }
+
+    #[inline(always)]
+    fn up<const N: i32>(self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_castsi256_pd(_mm256_slli_epi64::<N>(_mm256_castpd_si256(self.0))) })
+    }
+
+    #[inline(always)]
+    fn down<const N: i32>(self) -> Self {
+        // SAFETY: the processor has AVX2
+        Self(unsafe { _mm256_castsi256_pd(_mm256_srli_epi64::<N>(_mm256_castpd_si256(self.0))) })
+    }
+
+    #[inline(always)]
+    fn all(self) -> bool {
+        // SAFETY: the processor has AVX2
+        unsafe { _mm256_movemask_pd(self.0) == 15 }
+    }
+
+    #[inline(always)]
+    fn rescued(self, inside: Self, arguments: [Self; 2], f: fn(f64, f64) -> f64) -> Self {
+        let [mut values, x, y] = [self, arguments[0], arguments[1]].map(Self::numbers);
+        // SAFETY: the processor has AVX2
+        let inside = unsafe { _mm256_movemask_pd(inside.0) };
+        rescue(&mut values, inside, &x, &y, f);
+        // SAFETY: the processor has AVX2, and the array holds four numbers
+        Self(unsafe { _mm256_loadu_pd(values.as_ptr()) })
+    }
+}
+
+impl Avx {
+    #[inline(always)]
+    fn numbers(self) -> [f64; 4] {
+        let mut numbers = [0.0; 4];
+        // SAFETY: the processor has AVX2, and the array holds four numbers
+        unsafe { _mm256_storeu_pd(numbers.as_mut_ptr(), self.0) };
+        numbers
+    }
+}
+
+/// f(x, y) in the lanes whose bit of `inside` is not set.
+#[cold]
+#[inline(never)]
+fn rescue(values: &mut [f64; 4], inside: i32, x: &[f64; 4], y: &[f64; 4], f: fn(f64, f64) -> f64) {
+    for (lane, value) in values.iter_mut().enumerate() {
+        if inside >> lane & 1 == 0 {
+            *value = f(x[lane], y[lane]);
+        }
+    }
 }

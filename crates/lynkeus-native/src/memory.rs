@@ -6,17 +6,6 @@ use memmap2::{Mmap, MmapMut};
 /// of groups.
 type Entry = unsafe extern "sysv64" fn(*const f64, *mut f64, *mut f64, *const f64, usize);
 
-/// What code works on.
-pub(crate) struct Places {
-    pub inputs: *const f64,
-    pub outputs: *mut f64,
-    pub frame: *mut f64,
-    /// the inputs that all groups have in common
-    pub shared: *const f64,
-    /// number of groups, at least 1
-    pub groups: usize,
-}
-
 /// Machine code in memory of its own, which nobody can write to any more.
 #[derive(Debug)]
 pub(crate) struct Executable {
@@ -32,22 +21,30 @@ impl Executable {
         Some(Self { code })
     }
 
-    /// Runs the code.
+    /// Runs the code on so many groups, at least one; `shared` are the inputs that all of them have
+    /// in common.
     ///
     /// # Safety
     /// The code must be what `emit` wrote for a program whose inputs, outputs and frame fit into
-    /// what the pointers point at, group by group.
-    pub unsafe fn run(&self, places: Places) {
+    /// these places, group by group.
+    pub unsafe fn run<const LANES: usize>(
+        &self,
+        inputs: &[[f64; LANES]],
+        outputs: &mut [[f64; LANES]],
+        frame: &mut [[f64; LANES]],
+        shared: &[[f64; LANES]],
+        groups: usize,
+    ) {
         // SAFETY: the memory holds a whole function with this signature, by the caller's promise
         let entry = unsafe { std::mem::transmute::<*const u8, Entry>(self.code.as_ptr()) };
-        // SAFETY: what the pointers point at is large enough, by the caller's promise
+        // SAFETY: the places are large enough, by the caller's promise
         unsafe {
             entry(
-                places.inputs,
-                places.outputs,
-                places.frame,
-                places.shared,
-                places.groups,
+                inputs.as_ptr().cast(),
+                outputs.as_mut_ptr().cast(),
+                frame.as_mut_ptr().cast(),
+                shared.as_ptr().cast(),
+                groups,
             );
         }
     }

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use lynkeus_expr::real::rounded;
 use lynkeus_expr::{Graph, MissingInput, Node, Tape};
 use lynkeus_structure::{Extended, Matrix};
 
@@ -194,8 +195,7 @@ pub(crate) fn numbers(A: &[Vec<f64>]) -> String {
         if x.is_nan() {
             return "–".to_owned();
         }
-        let short: f64 = format!("{x:.5e}").parse().unwrap_or(*x);
-        short.to_string()
+        rounded(*x, 6).to_string()
     };
     rows(
         A.iter()

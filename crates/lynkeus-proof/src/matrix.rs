@@ -13,6 +13,11 @@ pub fn sum(terms: impl Iterator<Item = Interval>) -> Interval {
     terms.fold(Interval::ZERO, |a, b| a + b)
 }
 
+/// Σ a_k b_k, over as many as both have.
+pub fn dot(a: &[Interval], b: &[Interval]) -> Interval {
+    sum(a.iter().zip(b).map(|(a, b)| *a * *b))
+}
+
 /// The n×n table of the entries.
 pub fn square<T>(n: usize, entry: impl Fn(usize, usize) -> T) -> Vec<Vec<T>> {
     let row = |i| (0..n).map(|j| entry(i, j)).collect();

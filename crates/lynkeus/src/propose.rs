@@ -4,6 +4,7 @@ use lynkeus_proof::spectrum;
 use std::fmt;
 
 use lynkeus_expr::Spent;
+use lynkeus_expr::real::rounded;
 use lynkeus_observers::{Examination, Family, Value};
 use serde_json::{Value as Json, json};
 
@@ -51,12 +52,12 @@ impl Speed {
     /// The value for an error that decays like e^(−rate t): what this family takes under the key.
     fn value(self, family: &dyn Family, rate: f64) -> Value {
         match self {
-            Self::Poles => Value::Number(-rounded(rate)),
+            Self::Poles => Value::Number(-rounded(rate, 2)),
             Self::Theta => {
                 let parts = family.speeds();
-                let part = |factor: &f64| Value::Number(rounded(factor * rate));
+                let part = |factor: &f64| Value::Number(rounded(factor * rate, 2));
                 match parts {
-                    [] => Value::Number(rounded(rate)),
+                    [] => Value::Number(rounded(rate, 2)),
                     _ => Value::List(parts.iter().map(part).collect()),
                 }
             }
@@ -243,11 +244,6 @@ pub(crate) fn time_scales(
         value: speed.value(family, limited),
         why,
     })
-}
-
-/// Two significant digits.
-fn rounded(x: f64) -> f64 {
-    format!("{x:.1e}").parse().unwrap_or(x)
 }
 
 #[cfg(all(test, feature = "tune"))]

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lynkeus_expr::real::rounded;
 use lynkeus_observers::Check;
 use lynkeus_structure::{Verdict, figures};
 
@@ -12,7 +13,7 @@ pub(crate) fn number(value: f64) -> String {
 
 /// Ten significant digits of a time, all written out: rows of a log that counts seconds since 1970 differ.
 pub(crate) fn instant(time: f64) -> String {
-    let rounded: f64 = format!("{time:.9e}").parse().unwrap_or(time);
+    let rounded = rounded(time, 10);
     match rounded.abs() {
         0.0 | 1e-4..1e15 => rounded.to_string(),
         _ => figures(rounded, 10),

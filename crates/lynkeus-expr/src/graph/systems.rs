@@ -2,53 +2,8 @@
 
 use std::collections::HashSet;
 
-use super::{Graph, Inner, Key, Node};
-use crate::{Binary, Implicit, Nodes, Op, Unary};
-
-/// The linear system A x = b of an [`Op::Solve`] node.
-#[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub struct LinearSystem {
-    /// A row by row (n²), then b (n)
-    pub(super) arguments: Vec<Node>,
-    n: usize,
-}
-
-impl LinearSystem {
-    /// Number of unknowns n.
-    pub fn size(&self) -> usize {
-        self.n
-    }
-
-    /// A, n×n, row by row.
-    pub fn matrix(&self) -> &[Node] {
-        &self.arguments[..self.n * self.n]
-    }
-
-    /// b, n entries.
-    pub fn right(&self) -> &[Node] {
-        &self.arguments[self.n * self.n..]
-    }
-}
-
-/// The result of [`Graph::solve`].
-#[derive(Clone, Debug)]
-pub struct Solution {
-    /// the n components of x with A x = b
-    pub x: Vec<Node>,
-    /// estimate of 1/cond(A) in [0, 1]; near 0 where A is close to singular and
-    /// `x` is the bounded answer of a truncated factorisation. Its derivative
-    /// is taken as zero: it is a diagnostic, not part of the solution.
-    pub rcond: Node,
-}
-
-/// The implicit function of an [`Op::Implicit`] node, and where it is taken.
-#[derive(Clone, PartialEq, Eq, Hash, Debug)]
-pub struct ImplicitCall {
-    /// z as a function of p
-    pub function: Implicit,
-    /// p
-    pub arguments: Vec<Node>,
-}
+use super::{Graph, ImplicitCall, Inner, Key, LinearSystem, Solution};
+use crate::{Binary, Implicit, Node, Nodes, Op, Unary};
 
 impl ImplicitCall {
     /// (z, p): the results of the node and its arguments.

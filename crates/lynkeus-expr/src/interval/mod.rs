@@ -171,13 +171,6 @@ impl Interval {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Intervals;
 
-impl From<f64> for Interval {
-    /// See [`Interval::point`].
-    fn from(value: f64) -> Self {
-        Self::point(value)
-    }
-}
-
 impl fmt::Display for Interval {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_empty() {

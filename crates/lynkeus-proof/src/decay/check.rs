@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{ErrorModel, Proof};
 use crate::definite::is_positive_definite;
-use crate::matrix::{IntervalMatrix, points, sum};
+use crate::matrix::{IntervalMatrix, dot, points};
 
 /// Whether the proof holds for every model: P > 0, every multiplier positive, and
 /// He(P A(θ)) + 2·rate·P < 0 for every θ in the ranges.
@@ -30,8 +30,7 @@ fn is_symmetric(P: &DMatrix<f64>) -> bool {
 }
 
 fn product(P: &IntervalMatrix, column: &[Interval]) -> Vec<Interval> {
-    let row = |row: &Vec<Interval>| sum(row.iter().zip(column).map(|(a, b)| *a * *b));
-    P.iter().map(row).collect()
+    P.iter().map(|row| dot(row, column)).collect()
 }
 
 /// One inequality: the negative of the block matrix is positive definite.

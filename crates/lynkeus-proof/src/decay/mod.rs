@@ -14,23 +14,22 @@
 //! an uncertain number but a list of models, one per vertex of its range, with one P
 //! for all.
 
-mod analysis;
-mod check;
-mod extent;
-mod frame;
-mod growth;
-mod inequalities;
-mod model;
-mod scale;
-mod synthesis;
+use lynkeus_expr::Interval;
+use nalgebra::{DMatrix, DVector};
+
+use crate::matrix::IntervalMatrix;
+use crate::vertices::{Bounds, varying, vertices};
 
 pub use analysis::{fastest, prove};
 pub use check::holds;
 pub use growth::is_unstable;
-pub use model::{ErrorModel, Sector, expanded};
 pub use synthesis::{Aim, Gain, NoGain, Request, design, is_reachable};
 
-use nalgebra::{DMatrix, DVector};
+mod analysis;
+mod check;
+mod frame;
+mod growth;
+mod synthesis;
 
 /// A Lyapunov function with its multipliers: what has to be checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,4 +40,168 @@ pub struct Proof {
     pub P: DMatrix<f64>,
     /// per model: one multiplier per sector
     pub multipliers: Vec<DVector<f64>>,
+}
+
+/// θ b e_sᵀ with θ in a range: the slope of one nonlinear term in one state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sector {
+    /// s, the state the term depends on
+    pub column: usize,
+    /// b, the weight of the term in each equation
+    pub direction: Vec<Interval>,
+    /// range of the slope θ
+    pub range: Interval,
+}
+
+impl Sector {
+    /// m, the middle of the range.
+    pub fn middle(&self) -> f64 {
+        self.range.midpoint()
+    }
+
+    /// h with m − h ≤ θ ≤ m + h.
+    pub fn half(&self) -> f64 {
+        let from_middle = self.range - Interval::point(self.middle());
+        from_middle.magnitude()
+    }
+
+    fn weight(&self, row: usize) -> f64 {
+        self.direction[row].midpoint()
+    }
+}
+
+/// e' = (A₀ + Σ θ_k b_k e_{s_k}ᵀ) e
+#[derive(Clone, Debug, PartialEq)]
+pub struct ErrorModel {
+    /// A₀, n×n
+    pub constant: IntervalMatrix,
+    /// the uncertain terms
+    pub sectors: Vec<Sector>,
+}
+
+impl ErrorModel {
+    /// Number of states.
+    pub fn size(&self) -> usize {
+        self.constant.len()
+    }
+
+    /// The model with A₀ − KC, where output j shows the state `measured[j]`.
+    pub fn corrected(&self, K: &DMatrix<f64>, measured: &[usize]) -> Self {
+        let mut corrected = self.clone();
+        for (i, row) in corrected.constant.iter_mut().enumerate() {
+            for (j, &state) in measured.iter().enumerate() {
+                row[state] = row[state] - Interval::point(K[(i, j)]);
+            }
+        }
+        corrected
+    }
+
+    /// The model of e/scale: A becomes D⁻¹AD with D = diag(scale), over `unit` of time.
+    pub fn scaled(&self, scale: &[f64], unit: f64) -> Self {
+        let point = Interval::point;
+        let factor = |i: usize, j: usize| point(scale[j]) / point(scale[i]) * point(unit);
+        let mut scaled = self.clone();
+        for (i, row) in scaled.constant.iter_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = *entry * factor(i, j);
+            }
+        }
+        for sector in &mut scaled.sectors {
+            for (i, entry) in sector.direction.iter_mut().enumerate() {
+                *entry = *entry * factor(i, sector.column);
+            }
+        }
+        scaled
+    }
+
+    /// A₀ + Σ m_k b_k e_{s_k}ᵀ, in numbers.
+    fn nominal(&self) -> DMatrix<f64> {
+        self.at(&self.sectors.iter().map(Sector::middle).collect::<Vec<_>>())
+    }
+
+    /// A(θ), in numbers.
+    pub fn at(&self, θ: &[f64]) -> DMatrix<f64> {
+        let n = self.size();
+        let mut A = DMatrix::from_fn(n, n, |i, j| self.constant[i][j].midpoint());
+        for (sector, θ) in self.sectors.iter().zip(θ) {
+            for i in 0..n {
+                A[(i, sector.column)] += θ * sector.weight(i);
+            }
+        }
+        A
+    }
+
+    /// B = (h_k b_k), in numbers.
+    fn spread(&self) -> DMatrix<f64> {
+        let n = self.size();
+        DMatrix::from_fn(n, self.sectors.len(), |i, k| {
+            self.sectors[k].half() * self.sectors[k].weight(i)
+        })
+    }
+
+    /// The rows e_{s_k}ᵀ: which state each uncertain term reads.
+    fn reads(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.sectors.len(), self.size(), |k, i| {
+            f64::from(u8::from(self.sectors[k].column == i))
+        })
+    }
+
+    /// Whether every number is finite.
+    pub fn is_bounded(&self) -> bool {
+        let finite = |x: &Interval| x.magnitude().is_finite() && x.is_defined();
+        let entries = self.constant.iter().flatten();
+        let directions = self.sectors.iter().flat_map(|s| &s.direction);
+        let ranges = self.sectors.iter().map(|s| &s.range);
+        entries.chain(directions).chain(ranges).all(finite)
+    }
+
+    /// The model with every range shrunk about its middle, θ_k = m_k + factor_k·(…).
+    pub fn shrunk(&self, factor: impl Fn(usize) -> f64) -> Self {
+        let mut shrunk = self.clone();
+        for (k, sector) in shrunk.sectors.iter_mut().enumerate() {
+            let (middle, half) = (sector.middle(), sector.half() * factor(k));
+            // a half-width that is finite leaves ordered bounds
+            sector.range = Interval::new(middle - half, middle + half).unwrap_or(sector.range);
+        }
+        shrunk
+    }
+
+    fn ranges(&self) -> Vec<Bounds> {
+        let range = |s: &Sector| Bounds {
+            lower: s.range.lo(),
+            upper: s.range.hi(),
+        };
+        self.sectors.iter().map(range).collect()
+    }
+
+    /// The model with these slopes, exactly enclosed: without sectors.
+    fn fixed(&self, θ: &[f64]) -> Self {
+        let mut constant = self.constant.clone();
+        for (sector, &θ) in self.sectors.iter().zip(θ) {
+            for (row, weight) in constant.iter_mut().zip(&sector.direction) {
+                row[sector.column] = row[sector.column] + Interval::point(θ) * *weight;
+            }
+        }
+        let sectors = vec![];
+        Self { constant, sectors }
+    }
+}
+
+/// The same error systems by their vertices where these are at most `limit`: an
+/// inequality at every vertex asks for less than one with multipliers.
+pub fn expanded(models: &[ErrorModel], limit: usize) -> Vec<ErrorModel> {
+    let count = |m: &ErrorModel| 1_usize.checked_shl(varying(&m.ranges()) as u32);
+    let total = models
+        .iter()
+        .try_fold(0_usize, |sum, m| sum.checked_add(count(m)?));
+    match total {
+        Some(total) if total <= limit && models.iter().all(ErrorModel::is_bounded) => {
+            let fixed = |m: &ErrorModel| {
+                let ends = vertices(&m.ranges());
+                ends.map(|θ| m.fixed(&θ)).collect::<Vec<_>>()
+            };
+            models.iter().flat_map(fixed).collect()
+        }
+        _ => models.to_vec(),
+    }
 }

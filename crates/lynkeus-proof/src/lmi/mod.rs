@@ -28,12 +28,11 @@
 
 mod affine;
 mod barrier;
-mod block;
 
 pub use affine::Affine;
 
-use barrier::{Barrier, Ended};
-use block::Block;
+use barrier::{Barrier, Block, Ended};
+
 use lynkeus_expr::{Budget, Spent};
 use nalgebra::{DMatrix, DVector};
 

@@ -4,6 +4,7 @@ use lynkeus_proof::spectrum;
 use std::fmt;
 use std::path::Path;
 
+use lynkeus_expr::real::rounded;
 use lynkeus_model::Variable;
 use lynkeus_observers::{Initial, Tuning, Value as Tuned};
 use lynkeus_structure::figures;
@@ -306,7 +307,7 @@ fn choice_of_span(prepared: &Prepared<'_>) -> f64 {
         .filter(|x| *x > 1e-6 * largest)
         .fold(f64::INFINITY, f64::min);
     let span = 10.0 / slowest;
-    let rounded: f64 = format!("{span:.0e}").parse().unwrap_or(10.0);
+    let rounded = rounded(span, 1);
     if rounded.is_finite() && rounded > 0.0 {
         rounded
     } else {

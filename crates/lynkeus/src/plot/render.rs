@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use lynkeus_expr::real::rounded;
 use plotters::chart::ChartContext;
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -191,11 +192,6 @@ fn unless_dust(value: f64, height: f64) -> f64 {
     } else {
         value
     }
-}
-
-fn rounded(value: f64, digits: usize) -> f64 {
-    let text = format!("{value:.*e}", digits.saturating_sub(1));
-    text.parse().unwrap_or(value)
 }
 
 /// Names the picture for screen readers and hovering. Characters of names that no XML may have, and those that a

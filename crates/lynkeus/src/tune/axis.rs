@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use lynkeus_expr::real::rounded;
 use lynkeus_observers::{FAMILIES, Value};
 
 use crate::near::suggest;
@@ -370,12 +371,6 @@ fn spread(values: &Values, present: Option<f64>) -> Option<Vec<f64>> {
         .collect();
     all.dedup();
     Some(all)
-}
-
-/// With so many significant digits.
-fn rounded(x: f64, digits: usize) -> f64 {
-    let text = format!("{x:.*e}", digits.saturating_sub(1));
-    text.parse().unwrap_or(x)
 }
 
 /// A value as tables and messages show it.

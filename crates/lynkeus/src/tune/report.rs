@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use lynkeus_expr::real::rounded;
 use lynkeus_structure::counted;
 use serde_json::{Map, Value, json};
 
@@ -107,7 +108,7 @@ impl Sweep {
 
 /// Three significant digits.
 pub(crate) fn brief(x: f64) -> String {
-    let rounded: f64 = format!("{x:.2e}").parse().unwrap_or(x);
+    let rounded = rounded(x, 3);
     match rounded.abs() {
         1e5.. => format!("{rounded:e}"),
         y if y > 0.0 && y < 1e-4 => format!("{rounded:e}"),

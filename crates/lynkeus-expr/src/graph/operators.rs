@@ -1,40 +1,11 @@
-//! Handles with operators, so that equations in Rust read like equations.
+//! Operators and functions of expressions, so that equations in Rust read like equations.
 
 use std::ops::{Add, Div, Mul, Neg, Not, Sub};
 
-use crate::{Binary, Graph, Node, Unary};
-
-/// A node together with its graph.
-///
-/// # Panics
-/// Operators panic where the two sides come from different graphs.
-#[derive(Clone, Copy)]
-pub struct Expr<'g> {
-    graph: &'g Graph,
-    node: Node,
-}
-
-impl std::fmt::Debug for Expr<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.graph.render(self.node, 200))
-    }
-}
+use super::Expr;
+use crate::{Binary, Unary};
 
 impl<'g> Expr<'g> {
-    pub(crate) fn new(graph: &'g Graph, node: Node) -> Self {
-        Self { graph, node }
-    }
-
-    /// The node.
-    pub fn node(self) -> Node {
-        self.node
-    }
-
-    /// The graph the node lives in.
-    pub fn graph(self) -> &'g Graph {
-        self.graph
-    }
-
     fn unary(self, op: Unary) -> Self {
         Self::new(self.graph, self.graph.unary(op, self.node))
     }

@@ -19,13 +19,12 @@
 //! is sharper than ‖S‖, λ_min(S) and one Lipschitz constant, and each number is an
 //! outward-rounded bound.
 
-mod elimination;
-
 use lynkeus_expr::Interval;
 
 use crate::definite::{is_positive_definite, least_eigenvalue};
+use crate::elimination::{columns, positive};
 use crate::magnitude::Magnitudes;
-use crate::matrix::{IntervalMatrix, square, sum, upper};
+use crate::matrix::{IntervalMatrix, dot, square, sum, upper};
 use crate::search::largest;
 use crate::vertices::{Bounds, varying, vertices};
 use crate::{inverse, metzler};
@@ -82,6 +81,27 @@ impl Chain {
         (μ > 0.0 && μ.is_finite()).then_some(μ)
     }
 
+    /// μ, state by state, for chains whose partials have too many vertices to visit; none for an S that is not tridiagonal.
+    fn eliminated_decay(&self) -> Option<f64> {
+        let (n, S) = (self.size(), &self.S);
+        let far = |i: usize, j: usize| i.abs_diff(j) > 1 && S[i][j].magnitude() != 0.0;
+        if (0..n).any(|i| (0..n).any(|j| far(i, j))) {
+            return None;
+        }
+        let D: Vec<Interval> = (0..n).map(|j| self.weight(j)).collect();
+        let Sg = self.pushed();
+        let first = Interval::point(2.0) * Sg[0] / S[0][0];
+        // g = rS⁻¹Cᵀ up to rounding: the rest of Sg is small, its arrow has this norm
+        let rest = (1..n).map(|i| (Sg[i] / (D[0] * D[i])).powi(2));
+        let stray = sum(rest).sqrt().hi();
+        let columns = columns(n, |i, j| S[i][j]);
+        let proved = |μ: f64| {
+            let shift = (Interval::point(μ) + Interval::point(stray)).hi();
+            positive(first, &columns, &self.partials, shift)
+        };
+        largest(first.hi(), proved)
+    }
+
     /// −D⁻¹(AᵀS + SA − SgC − CᵀgᵀS)D⁻¹
     fn scaled_form(&self, a: &[f64]) -> IntervalMatrix {
         let n = self.size();
@@ -98,8 +118,7 @@ impl Chain {
 
     /// Sg
     fn pushed(&self) -> Vec<Interval> {
-        let products = |row: &Vec<Interval>| sum(row.iter().zip(&self.g).map(|(s, g)| *s * *g));
-        self.S.iter().map(products).collect()
+        self.S.iter().map(|row| dot(row, &self.g)).collect()
     }
 
     /// D_j, the weight of ε_j.

@@ -1,0 +1,444 @@
+//! Graphs compiled to straight-line code, and its evaluation.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::Arc;
+
+use crate::code::{Code, Instruction, Register, System, SystemSlots, Tape};
+use crate::{Algebra, Binary, Graph, Node, Op, Reals};
+
+/// An expression depends on a symbol that is not among the inputs.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the expression depends on '{name}', which is not among the inputs of the tape")]
+pub struct MissingInput {
+    /// name of the symbol
+    pub name: String,
+}
+
+impl Tape {
+    /// Compiles `outputs` as functions of the symbols `inputs`.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an output depends on another symbol.
+    pub fn new(graph: &Graph, inputs: &[Node], outputs: &[Node]) -> Result<Self, MissingInput> {
+        let code = Compiler::new(graph, inputs, outputs)?.run(outputs);
+        Ok(Self {
+            code: Arc::new(code),
+        })
+    }
+
+    /// An evaluator over the numbers.
+    pub fn evaluator(&self) -> Evaluator {
+        self.evaluator_in(Reals)
+    }
+
+    /// An evaluator over any algebra, for many evaluations: it keeps its registers.
+    pub fn evaluator_in<A: Algebra>(&self, algebra: A) -> Evaluator<A> {
+        Evaluator {
+            machine: Machine::new(&self.code, algebra),
+            tape: self.clone(),
+        }
+    }
+
+    /// The outputs over any algebra, once.
+    ///
+    /// # Panics
+    /// If `inputs` has not [`Tape::inputs`] entries.
+    pub fn eval_in<A: Algebra>(&self, algebra: &A, inputs: &[A::Value]) -> Vec<A::Value> {
+        let mut machine = Machine::new(&self.code, algebra);
+        machine.run(&self.code, inputs);
+        machine.outputs(&self.code).cloned().collect()
+    }
+
+    /// Names the first operation that makes a NaN or an infinity out of finite
+    /// arguments at these inputs; of an algebraic loop also how the search ended.
+    pub fn first_nonfinite(&self, graph: &Graph, inputs: &[f64]) -> Option<String> {
+        let code = &*self.code;
+        let mut machine = Machine::new(code, Reals);
+        machine.enter(code, inputs);
+        for (instruction, &source) in code.instructions.iter().zip(&code.sources) {
+            machine.step(code, instruction);
+            let mut written = code.written(instruction);
+            let bad = written.find_map(|r| {
+                let value = machine.registers[r as usize];
+                (!value.is_finite()).then_some(value)
+            });
+            if let Some(value) = bad {
+                let failure = machine.failure(code, instruction);
+                let failure = failure.map_or_else(String::new, |how| format!(": {how}"));
+                return Some(format!("{} is {value}{failure}", graph.render(source, 160)));
+            }
+        }
+        None
+    }
+}
+
+/// Evaluates a [`Tape`] again and again over one algebra, by default the numbers. It shares
+/// the tape's code and keeps its registers: over `f64` nothing is allocated.
+///
+/// ```
+/// use lynkeus_expr::{Graph, Interval, Tape, interval::Intervals};
+///
+/// let g = Graph::new();
+/// let x = g.symbol("x");
+/// let tape = Tape::new(&g, &[x.node()], &[(x * x).node()])?;
+/// let mut bounds = tape.evaluator_in(Intervals);
+/// let mut square = [Interval::ZERO];
+/// for side in [1.0, 2.0, 3.0] {
+///     bounds.eval(&[Interval::new(0.0, side).expect("in order")], &mut square);
+///     assert!(square[0].contains(side * side));
+/// }
+/// # Ok::<(), lynkeus_expr::MissingInput>(())
+/// ```
+#[derive(Clone)]
+pub struct Evaluator<A: Algebra = Reals> {
+    tape: Tape,
+    machine: Machine<A>,
+}
+
+impl<A: Algebra> fmt::Debug for Evaluator<A> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Evaluator({} instructions)", self.tape.len())
+    }
+}
+
+impl<A: Algebra> Evaluator<A> {
+    /// The tape.
+    pub fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
+    /// Writes the outputs at `inputs`.
+    ///
+    /// # Panics
+    /// If the slices have not the tape's numbers of inputs and outputs.
+    pub fn eval(&mut self, inputs: &[A::Value], outputs: &mut [A::Value]) {
+        let Self { tape, machine } = self;
+        machine.run(&tape.code, inputs);
+        assert_eq!(
+            outputs.len(),
+            tape.outputs(),
+            "one place per output of the tape"
+        );
+        for (output, value) in outputs.iter_mut().zip(machine.outputs(&tape.code)) {
+            output.clone_from(value);
+        }
+    }
+}
+
+/// Linear-scan register allocation over the reachable nodes.
+struct Compiler<'g> {
+    graph: &'g Graph,
+    nodes: Vec<Node>,
+    register: HashMap<Node, Register>,
+    /// how many uses of a node are still to come
+    uses: HashMap<Node, usize>,
+    free: Vec<Register>,
+    code: Code,
+}
+
+impl<'g> Compiler<'g> {
+    pub fn new(graph: &'g Graph, inputs: &[Node], outputs: &[Node]) -> Result<Self, MissingInput> {
+        let nodes = graph.reachable(outputs);
+        let mut compiler = Self {
+            graph,
+            register: inputs.iter().copied().zip(0..).collect(),
+            uses: HashMap::new(),
+            free: vec![],
+            code: Code {
+                inputs: inputs.len(),
+                registers: inputs.len(),
+                ..Code::default()
+            },
+            nodes,
+        };
+        compiler.place_leaves(outputs)?;
+        compiler.count_uses(outputs);
+        Ok(compiler)
+    }
+
+    fn place_leaves(&mut self, outputs: &[Node]) -> Result<(), MissingInput> {
+        // a system has results but no value of its own
+        let valueless = |&&node: &&Node| self.graph.op(node).is_system();
+        if let Some(&node) = outputs.iter().find(valueless) {
+            let name = self.graph.render(node, 20);
+            return Err(MissingInput { name });
+        }
+        for &node in &self.nodes {
+            match self.graph.op(node) {
+                Op::Constant(value) => {
+                    self.register.insert(node, self.code.registers as Register);
+                    self.code.constants.push(value);
+                    self.code.registers += 1;
+                }
+                Op::Symbol(_) if !self.register.contains_key(&node) => {
+                    let name = self.graph.symbol_name(node).unwrap_or_default();
+                    return Err(MissingInput { name });
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn count_uses(&mut self, outputs: &[Node]) {
+        for &node in &self.nodes {
+            for argument in self.graph.arguments(node) {
+                *self.uses.entry(argument).or_default() += 1;
+            }
+        }
+        for &output in outputs {
+            // never released: one use that does not come
+            *self.uses.entry(output).or_default() += 1;
+        }
+    }
+
+    pub fn run(mut self, outputs: &[Node]) -> Code {
+        for node in std::mem::take(&mut self.nodes) {
+            self.emit(node);
+        }
+        self.code.outputs = outputs.iter().map(|o| self.register[o]).collect();
+        self.code
+    }
+
+    fn emit(&mut self, node: Node) {
+        let op = self.graph.op(node);
+        if let Op::Constant(_) | Op::Symbol(_) = op {
+            return;
+        }
+        if let Op::Entry(solve, entry) = op {
+            return self.emit_entry(node, solve, entry);
+        }
+        let arguments = self.graph.arguments(node);
+        let from: Vec<Register> = arguments.iter().map(|a| self.register[a]).collect();
+        let instruction = match op {
+            Op::Solve(_) | Op::Implicit(_) => {
+                // results must not land on arguments: arguments are released after
+                self.code.systems.push(SystemSlots {
+                    system: self.system(node),
+                    arguments: from,
+                    results: vec![],
+                });
+                let index = self.code.systems.len() as u32 - 1;
+                self.register.insert(node, index);
+                Instruction::Solve(index)
+            }
+            Op::Unary(op, _) => Instruction::Unary(op, self.result(node, &arguments), from[0]),
+            Op::Powi(_, n) => Instruction::Powi(n, self.result(node, &arguments), from[0]),
+            Op::Binary(op, ..) => {
+                Instruction::binary(op, self.result(node, &arguments), from[0], from[1])
+            }
+            _ => Instruction::Select(self.result(node, &arguments), from[0], from[1], from[2]),
+        };
+        if let Instruction::Solve(_) = instruction {
+            self.release(&arguments);
+        }
+        self.code.instructions.push(instruction);
+        self.code.sources.push(node);
+    }
+
+    fn system(&self, node: Node) -> System {
+        match self.graph.implicit_call(node) {
+            Some(call) => System::Implicit(call.function),
+            None => System::Linear(self.graph.system(node).map_or(0, |system| system.size())),
+        }
+    }
+
+    /// Results of a system are written when it is solved, so each takes a fresh
+    /// register: one that was free now might have been busy then.
+    fn emit_entry(&mut self, node: Node, solve: Node, entry: u32) {
+        let register = self.code.registers as Register;
+        self.code.registers += 1;
+        let system = self.register[&solve];
+        self.code.systems[system as usize]
+            .results
+            .push((entry as usize, register));
+        self.register.insert(node, register);
+    }
+
+    /// A register for the result; arguments not needed any more give theirs.
+    fn result(&mut self, node: Node, arguments: &[Node]) -> Register {
+        self.release(arguments);
+        let register = self.free.pop().unwrap_or_else(|| {
+            self.code.registers += 1;
+            self.code.registers as Register - 1
+        });
+        self.register.insert(node, register);
+        register
+    }
+
+    fn release(&mut self, arguments: &[Node]) {
+        for argument in arguments {
+            let Some(left) = self.uses.get_mut(argument) else {
+                continue;
+            };
+            *left -= 1;
+            let leaf = matches!(self.graph.op(*argument), Op::Constant(_) | Op::Symbol(_));
+            if *left == 0 && !leaf {
+                self.free.push(self.register[argument]);
+            }
+        }
+    }
+}
+
+/// Registers over one algebra, for one [`Code`].
+#[derive(Clone)]
+struct Machine<A: Algebra> {
+    algebra: A,
+    pub registers: Vec<A::Value>,
+    /// the arguments of the system that is being solved
+    system: Vec<A::Value>,
+}
+
+impl<A: Algebra> Machine<A> {
+    /// With the code's constants in their places.
+    pub fn new(code: &Code, algebra: A) -> Self {
+        let mut registers = vec![algebra.constant(0.0); code.registers];
+        let places = registers.iter_mut().skip(code.inputs);
+        for (place, &constant) in places.zip(&code.constants) {
+            *place = algebra.constant(constant);
+        }
+        Self {
+            algebra,
+            registers,
+            system: vec![],
+        }
+    }
+
+    pub fn run(&mut self, code: &Code, inputs: &[A::Value]) {
+        self.enter(code, inputs);
+        for instruction in &code.instructions {
+            self.step(code, instruction);
+        }
+    }
+
+    pub fn enter(&mut self, code: &Code, inputs: &[A::Value]) {
+        assert_eq!(inputs.len(), code.inputs, "one value per input of the tape");
+        self.registers[..inputs.len()].clone_from_slice(inputs);
+    }
+
+    /// What the outputs' registers hold.
+    pub fn outputs<'a>(&'a self, code: &'a Code) -> impl Iterator<Item = &'a A::Value> {
+        let outputs = code.outputs.iter();
+        outputs.map(|&register| &self.registers[register as usize])
+    }
+
+    #[inline(always)]
+    pub fn step(&mut self, code: &Code, instruction: &Instruction) {
+        let (algebra, r) = (&self.algebra, &mut self.registers[..]);
+        match *instruction {
+            Instruction::Add(to, x, y) => {
+                r[to as usize] = algebra.binary(Binary::Add, &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Sub(to, x, y) => {
+                r[to as usize] = algebra.binary(Binary::Sub, &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Mul(to, x, y) => {
+                r[to as usize] = algebra.binary(Binary::Mul, &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Div(to, x, y) => {
+                r[to as usize] = algebra.binary(Binary::Div, &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Unary(op, to, x) => r[to as usize] = algebra.unary(op, &r[x as usize]),
+            Instruction::Powi(n, to, x) => r[to as usize] = algebra.powi(&r[x as usize], n),
+            Instruction::Binary(op, to, x, y) => {
+                r[to as usize] = algebra.binary(op, &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Select(to, c, x, y) => {
+                r[to as usize] = algebra.select(&r[c as usize], &r[x as usize], &r[y as usize]);
+            }
+            Instruction::Solve(index) => self.solve(code, index),
+        }
+    }
+
+    fn solve(&mut self, code: &Code, index: u32) {
+        let slots = &code.systems[index as usize];
+        let r = &mut self.registers;
+        self.system.clear();
+        let arguments = slots.arguments.iter();
+        self.system
+            .extend(arguments.map(|&a| r[a as usize].clone()));
+        match &slots.system {
+            System::Linear(n) => {
+                let (a, x) = self.system.split_at_mut(n * n);
+                let rcond = self.algebra.solve_in_place(a, x);
+                for &(entry, to) in &slots.results {
+                    r[to as usize].clone_from(x.get(entry).unwrap_or(&rcond));
+                }
+            }
+            System::Implicit(function) => {
+                let z = self.algebra.implicit(function, &self.system);
+                for &(entry, to) in &slots.results {
+                    r[to as usize].clone_from(&z[entry]);
+                }
+            }
+        }
+    }
+}
+
+impl Machine<Reals> {
+    /// Why the instruction that was just run found no root, where it looked for one.
+    pub fn failure(&self, code: &Code, instruction: &Instruction) -> Option<String> {
+        let Instruction::Solve(index) = *instruction else {
+            return None;
+        };
+        match &code.systems[index as usize].system {
+            System::Linear(_) => None,
+            System::Implicit(function) => function.root(&self.system).err(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dead_code_is_left_out_and_registers_are_reused() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let _unused = x.exp() + x.cos();
+        let sum = (0..50).fold(x, |sum, k| (sum + f64::from(k % 3)).sin());
+        let tape = Tape::new(&g, &[x.node()], &[sum.node()]).unwrap();
+        assert_eq!(tape.len(), 100);
+        assert!(
+            tape.code.registers <= 1 + 3 + 2,
+            "{} registers",
+            tape.code.registers
+        );
+    }
+
+    #[test]
+    fn a_missing_input_is_named() {
+        let g = Graph::new();
+        let error = Tape::new(&g, &[], &[g.symbol("pump").node()]).unwrap_err();
+        assert_eq!(error.name, "pump");
+    }
+
+    #[test]
+    fn the_operation_that_makes_a_nan_is_named() {
+        let g = Graph::new();
+        let x = g.symbol("x");
+        let f = (x - 1.0).sqrt() * 2.0 + 1.0;
+        let tape = Tape::new(&g, &[x.node()], &[f.node()]).unwrap();
+        assert_eq!(tape.first_nonfinite(&g, &[2.0]), None);
+        assert_eq!(
+            tape.first_nonfinite(&g, &[0.0]).unwrap(),
+            "sqrt(x - 1) is NaN"
+        );
+    }
+
+    #[test]
+    fn results_of_a_system_survive_register_reuse() {
+        let g = Graph::new();
+        let [a, b, c] = ["a", "b", "c"].map(|name| g.symbol(name));
+        let system = [a.exp(), b, c, a + b].map(|e| e.node());
+        let solution = g.solve(&system, &[(a * b).node(), (b * c).node()]);
+        let x: Vec<_> = solution.x.iter().map(|&x| g.expr(x)).collect();
+        let residual = a.exp() * x[0] + b * x[1] - a * b;
+        let tape = Tape::new(&g, &[a, b, c].map(|e| e.node()), &[residual.node()]).unwrap();
+        let mut out = [1.0];
+        tape.evaluator().eval(&[0.3, 0.8, -0.5], &mut out);
+        assert!(out[0].abs() < 1e-15);
+    }
+}
