@@ -46,6 +46,101 @@ pub enum Target {
     Html,
 }
 
+/// What is declared of a [`Target`]: all that the command, its refusals and the dispatch know of it.
+struct Declared {
+    /// on the command line and in Python
+    word: &'static str,
+    /// what is written, in words
+    about: &'static str,
+    /// whether its numbers may be `float`
+    has_float: bool,
+    writes: Writes,
+}
+
+/// What makes the files of a target.
+enum Writes {
+    /// source text
+    Sources(fn(&Device<'_>, Precision) -> Result<Sources, Refusal>),
+    /// an archive, in which what can be tuned always is
+    Archive(Version),
+    /// the page of `lynkeus report`
+    #[cfg(feature = "tune")]
+    Page,
+}
+
+impl Target {
+    /// All of them, an FMU in the version that is usual.
+    pub const ALL: &[Self] = &[
+        Self::C,
+        Self::JavaScript,
+        Self::Rust,
+        Self::StructuredText,
+        #[cfg(feature = "tune")]
+        Self::Html,
+        Self::Fmu(Version::Three),
+    ];
+
+    fn declared(self) -> Declared {
+        match self {
+            Self::C => Declared {
+                word: "c",
+                about: "C99: a header, a source, a bench that replays a log, a CMakeLists.txt",
+                has_float: true,
+                writes: Writes::Sources(c::sources),
+            },
+            Self::JavaScript => Declared {
+                word: "js",
+                about: "A JavaScript module, for pages and Node",
+                has_float: false,
+                writes: Writes::Sources(javascript_module),
+            },
+            Self::Rust => Declared {
+                word: "rust",
+                about: "A Rust crate without the standard library, with an example that replays a log",
+                has_float: true,
+                writes: Writes::Sources(rust::sources),
+            },
+            Self::StructuredText => Declared {
+                word: "st",
+                about: "Structured Text of IEC 61131-3: a function block for programmable controllers",
+                has_float: true,
+                writes: Writes::Sources(structured::sources),
+            },
+            Self::Fmu(version) => Declared {
+                word: "fmu",
+                about: "An archive for tools of simulation: the estimator for FMI co-simulation; a plant or an observer in continuous time for model exchange, too",
+                has_float: true,
+                writes: Writes::Archive(version),
+            },
+            #[cfg(feature = "tune")]
+            Self::Html => Declared {
+                word: "html",
+                about: "The page of `lynkeus report`, on the study's simulation",
+                has_float: false,
+                writes: Writes::Page,
+            },
+        }
+    }
+
+    /// What the command line and Python call it: `c`, `js`, `rust`, `st`, `fmu` or `html`.
+    pub fn word(self) -> &'static str {
+        self.declared().word
+    }
+
+    /// What is written, in words.
+    pub fn about(self) -> &'static str {
+        self.declared().about
+    }
+
+    /// The target of a [word](Self::word).
+    pub fn named(word: &str) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|target| target.word() == word)
+    }
+}
+
 /// What of a study is exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Subject {
@@ -109,10 +204,9 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
-    let has_float = matches!(
-        options.to,
-        Target::C | Target::Rust | Target::StructuredText | Target::Fmu(_)
-    );
+    let Declared {
+        has_float, writes, ..
+    } = options.to.declared();
     if options.precision == Precision::F32 && !has_float {
         let message = "--precision f32: expected f64, the numbers of JavaScript";
         return Err(Error::input(message));
@@ -123,19 +217,40 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         Some(Subject::Observer) => return continuous::observer(study, options),
         None | Some(Subject::Estimator) => {}
     }
-    #[cfg(feature = "tune")]
-    if options.to == Target::Html {
-        if options.tunable {
+    let precision = options.precision;
+    match writes {
+        #[cfg(feature = "tune")]
+        Writes::Page if options.tunable => {
             let message = "what is tunable: expected C, JavaScript, Rust, Structured Text or an FMU, found a page, whose slider moves it";
-            return Err(Error::input(message));
+            Err(Error::input(message))
         }
-        return page(study, options.step);
+        #[cfg(feature = "tune")]
+        Writes::Page => page(study, options.step),
+        Writes::Sources(write) => written(study, options, options.tunable, |made, notes| {
+            let sources = write(made.device, precision)?;
+            notes.extend(beyond_float(&sources.lost));
+            Ok(sources.files.into_iter().map(Artifact::from).collect())
+        }),
+        Writes::Archive(version) => written(study, options, true, |made, notes| {
+            if precision == Precision::F32 {
+                notes.extend(beyond_float(&c::lost_in_float(made.device)?));
+            }
+            Ok(vec![fmu::archive(made, version, precision, notes)?])
+        }),
     }
+}
+
+/// The study's estimator as `write` makes files of it; with what may be changed while it runs.
+fn written(
+    study: &Study,
+    options: &ExportOptions,
+    is_tunable: bool,
+    write: impl FnOnce(&fmu::Made<'_>, &mut Vec<String>) -> Result<Vec<Artifact>, Refusal>,
+) -> Result<Export, Error> {
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let is_tunable = options.tunable || matches!(options.to, Target::Fmu(_));
     let mut design = match is_tunable {
         true => tunable::design(&prepared)?,
         false => prepared.design()?,
@@ -154,31 +269,21 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let about = about(study, &made, hasty);
     let files = printed(&prepared, &design, &made, &about, |device, told| {
         notes.extend(told);
-        let sources = match options.to {
-            Target::C => c::sources(device, options.precision)?,
-            Target::Rust => rust::sources(device, options.precision)?,
-            Target::StructuredText => structured::sources(device, options.precision)?,
-            Target::Fmu(version) => {
-                if options.precision == Precision::F32 {
-                    notes.extend(beyond_float(&c::lost_in_float(device)?));
-                }
-                let of = fmu::Made {
-                    device,
-                    prepared: &prepared,
-                    design: &design,
-                };
-                let archive = fmu::archive(&of, version, options.precision, &mut notes)?;
-                return Ok(vec![archive]);
-            }
-            _ => Sources::from(File {
-                name: format!("{}.mjs", c::prefix(&plant.name)),
-                text: javascript::module(device)?,
-            }),
+        let of = fmu::Made {
+            device,
+            prepared: &prepared,
+            design: &design,
         };
-        notes.extend(beyond_float(&sources.lost));
-        Ok(sources.files.into_iter().map(Artifact::from).collect())
+        write(&of, &mut notes)
     })?;
     Ok(Export { files, notes })
+}
+
+fn javascript_module(device: &Device<'_>, _: Precision) -> Result<Sources, Refusal> {
+    Ok(Sources::from(File {
+        name: format!("{}.mjs", c::prefix(device.name)),
+        text: javascript::module(device)?,
+    }))
 }
 
 /// The report on the study's simulation.
