@@ -6,9 +6,9 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::Axis;
 use super::chart::{Chart, Line, Look, Plot};
 use super::decimate::clipped;
-use super::render::{
+use super::render::{tick, titled};
+use super::style::{
     Area, BLUE, Chart as Plane, Drawn, FAINT, FONT, FRAME, GREY, INK, ORANGE, VERMILION, WIDTH,
-    tick, titled,
 };
 use crate::Error;
 
