@@ -1,8 +1,8 @@
 //! Expression graphs as source text in other languages.
 //!
-//! [`Code`] is what a tape computes as a list of operations that any language has: each once,
-//! arguments first, nothing that no output needs. A [`Dialect`] says how one language writes an
-//! operation; [`Body`] is the list in its words, one assignment after the other. A frame around
+//! `Code` is what a tape computes as a list of operations that any language has: each once,
+//! arguments first, nothing that no output needs. A `Dialect` says how one language writes an
+//! operation; `Body` is the list in its words, one assignment after the other. A frame around
 //! bodies, a module with functions for example, is the language's own ([`python`], [`curly`]).
 //!
 //! An operation that a dialect lacks is refused by name ([`Refusal`]); nothing is approximated.
@@ -11,17 +11,13 @@
 mod code;
 pub mod curly;
 mod dialect;
-mod factorise;
-mod hidden;
 mod names;
-mod printer;
 pub mod python;
 
-pub use code::{Code, Part, Solver};
-pub use dialect::{Binding, Dialect, Form, Text};
-pub use hidden::is_hidden;
-pub use names::Names;
-pub use printer::Body;
+pub(crate) use code::Code;
+pub(crate) use dialect::{Binding, Body, Dialect, Form, Text};
+pub(crate) use names::Names;
+pub use names::is_hidden;
 
 /// What cannot be printed, and what to do about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

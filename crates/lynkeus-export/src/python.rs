@@ -86,7 +86,7 @@ pub fn module(
 
 /// A line for people, whatever the model calls its variables.
 fn comment(words: &str) -> String {
-    let words = crate::hidden::seen(words);
+    let words = crate::names::seen(words);
     format!("# {}\n", words.trim_end())
 }
 

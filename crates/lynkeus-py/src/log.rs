@@ -15,9 +15,6 @@ use crate::errors::{exception, text, unexpected, wrong};
 /// What messages call a log that is no file.
 const NAME: &str = "log";
 
-/// What to do about a column that cannot be read.
-pub const HINT: &str = "convert it before, or name another column under [estimate] columns";
-
 /// A table of named columns of equal length.
 #[pyclass(frozen, module = "lynkeus._lynkeus")]
 pub struct Log {
@@ -85,7 +82,7 @@ impl Column<'_> {
                 parts.for_each(|((kind, x), at)| column.cell(cell(*kind, *x, *at)));
                 Ok(column)
             }
-            Self::Refused(why) => Ok(log.refused(name, why, HINT)),
+            Self::Refused(why) => Ok(log.refused(name, why, import::HINT)),
             Self::Arrow(object) => import::column(object, name, log),
         }
     }

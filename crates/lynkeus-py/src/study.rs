@@ -372,19 +372,22 @@ fn subject(system: &str) -> PyResult<Subject> {
 }
 
 fn target(to: &str, fmi: &str) -> PyResult<Target> {
-    Ok(match (to, fmi) {
-        ("c", _) => Target::C,
-        ("js", _) => Target::JavaScript,
-        ("st", _) => Target::StructuredText,
-        ("rust", _) => Target::Rust,
-        ("html", _) => Target::Html,
-        ("fmu", "3") => Target::Fmu(FmiVersion::Three),
-        ("fmu", "2") => Target::Fmu(FmiVersion::Two),
-        ("fmu", other) => return Err(unknown("fmi", "\"3\" or \"2\"", other)),
-        (other, _) => {
-            let expected = "\"c\", \"js\", \"rust\", \"st\", \"fmu\" or \"html\"";
-            return Err(unknown("to", expected, other));
-        }
+    let Some(target) = Target::named(to) else {
+        let words: Vec<String> = Target::ALL
+            .iter()
+            .map(|t| format!("\"{}\"", t.word()))
+            .collect();
+        let (last, others) = words
+            .split_last()
+            .map_or(("", &words[..]), |(l, o)| (l.as_str(), o));
+        let expected = format!("{} or {last}", others.join(", "));
+        return Err(unknown("to", &expected, to));
+    };
+    Ok(match (target, fmi) {
+        (Target::Fmu(_), "3") => Target::Fmu(FmiVersion::Three),
+        (Target::Fmu(_), "2") => Target::Fmu(FmiVersion::Two),
+        (Target::Fmu(_), other) => return Err(unknown("fmi", "\"3\" or \"2\"", other)),
+        (target, _) => target,
     })
 }
 

@@ -1,6 +1,5 @@
 //! What can be guaranteed about a study's observer.
 
-use std::fmt;
 use std::ops::ControlFlow;
 
 use lynkeus_observers::{Bounds, Certificate, Claim, Design, Tuning};
@@ -275,11 +274,6 @@ impl CertifyReport {
         self.verdict() == Standing::Proved
     }
 
-    /// The verdict in a sentence.
-    pub fn conclusion(&self) -> String {
-        print::conclusion(self)
-    }
-
     /// Whether it is shown that there is no decay.
     pub fn is_refuted(&self) -> bool {
         self.verdict() == Standing::Refuted
@@ -315,12 +309,6 @@ impl CertifyReport {
         self.certificate.verdict() == Standing::Refuted && theorem == Some(Standing::Proved)
     }
 
-    /// The verdict of one of its certificates, in a word or two.
-    #[cfg(feature = "tune")]
-    pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
-        print::word(self, certificate)
-    }
-
     /// Whether a certificate of this report is the theorem's.
     fn is_theorem(&self, certificate: &Certificate) -> bool {
         let theorem = self.theorem.as_ref();
@@ -343,11 +331,5 @@ impl CertifyReport {
             Some(theorem) if theorem.rate > self.certificate.rate => theorem,
             _ => &self.certificate,
         }
-    }
-}
-
-impl fmt::Display for CertifyReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        print::report(f, self)
     }
 }

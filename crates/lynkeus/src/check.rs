@@ -4,8 +4,8 @@ mod json;
 mod knowledge;
 mod next;
 mod observability;
+mod report;
 mod reserves;
-mod sorted;
 mod uniform;
 
 use std::collections::BTreeSet;
@@ -13,71 +13,23 @@ use std::fmt;
 use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
-use lynkeus_model::{Diagnostic, Plant};
+use lynkeus_model::Plant;
 use lynkeus_observability::{Answer, Verdict};
 use lynkeus_observers::{Examination, fit_word};
 use lynkeus_structure::{Sensors, counted, determined, uniformity};
 
-use crate::choice::Choice;
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::study::Name;
-use crate::words::conditions;
+use crate::words::{conditions, listed};
 use crate::{Error, ErrorKind, Study, calibrate, estimate, prepare};
-pub(crate) use json::point;
+use knowledge::Sorted;
 pub use knowledge::{Assumption, Knowledge, Known, Reserve};
 pub use next::Next;
+pub use report::{CheckOptions, Report};
 use reserves::View;
-use sorted::Sorted;
 pub use uniform::Uniform;
-
-/// What to ask beside "which states, by which observer".
-#[derive(Clone, Debug, Default)]
-pub struct CheckOptions {
-    /// take the parameters as unknown constants, and ask for them too
-    pub parameters: bool,
-    /// expressions in states, parameters and inputs to decide on
-    pub about: Vec<String>,
-}
-
-/// The answer of `lynkeus check`.
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// name of the plant
-    pub plant: String,
-    /// names of its states
-    pub states: Vec<String>,
-    /// measured outputs
-    pub measured: Vec<String>,
-    /// inputs that nobody measures
-    pub unknown: Vec<String>,
-    /// what each family finds; none where parameters are unknown
-    pub examinations: Vec<Examination>,
-    /// the family to use
-    pub recommended: Option<&'static str>,
-    /// the same with why, and with what the study leaves out
-    pub choice: Option<Choice>,
-    /// what can be known of each quantity, for each assumption on unknown inputs; none where
-    /// parameters have no value or are asked for
-    pub knowledge: Vec<Knowledge>,
-    /// what to type next; none where no observer was asked for
-    pub next: Option<Next>,
-    /// the unit of time
-    pub time_unit: Option<String>,
-    /// what can be known at all
-    pub answer: Answer,
-    /// for what inputs and where states can be told apart; none for many states, or where
-    /// they cannot at all
-    pub uniform: Option<Uniform>,
-    /// parameters are unknown constants
-    pub parameters: bool,
-    /// what the model says that does not fit together, such as units
-    pub warnings: Vec<Diagnostic>,
-    /// which of the study's declarations the families' conditions count
-    pub declared: Account,
-    /// what ended the search for the places where states cannot be told apart
-    ended: Option<Spent>,
-}
+pub(crate) use uniform::point;
 
 /// The time for what can be known at all, where the study has no limit.
 const OBSERVABILITY: Duration = Duration::from_secs(20);
@@ -411,7 +363,7 @@ impl Report {
         let Some(family) = self.recommended else {
             return writeln!(f, "{}", self.none());
         };
-        let lists = |names: &[&str]| observability::listed(names);
+        let lists = |names: &[&str]| listed(names);
         let Sorted {
             seen,
             follows,

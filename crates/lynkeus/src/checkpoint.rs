@@ -9,11 +9,11 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use lynkeus_run::{Digest, Estimator};
+use lynkeus_run::filter::SensorHealth;
+use lynkeus_run::{Digest, Error as RunError, Estimator};
 
 use crate::course::{Course, Samples};
 use crate::judge::Trace;
-use crate::replay::Halfway;
 use crate::{Error, Series};
 
 const MAGIC: &[u8; 8] = b"LYNKCHK2";
@@ -21,6 +21,37 @@ const MAGIC: &[u8; 8] = b"LYNKCHK2";
 const HEAD: usize = 24;
 /// Between two records.
 const EVERY: Duration = Duration::from_millis(200);
+
+/// The health of the sensors half-way through the rows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Halfway {
+    pub sensors: Vec<SensorHealth>,
+    /// the estimator then, where there is a checkpoint; empty before
+    pub snapshot: Vec<u8>,
+}
+
+impl Halfway {
+    pub fn at(estimator: &Estimator, has_checkpoint: bool) -> Self {
+        let snapshot = has_checkpoint.then(|| estimator.snapshot());
+        Self {
+            sensors: estimator.health().sensors.clone(),
+            snapshot: snapshot.unwrap_or_default(),
+        }
+    }
+
+    /// From the snapshot alone.
+    pub fn restored(snapshot: Vec<u8>, estimator: &Estimator) -> Result<Self, RunError> {
+        if snapshot.is_empty() {
+            return Ok(Self::default());
+        }
+        let mut then = estimator.clone();
+        then.restore(&snapshot)?;
+        Ok(Self {
+            sensors: then.health().sensors.clone(),
+            snapshot,
+        })
+    }
+}
 
 /// Where a replay is kept while it runs.
 #[derive(Debug)]

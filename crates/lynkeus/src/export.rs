@@ -1,104 +1,26 @@
 //! A study's estimator as source code for other machines; what is exported otherwise is in `continuous`.
 
 use lynkeus_export::Refusal;
-use lynkeus_export::curly::c::{self, File, Precision, Sources};
-use lynkeus_export::curly::fmu::Version;
-use lynkeus_export::curly::{Device, Entry, FirstReading, Tunable, javascript, rust, structured};
-use lynkeus_model::Variable;
-use lynkeus_observers::Design;
-use lynkeus_run::{Blueprint, Level};
+use lynkeus_export::curly::c::{self, Precision};
 
 #[cfg(feature = "tune")]
 use crate::ReportOptions;
 use crate::choice::Choice;
-use crate::estimate::at_readings;
 use crate::fixed_steps::{bends, hasty, stepped};
-use crate::headers::Headers;
 use crate::inputs::on_device;
 use crate::live::blueprint;
 use crate::prepare::{self, Prepared};
-use crate::study::BetweenSamples;
-use crate::systems::hat;
 use crate::{Error, Study, continuous, fmu, tunable};
 
+mod device;
 mod head;
+mod target;
 
+pub(crate) use device::{causal, printed};
 use head::{about, beyond_float};
 pub(crate) use head::{designed, file_name, origin};
-
-/// The language of an export.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Target {
-    /// C99: a header, a source, a bench and how they are built
-    #[default]
-    C,
-    /// a JavaScript module
-    JavaScript,
-    /// a crate without the standard library, with an example that replays a log
-    Rust,
-    /// Structured Text of IEC 61131-3: a function block with its functions, and a program that calls it
-    StructuredText,
-    /// a functional mock-up unit: C in an archive with a description and, where a C compiler is at hand, a
-    /// library for this machine; a note says where there is none
-    Fmu(Version),
-    /// a page that explains the estimates and moves them: [`report()`](crate::report())
-    #[cfg(feature = "tune")]
-    Html,
-}
-
-/// What of a study is exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Subject {
-    /// the estimator: it takes samples, and goes from one to the next
-    Estimator,
-    /// the plant in continuous time: its inputs and outputs are those of the model
-    Plant,
-    /// the observer in continuous time, as its family's paper has it: measurements are inputs
-    Observer,
-}
-
-/// How an estimator is exported.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ExportOptions {
-    /// the language
-    pub to: Target,
-    /// what is exported; by default the estimator of a study, the plant of a bare model
-    pub subject: Option<Subject>,
-    /// the type of numbers, in C and Rust
-    pub precision: Precision,
-    /// longest step of the integration, in the unit of time, instead of the study's
-    pub step: Option<f64>,
-    /// θ, or what stands for it, may be changed while the estimator runs, where its family allows that;
-    /// a functional mock-up unit has it anyway
-    pub tunable: bool,
-}
-
-/// A file of an export.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Artifact {
-    /// its name in the folder
-    pub name: String,
-    /// what it holds
-    pub bytes: Vec<u8>,
-}
-
-impl From<File> for Artifact {
-    fn from(File { name, text }: File) -> Self {
-        Self {
-            name,
-            bytes: text.into_bytes(),
-        }
-    }
-}
-
-/// The answer of `lynkeus export`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Export {
-    /// files of one folder
-    pub files: Vec<Artifact>,
-    /// what the user should know
-    pub notes: Vec<String>,
-}
+pub use target::{Artifact, Export, ExportOptions, Subject, Target};
+use target::{Declared, Writes};
 
 /// The study's estimator as source code, as `[estimate]` says: with the same fixed step it gives what
 /// [`estimate()`](crate::estimate()) gives. Where the study has no fixed step, one that is short
@@ -109,10 +31,9 @@ pub struct Export {
 /// As [`estimator`](crate::estimator()); and what cannot run elsewhere: a moving horizon, plants
 /// that jump with time, loops that are searched, smoothing.
 pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
-    let has_float = matches!(
-        options.to,
-        Target::C | Target::Rust | Target::StructuredText | Target::Fmu(_)
-    );
+    let Declared {
+        has_float, writes, ..
+    } = options.to.declared();
     if options.precision == Precision::F32 && !has_float {
         let message = "--precision f32: expected f64, the numbers of JavaScript";
         return Err(Error::input(message));
@@ -123,19 +44,40 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
         Some(Subject::Observer) => return continuous::observer(study, options),
         None | Some(Subject::Estimator) => {}
     }
-    #[cfg(feature = "tune")]
-    if options.to == Target::Html {
-        if options.tunable {
+    let precision = options.precision;
+    match writes {
+        #[cfg(feature = "tune")]
+        Writes::Page if options.tunable => {
             let message = "what is tunable: expected C, JavaScript, Rust, Structured Text or an FMU, found a page, whose slider moves it";
-            return Err(Error::input(message));
+            Err(Error::input(message))
         }
-        return page(study, options.step);
+        #[cfg(feature = "tune")]
+        Writes::Page => page(study, options.step),
+        Writes::Sources(write) => written(study, options, options.tunable, |made, notes| {
+            let sources = write(made.device, precision)?;
+            notes.extend(beyond_float(&sources.lost));
+            Ok(sources.files.into_iter().map(Artifact::from).collect())
+        }),
+        Writes::Archive(version) => written(study, options, true, |made, notes| {
+            if precision == Precision::F32 {
+                notes.extend(beyond_float(&c::lost_in_float(made.device)?));
+            }
+            Ok(vec![fmu::archive(made, version, precision, notes)?])
+        }),
     }
+}
+
+/// The study's estimator as `write` makes files of it; with what may be changed while it runs.
+fn written(
+    study: &Study,
+    options: &ExportOptions,
+    is_tunable: bool,
+    write: impl FnOnce(&fmu::Made<'_>, &mut Vec<String>) -> Result<Vec<Artifact>, Refusal>,
+) -> Result<Export, Error> {
     let mut notes = vec![];
     let study = &causal(study, &mut notes);
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
-    let is_tunable = options.tunable || matches!(options.to, Target::Fmu(_));
     let mut design = match is_tunable {
         true => tunable::design(&prepared)?,
         false => prepared.design()?,
@@ -154,29 +96,12 @@ pub fn export(study: &Study, options: &ExportOptions) -> Result<Export, Error> {
     let about = about(study, &made, hasty);
     let files = printed(&prepared, &design, &made, &about, |device, told| {
         notes.extend(told);
-        let sources = match options.to {
-            Target::C => c::sources(device, options.precision)?,
-            Target::Rust => rust::sources(device, options.precision)?,
-            Target::StructuredText => structured::sources(device, options.precision)?,
-            Target::Fmu(version) => {
-                if options.precision == Precision::F32 {
-                    notes.extend(beyond_float(&c::lost_in_float(device)?));
-                }
-                let of = fmu::Made {
-                    device,
-                    prepared: &prepared,
-                    design: &design,
-                };
-                let archive = fmu::archive(&of, version, options.precision, &mut notes)?;
-                return Ok(vec![archive]);
-            }
-            _ => Sources::from(File {
-                name: format!("{}.mjs", c::prefix(&plant.name)),
-                text: javascript::module(device)?,
-            }),
+        let of = fmu::Made {
+            device,
+            prepared: &prepared,
+            design: &design,
         };
-        notes.extend(beyond_float(&sources.lost));
-        Ok(sources.files.into_iter().map(Artifact::from).collect())
+        write(&of, &mut notes)
     })?;
     Ok(Export { files, notes })
 }
@@ -193,148 +118,4 @@ fn page(study: &Study, step: Option<f64>) -> Result<Export, Error> {
         }],
         notes: page.notes,
     })
-}
-
-/// What `print` makes of an estimator, with `about` at its head, and of notes on names.
-///
-/// # Errors
-/// What cannot run elsewhere.
-pub(crate) fn printed<T>(
-    prepared: &Prepared<'_>,
-    design: &Design,
-    made: &Blueprint,
-    about: &[String],
-    print: impl FnOnce(&Device<'_>, Vec<String>) -> Result<T, Refusal>,
-) -> Result<T, Error> {
-    let told = Told::of(prepared, design, made);
-    let first: Vec<FirstReading> = at_readings(prepared)
-        .iter()
-        .map(|at| FirstReading {
-            sensor: at.sensor,
-            state: at.state,
-            slope: at.slope,
-            offset: at.offset,
-        })
-        .collect();
-    let study = prepared.study();
-    let declared = prepared.declared();
-    let measured = design.observer.measured.iter();
-    let noises = measured.map(|signal| declared.noise.of(&signal.name).map(|n| Level::from(*n)));
-    let noises: Vec<Option<Level>> = noises.collect();
-    let device = Device {
-        name: &prepared.plant().name,
-        blueprint: made,
-        first_readings: &first,
-        signals: &told.signals,
-        estimates: &told.estimates,
-        monitors: told.monitors,
-        deviations: study.estimate.deviations,
-        tunables: &told.tunables,
-        noises: &noises,
-        words: &told.words,
-        about,
-    };
-    print(&device, told.notes)
-        .map_err(|refusal| Error::refused(refusal.to_string()).at(&study.file))
-}
-
-/// The study without what looks ahead, which a device cannot.
-pub(crate) fn causal(study: &Study, notes: &mut Vec<String>) -> Study {
-    let mut study = study.clone();
-    let settings = &mut study.estimate;
-    if settings.between_samples == BetweenSamples::Linear {
-        settings.between_samples = BetweenSamples::Hold;
-        notes.push(
-            "between_samples = \"linear\" of [estimate] looks ahead: here signals are held between samples"
-                .to_owned(),
-        );
-    }
-    if settings.smoothing.take().is_some() {
-        notes.push("smoothing looks ahead: the estimates are those of the filter".to_owned());
-    }
-    study
-}
-
-/// What the code says of names.
-struct Told {
-    signals: Vec<Entry>,
-    estimates: Vec<Entry>,
-    monitors: usize,
-    tunables: Vec<Tunable>,
-    words: Vec<Entry>,
-    notes: Vec<String>,
-}
-
-impl Told {
-    fn of(prepared: &Prepared<'_>, design: &Design, made: &Blueprint) -> Self {
-        let plant = prepared.plant();
-        let variables = plant
-            .inputs
-            .iter()
-            .chain(&plant.outputs)
-            .chain(&plant.states);
-        let words: Vec<Entry> = variables.map(entry).collect();
-        let known = |name: &str| {
-            let own = words.iter().find(|entry| entry.name == name);
-            own.cloned().unwrap_or_else(|| Entry::named(name))
-        };
-        let observer = &design.observer;
-        let read = observer.measured.iter().chain(&observer.inputs);
-        let mut headers = Headers::beside(plant).of_variables();
-        // as in the table of estimates, which has a column of time besides
-        let _ = headers.time();
-        headers.notes.clear();
-        let has_deviations = prepared.study().estimate.deviations;
-        let mut deviations = vec![];
-        let mut estimates = vec![];
-        for estimate in &observer.estimates {
-            let name = &estimate.variable.name;
-            let about = known(name).about;
-            let header = headers.free(&hat(name), &format!("the estimate of {name}"));
-            estimates.push(Entry {
-                name: header,
-                about,
-            });
-            if has_deviations {
-                let about = format!("standard deviation of {name}");
-                deviations.push(Entry {
-                    name: headers.free(&format!("{name}_sd"), &format!("the {about}")),
-                    about,
-                });
-            }
-        }
-        let monitors: Vec<Entry> = match made {
-            Blueprint::Filter { .. } => vec![],
-            Blueprint::Sampled { .. } => observer
-                .monitors
-                .iter()
-                .map(|monitor| Entry {
-                    name: headers.free(&monitor.name, &monitor.name),
-                    about: format!("{}, where below {}", monitor.meaning, monitor.alarm_below),
-                })
-                .collect(),
-        };
-        Self {
-            signals: read.map(|signal| known(&signal.name)).collect(),
-            monitors: monitors.len(),
-            estimates: estimates
-                .into_iter()
-                .chain(deviations)
-                .chain(monitors)
-                .collect(),
-            tunables: tunable::printed(design, made),
-            words,
-            notes: headers.notes,
-        }
-    }
-}
-
-/// A variable with its unit and what it is.
-fn entry(variable: &Variable) -> Entry {
-    let unit = variable.unit.as_ref().map(|unit| format!("[{unit}]"));
-    let words = [unit, variable.description.clone()];
-    Entry {
-        name: variable.name.clone(),
-        about: words.into_iter().flatten().collect::<Vec<_>>().join(" "),
-    }
 }

@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use lynkeus_run::filter::{Innovation, Reading, SensorHealth};
+use lynkeus_run::filter::{Innovation, Reading};
 use lynkeus_run::{Error as RunError, Estimator};
 
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::{Checkpoint, Halfway};
 use crate::course::{Course, Samples, add_row};
 use crate::judge::Trace;
 use crate::{Error, Study};
@@ -27,37 +27,6 @@ impl<'w> Watch<'w> {
             watch,
             checkpoint: None,
         }
-    }
-}
-
-/// The health of the sensors half-way through the rows.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Halfway {
-    sensors: Vec<SensorHealth>,
-    /// the estimator then, where there is a checkpoint; empty before
-    pub snapshot: Vec<u8>,
-}
-
-impl Halfway {
-    fn at(estimator: &Estimator, has_checkpoint: bool) -> Self {
-        let snapshot = has_checkpoint.then(|| estimator.snapshot());
-        Self {
-            sensors: estimator.health().sensors.clone(),
-            snapshot: snapshot.unwrap_or_default(),
-        }
-    }
-
-    /// From the snapshot alone.
-    pub fn restored(snapshot: Vec<u8>, estimator: &Estimator) -> Result<Self, RunError> {
-        if snapshot.is_empty() {
-            return Ok(Self::default());
-        }
-        let mut then = estimator.clone();
-        then.restore(&snapshot)?;
-        Ok(Self {
-            sensors: then.health().sensors.clone(),
-            snapshot,
-        })
     }
 }
 

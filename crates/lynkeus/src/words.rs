@@ -54,6 +54,17 @@ pub(crate) fn conditions<'a>(
     Ok(())
 }
 
+/// Names listed before the rest becomes a count.
+const NAMED: usize = 24;
+
+/// Names, the rest as a count where there are many.
+pub(crate) fn listed(names: &[&str]) -> String {
+    match names.len() > NAMED {
+        true => format!("{}, … ({} in all)", names[..NAMED].join(", "), names.len()),
+        false => names.join(", "),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

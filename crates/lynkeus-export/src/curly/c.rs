@@ -1,16 +1,16 @@
-//! C99: a header, a source, a bench that replays a log, and how they are built.
+//! C99: what the draft becomes there, a header, a source, a bench that replays a log, and how they are built.
 
-use super::device::{Device, Tunable};
-use super::function::{Entry, comment};
-use super::language::{self, Language};
-use super::machine::{Field, Kind, Machine};
-use super::tables::number;
-use super::template::{chosen, exchanged};
-use super::words::{self, CREDIBLE, PATIENCE, READINGS};
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
+use super::device::{CREDIBLE, Device, Entry, PATIENCE, READINGS, Tunable, codes, number_of};
+use super::draft::{FUNCTIONS, comment, number};
+use super::estimator::drafted;
+use super::machine::{Field, Machine};
+use super::syntax::Type;
+use super::template::{chosen, exchanged, outside_comments};
 use crate::Refusal;
-use crate::hidden::is_hidden;
-
-pub(super) use super::words::codes;
+use crate::names::is_hidden;
 
 const REPLAY: &str = include_str!("runtime/replay.c");
 const CMAKE: &str = include_str!("runtime/CMakeLists.txt");
@@ -65,14 +65,11 @@ pub fn files(device: &Device<'_>, precision: Precision) -> Result<Vec<File>, Ref
 /// # Errors
 /// As [`files`].
 pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
-    let machine = Machine::of(device)?;
+    let machine = drafted(device)?;
     let frame = Frame {
         device,
         machine: &machine,
-        language: match precision {
-            Precision::F64 => Language::C,
-            Precision::F32 => Language::SingleC,
-        },
+        precision,
         prefix: prefix(device.name),
     };
     let named = |text: &str| {
@@ -97,7 +94,7 @@ pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Ref
 /// # Errors
 /// As [`files`].
 pub fn lost_in_float(device: &Device<'_>) -> Result<Vec<String>, Refusal> {
-    Ok(lost(&Machine::of(device)?, Precision::F32))
+    Ok(lost(&drafted(device)?, Precision::F32))
 }
 
 /// Numbers of a draft that `float` makes 0 or infinite.
@@ -108,9 +105,7 @@ pub(super) fn lost(machine: &Machine, precision: Precision) -> Vec<String> {
     let starts = machine.fields.iter().flat_map(|field| &field.start);
     let starts: String = starts.map(|value| number(value.abs()) + "\n").collect();
     let draft = [&machine.tables, &machine.source, &starts].map(String::as_str);
-    language::lost_in_float(&draft.concat())
-        .into_iter()
-        .collect()
+    numbers_lost(&draft.concat()).into_iter().collect()
 }
 
 /// Files that are there already: the bench, the answers of FMUs, the headers of C99 and of what
@@ -147,8 +142,8 @@ pub(super) fn title(what: &str, about: &[String]) -> String {
 }
 
 /// The entries of an array with what they are, as lines of a comment.
-pub(super) fn listed(entries: &[super::Entry]) -> String {
-    let line = |(place, entry): (usize, &super::Entry)| {
+pub(super) fn listed(entries: &[Entry]) -> String {
+    let line = |(place, entry): (usize, &Entry)| {
         let about = comment(&format!("{} {}", entry.name, entry.about));
         format!(" *   {place}  {}\n", about.trim())
     };
@@ -158,7 +153,7 @@ pub(super) fn listed(entries: &[super::Entry]) -> String {
 struct Frame<'a> {
     device: &'a Device<'a>,
     machine: &'a Machine,
-    language: Language,
+    precision: Precision,
     prefix: String,
 }
 
@@ -168,9 +163,9 @@ impl Frame<'_> {
     }
 
     fn real(&self) -> &'static str {
-        match self.language {
-            Language::SingleC => "float",
-            _ => "double",
+        match self.precision {
+            Precision::F64 => "double",
+            Precision::F32 => "float",
         }
     }
 
@@ -292,9 +287,9 @@ impl Frame<'_> {
 
     fn declared(&self, field: &Field) -> String {
         let kind = match field.kind {
-            Kind::Real => self.real(),
-            Kind::Double => "double",
-            Kind::Int | Kind::Truth => "int",
+            Type::Real => self.real(),
+            Type::Double => "double",
+            _ => "int",
         };
         let size = field
             .count
@@ -313,7 +308,7 @@ impl Frame<'_> {
             if word == "STATE" {
                 return Some(format!("{name}_state"));
             }
-            words::number(word).map(|_| format!("{capitals}_{word}"))
+            number_of(word).map(|_| format!("{capitals}_{word}"))
         });
         let names = |entries: &[Entry]| -> String {
             let texts = entries
@@ -353,7 +348,7 @@ impl Frame<'_> {
             title = title(&format!("{name}.c"), self.device.about),
             signals = names(self.device.signals),
             estimates = names(self.device.estimates),
-            body = self.language.render(&draft),
+            body = self.precision.render(&draft),
         )
     }
 
@@ -375,9 +370,9 @@ fn start(field: &Field) -> String {
         ..
     } = field;
     let value = |value: f64| match kind {
-        Kind::Real => number(value),
-        Kind::Double => format!("{value:?}"),
-        Kind::Int | Kind::Truth => format!("{}", value as i64),
+        Type::Real => number(value),
+        Type::Double => format!("{value:?}"),
+        _ => format!("{}", value as i64),
     };
     match count {
         None => format!(
@@ -410,4 +405,157 @@ fn escaped(name: &str) -> String {
         c => c.to_string(),
     };
     name.chars().map(plain).collect()
+}
+
+impl Precision {
+    /// What holds of a draft: what is between `//? single` and `//?` is for `float` alone, with `!single` for
+    /// `double`.
+    pub(super) fn holds(self) -> &'static [&'static str] {
+        match self {
+            Self::F64 => &[],
+            Self::F32 => &["single"],
+        }
+    }
+
+    /// Types, and numbers that depend on them.
+    pub(super) fn constant(self, word: &str) -> Option<&'static str> {
+        let is_single = self == Self::F32;
+        Some(match (word, is_single) {
+            ("truth", _) => "int",
+            ("real", false) => "double",
+            ("real", true) => "float",
+            ("EPSILON", false) => "2.220446049250313e-16",
+            ("EPSILON", true) => "1.1920929e-7f",
+            ("SMALLEST", false) => "2.2250738585072014e-308",
+            ("SMALLEST", true) => "1.1754944e-38f",
+            ("RANK", false) => "1e-13",
+            ("RANK", true) => "1e-6f",
+            // what math.h calls so is `float`
+            ("NAN", false) => "(double)NAN",
+            ("INFINITY", false) => "(double)INFINITY",
+            _ => return None,
+        })
+    }
+
+    /// A draft in C.
+    pub(super) fn render(self, draft: &str) -> String {
+        let draft = chosen(draft, self.holds());
+        let draft = match self {
+            // time is `double`, too
+            Self::F64 => draft.replace("(real)", ""),
+            Self::F32 => draft,
+        };
+        let words = exchanged(&draft, |word| {
+            if let Some(constant) = self.constant(word) {
+                return Some(constant.to_owned());
+            }
+            let is_single = self == Self::F32 && word != "ceil" && FUNCTIONS.contains(&word);
+            is_single.then(|| format!("{word}f"))
+        });
+        let literal = |number: &str| match self {
+            Self::F32 => single(number),
+            Self::F64 => number.to_owned(),
+        };
+        outside_comments(&words, |code| literals(code, literal))
+    }
+}
+
+/// The text with `R(number)` written as the number.
+fn literals(text: &str, write: impl Fn(&str) -> String) -> String {
+    let mut result = String::with_capacity(text.len());
+    let mut rest = text;
+    let mut before = None;
+    while let Some(place) = rest.find("R(") {
+        let head = &rest[..place];
+        let last = head.chars().last().or(before);
+        let is_word = last.is_some_and(|c: char| c.is_ascii_alphanumeric() || c == '_');
+        result += head;
+        let body = &rest[place + 2..];
+        match body.find(')') {
+            Some(end) if !is_word => {
+                result += &write(&body[..end]);
+                rest = &body[end + 1..];
+                before = Some(')');
+            }
+            _ => {
+                result += "R(";
+                rest = body;
+                before = Some('(');
+            }
+        }
+    }
+    result + rest
+}
+
+/// Numbers of a draft that `float` has not: it makes 0 or an infinity of them.
+fn numbers_lost(draft: &str) -> BTreeSet<String> {
+    let lost = RefCell::new(BTreeSet::new());
+    outside_comments(draft, |code| {
+        literals(code, |number| {
+            let value = number.parse::<f64>().unwrap_or_default();
+            let is_held = value == 0.0 || ((value as f32) != 0.0 && (value as f32).is_finite());
+            if !is_held {
+                lost.borrow_mut().insert(number.to_owned());
+            }
+            String::new()
+        })
+    });
+    lost.into_inner()
+}
+
+/// A literal of type `float`.
+fn single(number: &str) -> String {
+    match number.parse::<f64>() {
+        Ok(value) if (value as f32).is_infinite() => "INFINITY".to_owned(),
+        Ok(value) => format!("{:?}f", value as f32),
+        Err(_) => number.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DRAFT: &str = "static truth half(STATE *s, const real *a, int i)\n{\n    real b[3];\n    const real c = R(0.5) * a[i];\n    (void)i;\n    s->x[0] = sqrt(fabs(c)) + (real)i;\n    return c;\n}\n";
+
+    #[test]
+    fn a_draft_is_text_in_each_language() {
+        let c = Precision::F64.render(DRAFT);
+        assert!(c.starts_with("static int half(STATE *s, const double *a, int i)\n"));
+        assert!(c.contains("const double c = 0.5 * a[i];"));
+        let single = Precision::F32.render(DRAFT);
+        assert!(single.contains("const float c = 0.5f * a[i];"));
+        assert!(single.contains("sqrtf(fabsf(c)) + (float)i"));
+        assert!(c.contains("sqrt(fabs(c)) + i;"));
+    }
+
+    #[test]
+    fn no_number_changes_its_precision_unasked() {
+        let draft = "    const real a = (b ? NAN : -INFINITY);\n//? single\n    const real h = R(1.0);\n//?\n//? !single\n    const real h = R(2.0);\n//?\n";
+        assert_eq!(
+            Precision::F64.render(draft),
+            "    const double a = (b ? (double)NAN : -(double)INFINITY);\n    const double h = 2.0;\n"
+        );
+        assert_eq!(
+            Precision::F32.render(draft),
+            "    const float a = (b ? NAN : -INFINITY);\n    const float h = 1.0f;\n"
+        );
+    }
+
+    #[test]
+    fn numbers_that_float_has_not_are_found() {
+        let draft = "/* R(1e300) */ a = R(1e-46) + R(0.1) - R(1e39) + R(0.0) + R(1e-44);";
+        let lost: Vec<String> = numbers_lost(draft).into_iter().collect();
+        assert_eq!(lost, ["1e-46", "1e39"]);
+    }
+
+    #[test]
+    fn literals_of_float_fit() {
+        assert_eq!(single("0.1"), "0.1f");
+        assert_eq!(single("1e300"), "INFINITY");
+        assert_eq!(
+            literals("FOR(1) R(2.5) + R(1e-9)", single),
+            "FOR(1) 2.5f + 1e-9f"
+        );
+    }
 }

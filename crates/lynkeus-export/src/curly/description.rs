@@ -2,9 +2,77 @@
 
 use std::collections::HashSet;
 
-use crate::hidden::is_hidden;
+use crate::names::is_hidden;
 
-use super::fmu::{Base, Component, Experiment, Quantity, Unit, Version};
+/// Which edition of the standard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// FMI 2.0
+    Two,
+    /// FMI 3.0
+    #[default]
+    Three,
+}
+
+/// A unit, in SI base units where it can be written in them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// as the model writes it
+    pub name: String,
+    /// none where a part of it is not known
+    pub base: Option<Base>,
+}
+
+/// `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Base {
+    /// powers of kg, m, s, A, K, mol and cd
+    pub powers: [i32; 7],
+    /// how many of the base unit one of it is
+    pub factor: f64,
+    /// where its zero lies, in the base unit
+    pub offset: f64,
+}
+
+/// A run that a tool may propose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Experiment {
+    /// its first instant
+    pub start: f64,
+    /// its last
+    pub stop: f64,
+    /// from one communication point to the next
+    pub step: f64,
+}
+
+/// What the description says of a variable.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Quantity {
+    /// its name, unlike all others
+    pub name: String,
+    /// one line; may be empty
+    pub description: String,
+    /// the name of a unit
+    pub unit: Option<String>,
+    /// a difference of values: the zero of its unit does not count
+    pub is_difference: bool,
+    /// before anything is set; not finite where nothing was measured
+    pub start: f64,
+    /// the ends of its range, where it has any
+    pub range: [Option<f64>; 2],
+    /// its typical size, above 0
+    pub nominal: Option<f64>,
+}
+
+impl Version {
+    /// The source that answers as the standard asks.
+    pub(super) fn wrapper(self) -> &'static str {
+        match self {
+            Self::Two => "fmi2.c",
+            Self::Three => "fmi3.c",
+        }
+    }
+}
 
 /// The place of a variable in the model, from which its value reference follows.
 pub(super) struct Variable<'q> {
@@ -46,22 +114,6 @@ pub(super) struct Description<'a> {
     pub interface: String,
     /// what `ModelStructure` holds
     pub structure: String,
-}
-
-/// `modelDescription.xml` of an estimator.
-pub(super) fn description(component: &Component<'_>, version: Version, token: &str) -> String {
-    let variables = variables(component);
-    Description {
-        model: component.device.name,
-        title: &component.title(),
-        units: component.units,
-        experiment: component.experiment,
-        categories: &["logStatusError"],
-        variables: &variables,
-        interface: interface(component, version),
-        structure: structure(&variables, version),
-    }
-    .text(version, token)
 }
 
 impl Description<'_> {
@@ -109,40 +161,6 @@ fn experiment(experiment: Experiment) -> String {
     format!(
         "  <DefaultExperiment startTime=\"{start}\" stopTime=\"{stop}\" stepSize=\"{step}\"/>\n"
     )
-}
-
-fn variables<'q>(component: &Component<'q>) -> Vec<Variable<'q>> {
-    let of = |quantities: &'q [Quantity], role| {
-        quantities
-            .iter()
-            .map(move |quantity| Variable { quantity, role })
-    };
-    let mut all = vec![Variable {
-        quantity: component.time,
-        role: Role::Time,
-    }];
-    all.extend(of(component.signals, Role::Signal));
-    all.extend(of(component.estimates, Role::Estimate));
-    all.extend(of(component.starts, Role::Start));
-    all.extend(of(component.tunables, Role::Tunable));
-    all
-}
-
-fn interface(component: &Component<'_>, version: Version) -> String {
-    let name = component.identifier();
-    match version {
-        Version::Two => format!(
-            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
-             canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\">\n\
-             \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
-             \x20 </CoSimulation>\n",
-            version.wrapper()
-        ),
-        Version::Three => format!(
-            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
-             canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" hasEventMode=\"true\"/>\n"
-        ),
-    }
 }
 
 fn unit(unit: &Unit) -> String {
@@ -324,26 +342,6 @@ fn scalar(reference: usize, variable: &Variable<'_>, name: &str) -> String {
         variable.start(),
         variable.derivative(Version::Two),
     )
-}
-
-/// What is computed: every estimate, from everything.
-fn structure(variables: &[Variable<'_>], version: Version) -> String {
-    let all = variables.iter().enumerate();
-    let estimates = all.filter(|(_, variable)| variable.role == Role::Estimate);
-    let places: Vec<usize> = estimates.map(|(place, _)| place).collect();
-    let each = |line: &dyn Fn(usize) -> String| places.iter().map(|p| line(*p)).collect::<String>();
-    match version {
-        Version::Two => {
-            let unknowns = each(&|place| format!("      <Unknown index=\"{}\"/>\n", place + 1));
-            format!(
-                "    <Outputs>\n{unknowns}    </Outputs>\n    <InitialUnknowns>\n{unknowns}    </InitialUnknowns>\n"
-            )
-        }
-        Version::Three => {
-            each(&|place| format!("    <Output valueReference=\"{place}\"/>\n"))
-                + &each(&|place| format!("    <InitialUnknown valueReference=\"{place}\"/>\n"))
-        }
-    }
 }
 
 /// `buildDescription.xml` of FMI 3.0.

@@ -1,11 +1,13 @@
 //! Functional mock-up units: the files of the archive, of which the C is [`c`]'s.
 
-use super::c::{self, File, Precision, codes, prefix};
-use super::description::{build, description, page};
-use super::device::Device;
-use super::function::comment;
+use super::c::{self, File, Precision, prefix};
+use super::description::{Description, Role, Variable, build, page};
+use super::device::{Device, codes};
+use super::draft::comment;
 use super::template::chosen;
 use crate::Refusal;
+
+pub use super::description::{Base, Experiment, Quantity, Unit, Version};
 
 const HEAD: &str = include_str!("runtime/fmu/head.c");
 const CORE: &str = include_str!("runtime/fmu/core.c");
@@ -18,66 +20,6 @@ const TWO_EXCHANGE: &str = include_str!("runtime/fmu/fmi2_exchange.c");
 
 /// The part of the templates that is for continuous states.
 pub(super) const EXCHANGE: &str = "exchange";
-
-/// Which edition of the standard.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Version {
-    /// FMI 2.0
-    Two,
-    /// FMI 3.0
-    #[default]
-    Three,
-}
-
-/// A unit, in SI base units where it can be written in them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unit {
-    /// as the model writes it
-    pub name: String,
-    /// none where a part of it is not known
-    pub base: Option<Base>,
-}
-
-/// `value · factor + offset` counts in kg^a m^b s^c A^d K^e mol^f cd^g.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Base {
-    /// powers of kg, m, s, A, K, mol and cd
-    pub powers: [i32; 7],
-    /// how many of the base unit one of it is
-    pub factor: f64,
-    /// where its zero lies, in the base unit
-    pub offset: f64,
-}
-
-/// A run that a tool may propose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Experiment {
-    /// its first instant
-    pub start: f64,
-    /// its last
-    pub stop: f64,
-    /// from one communication point to the next
-    pub step: f64,
-}
-
-/// What the description says of a variable.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Quantity {
-    /// its name, unlike all others
-    pub name: String,
-    /// one line; may be empty
-    pub description: String,
-    /// the name of a unit
-    pub unit: Option<String>,
-    /// a difference of values: the zero of its unit does not count
-    pub is_difference: bool,
-    /// before anything is set; not finite where nothing was measured
-    pub start: f64,
-    /// the ends of its range, where it has any
-    pub range: [Option<f64>; 2],
-    /// its typical size, above 0
-    pub nominal: Option<f64>,
-}
 
 /// A device as a functional mock-up unit.
 #[derive(Clone, Copy, Debug)]
@@ -106,7 +48,7 @@ impl Component<'_> {
         prefix(self.device.name)
     }
 
-    pub(super) fn title(&self) -> String {
+    fn title(&self) -> String {
         format!("Estimator for {}", self.device.name)
     }
 }
@@ -124,75 +66,58 @@ pub fn files(
     let name = component.identifier();
     let mut sources = c::files(component.device, precision)?;
     sources.retain(|file| file.name == format!("{name}.h") || file.name == format!("{name}.c"));
-    Ok(Archive {
-        name: &name,
+    Ok(archive(
+        &name,
         version,
         sources,
-        description: &|token| description(component, version, token),
-        wrapper: &|token| wrapper(component, version, precision, token),
-        page: page(
+        |token| description(component, version, token),
+        |token| wrapper(component, version, precision, token),
+        page(
             component.device.name,
             &component.title(),
             component.device.about,
         ),
-    }
-    .files())
+    ))
 }
 
-/// What an archive is made of.
-pub(super) struct Archive<'a> {
-    pub name: &'a str,
-    pub version: Version,
-    /// the C that is wrapped
-    pub sources: Vec<File>,
-    /// `modelDescription.xml`, with the token of the archive
-    pub description: &'a dyn Fn(&str) -> String,
-    /// what answers as the standard asks, with the same token
-    pub wrapper: &'a dyn Fn(&str) -> String,
-    /// for people
-    pub page: String,
-}
-
-impl Archive<'_> {
-    pub fn files(self) -> Vec<File> {
-        let mut files = self.sources;
-        let texts = files.iter().map(|file| file.text.as_str());
-        let token = token(texts.chain([(self.description)("").as_str()]));
+/// The files of an archive around the C that is wrapped: `description` gives `modelDescription.xml`, `wrapper`
+/// what answers as the standard asks, each with the token of the archive; `page` is for people.
+pub(super) fn archive(
+    name: &str,
+    version: Version,
+    mut files: Vec<File>,
+    description: impl Fn(&str) -> String,
+    wrapper: impl Fn(&str) -> String,
+    page: String,
+) -> Vec<File> {
+    let texts = files.iter().map(|file| file.text.as_str());
+    let token = token(texts.chain([description("").as_str()]));
+    files.push(File {
+        name: version.wrapper().to_owned(),
+        text: wrapper(&token),
+    });
+    if version == Version::Three {
         files.push(File {
-            name: self.version.wrapper().to_owned(),
-            text: (self.wrapper)(&token),
+            name: "buildDescription.xml".into(),
+            text: build(name),
         });
-        if self.version == Version::Three {
-            files.push(File {
-                name: "buildDescription.xml".into(),
-                text: build(self.name),
-            });
-        }
-        for file in &mut files {
-            file.name.insert_str(0, "sources/");
-        }
-        let description = File {
-            name: "modelDescription.xml".into(),
-            text: (self.description)(&token),
-        };
-        files.insert(0, description);
-        files.push(File {
-            name: "documentation/index.html".into(),
-            text: self.page,
-        });
-        files
     }
+    for file in &mut files {
+        file.name.insert_str(0, "sources/");
+    }
+    let description = File {
+        name: "modelDescription.xml".into(),
+        text: description(&token),
+    };
+    files.insert(0, description);
+    files.push(File {
+        name: "documentation/index.html".into(),
+        text: page,
+    });
+    files
 }
 
 impl Version {
-    /// The source that answers as the standard asks.
-    pub(super) fn wrapper(self) -> &'static str {
-        match self {
-            Self::Two => "fmi2.c",
-            Self::Three => "fmi3.c",
-        }
-    }
-
     /// How the standard's macros begin.
     fn macros(self) -> &'static str {
         match self {
@@ -266,6 +191,76 @@ fn wrapper(
         ("@REASONS@", reasons(codes(component.device))),
     ];
     title + &version.wrapped(CORE, holds, &values)
+}
+
+/// `modelDescription.xml` of an estimator.
+fn description(component: &Component<'_>, version: Version, token: &str) -> String {
+    let variables = variables(component);
+    Description {
+        model: component.device.name,
+        title: &component.title(),
+        units: component.units,
+        experiment: component.experiment,
+        categories: &["logStatusError"],
+        variables: &variables,
+        interface: interface(component, version),
+        structure: structure(&variables, version),
+    }
+    .text(version, token)
+}
+
+fn variables<'q>(component: &Component<'q>) -> Vec<Variable<'q>> {
+    let of = |quantities: &'q [Quantity], role| {
+        quantities
+            .iter()
+            .map(move |quantity| Variable { quantity, role })
+    };
+    let mut all = vec![Variable {
+        quantity: component.time,
+        role: Role::Time,
+    }];
+    all.extend(of(component.signals, Role::Signal));
+    all.extend(of(component.estimates, Role::Estimate));
+    all.extend(of(component.starts, Role::Start));
+    all.extend(of(component.tunables, Role::Tunable));
+    all
+}
+
+fn interface(component: &Component<'_>, version: Version) -> String {
+    let name = component.identifier();
+    match version {
+        Version::Two => format!(
+            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
+             canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" canSerializeFMUstate=\"true\">\n\
+             \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
+             \x20 </CoSimulation>\n",
+            version.wrapper()
+        ),
+        Version::Three => format!(
+            "  <CoSimulation modelIdentifier=\"{name}\" canHandleVariableCommunicationStepSize=\"true\" \
+             canGetAndSetFMUState=\"true\" canSerializeFMUState=\"true\" hasEventMode=\"true\"/>\n"
+        ),
+    }
+}
+
+/// What is computed: every estimate, from everything.
+fn structure(variables: &[Variable<'_>], version: Version) -> String {
+    let all = variables.iter().enumerate();
+    let estimates = all.filter(|(_, variable)| variable.role == Role::Estimate);
+    let places: Vec<usize> = estimates.map(|(place, _)| place).collect();
+    let each = |line: &dyn Fn(usize) -> String| places.iter().map(|p| line(*p)).collect::<String>();
+    match version {
+        Version::Two => {
+            let unknowns = each(&|place| format!("      <Unknown index=\"{}\"/>\n", place + 1));
+            format!(
+                "    <Outputs>\n{unknowns}    </Outputs>\n    <InitialUnknowns>\n{unknowns}    </InitialUnknowns>\n"
+            )
+        }
+        Version::Three => {
+            each(&|place| format!("    <Output valueReference=\"{place}\"/>\n"))
+                + &each(&|place| format!("    <InitialUnknown valueReference=\"{place}\"/>\n"))
+        }
+    }
 }
 
 /// A name for these texts and no others, as a UUID is written: FNV-1a with 128 bits.

@@ -1,11 +1,11 @@
-//! A drafted estimator: its state, its tables, and what is done with them.
+//! A draft under way: its state, its tables, and how it goes along a flow, alone or with its Jacobian and the
+//! covariance along an estimate.
 
-use lynkeus_run::{Blueprint, Method, Step, System};
+use lynkeus_run::{Level, Method, Step, System};
 
-use super::device::{Device, FirstReading};
-use super::function::{Arguments, Entry, Target, draft};
-use super::tables::number;
-use super::template::{chosen, mentions, parts};
+use super::draft::{Arguments, Target, draft, places, table};
+use super::syntax::Type;
+use super::template::{chosen, exchanged, mentions, parts};
 use crate::code::{Part, Solver};
 use crate::{Code, Refusal};
 
@@ -13,21 +13,13 @@ use crate::{Code, Refusal};
 #[derive(Clone, Debug)]
 pub(super) struct Field {
     pub name: &'static str,
-    pub kind: Kind,
+    /// of a number, or of each entry
+    pub kind: Type,
     /// number of entries; none for a single number
     pub count: Option<usize>,
     pub about: String,
     /// at the start
     pub start: Vec<f64>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    Real,
-    Double,
-    Int,
-    /// 0 or 1
-    Truth,
 }
 
 /// The estimator as a draft, but for the frame that each language has of its own.
@@ -42,50 +34,8 @@ pub(super) struct Machine {
 
 const LIBRARY: &str = include_str!("runtime/library.c");
 const STEPS: &str = include_str!("runtime/steps.c");
-const INTEGRATE: &str = include_str!("runtime/integrate.c");
-const PUSH: &str = include_str!("runtime/push.c");
 
 impl Machine {
-    /// # Errors
-    /// [`Refusal`]: what solves an optimisation, looks ahead, has no fixed step or jumps with time,
-    /// and operations that no language has.
-    pub fn of(device: &Device<'_>) -> Result<Self, Refusal> {
-        let mut machine = Self::default();
-        let sensors = device.sensors();
-        machine.size("SENSORS", sensors);
-        machine.size("INPUTS", device.signals.len().saturating_sub(sensors));
-        machine.size("SIGNALS", device.signals.len());
-        machine.size("REPORTED", device.estimates.len());
-        machine.single("time", Kind::Double, "of the last sample", 0.0);
-        machine.single("started", Kind::Truth, "whether there was one", 0.0);
-        machine.single(
-            "scale",
-            Kind::Real,
-            "the largest start, reading or input so far",
-            1.0,
-        );
-        let about = "samples in a row for which the equations had no value or an estimate ran away";
-        machine.single("refused", Kind::Int, about, 0.0);
-        machine.steps(device.blueprint.method())?;
-        let mut holds = vec![];
-        match device.blueprint {
-            Blueprint::Sampled { observer, .. } => {
-                holds.push("sampled");
-                machine.sampled(device, observer)?;
-            }
-            Blueprint::Filter { .. } => machine.filter(device)?,
-        }
-        if !device.first_readings.is_empty() {
-            holds.push("first");
-        }
-        if !device.tunables.is_empty() {
-            holds.push("tunable");
-        }
-        let first: Vec<String> = device.first_readings.iter().map(first_reading).collect();
-        machine.add(&chosen(PUSH, &holds).replace("        FIRST_READINGS\n", &first.concat()));
-        Ok(machine)
-    }
-
     /// The functions of the library that are called, those that others call first.
     pub fn library(&self) -> Vec<(&'static str, &'static str)> {
         let mut needed: Vec<(&str, &str)> = vec![];
@@ -130,7 +80,7 @@ impl Machine {
         self.sizes.push((name.into(), value));
     }
 
-    pub fn field(&mut self, name: &'static str, kind: Kind, about: &str, start: Vec<f64>) {
+    pub fn field(&mut self, name: &'static str, kind: Type, about: &str, start: Vec<f64>) {
         self.fields.push(Field {
             name,
             kind,
@@ -140,7 +90,7 @@ impl Machine {
         });
     }
 
-    fn single(&mut self, name: &'static str, kind: Kind, about: &str, start: f64) {
+    pub fn single(&mut self, name: &'static str, kind: Type, about: &str, start: f64) {
         self.fields.push(Field {
             name,
             kind,
@@ -153,6 +103,11 @@ impl Machine {
     pub fn add(&mut self, text: &str) {
         self.source += text;
         self.source.push('\n');
+    }
+
+    /// Whether readings are judged.
+    pub fn is_judged(&self) -> bool {
+        self.fields.iter().any(|field| field.name == "squares")
     }
 
     /// x' alone.
@@ -194,25 +149,194 @@ pub(super) fn refuse_jumps(system: &System) -> Result<(), Refusal> {
     }
 }
 
-fn first_reading(first: &FirstReading) -> String {
-    let FirstReading {
-        sensor,
-        state,
-        slope,
-        offset,
-    } = first;
-    let (slope, offset) = (number(*slope), number(*offset));
-    format!(
-        "        if (isfinite(signals[{sensor}])) {{\n            s->x[{state}] = (signals[{sensor}] - ({offset})) / ({slope});\n        }}\n"
-    )
+pub(super) const INTEGRATE: &str = include_str!("runtime/integrate.c");
+const LINEARISED: &str = include_str!("runtime/linearised.c");
+const ALONG: &str = include_str!("runtime/along.c");
+const PREDICT: &str = include_str!("runtime/predict.c");
+
+/// What stands for the factor on a filter's process noise among what its flow reads.
+pub(super) const NOISE_FACTOR: &str = "w[INPUTS]";
+
+/// A flow with its Jacobian and the densities of the noise on its states.
+pub(super) struct Linear<'a> {
+    pub flow: &'a System,
+    pub entries: &'a [(usize, usize)],
+    pub noise: &'a [f64],
+    /// the densities are multiplied by a number that may be changed
+    pub is_tuned: bool,
 }
 
-/// States and signals with what the device knows of them.
-pub(super) fn arguments(states: &[String], signals: &[String], device: &Device<'_>) -> Arguments {
-    let known = |name: &String| device.words.iter().find(|entry| entry.name == *name);
-    let entry = |name: &String| known(name).cloned().unwrap_or_else(|| Entry::named(name));
-    Arguments {
-        x: states.iter().map(entry).collect(),
-        w: signals.iter().map(entry).collect(),
+/// Which of two flows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Which {
+    Free,
+    /// inside the declared ranges
+    Inside {
+        /// whether the free flow is linearised, too: then both are integrated by the same functions
+        is_shared: bool,
+        /// whether its covariance is carried by Φ, too: then by the same function
+        is_carried: bool,
+    },
+}
+
+/// Names and sizes of which there is one for each flow.
+const OWN: [&str; 6] = [
+    "linear_flow",
+    "linearised",
+    "entry_rows",
+    "entry_columns",
+    "ENTRIES",
+    "ENTRIES_ROOM",
+];
+
+/// And where the free flow has no covariance along it.
+const SHARED: [&str; 7] = [
+    "integrate",
+    "along",
+    "rows_of_noise",
+    "process_noise",
+    "WIDTH",
+    "CARRIED",
+    "DIMENSION",
+];
+
+impl Which {
+    /// Whether the free flow has left these functions, sizes and tables.
+    fn shares(self) -> bool {
+        matches!(
+            self,
+            Self::Inside {
+                is_shared: true,
+                ..
+            }
+        )
+    }
+
+    /// Whether the free flow has left the function that carries a covariance.
+    fn is_carried(self) -> bool {
+        matches!(
+            self,
+            Self::Inside {
+                is_carried: true,
+                ..
+            }
+        )
+    }
+
+    /// The text, in which what this flow has for itself is called so.
+    pub fn renamed(self, text: &str) -> String {
+        exchanged(text, |word| {
+            let is_own = OWN.contains(&word)
+                || (SHARED.contains(&word) && !self.shares())
+                || (word == "predict" && !self.is_carried());
+            let is_own = is_own && self != Self::Free;
+            is_own.then(|| match word.chars().all(|c| !c.is_lowercase()) {
+                true => format!("{word}_INSIDE"),
+                false => format!("{word}_inside"),
+            })
+        })
+    }
+}
+
+impl Machine {
+    /// The root of a covariance that starts diagonal.
+    pub fn root(&mut self, variances: &[f64]) {
+        let n = variances.len();
+        let mut start = vec![0.0; n * n];
+        for (i, variance) in variances.iter().enumerate() {
+            start[i * n + i] = variance.sqrt();
+        }
+        self.field(
+            "root",
+            Type::Real,
+            "lower root of the covariance, row by row",
+            start,
+        );
+    }
+
+    /// The variances of the noises of the sensors.
+    pub fn noises(&mut self, levels: impl Iterator<Item = Level>) {
+        let parts = levels.map(|level| match level {
+            Level::Relative(share) => (0.0, share),
+            other => (other.variance(0.0), 0.0),
+        });
+        let (variances, shares): (Vec<f64>, Vec<f64>) = parts.unzip();
+        self.tables += &table("noise_variances", &variances);
+        self.tables += &table("noise_shares", &shares);
+    }
+
+    /// x, Φ and W along a flow, together, and the rows that W adds to a root.
+    pub fn linear(
+        &mut self,
+        which: Which,
+        linear: &Linear<'_>,
+        arguments: &Arguments,
+    ) -> Result<(), Refusal> {
+        let Linear {
+            flow,
+            entries,
+            noise,
+            is_tuned,
+        } = linear;
+        refuse_jumps(flow)?;
+        let n = flow.states().len();
+        let scale = noise.iter().fold(0.0_f64, |m, q| m.max(*q));
+        let (width, holds): (usize, &[&str]) = match scale > 0.0 {
+            true => (2 * n, &["noisy"]),
+            false => (n, &[]),
+        };
+        self.size(which.renamed("ENTRIES"), entries.len());
+        self.size(which.renamed("ENTRIES_ROOM"), entries.len().max(1));
+        if !which.shares() {
+            self.size(which.renamed("WIDTH"), width);
+            self.size(which.renamed("CARRIED"), width);
+            self.size(which.renamed("DIMENSION"), n + n * width);
+        }
+        let mut tables = places("entry_rows", entries.iter().map(|e| e.0));
+        tables += &places("entry_columns", entries.iter().map(|e| e.1));
+        if scale > 0.0 && !which.shares() {
+            let shares: Vec<f64> = noise.iter().map(|q| q / scale).collect();
+            tables += &table("process_noise", &shares);
+        }
+        self.tables += &which.renamed(&tables);
+        let jacobian = Part {
+            tape: flow.output_tape(),
+            outputs: 0..entries.len(),
+        };
+        let flow = draft(
+            "The derivatives, and the entries of their Jacobian that are not zero.",
+            "linear_flow",
+            &code(&[Part::all(flow.derivative_tape()), jacobian])?,
+            arguments,
+            &[Target::all("dx", n), Target::all("slopes", entries.len())],
+        )?;
+        let scale = match is_tuned {
+            true => format!("R({scale:?}) * {NOISE_FACTOR}"),
+            false => format!("R({scale:?})"),
+        };
+        let along = chosen(ALONG, holds).replace("NOISE_SCALE", &scale);
+        let linearised = chosen(LINEARISED, holds);
+        let kind = if which == Which::Free { FIELD } else { "" };
+        let own = [kind, &flow, &linearised].join("\n");
+        self.add(&which.renamed(&own));
+        if !which.shares() {
+            self.add(&which.renamed(&[INTEGRATE, &along].join("\n")));
+        }
+        Ok(())
+    }
+
+    /// P = ΦPΦᵀ + W along a flow that is drafted already.
+    pub fn carried(&mut self, which: Which, linear: &Linear<'_>) {
+        if !which.is_carried() {
+            let holds: &[&str] = if linear.is_noisy() { &["noisy"] } else { &[] };
+            self.add(&which.renamed(&chosen(PREDICT, holds)));
+        }
+    }
+}
+
+impl Linear<'_> {
+    /// Whether anything disturbs the states.
+    pub fn is_noisy(&self) -> bool {
+        self.noise.iter().any(|q| *q > 0.0)
     }
 }

@@ -7,29 +7,18 @@
 //! of an observer, are drafted likewise and become an [`Exchange`].
 
 pub mod c;
-mod credible;
 mod description;
 mod device;
-mod dialect;
-mod exchange;
+mod draft;
+mod estimator;
 pub mod fmu;
-mod function;
 pub mod javascript;
-mod kalman;
-mod language;
-mod linear;
 mod machine;
-mod observer;
 mod ode;
 pub mod rust;
 pub mod structured;
 mod syntax;
-mod tables;
 mod template;
-mod tuning;
-mod words;
 
-pub use device::{Device, FirstReading, Tunable};
-pub use exchange::Exchange;
-pub use function::Entry;
-pub use ode::{Ode, State};
+pub use device::{Device, Entry, FirstReading, Tunable};
+pub use ode::{Exchange, Ode, State};

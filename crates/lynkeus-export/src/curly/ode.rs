@@ -1,12 +1,16 @@
-//! Equations x' = f(t, x, u), y = h(t, x, u) as C: what they give, how they change along a
-//! direction, and fixed steps of the classical Runge-Kutta method.
+//! Equations x' = f(t, x, u), y = h(t, x, u): in C what they give, how they change along a direction, and fixed
+//! steps of the classical Runge-Kutta method; and as functional mock-up units for model exchange and co-simulation
+//! in one archive.
+
+use std::ops::Range;
 
 use lynkeus_run::{Method, System};
 
-use super::c::{File, listed, prefix, title};
-use super::fmu::Quantity;
-use super::function::{Arguments, Entry, Target, draft};
-use super::language::Language;
+use super::c::{File, Precision, listed, prefix, title};
+use super::description::{Description, Experiment, Quantity, Role, Unit, Variable, Version, page};
+use super::device::Entry;
+use super::draft::{Arguments, Target, draft};
+use super::fmu::{EXCHANGE, archive, reasons};
 use super::machine::{Machine, code, refuse_jumps};
 use super::template::exchanged;
 use crate::code::{Part, Solver};
@@ -192,10 +196,249 @@ fn source(ode: &Ode<'_>, machine: &Machine) -> File {
     let text = format!(
         "{}#include \"{name}.h\"\n\n#include <math.h>\n\n{}{interface}",
         title(&format!("{name}.c"), ode.about),
-        Language::C.render(&draft),
+        Precision::F64.render(&draft),
     );
     File {
         name: format!("{name}.c"),
         text,
     }
+}
+
+const CORE: &str = include_str!("runtime/fmu/ode.c");
+
+/// Equations with what a description says of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Exchange<'a> {
+    /// the equations
+    pub ode: &'a Ode<'a>,
+    /// every unit that a quantity names, once
+    pub units: &'a [Unit],
+    /// the independent variable
+    pub time: &'a Quantity,
+    /// what a tool starts from, where the study says
+    pub experiment: Option<Experiment>,
+}
+
+impl Exchange<'_> {
+    /// The name of the archive, of its library and of its functions' source: a name of C.
+    pub fn identifier(&self) -> String {
+        prefix(self.ode.name)
+    }
+
+    /// The texts of the archive, as [`fmu::files`](super::fmu::files): for tools that integrate the
+    /// equations themselves (model exchange), and for those that have them integrated with fixed steps
+    /// (co-simulation).
+    ///
+    /// # Errors
+    /// What jumps with time alone, no fixed steps, operations that C has not.
+    pub fn files(&self, version: Version) -> Result<Vec<File>, Refusal> {
+        let name = self.identifier();
+        let ode = self.ode;
+        let Sources {
+            files,
+            dependencies,
+        } = sources(ode)?;
+        let structure = Structure { ode, dependencies };
+        Ok(archive(
+            &name,
+            version,
+            files.into(),
+            |token| self.description(&structure, version, token),
+            |token| self.wrapper(version, token),
+            page(ode.name, ode.title, ode.about),
+        ))
+    }
+
+    fn description(&self, structure: &Structure<'_>, version: Version, token: &str) -> String {
+        let ode = self.ode;
+        let variable = |quantity, role| Variable { quantity, role };
+        let mut variables = vec![variable(self.time, Role::Time)];
+        variables.extend(ode.inputs.iter().map(|q| variable(q, Role::Input)));
+        variables.extend(ode.states.iter().map(|state| {
+            let is_output = state.is_output;
+            variable(&state.quantity, Role::State { is_output })
+        }));
+        variables.extend(ode.states.iter().enumerate().map(|(i, state)| {
+            let of = structure.state(i);
+            variable(&state.derivative, Role::Derivative { of })
+        }));
+        variables.extend(ode.outputs.iter().map(|q| variable(q, Role::Estimate)));
+        variables.extend(ode.parameters.iter().map(|q| variable(q, Role::Tunable)));
+        Description {
+            model: ode.name,
+            title: ode.title,
+            units: self.units,
+            experiment: self.experiment,
+            categories: &["logStatusError", "logStatusDiscard"],
+            variables: &variables,
+            interface: interface(&self.identifier(), version),
+            structure: structure.text(version),
+        }
+        .text(version, token)
+    }
+
+    fn wrapper(&self, version: Version, token: &str) -> String {
+        let name = self.identifier();
+        let ode = self.ode;
+        let listed = |numbers: Vec<f64>| match numbers.is_empty() {
+            true => "0.0".to_owned(),
+            false => {
+                let texts: Vec<String> = numbers.iter().map(|n| format!("{n:?}")).collect();
+                texts.join(", ")
+            }
+        };
+        let given = ode.inputs.iter().chain(ode.parameters).map(|q| q.start);
+        let nominals = ode.states.iter().map(|state| &state.quantity);
+        let nominals = nominals.map(|q: &Quantity| q.nominal.unwrap_or(1.0));
+        let places = [
+            ("@NAME@", name.clone()),
+            ("@CAPITALS@", name.to_ascii_uppercase()),
+            ("@TOKEN@", token.to_owned()),
+            ("@FIRST_GIVEN@", listed(given.collect())),
+            ("@NOMINALS@", listed(nominals.collect())),
+            ("@REASONS@", reasons(CODES.into_iter())),
+        ];
+        let file = version.wrapper();
+        format!("/* {file}: {name} as a functional mock-up unit. */\n")
+            + &version.wrapped(CORE, &[EXCHANGE], &places)
+    }
+}
+
+fn interface(name: &str, version: Version) -> String {
+    match version {
+        Version::Two => {
+            let of = |kind: &str, more: &str| {
+                format!(
+                    "  <{kind} modelIdentifier=\"{name}\" {more} canNotUseMemoryManagementFunctions=\"true\" canGetAndSetFMUstate=\"true\" \
+                     canSerializeFMUstate=\"true\" providesDirectionalDerivative=\"true\">\n\
+                     \x20   <SourceFiles>\n      <File name=\"{name}.c\"/>\n      <File name=\"{}\"/>\n    </SourceFiles>\n\
+                     \x20 </{kind}>\n",
+                    version.wrapper()
+                )
+            };
+            of("ModelExchange", "completedIntegratorStepNotNeeded=\"true\"")
+                + &of(
+                    "CoSimulation",
+                    "canHandleVariableCommunicationStepSize=\"true\"",
+                )
+        }
+        Version::Three => {
+            let of = |kind: &str, more: &str| {
+                format!(
+                    "  <{kind} modelIdentifier=\"{name}\" {more}canGetAndSetFMUState=\"true\" \
+                     canSerializeFMUState=\"true\" providesDirectionalDerivatives=\"true\"/>\n"
+                )
+            };
+            of("ModelExchange", "")
+                + &of(
+                    "CoSimulation",
+                    "canHandleVariableCommunicationStepSize=\"true\" ",
+                )
+        }
+    }
+}
+
+/// What depends on what, by value references: time, inputs, states, derivatives, outputs, parameters.
+struct Structure<'a> {
+    ode: &'a Ode<'a>,
+    /// by derivative, then by output: places in (t, x, u, p)
+    dependencies: Vec<Vec<usize>>,
+}
+
+impl Structure<'_> {
+    /// The value reference of a state.
+    fn state(&self, place: usize) -> usize {
+        1 + self.ode.inputs.len() + place
+    }
+
+    /// The value references of the places in (t, x, u, p) that something depends on, in their order.
+    fn known(&self, places: impl Iterator<Item = usize>) -> Vec<usize> {
+        let states = self.ode.states.len();
+        let moving = states + self.ode.inputs.len();
+        let first_parameter = self.state(2 * states + self.ode.outputs.len());
+        let reference = |place: usize| match place {
+            0 => 0,
+            place if place <= states => self.state(place - 1),
+            place if place <= moving => place - states,
+            place => first_parameter + place - moving - 1,
+        };
+        let mut found: Vec<usize> = places.map(reference).collect();
+        found.sort_unstable();
+        found
+    }
+
+    /// Some of the derivatives and of the outputs that are no states, with those of the first `given` places in
+    /// (t, x, u, p) that they depend on.
+    fn computed(
+        &self,
+        version: Version,
+        element: &str,
+        which: Range<usize>,
+        given: usize,
+    ) -> String {
+        let line = |place: usize| {
+            let of = self.dependencies[place].iter().copied();
+            let of = self.known(of.filter(|place| *place < given));
+            unknown(
+                version,
+                element,
+                self.state(self.ode.states.len() + place),
+                &of,
+            )
+        };
+        which.map(line).collect()
+    }
+
+    /// The states that are outputs.
+    fn shown(&self, version: Version, element: &str) -> String {
+        let states = self.ode.states.iter().enumerate();
+        let shown = states.filter(|(_, state)| state.is_output);
+        let references = shown.map(|(place, _)| self.state(place));
+        references
+            .map(|reference| unknown(version, element, reference, &[reference]))
+            .collect()
+    }
+
+    /// While it runs, what does not move counts as known; at the start everything that can be set is told.
+    fn text(&self, version: Version) -> String {
+        let (n, all) = (self.ode.states.len(), self.dependencies.len());
+        let moving = 1 + n + self.ode.inputs.len();
+        let computed = |element, which, given| self.computed(version, element, which, given);
+        match version {
+            Version::Two => {
+                let outputs = self.shown(version, "Unknown") + &computed("Unknown", n..all, moving);
+                let lists = [
+                    ("Outputs", outputs),
+                    ("Derivatives", computed("Unknown", 0..n, moving)),
+                    ("InitialUnknowns", computed("Unknown", 0..all, usize::MAX)),
+                ];
+                let list = |(name, unknowns): (&str, String)| match unknowns.is_empty() {
+                    true => unknowns,
+                    false => format!("    <{name}>\n{unknowns}    </{name}>\n"),
+                };
+                lists.into_iter().map(list).collect()
+            }
+            Version::Three => [
+                self.shown(version, "Output"),
+                computed("Output", n..all, moving),
+                computed("ContinuousStateDerivative", 0..n, moving),
+                computed("InitialUnknown", 0..all, usize::MAX),
+            ]
+            .concat(),
+        }
+    }
+}
+
+/// A computed variable and what it depends on: by value references in FMI 3.0, by places from 1 on in FMI 2.0.
+fn unknown(version: Version, element: &str, reference: usize, of: &[usize]) -> String {
+    let (indent, attribute, first) = match version {
+        Version::Two => ("      ", "index", 1),
+        Version::Three => ("    ", "valueReference", 0),
+    };
+    let of: Vec<String> = of.iter().map(|k| (k + first).to_string()).collect();
+    format!(
+        "{indent}<{element} {attribute}=\"{}\" dependencies=\"{}\"/>\n",
+        reference + first,
+        of.join(" ")
+    )
 }

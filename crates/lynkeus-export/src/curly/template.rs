@@ -32,36 +32,26 @@ pub(super) fn parts(text: &str) -> impl Iterator<Item = (&str, &str)> {
     })
 }
 
-/// A piece of source text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Token<'t> {
-    /// a word or a number
-    Word(&'t str),
-    /// anything else
-    Other(&'t str),
+fn is_in_word(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '_'
 }
 
-/// Words, and what stands between them. A comment is none.
-pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
+/// A text in pieces: words and numbers, and what stands between them. A comment is no word.
+fn pieces(text: &str) -> impl Iterator<Item = &str> {
     let mut rest = text;
     std::iter::from_fn(move || {
-        let first = rest.chars().next()?;
-        let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        let kind = is_word(first);
+        let kind = is_in_word(rest.chars().next()?);
         let end = match comment_end(rest) {
             Some(end) => end,
             None => {
-                let end = rest.find(|c| is_word(c) != kind).unwrap_or(rest.len());
+                let end = rest.find(|c| is_in_word(c) != kind).unwrap_or(rest.len());
                 // a comment begins a piece of its own
                 rest[..end].find("/*").unwrap_or(end)
             }
         };
         let (piece, left) = rest.split_at(end);
         rest = left;
-        Some(match kind {
-            true => Token::Word(piece),
-            false => Token::Other(piece),
-        })
+        Some(piece)
     })
 }
 
@@ -88,13 +78,14 @@ pub(super) fn outside_comments(text: &str, write: impl Fn(&str) -> String) -> St
 /// The text with words exchanged.
 pub(super) fn exchanged<'t>(text: &'t str, other: impl Fn(&'t str) -> Option<String>) -> String {
     let mut result = String::with_capacity(text.len());
-    for token in tokens(text) {
-        match token {
-            Token::Word(word) => match other(word) {
-                Some(new) => result += &new,
-                None => result += word,
-            },
-            Token::Other(piece) => result += piece,
+    for piece in pieces(text) {
+        let new = match piece.starts_with(is_in_word) {
+            true => other(piece),
+            false => None,
+        };
+        match new {
+            Some(new) => result += &new,
+            None => result += piece,
         }
     }
     result
@@ -102,7 +93,7 @@ pub(super) fn exchanged<'t>(text: &'t str, other: impl Fn(&'t str) -> Option<Str
 
 /// Whether a word stands in a text.
 pub(super) fn mentions(text: &str, word: &str) -> bool {
-    tokens(text).any(|token| token == Token::Word(word))
+    pieces(text).any(|piece| piece == word)
 }
 
 #[cfg(test)]

@@ -6,7 +6,9 @@ use pyo3::prelude::*;
 
 use super::ffi::{self, Array, Schema, Stream, View};
 use super::kind::Kind;
-use crate::log::HINT;
+
+/// What to do about a column that cannot be read.
+pub const HINT: &str = "convert it before, or name another column under [estimate] columns";
 
 /// Where the arrays come from.
 enum Source {

@@ -16,7 +16,26 @@ pub(crate) fn region(report: &CertifyReport) -> String {
     format!("box: {}", abbreviated(&sides))
 }
 
-pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
+impl CertifyReport {
+    /// The verdict in a sentence.
+    pub fn conclusion(&self) -> String {
+        conclusion(self)
+    }
+
+    /// The verdict of one of its certificates, in a word or two.
+    #[cfg(feature = "tune")]
+    pub(crate) fn word(&self, certificate: &Certificate) -> &'static str {
+        word(self, certificate)
+    }
+}
+
+impl fmt::Display for CertifyReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        report(f, self)
+    }
+}
+
+fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt::Result {
     let observer = &report.design.observer;
     writeln!(
         f,
@@ -60,7 +79,7 @@ pub(super) fn report(f: &mut fmt::Formatter<'_>, report: &CertifyReport) -> fmt:
 }
 
 /// The verdict in a word or two: never "proved" alone where the study is not in the box.
-pub(super) fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
+fn word(report: &CertifyReport, certificate: &Certificate) -> &'static str {
     let strays = |certificate| report.strays.words(report.is_theorem(certificate));
     match certificate.verdict() {
         // the observer may converge all the same
@@ -70,7 +89,7 @@ pub(super) fn word(report: &CertifyReport, certificate: &Certificate) -> &'stati
     }
 }
 
-pub(super) fn conclusion(report: &CertifyReport) -> String {
+fn conclusion(report: &CertifyReport) -> String {
     let best = report.best();
     if report.is_contradiction() {
         return "undecided: one way proves and the other refutes it, which is a defect of this program; believe neither and report it".to_owned();

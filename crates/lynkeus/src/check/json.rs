@@ -3,10 +3,10 @@
 use lynkeus_model::Diagnostic;
 use lynkeus_observability::Verdict;
 use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{self as structure, Point};
+use lynkeus_structure as structure;
 use serde_json::{Value, json};
 
-use super::{Knowledge, Next, Report, Uniform, observability, uniform};
+use super::{Knowledge, Next, Report, Uniform, observability, point, uniform};
 use crate::choice::Choice;
 
 impl Report {
@@ -72,12 +72,4 @@ fn family(examination: &Examination) -> Value {
         "chains": examination.chains,
         "checks": examination.conditions().map(check).collect::<Vec<_>>(),
     })
-}
-
-pub(crate) fn point(point: &Point) -> Value {
-    let at = point
-        .coordinates
-        .iter()
-        .map(|c| (c.name.clone(), json!(c.value)));
-    json!({ "value": point.value, "at": Value::Object(at.collect()) })
 }

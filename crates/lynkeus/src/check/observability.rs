@@ -9,10 +9,9 @@ use lynkeus_structure::Sensors;
 use serde_json::{Map, Value, json};
 
 use super::{CheckOptions, Report};
+use crate::words::listed;
 use crate::{Error, Study};
 
-/// Names listed before the rest becomes a count.
-const LISTED: usize = 24;
 /// Symmetries told before the rest becomes a count.
 const TOLD: usize = 8;
 
@@ -128,13 +127,6 @@ pub(super) fn print(f: &mut fmt::Formatter<'_>, report: &Report) -> fmt::Result 
         .notes
         .iter()
         .try_for_each(|note| writeln!(f, "  ({note})"))
-}
-
-pub(super) fn listed(names: &[&str]) -> String {
-    match names.len() > LISTED {
-        true => format!("{}, … ({} in all)", names[..LISTED].join(", "), names.len()),
-        false => names.join(", "),
-    }
 }
 
 /// What to do about it.

@@ -2,10 +2,9 @@
 
 use std::fmt;
 
-use lynkeus_structure::{self as structure, Blind, Place, Uniformity, counted};
+use lynkeus_structure::{self as structure, Blind, Place, Point, Uniformity, counted};
 use serde_json::{Map, Value, json};
 
-use super::json::point;
 use crate::words::{number, side};
 #[cfg(feature = "plot")]
 use crate::{Error, plot::Plane};
@@ -177,6 +176,15 @@ fn hull(parts: &[Place]) -> String {
         )
     });
     sides.collect::<Vec<_>>().join(", ")
+}
+
+/// A point for machines.
+pub(crate) fn point(point: &Point) -> Value {
+    let at = point
+        .coordinates
+        .iter()
+        .map(|c| (c.name.clone(), json!(c.value)));
+    json!({ "value": point.value, "at": Value::Object(at.collect()) })
 }
 
 /// `{verdict, detail, one_to_one, share, singular, blind}`

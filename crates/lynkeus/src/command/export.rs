@@ -3,29 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use lynkeus::{Error, ExportOptions, FmiVersion, Precision, Subject};
+use lynkeus::{Error, ExportOptions, FmiVersion, Precision, Subject, Target};
 
 use super::inputs::Source;
 use super::output;
 use super::save::Results;
-
-/// What is exported.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Target {
-    /// C99: a header, a source, a bench that replays a log, a CMakeLists.txt
-    C,
-    /// A JavaScript module, for pages and Node
-    Js,
-    /// A Rust crate without the standard library, with an example that replays a log
-    Rust,
-    /// Structured Text of IEC 61131-3: a function block for programmable controllers
-    St,
-    /// The page of `lynkeus report`, on the study's simulation
-    Html,
-    /// An archive for tools of simulation: the estimator for FMI co-simulation; a plant or an observer in continuous time for model exchange, too
-    Fmu,
-}
 
 /// [`Subject`] in the words of the command line.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -73,7 +57,7 @@ pub(super) enum Numbers {
 #[derive(Debug, Args)]
 pub(super) struct Options {
     /// What to write
-    #[arg(long, value_enum, value_name = "WHAT")]
+    #[arg(long, value_parser = targets(), value_name = "WHAT")]
     to: Target,
     /// The folder for the files; one that is not empty only with --force
     #[arg(short, long, value_name = "DIR")]
@@ -105,7 +89,7 @@ pub(super) struct Options {
 /// Everything is made before the first file is written.
 pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Error> {
     let wanted = ExportOptions {
-        to: options.target(),
+        to: options.target()?,
         subject: options.system.map(Subject::from),
         precision: match options.precision {
             Numbers::F64 => Precision::F64,
@@ -114,7 +98,6 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
         step: options.step,
         tunable: options.tunable,
     };
-    options.sound()?;
     let folder = &options.output;
     if !options.force {
         must_be_empty(folder)?;
@@ -140,25 +123,22 @@ pub(super) fn export(source: &Source, options: &Options) -> Result<ExitCode, Err
     Ok(ExitCode::SUCCESS)
 }
 
-impl Options {
-    /// Nothing is given that would say nothing.
-    fn sound(&self) -> Result<(), Error> {
-        let is_fmu = matches!(self.to, Target::Fmu);
-        match self.fmi {
-            Fmi::Two if !is_fmu => Err(Error::input("--fmi 2: expected --to fmu with it")),
-            _ => Ok(()),
-        }
-    }
+/// The words for targets, with what each writes.
+fn targets() -> impl TypedValueParser<Value = Target> {
+    let words = Target::ALL.iter();
+    let words = words.map(|target| PossibleValue::new(target.word()).help(target.about()));
+    PossibleValuesParser::new(words)
+        .try_map(|word| Target::named(&word).ok_or("expected one of these words"))
+}
 
-    fn target(&self) -> lynkeus::Target {
+impl Options {
+    /// The target in the version of the standard; that is given to nothing else.
+    fn target(&self) -> Result<Target, Error> {
         match (self.to, self.fmi) {
-            (Target::C, _) => lynkeus::Target::C,
-            (Target::Js, _) => lynkeus::Target::JavaScript,
-            (Target::Rust, _) => lynkeus::Target::Rust,
-            (Target::St, _) => lynkeus::Target::StructuredText,
-            (Target::Html, _) => lynkeus::Target::Html,
-            (Target::Fmu, Fmi::Two) => lynkeus::Target::Fmu(FmiVersion::Two),
-            (Target::Fmu, Fmi::Three) => lynkeus::Target::Fmu(FmiVersion::Three),
+            (Target::Fmu(_), Fmi::Two) => Ok(Target::Fmu(FmiVersion::Two)),
+            (Target::Fmu(_), Fmi::Three) => Ok(Target::Fmu(FmiVersion::Three)),
+            (_, Fmi::Two) => Err(Error::input("--fmi 2: expected --to fmu with it")),
+            (to, Fmi::Three) => Ok(to),
         }
     }
 }

@@ -3,16 +3,35 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use lynkeus::Error;
 
-use super::save;
+use super::save::{self, is_standard};
 
-/// The name that stands for standard input or output.
-const STANDARD: &str = "-";
+/// Where results go.
+#[derive(Debug, Args)]
+pub(super) struct Output {
+    /// Write the columns as CSV ("-": standard output, the default without --json)
+    #[arg(short, long, value_name = "FILE.csv")]
+    pub output: Option<PathBuf>,
+    /// Draw the result
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+    /// Print one JSON object that sums the result up
+    #[arg(long)]
+    pub json: bool,
+    /// No progress bar and no notes
+    #[arg(short, long)]
+    pub quiet: bool,
+}
 
-/// Whether a path is the name of standard input or output.
-pub(super) fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == STANDARD
+impl Output {
+    pub fn added_to(&self, files: Files) -> Files {
+        files
+            .writes("-o", self.output.as_deref())
+            .draws("--plot", self.plot.as_deref())
+            .prints_json(self.json)
+    }
 }
 
 /// The files of one command.

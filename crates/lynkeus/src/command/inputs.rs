@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use lynkeus::expr::Budget;
 use lynkeus::{Error, Incoming, Study, Table};
 
-use super::files::{Files, is_standard};
+use super::files::Files;
+use super::save::is_standard;
 
 /// What messages call standard input.
 const STANDARD: &str = "standard input";

@@ -17,12 +17,12 @@ mod tune;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand, ValueEnum};
 
 use lynkeus::run::Backend;
 use lynkeus::{CheckOptions, Error, ErrorKind, interrupt};
 
-use files::Files;
+use files::Output;
 use inputs::Source;
 
 use limits::Limits;
@@ -216,32 +216,6 @@ enum Command {
     },
     /// The JSON Schema of a study, for editors that complete and check TOML
     Schema,
-}
-
-/// Where results go.
-#[derive(Debug, Args)]
-struct Output {
-    /// Write the columns as CSV ("-": standard output, the default without --json)
-    #[arg(short, long, value_name = "FILE.csv")]
-    output: Option<PathBuf>,
-    /// Draw the result
-    #[arg(long, value_name = "FILE.svg")]
-    plot: Option<PathBuf>,
-    /// Print one JSON object that sums the result up
-    #[arg(long)]
-    json: bool,
-    /// No progress bar and no notes
-    #[arg(short, long)]
-    quiet: bool,
-}
-
-impl Output {
-    fn added_to(&self, files: Files) -> Files {
-        files
-            .writes("-o", self.output.as_deref())
-            .draws("--plot", self.plot.as_deref())
-            .prints_json(self.json)
-    }
 }
 
 /// Runs the command line.

@@ -4,10 +4,11 @@ use std::process::ExitCode;
 
 use lynkeus::{Error, Series};
 
+use super::files::Output;
 use super::inputs::Source;
 use super::progress::Progress;
 use super::save::Results;
-use super::{Output, limits, output};
+use super::{limits, output};
 
 /// Everything is computed before the first file is written.
 pub(super) fn monte_carlo(

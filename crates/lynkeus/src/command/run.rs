@@ -6,12 +6,11 @@ use std::process::ExitCode;
 use lynkeus::{CheckOptions, Checkpoint, Error, Outcome, Study};
 use serde_json::Value;
 
-use super::files::is_standard;
+use super::files::Output;
 use super::inputs::{self, Source};
-use super::output;
 use super::progress::{Alive, Progress};
-use super::save::Results;
-use super::{Output, limits};
+use super::save::{Results, is_standard};
+use super::{limits, output};
 
 pub(super) fn check(
     source: &Source,

@@ -11,8 +11,15 @@ use std::path::{Path, PathBuf};
 use lynkeus::{Error, interrupt};
 use tempfile::{NamedTempFile, SpooledTempFile};
 
-use super::files::is_standard;
 use super::{output, signals};
+
+/// The name that stands for standard input or output.
+const STANDARD: &str = "-";
+
+/// Whether a path is the name of standard input or output.
+pub(super) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == STANDARD
+}
 
 const PREFIX: &str = ".lynkeus-";
 const SUFFIX: &str = ".part";

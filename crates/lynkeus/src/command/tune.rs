@@ -6,12 +6,11 @@ use std::process::ExitCode;
 use clap::Args;
 use serde_json::json;
 
-use super::files::is_standard;
 use super::inputs::{self, Source};
 use super::limits::{self, Limits};
 use super::output;
 use super::progress::Progress;
-use super::save::Results;
+use super::save::{Results, is_standard};
 use lynkeus::Error;
 use lynkeus::tune::{Change, Sweep};
 

@@ -3,9 +3,9 @@
 use lynkeus_run::credible::{By, CLIP, ENOUGH, FEW};
 use lynkeus_run::filter::SensorHealth;
 
+use super::doubt::{Doubt, Kind, Level, times};
 use super::quantile::{largest_sum, smallest_sum};
 use super::trace::{Stretch, Trace};
-use super::{Doubt, Kind, Level, times};
 use crate::outside::percent;
 use crate::words::instant;
 

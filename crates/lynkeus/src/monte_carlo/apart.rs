@@ -5,22 +5,14 @@ use std::sync::OnceLock;
 use lynkeus_expr::Spent;
 use lynkeus_model::Plant;
 
+use super::ends::{Clipped, Sensor};
+use super::runs::{Again, Failure, Followed, Track, Whole};
 use super::statistics::of_runs;
-use super::together::Screened;
-use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
+use super::together::{Figures, Screened};
 use crate::crew::{self, Watch};
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
-use crate::{Coverage, Error, Study};
-
-/// True course and estimate of one quantity in one run.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Track {
-    pub truth: Vec<f64>,
-    pub estimate: Vec<f64>,
-    /// its errors beside the deviations told
-    pub coverage: Option<Coverage>,
-}
+use crate::{Error, Study};
 
 /// What one run gave.
 #[derive(Debug)]
@@ -28,17 +20,6 @@ pub(super) struct Single {
     pub seed: u64,
     /// none where a limit ended the run
     pub result: Result<Option<Whole>, Error>,
-}
-
-/// A run that reached its end.
-#[derive(Debug)]
-pub(super) struct Whole {
-    /// by quantity
-    pub tracks: Vec<Track>,
-    /// readings at an end, by sensor with limits
-    pub at_ends: Vec<usize>,
-    /// why its estimate is not credible, where it is not
-    pub doubt: Option<String>,
 }
 
 /// What all runs share.

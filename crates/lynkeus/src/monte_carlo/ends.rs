@@ -5,7 +5,8 @@ use lynkeus_run::filter::Limits;
 use lynkeus_run::{Column, Role};
 use lynkeus_structure::figures;
 
-use super::{Rig, Whole};
+use super::Rig;
+use super::runs::Whole;
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::saturated::{Limited, TAKEN, limited};

@@ -10,6 +10,7 @@ mod ends;
 mod picture;
 mod portions;
 mod report;
+mod runs;
 mod statistics;
 mod together;
 
@@ -17,119 +18,19 @@ use std::ops::{ControlFlow, RangeInclusive};
 use std::sync::OnceLock;
 
 use lynkeus_model::{Plant, Variable};
-use lynkeus_run::Column;
 
 use crate::headers::Headers;
 use crate::prepare::Prepared;
 use crate::simulate::{self, Rig};
 use crate::systems::column_of;
-use crate::{Coverage, Error, Study, prepare};
-use apart::{Job, Track, Whole, room};
-use ends::{Clipped, Sensor};
+use crate::{Error, Study, prepare};
+use apart::{Job, room};
+use ends::Sensor;
 pub use report::Settled;
 use report::headers_of;
-use statistics::Found;
-use together::Together;
-
-/// What many runs of a study give.
-#[derive(Clone, Debug)]
-pub struct MonteCarlo {
-    /// Name of the plant.
-    pub plant: String,
-    /// The family of the observer.
-    pub family: &'static str,
-    /// The study, for messages.
-    pub file: String,
-    /// How many runs were asked for.
-    pub asked: usize,
-    /// The seeds of the runs that reached the end, increasing: the figures are of these.
-    pub seeds: Vec<u64>,
-    /// The runs that did not, in the order of their seeds.
-    pub failures: Vec<Failure>,
-    /// Those among `seeds` whose estimates are not credible.
-    pub doubtful: Vec<Failure>,
-    /// What a limit of time or memory left undone, in words.
-    pub limit: Option<String>,
-    /// What repeats one of the runs.
-    pub again: Again,
-    /// Times of the rows.
-    pub time: Vec<f64>,
-    /// Header of their column.
-    pub time_header: String,
-    /// Everything that is estimated and whose true course is known.
-    pub quantities: Vec<Scattered>,
-    /// What the user should know.
-    pub notes: Vec<String>,
-}
-
-/// What repeats one of many runs to the last digit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Again {
-    /// [`simulate`](crate::simulate()) with its seed.
-    Alone,
-    /// [`monte_carlo`] of this seed alone: exp, sin and the like are those of
-    /// [`lanes`](lynkeus_expr::lanes), which [`simulate`](crate::simulate()) rounds otherwise.
-    InABatch,
-}
-
-/// A run that did not reach its end, or whose estimate is not credible.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Failure {
-    /// Its seed.
-    pub seed: u64,
-    /// Why.
-    pub reason: String,
-}
-
-/// One quantity over all runs.
-#[derive(Clone, Debug)]
-pub struct Scattered {
-    /// Its name in the plant.
-    pub name: String,
-    /// Its unit, if declared.
-    pub unit: Option<String>,
-    /// Its description, if declared.
-    pub description: Option<String>,
-    /// An input that nobody measures.
-    pub unknown_input: bool,
-    /// A sensor shows it.
-    pub is_measured: bool,
-    /// What it truly is.
-    pub truth: Bands,
-    /// Estimate − truth.
-    pub error: Bands,
-    /// The largest |error| of all runs, row by row.
-    pub error_worst: Vec<f64>,
-    /// √(mean error²) over the last half of the rows, by run, in the order of the seeds.
-    pub rms: Vec<f64>,
-    /// The run with the greatest of these, by its place among the seeds.
-    pub worst_run: usize,
-    /// The error of that run; NaN from where a limit ended its repetition.
-    pub worst_course: Vec<f64>,
-    /// Errors beside the standard deviations told, over the last half of the rows of all runs; none where
-    /// there are no deviations.
-    pub coverage: Option<Coverage>,
-    /// Headers of its columns: mean and quantiles of truth and error, then the largest |error|.
-    pub headers: [String; 7],
-}
-
-/// How a value scatters over the runs, row by row; NaN where no run has a value.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Bands {
-    /// The mean.
-    pub mean: Vec<f64>,
-    /// The 5 % quantile.
-    pub low: Vec<f64>,
-    /// The 95 % quantile.
-    pub high: Vec<f64>,
-}
-
-/// What is followed: an estimate by its place, beside the column of its true value.
-#[derive(Clone, Debug)]
-struct Followed {
-    estimate: usize,
-    truth: Column,
-}
+use runs::Followed;
+pub use runs::{Again, Bands, Failure, MonteCarlo, Scattered};
+use together::{Figures, Together};
 
 /// Runs the study's plant with its observer `runs` times, on all processors; `watch` is told the
 /// fraction done, which never falls, and may stop it. A run that diverges or is refused is counted, and in no figure.
@@ -215,21 +116,6 @@ fn followed(plant: &Plant, rig: &Rig) -> Vec<Followed> {
         Some(Followed { estimate, truth })
     });
     known.collect()
-}
-
-/// What all runs together give.
-struct Figures {
-    /// of the runs that reached their end
-    seeds: Vec<u64>,
-    failures: Vec<Failure>,
-    /// in the figures, but not credible
-    doubtful: Vec<Failure>,
-    time: Vec<f64>,
-    /// by quantity
-    found: Vec<Found>,
-    /// by sensor with limits
-    clipped: Vec<Clipped>,
-    again: Again,
 }
 
 impl Figures {

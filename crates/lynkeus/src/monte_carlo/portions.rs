@@ -8,7 +8,8 @@ use std::time::Instant;
 use lynkeus_model::Plant;
 
 use super::Again;
-use super::apart::{Job, Single, Track, Whole};
+use super::apart::{Job, Single};
+use super::runs::{Track, Whole};
 use super::together::{Pass, Quantity, Together};
 use crate::Error;
 use crate::crew::Watch;

@@ -1,6 +1,6 @@
 //! Means, quantiles and the worst of many runs.
 
-use super::{Bands, Track, Whole};
+use super::runs::{Bands, Track, Whole};
 use crate::Coverage;
 
 /// The quantiles that a band reaches over.

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use lynkeus_run::{Batch, Column, Ended, Member, Method, Role, Step};
 
+use super::ends::{Clipped, Sensor};
+use super::runs::{Again, Failure, Followed};
 use super::statistics::{Found, Keep, Scatter};
-use super::{Again, Clipped, Failure, Figures, Followed, Sensor};
 use crate::crew::{self, Watch};
 use crate::judge::Screen;
 use crate::prepare::Prepared;
@@ -263,6 +264,21 @@ impl Followed {
     fn columns(&self) -> [Column; 2] {
         [self.truth, Role::Estimate.at(self.estimate)]
     }
+}
+
+/// What all runs together give.
+pub(super) struct Figures {
+    /// of the runs that reached their end
+    pub seeds: Vec<u64>,
+    pub failures: Vec<Failure>,
+    /// in the figures, but not credible
+    pub doubtful: Vec<Failure>,
+    pub time: Vec<f64>,
+    /// by quantity
+    pub found: Vec<Found>,
+    /// by sensor with limits
+    pub clipped: Vec<Clipped>,
+    pub again: Again,
 }
 
 /// Figures, and the seeds of runs whose estimates may not be credible.

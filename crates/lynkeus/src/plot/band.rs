@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 
 use super::decimate::{decimated, stretches};
-use super::render::{BLUE, Chart, Drawn, VERMILION};
+use super::style::{BLUE, Chart, Drawn, VERMILION};
 use super::{Band, Span};
 use crate::Series;
 

@@ -7,9 +7,8 @@ use super::axis::Axis;
 use super::chart::Chart;
 use super::grid;
 use super::limits::extremes;
-use super::render::{
-    Area, BLUE, Drawn, FAINT, FONT, FRAME, INK, ORANGE, VERMILION, WIDTH, tick, titled,
-};
+use super::render::{tick, titled};
+use super::style::{Area, BLUE, Drawn, FAINT, FONT, FRAME, INK, ORANGE, VERMILION, WIDTH};
 use crate::Error;
 
 const HEAD: u32 = 76;

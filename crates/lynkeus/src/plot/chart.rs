@@ -3,7 +3,6 @@
 use std::ops::{Range, RangeInclusive};
 
 use super::axis::Axis;
-use super::grid;
 use super::limits::extremes;
 
 /// Ends of a logarithmic axis differ at least by this ratio.
@@ -80,14 +79,6 @@ pub enum Look {
 }
 
 impl Chart {
-    /// The picture as SVG text.
-    ///
-    /// # Errors
-    /// There is nothing finite to draw.
-    pub fn to_svg(&self) -> Result<String, crate::Error> {
-        grid::svg(self)
-    }
-
     /// The parameter's axis: logarithmic where its values are positive and far apart.
     pub(super) fn axis(&self) -> Option<Axis> {
         let points = self.plots.iter().flat_map(|p| &p.lines);

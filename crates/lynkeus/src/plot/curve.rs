@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::prelude::*;
 
 use super::decimate::{clipped, decimated};
-use super::render::{Chart, Drawn, LEFT, ORANGE, RIGHT, WIDTH, stroke};
+use super::style::{Chart, Drawn, LEFT, ORANGE, RIGHT, WIDTH, stroke};
 use super::{Curve, Kind};
 
 /// A piece of a curve that is smaller than these shares of the panel, and would be no line.

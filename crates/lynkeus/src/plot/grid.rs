@@ -6,9 +6,9 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::Axis;
 use super::chart::{Chart, Line, Look, Plot};
 use super::decimate::clipped;
-use super::render::{
+use super::render::{tick, titled};
+use super::style::{
     Area, BLUE, Chart as Plane, Drawn, FAINT, FONT, FRAME, GREY, INK, ORANGE, VERMILION, WIDTH,
-    tick, titled,
 };
 use crate::Error;
 
@@ -24,8 +24,17 @@ const RIGHT: u32 = 24;
 const BAND: RGBColor = RGBColor(222, 239, 231);
 const PALE: RGBColor = RGBColor(176, 205, 226);
 
-/// The whole chart as SVG text.
-pub(super) fn svg(chart: &Chart) -> Result<String, Error> {
+impl Chart {
+    /// The picture as SVG text.
+    ///
+    /// # Errors
+    /// There is nothing finite to draw.
+    pub fn to_svg(&self) -> Result<String, crate::Error> {
+        svg(self)
+    }
+}
+
+fn svg(chart: &Chart) -> Result<String, Error> {
     let mark = chart.mark.as_ref().map(|m| m.0);
     let axes = chart.plots.iter().map(|plot| (plot, plot.axis(mark)));
     let shown: Vec<(&Plot, Axis)> = axes.filter_map(|(p, axis)| Some((p, axis?))).collect();

@@ -4,7 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::band::{band_style, mark_style};
-use super::render::{Area, Drawn, FONT, INK, LEFT, ORANGE, RIGHT, WIDTH, stroke};
+use super::style::{Area, Drawn, FONT, INK, LEFT, ORANGE, RIGHT, WIDTH, stroke};
 use super::{Extent, Figure, Kind};
 
 /// Sizes of the fonts.

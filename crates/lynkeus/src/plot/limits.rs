@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Band, Extent, Kind, Panel};
+use super::{Band, Extent, Figure, Kind, Panel};
 use crate::Series;
 use crate::series::{Sorted, Store};
 
@@ -80,6 +80,14 @@ impl Panel {
             .filter(move |c| of(c.kind))
             .flat_map(|c| &c.values)
             .filter(|v| v.is_finite())
+    }
+}
+
+impl Figure {
+    /// The span of time that all curves cover together.
+    pub(super) fn time_range(&self) -> Option<Range<f64>> {
+        let times = self.panels.iter().flat_map(|p| &p.curves);
+        extremes(times.flat_map(|c| &c.time))
     }
 }
 

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use plotters::prelude::*;
 
-use super::render::{BLUE, FAINT, FONT, INK, VERMILION, WIDTH, tick, titled};
+use super::render::{tick, titled};
+use super::style::{BLUE, FAINT, FONT, INK, VERMILION, WIDTH};
 use crate::Error;
 
 const HEIGHT: u32 = 640;
@@ -43,7 +44,7 @@ impl Plane {
         Ok(titled(text, &self.title))
     }
 
-    fn draw(&self, text: &mut String) -> super::render::Drawn {
+    fn draw(&self, text: &mut String) -> super::style::Drawn {
         let root = SVGBackend::with_string(text, (WIDTH, HEIGHT)).into_drawing_area();
         root.fill(&WHITE)?;
         let words = (FONT, 14).into_font().color(&INK);

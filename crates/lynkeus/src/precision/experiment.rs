@@ -8,7 +8,6 @@ use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, 
 use lynkeus_run::{Method, Tolerances, Trajectory};
 use lynkeus_structure::Extended;
 
-use super::{Assumed, Candidates, Options, POINTS};
 use crate::declared::Declared;
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
@@ -16,6 +15,44 @@ use crate::simulate::within;
 use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
 use crate::{Error, Study, simulate, systems};
+
+/// Horizons at which the errors are computed.
+const POINTS: usize = 25;
+
+/// What else is asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Length of the longest horizon in the plant's unit of time; the whole run where left out.
+    pub horizon: Option<f64>,
+    /// Which sensors to try beside the study's.
+    pub sensors: Option<Candidates>,
+}
+
+/// Sensors that could be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Candidates {
+    /// Every output of the model.
+    Outputs,
+    /// Every output and every state of the model.
+    All,
+}
+
+/// A sensor as it was assumed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Assumed {
+    /// Its name.
+    pub name: String,
+    /// Its noise in words.
+    pub noise: String,
+    /// Whether the study states the noise.
+    pub is_stated: bool,
+}
+
+/// What ended the work, if anything did.
+pub(super) fn ended(study: &Study) -> Option<Error> {
+    let spent = study.budget.spent()?;
+    Some(Error::ended(spent).at(&study.file))
+}
 
 /// Noise where the study states none, as a share of the range.
 const SHARE: f64 = 0.01;
@@ -49,7 +86,7 @@ impl<'p> Setup<'p> {
         let trajectory = run
             .run_watched(&mut within(&study.budget, go_on))
             .map_err(|error| {
-                super::ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
+                ended(study).unwrap_or_else(|| interrupted(error.error, &study.file))
             })?;
         let reach = Reach { plant, trajectory };
         let measured: Vec<Variable> = extended

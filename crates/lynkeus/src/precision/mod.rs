@@ -17,39 +17,8 @@ use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
 use crate::{Error, Study, prepare, simulate};
-use experiment::Setup;
-
-/// Horizons at which the errors are computed.
-const POINTS: usize = 25;
-
-/// What else is asked.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Length of the longest horizon in the plant's unit of time; the whole run where left out.
-    pub horizon: Option<f64>,
-    /// Which sensors to try beside the study's.
-    pub sensors: Option<Candidates>,
-}
-
-/// Sensors that could be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Candidates {
-    /// Every output of the model.
-    Outputs,
-    /// Every output and every state of the model.
-    All,
-}
-
-/// A sensor as it was assumed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Assumed {
-    /// Its name.
-    pub name: String,
-    /// Its noise in words.
-    pub noise: String,
-    /// Whether the study states the noise.
-    pub is_stated: bool,
-}
+pub use experiment::{Assumed, Candidates, Options};
+use experiment::{Setup, ended};
 
 /// The answer of `lynkeus check --how-well`.
 #[derive(Clone, Debug)]
@@ -179,12 +148,6 @@ fn account(declared: &Declared, counts_process_noise: bool) -> Account {
             "how far an unknown input wanders counts by [process_noise]",
         )
         .leaves(input_derivatives, "the inputs are those of [simulate]")
-}
-
-/// What ended the work, if anything did.
-fn ended(study: &Study) -> Option<Error> {
-    let spent = study.budget.spent()?;
-    Some(Error::ended(spent).at(&study.file))
 }
 
 /// Present errors with the process noise counted; what samples do not show stays unseen.

@@ -4,7 +4,6 @@ use lynkeus_model::Plant;
 use serde_json::{Value, json};
 
 use super::knob::Knob;
-use super::shown;
 use super::tradeoff::Tradeoff;
 use crate::course::Samples;
 use crate::prepare::Prepared;
@@ -142,4 +141,9 @@ pub(super) fn in_a_script(value: &Value) -> String {
         c => c.to_string(),
     };
     text.chars().map(each).collect()
+}
+
+/// Names of others as they can be shown.
+fn shown(text: &str) -> String {
+    crate::visible::lines(text).into_owned()
 }

@@ -1,6 +1,6 @@
 //! HTML, piece by piece; every text is escaped.
 
-use crate::visible;
+use crate::{Error, visible};
 
 /// A text of HTML.
 #[derive(Debug, Default)]
@@ -124,6 +124,12 @@ pub(super) fn badge(word: &str) -> String {
         _ => "open",
     };
     format!("<span class=\"verdict {class}\">{}</span>", escaped(word))
+}
+
+/// What happened and what to do, without where: a page goes to others, and no folder of this machine with it.
+pub(super) fn words(error: &Error) -> String {
+    let remedy = error.remedy().map(|remedy| format!("; {remedy}"));
+    format!("{}{}", error.message(), remedy.unwrap_or_default())
 }
 
 #[cfg(test)]

@@ -10,25 +10,22 @@ mod positions;
 mod proof;
 mod run;
 mod sections;
+mod told;
 mod tradeoff;
 
 use std::ops::ControlFlow;
 
 use lynkeus_export::curly::c::prefix;
-use lynkeus_model::{Diagnostic, Plant};
-use serde_json::Value;
 
 use crate::columns::Log;
-use crate::export::file_name;
+use crate::export::{causal, file_name};
 use crate::prepare::Prepared;
 use crate::tune::slider::Ground;
-use crate::{
-    CheckOptions, Error, Outcome, Study, Table, certify, check, estimate, export, fixed_steps,
-    prepare, visible,
-};
+use crate::{CheckOptions, Error, Study, Table, certify, check, estimate, fixed_steps, prepare};
 use html::Html;
 use knob::Knob;
 use positions::Positions;
+use told::{Told, without_folder};
 use tradeoff::Tradeoff;
 
 /// A report.
@@ -70,7 +67,7 @@ pub fn report(
     let step = fixed_steps::sound(options.step)?;
     let plant = prepare::plant(study)?;
     let mut notes = vec![];
-    let causal = export::causal(study, &mut notes);
+    let causal = causal(study, &mut notes);
     let prepared = Prepared::new(&causal, &plant)?;
     let recorded = match log {
         Some(_) => None,
@@ -145,27 +142,6 @@ fn checked(study: &Study) -> Result<check::Report, Error> {
     Ok(report)
 }
 
-fn without_folder(warning: &Diagnostic) -> Diagnostic {
-    let mut warning = warning.clone();
-    warning.file = file_name(&warning.file);
-    warning
-}
-
-/// All that a page tells.
-struct Told<'a> {
-    study: &'a Study,
-    plant: &'a Plant,
-    /// where the samples come from
-    source: String,
-    outcome: Outcome,
-    checked: Result<check::Report, Error>,
-    certified: Result<certify::CertifyReport, Error>,
-    moving: Result<Knob, Error>,
-    tradeoff: Option<Tradeoff>,
-    data: Value,
-    notes: Vec<String>,
-}
-
 const STYLE: &str = include_str!("../../assets/report/report.css");
 const SCRIPT: &str = include_str!("../../assets/report/report.js");
 const PLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
@@ -222,9 +198,4 @@ const observers = [
             env!("CARGO_PKG_VERSION"),
         )
     }
-}
-
-/// Names of others as they can be shown.
-fn shown(text: &str) -> String {
-    visible::lines(text).into_owned()
 }

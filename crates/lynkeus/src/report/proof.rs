@@ -1,9 +1,9 @@
 //! The certificate and what it certifies, as tables.
 
-use lynkeus_observers::{Certificate, UltimateBound};
+use lynkeus_observers::{Certificate, Check, UltimateBound};
+use lynkeus_structure::Verdict;
 
 use super::html::{Cell, Html, badge, escaped};
-use super::sections::conditions;
 use crate::words::number;
 use crate::{CertifyReport, Correction};
 
@@ -108,4 +108,21 @@ pub(super) fn correction(html: &mut Html, correction: &Correction) {
             });
         }
     }
+}
+
+/// Conditions with their verdicts.
+pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &'a Check>) {
+    let row = |check: &Check| {
+        let mut detail = check.detail.clone();
+        if let Verdict::Refuted(_) = check.verdict {
+            detail = format!("{detail}; {}", check.verdict);
+        }
+        vec![
+            Cell::Verdict(check.verdict.word()),
+            Cell::from(check.statement.to_string()),
+            Cell::from(detail),
+        ]
+    };
+    let rows = checks.into_iter().map(row).collect();
+    html.table(&["verdict", "condition", "what was found"], rows);
 }

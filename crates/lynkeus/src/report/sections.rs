@@ -1,11 +1,12 @@
 //! What a page says, section by section.
 
-use lynkeus_observers::{Check, Examination, fit_word};
-use lynkeus_structure::{Verdict, counted, figures};
+use lynkeus_observers::{Examination, fit_word};
+use lynkeus_structure::{counted, figures};
 
 use super::data::ROWS;
-use super::html::{Cell, Html, badge};
-use super::{Told, proof, without_folder};
+use super::html::{Cell, Html, badge, words};
+use super::proof;
+use super::told::{Told, without_folder};
 use crate::check::{Known, Report};
 use crate::export::file_name;
 use crate::words::{instant, number};
@@ -217,12 +218,6 @@ fn failed(html: &mut Html, error: &Error) {
     html.element("p class=\"alarm\"", &words(error));
 }
 
-/// What happened and what to do, without where: a page goes to others, and no folder of this machine with it.
-pub(super) fn words(error: &Error) -> String {
-    let remedy = error.remedy().map(|remedy| format!("; {remedy}"));
-    format!("{}{}", error.message(), remedy.unwrap_or_default())
-}
-
 fn accuracy(accuracy: &Accuracy) -> Vec<Cell> {
     let error = |e: f64| Cell::Number(figures(e, 3));
     vec![
@@ -245,22 +240,5 @@ fn examination(html: &mut Html, examination: &Examination) {
         badge(fit_word(examination.fit())),
         super::html::escaped(&examination.summary)
     ));
-    conditions(html, examination.conditions());
-}
-
-/// Conditions with their verdicts.
-pub(super) fn conditions<'a>(html: &mut Html, checks: impl IntoIterator<Item = &'a Check>) {
-    let row = |check: &Check| {
-        let mut detail = check.detail.clone();
-        if let Verdict::Refuted(_) = check.verdict {
-            detail = format!("{detail}; {}", check.verdict);
-        }
-        vec![
-            Cell::Verdict(check.verdict.word()),
-            Cell::from(check.statement.to_string()),
-            Cell::from(detail),
-        ]
-    };
-    let rows = checks.into_iter().map(row).collect();
-    html.table(&["verdict", "condition", "what was found"], rows);
+    proof::conditions(html, examination.conditions());
 }

@@ -5,9 +5,8 @@ use std::ops::ControlFlow;
 use lynkeus_observers::Design;
 use serde_json::{Map, Value, json};
 
-use super::html::{Cell, Html};
+use super::html::{Cell, Html, words};
 use super::positions::Positions;
-use super::sections::words;
 use crate::Error;
 use crate::prepare::Prepared;
 use crate::tune::slider::{self, Ground};

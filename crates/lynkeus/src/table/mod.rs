@@ -16,6 +16,7 @@ mod order;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod read;
+mod request;
 mod row;
 mod write;
 
@@ -33,7 +34,7 @@ pub use instant::Instant;
 pub use number::{exact, significant};
 pub(crate) use order::APART;
 pub use order::{Conflict, Lost, Ordered};
-pub use read::Request;
+pub use request::Request;
 pub use write::write_csv;
 
 /// Whether a file is a Parquet file by its name.

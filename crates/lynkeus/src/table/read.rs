@@ -1,15 +1,12 @@
 //! CSV text to tables.
 
-use std::collections::HashSet;
 use std::io::BufRead;
 use std::path::Path;
 
-use lynkeus_expr::Budget;
-
-use super::Table;
 use super::column::Column;
 use super::marks::FileMarks;
 use super::row::{Broken, Rows};
+use super::{Request, Table};
 use crate::incoming::unread;
 use crate::{Error, Incoming};
 
@@ -18,25 +15,6 @@ const SAMPLE: usize = 1 << 16;
 
 /// Most columns of a log.
 const MOST_COLUMNS: usize = 100_000;
-
-/// What of a log is read, and within which limits.
-#[derive(Clone, Debug, Default)]
-pub struct Request {
-    /// what reading may take
-    pub budget: Budget,
-    /// headers of the columns that are asked for, as far as it can be left out what else there is; all without it
-    pub columns: Option<HashSet<String>>,
-}
-
-impl Request {
-    /// Whether somebody asks for a column.
-    #[cfg(feature = "parquet")]
-    pub(super) fn wants(&self, header: &str) -> bool {
-        self.columns
-            .as_ref()
-            .is_none_or(|columns| columns.contains(header))
-    }
-}
 
 impl Table {
     /// Reads a CSV file with a header row, or a Parquet file if it is called `*.parquet`.

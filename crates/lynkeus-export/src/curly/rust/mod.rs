@@ -1,48 +1,19 @@
 //! Rust without its standard library: a crate, with an example that replays a log.
 
-mod names;
 mod print;
 mod value;
 
-use self::print::printed;
+use self::print::{documented, plain, printed};
+use self::value::{OWN, kind};
 use super::c::{File, Precision, Sources, lost, prefix};
-use super::device::Device;
-use super::function::Entry;
-use super::machine::{Field, Kind, Machine};
+use super::device::{CREDIBLE, Device, Entry, PATIENCE, READINGS};
+use super::estimator::drafted;
+use super::machine::{Field, Machine};
+use super::syntax::Type;
 use super::template::mentions;
-use super::words::{self, CREDIBLE, PATIENCE, READINGS};
 use crate::Refusal;
-use crate::hidden::seen;
 
 const REPLAY: &str = include_str!("../runtime/replay.rs");
-
-/// What of the library is not drafted: with numbers that may be negative, and parts of numbers.
-const OWN: [(&str, &str); 2] = [
-    (
-        "integer_power",
-        "/// An integer power, as it is computed everywhere else: by squares.
-fn integer_power(a: REAL, exponent: i32) -> REAL {
-    let mut power = 1.0;
-    let mut factor = a;
-    let mut rest = exponent.unsigned_abs();
-    while rest > 0 {
-        if rest % 2 == 1 {
-            power *= factor;
-        }
-        factor *= factor;
-        rest /= 2;
-    }
-    if exponent < 0 { 1.0 / power } else { power }
-}",
-    ),
-    (
-        "power_of_two",
-        "/// The power of two of a number.
-fn power_of_two(a: REAL) -> REAL {
-    libm::ldexpSUFFIX(1.0, libm::frexpSUFFIX(a).1 - 1)
-}",
-    ),
-];
 
 /// The files of a device: `Cargo.toml`, `src/lib.rs`, `examples/replay.rs`.
 ///
@@ -50,7 +21,7 @@ fn power_of_two(a: REAL) -> REAL {
 /// What cannot run there, or cannot be written.
 pub fn sources(device: &Device<'_>, precision: Precision) -> Result<Sources, Refusal> {
     let name = format!("{}_estimator", prefix(device.name));
-    let machine = &Machine::of(device)?;
+    let machine = &drafted(device)?;
     let frame = Frame {
         device,
         machine,
@@ -87,10 +58,7 @@ struct Frame<'a> {
 
 impl Frame<'_> {
     fn real(&self) -> &'static str {
-        match self.precision {
-            Precision::F64 => "f64",
-            Precision::F32 => "f32",
-        }
+        kind(Type::Real, self.precision)
     }
 
     fn library(&self) -> Result<String, Refusal> {
@@ -234,18 +202,9 @@ impl Frame<'_> {
         }
     }
 
-    fn kind(&self, kind: Kind) -> &'static str {
-        match kind {
-            Kind::Real => self.real(),
-            Kind::Double => "f64",
-            Kind::Int => "usize",
-            Kind::Truth => "bool",
-        }
-    }
-
     fn state(&self) -> String {
         let fields = self.machine.fields.iter().map(|field| {
-            let kind = self.kind(field.kind);
+            let kind = kind(field.kind, self.precision);
             let kind = match field.count {
                 None => kind.to_owned(),
                 Some(count) => format!("[{kind}; {count}]"),
@@ -276,9 +235,9 @@ impl Frame<'_> {
     /// A field at the start.
     fn start(&self, field: &Field) -> String {
         let value = |value: f64| match (field.kind, self.precision) {
-            (Kind::Int, _) => format!("{}", value as i64),
-            (Kind::Truth, _) => format!("{}", value != 0.0),
-            (Kind::Real, Precision::F32) => match value as f32 {
+            (Type::Int, _) => format!("{}", value as i64),
+            (Type::Truth, _) => format!("{}", value != 0.0),
+            (Type::Real, Precision::F32) => match value as f32 {
                 v if v.is_finite() => format!("{v:?}"),
                 v if v > 0.0 => "f32::INFINITY".to_owned(),
                 _ => "f32::NEG_INFINITY".to_owned(),
@@ -303,7 +262,7 @@ impl Frame<'_> {
 
 /// The codes, and what they are for people.
 fn codes(device: &Device<'_>) -> String {
-    let all = || words::codes(device).enumerate();
+    let all = || super::device::codes(device).enumerate();
     let constants = all().map(|(k, (code, _))| format!("const {code}: usize = {};\n", k + 1));
     let variants =
         all().map(|(_, (code, about))| format!("    /// {about}\n    {},\n", camel(code)));
@@ -332,18 +291,4 @@ fn camel(word: &str) -> String {
         format!("{first}{}", rest.to_ascii_lowercase())
     });
     parts.collect()
-}
-
-/// Words in a comment of one line.
-fn plain(words: &str) -> String {
-    seen(words)
-}
-
-/// Words in documentation, where brackets would be links and angles elements.
-fn documented(words: &str) -> String {
-    let words = words.chars().map(|c| match c {
-        '[' | ']' | '<' | '>' | '`' | '*' | '_' | '\\' => format!("\\{c}"),
-        c => c.to_string(),
-    });
-    words.collect()
 }

@@ -9,6 +9,7 @@ use crate::curly::syntax::{
     Type, Value, any, parsed, values, visit,
 };
 use crate::curly::template::{chosen, mentions};
+use crate::names::seen;
 
 /// A draft in Rust.
 ///
@@ -19,11 +20,7 @@ pub(super) fn printed(
     fields: &[Field],
     precision: Precision,
 ) -> Result<String, Refusal> {
-    let holds: &[&str] = match precision {
-        Precision::F64 => &[],
-        Precision::F32 => &["single"],
-    };
-    let items = parsed(&chosen(draft, holds))?;
+    let items = parsed(&chosen(draft, precision.holds()))?;
     let program = Program::of(&items, fields);
     let mut printer = Printer {
         values: Values::new(&program, precision),
@@ -85,8 +82,8 @@ impl<'p> Printer<'p> {
     fn comment(&mut self, depth: usize, mark: &str, words: &str) {
         for words in comment_lines(words) {
             let words = match mark {
-                "///" => super::documented(&super::plain(words)),
-                _ => super::plain(words),
+                "///" => documented(&plain(words)),
+                _ => plain(words),
             };
             self.line(depth, format!("{mark} {words}").trim_end());
         }
@@ -199,7 +196,7 @@ impl<'p> Printer<'p> {
                 let text = format!("{};", self.simple(place, simple));
                 let text = match words.is_empty() {
                     true => text,
-                    false => format!("{text} // {}", super::plain(&words.join(" "))),
+                    false => format!("{text} // {}", plain(&words.join(" "))),
                 };
                 self.line(depth, &text);
             }
@@ -384,6 +381,20 @@ fn is_used(lines: &[Line], name: &str) -> bool {
         }
         is_used
     })
+}
+
+/// Words in a comment of one line.
+pub(super) fn plain(words: &str) -> String {
+    seen(words)
+}
+
+/// Words in documentation, where brackets would be links and angles elements.
+pub(super) fn documented(words: &str) -> String {
+    let words = words.chars().map(|c| match c {
+        '[' | ']' | '<' | '>' | '`' | '*' | '_' | '\\' => format!("\\{c}"),
+        c => c.to_string(),
+    });
+    words.collect()
 }
 
 /// The words of a comment, line by line.

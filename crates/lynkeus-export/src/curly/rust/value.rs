@@ -1,41 +1,45 @@
-//! Values of a draft as Rust.
+//! Values of a draft as Rust, and names that cannot stay in it.
 
 use std::collections::HashMap;
 
-use super::names::renamed;
 use crate::curly::c::Precision;
-use crate::curly::syntax::{Expr, Function, Operator, Program, Scope, Shape, Type, reads_state};
+use crate::curly::syntax::{
+    ATOM, Bound, Expr, Function, Operator, Program, SIGN, Scope, Type, reads_state,
+};
 
-/// How tightly `as`, a sign before a value, and what needs no parentheses bind. A cast stands in
-/// parentheses wherever it is a part of an operation: `x as usize < y` begins a list of types.
+/// How tightly `as` binds. A cast stands in parentheses wherever it is a part of an operation: `x as usize < y`
+/// begins a list of types.
 const CAST: u8 = 4;
-const SIGN: u8 = 8;
-const ATOM: u8 = 9;
 /// `if … { … } else { … }`
 const CHOICE: u8 = 0;
 
-/// The text of a value, and how tightly it binds.
-struct Bound {
-    text: String,
-    level: u8,
-}
-
-impl Bound {
-    fn atom(text: impl Into<String>) -> Self {
-        Self {
-            text: text.into(),
-            level: ATOM,
+/// What of the library is not drafted: with numbers that may be negative, and parts of numbers.
+pub(super) const OWN: [(&str, &str); 2] = [
+    (
+        "integer_power",
+        "/// An integer power, as it is computed everywhere else: by squares.
+fn integer_power(a: REAL, exponent: i32) -> REAL {
+    let mut power = 1.0;
+    let mut factor = a;
+    let mut rest = exponent.unsigned_abs();
+    while rest > 0 {
+        if rest % 2 == 1 {
+            power *= factor;
         }
+        factor *= factor;
+        rest /= 2;
     }
-
-    /// In parentheses where it does not bind so tightly.
-    fn at_least(self, level: u8) -> String {
-        match self.level >= level {
-            true => self.text,
-            false => format!("({})", self.text),
-        }
-    }
-}
+    if exponent < 0 { 1.0 / power } else { power }
+}",
+    ),
+    (
+        "power_of_two",
+        "/// The power of two of a number.
+fn power_of_two(a: REAL) -> REAL {
+    libm::ldexpSUFFIX(1.0, libm::frexpSUFFIX(a).1 - 1)
+}",
+    ),
+];
 
 /// Writes the values of one function after the other.
 pub(super) struct Values<'p> {
@@ -66,16 +70,8 @@ impl<'p> Values<'p> {
         self.others = renamed(&self.scope, self.program);
     }
 
-    pub fn kind(&self, kind: Type) -> &'static str {
-        match kind {
-            Type::Void => "()",
-            Type::Real if self.precision == Precision::F32 => "f32",
-            Type::Real | Type::Double => "f64",
-            Type::Int => "usize",
-            Type::Truth => "bool",
-            Type::State => "State",
-            Type::Field => "Field",
-        }
+    pub fn kind(&self, of: Type) -> &'static str {
+        kind(of, self.precision)
     }
 
     pub fn zero(&self, kind: Type) -> &'static str {
@@ -203,7 +199,7 @@ impl<'p> Values<'p> {
                 Precision::F64 => "1e-13".to_owned(),
                 Precision::F32 => "1e-6".to_owned(),
             },
-            _ if self.program.is_table(name) => name.to_ascii_uppercase(),
+            _ if self.program.table(name).is_some() => name.to_ascii_uppercase(),
             _ => name.to_owned(),
         }
     }
@@ -246,10 +242,7 @@ impl<'p> Values<'p> {
         let least = if (3..5).contains(&level) { 5 } else { level };
         let left = self.bound_as(left, wanted).at_least(least);
         let right = self.bound_as(right, wanted).at_least(least.max(level + 1));
-        Bound {
-            text: format!("{left} {} {right}", operator.sign()),
-            level,
-        }
+        Bound::infix(&left, operator.sign(), &right, level)
     }
 
     fn call(&self, name: &str, arguments: &[Expr]) -> String {
@@ -271,7 +264,7 @@ impl<'p> Values<'p> {
             _ => {}
         }
         let parameters = self.program.parameters(name, &self.scope);
-        let is_own = super::OWN.iter().any(|own| own.0 == name);
+        let is_own = OWN.iter().any(|own| own.0 == name);
         if parameters.is_empty() && !is_own && self.program.is_foreign(name) {
             let single = self.precision == Precision::F32 && name != "ceil";
             let suffix = if single { "f" } else { "" };
@@ -300,7 +293,7 @@ impl<'p> Values<'p> {
         let is_lent = match argument {
             Expr::Name(name) => {
                 let variable = self.scope.variable(name);
-                variable.is_some_and(|variable| variable.shape == Shape::Pointer)
+                variable.is_some_and(|variable| variable.is_pointer)
             }
             _ => false,
         };
@@ -309,6 +302,19 @@ impl<'p> Values<'p> {
             (false, true) => format!("&{text}"),
             (false, false) => format!("&mut {text}"),
         }
+    }
+}
+
+/// What a type is called.
+pub(super) fn kind(kind: Type, precision: Precision) -> &'static str {
+    match kind {
+        Type::Void => "()",
+        Type::Real if precision == Precision::F32 => "f32",
+        Type::Real | Type::Double => "f64",
+        Type::Int => "usize",
+        Type::Truth => "bool",
+        Type::State => "State",
+        Type::Field => "Field",
     }
 }
 
@@ -331,4 +337,41 @@ fn is_zero(value: &Expr) -> bool {
 
 fn is_one(value: &Expr) -> bool {
     matches!(value, Expr::Number(digits) if digits == "1")
+}
+
+/// Words that cannot be names.
+const KEYWORDS: [&str; 51] = [
+    "Self", "abstract", "as", "async", "await", "become", "box", "break", "const", "continue",
+    "crate", "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if",
+    "impl", "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv", "pub",
+    "ref", "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof",
+    "unsafe", "unsized", "use", "where", "while", "yield",
+];
+
+/// Constants of the frame, and of every Rust program.
+const OWN_NAMES: [&str; 7] = [
+    "ESTIMATES",
+    "ESTIMATE_NAMES",
+    "Err",
+    "None",
+    "Ok",
+    "SIGNAL_NAMES",
+    "Some",
+];
+
+/// Names of a function that mean something else in Rust, with what they are called instead. A local name cannot
+/// be that of a constant; those of the runtime are names in no draft.
+fn renamed(scope: &Scope, program: &Program<'_>) -> HashMap<String, String> {
+    let is_taken = |name: &str| {
+        KEYWORDS.contains(&name) || OWN_NAMES.contains(&name) || program.has_table(name)
+    };
+    let mut others = HashMap::new();
+    for name in scope.names().iter().filter(|name| is_taken(name)) {
+        let mut other = format!("{name}_");
+        while is_taken(&other) || scope.variable(&other).is_some() {
+            other.push('_');
+        }
+        others.insert(name.clone(), other);
+    }
+    others
 }

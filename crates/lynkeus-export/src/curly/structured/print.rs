@@ -3,12 +3,31 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::names::Identifiers;
-use super::routine::{Instance, Routine};
 use crate::Refusal;
 use crate::curly::c::Precision;
 use crate::curly::machine::Field;
-use crate::curly::syntax::{Declaration, Expr, Function, Item, Program, Type, Value};
-use crate::hidden::seen;
+use crate::curly::syntax::{Declaration, Expr, Function, Item, Program, Scope, Type};
+use crate::names::seen;
+
+/// Functions that the standard has not, or has with another meaning here: in the order in which they are written.
+const LIBRARY: [&str; 11] = [
+    "infinite",
+    "undefined",
+    "smaller",
+    "larger",
+    "floor",
+    "ceil",
+    "power_of_two",
+    "sinh",
+    "cosh",
+    "tanh",
+    "atan2",
+];
+
+/// The function of the library for one of the draft.
+pub(super) fn library(name: &str) -> Option<&'static str> {
+    LIBRARY.into_iter().find(|own| *own == name)
+}
 
 /// Writes one function after the other, those that are called first.
 pub(super) struct Printer<'p> {
@@ -18,9 +37,8 @@ pub(super) struct Printer<'p> {
     pub precision: Precision,
     /// before the names of functions and types, which all programs of a controller share
     pub prefix: &'p str,
-    pub tables: HashMap<&'p str, &'p [Expr]>,
-    kinds: HashMap<&'p str, Type>,
-    functions: HashMap<&'p str, Documented<'p>>,
+    /// the comments before functions, by name
+    about: HashMap<&'p str, &'p str>,
     made: Vec<(Instance, Made)>,
     /// the function under way
     pub here: Routine,
@@ -30,13 +48,6 @@ pub(super) struct Printer<'p> {
     pub arrays: BTreeSet<(&'static str, usize)>,
     /// the functions
     pub text: String,
-}
-
-/// A function with the comment before it.
-#[derive(Clone, Copy)]
-struct Documented<'p> {
-    function: &'p Function,
-    about: &'p str,
 }
 
 /// What a function is called, and what its parameters are.
@@ -60,9 +71,7 @@ impl<'p> Printer<'p> {
             sizes,
             precision,
             prefix,
-            tables: HashMap::new(),
-            kinds: HashMap::new(),
-            functions: HashMap::new(),
+            about: HashMap::new(),
             made: vec![],
             here: Routine::none(),
             own: BTreeSet::new(),
@@ -73,18 +82,8 @@ impl<'p> Printer<'p> {
         for item in items {
             match item {
                 Item::Comment(words) => about = words,
-                Item::Table(Declaration {
-                    name,
-                    kind,
-                    value: Value::List(list),
-                    ..
-                }) => {
-                    printer.tables.insert(name, list);
-                    printer.kinds.insert(name, *kind);
-                }
                 Item::Function(function) => {
-                    let documented = Documented { function, about };
-                    printer.functions.insert(&function.name, documented);
+                    printer.about.insert(&function.name, about);
                     about = "";
                 }
                 _ => about = "",
@@ -119,10 +118,8 @@ impl<'p> Printer<'p> {
         if let Some(known) = self.here.known(name) {
             return Ok(known);
         }
-        let (Some(list), Some(kind)) = (self.tables.get(name), self.kinds.get(name)) else {
-            return Err(lacks(name));
-        };
-        let (list, kind) = (*list, *kind);
+        let table = self.program.table(name).ok_or_else(|| lacks(name))?;
+        let (list, kind) = (table.entries(), table.kind);
         let mut texts = vec![];
         let mut split = vec![];
         for (place, value) in list.iter().enumerate() {
@@ -171,9 +168,10 @@ impl<'p> Printer<'p> {
         if let Some((_, made)) = self.made.iter().find(|made| made.0 == instance) {
             return Ok(made.clone());
         }
-        let documented = self.functions.get(instance.function.as_str());
-        let Documented { function, about } =
-            *documented.ok_or_else(|| lacks(&instance.function))?;
+        let function = self.program.function(&instance.function);
+        let function = function.ok_or_else(|| lacks(&instance.function))?;
+        let about = self.about.get(instance.function.as_str());
+        let about = about.copied().unwrap_or_default();
         let others = self.made.iter();
         let others = others.filter(|made| made.0.function == instance.function);
         let name = match others.count() {
@@ -191,8 +189,8 @@ impl<'p> Printer<'p> {
     /// Without the names of functions and types.
     pub fn identifiers(&self) -> Identifiers {
         const TYPES: [&str; 6] = ["counts", "example", "flags", "init", "reals", "state"];
-        let functions = self.functions.keys().copied();
-        Identifiers::inside(self.prefix, functions.chain(super::OWN).chain(TYPES))
+        let functions = self.program.functions();
+        Identifiers::inside(self.prefix, functions.chain(LIBRARY).chain(TYPES))
     }
 
     fn written(
@@ -306,4 +304,145 @@ pub(super) fn lacks(operation: &str) -> Refusal {
         language: "Structured Text",
         operation: operation.to_owned(),
     }
+}
+
+/// A function of the draft for arrays of certain sizes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Instance {
+    pub function: String,
+    /// of its arrays, in the order of its parameters
+    pub sizes: Vec<usize>,
+    /// the functions that it is given, likewise
+    pub fields: Vec<String>,
+}
+
+/// What is known of the function that is being written.
+#[derive(Clone, Debug)]
+pub(super) struct Routine {
+    pub scope: Scope,
+    /// what it is called
+    pub name: String,
+    /// entries of its arrays
+    pub sizes: HashMap<String, usize>,
+    /// the functions that it is given, by parameter
+    pub fields: HashMap<String, String>,
+    names: HashMap<String, String>,
+    identifiers: Identifiers,
+    /// declarations, without their indent
+    pub locals: Vec<String>,
+    /// lines before all others
+    head: Vec<String>,
+    /// with their indents, as all others
+    lines: Vec<String>,
+    depth: usize,
+    /// what it returns
+    pub returns: Type,
+}
+
+impl Routine {
+    /// Before its first line.
+    pub fn new(function: &Function, name: String, mut identifiers: Identifiers) -> Self {
+        let scope = Scope::of(function);
+        let names = scope.names().iter();
+        let names = names.map(|name| (name.clone(), identifiers.of(name)));
+        Self {
+            names: names.collect(),
+            scope,
+            name,
+            identifiers,
+            depth: 1,
+            returns: function.kind,
+            ..Self::none()
+        }
+    }
+
+    /// No function.
+    pub fn none() -> Self {
+        Self {
+            scope: Scope::default(),
+            name: String::new(),
+            sizes: HashMap::new(),
+            fields: HashMap::new(),
+            names: HashMap::new(),
+            identifiers: Identifiers::default(),
+            locals: vec![],
+            head: vec![],
+            lines: vec![],
+            depth: 0,
+            returns: Type::Void,
+        }
+    }
+
+    /// What a variable of the draft is called here.
+    pub fn called(&self, name: &str) -> String {
+        self.known(name).unwrap_or_else(|| name.to_owned())
+    }
+
+    /// A variable that the draft has not.
+    pub fn fresh(&mut self, name: &str, kind: &str) -> String {
+        let name = self.identifiers.of(name);
+        self.locals.push(format!("{name} : {kind};"));
+        name
+    }
+
+    /// A variable that the draft has not, declared where it is first asked for.
+    pub fn once(&mut self, name: &str, declared: impl FnOnce(&str) -> String) -> String {
+        if let Some(known) = self.known(name) {
+            return known;
+        }
+        let own = self.identifiers.of(name);
+        self.locals.push(declared(&own));
+        self.names.insert(name.to_owned(), own.clone());
+        own
+    }
+
+    /// What a variable is called that is the draft's, or declared once.
+    pub fn known(&self, name: &str) -> Option<String> {
+        self.names.get(name).cloned()
+    }
+
+    /// A line at the beginning of the function.
+    pub fn first(&mut self, text: String) {
+        self.head.push(indented(1, &text));
+    }
+
+    pub fn line(&mut self, text: impl AsRef<str>) {
+        self.lines.push(indented(self.depth, text.as_ref()));
+    }
+
+    /// How many lines there are.
+    pub fn length(&self) -> usize {
+        self.lines.len()
+    }
+
+    /// The lines from one on, which are no longer there.
+    pub fn take_from(&mut self, line: usize) -> Vec<String> {
+        self.lines.split_off(line.min(self.lines.len()))
+    }
+
+    /// Lines that were taken.
+    pub fn put_back(&mut self, lines: Vec<String>) {
+        self.lines.extend(lines);
+    }
+
+    pub fn deeper(&mut self) {
+        self.depth += 1;
+    }
+
+    pub fn back(&mut self) {
+        self.depth = self.depth.saturating_sub(1);
+    }
+
+    pub fn is_outermost(&self) -> bool {
+        self.depth == 1
+    }
+
+    /// All lines with their indents.
+    pub fn text(&self) -> String {
+        self.head.concat() + &self.lines.concat()
+    }
+}
+
+fn indented(depth: usize, text: &str) -> String {
+    format!("{:1$}{text}\n", "", 4 * depth)
 }

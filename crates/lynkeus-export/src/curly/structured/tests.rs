@@ -1,17 +1,16 @@
 //! What a small draft becomes.
 
-use super::print::Printer;
-use super::routine::Instance;
+use super::print::{Instance, Printer};
 use crate::curly::c::Precision;
-use crate::curly::machine::{Field, Kind};
-use crate::curly::syntax::{Program, parsed};
+use crate::curly::machine::Field;
+use crate::curly::syntax::{Program, Type, parsed};
 
 /// The functions of a draft, the last one for arrays of two.
 fn printed(draft: &str, precision: Precision) -> String {
     let items = parsed(draft).unwrap();
     let fields = [Field {
         name: "x",
-        kind: Kind::Real,
+        kind: Type::Real,
         count: Some(2),
         about: String::new(),
         start: vec![0.0; 2],

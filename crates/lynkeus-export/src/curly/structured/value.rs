@@ -1,12 +1,11 @@
 //! Values of a draft as Structured Text. What C evaluates only under a condition becomes a variable, which is set
-//! in the lines before.
+//! in the lines before. Arguments have names, but for the standard's own functions.
 
-use super::bound::{ATOM, Bound, SIGN, literal};
-use super::print::{Printer, lacks};
+use super::print::{Instance, Printer, lacks, library};
 use crate::Refusal;
 use crate::curly::c::Precision;
-use crate::curly::syntax::{Expr, Operator, Type, visit};
-use crate::curly::words;
+use crate::curly::device::number_of;
+use crate::curly::syntax::{ATOM, Bound, Expr, Operator, Parameter, SIGN, Type, visit};
 
 impl<'p> Printer<'p> {
     /// A value where one of a type is wanted.
@@ -93,7 +92,7 @@ impl<'p> Printer<'p> {
         let size = match array {
             Expr::Name(name) => match self.here.sizes.get(name) {
                 Some(size) => Some(*size),
-                None => self.tables.get(name.as_str()).map(|list| list.len()),
+                None => self.program.table(name).map(|table| table.entries().len()),
             },
             Expr::Part(name) => {
                 let field = self.fields.iter().find(|field| field.name == name);
@@ -108,7 +107,7 @@ impl<'p> Printer<'p> {
         if self.here.scope.variable(name).is_some() {
             return Ok(Bound::atom(self.here.called(name)));
         }
-        if let Some(number) = words::number(name) {
+        if let Some(number) = number_of(name) {
             return Ok(Bound::atom(format!("{number} (* {name} *)")));
         }
         let is_single = self.precision == Precision::F32;
@@ -201,7 +200,7 @@ impl<'p> Printer<'p> {
             _ => left.at_least(least),
         };
         let right = self.bound(right, wanted)?;
-        let right = right.after_a_sign(least.max(level + 1));
+        let right = after_a_sign(right, least.max(level + 1));
         Ok(Bound::infix(&left, sign, &right, level))
     }
 
@@ -213,7 +212,7 @@ impl<'p> Printer<'p> {
         kind: Type,
     ) -> Result<String, Refusal> {
         let value = self.bound(value, kind)?;
-        Ok(value.after_a_sign(operator.level() + 1))
+        Ok(after_a_sign(value, operator.level() + 1))
     }
 
     /// The place before one.
@@ -300,4 +299,224 @@ fn variable(value: &Expr) -> Option<&str> {
 
 fn is(value: &Expr, digits: &str) -> bool {
     matches!(value, Expr::Number(number) if number == digits)
+}
+
+/// Functions of the standard, with their names in C.
+const STANDARD: [(&str, &str); 11] = [
+    ("acos", "ACOS"),
+    ("asin", "ASIN"),
+    ("atan", "ATAN"),
+    ("cos", "COS"),
+    ("exp", "EXP"),
+    ("fabs", "ABS"),
+    ("log", "LN"),
+    ("pow", "EXPT"),
+    ("sin", "SIN"),
+    ("sqrt", "SQRT"),
+    ("tan", "TAN"),
+];
+
+/// What is given and beyond it counts as missing. So no infinity has to be made to say that something is, at which
+/// there are controllers that stop.
+const FINITE: &str = "1.0E38";
+
+impl<'p> Printer<'p> {
+    /// A call of the library.
+    pub fn own(&mut self, name: &'static str, arguments: &str) -> Bound {
+        self.own.insert(name);
+        Bound::atom(format!("{}_{name}({arguments})", self.prefix))
+    }
+
+    pub fn call(&mut self, name: &'p str, arguments: &'p [Expr]) -> Result<Bound, Refusal> {
+        let parameters = self.program.parameters(name, &self.here.scope);
+        if !parameters.is_empty() {
+            return self.drafted(name, parameters, arguments);
+        }
+        let mut values = vec![];
+        for argument in arguments {
+            let kind = self.kind_of(argument);
+            values.push(self.bound(argument, kind)?);
+        }
+        if let ("isfinite" | "isnan", [argument]) = (name, arguments) {
+            let value = values.pop().ok_or_else(|| lacks(name))?;
+            return Ok(match name {
+                "isnan" => differs(value),
+                _ if is_given(argument) => Bound::infix(
+                    &format!("ABS({})", value.text),
+                    "<",
+                    FINITE,
+                    Operator::Less.level(),
+                ),
+                _ => is_finite(value),
+            });
+        }
+        let texts: Vec<String> = values.into_iter().map(|value| value.text).collect();
+        let typed = || {
+            let pairs = arguments.iter().zip(&texts);
+            let texts = pairs.map(|(argument, text)| self.typed(argument, text));
+            texts.collect::<Vec<_>>().join(", ")
+        };
+        if let Some((_, standard)) = STANDARD.iter().find(|known| known.0 == name) {
+            return Ok(Bound::atom(format!("{standard}({})", typed())));
+        }
+        match (library(name), &texts[..]) {
+            (Some(own), [a]) => Ok(self.own(own, &format!("a := {a}"))),
+            (Some(own), [a, b]) => Ok(self.own(own, &format!("a := {a}, b := {b}"))),
+            _ => Err(lacks(name)),
+        }
+    }
+
+    /// An argument of the standard's functions, which take numbers of any type: a literal says which one it is, as
+    /// there are compilers that take it for the smaller one.
+    fn typed(&self, argument: &Expr, text: &str) -> String {
+        let kind = self.kind(self.kind_of(argument));
+        match argument {
+            Expr::Group(inner) => self.typed(inner, text),
+            Expr::Real(_) | Expr::Number(_) => format!("{kind}#{text}"),
+            Expr::Prefix("-", inner) if matches!(**inner, Expr::Real(_)) => {
+                format!("-{kind}#{}", text.trim_start_matches('-'))
+            }
+            _ => text.to_owned(),
+        }
+    }
+
+    /// A call of a function of the draft.
+    fn drafted(
+        &mut self,
+        name: &'p str,
+        parameters: &'p [Parameter],
+        arguments: &'p [Expr],
+    ) -> Result<Bound, Refusal> {
+        let mut instance = Instance {
+            function: match self.here.fields.get(name) {
+                Some(given) => given.clone(),
+                None => name.to_owned(),
+            },
+            ..Instance::default()
+        };
+        let mut values = vec![];
+        for (parameter, argument) in parameters.iter().zip(arguments) {
+            match (parameter.kind, parameter.is_pointer) {
+                (Type::Field, _) => instance.fields.push(self.handed(argument)?),
+                (Type::State, _) => values.push(self.here.called("s")),
+                (_, true) => {
+                    instance.sizes.push(self.size_of(argument)?);
+                    values.push(self.value(argument, parameter.kind)?);
+                }
+                (kind, false) => values.push(self.value(argument, kind)?),
+            }
+        }
+        let made = self.instance(instance)?;
+        let pairs = made.parameters.iter().zip(values);
+        let texts: Vec<String> = pairs
+            .map(|(name, text)| format!("{name} := {text}"))
+            .collect();
+        Ok(Bound::atom(format!("{}({})", made.name, texts.join(", "))))
+    }
+
+    /// A function as an argument.
+    fn handed(&self, argument: &Expr) -> Result<String, Refusal> {
+        match argument {
+            Expr::Name(name) => Ok(self.here.fields.get(name).unwrap_or(name).clone()),
+            _ => Err(lacks("a function that is chosen while it runs")),
+        }
+    }
+}
+
+/// Whether a value is what the block was given, rather than computed: the runtime's names for that.
+fn is_given(value: &Expr) -> bool {
+    match value {
+        Expr::Name(name) | Expr::Part(name) => {
+            ["reading", "readings", "signals"].contains(&name.as_str())
+        }
+        Expr::Index(array, _) | Expr::Group(array) => is_given(array),
+        _ => false,
+    }
+}
+
+/// Only what is no number is not itself.
+fn differs(value: Bound) -> Bound {
+    let value = value.at_least(ATOM);
+    Bound::infix(&value, "<>", &value, Operator::Equal.level())
+}
+
+/// Only a finite number less itself is nothing. A controller that stops at an infinity has stopped where it arose.
+fn is_finite(value: Bound) -> Bound {
+    let value = value.at_least(ATOM);
+    let nothing = format!("{value} - {value}");
+    Bound::infix(&nothing, "=", "0.0", Operator::Equal.level())
+}
+
+/// What follows a sign has none of its own, but in parentheses.
+fn after_a_sign(value: Bound, level: u8) -> String {
+    match value.text.starts_with('-') {
+        true => format!("({})", value.text),
+        false => value.at_least(level),
+    }
+}
+
+/// A number as the standard writes it: with a point. Factors take the place of exponents that `REAL` has not:
+/// there are compilers that refuse them in `LREAL`, too.
+pub(super) fn literal(digits: &str) -> Bound {
+    const MOST: i32 = 30;
+    let (mantissa, exponent) = match digits.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse().unwrap_or(0)),
+        None => (digits, 0),
+    };
+    let mut rest: i32 = exponent;
+    let mut factors = vec![];
+    while rest.abs() > MOST + 6 {
+        let part = MOST * rest.signum();
+        factors.push(written("1", part));
+        rest -= part;
+    }
+    let first = written(mantissa, rest);
+    match factors.is_empty() {
+        true => Bound::atom(first),
+        false => Bound {
+            text: format!("{first} * {}", factors.join(" * ")),
+            level: Operator::Mul.level(),
+        },
+    }
+}
+
+/// A number in a declaration, which has no factors.
+pub(super) fn listed(value: f64) -> String {
+    let digits = format!("{value:?}");
+    match digits.split_once('e') {
+        Some((mantissa, exponent)) => written(mantissa, exponent.parse().unwrap_or(0)),
+        None => digits,
+    }
+}
+
+/// With a point.
+fn written(mantissa: &str, exponent: i32) -> String {
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    match exponent {
+        0 => format!("{mantissa}{point}"),
+        _ => format!("{mantissa}{point}E{exponent}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_points_and_exponents_that_every_compiler_takes() {
+        for (digits, expected) in [
+            ("0.5", "0.5"),
+            ("2", "2.0"),
+            ("1e-9", "1.0E-9"),
+            ("2.5e16", "2.5E16"),
+            (
+                "1e-307",
+                "1.0E-7 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30 * 1.0E-30",
+            ),
+        ] {
+            assert_eq!(literal(digits).text, expected);
+        }
+        assert_eq!(listed(-2e-307), "-2.0E-307");
+        assert_eq!(listed(3.0), "3.0");
+    }
 }

@@ -5,13 +5,11 @@
 //! named by what they mean: `real`, `double` (time), `int` (places and counts), `truth`. Layout is a part of the tree as far as people
 //! read it: comments, blank lines, parentheses.
 
-mod expression;
-mod lexer;
 mod parser;
 mod scope;
 
 pub(super) use parser::parsed;
-pub(super) use scope::{Program, Range, Scope, Shape, any, reads_state, values, visit};
+pub(super) use scope::{Program, Range, Scope, any, reads_state, values, visit};
 
 /// What a name holds, one or an array of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,6 +125,16 @@ pub(super) struct Declaration {
     pub value: Value,
 }
 
+impl Declaration {
+    /// The entries of a table.
+    pub fn entries(&self) -> &[Expr] {
+        match &self.value {
+            Value::List(list) => list,
+            Value::None | Value::One(_) => &[],
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Value {
     None,
@@ -206,6 +214,40 @@ impl Operator {
             Self::ShiftRight => 5,
             Self::Add | Self::Sub => 6,
             Self::Mul | Self::Div => 7,
+        }
+    }
+}
+
+/// How tightly a sign before a value, and what needs no parentheses bind; operators less ([`Operator::level`]).
+pub(super) const SIGN: u8 = 8;
+pub(super) const ATOM: u8 = 9;
+
+/// The text of a value in a language, and how tightly it binds.
+pub(super) struct Bound {
+    pub text: String,
+    pub level: u8,
+}
+
+impl Bound {
+    pub fn atom(text: impl Into<String>) -> Self {
+        Self {
+            text: text.into(),
+            level: ATOM,
+        }
+    }
+
+    pub fn infix(left: &str, operator: &str, right: &str, level: u8) -> Self {
+        Self {
+            text: format!("{left} {operator} {right}"),
+            level,
+        }
+    }
+
+    /// In parentheses where it does not bind so tightly.
+    pub fn at_least(self, level: u8) -> String {
+        match self.level >= level {
+            true => self.text,
+            false => format!("({})", self.text),
         }
     }
 }

@@ -4,15 +4,16 @@ use std::collections::HashMap;
 
 use super::{
     Declaration, Expr, Function, If, Item, Line, Operator, Otherwise, Parameter, Statement, Type,
+    Value,
 };
-use crate::curly::machine::{Field, Kind};
+use crate::curly::machine::Field;
 
 /// What is known wherever a function stands.
 #[derive(Clone, Debug)]
 pub(in crate::curly) struct Program<'p> {
     fields: &'p [Field],
     functions: HashMap<&'p str, &'p Function>,
-    tables: HashMap<&'p str, Type>,
+    tables: HashMap<&'p str, &'p Declaration>,
     alias: &'p [Parameter],
     /// functions that change the state
     changers: Vec<&'p str>,
@@ -22,16 +23,8 @@ pub(in crate::curly) struct Program<'p> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::curly) struct Variable {
     pub kind: Type,
-    pub shape: Shape,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::curly) enum Shape {
-    One,
-    /// of the function's own
-    Array,
-    /// somebody else's
-    Pointer,
+    /// an array, or the state, that is somebody else's
+    pub is_pointer: bool,
 }
 
 impl<'p> Program<'p> {
@@ -53,7 +46,7 @@ impl<'p> Program<'p> {
                     program.functions.insert(&function.name, function);
                 }
                 Item::Table(table) => {
-                    program.tables.insert(&table.name, table.kind);
+                    program.tables.insert(&table.name, table);
                 }
                 Item::Alias(parameters) => program.alias = parameters,
                 Item::Blank | Item::Comment(_) => {}
@@ -68,8 +61,17 @@ impl<'p> Program<'p> {
         tables.any(|table| table.to_ascii_uppercase() == name)
     }
 
-    pub fn is_table(&self, name: &str) -> bool {
-        self.tables.contains_key(name)
+    pub fn table(&self, name: &str) -> Option<&'p Declaration> {
+        self.tables.get(name).copied()
+    }
+
+    pub fn function(&self, name: &str) -> Option<&'p Function> {
+        self.functions.get(name).copied()
+    }
+
+    /// The names of the functions, in no order.
+    pub fn functions(&self) -> impl Iterator<Item = &'p str> {
+        self.functions.keys().copied()
     }
 
     /// What a call takes; empty for functions of the language's library.
@@ -91,25 +93,12 @@ impl<'p> Program<'p> {
         self.changers.contains(&function)
     }
 
-    pub fn part(&self, name: &str) -> Option<Variable> {
-        let field = self.fields.iter().find(|field| field.name == name)?;
-        Some(Variable {
-            kind: match field.kind {
-                Kind::Real => Type::Real,
-                Kind::Double => Type::Double,
-                Kind::Int => Type::Int,
-                Kind::Truth => Type::Truth,
-            },
-            shape: field.count.map_or(Shape::One, |_| Shape::Array),
-        })
-    }
-
     /// The type of a value, or of the entries of an array.
     pub fn kind(&self, value: &Expr, scope: &Scope) -> Type {
         match value {
             Expr::Name(name) => {
                 let own = scope.kind(name);
-                let own = own.or_else(|| self.tables.get(name.as_str()).copied());
+                let own = own.or_else(|| self.table(name).map(|table| table.kind));
                 own.unwrap_or(match name.as_str() {
                     "NAN" | "INFINITY" | "EPSILON" | "SMALLEST" | "RANK" => Type::Real,
                     // sizes and codes
@@ -121,7 +110,10 @@ impl<'p> Program<'p> {
                 true => Type::Double,
                 false => Type::Int,
             },
-            Expr::Part(name) => self.part(name).map_or(Type::Real, |part| part.kind),
+            Expr::Part(name) => {
+                let field = self.fields.iter().find(|field| field.name == name);
+                field.map_or(Type::Real, |field| field.kind)
+            }
             Expr::Index(array, _) => self.kind(array, scope),
             Expr::Call(name, _) => match (name.as_str(), self.functions.get(name.as_str())) {
                 (_, Some(function)) => function.kind,
@@ -190,18 +182,14 @@ impl Scope {
     pub fn of(function: &Function) -> Self {
         let mut scope = Self::default();
         for parameter in &function.parameters {
-            let shape = match parameter.is_pointer {
-                true => Shape::Pointer,
-                false => Shape::One,
-            };
-            scope.add(&parameter.name, parameter.kind, shape);
+            scope.add(&parameter.name, parameter.kind, parameter.is_pointer);
         }
         let _ = any(&function.body, &mut |statement| {
             match statement {
                 Statement::Declare(own)
                 | Statement::For {
                     start: Some(own), ..
-                } => scope.declare(own),
+                } => scope.add(&own.name, own.kind, false),
                 _ => {}
             }
             false
@@ -209,18 +197,10 @@ impl Scope {
         scope
     }
 
-    fn declare(&mut self, declaration: &Declaration) {
-        let shape = match declaration.size {
-            Some(_) => Shape::Array,
-            None => Shape::One,
-        };
-        self.add(&declaration.name, declaration.kind, shape);
-    }
-
-    fn add(&mut self, name: &str, kind: Type, shape: Shape) {
+    fn add(&mut self, name: &str, kind: Type, is_pointer: bool) {
         let known = self
             .variables
-            .insert(name.to_owned(), Variable { kind, shape });
+            .insert(name.to_owned(), Variable { kind, is_pointer });
         if known.is_none() {
             self.names.push(name.to_owned());
         }
@@ -313,9 +293,9 @@ fn conditions(conditional: &If) -> Vec<&Expr> {
 fn declared(declaration: &Declaration) -> Vec<&Expr> {
     let mut found: Vec<&Expr> = declaration.size.iter().collect();
     match &declaration.value {
-        super::Value::None => {}
-        super::Value::One(value) => found.push(value),
-        super::Value::List(list) => found.extend(list),
+        Value::None => {}
+        Value::One(value) => found.push(value),
+        Value::List(list) => found.extend(list),
     }
     found
 }
@@ -361,7 +341,7 @@ impl<'l> Range<'l> {
         step: &Statement,
     ) -> Option<Self> {
         let start = start?;
-        let super::Value::One(from) = &start.value else {
+        let Value::One(from) = &start.value else {
             return None;
         };
         let (condition, only) = match condition {

@@ -5,7 +5,7 @@ use lynkeus_observers::{KeySpec, Shape};
 use super::EXPRESSION;
 
 /// `[tune]`
-pub(in crate::study) const TUNE: [KeySpec; 5] = [
+pub(crate) const TUNE: [KeySpec; 5] = [
     KeySpec {
         name: "keys",
         kind: "table: key of `[observer]`, or an entry of one such as `\"theta[1]\"` = list of numbers, or `{ from, to, points, scale }`",
@@ -47,7 +47,7 @@ pub(in crate::study) const TUNE: [KeySpec; 5] = [
 ];
 
 /// A range of values in `keys` of `[tune]`.
-pub(in crate::study) const RANGE: [KeySpec; 4] = [
+pub(crate) const RANGE: [KeySpec; 4] = [
     KeySpec {
         name: "from",
         kind: "number",
@@ -79,7 +79,7 @@ pub(in crate::study) const RANGE: [KeySpec; 4] = [
 ];
 
 /// `[compare]`
-pub(in crate::study) const COMPARE: [KeySpec; 1] = [KeySpec {
+pub(crate) const COMPARE: [KeySpec; 1] = [KeySpec {
     name: "families",
     kind: "list of families",
     shape: Shape::NAMES,
@@ -88,7 +88,7 @@ pub(in crate::study) const COMPARE: [KeySpec; 1] = [KeySpec {
 }];
 
 /// `[plot]`
-pub(in crate::study) const PLOT: [KeySpec; 2] = [
+pub(crate) const PLOT: [KeySpec; 2] = [
     KeySpec {
         name: "show",
         kind: "list of names",

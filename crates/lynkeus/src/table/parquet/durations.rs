@@ -9,7 +9,7 @@ use ::parquet::file::metadata::FileMetaData;
 use ::parquet::schema::types::ColumnDescriptor;
 
 use super::arrow_schema;
-use super::meaning::Meaning;
+use super::meaning::{Meaning, nanoseconds};
 
 /// Nanoseconds of the units of NumPy, by name.
 const UNITS: [(&str, i64); 4] = [
@@ -61,15 +61,6 @@ impl Durations {
             _ => None,
         };
         unit.map_or(meaning, |unit| Meaning::Duration { unit })
-    }
-}
-
-/// Nanoseconds of a unit.
-pub(super) fn nanoseconds(unit: &TimeUnit) -> i64 {
-    match unit {
-        TimeUnit::MILLIS => 1_000_000,
-        TimeUnit::MICROS => 1000,
-        TimeUnit::NANOS => 1,
     }
 }
 

@@ -1,11 +1,10 @@
 //! What a column's values mean, by its physical and its logical type.
 
-use ::parquet::basic::{ConvertedType, LogicalType, Type as Physical};
+use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use ::parquet::schema::types::ColumnDescriptor;
 
 use super::super::column::Column;
 use super::super::instant::{self, Instant};
-use super::durations::nanoseconds;
 
 /// Nanoseconds of a day.
 const DAY: i64 = 86_400_000_000_000;
@@ -219,6 +218,15 @@ fn half(bits: u16) -> f64 {
         -magnitude
     } else {
         magnitude
+    }
+}
+
+/// Nanoseconds of a unit.
+pub(super) fn nanoseconds(unit: &TimeUnit) -> i64 {
+    match unit {
+        TimeUnit::MILLIS => 1_000_000,
+        TimeUnit::MICROS => 1000,
+        TimeUnit::NANOS => 1,
     }
 }
 

@@ -1,5 +1,4 @@
 use super::*;
-use crate::curly::machine::Kind;
 
 fn fields() -> Vec<Field> {
     let field = |name, kind, count| Field {
@@ -10,10 +9,10 @@ fn fields() -> Vec<Field> {
         start: vec![0.0],
     };
     vec![
-        field("x", Kind::Real, Some(2)),
-        field("time", Kind::Double, None),
-        field("started", Kind::Truth, None),
-        field("became", Kind::Int, Some(1)),
+        field("x", Type::Real, Some(2)),
+        field("time", Type::Double, None),
+        field("started", Type::Truth, None),
+        field("became", Type::Int, Some(1)),
     ]
 }
 

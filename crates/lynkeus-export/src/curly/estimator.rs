@@ -1,0 +1,531 @@
+//! Estimators as drafts: observers and Kalman filters whose sensors report when they do.
+
+use lynkeus_run::credible::{By, CHANCE, CLIP, ENOUGH, FEW};
+use lynkeus_run::filter::{FilterKind, FilterModel, FilterSettings, Limits, Sensor, SigmaPoints};
+use lynkeus_run::{BetweenSamples, Blueprint, ErrorModel, Level, SampledObserver, Tuned};
+
+use super::device::{Device, Entry, FirstReading};
+use super::draft::{Arguments, Target, draft, number, table};
+use super::machine::{FIELD, INTEGRATE, Linear, Machine, Which, code, refuse_jumps};
+use super::syntax::Type;
+use super::template::{chosen, exchanged};
+use crate::Refusal;
+use crate::code::Part;
+
+const PUSH: &str = include_str!("runtime/push.c");
+const SPREAD: &str = include_str!("runtime/spread.c");
+const SAMPLED: &str = include_str!("runtime/sampled.c");
+
+/// The estimator of a device as a draft.
+///
+/// # Errors
+/// [`Refusal`]: what solves an optimisation, looks ahead, has no fixed step or jumps with time,
+/// and operations that no language has.
+pub(super) fn drafted(device: &Device<'_>) -> Result<Machine, Refusal> {
+    let mut machine = Machine::default();
+    let sensors = device.sensors();
+    machine.size("SENSORS", sensors);
+    machine.size("INPUTS", device.signals.len().saturating_sub(sensors));
+    machine.size("SIGNALS", device.signals.len());
+    machine.size("REPORTED", device.estimates.len());
+    machine.single("time", Type::Double, "of the last sample", 0.0);
+    machine.single("started", Type::Truth, "whether there was one", 0.0);
+    machine.single(
+        "scale",
+        Type::Real,
+        "the largest start, reading or input so far",
+        1.0,
+    );
+    let about = "samples in a row for which the equations had no value or an estimate ran away";
+    machine.single("refused", Type::Int, about, 0.0);
+    machine.steps(device.blueprint.method())?;
+    let mut holds = vec![];
+    match device.blueprint {
+        Blueprint::Sampled { observer, .. } => {
+            holds.push("sampled");
+            machine.sampled(device, observer)?;
+        }
+        Blueprint::Filter { .. } => machine.filter(device)?,
+    }
+    if !device.first_readings.is_empty() {
+        holds.push("first");
+    }
+    if !device.tunables.is_empty() {
+        holds.push("tunable");
+    }
+    let first: Vec<String> = device.first_readings.iter().map(first_reading).collect();
+    machine.add(&chosen(PUSH, &holds).replace("        FIRST_READINGS\n", &first.concat()));
+    Ok(machine)
+}
+
+fn first_reading(first: &FirstReading) -> String {
+    let FirstReading {
+        sensor,
+        state,
+        slope,
+        offset,
+    } = first;
+    let (slope, offset) = (number(*slope), number(*offset));
+    format!(
+        "        if (isfinite(signals[{sensor}])) {{\n            s->x[{state}] = (signals[{sensor}] - ({offset})) / ({slope});\n        }}\n"
+    )
+}
+
+/// States and signals with what the device knows of them.
+fn arguments(states: &[String], signals: &[String], device: &Device<'_>) -> Arguments {
+    let known = |name: &String| device.words.iter().find(|entry| entry.name == *name);
+    let entry = |name: &String| known(name).cloned().unwrap_or_else(|| Entry::named(name));
+    Arguments {
+        x: states.iter().map(entry).collect(),
+        w: signals.iter().map(entry).collect(),
+    }
+}
+
+impl Machine {
+    fn sampled(&mut self, device: &Device<'_>, observer: &SampledObserver) -> Result<(), Refusal> {
+        let system = &observer.system;
+        refuse_jumps(system)?;
+        let (n, m) = (system.states().len(), observer.sensors.len());
+        let told = system.outputs().len().saturating_sub(m);
+        self.size("STATES", n);
+        self.size("OWN", n - m);
+        self.size("OUTPUTS", system.outputs().len());
+        self.size("TOLD", told);
+        self.size("ESTIMATED", told.saturating_sub(device.monitors));
+        let about = system.states().join(", ");
+        self.field("x", Type::Real, &about, system.start().to_vec());
+        let (tuned, behind) = match &observer.tuned {
+            Some(tuned) => (
+                tuned.system.outputs().len(),
+                ", then what follows from tuning",
+            ),
+            None => (0, ""),
+        };
+        let own = system.signals().len().saturating_sub(tuned);
+        let own = &system.signals()[..own];
+        let about = format!(
+            "{}; the last {m} say whether a measurement follows the model{behind}",
+            own.join(", ")
+        );
+        self.field(
+            "inputs",
+            Type::Real,
+            &about,
+            vec![0.0; system.signals().len()],
+        );
+        let arguments = arguments(system.states(), system.signals(), device);
+        let outputs = draft(
+            "What the observer reports, then what it expects of each sensor.",
+            "outputs",
+            &code(&[Part::all(system.output_tape())])?,
+            &arguments,
+            &[Target::all("y", system.outputs().len())],
+        )?;
+        self.add(&outputs);
+        let mut holds = vec![];
+        let field = match &observer.errors {
+            None => {
+                self.flow(system, &arguments)?;
+                self.integrate(n);
+                "flow"
+            }
+            Some(errors) => {
+                self.spread(errors, &arguments)?;
+                holds.push("deviations");
+                "linearised"
+            }
+        };
+        let is_declared = device.noises.iter().any(Option::is_some);
+        match &observer.errors {
+            _ if !is_declared => {}
+            Some(_) => {
+                self.credible(m, By::ErrorSystem, false);
+                holds.push("weighed");
+            }
+            None => {
+                self.followed(device.noises);
+                holds.push("judged");
+            }
+        }
+        self.tuned(device, observer.tuned.as_ref())?;
+        let follows = if observer.predict { "R(1.0)" } else { "R(0.0)" };
+        let text = chosen(SAMPLED, &holds).replace("FIELD", field);
+        self.add(&text.replace("FOLLOWS", follows));
+        Ok(())
+    }
+
+    /// The verdict by the noise of the sensors, those without one aside.
+    fn followed(&mut self, noises: &[Option<Level>]) {
+        let expected = vec![0.0; noises.len()];
+        let about = "what was expected of each sensor at the last sample";
+        self.field("expected", Type::Real, about, expected);
+        let unknown = Level::Absolute(f64::INFINITY);
+        self.noises(noises.iter().map(|noise| noise.unwrap_or(unknown)));
+        self.credible(noises.len(), By::Noise, false);
+    }
+
+    /// The covariance of an observer's error.
+    fn spread(&mut self, errors: &ErrorModel, arguments: &Arguments) -> Result<(), Refusal> {
+        let noise = errors.noise();
+        let flow = errors.flow();
+        let n = flow.states().len();
+        self.root(&noise.initial);
+        self.noises(noise.sensors.iter().copied());
+        self.size("LARGER", n);
+        let linear = Linear {
+            flow,
+            entries: errors.flow_entries(),
+            noise: &noise.process,
+            is_tuned: false,
+        };
+        self.linear(Which::Free, &linear, arguments)?;
+        self.carried(Which::Free, &linear);
+        let tape = flow.output_tape();
+        let estimates = errors.flow_entries().len();
+        let readings = estimates + errors.estimate_entries().len();
+        for (about, name, outputs, entries) in [
+            (
+                "The derivatives of the estimates by x, row by row.",
+                "estimate_slopes",
+                estimates..readings,
+                errors.estimate_entries(),
+            ),
+            (
+                "The derivatives of what is expected of the sensors by x, row by row.",
+                "reading_slopes",
+                readings..tape.outputs(),
+                errors.reading_entries(),
+            ),
+        ] {
+            let places = entries.iter().map(|(i, j)| i * n + j);
+            let target = Target {
+                name: "c",
+                places: places.collect(),
+            };
+            let code = code(&[Part { tape, outputs }])?;
+            self.add(&draft(about, name, &code, arguments, &[target])?);
+        }
+        self.add(SPREAD);
+        Ok(())
+    }
+}
+
+const JUDGE: &str = include_str!("runtime/judge.c");
+const EXTENDED: &str = include_str!("runtime/extended.c");
+const UNSCENTED: &str = include_str!("runtime/unscented.c");
+const FILTER: &str = include_str!("runtime/filter.c");
+
+impl Machine {
+    /// Nothing for an observer that is no filter.
+    fn filter(&mut self, device: &Device<'_>) -> Result<(), Refusal> {
+        let Blueprint::Filter {
+            model,
+            settings,
+            run,
+        } = device.blueprint
+        else {
+            return Ok(());
+        };
+        if run.between == BetweenSamples::Linear {
+            return Err(Refusal::LooksAhead);
+        }
+        if settings.bounds.is_some() {
+            return Err(Refusal::Projection);
+        }
+        let (states, inputs) = (model.states(), model.inputs());
+        let arguments = arguments(states, inputs, device);
+        let room = inputs.len() + device.tunables.len();
+        let room = vec![0.0; room.max(1)];
+        self.size("STATES", states.len());
+        self.field(
+            "x",
+            Type::Real,
+            &states.join(", "),
+            model.flow().start().to_vec(),
+        );
+        self.field("inputs", Type::Real, &inputs.join(", "), room);
+        self.root(model.initial_variance());
+        // also a polynomial has no value once it has run away
+        let confined = model.confined().filter(|confined| {
+            let mut bounds = confined.bounds.iter();
+            bounds.any(|b| b.low.is_finite() || b.high.is_finite())
+        });
+        let has_limits = model.sensors().iter().any(|sensor| sensor.limits.is_some());
+        let is_share = |sensor: &Sensor| matches!(sensor.noise, Level::Relative(_));
+        let is_relative = model.sensors().iter().any(is_share);
+        let facts = [
+            (confined.is_some(), "confined"),
+            (device.deviations, "deviations"),
+            (settings.gate.is_some(), "gate"),
+            (has_limits, "limits"),
+            (is_relative, "relative"),
+            (
+                settings.gate.is_some() || has_limits || is_relative,
+                "deviation",
+            ),
+        ];
+        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        self.measure(model, &arguments, &settings.kind)?;
+        let sensors = model.sensors().len();
+        self.credible(sensors, By::Filter, settings.gate.is_some());
+        self.judge(model, settings, &holds);
+        let free = Linear {
+            flow: model.flow(),
+            entries: model.flow_entries(),
+            noise: model.process_noise(),
+            is_tuned: !device.tunables.is_empty(),
+        };
+        self.tuned(device, None)?;
+        let field = self.engine(&settings.kind, &free, &arguments, &holds)?;
+        let is_extended = settings.kind == FilterKind::Extended;
+        let which_inside = Which::Inside {
+            is_shared: is_extended || free.is_noisy(),
+            is_carried: is_extended,
+        };
+        if let Some(confined) = confined {
+            let inside = Linear {
+                flow: &confined.flow,
+                entries: &confined.entries,
+                noise: model.process_noise(),
+                is_tuned: free.is_tuned,
+            };
+            self.linear(which_inside, &inside, &arguments)?;
+            self.carried(which_inside, &inside);
+            let ends = |end: fn(&lynkeus_run::filter::Bounds) -> f64| -> Vec<f64> {
+                confined.bounds.iter().map(end).collect()
+            };
+            self.tables += &table("range_from", &ends(|b| b.low));
+            self.tables += &table("range_to", &ends(|b| b.high));
+        }
+        let text = chosen(FILTER, &holds)
+            .replace("FIELD_INSIDE", "linearised_inside")
+            .replace("predict_inside", &which_inside.renamed("predict"));
+        self.add(&text.replace("FIELD", field));
+        Ok(())
+    }
+
+    /// The way from sample to sample, and the correction; the name of the flow.
+    fn engine(
+        &mut self,
+        kind: &FilterKind,
+        free: &Linear<'_>,
+        arguments: &Arguments,
+        holds: &[&str],
+    ) -> Result<&'static str, Refusal> {
+        let n = free.flow.states().len();
+        match kind {
+            FilterKind::MovingHorizon(..) => Err(Refusal::Window),
+            FilterKind::Extended => {
+                self.size("LARGER", n);
+                self.linear(Which::Free, free, arguments)?;
+                self.carried(Which::Free, free);
+                self.add(&chosen(EXTENDED, holds));
+                Ok("linearised")
+            }
+            FilterKind::Unscented(points) => {
+                self.unscented(points, free, arguments, holds)?;
+                Ok("flow")
+            }
+        }
+    }
+
+    /// h, and for the extended filter the entries of C.
+    fn measure(
+        &mut self,
+        model: &FilterModel,
+        arguments: &Arguments,
+        kind: &FilterKind,
+    ) -> Result<(), Refusal> {
+        let (n, m) = (model.dimension(), model.sensors().len());
+        refuse_jumps(model.output_map())?;
+        let tape = model.output_map().output_tape();
+        let mut targets = vec![Target::all("h", m)];
+        let mut outputs = 0..m;
+        if *kind == FilterKind::Extended {
+            let places = model.output_entries().iter().map(|(i, j)| i * n + j);
+            targets.push(Target {
+                name: "c",
+                places: places.collect(),
+            });
+            outputs = 0..tape.outputs();
+        }
+        let text = draft(
+            "What the sensors show (c: the derivatives by x, row by row).",
+            "measure",
+            &code(&[Part { tape, outputs }])?,
+            arguments,
+            &targets,
+        )?;
+        self.add(&text);
+        Ok(())
+    }
+
+    fn judge(&mut self, model: &FilterModel, settings: &FilterSettings, holds: &[&str]) {
+        let m = model.sensors().len();
+        let mut kept = |name, kind, about: &str| self.field(name, kind, about, vec![0.0; m]);
+        kept("readings", Type::Real, "of the last sample");
+        kept("became", Type::Int, "what became of each reading");
+        kept("rejected", Type::Int, "readings rejected in a row");
+        kept(
+            "moved",
+            Type::Int,
+            "of these, how many differ from the one before",
+        );
+        kept("last", Type::Real, "the reading before");
+        self.noises(model.sensors().iter().map(|s| s.noise));
+        if holds.contains(&"limits") {
+            let ends = |end: f64, pick: fn(Limits) -> f64| -> Vec<f64> {
+                let sensors = model.sensors().iter();
+                sensors.map(|s| s.limits.map_or(end, pick)).collect()
+            };
+            self.tables += &table("lowest", &ends(f64::NEG_INFINITY, |l| l.low));
+            self.tables += &table("highest", &ends(f64::INFINITY, |l| l.high));
+        }
+        let gate = number(settings.gate.unwrap_or_default());
+        let [shown, surprise] = match holds.contains(&"limits") {
+            true => [
+                "shown_of(i, reading)",
+                "end == R(0.0) ? reading - predicted : R(0.0)",
+            ],
+            false => ["reading", "reading - predicted"],
+        };
+        let text = chosen(JUDGE, holds).replace("GATE", &gate);
+        let text = text.replace("SHOWN_READING", shown);
+        self.add(&text.replace("SURPRISE", surprise));
+    }
+
+    fn unscented(
+        &mut self,
+        points: &SigmaPoints,
+        free: &Linear<'_>,
+        arguments: &Arguments,
+        about: &[&str],
+    ) -> Result<(), Refusal> {
+        let n = free.flow.states().len();
+        let has_limits = about.contains(&"limits");
+        let sensors = self.sizes.iter().find(|size| size.0 == "SENSORS");
+        self.size("LARGER", sensors.map_or(n, |size| size.1.max(n)));
+        let weights = points.weights(n).map_err(|error| Refusal::Setting {
+            error: error.to_string(),
+        })?;
+        self.size("POINTS", 2 * n + 1);
+        match free.is_noisy() {
+            true => self.linear(Which::Free, free, arguments)?,
+            false => self.add(FIELD),
+        }
+        self.flow(free.flow, arguments)?;
+        self.add(&exchanged(INTEGRATE, |word| match word {
+            "integrate" => Some("integrate_point".to_owned()),
+            "DIMENSION" => Some("STATES".to_owned()),
+            _ => None,
+        }));
+        let facts = [
+            (weights.centre >= 0.0, "definite"),
+            (free.is_noisy(), "noisy"),
+            (has_limits, "limits"),
+        ];
+        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let first = u8::from(free.is_noisy());
+        let rounds = if has_limits { "SENSORS + 1" } else { "1" };
+        let text = exchanged(&chosen(UNSCENTED, &holds), |word| {
+            Some(number(match word {
+                "FIRST" => return Some(first.to_string()),
+                "ROUNDS" => return Some(rounds.to_owned()),
+                "SPREAD" => weights.spread,
+                "WEIGHT_OF_CENTRE" => weights.centre,
+                "WEIGHT_OF_OTHERS" => weights.other,
+                "WEIGHT_OF_MEAN" => weights.mean_of_centre,
+                _ => return None,
+            }))
+        });
+        self.add(&text);
+        Ok(())
+    }
+}
+
+const CREDIBLE: &str = include_str!("runtime/credible.c");
+
+/// Readings of a block once there were that many; two blocks are judged together.
+const LONGEST_BLOCK: usize = 128;
+
+impl Machine {
+    /// What is kept of each sensor's readings, and the verdict on them.
+    fn credible(&mut self, sensors: usize, by: By, has_gate: bool) {
+        let both = || vec![0.0; 2 * sensors];
+        let about =
+            "of each sensor, in this block and in the one before: Σ z², z how many deviations off";
+        self.field("squares", Type::Real, about, both());
+        self.field("largest", Type::Real, "of these z²", both());
+        self.field("taken", Type::Int, "readings with such a z", both());
+        if has_gate {
+            let about = "readings that the gate kept out, likewise";
+            self.field("kept_out", Type::Int, about, both());
+        }
+        let about = "readings of a full block";
+        self.field("block", Type::Int, about, vec![1.0; sensors]);
+        let allowed = by.limit().powi(2);
+        // P(χ² of n degrees > n + 2√(nx) + 2x) < exp(-x) (Laurent and Massart), and 2√(nx) is n + x at most
+        let chance = 3.0 * -CHANCE.ln();
+        let facts = [
+            (has_gate, "gate"),
+            // of one reading the limit says it, too
+            (allowed < 2.0 + chance, "chance"),
+        ];
+        let holds: Vec<&str> = facts.iter().filter(|f| f.0).map(|f| f.1).collect();
+        let text = exchanged(&chosen(CREDIBLE, &holds), |word| {
+            Some(match word {
+                "MOST_OFF" => number(CLIP * CLIP),
+                "ALLOWED" => number(allowed),
+                "CHANCE" => number(chance),
+                "ENOUGH" => ENOUGH.to_string(),
+                "FEW" => FEW.to_string(),
+                "LONGEST_BLOCK" => LONGEST_BLOCK.to_string(),
+                _ => return None,
+            })
+        });
+        self.add(&text);
+    }
+}
+
+const TUNED: &str = include_str!("runtime/tuned.c");
+
+impl Machine {
+    /// The numbers with what follows from them: `gains` of an observer; the factor on its process
+    /// noise of a filter. What is made of them lies behind the known inputs, and what an observer
+    /// reads besides.
+    fn tuned(&mut self, device: &Device<'_>, gains: Option<&Tuned>) -> Result<(), Refusal> {
+        let tunables = device.tunables;
+        if tunables.is_empty() {
+            return Ok(());
+        }
+        self.size("TUNABLES", tunables.len());
+        let names: Vec<&str> = tunables.iter().map(|t| t.entry.name.as_str()).collect();
+        let starts = tunables.iter().map(|tunable| tunable.start).collect();
+        let about = format!("may be changed at any time: {}", names.join(", "));
+        self.field("tuning", Type::Real, &about, starts);
+        let holds: &[&str] = match gains {
+            None => &[],
+            Some(gains) => {
+                let count = gains.system.outputs().len();
+                self.size("TUNED", count);
+                let about = "the numbers for which the last inputs hold";
+                self.field("tuned_for", Type::Real, about, vec![0.0; tunables.len()]);
+                let arguments = Arguments {
+                    x: vec![],
+                    w: names.iter().map(|name| Entry::named(*name)).collect(),
+                };
+                let text = draft(
+                    "What the equations make of the numbers that may be changed.",
+                    "tune",
+                    &code(&[Part::all(gains.system.output_tape())])?,
+                    &arguments,
+                    &[Target::all("gains", count)],
+                )?;
+                self.add(&text);
+                &["gains"]
+            }
+        };
+        self.add(&chosen(TUNED, holds));
+        Ok(())
+    }
+}
