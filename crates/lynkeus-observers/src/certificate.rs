@@ -1,6 +1,6 @@
 //! What can be guaranteed about an observer, and why.
 
-use lynkeus_expr::{Interval, MissingInput, Spent};
+use lynkeus_expr::{Interval, MissingInput, Node, Spent};
 use lynkeus_structure::{Dimension, Extended, Measurement, Region, Side, Standing, range, short};
 use nalgebra::DMatrix;
 
@@ -27,6 +27,7 @@ pub struct Assumptions {
     within_limits: Option<Check>,
     /// of the extended states, then of the measured outputs
     names: Vec<String>,
+    time: Node,
 }
 
 impl Assumptions {
@@ -43,6 +44,7 @@ impl Assumptions {
             process_noise: vec![0.0; extended.states.len()],
             input_derivatives: extended.input_derivatives.clone(),
             within_limits: None,
+            time: extended.plant.time,
             names: extended
                 .states
                 .iter()
@@ -296,7 +298,7 @@ impl Certificate {
         assumptions: &Assumptions,
         hypotheses: Vec<Check>,
     ) -> Self {
-        let bounded = |d: &&Dimension| d.name != "time" || d.max.is_finite();
+        let bounded = |d: &&Dimension| d.symbol != assumptions.time || d.max.is_finite();
         let sides = assumptions.region.dimensions.iter().filter(bounded);
         let side = |d: &Dimension| Side {
             name: d.name.clone(),
@@ -357,6 +359,13 @@ impl Certificate {
         self
     }
 
+    /// Of a Kalman filter, of which nothing is certified.
+    pub(crate) fn of_filter(basis: impl Into<String>, assumptions: &Assumptions) -> Self {
+        let reason = "its gain depends on the run: no theorem holds on the whole box, however good it is on a log";
+        let check = undecided(Statement::FilterConverges, reason);
+        Self::new(basis, assumptions, vec![check])
+    }
+
     /// A limit ended the work: nothing is decided.
     pub(crate) fn ended(basis: impl Into<String>, assumptions: &Assumptions, spent: Spent) -> Self {
         let check = undecided(Statement::Finished, spent.to_string());
@@ -380,7 +389,3 @@ impl Certificate {
         self.hypotheses.iter().find(|check| !check.is_proved())
     }
 }
-
-/// Why nothing is certified of a filter.
-pub(crate) const NO_THEOREM: &str =
-    "its gain depends on the run: no theorem holds on the whole box, however good it is on a log";

@@ -51,6 +51,13 @@ pub(crate) struct Partial {
 }
 
 impl Partial {
+    /// The partial that a constant gain is made for: with the sign that is proved, between
+    /// its bounds in the middle of ratios.
+    pub fn nominal(&self) -> Option<f64> {
+        let middle = (self.bounds.0 * self.bounds.1).sqrt();
+        (middle > 0.0 && middle.is_finite()).then_some(self.sign * middle)
+    }
+
     /// The range, sign included.
     pub fn range(&self) -> (f64, f64) {
         let (low, high) = self.bounds;
@@ -296,13 +303,6 @@ fn listed(eigenvalues: &[(f64, f64)]) -> String {
         false => format!("{} ± {}i", short(re), short(im)),
     };
     upper.map(one).collect::<Vec<_>>().join(", ")
-}
-
-/// The partial that a constant gain is made for: with the sign that is proved, between
-/// its bounds in the middle of ratios.
-pub(crate) fn nominal(sign: f64, bounds: (f64, f64)) -> Option<f64> {
-    let middle = (bounds.0 * bounds.1).sqrt();
-    (middle > 0.0 && middle.is_finite()).then_some(sign * middle)
 }
 
 #[cfg(test)]

@@ -52,14 +52,15 @@ impl Examination {
         extended: &Extended<'_>,
         region: &Region,
         family: &'static str,
-        form: Form,
+        summary: String,
+        chains: Vec<Vec<String>>,
         checks: Vec<Check>,
     ) -> Result<Self, MissingInput> {
         let regularity = Statement::PlantIsRegular.with(extended.regularity(region)?);
         Ok(Self {
             family,
-            summary: form.summary,
-            chains: form.chains,
+            summary,
+            chains,
             checks,
             plant: PlantFit::Form(regularity),
         })
@@ -77,11 +78,11 @@ impl Examination {
     }
 
     /// Of a family that asks nothing of a plant, and promises nothing.
-    pub(crate) fn of_any_plant(family: &'static str, form: Form) -> Self {
+    pub(crate) fn of_any_plant(family: &'static str, summary: String) -> Self {
         Self {
             family,
-            summary: form.summary,
-            chains: form.chains,
+            summary,
+            chains: vec![],
             checks: vec![],
             plant: PlantFit::Any,
         }
@@ -132,14 +133,6 @@ impl Examination {
         self.conditions()
             .find(|check| check.standing() == Standing::Refuted)
     }
-}
-
-/// The form that a family found.
-pub(crate) struct Form {
-    /// the chains, in one or two sentences
-    pub summary: String,
-    /// names of the states of each chain
-    pub chains: Vec<Vec<String>>,
 }
 
 /// The constant gain on the error ŷ − y of one output: x̂' = f(x̂, u) − K (ŷ − y).

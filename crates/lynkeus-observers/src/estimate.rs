@@ -19,7 +19,7 @@ use lynkeus_expr::{Expr, Graph, Node};
 use lynkeus_model::Variable;
 use lynkeus_structure::{Extended, Measurement, Region};
 
-use crate::conditions::{Partial, nominal};
+use crate::conditions::Partial;
 use crate::tuning::is_or_has;
 use crate::{
     Estimate, Initial, KeySpec, Observer, Shape, Signal, Tunable, Tunables, Tuning, TuningError,
@@ -210,59 +210,30 @@ pub(crate) const PROLONG: KeySpec = KeySpec {
     meaning: "outside of the declared ranges the plant's functions are [prolonged](triangular.md#options) as the papers ask, so that the theorem holds for every start of the estimate",
 };
 
-/// One equation of a chain.
-pub(crate) struct Continued {
-    /// j
-    pub row: usize,
-    /// j + 1
-    pub next: usize,
-    /// of the partial ∂f_row/∂x_next
-    pub sign: f64,
-    /// (α₁, α₂) of its size
-    pub bounds: (f64, f64),
-}
-
-impl Continued {
-    /// The equations of a chain.
-    pub fn along(states: &[usize], partials: &[Partial]) -> impl Iterator<Item = Self> {
-        let rows = states.windows(2).zip(partials);
-        rows.map(|(pair, partial)| Self {
-            row: pair[0],
-            next: pair[1],
-            sign: partial.sign,
-            bounds: partial.bounds,
-        })
-    }
-}
-
-/// Adds ā (x̂_next − Px̂_next) to the equations of the chains, if the study asks for it; `copy`
+/// Adds ā (x̂_next − Px̂_next) to the equations of a chain with these partials, if the study asks for it; `copy`
 /// then evaluates everything else at Px̂.
 ///
 /// # Errors
 /// A partial without bounds.
 pub(crate) fn prolong(
     copy: &PlantCopy<'_, '_>,
-    rows: impl IntoIterator<Item = Continued>,
+    states: &[usize],
+    partials: &[Partial],
     derivatives: &mut [Node],
 ) -> Result<(), TuningError> {
     if !copy.common.prolong {
         return Ok(());
     }
     let graph = copy.extended.graph();
-    for Continued {
-        row,
-        next,
-        sign,
-        bounds,
-    } in rows
-    {
+    for (pair, partial) in states.windows(2).zip(partials) {
+        let (row, next) = (pair[0], pair[1]);
         let variable = &copy.extended.states[next];
-        let Some(slope) = nominal(sign, bounds) else {
+        let Some(slope) = partial.nominal() else {
             let expected = format!(
                 "∂f({})/∂{} with known bounds away from zero, to continue with; declare min and max",
                 copy.extended.states[row].name, variable.name
             );
-            let found = format!("bounds {} and {}", bounds.0, bounds.1);
+            let found = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
             return Err(TuningError::new(PROLONG.name, expected, found));
         };
         let hat = copy.hats[next].symbol;

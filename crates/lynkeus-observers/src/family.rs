@@ -8,18 +8,8 @@ use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
 };
 
-/// On which box the form of a theorem is sought.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FormBox {
-    /// The declared one, for its conditions choose the observer. The theorem decides its
-    /// hypotheses on the box of its assumptions, whatever the form's conditions said.
-    Declared,
-    /// That of the assumptions: a refuted condition ends the proof.
-    Assumed,
-}
-
 /// A published observer design, stage by stage.
-pub trait Stages: Sync {
+pub(crate) trait Stages: Sync {
     /// the keys, read
     type Settings;
     /// the canonical form in a plant
@@ -30,8 +20,10 @@ pub trait Stages: Sync {
     const PAPER: &'static str;
     /// the theorem, in words
     const BASIS: &'static str;
-    /// on which box the theorem's form is sought
-    const FORM_BOX: FormBox;
+    /// Whether the theorem's form is sought on the box of the assumptions, where a refuted condition
+    /// ends the proof. Else it is sought on the declared one, for its conditions choose the observer:
+    /// the theorem decides its hypotheses on the box of its assumptions, whatever they said.
+    const FORM_ON_ASSUMED_BOX: bool = false;
     /// its keys, in groups
     const KEYS: &'static [&'static [KeySpec]];
     /// how the entries of `theta` stand to one another where it has to be a list
@@ -157,16 +149,15 @@ fn theorem<S: Stages>(
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let settings = S::read(extended, tuning)?;
-    let (region, ends) = match S::FORM_BOX {
-        FormBox::Declared => (extended.region(), false),
-        FormBox::Assumed => (assumptions.region.clone(), true),
+    let region = match S::FORM_ON_ASSUMED_BOX {
+        true => assumptions.region.clone(),
+        false => extended.region(),
     };
+    let refuted = |found: &Found<_>| found.examination.fit() == Standing::Refuted;
     match lasting(extended, || S::form(extended, &settings, &region))? {
-        Ok(found) if !(ends && found.examination.fit() == Standing::Refuted) => {
-            lasting(extended, || {
-                S::theorem(extended, &settings, found, assumptions)
-            })
-        }
+        Ok(found) if !(S::FORM_ON_ASSUMED_BOX && refuted(&found)) => lasting(extended, || {
+            S::theorem(extended, &settings, found, assumptions)
+        }),
         Ok(Found { examination, .. }) | Err(examination) if examination.refuted().is_some() => {
             Ok(Certificate::new(S::BASIS, assumptions, examination.checks))
         }

@@ -17,11 +17,9 @@ use lynkeus_model::Variable;
 use lynkeus_run::filter::{Bounds, FilterKind, SigmaPoints};
 use lynkeus_structure::{Extended, Region, Standing};
 
-use crate::certificate::NO_THEOREM;
-use crate::design::{Form, Found, Searched};
+use crate::design::{Found, Searched};
 use crate::estimate::{Common, PlantCopy, Speed, limited};
-use crate::family::{FormBox, Stages};
-use crate::statement::undecided;
+use crate::family::Stages;
 use crate::tuning::is_or_has;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, FilterTuning, KeySpec, Shape,
@@ -115,7 +113,6 @@ impl<K: Kalman> Stages for K {
     const NAME: &'static str = K::NAME;
     const PAPER: &'static str = K::PAPER;
     const BASIS: &'static str = "no theorem";
-    const FORM_BOX: FormBox = FormBox::Declared;
     const IS_FILTER: bool = true;
     const KEYS: &'static [&'static [KeySpec]] = K::KEYS;
 
@@ -136,11 +133,7 @@ impl<K: Kalman> Stages for K {
             "the {} runs on any plant; no theorem bounds its error{jumps}",
             K::WORDS
         );
-        let form = Form {
-            summary,
-            chains: vec![],
-        };
-        let examination = Examination::of_any_plant(K::NAME, form);
+        let examination = Examination::of_any_plant(K::NAME, summary);
         Ok(Ok(Found {
             form: (),
             examination,
@@ -169,13 +162,17 @@ impl<K: Kalman> Stages for K {
             bounds: settings.projects.then(|| ranges(extended)),
             outputs: copy.at_estimate(&outputs),
             confined,
-            initial_variance: variance.iter().map(|v| v.value).collect(),
+            initial_variance: variance.clone(),
         });
-        let parameters = variance.iter().zip(&extended.states).map(|(v, state)| {
-            let from = if v.given { "" } else { " (from its range)" };
+        let given = settings.variance.iter().zip(&extended.states);
+        let parameters = variance.iter().zip(given).map(|(value, (given, state))| {
+            let from = match given {
+                Some(_) => "",
+                None => " (from its range)",
+            };
             (
                 format!("initial variance of {}", state.name),
-                format!("{}{from}", v.value),
+                format!("{value}{from}"),
             )
         });
         Ok(Design {
@@ -193,8 +190,7 @@ impl<K: Kalman> Stages for K {
         _: Found<()>,
         assumptions: &Assumptions,
     ) -> Result<Certificate, DesignError> {
-        let check = undecided(Statement::FilterConverges, NO_THEOREM);
-        Ok(Certificate::new(Self::BASIS, assumptions, vec![check]))
+        Ok(Certificate::of_filter(Self::BASIS, assumptions))
     }
 }
 
@@ -274,13 +270,6 @@ pub(crate) struct Settings {
     variance: Vec<Option<f64>>,
 }
 
-/// A variance of the first estimate.
-pub(crate) struct Variance {
-    pub value: f64,
-    /// by the study
-    pub given: bool,
-}
-
 impl Settings {
     pub fn read(
         extended: &Extended<'_>,
@@ -291,18 +280,17 @@ impl Settings {
             common: Common::read(tuning)?,
             kind,
             gate: tuning.positive(GATE.name)?,
-            projects: tuning.choice(BOUNDS[0].name, &["project"])?.is_some(),
+            projects: tuning.meant(&BOUNDS[0], [true])?.is_some(),
             variance: variances(extended, tuning)?,
         })
     }
 
     /// The variances given, and those that follow from the declared ranges.
-    pub fn variances(&self, extended: &Extended<'_>, starts: &[(Signal, f64)]) -> Vec<Variance> {
+    fn variances(&self, extended: &Extended<'_>, starts: &[(Signal, f64)]) -> Vec<f64> {
         let states = extended.states.iter().zip(starts).zip(&self.variance);
         states
-            .map(|((state, (_, start)), given)| Variance {
-                value: given.unwrap_or_else(|| prior_variance(state, *start)),
-                given: given.is_some(),
+            .map(|((state, (_, start)), given)| {
+                given.unwrap_or_else(|| prior_variance(state, *start))
             })
             .collect()
     }

@@ -71,12 +71,13 @@ pub(crate) fn magnitude(graph: &Graph, node: Node, region: &Region) -> Result<f6
 }
 
 /// Variables of the expressions that have no declared end.
-pub(crate) fn undeclared(graph: &Graph, nodes: &[Node], region: &Region) -> Vec<String> {
-    let used = region.restricted(&graph.symbols_of(nodes));
+pub(crate) fn undeclared(extended: &Extended<'_>, nodes: &[Node], region: &Region) -> Vec<String> {
+    let used = region.restricted(&extended.graph().symbols_of(nodes));
+    let time = extended.plant.time;
     let open = used
         .dimensions
         .into_iter()
-        .filter(|d| d.name != "time" && !(d.min.is_finite() && d.max.is_finite()));
+        .filter(|d| d.symbol != time && !(d.min.is_finite() && d.max.is_finite()));
     open.map(|d| d.name).collect()
 }
 
@@ -107,7 +108,7 @@ fn check(extended: &Extended<'_>, region: &Region, found: &[Slope], open: &[Open
         &extended.states[first.column].name,
     );
     let shown = first.node.map_or_else(String::new, |n| graph.render(n, 60));
-    let missing = undeclared(graph, &nodes, region);
+    let missing = undeclared(extended, &nodes, region);
     let detail = match (first.jumps, missing.is_empty()) {
         (true, _) => {
             format!("f({f}) switches with {shown}, so no Lipschitz constant is known for it")
@@ -238,6 +239,7 @@ const CELLS: usize = 600;
 /// A box with what was found to be unbounded on it.
 pub(crate) struct Enclosure<'g> {
     graph: &'g Graph,
+    time: Node,
     region: Region,
     open: RefCell<BTreeSet<String>>,
     /// largest absolute values, found once for every part that expressions share
@@ -245,9 +247,10 @@ pub(crate) struct Enclosure<'g> {
 }
 
 impl<'g> Enclosure<'g> {
-    pub fn new(graph: &'g Graph, region: &Region) -> Self {
+    pub fn new(extended: &Extended<'g>, region: &Region) -> Self {
         Self {
-            graph,
+            graph: extended.graph(),
+            time: extended.plant.time,
             region: region.clone(),
             open: RefCell::default(),
             sizes: RefCell::default(),
@@ -369,7 +372,7 @@ impl<'g> Enclosure<'g> {
 
     fn note(&self, node: Node) {
         let used = self.region.restricted(&self.graph.symbols_of(&[node]));
-        let sides = used.dimensions.iter().filter(|d| d.name != "time");
+        let sides = used.dimensions.iter().filter(|d| d.symbol != self.time);
         let open = sides.filter(|d| !(d.min.is_finite() && d.max.is_finite()));
         let names: Vec<String> = open.map(|d| d.name.clone()).collect();
         let mut noted = self.open.borrow_mut();

@@ -204,6 +204,20 @@ impl Tuning {
         }
     }
 
+    /// What the word under a key stands for; `meanings` are those of its allowed words, in their order.
+    pub(crate) fn meant<T, const N: usize>(
+        &self,
+        key: &KeySpec,
+        meanings: [T; N],
+    ) -> Result<Option<T>, TuningError> {
+        let Shape::Word(words) = key.shape else {
+            return Ok(None);
+        };
+        let found = self.choice(key.name, words)?;
+        let place = found.and_then(|found| words.iter().position(|word| *word == found));
+        Ok(place.and_then(|place| meanings.into_iter().nth(place)))
+    }
+
     /// Lists of names.
     ///
     /// # Errors

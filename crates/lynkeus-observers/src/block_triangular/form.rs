@@ -16,7 +16,7 @@ use super::settings::{Correction, Settings};
 use crate::conditions::{GainedChain, Partial, lipschitz, names, output_slope, partials, told};
 use crate::design::{Found, Searched};
 use crate::statement::{proved, refuted, undecided};
-use crate::{Check, DesignError, Examination, Lee, TuningError, design};
+use crate::{Check, DesignError, Examination, Lee, TuningError};
 
 pub(super) const NAME: &str = "block-triangular";
 
@@ -143,8 +143,7 @@ fn examined(
             &format!("; one of {orders} orders of these chains, the key 'order' decides otherwise");
     }
     let chains = blocks.names(extended);
-    let found = design::Form { summary, chains };
-    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
     let form = Form {
         blocks,
         partials: all,

@@ -23,7 +23,7 @@ mod transformed;
 use lynkeus_structure::{Extended, Region};
 
 use crate::design::{Found, Searched};
-use crate::family::{FormBox, Stages};
+use crate::family::Stages;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Tuning, TuningError,
     guarantee,
@@ -43,7 +43,6 @@ impl Stages for BlockTriangular {
     const NAME: &'static str = NAME;
     const PAPER: &'static str = "Lee, Yee, Park 2000, observers (3) and (7)";
     const BASIS: &'static str = BASIS;
-    const FORM_BOX: FormBox = FormBox::Declared;
     const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {

@@ -8,12 +8,12 @@ use lynkeus_structure::{Blocks, Chain, Extended};
 
 use super::form::{Form, NAME, chain_rule};
 use super::settings::{Correction, Settings};
-use crate::conditions::{Partial, nominal};
+use crate::conditions::Partial;
 use crate::design::Found;
-use crate::estimate::{Continued, PlantCopy, Speed, prolong};
-use crate::peaking::{Part, Remedies, Run, Transient, factor_rows, variation};
+use crate::estimate::{PlantCopy, Speed, prolong};
+use crate::peaking::{self, Part, Run, Transient, factor_rows, variation};
 use crate::printed::AtStart;
-use crate::{Design, DesignError, TuningError, estimate, peaking, printed};
+use crate::{Design, DesignError, TuningError, estimate, printed};
 
 /// Why there is no such form of the default observer.
 pub(super) const ONLY_CLASSICAL: &str =
@@ -28,9 +28,8 @@ pub(super) fn observer(
     let graph = extended.graph();
     let copy = PlantCopy::new(extended, &settings.common);
     let blocks = &form.blocks;
-    let Remedies {
-        limit, transient, ..
-    } = &settings.remedies;
+    let remedies = &settings.remedies;
+    let transient = &remedies.transient;
     let (θ, K) = (settings.θ()?, settings.K(&blocks.lengths()));
     let correction = settings.correction;
     let start = AtStart::new(&copy)?;
@@ -44,7 +43,7 @@ pub(super) fn observer(
     let speeds = Speed::of_chains(&copy, &θ);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
         let injected = injected(&copy, blocks, place);
-        let Some(innovation) = limit.innovation(&copy, *output) else {
+        let Some(innovation) = remedies.innovation(&copy, *output) else {
             continue;
         };
         let power = |(j, k): (usize, &f64)| (θ[*output].powi(j as i32 + 1) * k, (j + 1) as f64);
@@ -75,7 +74,7 @@ pub(super) fn observer(
             output: *output,
             states: &chain.states,
             factors: &gain,
-            limited: limit.is_set(),
+            limited: remedies.limit.is_some(),
         };
         match printed.constant(extended) {
             Some(constant) => gains.push(constant),
@@ -92,7 +91,9 @@ pub(super) fn observer(
             }
         }
     }
-    prolong(&copy, continued(&form), &mut derivatives)?;
+    for ((_, chain), partials) in blocks.order.iter().zip(&form.partials) {
+        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+    }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         notes: chain_rule(blocks, &θ).into_iter().collect(),
@@ -100,12 +101,6 @@ pub(super) fn observer(
         gains,
         parameters,
     })
-}
-
-/// The equations of the chains, for their prolongation.
-fn continued(form: &Form) -> impl Iterator<Item = Continued> {
-    let blocks = form.blocks.order.iter().zip(&form.partials);
-    blocks.flat_map(|((_, chain), partials)| Continued::along(&chain.states, partials))
 }
 
 /// y_{i+1}, …, y_p in place of the states they show.
@@ -136,7 +131,7 @@ pub(super) fn assemble(
     let speeds = Speed::of_chains(&copy, &θ);
     let (mut notes, mut factors) = (vec![], vec![]);
     for (place, (output, chain)) in blocks.order.iter().enumerate() {
-        let Some(innovation) = remedies.limit.innovation(&copy, *output) else {
+        let Some(innovation) = remedies.innovation(&copy, *output) else {
             continue;
         };
         let derivative = |&state: &usize| extended.derivatives[state];
@@ -146,14 +141,14 @@ pub(super) fn assemble(
         notes.extend(variation(
             output_name,
             &bounds(found),
-            &coefficients.K[*output],
+            &coefficients[*output],
         ));
         let added = run.add(&Part {
             states: &chain.states,
             f: &graph.substitute(&f, &injected(&copy, blocks, place)),
             divisors: &divisors(extended, found)?,
             innovation,
-            K: &coefficients.K[*output],
+            K: &coefficients[*output],
             θ: &speeds[*output],
             δ: 1.0,
             number: *output,
@@ -163,7 +158,7 @@ pub(super) fn assemble(
     let text: Vec<String> = θ.iter().map(f64::to_string).collect();
     let mut parameters = vec![("θ".to_owned(), text.join(", "))];
     parameters.extend(transient.map(Transient::parameter));
-    parameters.extend(coefficients.parameters());
+    parameters.extend(peaking::parameters(&coefficients));
     parameters.extend(factors);
     notes.extend(chain_rule(blocks, &θ));
     Ok(Design {
@@ -179,7 +174,7 @@ pub(super) fn assemble(
 fn divisors(extended: &Extended<'_>, partials: &[Partial]) -> Result<Vec<Node>, DesignError> {
     let mut found = vec![];
     for partial in partials {
-        let Some(middle) = nominal(partial.sign, partial.bounds) else {
+        let Some(middle) = partial.nominal() else {
             let expected = "partial derivatives with known positive bounds for form = \"low-power\"; declare min and max in the model";
             let bounds = format!("bounds {} and {}", partial.bounds.0, partial.bounds.1);
             return Err(TuningError::new("form", expected, bounds).into());

@@ -94,13 +94,7 @@ impl Settings {
     pub fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Self, TuningError> {
         let count = extended.outputs.len();
         let remedies = Remedies::read(tuning, count, &[GIVEN, POLES])?;
-        let correction = match tuning
-            .choice(CORRECTION.name, &["lee", "classical"])?
-            .as_deref()
-        {
-            Some("classical") => Correction::Classical,
-            _ => Correction::Lee,
-        };
+        let correction = tuning.meant(&CORRECTION, [Correction::Lee, Correction::Classical])?;
         let K = coefficients(tuning)?;
         let lengths = K.as_ref().map(|k| k.iter().map(Vec::len).collect());
         Ok(Self {
@@ -108,10 +102,10 @@ impl Settings {
             θ: tuning.positive_per_chain(THETA.name, count),
             K,
             given: tuning.values.contains_key(GIVEN.name),
-            correction,
+            correction: correction.unwrap_or(Correction::Lee),
             request: chain_request(extended, tuning, GIVEN.name, lengths)?,
             order: order(extended, tuning)?,
-            lmi: Lmi::read(tuning, &[]),
+            lmi: (tuning.meant(&GAIN, [true])).and_then(|asked| Lmi::read(tuning, asked.is_some())),
             remedies,
         })
     }

@@ -19,7 +19,7 @@ use super::settings::{Correction, Settings};
 use super::transformed::{Plant, Similar, Table, Term};
 use crate::conditions::{GainedChain, Partial, names, output_slope, partials};
 use crate::estimate::{Common, box_note};
-use crate::peaking::Departure;
+use crate::peaking::departure;
 use crate::statement::{proved, standing, undecided};
 use crate::theorem::{conclude, slopes, state_noise};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Lee, estimate};
@@ -33,8 +33,7 @@ pub(super) fn certificate(
     assumptions: &Assumptions,
 ) -> Result<Certificate, DesignError> {
     let lmi = settings.lmi.clone()?;
-    if let Some(departure) = Departure::of(lmi.as_ref(), &settings.remedies) {
-        let check = departure.check(Lee::Observer);
+    if let Some(check) = departure(Lee::Observer, lmi.as_ref(), &settings.remedies) {
         return Ok(Certificate::new(BASIS, assumptions, vec![check]));
     }
     let order: Vec<usize> = blocks.order.iter().map(|(output, _)| *output).collect();

@@ -13,7 +13,7 @@ use super::settings::{Settings, Variant};
 use crate::conditions::{lasts, lipschitz, names};
 use crate::design::Found;
 use crate::statement::{sufficient, undecided};
-use crate::{Check, DesignError, Examination, Germani, Statement, design};
+use crate::{Check, DesignError, Examination, Germani, Statement};
 
 pub(super) const NAME: &str = "drift-observable";
 
@@ -180,11 +180,9 @@ impl Form {
             },
         };
         let every: Vec<usize> = (0..extended.states.len()).collect();
-        let found = design::Form {
-            summary: summary(extended, variant, &rows, &U),
-            chains: vec![names(extended, &every)],
-        };
-        let examination = Examination::new(extended, region, NAME, found, checks.all())?;
+        let summary = summary(extended, variant, &rows, &U);
+        let chains = vec![names(extended, &every)];
+        let examination = Examination::new(extended, region, NAME, summary, chains, checks.all())?;
         let next = map.slopes.iter().zip(&U);
         let form = Self {
             variant,

@@ -51,13 +51,14 @@ pub(super) fn form(
         map: &map,
         region: declared(extended, region),
         rows,
+        others: vec![],
     };
     let found = search.best(&first, &lengths)?;
     let mut chosen = match search.region == *region {
-        true => found.form,
-        false => Form::new(extended, &map, found.form.form.indices, region)?,
+        true => found,
+        false => Form::new(extended, &map, found.form.indices, region)?,
     };
-    chosen.examination.summary += &told(&chosen.form.indices, &found.others);
+    chosen.examination.summary += &told(&chosen.form.indices, &search.others);
     Ok(Ok(chosen))
 }
 
@@ -90,21 +91,22 @@ enum Known {
     Open,
 }
 
-struct Chosen {
-    form: Found<Form>,
-    others: Vec<Other>,
-}
-
 struct Search<'a, 'p> {
     extended: &'a Extended<'p>,
     map: &'a Map<'a>,
     region: Region,
     rows: Codistribution,
+    /// those that were not chosen
+    others: Vec<Other>,
 }
 
 impl Search<'_, '_> {
     /// The first of the candidates with which most is proved.
-    fn best(&mut self, first: &[usize], lengths: &[Option<usize>]) -> Result<Chosen, DesignError> {
+    fn best(
+        &mut self,
+        first: &[usize],
+        lengths: &[Option<usize>],
+    ) -> Result<Found<Form>, DesignError> {
         let mut candidates = vec![first.to_vec()];
         if first.len() > 1 {
             candidates.extend(self.rows.alternatives(first));
@@ -123,7 +125,6 @@ impl Search<'_, '_> {
             return Err(TuningError::new(POLES.name, expected, found).into());
         };
         let mut form = self.examined(first)?;
-        let mut others = vec![];
         let mut examined = 0;
         for indices in rest {
             let open = form.examination.fit() != Standing::Proved && examined < EXAMINED;
@@ -138,19 +139,19 @@ impl Search<'_, '_> {
                         false => (form, next),
                     };
                     form = kept;
-                    others.push(Other {
+                    self.others.push(Other {
                         indices: left.form.indices,
                         known: Known::Examined(left.examination.fit()),
                     });
                     continue;
                 }
             };
-            others.push(Other {
+            self.others.push(Other {
                 indices: indices.clone(),
                 known,
             });
         }
-        Ok(Chosen { form, others })
+        Ok(form)
     }
 
     fn examined(&self, indices: &[usize]) -> Result<Found<Form>, DesignError> {

@@ -63,7 +63,7 @@ pub(super) fn bounds(
     region: &Region,
 ) -> Result<Lipschitz, DesignError> {
     let graph = extended.graph();
-    let mut box_ = Enclosure::new(graph, region);
+    let mut box_ = Enclosure::new(extended, region);
     let U = further(extended, form, slopes, &mut box_);
     let n = form.rows.len();
     let of_rows = |rows: &output_map::Rows, columns: usize| {

@@ -26,7 +26,7 @@ mod theorem;
 use lynkeus_structure::{Extended, Region};
 
 use crate::design::{Found, Searched};
-use crate::family::{FormBox, Stages};
+use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::{Form, NAME};
 use settings::Settings;
@@ -43,7 +43,7 @@ impl Stages for DriftObservable {
     const NAME: &'static str = NAME;
     const PAPER: &'static str = PAPER;
     const BASIS: &'static str = PAPER;
-    const FORM_BOX: FormBox = FormBox::Assumed;
+    const FORM_ON_ASSUMED_BOX: bool = true;
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {

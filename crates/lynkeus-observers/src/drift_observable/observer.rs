@@ -44,12 +44,7 @@ pub(super) fn design(
     let seen = filters.seen();
     // the plant and its map at x̂, and at x̂_a where (4.22) has it
     let at = |expressions: &[Node]| graph.substitute(&copy.at_estimate(expressions), &seen);
-    let K = Corrections {
-        gains: &gains,
-        speed: &speed,
-        filters: &filters,
-    };
-    let right = innovations(extended, &copy, &form, &K, &at);
+    let right = innovations(&copy, &form, &gains, &speed, &filters, &at);
     let Q = numbers(graph, &form.Q, &at);
     let solution = solve(extended, &Q, &right);
     let f = at(&extended.derivatives);
@@ -178,25 +173,16 @@ impl Filters {
     }
 }
 
-/// What the innovations are multiplied with.
-struct Corrections<'a> {
-    gains: &'a Gains,
-    speed: &'a Speed,
-    filters: &'a Filters,
-}
-
 /// K(y − h(x̂)) and, for (4.22), − Q̄_a K₂(u − C x̂_a).
 fn innovations(
-    extended: &Extended<'_>,
     copy: &PlantCopy<'_, '_>,
     form: &Form,
-    Corrections {
-        gains,
-        speed,
-        filters,
-    }: &Corrections<'_>,
+    gains: &Gains,
+    speed: &Speed,
+    filters: &Filters,
     at: &dyn Fn(&[Node]) -> Vec<Node>,
 ) -> Vec<Node> {
+    let extended = copy.extended;
     let graph = extended.graph();
     let y = &copy.measured;
     let x̂: HashMap<Node, Node> = extended

@@ -127,7 +127,7 @@ impl Settings {
         let poles = value(POLES);
         Ok(Self {
             common: Common::read(tuning)?,
-            variant: Variant::read(tuning, VARIANT.name)?,
+            variant: tuning.meant(&VARIANT, Variant::ALL)?,
             asked: indices(extended, tuning, poles.as_ref())?,
             poles,
             α: tuning.positive(ALPHA.name)?,
@@ -277,13 +277,6 @@ impl Variant {
             1 => Self::Theoretical,
             _ => Self::Practical,
         }
-    }
-
-    /// The one that stands under a key.
-    pub fn read(tuning: &Tuning, key: &str) -> Result<Option<Self>, TuningError> {
-        let words = Self::ALL.map(Self::word);
-        let word = tuning.choice(key, &words)?;
-        Ok(word.and_then(|word| Self::ALL.into_iter().find(|v| v.word() == word)))
     }
 }
 

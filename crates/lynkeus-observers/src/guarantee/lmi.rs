@@ -64,14 +64,11 @@ pub struct Lmi {
 }
 
 impl Lmi {
-    /// None where the key `gain` does not ask for it; `others` are the family's own words
-    /// for that key.
+    /// None where the key `gain` does not ask for it.
     ///
     /// # Errors
-    /// Another word, or keys of this gain without it.
-    pub fn read(tuning: &Tuning, others: &[&str]) -> Result<Option<Self>, TuningError> {
-        let words: Vec<&str> = others.iter().copied().chain(["lmi"]).collect();
-        let asked = tuning.choice("gain", &words)?.as_deref() == Some("lmi");
+    /// Wrong values, or keys of this gain where it is not asked for.
+    pub fn read(tuning: &Tuning, asked: bool) -> Result<Option<Self>, TuningError> {
         let given = |key: &&KeySpec| tuning.values.contains_key(key.name);
         match (asked, LMI_KEYS.iter().find(given)) {
             (false, Some(key)) => {
@@ -99,7 +96,7 @@ pub(crate) fn design_lmi(
 ) -> Result<Design, DesignError> {
     estimate::refuse(common, "gain = \"lmi\"")?;
     let copy = PlantCopy::new(extended, common);
-    let Shown { measured, slopes } = shown(extended, &copy)?;
+    let (measured, slopes) = shown(extended, &copy)?;
     let system = ErrorSystem::open_loop(extended, &extended.region())?;
     if let Some((slope, open)) = system.slopes.unbounded(&system.region) {
         let cure = match open.is_empty() {
@@ -136,15 +133,12 @@ pub(crate) fn design_lmi(
     assemble(extended, &copy, family, examination, &request, &gain)
 }
 
-/// What the outputs show, one entry each.
-struct Shown {
-    /// the state
-    measured: Vec<usize>,
-    /// |c| of y = c·x + d; the smallest on the box where it varies
-    slopes: Vec<f64>,
-}
-
-fn shown(extended: &Extended<'_>, copy: &PlantCopy<'_, '_>) -> Result<Shown, DesignError> {
+/// Of each output the state that it shows, and |c| of y = c·x + d: the smallest on the box where it
+/// varies.
+fn shown(
+    extended: &Extended<'_>,
+    copy: &PlantCopy<'_, '_>,
+) -> Result<(Vec<usize>, Vec<f64>), DesignError> {
     let (mut measured, mut slopes) = (vec![], vec![]);
     for (i, output) in extended.outputs.iter().enumerate() {
         let wrong = |expected: &str| {
@@ -161,7 +155,7 @@ fn shown(extended: &Extended<'_>, copy: &PlantCopy<'_, '_>) -> Result<Shown, Des
         measured.push(state);
         slopes.push(c);
     }
-    Ok(Shown { measured, slopes })
+    Ok((measured, slopes))
 }
 
 /// The smallest |c| on the box of an output y = c·x + d; 0 where it is none.

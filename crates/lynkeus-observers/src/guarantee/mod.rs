@@ -38,11 +38,8 @@ use lynkeus_proof::{decay, spectrum};
 use lynkeus_structure::{Extended, Standing, short};
 use nalgebra::DMatrix;
 
-use crate::certificate::NO_THEOREM;
 use crate::statement::{proved, undecided};
-use crate::{
-    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer, Statement,
-};
+use crate::{Assumptions, Bounds, Certificate, Check, Constant, DesignError, Inequality, Observer};
 use error_system::ErrorSystem;
 use refute::Sample;
 
@@ -72,8 +69,7 @@ pub fn certify(
     claim: Claim,
 ) -> Result<Certificate, DesignError> {
     if observer.filter.is_some() {
-        let check = undecided(Statement::FilterConverges, NO_THEOREM);
-        return Ok(Certificate::new(BASIS, assumptions, vec![check]));
+        return Ok(Certificate::of_filter(BASIS, assumptions));
     }
     let graph = extended.graph();
     let certified = graph.budgeted(graph.budget().part(1.0), || {

@@ -47,59 +47,52 @@ pub(super) const GIVEN: KeySpec = KeySpec {
     meaning: "with `form = \"low-power\"`: its coefficients",
 };
 
-/// K_1, …, K_{n−1} of each chain.
-pub struct LowPower {
-    pub K: Vec<Coefficients>,
+/// K_1, …, K_{n−1} of each chain: given, or by the eigenvalues of M, which are all −1 if nothing
+/// is given.
+pub(super) fn coefficients(
+    given: Option<&Value>,
+    poles: Option<&Value>,
+    lengths: &[usize],
+) -> Result<Vec<Coefficients>, TuningError> {
+    match (given, poles) {
+        (Some(_), Some(_)) => {
+            let expected = format!(
+                "{} or {}, which both decide the coefficients",
+                GIVEN.name, POLES.name
+            );
+            Err(TuningError::new(POLES.name, expected, "both"))
+        }
+        (Some(given), None) => explicit(given, lengths),
+        (None, Some(poles)) => placed(poles, lengths),
+        (None, None) => Ok(lengths.iter().map(|n| low_power::at_one(n - 1)).collect()),
+    }
 }
 
-impl LowPower {
-    /// Given, or by the eigenvalues of M, which are all −1 if nothing is given.
-    pub fn of(
-        given: Option<&Value>,
-        poles: Option<&Value>,
-        lengths: &[usize],
-    ) -> Result<Self, TuningError> {
-        let K = match (given, poles) {
-            (Some(_), Some(_)) => {
-                let expected = format!(
-                    "{} or {}, which both decide the coefficients",
-                    GIVEN.name, POLES.name
-                );
-                return Err(TuningError::new(POLES.name, expected, "both"));
-            }
-            (Some(given), None) => explicit(given, lengths)?,
-            (None, Some(poles)) => placed(poles, lengths)?,
-            (None, None) => lengths.iter().map(|n| low_power::at_one(n - 1)).collect(),
-        };
-        Ok(Self { K })
+/// Refuses given coefficients or poles that no chain could have.
+pub(super) fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
+    if let Some(poles) = tuning.values.get(POLES.name) {
+        let chains = chains(POLES.name, poles)?;
+        chains
+            .iter()
+            .try_for_each(|chain| negative(chain, poles).map(drop))?;
     }
+    if let Some(given) = tuning.values.get(GIVEN.name) {
+        let chains = chains(GIVEN.name, given)?;
+        chains
+            .iter()
+            .try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
+    }
+    Ok(())
+}
 
-    /// Refuses given coefficients or poles that no chain could have.
-    pub fn refuse_unstable(tuning: &Tuning) -> Result<(), TuningError> {
-        if let Some(poles) = tuning.values.get(POLES.name) {
-            let chains = chains(POLES.name, poles)?;
-            chains
-                .iter()
-                .try_for_each(|chain| negative(chain, poles).map(drop))?;
-        }
-        if let Some(given) = tuning.values.get(GIVEN.name) {
-            let chains = chains(GIVEN.name, given)?;
-            chains
-                .iter()
-                .try_for_each(|chain| stable_pairs(chain, given).map(drop))?;
-        }
-        Ok(())
-    }
-
-    /// For the reader.
-    pub fn parameters(&self) -> Vec<(String, String)> {
-        let pair = |k: &[f64; 2]| format!("({}, {})", k[0], k[1]);
-        let row = |(i, K): (usize, &Coefficients)| {
-            let K: Vec<String> = K.iter().map(pair).collect();
-            (format!("K of chain {}", i + 1), K.join(", "))
-        };
-        self.K.iter().enumerate().map(row).collect()
-    }
+/// The coefficients of each chain, for the reader.
+pub(crate) fn parameters(coefficients: &[Coefficients]) -> Vec<(String, String)> {
+    let pair = |k: &[f64; 2]| format!("({}, {})", k[0], k[1]);
+    let row = |(i, K): (usize, &Coefficients)| {
+        let K: Vec<String> = K.iter().map(pair).collect();
+        (format!("K of chain {}", i + 1), K.join(", "))
+    };
+    coefficients.iter().enumerate().map(row).collect()
 }
 
 /// What the lists under the two keys hold, in words.

@@ -23,7 +23,7 @@ use lynkeus_structure::{Extended, Region, Standing, Superdiagonal, superdiagonal
 
 use crate::conditions::{lipschitz, names};
 use crate::design::{Found, Searched};
-use crate::family::{FormBox, Stages};
+use crate::family::Stages;
 use crate::statement::standing;
 use crate::{
     Assumptions, Certificate, Design, DesignError, Examination, KeySpec, Ltaief, Statement, Tuning,
@@ -43,7 +43,6 @@ impl Stages for StateAffine {
     const NAME: &'static str = NAME;
     const PAPER: &'static str = "Ltaief, Maatoug, Farza, Ménard, M'Saad, Koubaa, observer (7)–(8)";
     const BASIS: &'static str = BASIS;
-    const FORM_BOX: FormBox = FormBox::Declared;
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {
@@ -102,10 +101,6 @@ pub(crate) fn form(extended: &Extended<'_>, region: &Region) -> Searched<Superdi
         summary += "; which inputs suffice depends on their excitation (A4), which the monitor 'excitation' watches";
     }
     let chains = form.declared().map(|block| names(extended, &block));
-    let found = crate::design::Form {
-        summary,
-        chains: chains.collect(),
-    };
-    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let examination = Examination::new(extended, region, NAME, summary, chains.collect(), checks)?;
     Ok(Ok(Found { form, examination }))
 }

@@ -188,7 +188,7 @@ impl Study<'_> {
         let check = match open.first() {
             None => proved(name, "every entry enclosed"),
             Some(&node) => {
-                let missing = undeclared(graph, &open, self.region());
+                let missing = undeclared(self.extended, &open, self.region());
                 let advice = match missing.is_empty() {
                     true => "mind divisions and roots at the edges of the box".to_owned(),
                     false => format!("declare min and max of {}", missing.join(", ")),

@@ -12,7 +12,7 @@ use super::settings::Settings;
 use crate::conditions::{GainedChain, lipschitz, names, output_slope, partials, told};
 use crate::design::{Found, Searched};
 use crate::statement::undecided;
-use crate::{DesignError, Examination, Hammouri, TuningError, design};
+use crate::{DesignError, Examination, Hammouri, TuningError};
 
 /// The first assignment whose conditions are proved, else the first that no condition
 /// refutes, else the first with its refusal; or the examination that says why there is none.
@@ -110,8 +110,7 @@ fn examined(
             "; {which} can lead in Theorem 2, that of {leading} does, the key 'leading' decides otherwise"
         );
     }
-    let found = design::Form { summary, chains };
-    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
     let form = Form {
         assignment,
         partials: all,

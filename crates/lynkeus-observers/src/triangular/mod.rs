@@ -18,7 +18,7 @@ mod theorem;
 use lynkeus_structure::{Extended, Region};
 
 use crate::design::{Found, Searched};
-use crate::family::{FormBox, Stages};
+use crate::family::Stages;
 use crate::{
     Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError, guarantee,
 };
@@ -37,7 +37,6 @@ impl Stages for Triangular {
     const NAME: &'static str = NAME;
     const PAPER: &'static str = "Hammouri, Targui, Armanet 2002, doi:10.1002/rnc.638";
     const BASIS: &'static str = BASIS;
-    const FORM_BOX: FormBox = FormBox::Declared;
     const KEYS: &'static [&'static [KeySpec]] = settings::KEYS;
 
     fn read(extended: &Extended<'_>, tuning: &Tuning) -> Result<Settings, TuningError> {

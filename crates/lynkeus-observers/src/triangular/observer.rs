@@ -9,10 +9,10 @@ use lynkeus_structure::Extended;
 
 use super::form::{Form, Gains, NAME, Window, exponents};
 use super::settings::Settings;
-use crate::conditions::{Partial, nominal};
+use crate::conditions::Partial;
 use crate::design::Found;
-use crate::estimate::{Continued, PlantCopy, Speed, prolong};
-use crate::peaking::{Part, Run, Transient, factor_rows, variation};
+use crate::estimate::{PlantCopy, Speed, prolong};
+use crate::peaking::{self, Part, Run, Transient, factor_rows, variation};
 use crate::printed::{AtStart, ChainCorrection};
 use crate::{Design, Examination, TuningError, estimate};
 
@@ -26,13 +26,13 @@ pub(super) fn observer(
 ) -> Result<Design, TuningError> {
     let graph = extended.graph();
     let copy = PlantCopy::new(extended, &settings.common);
-    let limit = &settings.remedies.limit;
+    let remedies = &settings.remedies;
     let start = AtStart::new(&copy)?;
     let mut derivatives = copy.at_estimate(&extended.derivatives);
     let (mut table, mut parameters) = (vec![], gains.parameters());
     let speeds = Speed::of_chains(&copy, &gains.θ);
     for (i, (chain, θ)) in form.assignment.chains.iter().zip(&speeds).enumerate() {
-        let Some(innovation) = limit.innovation(&copy, i) else {
+        let Some(innovation) = remedies.innovation(&copy, i) else {
             continue;
         };
         let timed = gains.timed(&copy, i, θ);
@@ -45,7 +45,7 @@ pub(super) fn observer(
             output: i,
             states: &chain.states,
             factors: &scaled,
-            limited: limit.is_set(),
+            limited: remedies.limit.is_some(),
         };
         match printed.constant(extended) {
             Some(constant) => table.push(constant),
@@ -56,7 +56,9 @@ pub(super) fn observer(
             }
         }
     }
-    prolong(&copy, continued(form), &mut derivatives)?;
+    for (chain, partials) in form.assignment.chains.iter().zip(&form.partials) {
+        prolong(&copy, &chain.states, partials, &mut derivatives)?;
+    }
     Ok(Design {
         observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         parameters,
@@ -64,12 +66,6 @@ pub(super) fn observer(
         gains: table,
         examination,
     })
-}
-
-/// The equations of the chains, for their prolongation.
-fn continued(form: &Form) -> impl Iterator<Item = Continued> {
-    let chains = form.assignment.chains.iter().zip(&form.partials);
-    chains.flat_map(|(chain, partials)| Continued::along(&chain.states, partials))
 }
 
 /// The gains in the coordinates of the plant: with the signs of Remark 2, or
@@ -119,7 +115,7 @@ pub(super) fn assemble(
     let speeds = Speed::of_chains(&copy, &θ);
     let (mut factors, mut notes) = (vec![], vec![]);
     for (i, chain) in chains.iter().enumerate() {
-        let Some(innovation) = remedies.limit.innovation(&copy, i) else {
+        let Some(innovation) = remedies.innovation(&copy, i) else {
             continue;
         };
         let derivative = |&state: &usize| extended.derivatives[state];
@@ -127,14 +123,14 @@ pub(super) fn assemble(
         let output = &extended.outputs[i].variable.name;
         if !divided {
             let bounds: Vec<(f64, f64)> = form.partials[i].iter().map(|p| p.bounds).collect();
-            notes.extend(variation(output, &bounds, &coefficients.K[i]));
+            notes.extend(variation(output, &bounds, &coefficients[i]));
         }
         let added = run.add(&Part {
             states: &chain.states,
             f: &f,
             divisors: &divisors(extended, &form.partials[i], divided)?,
             innovation,
-            K: &coefficients.K[i],
+            K: &coefficients[i],
             θ: &speeds[i],
             δ: δ[i],
             number: i,
@@ -155,7 +151,7 @@ pub(super) fn assemble(
     };
     let mut parameters = vec![("θ".to_owned(), list(&θ)), ("δ".to_owned(), list(&δ))];
     parameters.extend(transient.map(Transient::parameter));
-    parameters.extend(coefficients.parameters());
+    parameters.extend(peaking::parameters(&coefficients));
     parameters.extend(factors);
     Ok(Design {
         observer: run.finish(NAME)?.tuned_by(&speeds),
@@ -172,7 +168,7 @@ fn divisors(
     partials: &[Partial],
     divided: bool,
 ) -> Result<Vec<Node>, TuningError> {
-    let divisor = |partial: &Partial| match (divided, nominal(partial.sign, partial.bounds)) {
+    let divisor = |partial: &Partial| match (divided, partial.nominal()) {
         (true, _) => Ok(partial.node),
         (false, Some(middle)) => Ok(extended.graph().constant(middle).node()),
         (false, None) => {

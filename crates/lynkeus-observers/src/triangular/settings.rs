@@ -114,7 +114,7 @@ impl Settings {
         let sizes = S
             .as_ref()
             .map(|S| S.iter().map(Tridiagonal::size).collect());
-        let lmi = Lmi::read(tuning, &["lemma1"])?;
+        let lmi = Lmi::read(tuning, tuning.meant(&GAIN, [false, true])?.unwrap_or(false))?;
         let of_standard: &[KeySpec] = match lmi {
             Some(_) => &[],
             None => &[MATRICES, FACTOR, GAIN],

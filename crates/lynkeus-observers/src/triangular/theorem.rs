@@ -24,7 +24,7 @@ use super::observer::observer;
 use super::settings::Settings;
 use crate::conditions::{names, output_slope, partials};
 use crate::design::Found;
-use crate::peaking::Departure;
+use crate::peaking::departure;
 use crate::statement::{proved, refuted, standing, undecided};
 use crate::theorem::{conclude, reached, slopes, state_noise, undeclared};
 use crate::{Assumptions, Certificate, Check, Constant, DesignError, Hammouri, estimate};
@@ -48,8 +48,12 @@ pub(super) fn certificate(
         1 | 2 => BASIS,
         _ => MANY,
     };
-    if let Some(departure) = Departure::of(settings.lmi.as_ref(), &settings.remedies) {
-        checks.push(departure.check(Hammouri::Observer));
+    if let Some(check) = departure(
+        Hammouri::Observer,
+        settings.lmi.as_ref(),
+        &settings.remedies,
+    ) {
+        checks.push(check);
         return Ok(Certificate::new(basis, assumptions, checks));
     }
     let unbounded = facts
@@ -394,7 +398,7 @@ pub(super) fn without_bounds(
     let nodes: Vec<_> = open.map(|(partial, _)| partial.node).collect();
     let first = nodes.first()?;
     let graph: &Graph = extended.graph();
-    let missing = undeclared(graph, &nodes, region);
+    let missing = undeclared(extended, &nodes, region);
     let advice = match missing.is_empty() {
         true => "narrow min and max so that it keeps away from zero and infinity".to_owned(),
         false => format!("declare min and max of {}", missing.join(", ")),

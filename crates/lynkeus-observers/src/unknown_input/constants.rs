@@ -143,7 +143,7 @@ impl<'e, 'p> Signals<'e, 'p> {
     fn new(form: &Form<'e, 'p>, assumptions: &Assumptions) -> Result<Self, MissingInput> {
         let extended: &'e Extended<'p> = form.extended;
         let graph = extended.graph();
-        let mut box_ = Enclosure::new(graph, &assumptions.region);
+        let mut box_ = Enclosure::new(extended, &assumptions.region);
         let mut slopes = vec![(extended.plant.time, graph.constant(1.0).node())];
         let mut measured = HashMap::new();
         for &state in &form.layers.layers[0] {
@@ -323,7 +323,7 @@ fn slope(
 ) -> Result<Node, MissingInput> {
     let name = &extended.states[state].name;
     // what is open here must not be mixed up with what was before
-    let inside = Enclosure::new(extended.graph(), box_.region());
+    let inside = Enclosure::new(extended, box_.region());
     let (low, high) = inside.range(extended.derivatives[state])?;
     let open = inside.open();
     let label = match open.is_empty() {

@@ -23,7 +23,7 @@ use super::settings::{Settings, wrong_size};
 use crate::conditions::{lipschitz, names, output_slope};
 use crate::design::{Found, Searched};
 use crate::statement::{proved, standing, undecided};
-use crate::{Check, DesignError, Examination, Farza, Statement, TuningError, design};
+use crate::{Check, DesignError, Examination, Farza, Statement, TuningError};
 
 pub(super) const NAME: &str = "unknown-input";
 
@@ -326,8 +326,7 @@ fn finish<'e, 'p>(
         chains[0].join(", "),
         chains[1].join(", ")
     );
-    let found = design::Form { summary, chains };
-    let examination = Examination::new(extended, region, NAME, found, checks)?;
+    let examination = Examination::new(extended, region, NAME, summary, chains, checks)?;
     Ok(Found { form, examination })
 }
 

@@ -27,7 +27,7 @@ mod theorem;
 use lynkeus_structure::{Extended, Region};
 
 use crate::design::{Found, Searched};
-use crate::family::{FormBox, Stages};
+use crate::family::Stages;
 use crate::{Assumptions, Certificate, Design, DesignError, KeySpec, Tuning, TuningError};
 use form::NAME;
 use settings::Settings;
@@ -42,7 +42,7 @@ impl Stages for UnknownInput {
     const NAME: &'static str = NAME;
     const PAPER: &'static str = "Farza, M'Saad, Liu, Targui 2005, observer (14)";
     const BASIS: &'static str = theorem::BASIS;
-    const FORM_BOX: FormBox = FormBox::Assumed;
+    const FORM_ON_ASSUMED_BOX: bool = true;
     /// θ₁ is four times θ₂, as in the paper's example
     const SPEEDS: &'static [f64] = &[4.0, 1.0];
     const KEYS: &'static [&'static [KeySpec]] = &[&settings::KEYS];

@@ -41,52 +41,38 @@ pub(super) fn design(
     form: &Form<'_, '_>,
     examination: Examination,
 ) -> Result<Design, DesignError> {
-    let chosen = match settings.thetas.clone()? {
-        Some(thetas) => Choice::given(thetas),
-        None => thetas(form)?,
+    let (thetas, note) = match settings.thetas.clone()? {
+        Some(given) => (given, None),
+        None => {
+            let (found, note) = thetas(form)?;
+            (found, Some(note))
+        }
     };
     let copy = PlantCopy::new(extended, &settings.common);
-    let thetas = chosen.thetas;
-    let speeds = Speeds::new(&copy, &thetas);
+    let speeds = speeds(&copy, &thetas);
     let derivatives = derivatives(form, &copy, settings, &speeds);
     let start = StartPoint::new(&copy)?;
     let matrices = Matrices::new(form, thetas);
     Ok(Design {
-        observer: copy
-            .observer(NAME, derivatives)?
-            .tuned_by([&speeds.θ1, &speeds.θ2]),
+        observer: copy.observer(NAME, derivatives)?.tuned_by(&speeds),
         gains: matrices.gains(&start)?,
         parameters: matrices.parameters(&start)?,
-        notes: chosen.notes,
+        notes: note.into_iter().collect(),
         examination,
     })
 }
 
 /// θ₁ and θ₂ of the observer.
-struct Speeds {
-    θ1: Speed,
-    θ2: Speed,
-}
-
-impl Speeds {
-    fn new(copy: &PlantCopy<'_, '_>, thetas: &Thetas) -> Self {
-        let speed = |place: usize, value: f64, of: &str| {
-            Speed::new(
-                copy,
-                format!("theta[{place}]"),
-                value,
-                format!("θ{place}, of {of}"),
-            )
-        };
-        Self {
-            θ1: speed(
-                1,
-                thetas.θ1,
-                "the unknown inputs and of the outputs that show them",
-            ),
-            θ2: speed(2, thetas.θ2, "the other states"),
-        }
-    }
+fn speeds(copy: &PlantCopy<'_, '_>, thetas: &Thetas) -> [Speed; 2] {
+    let speed = |place: usize, value: f64, of: &str| {
+        let meaning = format!("θ{place}, of {of}");
+        Speed::new(copy, format!("theta[{place}]"), value, meaning)
+    };
+    let first = "the unknown inputs and of the outputs that show them";
+    [
+        speed(1, thetas.θ1, first),
+        speed(2, thetas.θ2, "the other states"),
+    ]
 }
 
 /// The right-hand side of (14), in the order of the extended states.
@@ -94,7 +80,7 @@ fn derivatives(
     form: &Form<'_, '_>,
     copy: &PlantCopy<'_, '_>,
     settings: &Settings,
-    Speeds { θ1, θ2 }: &Speeds,
+    [θ1, θ2]: &[Speed; 2],
 ) -> Vec<Node> {
     let extended = form.extended;
     let (graph, n) = (extended.graph(), extended.plant_states());
@@ -323,21 +309,9 @@ const MARGIN: f64 = 1.1;
 /// Larger gains are not chosen: no integrator follows them.
 const LARGEST: f64 = 1e6;
 
-/// θ₁ and θ₂ with what is to be said about them.
-pub(super) struct Choice {
-    pub thetas: Thetas,
-    pub notes: Vec<String>,
-}
-
-impl Choice {
-    pub fn given(thetas: Thetas) -> Self {
-        let notes = vec![];
-        Self { thetas, notes }
-    }
-}
-
-/// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so.
-pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Choice, DesignError> {
+/// The smallest θ₁ that the inequality allows, with θ₂ = max(1, 2c₄), which makes it so; and what
+/// is to be said about them.
+pub(super) fn thetas(form: &Form<'_, '_>) -> Result<(Thetas, String), DesignError> {
     let q = form.q();
     if form.shape() != Shape::Square {
         return Err(missing(
@@ -361,10 +335,7 @@ pub(super) fn thetas(form: &Form<'_, '_>) -> Result<Choice, DesignError> {
     let note = format!(
         "theta: [{θ1:.4e}, {θ2:.4e}] from the inequality at the end of the proof of Theorem 1 with c1 = {c1:.3e}, c2 = {c2:.3e}, c4 = {c4:.3e}, c5 = {c5:.3e}, bounds on the declared box of the error linearised along the trajectory; sufficient, by far not necessary: give theta to amplify noise less"
     );
-    Ok(Choice {
-        thetas: Thetas { θ1, θ2 },
-        notes: vec![note],
-    })
+    Ok((Thetas { θ1, θ2 }, note))
 }
 
 fn missing(reason: &str) -> DesignError {
@@ -454,7 +425,7 @@ fn rate<'p>(form: &Form<'_, 'p>, A: &Matrix<'p>) -> Result<Matrix<'p>, DesignErr
 /// An upper bound over the box of the Frobenius norm, hence of the spectral norm.
 fn norm(form: &Form<'_, '_>, A: &Matrix<'_>) -> Result<f64, DesignError> {
     let region = form.extended.region();
-    let box_ = Enclosure::new(form.extended.graph(), &region);
+    let box_ = Enclosure::new(form.extended, &region);
     let mut sum = 0.0;
     for node in A.nonzero() {
         let bound = box_.magnitude(node)?;

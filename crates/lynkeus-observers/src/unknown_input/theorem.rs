@@ -19,6 +19,7 @@ use super::form::Form;
 use super::settings::{Settings, Thetas};
 use super::{constants, observer};
 use crate::statement::{sufficient, undecided};
+use crate::theorem::Enclosure;
 use crate::{
     Assumptions, Certificate, Check, Constant, DesignError, Examination, Farza, UltimateBound,
 };
@@ -37,7 +38,7 @@ pub(super) fn certificate(
     let given = settings.thetas.clone()?;
     let norms = constants::norms(form, assumptions)?;
     let c = norms.constants();
-    let chosen = || observer::thetas(form).ok().map(|choice| choice.thetas);
+    let chosen = || observer::thetas(form).ok().map(|(thetas, _)| thetas);
     let thetas = given.or_else(chosen);
     let proof = Proof { form, norms, c };
     let mut hypotheses = examination.checks;
@@ -317,7 +318,7 @@ impl Proof<'_, '_, '_> {
     fn noise(&self, assumptions: &Assumptions) -> Result<[f64; 2], DesignError> {
         let extended = self.form.extended;
         let graph = extended.graph();
-        let box_ = crate::theorem::Enclosure::new(graph, &assumptions.region);
+        let box_ = Enclosure::new(extended, &assumptions.region);
         let one = |i: &usize| -> Result<f64, DesignError> {
             let noise = assumptions.noise.get(*i).copied().unwrap_or(0.0);
             let Some((_, slope, _)) = extended.outputs[*i].state.filter(|_| noise > 0.0) else {
