@@ -26,8 +26,7 @@
 //! P is that for the study's gain.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::vandermonde;
-use lynkeus_gain::vandermonde::Pole;
+use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{Extended, Verdict, short};
@@ -280,7 +279,7 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
     if let [n] = form.indices[..] {
         // β² = γ/√n makes the two terms of (3.20) equal where ‖V⁻¹‖ is one
         let β = (γ / (n as f64).sqrt()).max(f64::MIN_POSITIVE).sqrt();
-        let lemma = vandermonde::lemma_3_2(n, SLOW, β, γ / β);
+        let lemma = integrators::lemma_3_2(n, SLOW, β, γ / β);
         if let Ok(lemma) = lemma {
             list.push(("σ0", lemma.σ, "θ0 of this family: the smallest σ of Lemma 3.2 whose poles −σ, …, −σⁿ do for γ, without input"));
         }
@@ -607,7 +606,7 @@ impl Proof<'_, '_> {
         let bears = |s: f64| {
             let scaled = |λ: &Vec<Pole>| -> Vec<f64> {
                 let faster: Vec<Pole> = λ.iter().map(|λ| λ.scaled(s)).collect();
-                vandermonde::place_all(&faster)
+                integrators::place_all(&faster)
             };
             let K: Vec<Vec<f64>> = self.gains.λ.iter().map(scaled).collect();
             self.bears(&closed_loop(&K), &self.lipschitz.drift, s * self.slowest)
