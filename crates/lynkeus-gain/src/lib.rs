@@ -16,10 +16,7 @@ pub mod integrators;
 pub mod lemma1;
 pub mod low_power;
 pub mod sampling;
-mod tridiagonal;
-mod unit_factor;
-pub mod vandermonde;
+mod symmetric;
 
 pub use lynkeus_proof::Bounds;
-pub use tridiagonal::{Tridiagonal, TridiagonalError};
-pub use unit_factor::{FactorError, UnitFactor};
+pub use symmetric::{FactorError, Tridiagonal, UnitFactor};

@@ -17,11 +17,10 @@
 
 use lynkeus_proof::decay::{self, ErrorModel, Proof};
 use lynkeus_proof::matrix::points;
-use lynkeus_proof::{lyapunov, vertices};
+use lynkeus_proof::{lyapunov, spectrum, vertices};
 use nalgebra::{DMatrix, DVector};
 
-use crate::vandermonde;
-use lynkeus_proof::spectrum;
+use crate::integrators;
 
 /// (k_i1, k_i2) of each block, from the first.
 pub type Coefficients = Vec<[f64; 2]>;
@@ -49,7 +48,7 @@ pub fn place(poles: &[f64]) -> Option<Coefficients> {
         return None;
     }
     let mut P = vec![1.0];
-    P.extend(vandermonde::place(poles));
+    P.extend(integrators::place(poles));
     let mut blocks = vec![];
     while P.len() > 1 {
         let κ = P.pop()?; // P(0); what is left is (P − P(0))/s

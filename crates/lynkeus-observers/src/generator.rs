@@ -9,7 +9,7 @@
 
 use lynkeus_expr::flow::Flow;
 use lynkeus_expr::{Graph, MissingInput, Node, flow};
-use lynkeus_gain::vandermonde::{Pole, place_all};
+use lynkeus_gain::integrators::{Pole, place_all};
 
 use crate::{Observer, Signal};
 

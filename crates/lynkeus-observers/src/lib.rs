@@ -35,8 +35,8 @@ pub use certificate::{Assumptions, Bounds, Certificate, Constant, UltimateBound}
 pub use design::{ChainGain, Design, DesignError, Examination, fit_word};
 pub use family::Family;
 pub use generator::{Generator, GeneratorError, Prefilter};
-pub use guarantee::{Claim, Correction, Injection, certify};
-pub use lynkeus_gain::vandermonde::Pole;
+pub use guarantee::{Claim, Correction, Injection, certify, is_certified_gain};
+pub use lynkeus_gain::integrators::Pole;
 pub use observer::{
     Estimate, FilterTuning, InputDerivative, Monitor, Observer, Sampled, Signal, Tunable, Tunables,
 };

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use lynkeus_expr::{Budget, Spent};
 use lynkeus_model::{LoadError, LoadOptions, Plant, Variable};
-use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning, Value};
+pub(crate) use lynkeus_observers::is_certified_gain;
+use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
 use crate::choice::{Choice, choose};
@@ -425,11 +426,6 @@ fn blame(study: &Study, error: SensorsError) -> Error {
         Some(found) => found.blame(refusal),
         None => refusal.at(&study.file),
     }
-}
-
-/// Whether the study asks for a certified gain.
-pub(crate) fn is_certified_gain(tuning: &Tuning) -> bool {
-    tuning.values.get("gain") == Some(&Value::Text("lmi".into()))
 }
 
 /// A limit came before the decision on the family.

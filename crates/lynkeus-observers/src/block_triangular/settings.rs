@@ -4,7 +4,7 @@ use lynkeus_structure::{ChainRequest, Extended};
 
 use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::{Common, PROLONG};
-use crate::guarantee::{LMI_KEYS, Lmi};
+use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
 use crate::tuning::Late;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, Value, peaking};
@@ -52,7 +52,7 @@ const ORDER: KeySpec = KeySpec {
 const GAIN: KeySpec = KeySpec {
     name: "gain",
     kind: "`\"lmi\"`",
-    shape: Shape::Word(&["lmi"]),
+    shape: Shape::Word(&[LMI]),
     default: "by `k` or `k_poles`",
     meaning: "[a certified gain](certificates.md) instead of the paper's",
 };

@@ -86,6 +86,7 @@ pub(super) fn bounds(
         drift,
         input,
         unseen,
+        w,
     } = remainders(extended, form, &U)?;
     let rows: Vec<Node> = input.iter().flatten().chain(&drift).copied().collect();
     let sides = box_.region();
@@ -125,7 +126,7 @@ pub(super) fn bounds(
         inverse: norm(&beside(&size, &size_a)),
         drift: of_remainder(&drift)?,
         input: input_rows,
-        unseen: forced(&unseen, &box_)?,
+        unseen: forced(&unseen, &w, &box_)?,
         states: states
             .map(|(z, a)| Share {
                 z: z.clone(),
@@ -168,14 +169,9 @@ struct Remainders {
     drift: Vec<Node>,
     /// (3.1): the factor of each input
     input: Vec<Vec<Node>>,
-    /// (4.22): n̄ and the symbols of w
-    unseen: Unseen,
-}
-
-/// n̄ w
-struct Unseen {
-    /// rows of z, columns of w
-    factors: Vec<Vec<Option<Node>>>,
+    /// (4.22): n̄, a column per entry of w
+    unseen: Vec<Vec<Option<Node>>>,
+    /// the symbols of w
     w: Vec<Node>,
 }
 
@@ -206,10 +202,8 @@ fn remainders(
     };
     let still: HashMap<Node, Node> = w.iter().map(|&w| (w, zero)).collect();
     Ok(Remainders {
-        unseen: Unseen {
-            factors: output_map::jacobian_rows(graph, &drift, &w),
-            w,
-        },
+        unseen: output_map::jacobian_rows(graph, &drift, &w),
+        w,
         drift: graph.substitute(&drift, &still),
         input: bounded.map_or_else(Vec::new, |affine| {
             let columns = affine.input_columns.iter();
@@ -240,10 +234,14 @@ fn unseen_derivatives(form: &Form, U: &[Vec<Node>]) -> Vec<Node> {
 }
 
 /// Bounds of |n̄ w| row by row. y^(μ) is affine in w, so that n̄ reads none of it.
-fn forced(unseen: &Unseen, box_: &Enclosure<'_>) -> Result<Vec<f64>, MissingInput> {
+fn forced(
+    unseen: &[Vec<Option<Node>>],
+    w: &[Node],
+    box_: &Enclosure<'_>,
+) -> Result<Vec<f64>, MissingInput> {
     let row = |row: &Vec<Option<Node>>| {
         let mut sum = 0.0;
-        for (factor, &w) in row.iter().zip(&unseen.w) {
+        for (factor, &w) in row.iter().zip(w) {
             let Some(factor) = factor else { continue };
             let (low, high) = box_.side(w);
             let bound = times(box_.magnitude(*factor)?, low.abs().max(high.abs()));
@@ -251,5 +249,5 @@ fn forced(unseen: &Unseen, box_: &Enclosure<'_>) -> Result<Vec<f64>, MissingInpu
         }
         Ok(sum)
     };
-    unseen.factors.iter().map(row).collect()
+    unseen.iter().map(row).collect()
 }

@@ -4,8 +4,7 @@
 use std::collections::HashMap;
 
 use lynkeus_expr::{Expr, Graph, Node, Tape};
-use lynkeus_gain::vandermonde;
-use lynkeus_gain::vandermonde::{Lemma32, Pole};
+use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_model::Variable;
 use lynkeus_proof::magnitude::{root, times};
 use lynkeus_structure::Extended;
@@ -363,7 +362,7 @@ impl Gains {
             .enumerate()
             .map(|(j, given)| given.unwrap_or_else(|| start(j)))
             .collect();
-        let place = |λ: &Vec<Pole>| vandermonde::place_all(λ);
+        let place = |λ: &Vec<Pole>| integrators::place_all(λ);
         Ok(Self {
             K: λ.iter().map(place).collect(),
             K2: filter_λ.iter().map(place).collect(),

@@ -2,8 +2,7 @@
 //! What depends on the form is kept as it stands until the indices are known.
 
 use lynkeus_expr::Node;
-use lynkeus_gain::vandermonde;
-use lynkeus_gain::vandermonde::{Lemma32, Pole};
+use lynkeus_gain::integrators::{self, Lemma32, Pole};
 use lynkeus_structure::Extended;
 
 use crate::estimate::Common;
@@ -183,7 +182,7 @@ impl Settings {
         let β = self.β.unwrap_or(1.0);
         let of = |&μ: &usize| match μ {
             0 => Ok(None),
-            _ => vandermonde::lemma_3_2(μ, α, β, γ)
+            _ => integrators::lemma_3_2(μ, α, β, γ)
                 .map(Some)
                 .map_err(|error| {
                     TuningError::new(ALPHA.name, "numbers Lemma 3.2 can be used with", error)

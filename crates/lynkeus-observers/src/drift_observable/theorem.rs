@@ -26,8 +26,7 @@
 //! P is that for the study's gain.
 
 use lynkeus_expr::Interval;
-use lynkeus_gain::vandermonde;
-use lynkeus_gain::vandermonde::Pole;
+use lynkeus_gain::integrators::{self, Pole};
 use lynkeus_proof::magnitude::{length, plus, size, times, total};
 use lynkeus_proof::riccati::Riccati;
 use lynkeus_structure::{Extended, Verdict, short};
@@ -39,7 +38,8 @@ use super::observer::{Gains, closed_loop, slowest, spread};
 use super::settings::{Needed, SLOPES, Settings, Variant};
 use crate::statement::{sufficient, undecided};
 use crate::{
-    Assumptions, Certificate, Check, Constant, DesignError, Germani, TuningError, UltimateBound,
+    Assumptions, Bounds, Certificate, Check, Constant, DesignError, Germani, TuningError,
+    UltimateBound,
 };
 
 pub(super) fn certificate(
@@ -280,7 +280,7 @@ fn of_lipschitz(form: &Form, found: &Lipschitz, u_M: f64) -> Vec<Constant> {
     if let [n] = form.indices[..] {
         // β² = γ/√n makes the two terms of (3.20) equal where ‖V⁻¹‖ is one
         let β = (γ / (n as f64).sqrt()).max(f64::MIN_POSITIVE).sqrt();
-        let lemma = vandermonde::lemma_3_2(n, SLOW, β, γ / β);
+        let lemma = integrators::lemma_3_2(n, SLOW, β, γ / β);
         if let Ok(lemma) = lemma {
             list.push(("σ0", lemma.σ, "θ0 of this family: the smallest σ of Lemma 3.2 whose poles −σ, …, −σⁿ do for γ, without input"));
         }
@@ -333,41 +333,33 @@ pub(super) fn conclude(
     let a = filter.map_or(0.0, |f| f.rest);
     let left = std::iter::once(P)
         .chain(&solutions.slower)
-        .map(|P| Left::of(proof, P, a, assumptions));
-    if let Some(left) = left.min_by(|x, y| x.whole.total_cmp(&y.whole)) {
-        let names = proof.extended.states.iter().map(|x| x.name.clone());
-        found.ultimate_bound = Some(left.whole);
-        found.ultimate = names.zip(left.each).map(UltimateBound::from).collect();
+        .map(|P| left(proof, P, a, assumptions));
+    if let Some(left) = left.min_by(|x, y| x.norm.total_cmp(&y.norm)) {
+        found.ultimate_bound = Some(left.norm);
+        found.ultimate = left.states;
     }
 }
 
-/// Bounds as t → ∞.
-struct Left {
-    /// of every state's error
-    each: Vec<f64>,
-    /// of the length of the error
-    whole: f64,
-}
-
-impl Left {
-    /// By P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and |e_z,j| ≤ √(P_jj ν).
-    fn of(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Self {
-        let f = size(of_rows(P, &proof.lipschitz.unseen)) + size(forces(proof, P, assumptions));
-        let twice = Interval::point(2.0) * Interval::point(P.α);
-        let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
-        let e_z = Interval::point(P.largest).sqrt() * root_ν;
-        let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
-        let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
-        let e_z = e_z.hi();
-        let of_state = |share: &Share| {
-            let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
-            let together = times(length(&share.z), e_z);
-            plus(one_by_one.min(together), times(share.through, a))
-        };
-        let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
-        let whole = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
-        Self { each, whole }
-    }
+/// Bounds as t → ∞ by P, where |e_a| → a: √ν settles where 2αν = a² + 2f√ν, and
+/// |e_z,j| ≤ √(P_jj ν).
+fn left(proof: &Proof<'_, '_>, P: &Riccati, a: f64, assumptions: &Assumptions) -> Bounds {
+    let f = size(of_rows(P, &proof.lipschitz.unseen)) + size(forces(proof, P, assumptions));
+    let twice = Interval::point(2.0) * Interval::point(P.α);
+    let root_ν = (f + (f.powi(2) + twice * size(a).powi(2)).sqrt()) / twice;
+    let e_z = Interval::point(P.largest).sqrt() * root_ν;
+    let part = |j: usize| (Interval::point(P.P[j][j]).sqrt() * root_ν).min(e_z).hi();
+    let parts: Vec<f64> = (0..P.P.len()).map(part).collect();
+    let e_z = e_z.hi();
+    let of_state = |share: &Share| {
+        let one_by_one = total(share.z.iter().zip(&parts).map(|(z, e)| times(*z, *e)));
+        let together = times(length(&share.z), e_z);
+        plus(one_by_one.min(together), times(share.through, a))
+    };
+    let each: Vec<f64> = proof.lipschitz.states.iter().map(of_state).collect();
+    let norm = times(proof.lipschitz.inverse, length(&[e_z, a])).min(length(&each));
+    let names = proof.extended.states.iter().map(|x| x.name.clone());
+    let states = names.zip(each).map(UltimateBound::from).collect();
+    Bounds { norm, states }
 }
 
 /// The P_a of (4.27) with the smallest bound of the filter's error.
@@ -607,7 +599,7 @@ impl Proof<'_, '_> {
         let bears = |s: f64| {
             let scaled = |λ: &Vec<Pole>| -> Vec<f64> {
                 let faster: Vec<Pole> = λ.iter().map(|λ| λ.scaled(s)).collect();
-                vandermonde::place_all(&faster)
+                integrators::place_all(&faster)
             };
             let K: Vec<Vec<f64>> = self.gains.λ.iter().map(scaled).collect();
             self.bears(&closed_loop(&K), &self.lipschitz.drift, s * self.slowest)

@@ -16,7 +16,8 @@ use super::error_system::{ErrorSystem, expanded};
 use crate::conditions::on_output;
 use crate::estimate::{Common, PlantCopy};
 use crate::{
-    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, estimate,
+    ChainGain, Design, DesignError, Examination, KeySpec, Shape, Tuning, TuningError, Value,
+    estimate,
 };
 
 /// Why nothing of such an observer may be changed.
@@ -49,6 +50,14 @@ const MINIMISE: KeySpec = KeySpec {
     default: "`\"noise\"`",
     meaning: "what the gain makes small at that rate, with `\"lmi\"`",
 };
+
+/// The word under the key `gain` that asks for it.
+pub(crate) const LMI: &str = "lmi";
+
+/// Whether a study asks for a gain that comes with a proof.
+pub fn is_certified_gain(tuning: &Tuning) -> bool {
+    matches!(tuning.values.get("gain"), Some(Value::Text(word)) if word == LMI)
+}
 
 /// The keys of this gain, for every family that has it.
 pub(crate) const LMI_KEYS: [KeySpec; 3] = [RATE, LIMIT, MINIMISE];

@@ -27,7 +27,8 @@ mod lmi;
 mod refute;
 
 pub use correction::{Correction, Injection};
-pub(crate) use lmi::{LMI_KEYS, Lmi, design_lmi};
+pub use lmi::is_certified_gain;
+pub(crate) use lmi::{LMI, LMI_KEYS, Lmi, design_lmi};
 use lynkeus_expr::{Budget, Interval};
 use lynkeus_proof::chain::settled;
 use lynkeus_proof::decay::Proof;

@@ -5,7 +5,7 @@ use lynkeus_structure::{ChainRequest, Extended};
 
 use crate::conditions::{CHAINS, chain_request};
 use crate::estimate::{Common, PROLONG};
-use crate::guarantee::{LMI_KEYS, Lmi};
+use crate::guarantee::{LMI, LMI_KEYS, Lmi};
 use crate::peaking::Remedies;
 use crate::tuning::Late;
 use crate::{KeySpec, REQUIRED, Shape, Tuning, TuningError, peaking};
@@ -37,7 +37,7 @@ const FACTOR: KeySpec = KeySpec {
 const GAIN: KeySpec = KeySpec {
     name: "gain",
     kind: "`\"lemma1\"`, `\"lmi\"`",
-    shape: Shape::Word(&["lemma1", "lmi"]),
+    shape: Shape::Word(&["lemma1", LMI]),
     default: "`\"lemma1\"`",
     meaning: "where the gain comes from: Lemma 1's S (unless `S` is given), or [a linear matrix inequality](certificates.md)",
 };
