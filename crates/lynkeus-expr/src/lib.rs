@@ -26,6 +26,7 @@
 
 mod algebra;
 mod budget;
+mod components;
 mod expr;
 mod facts;
 pub mod flow;
@@ -46,6 +47,7 @@ mod tape;
 
 pub use algebra::{Algebra, Nodes, Reals};
 pub use budget::{Budget, Memory, Spent};
+pub use components::components;
 pub use expr::Expr;
 pub use graph::{Graph, ImplicitCall, LinearSystem, Node, Solution};
 pub use hoist::{Hoisted, HoistedPart};

@@ -12,14 +12,13 @@ mod incidence;
 mod linear;
 mod loops;
 mod matching;
-mod order;
 mod reduce;
 mod rows;
 mod singular;
 
 use std::collections::HashMap;
 
-use lynkeus_expr::{Graph, Interval, Node};
+use lynkeus_expr::{Graph, Interval, Node, components};
 
 use crate::syntax::{Problem, Result, Span};
 use incidence::Incidence;
@@ -136,7 +135,13 @@ fn solved(
         }
     };
     matched.check(model).map_err(unsolved(true))?;
-    let blocks = order::blocks(&incidence.of_equation, &matching);
+    // an equation needs those that give its unknowns
+    let needs = |unknowns: &Vec<usize>| {
+        let given = unknowns.iter().filter_map(|&u| matching.of_unknown[u]);
+        given.collect()
+    };
+    let needs: Vec<Vec<usize>> = incidence.of_equation.iter().map(needs).collect();
+    let blocks = components(&needs);
     let solver = blocks::Solver::new(system, &incidence, source);
     solver.solve(&blocks, &matching).map_err(unsolved(false))
 }
