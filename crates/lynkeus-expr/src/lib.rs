@@ -38,6 +38,7 @@ pub mod jacobian;
 mod jet;
 pub mod lanes;
 mod linear;
+pub mod modular;
 mod op;
 mod partials;
 pub mod real;

@@ -5,12 +5,12 @@ use lynkeus_model::Plant;
 
 use crate::branches::{Branches, Choices, Reference};
 use crate::expansion::{Affine, Columns, Start};
-use crate::field::Modular;
 use crate::hidden::{Hidden, Twin, beside, joined, steady_from, symmetries};
 use crate::model::{Model, Refused, measured};
 use crate::search::Search;
 use crate::series::Stop;
 use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
+use lynkeus_expr::modular::Modular;
 
 /// Seed of the first point.
 const FIRST: u64 = 1;

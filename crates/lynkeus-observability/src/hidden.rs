@@ -6,12 +6,11 @@ use std::collections::BTreeSet;
 use lynkeus_expr::Budget;
 
 use crate::Symmetry;
-use crate::echelon::Echelon;
 use crate::expansion::{Affine, Columns, Start};
-use crate::field::Modular;
 use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
+use lynkeus_expr::modular::{Echelon, Modular};
 
 /// A direction of the named quantities, with the column that moves in no other one.
 pub(crate) type Direction = (usize, Vec<Modular>);

@@ -4,9 +4,9 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 
 use crate::branches::Reference;
-use crate::field::{Modular, Random};
 use crate::series::{Program, Unsupported};
 use crate::{Quantity, Question, QuestionError, branches};
+use lynkeus_expr::modular::{Modular, Random};
 
 /// What role a symbol plays in the series.
 #[derive(Clone, Copy, Debug)]

@@ -5,8 +5,8 @@ use std::f64::consts::{E, LN_2, LN_10, PI};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
-use crate::field::Modular;
 use crate::series::functions::Arc;
+use lynkeus_expr::modular::Modular;
 
 /// One operation; slots are numbered in order.
 #[derive(Clone, Copy, Debug)]
