@@ -159,9 +159,12 @@ impl Codistribution {
     }
 
     fn is_independent(&self, values: &[f64], indices: &[usize]) -> bool {
-        let mut kept = Kept::default();
+        let mut kept = vec![];
         let rows = self.chosen(indices);
-        rows.len() == self.n && rows.iter().all(|&row| kept.adds(self.row(values, row)))
+        rows.len() == self.n
+            && rows
+                .iter()
+                .all(|&row| adds(&mut kept, self.row(values, row)))
     }
 
     fn row<'v>(&self, values: &'v [f64], row: usize) -> &'v [f64] {
@@ -169,7 +172,7 @@ impl Codistribution {
     }
 
     fn indices_at(&self, values: &[f64]) -> Vec<usize> {
-        let mut kept = Kept::default();
+        let mut kept = vec![];
         let mut indices = vec![0; self.lengths.len()];
         let orders = self.lengths.iter().copied().max().unwrap_or(0);
         for k in 0..orders {
@@ -177,10 +180,10 @@ impl Codistribution {
             for (index, &length) in indices.iter_mut().zip(&self.lengths) {
                 let place = start + k;
                 start += length;
-                if *index < k || k >= length || kept.rows.len() == self.n {
+                if *index < k || k >= length || kept.len() == self.n {
                     continue;
                 }
-                if kept.adds(self.row(values, place)) {
+                if adds(&mut kept, self.row(values, place)) {
                     *index = k + 1;
                 }
             }
@@ -189,35 +192,27 @@ impl Codistribution {
     }
 }
 
-/// Orthonormal rows.
-#[derive(Default)]
-struct Kept {
-    rows: Vec<DVector<f64>>,
-}
-
-impl Kept {
-    /// Takes the row if it is independent of those before.
-    fn adds(&mut self, row: &[f64]) -> bool {
-        let mut row = DVector::from_column_slice(row);
-        let norm = row.norm();
-        if norm == 0.0 {
-            return false;
-        }
-        row /= norm;
-        // twice is enough for orthogonality to rounding
-        for _ in 0..2 {
-            for q in &self.rows {
-                let share = q.dot(&row);
-                row.axpy(-share, q, 1.0);
-            }
-        }
-        let left = row.norm();
-        let independent = left > RANK_TOLERANCE;
-        if independent {
-            self.rows.push(row / left);
-        }
-        independent
+/// Adds a row, orthonormal, if it is independent of those before.
+fn adds(kept: &mut Vec<DVector<f64>>, row: &[f64]) -> bool {
+    let mut row = DVector::from_column_slice(row);
+    let norm = row.norm();
+    if norm == 0.0 {
+        return false;
     }
+    row /= norm;
+    // twice is enough for orthogonality to rounding
+    for _ in 0..2 {
+        for q in &*kept {
+            let share = q.dot(&row);
+            row.axpy(-share, q, 1.0);
+        }
+    }
+    let left = row.norm();
+    let independent = left > RANK_TOLERANCE;
+    if independent {
+        kept.push(row / left);
+    }
+    independent
 }
 
 #[cfg(test)]
