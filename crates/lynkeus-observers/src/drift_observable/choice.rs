@@ -5,7 +5,7 @@
 //! certificate on a smaller range of the inputs is about the same observer.
 
 use crate::fit_word;
-use lynkeus_structure::indices::Codistribution;
+use lynkeus_structure::output_map::Codistribution;
 use lynkeus_structure::{Extended, Region};
 use lynkeus_structure::{Standing, Verdict};
 
