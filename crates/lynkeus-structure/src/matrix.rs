@@ -180,7 +180,7 @@ impl<'g> Matrix<'g> {
         places.map(|(i, j)| self.node(i, j)).collect()
     }
 
-    /// The [`determinant`]; none where it is zero everywhere. For small square matrices only.
+    /// The determinant by expansion along the rows; none where it is zero everywhere. For small square matrices only.
     pub fn determinant(&self) -> Option<Node> {
         let row = |i: usize| (0..self.columns).map(move |j| self.get(i, j)).collect();
         let rows: Rows = (0..self.rows).map(row).collect();
