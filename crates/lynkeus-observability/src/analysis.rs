@@ -5,12 +5,12 @@ use lynkeus_model::Plant;
 
 use crate::branches::{Branches, Choices, Reference};
 use crate::expansion::{Affine, Columns, Start};
-use crate::field::Modular;
-use crate::hidden::{Hidden, Twin, beside, joined, steady_from, symmetries};
+use crate::hidden::{Hidden, beside, joined, steady_from, symmetries};
 use crate::model::{Model, Refused, measured};
 use crate::search::Search;
 use crate::series::Stop;
 use crate::{Answer, Asked, Partial, Quantity, Question, QuestionError, Verdict, hull, lie};
+use lynkeus_expr::modular::Modular;
 
 /// Seed of the first point.
 const FIRST: u64 = 1;
@@ -202,19 +202,12 @@ fn undecided(named: &[(String, Quantity)], question: &Question, reason: &str) ->
     }
 }
 
-/// What surrounds the start.
-enum Surroundings {
-    /// the start is as good as any other in an invariant set: a rank that does not grow
-    /// once never grows
-    Generic,
-    /// known starts, and an invariant set around them in which other points may show more
-    Special(Affine),
-}
-
 /// A start, and what it is worth.
 struct Ground {
     start: Start,
-    surroundings: Surroundings,
+    /// around known starts an invariant set in which other points may show more; none where the start is as good
+    /// as any other: a rank that does not grow once never grows
+    set: Option<Affine>,
     /// time starts at zero
     at_zero: bool,
 }
@@ -260,7 +253,7 @@ impl<'a> Analysis<'a> {
         if self.model.known_starts().next().is_none() {
             return Ok(Ground {
                 start: self.find(start)?,
-                surroundings: Surroundings::Generic,
+                set: None,
                 at_zero: false,
             });
         }
@@ -268,7 +261,7 @@ impl<'a> Analysis<'a> {
         if set.directions.is_empty() {
             return Ok(Ground {
                 start: self.find(start)?,
-                surroundings: Surroundings::Generic,
+                set: None,
                 at_zero: false,
             });
         }
@@ -278,7 +271,7 @@ impl<'a> Analysis<'a> {
                 Ok(start) => {
                     return Ok(Ground {
                         start,
-                        surroundings: Surroundings::Special(around(true)?),
+                        set: Some(around(true)?),
                         at_zero: true,
                     });
                 }
@@ -288,7 +281,7 @@ impl<'a> Analysis<'a> {
         }
         Ok(Ground {
             start: self.find(start)?,
-            surroundings: Surroundings::Special(set),
+            set: Some(set),
             at_zero: false,
         })
     }
@@ -326,14 +319,12 @@ impl<'a> Analysis<'a> {
     where
         'a: 's,
     {
-        let columns = Columns::new(self.model, self.last_order(&ground.surroundings));
+        let columns = Columns::new(self.model, self.last_order(ground));
         let mut search = self.search(&ground.start, columns);
-        let ended = match &ground.surroundings {
-            Surroundings::Generic => search.run_out().map(|()| vec![Hidden::all(&search)]),
-            Surroundings::Special(set) if self.model.unknown_inputs == 0 => {
-                self.beside(ground, set, &mut search)
-            }
-            Surroundings::Special(set) => self.steady(ground, set, &mut search),
+        let ended = match &ground.set {
+            None => search.run_out().map(|()| vec![Hidden::all(&search)]),
+            Some(set) if self.model.unknown_inputs == 0 => self.beside(ground, set, &mut search),
+            Some(set) => self.steady(ground, set, &mut search),
         };
         let (stop, hidden) = match ended {
             Ok(hidden) => (None, hidden),
@@ -347,16 +338,16 @@ impl<'a> Analysis<'a> {
     }
 
     /// Orders after which nothing more is looked for.
-    fn last_order(&self, surroundings: &Surroundings) -> usize {
+    fn last_order(&self, ground: &Ground) -> usize {
         let depth = self.model.depth;
-        match (surroundings, self.model.unknown_inputs) {
-            (Surroundings::Generic, _) => depth,
-            (Surroundings::Special(_), 0) => {
+        match (&ground.set, self.model.unknown_inputs) {
+            (None, _) => depth,
+            (Some(_), 0) => {
                 let width = self.model.named.len() + 1;
                 let affordable = (2 * WORK / (self.model.program.len() + 1) / width).isqrt();
                 affordable.min(ORDERS).max(3 * depth + 24)
             }
-            (Surroundings::Special(_), _) => 2 * depth + 6,
+            (Some(_), _) => 2 * depth + 6,
         }
     }
 
@@ -376,7 +367,7 @@ impl<'a> Analysis<'a> {
         set: &Affine,
         search: &mut Search<'_>,
     ) -> Result<Vec<Hidden>, Stop> {
-        let last = self.last_order(&ground.surroundings);
+        let last = self.last_order(ground);
         let depth = self.model.depth;
         let elsewhere = self.elsewhere(ground, set);
         let Ok(Some(elsewhere)) = elsewhere else {
@@ -421,7 +412,7 @@ impl<'a> Analysis<'a> {
         set: &Affine,
         search: &mut Search<'_>,
     ) -> Result<Vec<Hidden>, Stop> {
-        let last = self.last_order(&ground.surroundings);
+        let last = self.last_order(ground);
         search.until(None, last)?;
         let elsewhere = self.elsewhere(ground, set)?;
         let Some(elsewhere) = elsewhere.filter(|_| !search.is_complete()) else {
@@ -456,7 +447,6 @@ impl<'a> Analysis<'a> {
             ended.is_ok() && second.rank() == search.rank()
         });
         let twin = second.filter(|_| reached);
-        let twin = twin.as_ref().map(|twin| Twin { search: twin });
         let hidden = found.hidden.iter();
         hidden
             .flat_map(|hidden| symmetries(self.model, hidden, search.point(), twin.as_ref()))

@@ -11,7 +11,7 @@ use std::collections::{HashMap, HashSet};
 use lynkeus_expr::{Binary, Graph, Node, Op, Tape, Unary};
 use lynkeus_model::{Plant, Variable};
 
-use crate::field::Random;
+use lynkeus_expr::modular::Random;
 
 /// Points at which branches are looked for.
 const POINTS: usize = 256;

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use lynkeus_expr::Budget;
 
-use crate::field::{Modular, Random};
 use crate::model::{First, Model, Role};
 use crate::series::{Functions, Run, Stop};
+use lynkeus_expr::modular::{Modular, Random};
 
 /// Bytes of a series where nothing limits the memory.
 const ROOM: usize = 1 << 30;

@@ -6,12 +6,11 @@ use std::collections::BTreeSet;
 use lynkeus_expr::Budget;
 
 use crate::Symmetry;
-use crate::echelon::Echelon;
 use crate::expansion::{Affine, Columns, Start};
-use crate::field::Modular;
 use crate::model::Model;
 use crate::search::Search;
 use crate::series::Stop;
+use lynkeus_expr::modular::{Echelon, Modular};
 
 /// A direction of the named quantities, with the column that moves in no other one.
 pub(crate) type Direction = (usize, Vec<Modular>);
@@ -215,24 +214,6 @@ const LISTED: usize = 8;
 /// n/d by column, relative to the own column of the direction.
 type Weights = Vec<(usize, i64, i64)>;
 
-/// A second start, which confirms what the first suggests.
-pub(crate) struct Twin<'a> {
-    pub search: &'a Search<'a>,
-}
-
-impl Twin<'_> {
-    /// What is hidden there among the same quantities.
-    fn hidden(&self, hidden: &Hidden) -> Vec<Direction> {
-        match &hidden.among {
-            None => self.search.unseen(),
-            Some(among) => {
-                let rows = self.search.restricted(among);
-                kernel_among(&rows, among, self.search.columns().named)
-            }
-        }
-    }
-}
-
 /// How a group acts on its quantities.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -240,15 +221,27 @@ enum Kind {
     Shift,
 }
 
-/// The groups of quantities that the hidden directions move, in words.
+/// What is hidden at another start among the same quantities.
+fn hidden_at(search: &Search<'_>, hidden: &Hidden) -> Vec<Direction> {
+    match &hidden.among {
+        None => search.unseen(),
+        Some(among) => {
+            let rows = search.restricted(among);
+            kernel_among(&rows, among, search.columns().named)
+        }
+    }
+}
+
+/// The groups of quantities that the hidden directions move, in words; `twin` is a second start, which confirms what
+/// the first suggests.
 pub(crate) fn symmetries(
     model: &Model,
     hidden: &Hidden,
     point: &[Modular],
-    twin: Option<&Twin<'_>>,
+    twin: Option<&Search<'_>>,
 ) -> Vec<Symmetry> {
     let names: Vec<&str> = model.named.iter().map(|(name, _)| name.as_str()).collect();
-    let others = twin.map(|twin| twin.hidden(hidden));
+    let others = twin.map(|twin| hidden_at(twin, hidden));
     let described = |group: Vec<&Direction>| {
         let of = |kind: Kind| {
             let here = weights_of(&group, kind, point)?;
@@ -257,7 +250,7 @@ pub(crate) fn symmetries(
                 .iter()
                 .map(|(own, _)| others.iter().find(|(o, _)| o == own));
             let twins: Vec<&Direction> = twins.collect::<Option<_>>()?;
-            let there = weights_of(&twins, kind, twin?.search.point())?;
+            let there = weights_of(&twins, kind, twin?.point())?;
             (here == there).then_some(here)
         };
         let kinds = [Kind::Scaling, Kind::Shift];

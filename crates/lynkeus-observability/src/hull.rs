@@ -12,11 +12,10 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::Budget;
 
-use crate::echelon::Echelon;
 use crate::expansion::{Affine, Columns, Expansion, Start};
-use crate::field::{Modular, Random};
 use crate::model::{Model, Role};
 use crate::series::Stop;
+use lynkeus_expr::modular::{Echelon, Modular, Random};
 
 /// Seed of the points at which the flow is looked at.
 const FIRST: u64 = 9001;

@@ -32,9 +32,7 @@
 
 mod analysis;
 mod branches;
-mod echelon;
 mod expansion;
-mod field;
 mod hidden;
 mod hull;
 mod lie;

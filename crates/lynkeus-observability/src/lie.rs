@@ -8,12 +8,11 @@
 
 use lynkeus_expr::Budget;
 
-use crate::echelon::Echelon;
 use crate::expansion::{Affine, Columns, Expansion, Start};
-use crate::field::Modular;
 use crate::hull;
 use crate::model::{Model, Role};
 use crate::series::Stop;
+use lynkeus_expr::modular::{Echelon, Modular};
 
 /// Seed of the points.
 const FIRST: u64 = 70_001;

@@ -4,9 +4,9 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable, parse_expression};
 
 use crate::branches::Reference;
-use crate::field::{Modular, Random};
-use crate::series::{Program, Unsupported};
+use crate::series::Program;
 use crate::{Quantity, Question, QuestionError, branches};
+use lynkeus_expr::modular::{Modular, Random};
 
 /// What role a symbol plays in the series.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +103,7 @@ impl Model {
         let programs = compiled(&roots).and_then(|program| Ok((program, compiled(&starts)?)));
         let (program, starts) = match programs {
             Ok(programs) => programs,
-            Err(Unsupported(reason)) => {
+            Err(reason) => {
                 let reason = format!("the model contains {reason}");
                 return Ok(Err(Refused { named, reason }));
             }

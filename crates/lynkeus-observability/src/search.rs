@@ -4,11 +4,10 @@ use std::collections::{BTreeSet, VecDeque};
 
 use lynkeus_expr::Budget;
 
-use crate::echelon::Echelon;
 use crate::expansion::{Columns, Expansion, Start};
-use crate::field::Modular;
 use crate::model::{Model, Role};
 use crate::series::Stop;
+use lynkeus_expr::modular::{Echelon, Modular};
 
 /// Products of coefficients, with a sensitivity each, that cost little.
 const WORK: usize = 100_000_000;

@@ -10,10 +10,8 @@
 
 pub mod blocks;
 pub mod chains;
-mod determined;
 mod extended;
 pub mod fate;
-pub mod indices;
 mod jumps;
 pub mod layers;
 mod matrix;
@@ -33,7 +31,6 @@ mod zero;
 
 pub use blocks::Blocks;
 pub use chains::{Assignment, Chain, ChainRequest};
-pub use determined::{determined, uncertain};
 pub use extended::{Extended, Measurement, NarrowError, Sensors, SensorsError};
 pub use layers::Layers;
 pub use matrix::Matrix;
@@ -43,7 +40,7 @@ pub use region::{Dimension, Region};
 pub use regularity::{Regularity, Trouble, has_value_at, steps};
 pub use slopes::{Innovation, Slopes};
 pub use superdiagonal::Superdiagonal;
-pub use uniform::{Blind, Uniformity, apart_whatever, uniformity};
+pub use uniform::{Blind, Uniformity, apart_whatever, determined, uncertain, uniformity};
 pub use verdict::{Coordinate, Finding, Place, Point, Side, Standing, Verdict, Witness};
 pub use words::{counted, figures, short};
 pub use zero::vanishes;

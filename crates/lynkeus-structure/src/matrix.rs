@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, VecDeque};
 
-use lynkeus_expr::{Binary, Expr, Graph, Node, Unary, jacobian};
+use lynkeus_expr::{Binary, Expr, Graph, Node, Unary, components, jacobian};
 
 use crate::zero::is_zero;
 
@@ -180,7 +180,7 @@ impl<'g> Matrix<'g> {
         places.map(|(i, j)| self.node(i, j)).collect()
     }
 
-    /// The [`determinant`]; none where it is zero everywhere. For small square matrices only.
+    /// The determinant by expansion along the rows; none where it is zero everywhere. For small square matrices only.
     pub fn determinant(&self) -> Option<Node> {
         let row = |i: usize| (0..self.columns).map(move |j| self.get(i, j)).collect();
         let rows: Rows = (0..self.rows).map(row).collect();
@@ -253,32 +253,20 @@ fn minor(
 pub(crate) fn blocks<'g>(matrix: &Matrix<'g>) -> Option<Vec<Matrix<'g>>> {
     let column_of = transversal(matrix)?;
     let n = matrix.rows;
-    // i is followed by k where row i reads the column that belongs to row k
-    let follows = |i: usize, k: usize| matrix.get(i, column_of[k]).is_some();
-    let reached: Vec<Vec<bool>> = (0..n)
-        .map(|start| {
-            let mut seen = vec![false; n];
-            seen[start] = true;
-            let mut open = vec![start];
-            while let Some(i) = open.pop() {
-                for k in (0..n).filter(|&k| follows(i, k)) {
-                    if !std::mem::replace(&mut seen[k], true) {
-                        open.push(k);
-                    }
-                }
-            }
-            seen
-        })
-        .collect();
-    let together = |i: usize, k: usize| reached[i][k] && reached[k][i];
-    let heads = (0..n).filter(|&i| (0..i).all(|k| !together(i, k)));
-    let block = |head: usize| {
-        let rows: Vec<usize> = (0..n).filter(|&k| together(head, k)).collect();
+    // row i reads the column that belongs to row k
+    let reads = |i: usize| {
+        (0..n)
+            .filter(|&k| matrix.get(i, column_of[k]).is_some())
+            .collect()
+    };
+    let mut blocks = components(&(0..n).map(reads).collect::<Vec<Vec<usize>>>());
+    blocks.sort_unstable();
+    let block = |rows: Vec<usize>| {
         Matrix::from_fn(matrix.graph(), (rows.len(), rows.len()), |i, j| {
             matrix.get(rows[i], column_of[rows[j]])
         })
     };
-    Some(heads.map(block).collect())
+    Some(blocks.into_iter().map(block).collect())
 }
 
 /// A column for every row, all different, with entries that are not zero everywhere.

@@ -6,13 +6,24 @@
 //! outputs are L_f^k h_i(x), and their Jacobian is Q(x). With inputs they are
 //! functions of x and of u, u', …; input j appears first in the derivative of
 //! order r_ij, the observation relative degree of Definition 2.2.
+//!
+//! Observability indices: of which output how many derivatives make up a map of the
+//! state that is regular, at generic points.
+//!
+//! The rows dL_f^k h_i span the observability codistribution. Index i says that the
+//! first μ_i of them are taken of output i; with Σμ_i = n they form a square matrix. There
+//! may be many such vectors, and which of them is regular on a whole box is another
+//! question than which is regular almost everywhere.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet, VecDeque};
 
 use lynkeus_expr::flow::{self, Flow, InputJet};
-use lynkeus_expr::{Expr, Graph, MissingInput, Node, jacobian};
+use lynkeus_expr::{Evaluator, Expr, Graph, MissingInput, Node, Tape, jacobian};
+use nalgebra::{DMatrix, DVector};
 
-pub use crate::matrix::{Rows, jacobian_rows};
+pub use crate::matrix::Rows;
+pub use crate::matrix::jacobian_rows;
+use crate::region::{inside, spread};
 use crate::{Extended, Region, Verdict, vanishes};
 
 /// f and g of x' = f(x) + g(x)u.
@@ -202,16 +213,217 @@ pub fn relative_degree(
     })
 }
 
+/// Points at which the rank of the rows is tried.
+const POINTS: usize = 5;
+/// Points at which the sign of a determinant is tried.
+const SIGNS: usize = 40;
+/// Index vectors whose rank is tried.
+const VISITED: usize = 300;
+/// A row of unit length that keeps less than this beside the rows before it
+/// depends on them. Long chains lose about a digit per row without being
+/// singular, rounding leaves 1e-15.
+const RANK_TOLERANCE: f64 = 1e-12;
+
+/// The rows dL_f^k h_i, output by output, order by order, at points of the box.
+#[derive(Debug)]
+pub struct Codistribution {
+    evaluator: Evaluator,
+    /// ranges of what the rows read, time last
+    sides: Vec<(f64, f64)>,
+    /// rows of each output
+    lengths: Vec<usize>,
+    /// number of states
+    n: usize,
+}
+
+impl Codistribution {
+    /// For `rows[i]`, the gradients of the derivatives 0, 1, … of output i.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where the plant has parameters without value.
+    pub fn new(extended: &Extended<'_>, rows: &[Rows]) -> Result<Self, MissingInput> {
+        let zero = extended.graph().constant(0.0).node();
+        let entries = rows.iter().flatten().flatten();
+        let entries: Vec<Node> = entries.map(|e| e.unwrap_or(zero)).collect();
+        let region = extended.region();
+        let tape = Tape::new(extended.graph(), &region.symbols(), &entries)?;
+        let sides = region.dimensions.iter().map(|d| (d.min, d.max));
+        Ok(Self {
+            evaluator: tape.evaluator(),
+            sides: sides.collect(),
+            lengths: rows.iter().map(Vec::len).collect(),
+            n: extended.states.len(),
+        })
+    }
+
+    /// The indices of A. J. Krener and W. Respondek (SIAM J. Control Optim. 23 (1985)
+    /// 197–216, after Brunovsky): rows are taken in the order k = 0, 1, …, within k in the
+    /// order of the outputs, and kept while they are independent of those before; an
+    /// output that fails once is left out from there on. Fewer than n in sum where
+    /// no point shows more.
+    pub fn krener_respondek(&mut self) -> Vec<usize> {
+        let mut best = vec![0; self.lengths.len()];
+        for point in 0..POINTS {
+            let Some(values) = self.at(point) else {
+                continue;
+            };
+            let indices = self.indices_at(&values);
+            if indices.iter().sum::<usize>() > best.iter().sum() {
+                best = indices;
+            }
+        }
+        best
+    }
+
+    /// Further index vectors with n independent rows at some point: those near
+    /// `first` are looked at, and those with the fewest derivatives come first.
+    pub fn alternatives(&mut self, first: &[usize]) -> Vec<Vec<usize>> {
+        let points: Vec<Vec<f64>> = (0..POINTS).filter_map(|p| self.at(p)).collect();
+        let mut seen = HashSet::from([first.to_vec()]);
+        let mut open = VecDeque::from([first.to_vec()]);
+        let mut found = vec![];
+        while let Some(indices) = open.pop_front() {
+            for next in self.neighbours(&indices) {
+                if seen.len() >= VISITED || !seen.insert(next.clone()) {
+                    continue;
+                }
+                if points
+                    .iter()
+                    .any(|values| self.is_independent(values, &next))
+                {
+                    found.push(next.clone());
+                }
+                open.push_back(next);
+            }
+        }
+        found.sort_by_key(|indices| indices.iter().copied().max());
+        found
+    }
+
+    /// Whether the determinant of the chosen rows is seen with both signs: such indices
+    /// are singular somewhere, unless the box falls apart.
+    pub fn changes_sign(&mut self, indices: &[usize]) -> bool {
+        let (mut positive, mut negative) = (false, false);
+        for point in 0..SIGNS {
+            let Some(values) = self.at(point) else {
+                continue;
+            };
+            let rows = self.chosen(indices);
+            let square = rows.len() == self.n;
+            let matrix = DMatrix::from_fn(rows.len(), self.n, |i, j| values[rows[i] * self.n + j]);
+            let det = if square { matrix.determinant() } else { 0.0 };
+            positive |= det > 0.0;
+            negative |= det < 0.0;
+        }
+        positive && negative
+    }
+
+    /// One derivative less of one output, one more of another.
+    fn neighbours(&self, indices: &[usize]) -> Vec<Vec<usize>> {
+        let mut all = vec![];
+        for from in (0..indices.len()).filter(|&i| indices[i] > 0) {
+            for to in (0..indices.len()).filter(|&i| indices[i] < self.lengths[i]) {
+                if from != to {
+                    let mut next = indices.to_vec();
+                    next[from] -= 1;
+                    next[to] += 1;
+                    all.push(next);
+                }
+            }
+        }
+        all
+    }
+
+    /// Places of the chosen rows.
+    fn chosen(&self, indices: &[usize]) -> Vec<usize> {
+        let mut start = 0;
+        let mut rows = vec![];
+        for (&count, &length) in indices.iter().zip(&self.lengths) {
+            rows.extend(start..start + count.min(length));
+            start += length;
+        }
+        rows
+    }
+
+    /// The entries at a generic point; none outside the domain of the equations.
+    fn at(&mut self, point: usize) -> Option<Vec<f64>> {
+        let sides = self.sides.iter().enumerate();
+        let at: Vec<f64> = sides
+            .map(|(i, &(min, max))| inside(min, max, spread(point, i)))
+            .collect();
+        let mut values = vec![0.0; self.lengths.iter().sum::<usize>() * self.n];
+        self.evaluator.eval(&at, &mut values);
+        values.iter().all(|v| v.is_finite()).then_some(values)
+    }
+
+    fn is_independent(&self, values: &[f64], indices: &[usize]) -> bool {
+        let mut kept = vec![];
+        let rows = self.chosen(indices);
+        rows.len() == self.n
+            && rows
+                .iter()
+                .all(|&row| adds(&mut kept, self.row(values, row)))
+    }
+
+    fn row<'v>(&self, values: &'v [f64], row: usize) -> &'v [f64] {
+        &values[row * self.n..(row + 1) * self.n]
+    }
+
+    fn indices_at(&self, values: &[f64]) -> Vec<usize> {
+        let mut kept = vec![];
+        let mut indices = vec![0; self.lengths.len()];
+        let orders = self.lengths.iter().copied().max().unwrap_or(0);
+        for k in 0..orders {
+            let mut start = 0;
+            for (index, &length) in indices.iter_mut().zip(&self.lengths) {
+                let place = start + k;
+                start += length;
+                if *index < k || k >= length || kept.len() == self.n {
+                    continue;
+                }
+                if adds(&mut kept, self.row(values, place)) {
+                    *index = k + 1;
+                }
+            }
+        }
+        indices
+    }
+}
+
+/// Adds a row, orthonormal, if it is independent of those before.
+fn adds(kept: &mut Vec<DVector<f64>>, row: &[f64]) -> bool {
+    let mut row = DVector::from_column_slice(row);
+    let norm = row.norm();
+    if norm == 0.0 {
+        return false;
+    }
+    row /= norm;
+    // twice is enough for orthogonality to rounding
+    for _ in 0..2 {
+        for q in &*kept {
+            let share = q.dot(&row);
+            row.axpy(-share, q, 1.0);
+        }
+    }
+    let left = row.norm();
+    let independent = left > RANK_TOLERANCE;
+    if independent {
+        kept.push(row / left);
+    }
+    independent
+}
+
 #[cfg(test)]
 mod tests {
+    use lynkeus_model::{LoadOptions, Plant};
+
     use super::*;
     use crate::Sensors;
-    use lynkeus_model::{LoadOptions, Plant};
 
     #[test]
     fn the_first_equation_that_is_not_affine_is_named() {
         let text = "model P input Real u; Real a; Real b; output Real y = a;
-          equation der(a) = b + u; der(b) = u*u; end P;";
+      equation der(a) = b + u; der(b) = u*u; end P;";
         let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
         let extended = Extended::new(&plant, &Sensors::default()).unwrap();
         let why = affine_form(&extended).unwrap().unwrap_err();
@@ -219,5 +431,62 @@ mod tests {
             why.contains("equation of b is not affine in the input u"),
             "{why}"
         );
+    }
+
+    fn codistribution(text: &str) -> Codistribution {
+        let plant = Plant::from_modelica(text, "p.mo", &LoadOptions::default()).unwrap();
+        let extended = Extended::new(&plant, &Sensors::default()).unwrap();
+        let form = affine_form(&extended).unwrap().unwrap();
+        let n = extended.states.len();
+        let h = lie_derivatives(&extended, &form, n - 1).unwrap();
+        let rows: Vec<Rows> = h
+            .iter()
+            .map(|h| jacobian_rows(&plant.graph, h, &extended.symbols()))
+            .collect();
+        Codistribution::new(&extended, &rows).unwrap()
+    }
+
+    /// Two sensors on chains of 3 and 1, and a third that adds nothing.
+    #[test]
+    fn rows_are_taken_while_they_are_independent() {
+        let text = "model P Real a; Real b; Real c; Real d;
+      output Real y = a; output Real z = a + d; output Real w = 2*a;
+      equation der(a) = b; der(b) = c + d*a; der(c) = -sin(a); der(d) = -d; end P;";
+        assert_eq!(codistribution(text).krener_respondek(), [3, 1, 0]);
+    }
+
+    #[test]
+    fn what_no_output_feels_leaves_the_sum_short() {
+        let text = "model P Real a; Real b; output Real y = a;
+      equation der(a) = -a; der(b) = a; end P;";
+        assert_eq!(codistribution(text).krener_respondek(), [1]);
+    }
+
+    /// z' = −z + b c sees c wherever b is not zero, y'' sees it everywhere. y alone shows
+    /// nothing of d, z alone all four but not everywhere.
+    #[test]
+    fn other_indices_are_found_and_those_that_change_sign_are_told() {
+        let text = "model P Real a(min = -2, max = 2); Real b(min = -2, max = 2);
+      Real c(min = -2, max = 2); Real d(min = -2, max = 2); output Real y = a; output Real z = d;
+      equation der(a) = b; der(b) = c; der(c) = -a - 3*b - 3*c; der(d) = -d + b*c; end P;";
+        let mut rows = codistribution(text);
+        assert_eq!(rows.krener_respondek(), [2, 2]);
+        assert_eq!(rows.alternatives(&[2, 2]), [[1, 3], [3, 1], [0, 4]]);
+        assert!(rows.changes_sign(&[2, 2]));
+        assert!(!rows.changes_sign(&[3, 1]));
+    }
+
+    /// Twenty outputs of twenty states: the number of tries is bounded.
+    #[test]
+    fn many_outputs_are_not_searched_for_ever() {
+        let declared: String = (0..20)
+            .map(|i| format!("Real x{i}; output Real y{i} = x{i};"))
+            .collect();
+        let equations: String = (0..20)
+            .map(|i| format!("der(x{i}) = x{};", (i + 1) % 20))
+            .collect();
+        let mut rows = codistribution(&format!("model P {declared} equation {equations} end P;"));
+        assert_eq!(rows.krener_respondek(), [1; 20]);
+        assert!(rows.alternatives(&[1; 20]).len() < VISITED);
     }
 }

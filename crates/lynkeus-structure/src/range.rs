@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Evaluator, Graph, Interval, MissingInput, Node, Tape};
 
 use crate::region::{Cell, Question, highest_corner, lowest_corner};
-use crate::{Coordinate, Place, Point, Region, Regularity};
+use crate::{Place, Point, Region, Regularity};
 
 /// Cells examined per end of the range.
 const BUDGET: usize = 4000;
@@ -137,7 +137,7 @@ fn valued<'a>(
     region: &'a Region,
     budget: usize,
 ) -> Result<Option<Search<'a>>, MissingInput> {
-    if graph.noted(&Glance(Question::new(node, region, 0))) == Some(false) {
+    if graph.noted(&Question::new(node, region, 0)) == Some(false) {
         return Ok(None);
     }
     let search = Search::new(graph, node, region, budget)?;
@@ -155,7 +155,8 @@ fn has_values(
     if search.is_defined() {
         return Ok(true);
     }
-    let question = Glance(Question::new(node, region, 0));
+    // of no budget: that of no search
+    let question = Question::new(node, region, 0);
     if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
@@ -164,19 +165,15 @@ fn has_values(
     Ok(regular)
 }
 
-/// Whether an expression has values on the whole box.
-#[derive(Clone, PartialEq, Eq, Hash)]
-struct Glance(Question);
-
 fn both_ends(search: &mut Search<'_>, valued: bool) -> Range {
     let lower = search.end(End::Lower);
     let upper = search.end(End::Upper);
     let values = Interval::new(lower.bound, -upper.bound).ok();
     Range {
         enclosure: values.filter(|_| valued).unwrap_or(Interval::UNKNOWN),
-        lowest: search.point(End::Lower),
-        highest: search.point(End::Upper),
-        weakest: lower.weakest,
+        lowest: search.lowest.take(),
+        highest: search.highest.take(),
+        weakest: search.region.named(&search.tree[lower.place].cell),
     }
 }
 
@@ -213,14 +210,6 @@ impl End {
     }
 }
 
-/// What was found of one end.
-struct Found {
-    /// every value on the region is this or further in
-    bound: f64,
-    /// the cell with that bound
-    weakest: Place,
-}
-
 /// A cell that was bounded.
 struct Branch {
     cell: Cell,
@@ -232,14 +221,9 @@ struct Branch {
     shared: Option<End>,
 }
 
-/// A value attained.
-struct Attained {
-    at: Vec<f64>,
-    value: f64,
-}
-
 /// A cell by its place in the tree, the one with the lowest bound first.
 struct Open {
+    /// every value on the cell is this or further in
     bound: f64,
     place: usize,
 }
@@ -269,8 +253,8 @@ struct Search<'a> {
     budget: usize,
     tree: Vec<Branch>,
     /// the smallest and the largest value attained
-    lowest: Option<Attained>,
-    highest: Option<Attained>,
+    lowest: Option<Point>,
+    highest: Option<Point>,
 }
 
 impl<'a> Search<'a> {
@@ -305,7 +289,7 @@ impl<'a> Search<'a> {
     }
 
     /// The end of the range, as well as the budget allows.
-    fn end(&mut self, end: End) -> Found {
+    fn end(&mut self, end: End) -> Open {
         self.end_beyond(end, f64::NEG_INFINITY, f64::INFINITY)
     }
 
@@ -334,7 +318,7 @@ impl<'a> Search<'a> {
 
     /// The same where a bound of `enough` is as good as a better one, and none matters once a value of at
     /// most `hopeless` was seen.
-    fn end_beyond(&mut self, end: End, hopeless: f64, enough: f64) -> Found {
+    fn end_beyond(&mut self, end: End, hopeless: f64, enough: f64) -> Open {
         self.sample(0, true);
         let mut open = BinaryHeap::from([Open {
             bound: end.bound(self.tree[0].values),
@@ -362,27 +346,9 @@ impl<'a> Search<'a> {
             }
         }
         // one cell stands there from the start, and two take the place of one
-        let (bound, place) = open
-            .peek()
-            .map_or((f64::INFINITY, 0), |o| (o.bound, o.place));
-        Found {
-            bound,
-            weakest: self.region.named(&self.tree[place].cell),
-        }
-    }
-
-    /// The point with the value furthest out, by names.
-    fn point(&self, end: End) -> Option<Point> {
-        let best = match end {
-            End::Lower => self.lowest.as_ref(),
-            End::Upper => self.highest.as_ref(),
-        }?;
-        let pairs = self.region.dimensions.iter().zip(&best.at);
-        Some(Point {
-            coordinates: pairs
-                .map(|(d, &x)| Coordinate::from((d.name.clone(), x)))
-                .collect(),
-            value: best.value,
+        open.pop().unwrap_or(Open {
+            bound: f64::INFINITY,
+            place: 0,
         })
     }
 
@@ -446,22 +412,22 @@ impl<'a> Search<'a> {
             points.extend(self.region.faces(cell));
         }
         for point in points {
-            self.look(point);
+            self.look(&point);
         }
     }
 
-    fn look(&mut self, at: Vec<f64>) {
-        if !(at.iter().all(|x| x.is_finite()) && self.region.reaches(&at)) {
+    fn look(&mut self, at: &[f64]) {
+        if !(at.iter().all(|x| x.is_finite()) && self.region.reaches(at)) {
             return;
         }
         let mut out = [0.0];
-        self.evaluator.eval(&at, &mut out);
+        self.evaluator.eval(at, &mut out);
         let [value] = out;
         if value.is_nan() {
             return;
         }
-        let attained = || Attained {
-            at: at.clone(),
+        let attained = || Point {
+            coordinates: self.region.coordinates(at),
             value,
         };
         if self.lowest.as_ref().is_none_or(|best| value < best.value) {

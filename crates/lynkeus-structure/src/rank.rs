@@ -14,10 +14,7 @@ use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Tape, jacobian};
 use crate::matrix::{blocks, determinant};
 use crate::region::Cell;
 use crate::words::short;
-use crate::{
-    Coordinate, Dimension, Finding, Matrix, Point, Region, Regularity, Verdict, Witness, sign,
-    steps,
-};
+use crate::{Dimension, Finding, Matrix, Point, Region, Regularity, Verdict, Witness, sign, steps};
 
 /// Larger minors are not expanded.
 const MAX_COLUMNS: usize = 5;
@@ -302,7 +299,7 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         let entries = tape.eval_in(&Intervals, cell);
         entries.iter().all(|e| e.is_defined() && !e.is_empty()) && solve(&entries, &zeros).1
     };
-    let mut signs = Signs::default();
+    let (mut negative, mut positive): (Option<Point>, Option<Point>) = (None, None);
     let mut open = VecDeque::from([region.cell()]);
     let mut parts = 0;
     let mut looked = 0;
@@ -314,14 +311,26 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         }
         let middle = region.middle_point(&cell);
         let at: Cell = middle.iter().map(|&x| Interval::point(x)).collect();
-        let det = sure_determinant(tape.eval_in(&Intervals, &at), block.rows);
-        signs.note(&region, &middle, det);
+        if let Some(value) = sure_determinant(tape.eval_in(&Intervals, &at), block.rows) {
+            let seen = if value > 0.0 {
+                &mut positive
+            } else {
+                &mut negative
+            };
+            *seen = Some(Point {
+                coordinates: region.coordinates(&middle),
+                value,
+            });
+        }
+        // determinants of either sign
+        let both = negative.iter().chain(&positive).cloned();
+        let witness = Some(both.collect::<Vec<Point>>()).filter(|points| points.len() == 2);
         let halves = region
             .split(&cell)
             .filter(|_| looked < CELLS && graph.spent().is_none());
-        let Some((first, second)) = halves.filter(|_| signs.witness().is_none()) else {
-            let verdict = match signs.witness() {
-                Some(witness) => Verdict::Refuted(witness),
+        let Some((first, second)) = halves.filter(|_| witness.is_none()) else {
+            let verdict = match witness {
+                Some(points) => Verdict::Refuted(Witness { points }),
                 None => Verdict::Undecided(region.named(&cell)),
             };
             return Ok(Block {
@@ -342,36 +351,6 @@ fn by_parts(block: &Matrix<'_>, region: &Region) -> Result<Block, MissingInput> 
         bounds: None,
         parts,
     })
-}
-
-/// Points with determinants of either sign.
-#[derive(Default)]
-struct Signs {
-    positive: Option<Point>,
-    negative: Option<Point>,
-}
-
-impl Signs {
-    fn note(&mut self, region: &Region, at: &[f64], det: Option<f64>) {
-        let Some(value) = det else { return };
-        let names = region.dimensions.iter().map(|d| d.name.clone());
-        let point = Point {
-            coordinates: names
-                .zip(at.iter().copied())
-                .map(Coordinate::from)
-                .collect(),
-            value,
-        };
-        match value > 0.0 {
-            true => self.positive = Some(point),
-            false => self.negative = Some(point),
-        }
-    }
-
-    fn witness(&self) -> Option<Witness> {
-        let points = vec![self.negative.clone()?, self.positive.clone()?];
-        Some(Witness { points })
-    }
 }
 
 /// The determinant by elimination, where its sign is beyond rounding errors.

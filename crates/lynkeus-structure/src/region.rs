@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Interval, Node};
 
-use crate::{Place, Side};
+use crate::{Coordinate, Place, Side};
 
 /// One side of the box.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,6 +98,12 @@ impl Region {
         let open = |d: &&Dimension| d.min.is_infinite() || d.max.is_infinite();
         let open = self.dimensions.iter().filter(open);
         open.map(|d| d.name.as_str()).collect()
+    }
+
+    /// A point by the names of the sides.
+    pub(crate) fn coordinates(&self, point: &[f64]) -> Vec<Coordinate> {
+        let sides = self.dimensions.iter().zip(point);
+        sides.map(|(d, &x)| (d.name.clone(), x).into()).collect()
     }
 
     /// Whether a point is not absurdly far where no end is declared.

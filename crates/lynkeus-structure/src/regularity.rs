@@ -254,13 +254,6 @@ fn search(
     Ok(None)
 }
 
-/// A part of expressions, with what its trouble depends on.
-#[derive(Clone, PartialEq, Eq, Hash)]
-struct PartOf {
-    question: Question,
-    moving: Vec<Node>,
-}
-
 /// [`search`] of a part, which the graph remembers.
 fn part(
     graph: &Graph,
@@ -271,15 +264,13 @@ fn part(
     let symbols = graph.symbols_of(&[node]);
     let region = region.restricted(&symbols);
     let moving = moving.iter().copied().filter(|m| symbols.contains(m));
-    let part = PartOf {
-        moving: moving.collect(),
-        question: Question::new(node, &region, BUDGET),
-    };
-    if let Some(known) = graph.noted(&part) {
+    let moving: Vec<Node> = moving.collect();
+    let question = (Question::new(node, &region, BUDGET), moving);
+    if let Some(known) = graph.noted(&question) {
         return Ok(known);
     }
-    let found = search(graph, node, &part.moving, &region)?;
-    graph.note(part, found.clone());
+    let found = search(graph, node, &question.1, &region)?;
+    graph.note(question, found.clone());
     Ok(found)
 }
 

@@ -331,37 +331,32 @@ enum Kernel {
     Unknown,
 }
 
-/// A column in which nothing but a one is left.
-struct Pivot {
-    row: usize,
-    column: usize,
-}
-
 /// The kernel of F.
 fn kernel(F: &DMatrix<f64>) -> Kernel {
     let mut rows = points(F);
-    let mut pivots: Vec<Pivot> = vec![];
-    let mut free = vec![];
+    // per column the row of the one that is left there
+    let mut pivots: Vec<Option<usize>> = vec![];
     for column in 0..F.ncols() {
-        let unused = (0..F.nrows()).filter(|row| pivots.iter().all(|p| p.row != *row));
+        let unused = (0..F.nrows()).filter(|row| !pivots.contains(&Some(*row)));
         let size = |row: usize| rows[row][column].mignitude();
         let largest = unused.max_by(|&i, &j| size(i).total_cmp(&size(j)));
-        match largest.filter(|&row| size(row) > 0.0) {
-            Some(row) => {
-                eliminate(&mut rows, row, column);
-                pivots.push(Pivot { row, column });
-            }
-            None => free.push(column),
+        let pivot = largest.filter(|&row| size(row) > 0.0);
+        if let Some(row) = pivot {
+            eliminate(&mut rows, row, column);
         }
+        pivots.push(pivot);
     }
-    if free.is_empty() {
+    if pivots.iter().all(Option::is_some) {
         return Kernel::Zero;
     }
-    let directions = free.iter().map(|&column| {
+    let free = (0..F.ncols()).filter(|&column| pivots[column].is_none());
+    let directions = free.map(|column| {
         let mut ξ = vec![0.0; F.ncols()];
         ξ[column] = 1.0;
-        for pivot in &pivots {
-            ξ[pivot.column] = -rows[pivot.row][column].midpoint();
+        for (place, row) in pivots.iter().enumerate() {
+            if let Some(row) = row {
+                ξ[place] = -rows[*row][column].midpoint();
+            }
         }
         ξ
     });

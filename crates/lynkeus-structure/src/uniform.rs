@@ -3,22 +3,24 @@
 //!
 //! The outputs with their first derivatives along the flow, for inputs that stay
 //! constant, are a map of the state; of its rows n independent ones are chosen
-//! ([`crate::indices`]), with a determinant that is proved to keep its sign if there are any.
+//! ([`Codistribution`]), with a determinant that is proved to keep its sign if there are any.
 //! Where their determinant is not zero the state is seen, at once and for any small error.
 //! Where it is zero, that many derivatives do not show it.
+//!
+//! What is known everywhere on the box whatever the inputs do, unknown ones being any functions of time:
+//! [`determined`].
 
 use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::interval::Intervals;
-use lynkeus_expr::{Graph, MissingInput, Node, Tape};
+use lynkeus_expr::{Graph, MissingInput, Node, Tape, jacobian};
 
-use crate::indices::Codistribution;
 use crate::matrix::{Rows, determinant, jacobian_rows};
-use crate::output_map::output_derivatives;
+use crate::output_map::{Codistribution, output_derivatives};
 use crate::region::{Cell, inside};
 use crate::{
-    Extended, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, one_to_one, sign,
-    vanishes,
+    Extended, Finding, OneToOne, Place, Region, Regularity, Side, Verdict, magnitude_within,
+    one_to_one, sign, vanishes,
 };
 
 /// A determinant of more states has too many terms.
@@ -409,22 +411,121 @@ fn jumping(graph: &Graph, function: Node) -> HashSet<Node> {
     graph.symbols_of(&jumps).into_iter().collect()
 }
 
+/// States beyond which nothing is tried.
+const KNOWN_STATES: usize = 300;
+/// Cells examined for the size of a slope.
+const SLOPE_CELLS: usize = 400;
+
+/// Per extended state whether it is known everywhere on the box whatever the inputs do: because alone, beside what is
+/// known already, it moves an output or the derivative of a known state, with a slope that never vanishes. The functions
+/// are then strictly monotone in it, so that it is known at once and globally: no derivative of an unknown input enters.
+/// False says nothing.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn determined(extended: &Extended<'_>) -> Result<Vec<bool>, MissingInput> {
+    let (graph, region) = (extended.graph(), extended.region());
+    let mut known = vec![false; extended.states.len()];
+    if known.len() > KNOWN_STATES {
+        return Ok(known);
+    }
+    // a function that jumps may take a value twice though its slope has one sign
+    if extended.regularity(&region)?.verdict != Verdict::Proved {
+        return Ok(known);
+    }
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = outputs
+        .chain(extended.derivatives.iter().copied())
+        .collect();
+    let slopes = jacobian::forward(graph, &functions, &extended.symbols());
+    let first = extended.outputs.len();
+    // the derivative of an unknown input is no equation
+    let mut open: Vec<usize> = (0..first + extended.plant_states()).collect();
+    loop {
+        let mut next = None;
+        for (place, &row) in open.iter().enumerate() {
+            let is_told = row < first || known[row - first];
+            let mut entries = slopes.row(row).filter(|(j, _)| !known[*j]);
+            if let (true, Some((j, slope)), None) = (is_told, entries.next(), entries.next()) {
+                next = Some((place, j, slope));
+                break;
+            }
+        }
+        let Some((place, j, slope)) = next.filter(|_| graph.spent().is_none()) else {
+            return Ok(known);
+        };
+        open.remove(place);
+        known[j] = sign::keeps_sign(graph, slope, &region)?.finding.verdict == Verdict::Proved;
+    }
+}
+
+/// Per extended state how far two of its values can be apart that the same outputs go with, where that is
+/// known: zero for those of `known`, what is `given` for some (place, size), and what follows from these by an output,
+/// or by the derivative of a known state, along a slope that never vanishes.
+///
+/// # Errors
+/// [`MissingInput`] where the plant has parameters without value.
+pub fn uncertain(
+    extended: &Extended<'_>,
+    known: &[bool],
+    given: &[(usize, f64)],
+) -> Result<Vec<Option<f64>>, MissingInput> {
+    let (graph, region) = (extended.graph(), extended.region());
+    let mut sizes: Vec<Option<f64>> = known.iter().map(|known| known.then_some(0.0)).collect();
+    for &(place, size) in given {
+        sizes[place] = sizes[place].or(Some(size).filter(|size| size.is_finite()));
+    }
+    if sizes.len() > KNOWN_STATES || extended.regularity(&region)?.verdict != Verdict::Proved {
+        return Ok(sizes);
+    }
+    let outputs = extended.outputs.iter().map(|o| o.variable.node);
+    let functions: Vec<Node> = outputs
+        .chain(extended.derivatives.iter().copied())
+        .collect();
+    let slopes = jacobian::forward(graph, &functions, &extended.symbols());
+    let first = extended.outputs.len();
+    let mut open: Vec<usize> = (0..first + extended.plant_states())
+        .filter(|&row| row < first || known[row - first])
+        .collect();
+    loop {
+        let one = |row: usize| {
+            let mut entries = slopes.row(row).filter(|(j, _)| sizes[*j].is_none());
+            entries.next().filter(|_| entries.next().is_none())
+        };
+        let mut next = open.iter().enumerate();
+        let next = next.find_map(|(place, &row)| Some((place, row, one(row)?)));
+        let Some((place, row, (j, slope))) = next.filter(|_| graph.spent().is_none()) else {
+            return Ok(sizes);
+        };
+        open.remove(place);
+        let (least, _) = sign::keeps_sign(graph, slope, &region)?.bounds;
+        let mut sum = 0.0;
+        for (k, slope) in slopes.row(row).filter(|(k, _)| *k != j) {
+            let size = sizes[k].unwrap_or(f64::INFINITY);
+            if size > 0.0 {
+                sum += size * magnitude_within(graph, slope, &region, SLOPE_CELLS)?;
+            }
+        }
+        sizes[j] = Some(sum / least).filter(|size| size.is_finite());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use lynkeus_model::{LoadOptions, Plant};
 
     use super::*;
-    use crate::{Sensors, determined};
+    use crate::Sensors;
 
     fn examined(equations: &str) -> Option<Uniformity> {
         let text = format!(
             "model P
-          input Real u(min = -1, max = 1);
-          Real a(min = -1, max = 1); Real b(min = -1, max = 2);
-          output Real y = a;
-        equation
-          {equations}
-        end P;"
+      input Real u(min = -1, max = 1);
+      Real a(min = -1, max = 1); Real b(min = -1, max = 2);
+      output Real y = a;
+    equation
+      {equations}
+    end P;"
         );
         let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
         let extended = Extended::new(&plant, &Sensors::default()).unwrap();
@@ -472,9 +573,9 @@ mod tests {
     fn what_another_output_shows_by_a_jump_is_not_hidden() {
         let hidden = |output: &str| {
             let text = format!(
-            "model P input Real u(min = -1, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2);
-               output Real y = a; output Real z = {output}; equation der(a) = u*b; der(b) = -b; end P;"
-        );
+        "model P input Real u(min = -1, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2);
+           output Real y = a; output Real z = {output}; equation der(a) = u*b; der(b) = -b; end P;"
+    );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
             let extended = Extended::new(&plant, &Sensors::default()).unwrap();
             let found = uniformity(&extended, &determined(&extended).unwrap())
@@ -526,9 +627,9 @@ mod tests {
     fn a_whole_input_blinds_at_whole_values_only() {
         let blind = |factor: &str| {
             let text = format!(
-            "model P input Integer s(min = 0, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2); output Real y = a;
-             equation der(a) = {factor}*b; der(b) = -b; end P;"
-        );
+        "model P input Integer s(min = 0, max = 1); Real a(min = -1, max = 1); Real b(min = -1, max = 2); output Real y = a;
+         equation der(a) = {factor}*b; der(b) = -b; end P;"
+    );
             let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
             let extended = Extended::new(&plant, &Sensors::default()).unwrap();
             uniformity(&extended, &determined(&extended).unwrap())
@@ -548,5 +649,42 @@ mod tests {
     #[test]
     fn what_no_output_shows_has_no_map() {
         assert!(examined("der(a) = -a; der(b) = -b;").is_none());
+    }
+
+    fn known(equations: &str) -> Vec<bool> {
+        let text = format!(
+            "model P
+          input Real w(min = -1, max = 1);
+          Real a(min = -1, max = 1); Real b(min = 1, max = 2); Real c(min = -1, max = 1);
+          output Real y = a;
+        equation
+          {equations}
+        end P;"
+        );
+        let plant = Plant::from_modelica(&text, "p.mo", &LoadOptions::default()).unwrap();
+        let sensors = Sensors {
+            unknown: vec!["w".into()],
+            ..Sensors::default()
+        };
+        determined(&Extended::new(&plant, &sensors).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_chain_to_the_unknown_input_is_known_everywhere() {
+        let found = known("der(a) = b^2; der(b) = c - b; der(c) = w;");
+        assert_eq!(found, [true; 4]);
+    }
+
+    #[test]
+    fn two_at_once_and_slopes_that_vanish_are_not() {
+        // b and w together
+        let found = known("der(a) = b + w; der(b) = -b; der(c) = -c;");
+        assert_eq!(found, [true, false, false, false]);
+        // c^2 does not tell the sign of c
+        let found = known("der(a) = b; der(b) = c^2; der(c) = w;");
+        assert_eq!(found, [true, true, false, false]);
+        // a jump
+        let found = known("der(a) = if a > 0 then b else b - 3; der(b) = c; der(c) = w;");
+        assert_eq!(found, [false; 4]);
     }
 }

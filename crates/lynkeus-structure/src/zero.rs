@@ -7,7 +7,7 @@ use lynkeus_expr::interval::Intervals;
 use lynkeus_expr::{Binary, Graph, Interval, MissingInput, Node, Op, Tape, Unary};
 
 use crate::region::{inside, spread};
-use crate::{Coordinate, Point, Region, Verdict, Witness};
+use crate::{Point, Region, Verdict, Witness};
 
 /// Points tried beside those on the edges of the box.
 const POINTS: usize = 12;
@@ -41,9 +41,8 @@ pub fn vanishes(graph: &Graph, node: Node, region: &Region) -> Result<Verdict, M
         let enclosure = value(&cell);
         let sure = enclosure.is_positive() || enclosure.is_negative();
         if sure && enclosure.lo().is_finite() && enclosure.hi().is_finite() {
-            let names = region.dimensions.iter().map(|d| d.name.clone());
             return Ok(Verdict::Refuted(Witness::from(Point {
-                coordinates: names.zip(point).map(Coordinate::from).collect(),
+                coordinates: region.coordinates(&point),
                 value: enclosure.lo() + (enclosure.hi() - enclosure.lo()) / 2.0,
             })));
         }

@@ -10,13 +10,12 @@ mod diagnose;
 mod linear;
 mod loops;
 mod matching;
-mod order;
 mod reduce;
 mod system;
 
 use std::collections::HashMap;
 
-use lynkeus_expr::Node;
+use lynkeus_expr::{Node, components};
 
 pub(crate) use system::{FlatEquation, System, Unknown};
 
@@ -73,6 +72,12 @@ fn in_order(
     matching: &Matching,
     source: &str,
 ) -> Result<HashMap<Node, Node>> {
-    let blocks = order::blocks(&incidence.of_equation, matching);
+    // an equation needs those that give its unknowns
+    let needs = |unknowns: &Vec<usize>| {
+        let given = unknowns.iter().filter_map(|&u| matching.of_unknown[u]);
+        given.collect()
+    };
+    let needs: Vec<Vec<usize>> = incidence.of_equation.iter().map(needs).collect();
+    let blocks = components(&needs);
     blocks::Solver::new(system, incidence, source).solve(&blocks, matching)
 }

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::field::{Modular, Random};
+use lynkeus_expr::modular::{Modular, Random};
 
 /// Largest number looked for beside an earlier argument of a logarithm, and largest multiple of an angle.
 const LARGEST: u64 = 24;

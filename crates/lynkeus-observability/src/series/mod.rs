@@ -12,5 +12,5 @@ mod program;
 mod run;
 
 pub(crate) use functions::Functions;
-pub(crate) use program::{Program, Unsupported};
+pub(crate) use program::Program;
 pub(crate) use run::{Run, Stop};

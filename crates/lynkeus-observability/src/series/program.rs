@@ -5,8 +5,8 @@ use std::f64::consts::{E, LN_2, LN_10, PI};
 
 use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
-use crate::field::Modular;
 use crate::series::functions::Arc;
+use lynkeus_expr::modular::Modular;
 
 /// One operation; slots are numbered in order.
 #[derive(Clone, Copy, Debug)]
@@ -50,19 +50,18 @@ pub(crate) struct Program {
     pub choices: usize,
 }
 
-/// An expression that has no power series here.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Unsupported(pub String);
-
 impl Program {
     /// Compiles roots. `branch` gives the value of a condition at a reference point:
     /// of several branches the one there is analysed.
+    ///
+    /// # Errors
+    /// What has no power series here, in words.
     pub fn new(
         graph: &Graph,
         symbols: &[Node],
         roots: &[Node],
         branch: &dyn Fn(Node) -> Option<f64>,
-    ) -> Result<Self, Unsupported> {
+    ) -> Result<Self, String> {
         let mut builder = Builder {
             graph,
             symbols,
@@ -78,8 +77,7 @@ impl Program {
         }
         let slot = |root: &Node| builder.slots.get(root).copied();
         let roots: Option<Vec<usize>> = roots.iter().map(slot).collect();
-        builder.program.roots =
-            roots.ok_or_else(|| Unsupported("a linear system as a value".into()))?;
+        builder.program.roots = roots.ok_or_else(|| "a linear system as a value".to_owned())?;
         Ok(builder.program)
     }
 }
@@ -178,7 +176,7 @@ impl Builder<'_> {
     }
 
     /// Slots of the arguments; a linear system has none of its own.
-    fn node(&mut self, node: Node) -> Result<(), Unsupported> {
+    fn node(&mut self, node: Node) -> Result<(), String> {
         let of = |builder: &Self, a: Node| builder.slots.get(&a).copied().unwrap_or(usize::MAX);
         let slot = match self.graph.op(node) {
             Op::Constant(x) => self.number(x)?,
@@ -193,15 +191,13 @@ impl Builder<'_> {
             Op::Solve(_) => return self.solve(node),
             Op::Implicit(_) => {
                 let text = self.graph.render(node, 60);
-                return Err(Unsupported(format!("an algebraic loop, {text}")));
+                return Err(format!("an algebraic loop, {text}"));
             }
             Op::Entry(solve, i) => match self.solutions.get(&solve).and_then(|x| x.get(i as usize))
             {
                 Some(&slot) => slot,
                 None => {
-                    return Err(Unsupported(
-                        "the condition estimate of a linear system".into(),
-                    ));
+                    return Err("the condition estimate of a linear system".to_owned());
                 }
             },
         };
@@ -209,27 +205,25 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn symbol(&mut self, node: Node) -> Result<usize, Unsupported> {
+    fn symbol(&mut self, node: Node) -> Result<usize, String> {
         match self.symbols.iter().position(|&s| s == node) {
             Some(place) => Ok(self.push(Step::Symbol(place))),
             None => {
                 let name = self.graph.symbol_name(node).unwrap_or_default();
-                Err(Unsupported(format!("'{name}', which has no value")))
+                Err(format!("'{name}', which has no value"))
             }
         }
     }
 
-    fn value_at_reference(&mut self, node: Node) -> Result<f64, Unsupported> {
+    fn value_at_reference(&mut self, node: Node) -> Result<f64, String> {
         self.program.choices += usize::from(!self.graph.symbols_of(&[node]).is_empty());
         (self.branch)(node).ok_or_else(|| {
             let text = self.graph.render(node, 60);
-            Unsupported(format!(
-                "{text}, which is not defined at the reference point"
-            ))
+            format!("{text}, which is not defined at the reference point")
         })
     }
 
-    fn power(&mut self, a: usize, n: i32) -> Result<usize, Unsupported> {
+    fn power(&mut self, a: usize, n: i32) -> Result<usize, String> {
         if n == 0 {
             return self.number(1.0);
         }
@@ -256,7 +250,7 @@ impl Builder<'_> {
         Ok(self.push(Step::Div(one, result)))
     }
 
-    fn binary(&mut self, op: Binary, a: usize, b: usize, node: Node) -> Result<usize, Unsupported> {
+    fn binary(&mut self, op: Binary, a: usize, b: usize, node: Node) -> Result<usize, String> {
         Ok(match op {
             Binary::Add => self.push(Step::Add(a, b)),
             Binary::Sub => self.push(Step::Sub(a, b)),
@@ -277,7 +271,7 @@ impl Builder<'_> {
             Binary::Atan2 => self.angle_of(a, b, node)?,
             Binary::Min | Binary::Max => {
                 let [x, y] = self.graph.arguments(node)[..] else {
-                    return Err(Unsupported("a choice without arguments".into()));
+                    return Err("a choice without arguments".to_owned());
                 };
                 let first = self.value_at_reference(x)? < self.value_at_reference(y)?;
                 if first == (op == Binary::Min) { a } else { b }
@@ -301,7 +295,7 @@ impl Builder<'_> {
     }
 
     /// Gaussian elimination; pivots are generic, so that only structural zeros matter.
-    fn solve(&mut self, node: Node) -> Result<(), Unsupported> {
+    fn solve(&mut self, node: Node) -> Result<(), String> {
         let Some(system) = self.graph.system(node) else {
             return Ok(());
         };
@@ -316,7 +310,7 @@ impl Builder<'_> {
             .collect();
         for k in 0..n {
             let Some(pivot) = (k..n).find(|&i| !zero(self, rows[i][k])) else {
-                return Err(Unsupported("a singular linear system".into()));
+                return Err("a singular linear system".to_owned());
             };
             rows.swap(k, pivot);
             let chosen = rows[k].clone();
@@ -344,7 +338,7 @@ const PARTS: [f64; 7] = [1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 180.0];
 
 impl Builder<'_> {
     /// A number: e and the logarithms of 2 and 10 by what they are, fractions of π as such.
-    pub(super) fn number(&mut self, x: f64) -> Result<usize, Unsupported> {
+    pub(super) fn number(&mut self, x: f64) -> Result<usize, String> {
         let natural = [(LN_2, 2.0), (LN_10, 10.0)];
         if let Some((_, of)) = natural.into_iter().find(|(logarithm, _)| *logarithm == x) {
             let of = self.number(of)?;
@@ -355,7 +349,7 @@ impl Builder<'_> {
             return Ok(self.push(Step::Exp(one)));
         }
         let value = fraction_of_pi(x).or_else(|| Modular::from_f64(x));
-        let value = value.ok_or_else(|| Unsupported(format!("the number {x}")))?;
+        let value = value.ok_or_else(|| format!("the number {x}"))?;
         Ok(self.push(Step::Constant(value)))
     }
 }
@@ -408,12 +402,7 @@ impl Builder<'_> {
     }
 
     /// The angle of a point (a above b): what b/a's inverse tangent leaves out is a half turn.
-    pub(super) fn angle_of(
-        &mut self,
-        a: usize,
-        b: usize,
-        node: Node,
-    ) -> Result<usize, Unsupported> {
+    pub(super) fn angle_of(&mut self, a: usize, b: usize, node: Node) -> Result<usize, String> {
         self.function(ARCS);
         let ratio = self.push(Step::Div(a, b));
         let arc = self.arc_tangent(ratio)?;
@@ -426,12 +415,7 @@ impl Builder<'_> {
     }
 
     /// f⁻¹(f(z)) and √z², which are z up to sign and shift: as they are at the reference point.
-    fn undone(
-        &mut self,
-        op: Unary,
-        node: Node,
-        argument: Node,
-    ) -> Result<Option<usize>, Unsupported> {
+    fn undone(&mut self, op: Unary, node: Node, argument: Node) -> Result<Option<usize>, String> {
         let inner = match (op, self.graph.op(argument)) {
             (Unary::Asin, Op::Unary(Unary::Sin, z))
             | (Unary::Acos, Op::Unary(Unary::Cos, z))
@@ -468,7 +452,7 @@ impl Builder<'_> {
     }
 
     /// e^a + e^−a and e^a − e^−a
-    fn hyperbolic(&mut self, a: usize) -> Result<(usize, usize), Unsupported> {
+    fn hyperbolic(&mut self, a: usize) -> Result<(usize, usize), String> {
         let one = self.number(1.0)?;
         let up = self.push(Step::Exp(a));
         let down = self.push(Step::Div(one, up));
@@ -478,19 +462,19 @@ impl Builder<'_> {
         ))
     }
 
-    fn half(&mut self, a: usize) -> Result<usize, Unsupported> {
+    fn half(&mut self, a: usize) -> Result<usize, String> {
         let half = self.number(0.5)?;
         Ok(self.push(Step::Mul(half, a)))
     }
 
-    pub(super) fn logarithm(&mut self, a: usize) -> Result<usize, Unsupported> {
+    pub(super) fn logarithm(&mut self, a: usize) -> Result<usize, String> {
         let one = self.number(1.0)?;
         let h = self.push(Step::Div(one, a));
         let of = Inverse::Logarithm;
         Ok(self.push(Step::Integral { a, h, of }))
     }
 
-    fn arc_sine(&mut self, a: usize) -> Result<usize, Unsupported> {
+    fn arc_sine(&mut self, a: usize) -> Result<usize, String> {
         let one = self.number(1.0)?;
         let square = self.push(Step::Mul(a, a));
         let rest = self.push(Step::Sub(one, square));
@@ -506,7 +490,7 @@ impl Builder<'_> {
         a: usize,
         node: Node,
         argument: Node,
-    ) -> Result<usize, Unsupported> {
+    ) -> Result<usize, String> {
         let name = match op {
             Unary::Exp => "exp",
             Unary::Ln => "log",
@@ -560,7 +544,7 @@ impl Builder<'_> {
         })
     }
 
-    pub(super) fn arc_tangent(&mut self, a: usize) -> Result<usize, Unsupported> {
+    pub(super) fn arc_tangent(&mut self, a: usize) -> Result<usize, String> {
         let one = self.number(1.0)?;
         let square = self.push(Step::Mul(a, a));
         let sum = self.push(Step::Add(one, square));

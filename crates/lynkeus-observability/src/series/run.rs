@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use lynkeus_expr::{Budget, Spent};
 
-use crate::field::{Modular, Wide};
 use crate::series::functions::Arc;
 use crate::series::program::{Inverse, Step};
 use crate::series::{Functions, Program};
+use lynkeus_expr::modular::{Modular, Wide};
 
 /// Why a run ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

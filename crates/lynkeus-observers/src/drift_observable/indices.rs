@@ -10,7 +10,7 @@
 use lynkeus_expr::Spent;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observability::{Answer, Question, analyse};
-use lynkeus_structure::indices::Codistribution;
+use lynkeus_structure::output_map::Codistribution;
 use lynkeus_structure::{Extended, Region, Standing, Verdict};
 
 use super::form::{Form, Map, unfit};

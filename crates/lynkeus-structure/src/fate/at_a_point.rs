@@ -12,25 +12,18 @@ use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
 use crate::fate::exact::{self, Shows};
-use crate::fate::hidden::{Fate, Hidden, Told};
+use crate::fate::hidden::{Fate, Fates, Hidden, Told};
 use crate::fate::modes::{Modes, image, null_space, reached};
-use crate::{Coordinate, Dimension, Extended, Region};
+use crate::{Dimension, Extended, Region};
 
 /// States beyond which no modes are looked for.
 const STATES: usize = 60;
 /// What counts as zero beside one.
 const ZERO: f64 = 1e-8;
 
-/// What the linearisation shows.
-#[derive(Debug)]
-pub(super) struct Local {
-    pub of: Vec<Fate>,
-    pub point: Vec<Coordinate>,
-}
-
 /// At the first of a few points whose linearisation hides exactly what is hidden, those at which nothing moves that it
 /// reads before the others; none where there is no such point. Of what reads something that moves on no rate is told.
-pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInput> {
+pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Fates>, MissingInput> {
     let extended = hidden.extended;
     if extended.states.len() > STATES {
         return Ok(None);
@@ -96,7 +89,8 @@ pub(super) fn fates(hidden: &Hidden<'_, '_>) -> Result<Option<Local>, MissingInp
             let time = sides().filter(|(d, _)| is_read && is_time(d));
             let named = time.chain(sides().filter(|(d, _)| !is_time(d)));
             let point = named.map(|(d, &x)| (d.name.clone(), x).into()).collect();
-            return Ok(Some(Local { of, point }));
+            let of = of.into_iter().map(Some).collect();
+            return Ok(Some(Fates { of, point }));
         }
     }
     Ok(None)

@@ -1,12 +1,10 @@
 //! The dimensions behind a linearisation, exactly: which rounding and thresholds have to agree with before its modes count.
 //!
-//! The numbers of the Jacobian are rational, every one of them. Their images modulo the prime 2⁶¹ − 1 have the same
+//! The numbers of the Jacobian are rational, every one of them. Their images modulo a prime of 61 bits have the same
 //! ranks, but for accidents of a probability near 2⁻⁵⁰.
 
+use lynkeus_expr::modular::{Echelon, Modular};
 use nalgebra::DMatrix;
-
-/// 2⁶¹ − 1
-const P: u64 = (1 << 61) - 1;
 
 /// What an extended state shows of what can move without a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,73 +17,40 @@ pub(super) enum Shows {
     Modes(usize),
 }
 
-/// A matrix row by row.
-type Rows = Vec<Vec<u64>>;
-
 /// What each state and each signal shows, from ∂(f, h)/∂(x, v) with `n` states; none where a number has no image.
 pub(super) fn shows(J: &DMatrix<f64>, n: usize) -> Option<Vec<Shows>> {
     let wide = J.ncols();
-    let rows: Rows = J
+    let rows: Vec<Vec<Modular>> = J
         .row_iter()
-        .map(|row| row.iter().map(|x| image(*x)).collect())
+        .map(|row| row.iter().map(|x| Modular::of_double(*x)).collect())
         .collect::<Option<_>>()?;
     let (flow, outputs) = (&rows[..n], &rows[wide..]);
-    // pairs (x, v), one per row
-    let mut space: Rows = (0..n).map(|i| unit(i, n)).collect();
-    let pairs = loop {
-        // what has no part across the space
-        let across = null_space(&space, n);
-        let mut conditions: Rows = across.iter().map(|w| times(w, flow)).collect();
-        conditions.extend(outputs.iter().cloned());
-        let pairs = null_space(&conditions, wide);
-        let next = echelon(pairs.iter().map(|pair| pair[..n].to_vec()).collect(), n).0;
-        if next.len() >= space.len() {
-            break echelon(pairs, n).0;
-        }
-        space = next;
-    };
     // the first have different x, of the rest x is zero
-    let (moving, free): (Vec<_>, Vec<_>) = pairs
+    let (moving, free): (Vec<_>, Vec<_>) = traceless(flow, outputs, wide)
         .into_iter()
-        .partition(|pair| pair[..n].iter().any(|x| *x != 0));
-    let basis: Rows = moving.iter().map(|pair| pair[..n].to_vec()).collect();
-    let d = basis.len();
-    let step = |pair: &Vec<u64>| -> Option<Vec<u64>> {
-        let moved: Vec<u64> = flow.iter().map(|row| dot(row, pair)).collect();
-        coordinates(&basis, &moved)
+        .partition(|(pivot, _)| *pivot < n);
+    let d = moving.len();
+    let step = |(_, pair): &(usize, Vec<Modular>)| -> Option<Vec<Modular>> {
+        let moved: Vec<Modular> = flow.iter().map(|row| dot(row, pair)).collect();
+        coordinates(&moving, &moved)
     };
     // x = Σ aₖ basisₖ: row k has the coordinates of what basisₖ becomes
-    let A: Rows = moving.iter().map(step).collect::<Option<_>>()?;
-    let mut reached: Rows = free.iter().map(step).collect::<Option<_>>()?;
-    loop {
-        let count = reached.len();
-        let mut all = reached.clone();
-        all.extend(reached.iter().map(|a| times(a, &A)));
-        reached = echelon(all, d).0;
-        if reached.len() <= count {
-            break;
-        }
-    }
+    let A: Vec<Vec<Modular>> = moving.iter().map(step).collect::<Option<_>>()?;
+    let first: Vec<Vec<Modular>> = free.iter().map(step).collect::<Option<_>>()?;
+    let reached = reached(&A, first);
     let of = |place: usize| {
-        let row: Vec<u64> = moving.iter().map(|pair| pair[place]).collect();
-        let is_moved =
-            free.iter().any(|pair| pair[place] != 0) || reached.iter().any(|a| dot(a, &row) != 0);
-        if is_moved {
+        let row: Vec<Modular> = moving.iter().map(|(_, pair)| pair[place]).collect();
+        let is_free = free.iter().any(|(_, pair)| !pair[place].is_zero());
+        if is_free || reached.rows().any(|a| !dot(a, &row).is_zero()) {
             return Shows::Moved;
         }
         // row, A row, A² row, …
-        let mut seen: Rows = vec![];
+        let mut seen = Echelon::new(d);
         let mut next = row;
-        loop {
-            let count = seen.len();
-            seen.push(next.clone());
-            seen = echelon(seen, d).0;
-            if seen.len() == count {
-                break;
-            }
+        while seen.add(&next) {
             next = A.iter().map(|a| dot(a, &next)).collect();
         }
-        match seen.len() {
+        match seen.rank() {
             0 => Shows::Nothing,
             count => Shows::Modes(count),
         }
@@ -93,139 +58,81 @@ pub(super) fn shows(J: &DMatrix<f64>, n: usize) -> Option<Vec<Shows>> {
     Some((0..wide).map(of).collect())
 }
 
-/// The image of a number, which is m·2ᵉ.
-fn image(x: f64) -> Option<u64> {
-    if !x.is_finite() {
-        return None;
-    }
-    let bits = x.abs().to_bits();
-    let exponent = (bits >> 52) as i64;
-    let fraction = bits & ((1 << 52) - 1);
-    let (mantissa, exponent) = match exponent {
-        0 => (fraction, -1074),
-        exponent => (fraction | 1 << 52, exponent - 1075),
+/// The pairs (x, v) that can move without a trace, reduced, each with its pivot.
+fn traceless(
+    flow: &[Vec<Modular>],
+    outputs: &[Vec<Modular>],
+    wide: usize,
+) -> Vec<(usize, Vec<Modular>)> {
+    let n = flow.len();
+    let unit = |i: usize| {
+        (0..n)
+            .map(move |j| Modular::new(u64::from(i == j)))
+            .collect()
     };
-    // 2⁶¹ = 1
-    let shifted = multiply(mantissa % P, 1 << exponent.rem_euclid(61));
-    Some(if x < 0.0 {
-        subtract(0, shifted)
-    } else {
-        shifted
-    })
-}
-
-fn multiply(a: u64, b: u64) -> u64 {
-    (u128::from(a) * u128::from(b) % u128::from(P)) as u64
-}
-
-fn add(a: u64, b: u64) -> u64 {
-    (a + b) % P
-}
-
-fn subtract(a: u64, b: u64) -> u64 {
-    (a + P - b) % P
-}
-
-/// a^(P − 2)
-fn inverse(a: u64) -> u64 {
-    let (mut base, mut left, mut result) = (a, P - 2, 1);
-    while left > 0 {
-        if left & 1 == 1 {
-            result = multiply(result, base);
+    let mut space = spanned(n, (0..n).map(unit));
+    loop {
+        // what has no part across the space
+        let across = space.kernel();
+        let conditions = across.iter().map(|w| times(w, flow));
+        let pairs = spanned(wide, conditions.chain(outputs.iter().cloned())).kernel();
+        let next = spanned(n, pairs.iter().map(|pair| pair[..n].to_vec()));
+        if next.rank() >= space.rank() {
+            return spanned(wide, pairs.into_iter()).reduced_rows();
         }
-        base = multiply(base, base);
-        left >>= 1;
+        space = next;
     }
-    result
 }
 
-fn dot(a: &[u64], b: &[u64]) -> u64 {
-    let terms = a.iter().zip(b).map(|(a, b)| multiply(*a, *b));
-    terms.fold(0, add)
+/// The smallest space with these rows that A maps into itself.
+fn reached(A: &[Vec<Modular>], first: Vec<Vec<Modular>>) -> Echelon {
+    let mut space = spanned(A.len(), first.into_iter());
+    let mut open: Vec<Vec<Modular>> = space.rows().map(<[Modular]>::to_vec).collect();
+    while let Some(a) = open.pop() {
+        let next = times(&a, A);
+        if space.add(&next) {
+            open.push(next);
+        }
+    }
+    space
+}
+
+fn spanned(width: usize, rows: impl Iterator<Item = Vec<Modular>>) -> Echelon {
+    let mut space = Echelon::new(width);
+    rows.for_each(|row| {
+        space.add(&row);
+    });
+    space
+}
+
+fn dot(a: &[Modular], b: &[Modular]) -> Modular {
+    let terms = a.iter().zip(b).map(|(a, b)| *a * *b);
+    terms.fold(Modular::ZERO, |sum, term| sum + term)
 }
 
 /// Σ aₖ rowₖ
-fn times(a: &[u64], rows: &[Vec<u64>]) -> Vec<u64> {
+fn times(a: &[Modular], rows: &[Vec<Modular>]) -> Vec<Modular> {
     let wide = rows.first().map_or(0, Vec::len);
-    (0..wide)
-        .map(|j| {
-            a.iter()
-                .zip(rows)
-                .fold(0, |sum, (a, row)| add(sum, multiply(*a, row[j])))
-        })
-        .collect()
-}
-
-fn unit(i: usize, n: usize) -> Vec<u64> {
-    (0..n).map(|j| u64::from(i == j)).collect()
-}
-
-/// Rows reduced by their first `wide` entries, those of zeros left out unless further entries are not, and the places
-/// of the pivots.
-fn echelon(mut rows: Rows, wide: usize) -> (Rows, Vec<usize>) {
-    let mut pivots = vec![];
-    for j in 0..wide {
-        let done = pivots.len();
-        let Some(place) = (done..rows.len()).find(|&i| rows[i][j] != 0) else {
-            continue;
-        };
-        rows.swap(done, place);
-        let scale = inverse(rows[done][j]);
-        rows[done].iter_mut().for_each(|x| *x = multiply(*x, scale));
-        let pivot = rows[done].clone();
-        for (_, row) in rows.iter_mut().enumerate().filter(|(i, _)| *i != done) {
-            let factor = row[j];
-            if factor != 0 {
-                let pairs = row.iter_mut().zip(&pivot);
-                pairs.for_each(|(x, p)| *x = subtract(*x, multiply(factor, *p)));
-            }
-        }
-        pivots.push(j);
-    }
-    rows.retain(|row| row.iter().any(|x| *x != 0));
-    (rows, pivots)
-}
-
-/// A basis of the x of `wide` entries that all rows send to zero.
-fn null_space(rows: &[Vec<u64>], wide: usize) -> Rows {
-    let (rows, pivots) = echelon(rows.to_vec(), wide);
-    let free = (0..wide).filter(|j| !pivots.contains(j));
-    free.map(|j| {
-        let mut x = unit(j, wide);
-        for (row, &pivot) in rows.iter().zip(&pivots) {
-            x[pivot] = subtract(0, row[j]);
-        }
-        x
-    })
-    .collect()
-}
-
-/// a with Σ aₖ basisₖ = x, for a basis in echelon form; none where there is none.
-fn coordinates(basis: &[Vec<u64>], x: &[u64]) -> Option<Vec<u64>> {
-    let pivot = |row: &Vec<u64>| row.iter().position(|x| *x != 0);
-    let a: Vec<u64> = basis
-        .iter()
-        .map(|row| pivot(row).map(|j| x[j]))
-        .collect::<Option<_>>()?;
-    let same = match basis.is_empty() {
-        true => x.iter().all(|x| *x == 0),
-        false => times(&a, basis) == x,
+    let column = |j: usize| {
+        let terms = a.iter().zip(rows).map(|(a, row)| *a * row[j]);
+        terms.fold(Modular::ZERO, |sum, term| sum + term)
     };
-    same.then_some(a)
+    (0..wide).map(column).collect()
+}
+
+/// a with x = Σ aₖ basisₖ in the leading entries, for a reduced basis with its pivots; none where there is none.
+fn coordinates(basis: &[(usize, Vec<Modular>)], x: &[Modular]) -> Option<Vec<Modular>> {
+    let a: Vec<Modular> = basis.iter().map(|(pivot, _)| x[*pivot]).collect();
+    let is_same = x.iter().enumerate().all(|(j, x)| {
+        let terms = a.iter().zip(basis).map(|(a, (_, row))| *a * row[j]);
+        terms.fold(Modular::ZERO, |sum, term| sum + term) == *x
+    });
+    is_same.then_some(a)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_images() {
-        let half = image(0.5).unwrap();
-        assert_eq!(multiply(half, 2), 1);
-        assert_eq!(add(image(-3.0).unwrap(), 3), 0);
-        let small = image(1e-300).unwrap();
-        assert_eq!(multiply(small, inverse(small)), 1);
-    }
 
     /// x1' = w, y = x0, x0' = −x0 + 1e-12 x1: however small, it shows.
     #[test]

@@ -38,7 +38,7 @@ impl Hidden<'_, '_> {
             false => None,
         };
         let of = (0..self.told.len()).map(|i| {
-            let there = local.as_ref().map(|local| local.of[i]);
+            let there = local.as_ref().and_then(|local| local.of[i]);
             let fate = match (proved[i], there) {
                 // a bound says little where the error vanishes near some point
                 (Some(Fate::Bounded { .. }), Some(Fate::Decays { .. })) | (None, Some(_)) => there,

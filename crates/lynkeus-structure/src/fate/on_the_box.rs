@@ -1,6 +1,6 @@
 //! Decay for every pair of solutions in the box, by intervals.
 
-use lynkeus_expr::{Budget, Interval, MissingInput, Node, jacobian};
+use lynkeus_expr::{Budget, Interval, MissingInput, Node, components, jacobian};
 use lynkeus_proof::decay::{ErrorModel, Sector, fastest};
 use lynkeus_proof::spectrum;
 use nalgebra::DMatrix;
@@ -83,48 +83,26 @@ impl Cascade {
         self.row(s).is_some_and(|row| !is_zero(&row.a[q]))
     }
 
-    /// Everything that acts on each state, itself included.
-    fn sources(&self) -> Vec<Vec<bool>> {
-        let n = self.system.flow.len();
-        let from = |start: usize| {
-            let mut seen = vec![false; n];
-            seen[start] = true;
-            let mut open = vec![start];
-            while let Some(s) = open.pop() {
-                for q in (0..n).filter(|&q| self.reads(s, q)) {
-                    if !std::mem::replace(&mut seen[q], true) {
-                        open.push(q);
-                    }
-                }
-            }
-            seen
-        };
-        (0..n).map(from).collect()
-    }
-
     /// The rate at which each state's difference is proved to decay.
     fn rates(&self) -> Vec<Option<f64>> {
-        let sources = self.sources();
-        let n = sources.len();
-        let block = |s: usize| -> Vec<usize> {
-            (0..n).filter(|&q| sources[s][q] && sources[q][s]).collect()
-        };
-        let mut own: Vec<Option<f64>> = vec![None; n];
-        for s in 0..n {
-            let together = block(s);
-            own[s] = match together.first() {
-                Some(&first) if first < s => own[first],
-                _ => self.of_block(&together),
-            };
+        let n = self.system.flow.len();
+        let reads = |s: usize| (0..n).filter(|&q| self.reads(s, q)).collect();
+        let reads: Vec<Vec<usize>> = (0..n).map(reads).collect();
+        let mut rates = vec![None; n];
+        // of everything that acts on a state, itself included
+        let mut least = vec![None; n];
+        for block in components(&reads) {
+            let own = self.of_block(&block);
+            let sources = || block.iter().flat_map(|&s| &reads[s]);
+            let mut others = sources().filter(|q| !block.contains(q)).peekable();
+            let is_alone = others.peek().is_none();
+            let all = others.fold(own, |all, &q| Some(all?.min(least[q]?)));
+            for &s in &block {
+                least[s] = all;
+                rates[s] = all.map(|rate: f64| if is_alone { rate } else { BELOW * rate });
+            }
         }
-        let all = |s: usize| {
-            let acting = (0..n).filter(|&q| sources[s][q]);
-            let rates: Vec<f64> = acting.map(|q| own[q]).collect::<Option<_>>()?;
-            let is_one_block = (0..n).all(|q| !sources[s][q] || sources[q][s]);
-            let least = rates.into_iter().fold(f64::INFINITY, f64::min);
-            Some(if is_one_block { least } else { BELOW * least })
-        };
-        (0..n).map(all).collect()
+        rates
     }
 
     /// The rate of coupled states that nothing drives; none where an unknown input does, or

@@ -8,7 +8,7 @@ use lynkeus_proof::spectrum;
 use nalgebra::{DMatrix, DVector};
 
 use crate::region::Cell;
-use crate::{Coordinate, Matrix, Place, Point, Region};
+use crate::{Matrix, Place, Point, Region};
 
 /// Pairs of a box with itself that are looked at.
 const NEAR: usize = 400;
@@ -388,7 +388,7 @@ impl Twins {
         let is_proved = self.is_proved(&first, &second).unwrap_or(false);
         let value = self.values(&first)[0];
         let point = |at: Vec<f64>| Point {
-            coordinates: self.named(&at),
+            coordinates: self.region.coordinates(&at),
             value,
         };
         Some(Alike {
@@ -408,14 +408,6 @@ impl Twins {
         };
         sides
             .map(|(d, middle)| given(&d.name).unwrap_or(middle))
-            .collect()
-    }
-
-    fn named(&self, point: &[f64]) -> Vec<Coordinate> {
-        let names = self.region.dimensions.iter().map(|d| d.name.clone());
-        names
-            .zip(point.iter().copied())
-            .map(Coordinate::from)
             .collect()
     }
 

@@ -21,20 +21,27 @@ const DENOMINATOR: u32 = 1000;
 
 /// An element of the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Modular(u64);
+pub struct Modular(u64);
 
 impl Modular {
+    /// 0
     pub const ZERO: Self = Self(0);
+    /// 1
     pub const ONE: Self = Self(1);
 
+    /// The residue of a number.
+    #[inline]
     pub fn new(value: u64) -> Self {
         Self(value % PRIME)
     }
 
+    /// Whether it is 0.
+    #[inline]
     pub fn is_zero(self) -> bool {
         self.0 == 0
     }
 
+    /// self^exponent
     pub fn power(self, mut exponent: u64) -> Self {
         let (mut base, mut result) = (self, Self::ONE);
         while exponent > 0 {
@@ -115,6 +122,27 @@ impl Modular {
         Some(if value < 0.0 { -magnitude } else { magnitude })
     }
 
+    /// The double itself, which is m·2ᵉ.
+    pub fn of_double(value: f64) -> Option<Self> {
+        if !value.is_finite() {
+            return None;
+        }
+        let bits = value.abs().to_bits();
+        let fraction = bits & ((1 << 52) - 1);
+        let (mantissa, exponent) = match (bits >> 52) as i64 {
+            0 => (fraction, -1074),
+            exponent => (fraction | 1 << 52, exponent - 1075),
+        };
+        let scale = Self::new(2).power(exponent.unsigned_abs());
+        let scale = if exponent < 0 {
+            scale.inverse()?
+        } else {
+            scale
+        };
+        let magnitude = Self::new(mantissa) * scale;
+        Some(if value < 0.0 { -magnitude } else { magnitude })
+    }
+
     /// n/d, where that is the nearest double for a small d.
     fn rounded_fraction(value: f64) -> Option<Self> {
         let denominators = (3..=DENOMINATOR).map(f64::from);
@@ -156,6 +184,7 @@ impl Modular {
 
 impl Add for Modular {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         let sum = self.0 + other.0;
         Self(if sum >= PRIME { sum - PRIME } else { sum })
@@ -164,6 +193,7 @@ impl Add for Modular {
 
 impl Sub for Modular {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -171,6 +201,7 @@ impl Sub for Modular {
 
 impl Neg for Modular {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self(if self.0 == 0 { 0 } else { PRIME - self.0 })
     }
@@ -178,6 +209,7 @@ impl Neg for Modular {
 
 impl Mul for Modular {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self::reduced(u128::from(self.0) * u128::from(other.0))
     }
@@ -185,12 +217,13 @@ impl Mul for Modular {
 
 /// A sum of products that is reduced at the end: [`Wide::PRODUCTS`] of them fit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Wide(u128);
+pub struct Wide(u128);
 
 impl Wide {
     /// Products that may be added between two calls of [`Wide::folded`].
     pub const PRODUCTS: usize = 60;
 
+    /// Adds a·b.
     #[inline]
     pub fn add_product(&mut self, a: Modular, b: Modular) {
         self.0 += u128::from(a.0) * u128::from(b.0);
@@ -202,6 +235,7 @@ impl Wide {
         Self(u128::from(self.0 as u64 & LOW) + (self.0 >> 61) * u128::from(GAP))
     }
 
+    /// The residue.
     #[inline]
     pub fn value(self) -> Modular {
         Modular::reduced(self.folded().0)
@@ -209,6 +243,7 @@ impl Wide {
 }
 
 impl From<Modular> for Wide {
+    #[inline]
     fn from(value: Modular) -> Self {
         Self(u128::from(value.0))
     }
@@ -232,9 +267,10 @@ impl Modular {
 
 /// A reproducible stream of field elements (SplitMix64).
 #[derive(Clone, Debug)]
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
+    /// The stream of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -268,6 +304,117 @@ impl Random {
     }
 }
 
+/// Row echelon form, row by row: the row space of the rows added so far.
+#[derive(Clone, Debug)]
+pub struct Echelon {
+    width: usize,
+    /// (pivot column, row scaled to 1 there), in order of arrival
+    rows: Vec<(usize, Vec<Modular>)>,
+}
+
+impl Echelon {
+    /// No rows of that many columns.
+    pub fn new(width: usize) -> Self {
+        let rows = vec![];
+        Self { width, rows }
+    }
+
+    /// Number of independent rows.
+    pub fn rank(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The rows, each scaled to 1 at its pivot.
+    pub fn rows(&self) -> impl Iterator<Item = &[Modular]> {
+        self.rows.iter().map(|(_, row)| row.as_slice())
+    }
+
+    /// The pivot columns: the first that is not zero of each row of the echelon form.
+    pub fn pivots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rows.iter().map(|(pivot, _)| *pivot)
+    }
+
+    /// What is left of a row after the known rows are taken out.
+    fn reduced(&self, row: &[Modular]) -> Vec<Modular> {
+        let mut wide: Vec<Wide> = row.iter().map(|&x| Wide::from(x)).collect();
+        wide.resize(self.width, Wide::default());
+        let mut products = 1;
+        for (pivot, known) in &self.rows {
+            let factor = -wide[*pivot].value();
+            if factor.is_zero() {
+                continue;
+            }
+            products += 1;
+            if products >= Wide::PRODUCTS {
+                wide.iter_mut().for_each(|x| *x = x.folded());
+                products = 2;
+            }
+            // a row is zero before its pivot, and so is what is left there
+            for (x, y) in wide[*pivot..].iter_mut().zip(&known[*pivot..]) {
+                x.add_product(factor, *y);
+            }
+        }
+        wide.into_iter().map(Wide::value).collect()
+    }
+
+    /// Adds a row; true if it was independent of the others.
+    pub fn add(&mut self, row: &[Modular]) -> bool {
+        let mut row = self.reduced(row);
+        let Some(pivot) = row.iter().position(|x| !x.is_zero()) else {
+            return false;
+        };
+        let Some(inverse) = row[pivot].inverse() else {
+            return false;
+        };
+        row.iter_mut().for_each(|x| *x = *x * inverse);
+        self.rows.push((pivot, row));
+        true
+    }
+
+    /// Whether a row lies in the row space.
+    pub fn contains(&self, row: &[Modular]) -> bool {
+        self.reduced(row).iter().all(|x| x.is_zero())
+    }
+
+    /// The rows in reduced form: each pivot column is zero in all rows but its own.
+    pub fn reduced_rows(&self) -> Vec<(usize, Vec<Modular>)> {
+        let mut rows = self.rows.clone();
+        for k in (0..rows.len()).rev() {
+            let (pivot, row) = rows[k].clone();
+            for (_, above) in &mut rows[..k] {
+                eliminate(above, pivot, &row);
+            }
+        }
+        rows
+    }
+
+    /// A basis of the directions that no row sees: one vector per column without pivot.
+    pub fn kernel(&self) -> Vec<Vec<Modular>> {
+        let rows = self.reduced_rows();
+        let free = (0..self.width).filter(|j| rows.iter().all(|(pivot, _)| pivot != j));
+        let direction = |j: usize| {
+            let mut direction = vec![Modular::ZERO; self.width];
+            direction[j] = Modular::ONE;
+            for (pivot, row) in &rows {
+                direction[*pivot] = -row[j];
+            }
+            direction
+        };
+        free.map(direction).collect()
+    }
+}
+
+/// row −= row[pivot]·known
+fn eliminate(row: &mut [Modular], pivot: usize, known: &[Modular]) {
+    let factor = -row[pivot];
+    if factor.is_zero() {
+        return;
+    }
+    for (x, y) in row.iter_mut().zip(known) {
+        *x = *x + factor * *y;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -290,6 +437,17 @@ mod tests {
         assert_eq!(Modular::from_f64(f64::NAN), None);
         let third = Modular::from_f64(-1.0 / 3.0).unwrap();
         assert_eq!(third * Modular::new(3), -Modular::ONE);
+    }
+
+    #[test]
+    fn doubles_are_taken_as_they_are() {
+        let half = Modular::of_double(0.5).unwrap();
+        assert_eq!(half * Modular::new(2), Modular::ONE);
+        let minus = Modular::of_double(-3.0).unwrap();
+        assert_eq!(minus + Modular::new(3), Modular::ZERO);
+        let small = Modular::of_double(1e-300).unwrap();
+        assert_eq!(small * small.inverse().unwrap(), Modular::ONE);
+        assert_ne!(Modular::of_double(0.1), Modular::from_f64(0.1));
     }
 
     /// Against arithmetic in 128 bits, where the folding could go wrong.
@@ -319,6 +477,29 @@ mod tests {
         for small in [2, 3, 5, 7, 11] {
             assert!(Modular::new(small).is_positive());
         }
+    }
+
+    fn row(values: &[i64]) -> Vec<Modular> {
+        let number = |&x: &i64| {
+            let magnitude = Modular::new(x.unsigned_abs());
+            if x < 0 { -magnitude } else { magnitude }
+        };
+        values.iter().map(number).collect()
+    }
+
+    #[test]
+    fn kernel_and_rows_are_orthogonal() {
+        let rows = [row(&[1, 2, 3, 4]), row(&[2, 4, 6, 9]), row(&[1, 2, 3, 5])];
+        let mut echelon = Echelon::new(4);
+        let new: Vec<bool> = rows.iter().map(|r| echelon.add(r)).collect();
+        assert_eq!(new, [true, true, false]);
+        let kernel = echelon.kernel();
+        assert_eq!(kernel.len(), 2);
+        for (r, v) in rows.iter().flat_map(|r| kernel.iter().map(move |v| (r, v))) {
+            let product = r.iter().zip(v).fold(Modular::ZERO, |s, (a, b)| s + *a * *b);
+            assert!(product.is_zero());
+        }
+        assert!(echelon.contains(&row(&[0, 0, 0, 7])) && !echelon.contains(&row(&[1, 0, 0, 0])));
     }
 
     proptest! {
