@@ -8,6 +8,9 @@ use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
+/// Conditions with what holds under them, and what holds under none.
+type Cases<T> = (Vec<(ExprId, Vec<T>)>, Vec<T>);
+
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
         self.nested(|parser| parser.equation_here())
@@ -127,11 +130,8 @@ impl Parser<'_> {
         }))
     }
 
-    /// Conditions with what holds under them, and what holds under none, behind `if`.
-    fn branches<T>(
-        &mut self,
-        one: fn(&mut Self) -> Result<T>,
-    ) -> Result<(Vec<(ExprId, Vec<T>)>, Vec<T>)> {
+    /// Equations or statements behind `if`.
+    fn branches<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Cases<T>> {
         self.advance()?;
         let mut branches = vec![];
         loop {
@@ -160,7 +160,7 @@ impl Parser<'_> {
         Ok((iterators, body))
     }
 
-    /// Equations or statements.
+    /// Equations or statements up to `end` or `else`.
     fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let mut found = vec![];
         while !matches!(
