@@ -133,15 +133,7 @@ impl Parser<'_> {
     /// Equations or statements behind `if`.
     fn branches<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Cases<T>> {
         self.advance()?;
-        let mut branches = vec![];
-        loop {
-            let condition = self.expression()?;
-            self.expect_word(Keyword::Then)?;
-            branches.push((condition, self.until_end(one)?));
-            if !self.accept_word(Keyword::Elseif)? {
-                break;
-            }
-        }
+        let branches = self.cases(|parser| parser.until_end(one))?;
         let mut otherwise = vec![];
         if self.accept_word(Keyword::Else)? {
             otherwise = self.until_end(one)?;
