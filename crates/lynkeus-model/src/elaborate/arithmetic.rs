@@ -4,17 +4,15 @@ use super::value::unequal_sizes;
 use lynkeus_expr::{Binary, Node, Unary};
 
 use super::evaluate::Evaluator;
-use super::value::{Array, Scalar, Value, describe_dims};
+use super::value::{Array, Scalar, Value, describe_dims, expected_number};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{BinaryOperator, Relation};
 
 impl Evaluator<'_> {
     /// A number as a Real expression.
     pub(super) fn real(&self, scalar: Scalar, span: Span) -> Result<Node> {
-        scalar.real(self.graph).ok_or_else(|| {
-            Problem::new(span, "expected a number, found a Boolean")
-                .hint("write `if a then 1 else 0`")
-        })
+        let expected = || expected_number(span);
+        scalar.real(self.graph).ok_or_else(expected)
     }
 
     /// A truth value.

@@ -517,8 +517,7 @@ impl<'a> Evaluator<'a> {
             }
             Named::Scalar(_) => Err(not_an_array(text, name)),
             Named::Unknown => self.index_by_full_name(text, name, subscripts),
-            Named::Varying => Err(self.varying(name)),
-            Named::Valueless => Err(self.without_value(name)),
+            found => self.meant(found, name),
         }
     }
 
@@ -552,13 +551,7 @@ impl<'a> Evaluator<'a> {
             numbers.push(self.known_integer(subscript, "a subscript")?.to_string());
         }
         let full = format!("{text}[{}]", numbers.join(","));
-        match self.named(&full) {
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
-            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
-            Named::Varying => Err(self.varying(name)),
-            Named::Valueless => Err(self.without_value(name)),
-            Named::Unknown => Err(self.unknown_name(name)),
-        }
+        self.meant(self.named(&full), name)
     }
 
     fn check_rank(

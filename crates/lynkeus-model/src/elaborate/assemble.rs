@@ -50,7 +50,7 @@ pub(super) fn plant<'a>(
         if declaration.package.is_some() {
             continue;
         }
-        let attributes = Attributes::new(context, symbols, declaration, component)?;
+        let attributes = Declared::new(context, symbols, declaration, component)?;
         if declaration.prefix.variability == Variability::Continuous {
             variables(symbols, &attributes, &inputs, &solution, &mut plant);
         } else if !symbols.dependent.get(place).copied().unwrap_or_default() {
@@ -82,7 +82,7 @@ fn unknowns(
             continue;
         }
         let is_input = declaration.prefix.causality == Causality::Input;
-        let attributes = Attributes::new(context, symbols, declaration, component)?;
+        let attributes = Declared::new(context, symbols, declaration, component)?;
         for (offset, node) in nodes(component).enumerate() {
             let is_open = declaration.binding.is_none() && !equated.contains(&node);
             if is_input && (is_open || is_outer_input(declaration)) {
@@ -142,15 +142,15 @@ fn nodes(component: &Component) -> impl Iterator<Item = Node> {
 /// Puts the elements of a declared variable where they belong.
 fn variables(
     symbols: &Symbols<'_>,
-    attributes: &Attributes<'_>,
+    declared: &Declared<'_>,
     inputs: &HashSet<Node>,
     solution: &HashMap<Node, Node>,
     plant: &mut Plant,
 ) {
-    let causality = attributes.declaration.prefix.causality;
-    for (offset, symbol) in nodes(attributes.component).enumerate() {
+    let causality = declared.declaration.prefix.causality;
+    for (offset, symbol) in nodes(declared.component).enumerate() {
         if inputs.contains(&symbol) {
-            plant.inputs.push(attributes.variable(offset, symbol));
+            plant.inputs.push(declared.variable(offset, symbol));
             continue;
         }
         let derivative = symbols.derivative_of(symbol);
@@ -159,25 +159,25 @@ fn variables(
         let derivative = derivative.filter(|_| !solution.contains_key(&symbol));
         let is_state = derivative.is_some();
         if let Some(derivative) = derivative {
-            plant.states.push(attributes.variable(offset, symbol));
+            plant.states.push(declared.variable(offset, symbol));
             plant.derivatives.push(derivative);
         }
         let value = solution.get(&symbol).copied().unwrap_or(symbol);
         if causality == Causality::Output {
-            plant.outputs.push(attributes.variable(offset, value));
+            plant.outputs.push(declared.variable(offset, value));
         } else if !is_state {
-            plant.algebraics.push(attributes.variable(offset, value));
+            plant.algebraics.push(declared.variable(offset, value));
         }
     }
 }
 
 /// The elements of a declared parameter, where a caller may set them.
-fn parameters(graph: &Graph, attributes: &Attributes<'_>, plant: &mut Plant) {
-    let Attributes {
+fn parameters(graph: &Graph, declared: &Declared<'_>, plant: &mut Plant) {
+    let Declared {
         declaration,
         component,
         ..
-    } = attributes;
+    } = declared;
     let prefix = &declaration.prefix;
     let is_fixed = prefix.variability == Variability::Constant || prefix.is_final;
     if is_fixed || prefix.type_name == TypeName::Boolean {
@@ -188,7 +188,7 @@ fn parameters(graph: &Graph, attributes: &Attributes<'_>, plant: &mut Plant) {
         let values = component.values.as_ref();
         let value = values.and_then(|values| values.get(offset));
         plant.parameters.push(Parameter {
-            variable: attributes.variable(offset, graph.symbol(&full).node()),
+            variable: declared.variable(offset, graph.symbol(&full).node()),
             value: value.and_then(|value| value.number(graph)),
         });
     }
@@ -196,7 +196,7 @@ fn parameters(graph: &Graph, attributes: &Attributes<'_>, plant: &mut Plant) {
 
 /// What a declaration says of all its elements. Numbers are one for all elements or one for each;
 /// none where nothing is given.
-struct Attributes<'s> {
+struct Declared<'s> {
     declaration: &'s Declaration,
     component: &'s Component,
     start: Vec<f64>,
@@ -218,7 +218,7 @@ fn at<T: Copy>(values: &[T], offset: usize) -> Option<T> {
     }
 }
 
-impl<'s> Attributes<'s> {
+impl<'s> Declared<'s> {
     fn new<'a>(
         context: &Context<'a>,
         symbols: &Symbols<'a>,

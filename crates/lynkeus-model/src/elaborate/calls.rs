@@ -2,7 +2,7 @@
 
 use super::evaluate::{Evaluator, joined};
 use super::scope::{Frame, Local};
-use super::value::{Outcome, Record, Value, describe_dims, element_count};
+use super::value::{Outcome, Record, Value, check_size, element_count};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::constant_label;
 use crate::syntax::ast::{Call, Causality, Class, ClassKind, Declaration, ExprId, Kind, TypeName};
@@ -336,11 +336,7 @@ impl<'a> Evaluator<'a> {
         let dims = self.dims_declared(declaration, value.as_ref(), span)?;
         let mut local = Local::without_value(dims, declaration.prefix.is_integer());
         if let Some(value) = value {
-            if value.dims() != local.dims {
-                let (has, found) = (describe_dims(&local.dims), describe_dims(value.dims()));
-                let message = format!("`{name}` has the size {has}, its value has {found}");
-                return Err(Problem::new(span, message));
-            }
+            check_size(&name, &local.dims, value.dims(), span)?;
             let elements = value.into_array().elements.into_iter();
             let graph = self.graph;
             local.elements = elements

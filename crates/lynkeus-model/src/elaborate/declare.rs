@@ -6,7 +6,9 @@ use std::collections::{HashMap, HashSet};
 
 use super::scope::{Context, Mode};
 use super::symbols::{Component, Symbols, gathered, is_outer_input};
-use super::value::{Array, Scalar, describe_dims, element_count, element_name};
+use super::value::{
+    Array, Scalar, check_size, describe_dims, element_count, element_name, expected_number,
+};
 use crate::diagnostic::{Problem, Result, Span};
 use crate::flat::{FlatModel, constant_label};
 use crate::limits::{Budget, MAX_SCALARS, MAX_TEXT};
@@ -552,18 +554,12 @@ impl Parts<'_> {
     }
 
     fn check_size(&self, array: &Array, id: ExprId) -> Result<()> {
-        if array.dims == self.dims {
-            return Ok(());
-        }
-        let (has, found) = (describe_dims(self.dims), describe_dims(&array.dims));
-        let message = format!("`{}` has the size {has}, its value has {found}", self.name);
         let span = self.context.ast.expression(id).span;
-        Err(Problem::new(span, message).maybe_hint(
-            array
-                .dims
-                .is_empty()
-                .then(|| "use `fill(value, size)`".to_owned()),
-        ))
+        let checked = check_size(self.name, self.dims, &array.dims, span);
+        checked.map_err(|problem| match array.dims.is_empty() {
+            true => problem.hint("use `fill(value, size)`"),
+            false => problem,
+        })
     }
 
     /// A value of the declared type.
@@ -621,10 +617,6 @@ impl Parts<'_> {
             "write `{name} = …` here, or give the value on loading"
         ))
     }
-}
-
-fn expected_number(span: Span) -> Problem {
-    Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 
 /// A value that the caller gives to a parameter, or to an element of one.

@@ -395,19 +395,28 @@ impl<'a> Evaluator<'a> {
             Some(Err(())) => return self.outside_of_function(&name, span),
             None => {}
         }
-        match self.named(&name) {
-            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
-            Named::Array(dims, elements) => {
-                self.budget.charge(elements.len() as u64, span)?;
-                Ok(Value::new(dims.to_vec(), elements.to_vec()))
-            }
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+        let found = self.named(&name);
+        if let Named::Array([_, ..], elements) = found {
+            self.budget.charge(elements.len() as u64, span)?;
+        }
+        match found {
             Named::Unknown => match self.builtin(&name) {
                 Some(scalar) => Ok(Value::Scalar(scalar)),
                 None => Err(self.unknown_name(span)),
             },
+            found => self.meant(found, span),
+        }
+    }
+
+    /// The value that a name means.
+    pub(super) fn meant(&mut self, found: Named<'a>, span: Span) -> Result<Value> {
+        match found {
+            Named::Array([], [scalar]) => Ok(Value::Scalar(*scalar)),
+            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
+            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
             Named::Varying => Err(self.varying(span)),
             Named::Valueless => Err(self.without_value(span)),
+            Named::Unknown => Err(self.unknown_name(span)),
         }
     }
 
@@ -453,8 +462,7 @@ impl<'a> Evaluator<'a> {
         let found = self.named(name);
         self.mode = mode;
         match found {
-            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
+            found @ (Named::Array(..) | Named::Scalar(_)) => self.meant(found, span),
             _ => match self.builtin(name) {
                 Some(scalar) => Ok(Value::Scalar(scalar)),
                 None if self.scope.dims(name).is_some() => {
@@ -534,13 +542,7 @@ impl<'a> Evaluator<'a> {
         if let Some(Ok(local)) = self.local(name) {
             return local.value().ok_or_else(|| self.unassigned(name, span));
         }
-        match self.named(name) {
-            Named::Array(dims, elements) => Ok(Value::new(dims.to_vec(), elements.to_vec())),
-            Named::Scalar(scalar) => Ok(Value::Scalar(scalar)),
-            Named::Varying => Err(self.varying(span)),
-            Named::Valueless => Err(self.without_value(span)),
-            Named::Unknown => Err(self.unknown_name(span)),
-        }
+        self.meant(self.named(name), span)
     }
 
     /// A variable of the function or algorithm around; `Err` where a function has none of that

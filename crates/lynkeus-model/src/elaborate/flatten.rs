@@ -7,7 +7,7 @@ use super::evaluate::{Branches, Evaluator};
 use super::execute;
 use super::scope::{Context, Frame, Local, Mode, Named};
 use super::symbols::Symbols;
-use super::value::{Outcome, Record, Scalar, Value, describe_dims, element_name};
+use super::value::{Outcome, Record, Scalar, Value, check_size, describe_dims, element_name};
 use crate::balance::FlatEquation;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::syntax::ast::{
@@ -140,11 +140,12 @@ impl<'a> Flattener<'a> {
         let name = &declaration.label;
         let span = declaration.name.to(self.evaluator.span(binding));
         let value = self.evaluator.value(binding)?;
-        if variable.dims() != value.dims() {
-            let (has, found) = (describe_dims(variable.dims()), describe_dims(value.dims()));
-            let message = format!("`{name}` has the size {has}, its value has {found}");
-            return Err(Problem::new(self.evaluator.span(binding), message));
-        }
+        check_size(
+            name,
+            variable.dims(),
+            value.dims(),
+            self.evaluator.span(binding),
+        )?;
         self.equate(variable, value, span)
     }
 

@@ -57,14 +57,8 @@ impl<'a> Symbols<'a> {
     }
 
     pub(crate) fn evaluator<'e>(&'e self, context: &'e Context<'a>, mode: Mode) -> Evaluator<'e> {
-        let Context {
-            source,
-            ast,
-            graph,
-            budget,
-            ..
-        } = context;
-        Evaluator::new(source, ast, graph, budget, self, mode).within(context)
+        let (source, ast) = (context.source, context.ast);
+        Evaluator::new(source, ast, context.graph, context.budget, self, mode).within(context)
     }
 
     /// For the declaration of a name: of a package, only what it knows.

@@ -2,7 +2,7 @@
 
 use lynkeus_expr::{Graph, Node};
 
-use crate::diagnostic::{Problem, Span};
+use crate::diagnostic::{Problem, Result, Span};
 
 /// An Integer is always known; Real and Boolean values are expressions (truth is 1, else 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,6 +152,21 @@ impl Record {
 pub(super) enum Outcome {
     Value(Value),
     Record(Record),
+}
+
+/// Refuses a value of another size than its variable has.
+pub(super) fn check_size(name: &str, has: &[usize], found: &[usize], span: Span) -> Result<()> {
+    if has == found {
+        return Ok(());
+    }
+    let (has, found) = (describe_dims(has), describe_dims(found));
+    let message = format!("`{name}` has the size {has}, its value has {found}");
+    Err(Problem::new(span, message))
+}
+
+/// Refuses a truth value where a number must stand.
+pub(super) fn expected_number(span: Span) -> Problem {
+    Problem::new(span, "expected a number, found a Boolean").hint("write `if a then 1 else 0`")
 }
 
 #[cfg(test)]

@@ -168,14 +168,8 @@ impl Parser<'_> {
         let mut prefix = Prefix::plain();
         self.causality(&mut prefix)?;
         let of = self.type_name()?;
-        let mut dimensions = vec![];
-        if self.at(Symbol::OpenBracket) {
-            dimensions = self.subscripts()?;
-        }
-        let mut modification = vec![];
-        if self.accept(Symbol::OpenParen)? {
-            self.modification(&mut modification)?;
-        }
+        let dimensions = self.maybe_subscripts()?;
+        let modification = self.modification()?;
         class.alias = Some(Alias {
             of,
             dimensions,
@@ -300,10 +294,7 @@ impl Parser<'_> {
 
     fn base(&mut self) -> Result<Base> {
         let name = self.dotted_name()?;
-        let mut modification = vec![];
-        if self.accept(Symbol::OpenParen)? {
-            self.modification(&mut modification)?;
-        }
+        let modification = self.modification()?;
         self.comment()?;
         self.expect(Symbol::Semicolon)?;
         Ok(Base { name, modification })
@@ -406,9 +397,7 @@ impl Parser<'_> {
         prefix.is_final = self.accept_word(Keyword::Final)?;
         self.causality(&mut prefix)?;
         prefix.type_name = self.type_name()?;
-        if self.at(Symbol::OpenBracket) {
-            prefix.dimensions = self.subscripts()?;
-        }
+        prefix.dimensions = self.maybe_subscripts()?;
         Ok(prefix)
     }
 
@@ -470,15 +459,9 @@ impl Parser<'_> {
         self.count(8)?;
         let name = self.variable_name()?;
         let label = plain(name.text(self.source)).into_owned();
-        let mut dimensions = vec![];
-        if self.at(Symbol::OpenBracket) {
-            dimensions = self.subscripts()?;
-        }
+        let mut dimensions = self.maybe_subscripts()?;
         dimensions.extend(&prefix.dimensions);
-        let mut attributes = vec![];
-        if self.accept(Symbol::OpenParen)? {
-            self.modification(&mut attributes)?;
-        }
+        let attributes = self.modification()?;
         let mut binding = None;
         if self.accept(Symbol::Equal)? {
             binding = Some(self.expression()?);
@@ -518,12 +501,16 @@ impl Parser<'_> {
         }
     }
 
-    /// `start = 1, each min = 0)`, behind the opening parenthesis.
-    pub(super) fn modification(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
-        self.nested(|parser| parser.modification_here(into))
+    /// `(start = 1, each min = 0)`, where it stands here.
+    fn modification(&mut self) -> Result<Vec<Attribute>> {
+        let mut given = vec![];
+        if self.accept(Symbol::OpenParen)? {
+            self.nested(|parser| parser.attributes(&mut given))?;
+        }
+        Ok(given)
     }
 
-    fn modification_here(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
+    fn attributes(&mut self, into: &mut Vec<Attribute>) -> Result<()> {
         if self.accept(Symbol::CloseParen)? {
             return Ok(());
         }
@@ -534,10 +521,7 @@ impl Parser<'_> {
             self.accept_word(Keyword::Each)?;
             self.accept_word(Keyword::Final)?;
             let name = self.identifier("the name of an attribute")?;
-            let mut nested = vec![];
-            if self.accept(Symbol::OpenParen)? {
-                self.modification(&mut nested)?;
-            }
+            let nested = self.modification()?;
             let mut value = None;
             if nested.is_empty() {
                 self.expect(Symbol::Equal)?;

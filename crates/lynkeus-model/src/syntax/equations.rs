@@ -8,6 +8,9 @@ use super::unquoted;
 use crate::diagnostic::{Problem, Result, Span};
 use crate::limits::MAX_ITERATORS;
 
+/// Conditions with what holds under them, and what holds under none.
+type Cases<T> = (Vec<(ExprId, Vec<T>)>, Vec<T>);
+
 impl Parser<'_> {
     pub(super) fn equation(&mut self) -> Result<Equation> {
         self.nested(|parser| parser.equation_here())
@@ -127,21 +130,10 @@ impl Parser<'_> {
         }))
     }
 
-    /// Conditions with what holds under them, and what holds under none, behind `if`.
-    fn branches<T>(
-        &mut self,
-        one: fn(&mut Self) -> Result<T>,
-    ) -> Result<(Vec<(ExprId, Vec<T>)>, Vec<T>)> {
+    /// Equations or statements behind `if`.
+    fn branches<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Cases<T>> {
         self.advance()?;
-        let mut branches = vec![];
-        loop {
-            let condition = self.expression()?;
-            self.expect_word(Keyword::Then)?;
-            branches.push((condition, self.until_end(one)?));
-            if !self.accept_word(Keyword::Elseif)? {
-                break;
-            }
-        }
+        let branches = self.cases(|parser| parser.until_end(one))?;
         let mut otherwise = vec![];
         if self.accept_word(Keyword::Else)? {
             otherwise = self.until_end(one)?;
@@ -160,7 +152,7 @@ impl Parser<'_> {
         Ok((iterators, body))
     }
 
-    /// Equations or statements.
+    /// Equations or statements up to `end` or `else`.
     fn until_end<T>(&mut self, one: fn(&mut Self) -> Result<T>) -> Result<Vec<T>> {
         let mut found = vec![];
         while !matches!(

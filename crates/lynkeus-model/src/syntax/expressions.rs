@@ -54,15 +54,7 @@ impl Parser<'_> {
 
     fn if_expression(&mut self) -> Result<ExprId> {
         let (start, first) = (self.advance()?, self.next_id());
-        let mut branches = vec![];
-        loop {
-            let condition = self.expression()?;
-            self.expect_word(Keyword::Then)?;
-            branches.push((condition, self.expression()?));
-            if !self.accept_word(Keyword::Elseif)? {
-                break;
-            }
-        }
+        let branches = self.cases(Self::expression)?;
         if !self.at_word(Keyword::Else) {
             let problem = self.unexpected("`else`");
             return Err(problem.hint("an `if` expression has a value in every case"));
@@ -70,6 +62,22 @@ impl Parser<'_> {
         self.advance()?;
         let otherwise = self.expression()?;
         self.push(Kind::If(branches, otherwise), start, first)
+    }
+
+    /// Conditions with what stands behind their `then`, up to `else` or `end`.
+    pub(super) fn cases<T>(
+        &mut self,
+        then: impl Fn(&mut Self) -> Result<T>,
+    ) -> Result<Vec<(ExprId, T)>> {
+        let mut cases = vec![];
+        loop {
+            let condition = self.expression()?;
+            self.expect_word(Keyword::Then)?;
+            cases.push((condition, then(self)?));
+            if !self.accept_word(Keyword::Elseif)? {
+                return Ok(cases);
+            }
+        }
     }
 
     /// Operands joined by operators that bind at least as tightly as `least`.
@@ -338,10 +346,7 @@ impl Parser<'_> {
         let mut parts = vec![PathPart { name, subscripts }];
         while self.accept(Symbol::Dot)? {
             let name = self.identifier("a name after `.`")?;
-            let mut subscripts = vec![];
-            if self.at(Symbol::OpenBracket) {
-                subscripts = self.subscripts()?;
-            }
+            let subscripts = self.maybe_subscripts()?;
             self.count(1)?;
             parts.push(PathPart { name, subscripts });
         }
@@ -391,6 +396,14 @@ impl Parser<'_> {
         }
         self.expect(Symbol::CloseParen)?;
         self.push(Kind::Call(call), function, first)
+    }
+
+    /// `[1, :, 2:end]`, where it stands here.
+    pub(super) fn maybe_subscripts(&mut self) -> Result<Vec<ExprId>> {
+        match self.at(Symbol::OpenBracket) {
+            true => self.subscripts(),
+            false => Ok(vec![]),
+        }
     }
 
     /// `[1, :, 2:end]`
