@@ -153,6 +153,7 @@ mod tests {
     use lynkeus_run::{BetweenSamples, EstimatorSettings, Log, Role};
 
     use super::*;
+    use crate::estimate::run_settings;
     use crate::{Study, Table, prepare};
 
     /// The runner's own replay of a log knows nothing of gaps, nor of files.
