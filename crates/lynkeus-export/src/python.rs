@@ -63,7 +63,7 @@ pub struct Module {
 /// Prints functions of time and these vectors; the title stands above them.
 ///
 /// # Errors
-/// As [`Code::of`] and [`Body::of`].
+/// [`Refusal::Loop`], [`Refusal::LargeSystem`] and [`Refusal::Lacks`].
 pub fn module(
     title: &str,
     functions: &[Function<'_>],

@@ -4,12 +4,10 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::path::Path;
 
-use lynkeus_model::Plant;
 use lynkeus_structure::Extended;
 
 use crate::course::Samples;
-use crate::headers::{log_time, refuse_seconds, time_of};
-use crate::inputs::further_headers;
+use crate::headers::{further_headers, header, log_time, refuse_seconds, time_of};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::table::{APART, Lost, Ordered, Request, is_parquet};
@@ -137,43 +135,6 @@ pub(crate) fn truth<'t>(
     let is_read = read(prepared.extended()).any(|name| header(settings, name) == own);
     let unread = || logged(&log.table, settings, &log.time, name).filter(|_| !is_read);
     log.table.truth(name).or_else(unread)
-}
-
-/// The header under which the log has a signal of the plant.
-pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
-    let given = settings
-        .columns
-        .iter()
-        .find(|(plant, _)| plant.text == name);
-    given.map_or(name, |(_, header)| header)
-}
-
-/// Refuses headers under which the study looks for what the plant does not have.
-pub(crate) fn refuse_stray_columns(
-    plant: &Plant,
-    settings: &EstimateSettings,
-) -> Result<(), Error> {
-    let names = || {
-        plant
-            .outputs
-            .iter()
-            .chain(&plant.inputs)
-            .map(|v| v.name.as_str())
-    };
-    match settings
-        .columns
-        .iter()
-        .find(|(name, _)| !names().any(|n| n == name.text))
-    {
-        None => Ok(()),
-        Some((name, _)) => Err(name.blame(
-            Error::input(format!(
-                "columns: the plant '{}' has no output or input named \"{name}\"",
-                plant.name
-            ))
-            .hint(crate::near::suggest(&name.text, names())),
-        )),
-    }
 }
 
 /// The columns of a log that an observer reads: an input's last value stands where its cell is

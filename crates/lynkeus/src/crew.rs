@@ -7,7 +7,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread::{self, Builder};
 
+use lynkeus_expr::Budget;
+
 use crate::Error;
+
+/// A watch that also ends a run whose budget is spent.
+pub(crate) fn within<'a>(
+    budget: &'a Budget,
+    watch: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
+    move |fraction| match budget.spent() {
+        Some(_) => ControlFlow::Break(()),
+        None => watch(fraction),
+    }
+}
 
 /// Fractions of a run that are told.
 const STEP: f64 = 0.02;

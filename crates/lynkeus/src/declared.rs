@@ -10,9 +10,10 @@ use std::collections::BTreeMap;
 
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::filter::Limits;
+use lynkeus_structure::{Extended, range};
 
 use crate::study::{Name, Noise};
-use crate::{Error, Study, calibrate, near, simulate};
+use crate::{Error, Study, calibrate, near, systems};
 pub use account::Account;
 
 /// One kind of declaration: what is said of single quantities, by their names.
@@ -68,7 +69,7 @@ impl Declared {
         let step = study
             .simulate
             .as_ref()
-            .and_then(|settings| simulate::sampled_every(study, settings));
+            .and_then(|settings| systems::sampled_every(study, settings));
         let limits = |(name, low, high): &(Name, f64, f64)| {
             (
                 name.clone(),
@@ -195,4 +196,29 @@ impl<T> Kind<T> {
     pub fn iter(&self) -> impl Iterator<Item = (&String, &T)> {
         self.said.iter()
     }
+}
+
+/// The declared noise as standard deviations, by output; that of a share is one of the largest value
+/// on the box, which may be infinite.
+pub(crate) fn deviations(
+    declared: &Declared,
+    extended: &Extended<'_>,
+) -> Result<BTreeMap<String, f64>, Error> {
+    let mut found = BTreeMap::new();
+    for output in &extended.outputs {
+        let name = &output.variable.name;
+        let Some(noise) = declared.noise.of(name) else {
+            continue;
+        };
+        let deviation = match *noise {
+            Noise::Absolute(deviation) => deviation,
+            Noise::Uniform(bound) => bound / 3.0_f64.sqrt(),
+            Noise::Relative(share) => {
+                let values = range(extended.graph(), output.variable.node, &extended.region());
+                share * values.map_err(Error::from_source)?.enclosure.magnitude()
+            }
+        };
+        found.insert(name.clone(), deviation);
+    }
+    Ok(found)
 }

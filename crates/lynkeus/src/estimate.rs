@@ -9,13 +9,13 @@ use lynkeus_run::{Estimator, EstimatorSettings};
 use crate::checkpoint::Checkpoint;
 use crate::columns::{self, Log};
 use crate::course::{Course, Samples};
+use crate::crew::within;
 use crate::fixed_steps::unlocated;
 use crate::frozen::{Channel, Frozen, frozen};
 use crate::inputs::{are_logged, refuse_strays, supplied};
 use crate::outcome::{Raw, is_observers_answer, measurements, settle};
 use crate::prepare::Prepared;
 use crate::replay::{Watch, refuse_smoothing, replay};
-use crate::simulate::within;
 use crate::study::{BetweenSamples, EstimateSettings};
 use crate::systems::{self, method};
 use crate::{

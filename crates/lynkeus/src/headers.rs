@@ -6,8 +6,7 @@ use std::collections::HashSet;
 
 use lynkeus_model::{Plant, Variable};
 
-use crate::columns::header;
-use crate::study::EstimateSettings;
+use crate::study::{self, EstimateSettings, Name};
 use crate::{Error, Study, Table};
 
 /// The header of time, and what it is where a column of data is called so.
@@ -151,6 +150,62 @@ fn is_no_second(unit: &str) -> bool {
         "d", "day", "days", "week", "weeks", "year", "years",
     ];
     OTHERS.contains(&unit.trim().to_lowercase().as_str())
+}
+
+/// The header under which the log has a signal of the plant.
+pub(crate) fn header<'a>(settings: &'a EstimateSettings, name: &'a str) -> &'a str {
+    let given = settings
+        .columns
+        .iter()
+        .find(|(plant, _)| plant.text == name);
+    given.map_or(name, |(_, header)| header)
+}
+
+/// Refuses headers under which the study looks for what the plant does not have.
+pub(crate) fn refuse_stray_columns(
+    plant: &Plant,
+    settings: &EstimateSettings,
+) -> Result<(), Error> {
+    let names = || {
+        plant
+            .outputs
+            .iter()
+            .chain(&plant.inputs)
+            .map(|v| v.name.as_str())
+    };
+    match settings
+        .columns
+        .iter()
+        .find(|(name, _)| !names().any(|n| n == name.text))
+    {
+        None => Ok(()),
+        Some((name, _)) => Err(name.blame(
+            Error::input(format!(
+                "columns: the plant '{}' has no output or input named \"{name}\"",
+                plant.name
+            ))
+            .hint(crate::near::suggest(&name.text, names())),
+        )),
+    }
+}
+
+/// The header of what a generator reads of a log.
+pub(crate) fn command(name: &Name, generator: &study::Generator) -> Option<String> {
+    match generator {
+        study::Generator::Time(_) => None,
+        study::Generator::Prefilter { command, .. } => {
+            let own = || format!("{name}_command");
+            Some(command.clone().unwrap_or_else(own))
+        }
+    }
+}
+
+/// Headers beside those of the plant's variables that an observer may read.
+pub(crate) fn further_headers(settings: &EstimateSettings) -> impl Iterator<Item = String> {
+    let derivatives = settings.input_derivatives.iter();
+    let derivatives = derivatives.flat_map(|(_, headers)| headers.iter().cloned());
+    let generators = settings.generator.iter();
+    derivatives.chain(generators.filter_map(|(name, given)| command(name, given)))
 }
 
 #[cfg(test)]

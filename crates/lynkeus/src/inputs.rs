@@ -2,10 +2,11 @@
 
 use lynkeus_observers::{Design, Generator, InputDerivative, Prefilter, Signal};
 
-use crate::columns::{Log, header, held};
+use crate::columns::{Log, held};
+use crate::headers::{command, header};
 use crate::near::suggest;
 use crate::prepare::Prepared;
-use crate::study::{self, EstimateSettings, Name};
+use crate::study::{self, Name};
 use crate::{Error, Series, Study, systems};
 
 /// What a known input of an observer reads.
@@ -105,26 +106,6 @@ fn generator(
         }
     }
 }
-
-/// The header of what a generator reads of a log.
-fn command(name: &Name, generator: &study::Generator) -> Option<String> {
-    match generator {
-        study::Generator::Time(_) => None,
-        study::Generator::Prefilter { command, .. } => {
-            let own = || format!("{name}_command");
-            Some(command.clone().unwrap_or_else(own))
-        }
-    }
-}
-
-/// Headers beside those of the plant's variables that an observer may read.
-pub(crate) fn further_headers(settings: &EstimateSettings) -> impl Iterator<Item = String> {
-    let derivatives = settings.input_derivatives.iter();
-    let derivatives = derivatives.flat_map(|(_, headers)| headers.iter().cloned());
-    let generators = settings.generator.iter();
-    derivatives.chain(generators.filter_map(|(name, given)| command(name, given)))
-}
-
 /// The header under which the study has a derivative.
 fn column<'s>(study: &'s Study, needed: &InputDerivative) -> Option<&'s String> {
     let given = study.estimate.input_derivatives.iter();

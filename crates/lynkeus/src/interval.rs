@@ -10,7 +10,7 @@ use crate::course::{Course, Samples};
 use crate::prepare::Prepared;
 use crate::series::{Sorted, points, steps};
 use crate::study::BetweenSamples;
-use crate::{Quantity, Series, simulate};
+use crate::{Quantity, Series, systems};
 
 /// Rows of the log at which the error is linearised.
 const PLACES: usize = 12;
@@ -69,7 +69,7 @@ pub(crate) fn simulated(
     let noise = &prepared.declared().noise;
     let noisy = noise.iter().any(|(_, noise)| noise.size() > 0.0);
     let settings = study.simulate.as_ref().filter(|_| noisy)?;
-    let step = simulate::sampled_every(study, settings)?;
+    let step = systems::sampled_every(study, settings)?;
     let of = |name: &str| quantities.iter().find(|q| q.name == name);
     let observer = &design.observer;
     let estimates = observer.estimates.iter();

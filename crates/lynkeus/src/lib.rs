@@ -61,6 +61,7 @@ mod certify;
 mod check;
 mod checkpoint;
 mod choice;
+mod choose;
 mod columns;
 #[cfg(feature = "tune")]
 mod compare;
@@ -125,7 +126,7 @@ pub use accuracy::{Accuracy, Coverage, Settling};
 pub use certify::{AtTheta, CertifyReport, Excitation, Excited, Strays, certify};
 pub use check::{Assumption, CheckOptions, Knowledge, Known, Next, Report, Reserve, check};
 pub use checkpoint::Checkpoint;
-pub use choice::{Choice, Grounds};
+pub use choice::{Choice, Grounds, Proposal, Speed};
 pub use columns::log;
 #[cfg(feature = "tune")]
 pub use compare::{Against, Compared, Comparison, Interval, Resolution, Run, Settled, compare};
@@ -146,7 +147,6 @@ pub use monte_carlo::monte_carlo;
 pub use outcome::{Outcome, Watch};
 pub use outside::{Excursion, Outside};
 pub use precision::precision;
-pub use propose::{Proposal, Speed};
 pub use quantity::Quantity;
 #[cfg(feature = "tune")]
 pub use report::{Page, ReportOptions, report};

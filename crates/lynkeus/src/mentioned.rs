@@ -3,10 +3,13 @@
 use std::collections::HashSet;
 
 use lynkeus_model::Plant;
+#[cfg(feature = "tune")]
+use lynkeus_observers::{FAMILIES, Family};
 
+use crate::headers::refuse_stray_columns;
 use crate::spread::Spread;
 use crate::study::Name;
-use crate::{Error, Study, columns, near, systems};
+use crate::{Error, Study, near, systems};
 
 /// Refuses a study in which any section names what the plant does not have.
 ///
@@ -18,7 +21,7 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
         systems::starts(plant, &settings.initial)?;
         Spread::new(plant, settings)?;
     }
-    columns::refuse_stray_columns(plant, &study.estimate)?;
+    refuse_stray_columns(plant, &study.estimate)?;
     drawn(study, plant)?;
     for (name, expression) in &study.tune.disturbance {
         if !plant.inputs.iter().any(|input| input.name == name.text) {
@@ -30,7 +33,7 @@ pub(crate) fn refuse_strangers(study: &Study, plant: &Plant) -> Result<(), Error
     {
         // another observer may have been put in the place of the one that is tuned
         crate::tune::refuse_strange_keys(study, false)?;
-        crate::compare::asked(study)?;
+        asked(study)?;
     }
     Ok(())
 }
@@ -85,4 +88,24 @@ fn drawn(study: &Study, plant: &Plant) -> Result<(), Error> {
 pub(crate) fn not_drawn(name: &Name, nothing: &str, names: &[&str]) -> Error {
     let refusal = Error::input(format!("`show` of [plot]: {nothing} is called \"{name}\""));
     name.blame(refusal.hint(near::suggest(&name.text, names.iter().copied())))
+}
+
+/// The families that `[compare]` asks for.
+///
+/// # Errors
+/// One that there is not.
+#[cfg(feature = "tune")]
+pub(crate) fn asked(study: &Study) -> Result<Option<Vec<&'static dyn Family>>, Error> {
+    let find = |name: &Name| {
+        let found = lynkeus_observers::find(&name.text);
+        found.ok_or_else(|| {
+            let names = FAMILIES.iter().map(|f| f.name());
+            let message = format!("families of [compare]: no family is called \"{name}\"");
+            name.blame(Error::input(message).hint(crate::near::suggest(&name.text, names)))
+        })
+    };
+    let names = study.compare.as_ref();
+    names
+        .map(|names| names.iter().map(find).collect())
+        .transpose()
 }

@@ -19,7 +19,7 @@ use crate::outside::{self, Outside, outside};
 use crate::prepare::Prepared;
 use crate::study::EstimateSettings;
 use crate::systems::hat;
-use crate::{Error, Quantity, Series, Study, columns, expected, saturated};
+use crate::{Error, Quantity, Series, Study, expected, headers, saturated};
 
 /// The trust in an estimate over time, and whether it was ever lost.
 #[derive(Clone, Debug)]
@@ -137,7 +137,7 @@ impl Outcome {
     /// # Errors
     /// The study's `[estimate]` gives two of them the same header.
     pub fn log(&self, settings: &EstimateSettings) -> Result<Vec<(String, &Series)>, Error> {
-        let header = |name: &str| columns::header(settings, name).to_owned();
+        let header = |name: &str| headers::header(settings, name).to_owned();
         let inputs = self.quantities.iter().filter(|q| q.is_input);
         let inputs = inputs.filter_map(|q| Some((&q.name, q.truth.as_ref()?)));
         let measured = self.measurements.iter().map(|(n, values)| (n, values));

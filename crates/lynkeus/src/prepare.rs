@@ -10,11 +10,11 @@ pub(crate) use lynkeus_observers::is_certified_gain;
 use lynkeus_observers::{Design, DesignError, Examination, Family, Tuning};
 use lynkeus_structure::{Dimension, Extended, Region, Sensors, SensorsError, range};
 
-use crate::choice::{Choice, choose};
+use crate::choice::Choice;
 use crate::declared::Declared;
 use crate::mentioned::{refuse_strangers, refuse_unknown_states};
 use crate::study::Name;
-use crate::{Error, Study, calibrate, filter, systems};
+use crate::{Error, Study, calibrate, declared, systems};
 
 /// The plant of a study, with the study's parameters.
 ///
@@ -238,16 +238,9 @@ impl<'a> Prepared<'a> {
         self.design_with(&self.study.observer.tuning)
     }
 
-    /// The family to use, and why: the same for every command.
-    ///
-    /// # Errors
-    /// Keys of `[observer]` that cannot be used.
-    pub fn choice(&self) -> Result<Option<&Choice>, Error> {
-        if let Some(known) = self.choice.get() {
-            return Ok(known.as_ref());
-        }
-        let found = choose(self)?;
-        Ok(self.choice.get_or_init(|| found).as_ref())
+    /// Where the decision is kept once it is made.
+    pub(crate) fn chosen(&self) -> &OnceCell<Option<Choice>> {
+        &self.choice
     }
 
     /// The tuning of the study, with what is proposed.
@@ -291,7 +284,7 @@ impl<'a> Prepared<'a> {
         let simulated = match is_certified_gain(tuning) {
             true => {
                 let place = self.narrowed(&self.simulated_inputs()?)?;
-                tuned.noise = filter::noise::deviations(&self.declared, &place)?;
+                tuned.noise = declared::deviations(&self.declared, &place)?;
                 Some(place)
             }
             false => None,

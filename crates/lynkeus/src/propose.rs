@@ -1,13 +1,13 @@
 //! How fast an observer is to be, where the study leaves it out.
 
 use lynkeus_proof::spectrum;
-use std::fmt;
 
 use lynkeus_expr::Spent;
-use lynkeus_expr::real::rounded;
-use lynkeus_observers::{Examination, Family, Value};
-use serde_json::{Value as Json, json};
+use lynkeus_observers::Examination;
+#[cfg(feature = "tune")]
+use lynkeus_observers::Value;
 
+use crate::choice::{Proposal, Speed};
 use crate::modes::Start;
 use crate::prepare::Prepared;
 
@@ -27,85 +27,6 @@ const ROWS: f64 = 5000.0;
 /// The time that the runs may take: seldom reached, as what is chosen must not depend on the machine.
 #[cfg(feature = "tune")]
 const TIME: std::time::Duration = std::time::Duration::from_secs(30);
-
-/// The key that says how fast an observer is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Speed {
-    /// `theta`
-    Theta,
-    /// `poles`: a number is the slowest pole of every output
-    Poles,
-}
-
-impl Speed {
-    pub(crate) const ALL: [Self; 2] = [Self::Theta, Self::Poles];
-
-    /// Its name.
-    #[must_use]
-    pub fn key(self) -> &'static str {
-        match self {
-            Self::Theta => "theta",
-            Self::Poles => "poles",
-        }
-    }
-
-    /// The value for an error that decays like e^(−rate t): what this family takes under the key.
-    fn value(self, family: &dyn Family, rate: f64) -> Value {
-        match self {
-            Self::Poles => Value::Number(-rounded(rate, 2)),
-            Self::Theta => {
-                let parts = family.speeds();
-                let part = |factor: &f64| Value::Number(rounded(factor * rate, 2));
-                match parts {
-                    [] => Value::Number(rounded(rate, 2)),
-                    _ => Value::List(parts.iter().map(part).collect()),
-                }
-            }
-        }
-    }
-}
-
-/// A value that the study leaves out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Proposal {
-    /// what it is of
-    pub speed: Speed,
-    /// a number or a list of them, in 1/(unit of time)
-    pub value: Value,
-    /// where it comes from
-    pub why: String,
-    /// the best of values that were tried in simulation
-    pub is_tried: bool,
-}
-
-impl Proposal {
-    pub(crate) fn to_json(&self) -> Json {
-        let value = match &self.value {
-            Value::List(values) => values.iter().map(plain).collect(),
-            one => plain(one),
-        };
-        json!({ "key": self.speed.key(), "value": value, "why": self.why })
-    }
-}
-
-/// A number for machines.
-fn plain(value: &Value) -> Json {
-    match value {
-        Value::Number(x) => json!(x),
-        _ => Json::Null,
-    }
-}
-
-impl fmt::Display for Proposal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (key, value) = (self.speed.key(), &self.value);
-        write!(
-            f,
-            "{key} = {value} is proposed: {}; write it, or another, into [observer]",
-            self.why
-        )
-    }
-}
 
 /// The knee of a short sweep where the study has a simulation, else twice the mean rate of the plant.
 ///

@@ -10,7 +10,7 @@ use lynkeus_observers::Design;
 use crate::prepare::{Prepared, is_certified_gain};
 use crate::simulate::{self, Rig};
 use crate::study::SimulateSettings;
-use crate::{Error, Outcome, Study, Table, choice, estimate, prepare};
+use crate::{Error, Outcome, Study, Table, choose, estimate, prepare, systems};
 
 /// Runs a study as [`simulate`](crate::simulate()) and [`estimate`](crate::estimate()) do, to the
 /// bit, and keeps its plant and observer for further runs and for studies that
@@ -64,7 +64,7 @@ impl Runner {
         study: &Study,
         watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Result<Outcome, Error> {
-        simulate::settings(study)?;
+        systems::settings(study)?;
         let (plant, rig) = match self.simulated.copy(study) {
             Some((plant, rig)) => {
                 let rig = rig.redrawn(study, &plant)?;
@@ -146,7 +146,7 @@ impl<T: Clone> Kept<T> {
         // before anything more is asked of the graph
         let copy = (prepared.plant().clone(), made.clone());
         let is_whole = budget.left().is_none() && budget.marked().is_none();
-        if is_whole && choice::is_fixed(prepared) {
+        if is_whole && choose::is_fixed(prepared) {
             *self.lock() = Some(copy);
         }
     }

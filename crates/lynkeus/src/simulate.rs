@@ -4,12 +4,12 @@ mod noise;
 
 use std::ops::ControlFlow;
 
-use lynkeus_expr::Budget;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_observers::{Design, Observer};
-use lynkeus_run::{Role, Simulation};
+use lynkeus_run::{Role, Simulation, System};
 
 use crate::course::{Course, Samples};
+use crate::crew::within;
 use crate::fixed_steps::unlocated;
 use crate::headers::log_time;
 use crate::outcome::{Raw, interrupted, is_answer, measurements, settle};
@@ -17,8 +17,8 @@ use crate::prepare::Prepared;
 use crate::recorded::Recorded;
 use crate::spread::Spread;
 use crate::study::SimulateSettings;
-use crate::systems::{self, method};
-use crate::{Error, Outcome, Quantity, Series, Study, Table, columns, estimate, prepare};
+use crate::systems::{self, method, settings};
+use crate::{Error, Outcome, Quantity, Series, Study, Table, estimate, headers, prepare};
 use noise::{noise, stirred};
 
 /// Runs the study's plant with its observer; `watch` is told the fraction done
@@ -73,6 +73,25 @@ pub(crate) struct Ran {
     pub run: Recorded,
     /// the estimates, row by row of the run
     pub course: Course,
+}
+
+impl Spread {
+    /// The plant of the run of a seed; `nominal` is the study's.
+    ///
+    /// # Errors
+    /// A plant that cannot be made with the parameters that were drawn.
+    pub fn drawn(&self, study: &Study, nominal: &System, seed: u64) -> Result<System, Error> {
+        let plant = match self.has_parameters() {
+            false => nominal.clone(),
+            true => {
+                let drawn = self.study(study, seed);
+                let plant = prepare::plant(&drawn)?;
+                systems::plant(&plant, systems::settings(&drawn)?)?
+            }
+        };
+        let start = self.start(&plant, seed);
+        plant.with_start(start).map_err(Error::from_source)
+    }
 }
 
 impl Rig {
@@ -236,17 +255,6 @@ pub(crate) fn seen(plant: &Plant, observer: &Observer, run: &Recorded) -> Sample
     }
 }
 
-/// A watch that also ends a run whose budget is spent.
-pub(crate) fn within<'a>(
-    budget: &'a Budget,
-    watch: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-) -> impl FnMut(f64) -> ControlFlow<()> + 'a {
-    move |fraction| match budget.spent() {
-        Some(_) => ControlFlow::Break(()),
-        None => watch(fraction),
-    }
-}
-
 /// The study's plant as a logger would have it, a sample every `step`, with the true states and
 /// inputs beside it.
 ///
@@ -271,28 +279,11 @@ pub(crate) fn recorded(study: &Study, plant: &Plant, step: f64) -> Result<Table,
     let inputs = own(&plant.inputs, Role::Input);
     let seen = own(&plant.outputs, Role::Measured).into_iter();
     let seen = seen.chain(inputs.clone());
-    let seen = seen.map(|(name, values)| (columns::header(settings, &name).to_owned(), values));
+    let seen = seen.map(|(name, values)| (headers::header(settings, &name).to_owned(), values));
     let time = (log_time(plant, settings), run.times().to_vec());
     let truth = own(&plant.states, Role::State).into_iter().chain(inputs);
     let table = Table::from_columns([time].into_iter().chain(seen).collect())?;
     Ok(table.with_truth(truth.collect()))
-}
-
-/// The study's `[simulate]`.
-pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
-    study.simulate.as_ref().ok_or_else(|| {
-        Error::input("the study has no [simulate] section")
-            .at(&study.file)
-            .hint("add [simulate] with `until` and `inputs`")
-    })
-}
-
-/// The time between two samples of the simulation where the study says that it is sampled: its
-/// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
-pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
-    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
-    let drawn = is_noisy.then(|| settings.row_step());
-    settings.sample_step.or(drawn)
 }
 
 /// The study's plant under its inputs and with its noise, without an observer.

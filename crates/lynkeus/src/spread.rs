@@ -4,7 +4,7 @@ use lynkeus_model::Plant;
 use lynkeus_run::{System, deviate};
 
 use crate::study::{Name, SimulateSettings};
-use crate::{Error, Study, prepare, systems};
+use crate::{Error, Study};
 
 /// What a run draws by its seed.
 #[derive(Clone, Debug, Default)]
@@ -57,19 +57,6 @@ impl Spread {
         all.any(|deviation| deviation > 0.0)
     }
 
-    /// The plant of the run of a seed; `nominal` is the study's.
-    ///
-    /// # Errors
-    /// A plant that cannot be made with the parameters that were drawn.
-    pub fn drawn(&self, study: &Study, nominal: &System, seed: u64) -> Result<System, Error> {
-        let plant = match self.parameters.is_empty() {
-            true => nominal.clone(),
-            false => self.with_parameters(study, seed)?,
-        };
-        let start = self.start(&plant, seed);
-        plant.with_start(start).map_err(Error::from_source)
-    }
-
     /// The start of the run of a seed.
     pub fn start(&self, plant: &System, seed: u64) -> Vec<f64> {
         let mut start = plant.start().to_vec();
@@ -87,7 +74,8 @@ impl Spread {
         !self.parameters.is_empty()
     }
 
-    fn with_parameters(&self, study: &Study, seed: u64) -> Result<System, Error> {
+    /// The study with the parameters of the run of a seed.
+    pub fn study(&self, study: &Study, seed: u64) -> Study {
         let mut drawn = study.clone();
         for Uncertain {
             name,
@@ -98,8 +86,7 @@ impl Spread {
             let value = value + deviation * deviate(seed, name);
             drawn.parameters.insert(name.clone(), value);
         }
-        let plant = prepare::plant(&drawn)?;
-        systems::plant(&plant, crate::simulate::settings(&drawn)?)
+        drawn
     }
 }
 

@@ -8,6 +8,23 @@ use lynkeus_run::{Column, Margin, Method, Role, Step, System, Tolerances};
 use crate::study::{self, Expression, Name, Rk4Step, SimulateSettings, Solver};
 use crate::{Error, Study};
 
+/// The study's `[simulate]`.
+pub(crate) fn settings(study: &Study) -> Result<&SimulateSettings, Error> {
+    study.simulate.as_ref().ok_or_else(|| {
+        Error::input("the study has no [simulate] section")
+            .at(&study.file)
+            .hint("add [simulate] with `until` and `inputs`")
+    })
+}
+
+/// The time between two samples of the simulation where the study says that it is sampled: its
+/// sensors have noise, which is drawn anew with each, or there is a `sample_step`.
+pub(crate) fn sampled_every(study: &Study, settings: &SimulateSettings) -> Option<f64> {
+    let is_noisy = study.sensors.noise.iter().any(|(_, n)| n.size() > 0.0);
+    let drawn = is_noisy.then(|| settings.row_step());
+    settings.sample_step.or(drawn)
+}
+
 /// What the column of an estimate is called, where the model has not that name itself.
 pub(crate) fn hat(name: &str) -> String {
     format!("{name}_hat")

@@ -11,9 +11,8 @@ use lynkeus_structure::figures;
 use serde_json::{Value, json};
 
 use crate::Study;
-use crate::choice::{Choice, Grounds};
+use crate::choice::{Choice, Grounds, Proposal};
 use crate::prepare::Prepared;
-use crate::propose::Proposal;
 use crate::words::number;
 
 /// The next steps.

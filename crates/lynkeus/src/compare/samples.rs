@@ -1,7 +1,6 @@
 //! How densely a simulation is sampled, so that the samples do not decide the comparison.
 
 use std::fmt;
-use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use lynkeus_model::Plant;
@@ -9,12 +8,9 @@ use lynkeus_observers::Family;
 use lynkeus_structure::short;
 use serde_json::{Value, json};
 
-use super::{Compared, run_all};
+use super::run::{Compared, Watch, run_all};
 use crate::study::{BetweenSamples, SimulateSettings};
-use crate::{Error, Study, simulate};
-
-/// Is told the fraction done and may stop the work.
-pub(super) type Watch<'w> = &'w mut dyn FnMut(f64) -> ControlFlow<()>;
+use crate::{Error, Study, simulate, systems};
 
 /// How a simulation was sampled.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,13 +52,13 @@ pub(super) fn simulated(
     families: &[&'static dyn Family],
     watch: Watch<'_>,
 ) -> Result<(Vec<Compared>, Interval), Error> {
-    let settings = simulate::settings(study)?;
+    let settings = systems::settings(study)?;
     let interval = |step, resolution| Interval {
         step,
         resolution,
         unit: study.time_unit.clone(),
     };
-    if let Some(step) = simulate::sampled_every(study, settings) {
+    if let Some(step) = systems::sampled_every(study, settings) {
         let table = simulate::recorded(study, plant, step)?;
         let rows = run_all(study, plant, families, &table, watch)?;
         return Ok((rows, interval(step, Resolution::Study)));

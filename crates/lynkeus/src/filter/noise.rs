@@ -1,17 +1,14 @@
 //! The noises of a filter: as the study declares them, else from the log and the ranges.
 
-use std::collections::BTreeMap;
-
 use lynkeus_model::Variable;
 use lynkeus_run::Level;
-use lynkeus_structure::{Extended, range, short};
+use lynkeus_structure::{Extended, short};
 
+use crate::Series;
 use crate::course::Samples;
 use crate::declared::Declared;
 use crate::prepare::Prepared;
 use crate::series::{Sorted, steps};
-use crate::study::Noise;
-use crate::{Error, Series};
 
 /// The noise of each measured output; without `noise` in the study, how much the log's own
 /// readings scatter.
@@ -38,31 +35,6 @@ pub(crate) fn levels(
         });
     }
     levels
-}
-
-/// The declared noise as standard deviations, by output; that of a share is one of the largest value
-/// on the box, which may be infinite.
-pub(crate) fn deviations(
-    declared: &Declared,
-    extended: &Extended<'_>,
-) -> Result<BTreeMap<String, f64>, Error> {
-    let mut found = BTreeMap::new();
-    for output in &extended.outputs {
-        let name = &output.variable.name;
-        let Some(noise) = declared.noise.of(name) else {
-            continue;
-        };
-        let deviation = match *noise {
-            Noise::Absolute(deviation) => deviation,
-            Noise::Uniform(bound) => bound / 3.0_f64.sqrt(),
-            Noise::Relative(share) => {
-                let values = range(extended.graph(), output.variable.node, &extended.region());
-                share * values.map_err(Error::from_source)?.enclosure.magnitude()
-            }
-        };
-        found.insert(name.clone(), deviation);
-    }
-    Ok(found)
 }
 
 /// Readings that do not scatter: a thousandth of their range, or of their size.

@@ -21,9 +21,9 @@ use lynkeus_model::{Plant, Variable};
 
 use crate::headers::Headers;
 use crate::prepare::Prepared;
-use crate::simulate::{self, Rig};
+use crate::simulate::Rig;
 use crate::systems::column_of;
-use crate::{Error, Study, prepare};
+use crate::{Error, Study, prepare, systems};
 use apart::{Job, room};
 use ends::Sensor;
 pub use report::Settled;
@@ -43,7 +43,7 @@ pub fn monte_carlo(
     runs: usize,
     watch: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<MonteCarlo, Error> {
-    let settings = simulate::settings(study)?;
+    let settings = systems::settings(study)?;
     let count = u64::try_from(runs).ok().filter(|count| *count > 0);
     let last = count.and_then(|count| settings.seed.checked_add(count - 1));
     let Some(last) = last else {

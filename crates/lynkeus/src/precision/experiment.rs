@@ -8,10 +8,10 @@ use lynkeus_observability::precision::{Deviation, Experiment, Quantity, Sensor, 
 use lynkeus_run::{Method, Tolerances, Trajectory};
 use lynkeus_structure::Extended;
 
+use crate::crew::within;
 use crate::declared::Declared;
 use crate::outcome::interrupted;
 use crate::prepare::Prepared;
-use crate::simulate::within;
 use crate::study::{Noise, SimulateSettings};
 use crate::words::number;
 use crate::{Error, Study, simulate, systems};

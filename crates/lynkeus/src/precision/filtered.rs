@@ -12,9 +12,9 @@ use lynkeus_run::{Blueprint, Role, Simulation};
 
 use super::experiment::Setup;
 use crate::course::{Course, Samples};
+use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::replay::{Watch, replay};
-use crate::simulate::within;
 use crate::study::{Name, Noise};
 use crate::{Error, Series, Study, estimate, filter};
 

@@ -16,7 +16,7 @@ use lynkeus_observability::precision::{Advice, Deviations, SensorSet};
 
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
-use crate::{Error, Study, prepare, simulate};
+use crate::{Error, Study, prepare, simulate, systems};
 pub use experiment::{Assumed, Candidates, Options};
 use experiment::{Setup, ended};
 
@@ -70,7 +70,7 @@ pub struct Report {
 /// A study that does not fit its plant or has no `[simulate]`; an impossible horizon; a run that
 /// breaks down.
 pub fn precision(study: &Study, options: &Options) -> Result<Report, Error> {
-    let settings = simulate::settings(study)?;
+    let settings = systems::settings(study)?;
     let plant = prepare::plant(study)?;
     let prepared = Prepared::new(study, &plant)?;
     let setup = Setup::new(&prepared, settings, options)?;

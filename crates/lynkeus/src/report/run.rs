@@ -10,7 +10,9 @@ use lynkeus_structure::short;
 use super::data::ROWS;
 use super::knob::Fixed;
 use crate::prepare::Prepared;
-use crate::{Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, simulate};
+use crate::{
+    Accuracy, Error, ErrorKind, Outcome, Quantity, Study, Table, estimate, simulate, systems,
+};
 
 /// Errors that differ by no more than this share of the larger one are the same,
 const SAME: f64 = 0.25;
@@ -43,10 +45,10 @@ pub(super) fn simulated(
     plant: &Plant,
     notes: &mut Vec<String>,
 ) -> Result<Simulated, Error> {
-    let settings = simulate::settings(study).map_err(|error| {
+    let settings = systems::settings(study).map_err(|error| {
         error.hint("give a log after the study, or add [simulate] with `until` and `inputs`")
     })?;
-    if let Some(step) = simulate::sampled_every(study, settings) {
+    if let Some(step) = systems::sampled_every(study, settings) {
         let table = simulate::recorded(study, plant, step)?;
         return Ok(Simulated { table, step });
     }

@@ -5,7 +5,7 @@ use lynkeus_model::Plant;
 use lynkeus_observers::Observer;
 use lynkeus_run::Simulation;
 
-use crate::simulate::settings;
+use crate::systems::settings;
 use crate::systems::{self, named};
 use crate::{Error, Study};
 

@@ -8,15 +8,16 @@ use lynkeus_run::{Column, Role, Simulation};
 
 use super::disturbed::disturbed;
 use super::judge::{Judge, Run, Runs, Under};
-use super::record::Record;
+use super::record::{Record, course};
 use super::reference::Reference;
-use super::replay::course;
 use super::{Row, measures};
 use crate::course::{Course, Samples};
 use crate::crew::Watch;
+use crate::crew::within;
 use crate::prepare::Prepared;
 use crate::recorded::Recorded;
-use crate::simulate::{alone, open_loop, seen, settings, within};
+use crate::simulate::{alone, open_loop, seen};
+use crate::systems::settings;
 use crate::{Error, ErrorKind, Series};
 
 /// Samples of a simulation, the same for every position.

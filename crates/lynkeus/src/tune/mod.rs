@@ -20,6 +20,7 @@ mod reference;
 mod replay;
 mod report;
 mod rewrite;
+mod row;
 pub(crate) mod slider;
 mod speed;
 mod trial;
@@ -32,67 +33,17 @@ pub(crate) use axis::refuse_strange_keys;
 pub use measures::Measure;
 pub(crate) use report::{brief, shortened};
 pub use rewrite::Change;
+pub use row::{Peak, Row};
 
+use crate::crew::within;
 use crate::declared::{Account, Declared};
 use crate::prepare::Prepared;
-use crate::simulate::within;
 use crate::{Error, Study, Table, crew, prepare};
 use bench::{Bench, filter_refused};
 use pinned::pinned;
 
 /// Rows whose first figure is at most this many times the least are nearly as good as the knee.
 const NEARLY: f64 = 1.1;
-
-/// One combination of values and what came of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// The values, one per axis.
-    pub values: Vec<f64>,
-    /// The figures, one per measure; none where a run failed or the figure does not exist.
-    pub figures: Vec<Option<f64>>,
-    /// Where the largest error of the exact run is; only in simulation.
-    pub peak: Option<Peak>,
-    /// Why figures are missing, if a run failed.
-    pub failure: Option<String>,
-}
-
-/// The largest error of a run after its start.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Peak {
-    /// The quantity.
-    pub name: String,
-    /// Its estimate there, in its unit.
-    pub estimate: f64,
-    /// When, in the plant's unit of time.
-    pub time: f64,
-}
-
-impl Row {
-    fn empty(values: &[f64], measures: usize) -> Self {
-        Self {
-            values: values.to_vec(),
-            figures: vec![None; measures],
-            peak: None,
-            failure: None,
-        }
-    }
-
-    fn set(&mut self, measure: usize, figure: Option<f64>) {
-        if let Some(slot) = self.figures.get_mut(measure) {
-            *slot = figure.filter(|x| x.is_finite());
-        }
-    }
-
-    fn failed(mut self, reason: impl ToString) -> Self {
-        self.failure = Some(reason.to_string());
-        self
-    }
-
-    /// A figure by its place among the measures.
-    pub fn figure(&self, measure: usize) -> Option<f64> {
-        self.figures.get(measure).copied().flatten()
-    }
-}
 
 /// What a sweep gives.
 #[derive(Clone, Debug)]

@@ -2,14 +2,20 @@
 
 use std::borrow::Cow;
 
+use lynkeus_observers::Design;
+
 use super::errors::rms;
 use super::holdout::{FEWER, Plan};
 use crate::columns::Log;
-use crate::course::Samples;
+use crate::course::{Course, Samples};
+use crate::crew::Watch;
+use crate::estimate::{course_of, run_settings};
 use crate::inputs::{Source, are_logged};
+use crate::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::study::BetweenSamples;
-use crate::{Error, Series, Table, lines};
+use crate::thrifty::thrifty;
+use crate::{Error, Series, Table, lines, replay};
 
 /// What is the same for all values.
 #[derive(Clone, Debug)]
@@ -161,6 +167,37 @@ fn held_out(samples: &Samples, plan: &Plan, between: BetweenSamples) -> Samples 
     Samples {
         readings: samples.readings.iter().map(left).collect(),
         ..samples.clone()
+    }
+}
+
+/// What `estimate` makes of samples, as far as a figure depends on it, or why its estimate is none;
+/// `place` is what an error of theirs is told of.
+///
+/// # Errors
+/// A study or samples that cannot be used.
+pub(super) fn course(
+    prepared: &Prepared<'_>,
+    design: &Design,
+    samples: &Samples,
+    between: BetweenSamples,
+    place: &str,
+    watch: &mut Watch<'_>,
+) -> Result<Result<Course, String>, Error> {
+    let mut study = prepared.study().clone();
+    study.estimate.between_samples = between;
+    study.estimate.deviations = false;
+    study.estimate.innovations = false;
+    study.estimate.smoothing = None;
+    let prepared = prepared.run_by(&study)?;
+    let mut run = run_settings(&study.estimate);
+    run.method = thrifty(run.method, samples.time.len() as f64);
+    let watch = &mut replay::Watch::only(watch);
+    let mut course = course_of(&prepared, design, samples, run, watch)?;
+    course.check()?;
+    match course.ended.take() {
+        None => Ok(Ok(course)),
+        Some(error) if is_observers_answer(&error) => Ok(Err(error.to_string())),
+        Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
 }
 

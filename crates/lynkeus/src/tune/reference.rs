@@ -7,9 +7,11 @@ use lynkeus_expr::Node;
 use lynkeus_model::{Plant, Variable};
 use lynkeus_run::{Column, Dynamics, Level, Noise, Role, Trajectory};
 
+use crate::crew::within;
 use crate::prepare::Prepared;
-use crate::simulate::{ended_early, open_loop, settings, within};
+use crate::simulate::{ended_early, open_loop};
 use crate::systems;
+use crate::systems::settings;
 use crate::{Error, Study};
 
 /// Noise where the study states none, as a share of what the output spans in the run.

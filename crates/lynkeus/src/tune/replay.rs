@@ -5,20 +5,17 @@ use lynkeus_observers::Design;
 use super::errors::{rms, run_away};
 use super::filtered;
 use super::holdout::{predicted, switchable};
-use super::record::{Record, Replayed, span};
+use super::record::{Record, Replayed, course, span};
 use super::speed::longest_step;
-use super::trial::thrifty;
 use super::whiteness::{Whiteness, whiteness};
 use super::{Row, measures};
-use crate::course::{Course, Samples};
+use crate::course::Course;
 use crate::crew::{Watch, part};
-use crate::estimate::{course_of, run_settings, start_at_readings};
+use crate::estimate::start_at_readings;
 use crate::inputs::supplied;
-use crate::outcome::{interrupted_on, is_observers_answer};
 use crate::prepare::Prepared;
 use crate::series::steps;
-use crate::study::BetweenSamples;
-use crate::{Error, Series, replay, systems};
+use crate::{Error, Series, systems};
 
 /// Judges the tuning of an observer or of a filter on a log; an estimate that diverges is a row without figures.
 ///
@@ -48,37 +45,6 @@ pub(super) fn logged(
     match failure {
         None => Ok(row),
         Some(reason) => Ok(row.failed(reason)),
-    }
-}
-
-/// What `estimate` makes of samples, as far as a figure depends on it, or why its estimate is none;
-/// `place` is what an error of theirs is told of.
-///
-/// # Errors
-/// A study or samples that cannot be used.
-pub(super) fn course(
-    prepared: &Prepared<'_>,
-    design: &Design,
-    samples: &Samples,
-    between: BetweenSamples,
-    place: &str,
-    watch: &mut Watch<'_>,
-) -> Result<Result<Course, String>, Error> {
-    let mut study = prepared.study().clone();
-    study.estimate.between_samples = between;
-    study.estimate.deviations = false;
-    study.estimate.innovations = false;
-    study.estimate.smoothing = None;
-    let prepared = prepared.run_by(&study)?;
-    let mut run = run_settings(&study.estimate);
-    run.method = thrifty(run.method, samples.time.len() as f64);
-    let watch = &mut replay::Watch::only(watch);
-    let mut course = course_of(&prepared, design, samples, run, watch)?;
-    course.check()?;
-    match course.ended.take() {
-        None => Ok(Ok(course)),
-        Some(error) if is_observers_answer(&error) => Ok(Err(error.to_string())),
-        Some(error) => Err(interrupted_on(error, place, &study.file)),
     }
 }
 
@@ -187,6 +153,7 @@ mod tests {
     use lynkeus_run::{BetweenSamples, Estimator, EstimatorSettings};
 
     use super::*;
+    use crate::estimate::run_settings;
     use crate::{Study, Table, prepare};
 
     /// An estimator that takes the rows one by one knows nothing of gaps, nor of files.

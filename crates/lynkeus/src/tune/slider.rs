@@ -8,9 +8,9 @@ use lynkeus_observers::Design;
 use super::bench::Bench;
 use super::record::Record;
 use super::{Axis, Sweep, filtered, judged};
-use crate::columns::{self, Log};
+use crate::columns::Log;
 use crate::prepare::Prepared;
-use crate::{Error, Series, Study, Table};
+use crate::{Error, Series, Study, Table, headers};
 
 /// Rows of a log that are judged: each is replayed twice for every position.
 pub(crate) const ROWS: usize = 5_000;
@@ -64,7 +64,7 @@ fn first<'t>(prepared: &Prepared<'_>, table: &'t Table) -> Result<Cow<'t, Table>
     let extended = prepared.extended();
     let outputs = extended.outputs.iter().map(|o| o.variable.name.as_str());
     let names = outputs.chain(extended.inputs.iter().map(|u| u.name.as_str()));
-    let headers = names.map(|name| columns::header(settings, name).to_owned());
+    let headers = names.map(|name| headers::header(settings, name).to_owned());
     let part = |values: &Series| values.part(0, ROWS);
     let signals = headers.zip(log.samples.columns().map(part));
     let time = (log.time.clone(), part(&log.samples.time));

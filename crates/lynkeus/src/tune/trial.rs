@@ -12,7 +12,8 @@ use crate::Error;
 use crate::crew::Watch;
 use crate::outcome::{interrupted, is_observers_answer};
 use crate::prepare::Prepared;
-use crate::simulate::{open_loop, settings};
+use crate::simulate::open_loop;
+use crate::systems::settings;
 use crate::systems::{self, monitor_column};
 pub(super) use crate::thrifty::thrifty;
 
