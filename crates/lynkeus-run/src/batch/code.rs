@@ -1,12 +1,9 @@
 //! Code for many trajectories side by side: what all of them have in common is computed once.
 
-use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use lynkeus_expr::lanes::{self, Lanes, Portable};
-use lynkeus_expr::{
-    Algebra, Binary, Evaluator, Graph, Implicit, MissingInput, Node, Nodes, Tape, Unary,
-};
+use lynkeus_expr::{Evaluator, Graph, MissingInput, Node, Op, Tape};
 use lynkeus_native::{Function, Sweep, Sweeper};
 
 use crate::routine::Backend;
@@ -143,141 +140,76 @@ pub(crate) struct Divided {
 }
 
 impl Divided {
-    /// Divides a tape; `is_shared` says of each input whether all trajectories have the same.
+    /// Divides `outputs`, functions of `inputs`; `is_shared` says of each input whether all
+    /// trajectories have the same.
     ///
     /// # Errors
-    /// None with a tape that reads its own inputs.
-    pub fn new(tape: &Tape, is_shared: impl Fn(usize) -> bool) -> Result<Self, MissingInput> {
-        let g = Graph::new();
-        let inputs: Vec<Value> = (0..tape.inputs())
-            .map(|i| Value {
-                node: g.fresh("w").node(),
-                is_shared: is_shared(i),
-            })
-            .collect();
-        let division = Division {
-            graph: &g,
-            frontier: RefCell::default(),
-            known: RefCell::default(),
-            has_functions: Cell::default(),
+    /// None with outputs that read the inputs alone.
+    pub fn new(
+        g: &Graph,
+        inputs: &[Node],
+        outputs: &[Node],
+        is_shared: impl Fn(usize) -> bool,
+    ) -> Result<Self, MissingInput> {
+        let (shared, own): (Vec<usize>, Vec<usize>) =
+            (0..inputs.len()).partition(|&i| is_shared(i));
+        let [shared, own] =
+            [shared, own].map(|of| of.iter().map(|&i| inputs[i]).collect::<Vec<_>>());
+        let mut frontier = Frontier {
+            graph: g,
+            own: own.iter().copied().collect(),
+            read: HashMap::new(),
+            values: vec![],
         };
-        let outputs = tape.eval_in(&division, &inputs);
-        let outputs: Vec<Node> = outputs.iter().map(|v| division.own(v)).collect();
-        let frontier = division.frontier.take();
-        let of = |shared: bool| inputs.iter().filter(move |v| v.is_shared == shared);
-        let shared: Vec<Node> = of(true).map(|v| v.node).collect();
-        let (values, symbols): (Vec<Node>, Vec<Node>) = frontier.into_iter().unzip();
-        let rest: Vec<Node> = symbols
-            .into_iter()
-            .chain(of(false).map(|v| v.node))
-            .collect();
+        let mut has_functions = false;
+        for node in g.reachable(outputs) {
+            has_functions |= match g.op(node) {
+                Op::Unary(op, _) => lanes::unary::<Portable<1>>(op).is_some(),
+                Op::Binary(op, ..) => lanes::binary::<Portable<1>>(op).is_some(),
+                _ => false,
+            };
+            frontier.meet(node);
+        }
+        outputs.iter().for_each(|&output| frontier.read(output));
+        let Frontier { read, values, .. } = frontier;
+        let symbols: Vec<Node> = values.iter().map(|value| read[value]).collect();
         Ok(Self {
-            common: Tape::new(&g, &shared, &values)?,
-            own: Tape::new(&g, &rest, &outputs)?,
-            has_functions: division.has_functions.get(),
+            common: Tape::new(g, &shared, &values)?,
+            own: Tape::new(g, &[symbols, own].concat(), &g.substitute(outputs, &read))?,
+            has_functions,
         })
     }
 }
 
-/// A node, and whether it follows from the shared inputs alone.
-#[derive(Clone, Copy, Debug)]
-struct Value {
-    node: Node,
-    is_shared: bool,
-}
-
-/// The nodes of a graph where shared values end in symbols.
-struct Division<'g> {
+/// The values that follow from the shared inputs alone and are read by others.
+struct Frontier<'g> {
     graph: &'g Graph,
-    /// shared values that others read, each with its symbol
-    frontier: RefCell<Vec<(Node, Node)>>,
-    known: RefCell<HashMap<Node, Node>>,
-    has_functions: Cell<bool>,
+    /// nodes that differ between trajectories
+    own: HashSet<Node>,
+    /// each value with its symbol
+    read: HashMap<Node, Node>,
+    values: Vec<Node>,
 }
 
-impl Division<'_> {
-    /// The value as others read it.
-    fn own(&self, value: &Value) -> Node {
-        let Value { node, is_shared } = *value;
-        if !is_shared || self.graph.constant_value(node).is_some() {
-            return node;
-        }
-        let new = || {
-            let symbol = self.graph.fresh("shared").node();
-            self.frontier.borrow_mut().push((node, symbol));
-            symbol
-        };
-        *self.known.borrow_mut().entry(node).or_insert_with(new)
-    }
-
-    fn made<T>(&self, arguments: &[Value], make: impl FnOnce(&[Node]) -> T) -> (T, bool) {
-        let is_shared = arguments.iter().all(|v| v.is_shared);
-        let nodes: Vec<Node> = match is_shared {
-            true => arguments.iter().map(|v| v.node).collect(),
-            false => arguments.iter().map(|v| self.own(v)).collect(),
-        };
-        (make(&nodes), is_shared)
-    }
-
-    /// Takes note of a function of lanes.
-    fn see<F>(&self, function: Option<F>) {
-        if function.is_some() {
-            self.has_functions.set(true);
+impl Frontier<'_> {
+    /// The next node, after its arguments.
+    fn meet(&mut self, node: Node) {
+        let arguments = self.graph.arguments(node);
+        if arguments.iter().any(|argument| self.own.contains(argument)) {
+            self.own.insert(node);
+            arguments
+                .into_iter()
+                .for_each(|argument| self.read(argument));
         }
     }
 
-    fn one(&self, arguments: &[Value], make: impl FnOnce(&[Node]) -> Node) -> Value {
-        let (node, is_shared) = self.made(arguments, make);
-        Value { node, is_shared }
-    }
-}
-
-impl Algebra for Division<'_> {
-    type Value = Value;
-
-    fn constant(&self, value: f64) -> Value {
-        Value {
-            node: self.graph.constant(value).node(),
-            is_shared: true,
+    /// A value that is the trajectory's own, or read by what is.
+    fn read(&mut self, value: Node) {
+        let is_common = !self.own.contains(&value) && self.graph.constant_value(value).is_none();
+        if is_common && !self.read.contains_key(&value) {
+            self.read.insert(value, self.graph.fresh("shared").node());
+            self.values.push(value);
         }
-    }
-
-    fn unary(&self, op: Unary, x: &Value) -> Value {
-        self.see(lanes::unary::<Portable<1>>(op));
-        self.one(&[*x], |a| self.graph.unary(op, a[0]))
-    }
-
-    fn powi(&self, x: &Value, n: i32) -> Value {
-        self.one(&[*x], |a| self.graph.powi(a[0], n))
-    }
-
-    fn binary(&self, op: Binary, x: &Value, y: &Value) -> Value {
-        self.see(lanes::binary::<Portable<1>>(op));
-        self.one(&[*x, *y], |a| self.graph.binary(op, a[0], a[1]))
-    }
-
-    fn select(&self, condition: &Value, x: &Value, y: &Value) -> Value {
-        self.one(&[*condition, *x, *y], |a| {
-            self.graph.select(a[0], a[1], a[2])
-        })
-    }
-
-    fn solve(&self, a: &[Value], b: &[Value]) -> (Vec<Value>, Value) {
-        let all = [a, b].concat();
-        let solve = |n: &[Node]| {
-            let (a, b) = n.split_at(a.len());
-            Nodes(self.graph).solve(a, b)
-        };
-        let ((x, rcond), is_shared) = self.made(&all, solve);
-        let value = |node: Node| Value { node, is_shared };
-        (x.into_iter().map(value).collect(), value(rcond))
-    }
-
-    fn implicit(&self, function: &Implicit, p: &[Value]) -> Vec<Value> {
-        let (z, is_shared) = self.made(p, |p| self.graph.implicit(function, p));
-        z.into_iter()
-            .map(|node| Value { node, is_shared })
-            .collect()
     }
 }
 
@@ -291,8 +223,9 @@ mod tests {
         let [t, x, p] = ["t", "x", "p"].map(|name| g.symbol(name));
         let u = (t * 3.0).sin() * 2.0;
         let dx = x * u + u.exp() * p - x.sin();
-        let tape = Tape::new(&g, &[t, x, p].map(|e| e.node()), &[dx.node(), u.node()]).unwrap();
-        let divided = Divided::new(&tape, |i| i == 0).unwrap();
+        let (inputs, outputs) = ([t, x, p].map(|e| e.node()), [dx.node(), u.node()]);
+        let tape = Tape::new(&g, &inputs, &outputs).unwrap();
+        let divided = Divided::new(&g, &inputs, &outputs, |i| i == 0).unwrap();
         // u and eᵘ
         assert_eq!((divided.common.inputs(), divided.common.outputs()), (1, 2));
         assert_eq!((divided.own.inputs(), divided.own.len()), (4, 5));

@@ -1,10 +1,11 @@
 //! What a batch does, worked out once for all trajectories.
 
+use lynkeus_expr::Node;
+
 use super::code::{Code, Divided};
 use crate::closed_loop::Loop;
 use crate::integrator::{check_interval, fixed_steps, pieces};
 use crate::noise::Sensors;
-use crate::routine::{LARGEST_STEP, classical_step};
 use crate::run::{Itinerary, Stop};
 use crate::{Column, Dynamics, Error, Method, Simulation, Step};
 
@@ -152,22 +153,26 @@ fn sensors(simulation: &Simulation, hold: f64, seed: u64) -> Result<Sensors, Err
 /// what jumps with time) and what is their own.
 fn program(clock: &Loop) -> Result<Option<Program>, Error> {
     let states = clock.dimension();
-    let disturbances = clock.disturbances();
-    if clock.tape().len() > LARGEST_STEP {
-        return Ok(None);
-    }
-    let Some(step) = classical_step(clock.tape()) else {
+    let equations = clock.system().equations();
+    let disturbances = equations.signals.len();
+    let own = 1..1 + states + disturbances;
+    let row = &equations.roots.outputs;
+    let columns = row.len();
+    let graph = equations.graph();
+    let Some((inputs, next)) = clock.system().derivatives_at().step_in(&graph) else {
         return Ok(None);
     };
-    let own = 1..1 + states + disturbances;
-    let row = clock.row_tape()?;
-    let columns = row.outputs();
-    let [step, row] = [&step, &row].map(|tape| Divided::new(tape, |input| !own.contains(&input)));
+    let divided = |inputs: &[Node], outputs: &[Node]| {
+        Divided::new(&graph, inputs, outputs, |input| !own.contains(&input))
+    };
+    let step = divided(&inputs, &next)?;
+    let row = divided(&equations.inputs[..equations.smooth_inputs()], row)?;
+    drop(graph);
     let start = vec![0.0; states];
     let (observer_names, estimates) = clock.estimate(&start);
     Ok(Some(Program {
-        step: Code::new(step?, states + disturbances),
-        row: Code::new(row?, columns),
+        step: Code::new(step, states + disturbances),
+        row: Code::new(row, columns),
         states,
         disturbances,
         columns,
