@@ -98,7 +98,6 @@ mod equations;
 mod error;
 mod estimator;
 pub mod filter;
-mod flow;
 mod integrator;
 mod jacobian;
 mod method;
