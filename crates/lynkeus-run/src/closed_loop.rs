@@ -10,55 +10,26 @@ use crate::noise::{Disturbed, Sensors};
 use crate::relays::Guards;
 use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
 
-/// Where a signal of the observer comes from.
-#[derive(Clone, Copy, Debug)]
-enum Source {
-    /// output of the plant, as measured
-    Sensor(usize),
-    /// an input
-    Input(usize),
-}
-
-/// What the signals of a system can come from.
-struct Sources<'a> {
-    sensors: &'a [String],
-    inputs: &'a [String],
-}
-
-impl Sources<'_> {
-    /// The input of a name.
-    fn input(&self, name: &str) -> Result<usize, Error> {
-        let found = places(self.inputs, name).collect::<Vec<_>>();
-        self.only("plant", name, &found)
+/// The place of a name among those that a system can read.
+fn place(
+    reader: &'static str,
+    name: &str,
+    among: &[String],
+    available: &[String],
+) -> Result<usize, Error> {
+    let mut found = (0..among.len()).filter(|&i| among[i] == name);
+    match (found.next(), found.next()) {
+        (Some(place), None) => Ok(place),
+        (None, _) => Err(Error::Unconnected {
+            reader,
+            name: name.to_owned(),
+            available: available.join(", "),
+        }),
+        (Some(_), Some(_)) => Err(Error::Ambiguous {
+            reader,
+            name: name.to_owned(),
+        }),
     }
-
-    /// The sensor or the input of a name.
-    fn any(&self, name: &str) -> Result<Source, Error> {
-        let sensors = places(self.sensors, name).map(Source::Sensor);
-        let inputs = places(self.inputs, name).map(Source::Input);
-        let found: Vec<Source> = sensors.chain(inputs).collect();
-        self.only("observer", name, &found)
-    }
-
-    fn only<T: Copy>(&self, reader: &'static str, name: &str, found: &[T]) -> Result<T, Error> {
-        match found {
-            [one] => Ok(*one),
-            [] => Err(Error::Unconnected {
-                reader,
-                name: name.to_owned(),
-                available: [self.sensors, self.inputs].concat().join(", "),
-            }),
-            _ => Err(Error::Ambiguous {
-                reader,
-                name: name.to_owned(),
-            }),
-        }
-    }
-}
-
-fn places<'a>(names: &'a [String], name: &'a str) -> impl Iterator<Item = usize> + 'a {
-    let named = names.iter().enumerate().filter(move |(_, n)| *n == name);
-    named.map(|(place, _)| place)
 }
 
 /// A table with the columns that a run records.
@@ -84,7 +55,8 @@ struct Wiring {
     observer: Option<System>,
     /// which input each signal of the plant is
     plant_wires: Vec<usize>,
-    observer_wires: Vec<Source>,
+    /// which sensor each signal of the observer is, or, counted on from them, which input
+    observer_wires: Vec<usize>,
     record_outputs: bool,
 }
 
@@ -103,13 +75,11 @@ impl Wiring {
                 available: "time alone".to_owned(),
             });
         }
-        let sources = Sources {
-            sensors: plant.outputs(),
-            inputs: inputs.outputs(),
-        };
-        let plant_wires = plant.signals().iter().map(|name| sources.input(name));
-        let read = observer.as_ref().map_or(&[][..], |o| o.signals());
-        let observer_wires = read.iter().map(|name| sources.any(name));
+        let all = [plant.outputs(), inputs.outputs()].concat();
+        let plant_wires = plant.signals().iter();
+        let plant_wires = plant_wires.map(|name| place("plant", name, inputs.outputs(), &all));
+        let observer_wires = observer.iter().flat_map(System::signals);
+        let observer_wires = observer_wires.map(|name| place("observer", name, &all, &all));
         Ok(Self {
             plant_wires: plant_wires.collect::<Result<_, _>>()?,
             observer_wires: observer_wires.collect::<Result<_, _>>()?,
@@ -128,11 +98,8 @@ impl Wiring {
 
     /// The signals of the observer, given the inputs and what the sensors show.
     fn observed<T: Copy>(&self, u: &[T], shown: &[T]) -> Vec<T> {
-        let signal = |wire: &Source| match *wire {
-            Source::Input(i) => u[i],
-            Source::Sensor(i) => shown[i],
-        };
-        self.observer_wires.iter().map(signal).collect()
+        let all = [shown, u].concat();
+        self.observer_wires.iter().map(|&wire| all[wire]).collect()
     }
 
     /// One system: its states are the plant's, then the observer's, its signals what disturbs each

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
-use crate::divergence::Place;
+use crate::divergence::explained;
 use crate::equations::Equations;
 use crate::error::state_text;
 use crate::relays::{Guards, Watched};
@@ -375,13 +375,7 @@ impl Evaluation {
         let value = |margin: &Margin| values.get(margin.output).copied();
         let margins = system.margins.iter();
         let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
-        Place {
-            names: system.states(),
-            x,
-            scale,
-            margins: &margins,
-        }
-        .explained(error)
+        explained(error, system.states(), x, scale, &margins)
     }
 
     /// Values of the switches at the last [`Dynamics::enter`].
