@@ -1,18 +1,19 @@
-//! What an estimator is made of.
+//! An observer from its design to where it runs.
+
+use std::fmt::Write;
 
 use crate::filter::{FilterModel, FilterSettings};
 use crate::integrator::AUTO_PRODUCT;
 use crate::jacobian::fastest;
+use crate::snapshot::Digest;
 use crate::system::Evaluation;
-use crate::{
-    Dynamics, Error, Estimator, EstimatorSettings, Method, SampledObserver, System, Tuned,
-};
+use crate::{Dynamics, EstimatorSettings, Method, SampledObserver, System, Tuned};
 
-/// An observer with all that says how it is run: an [`Estimator`] is made of one, and what runs
-/// elsewhere (another language, a device) is printed from one.
+/// An observer with all that says how it is run: every [`Estimator`](crate::Estimator) is made of
+/// one, and what runs elsewhere (another language, a device) is printed from one.
 #[derive(Clone, Debug)]
 pub enum Blueprint {
-    /// an observer whose sensors report when they do
+    /// an observer whose sensors, if it has any, report when they do
     Sampled {
         /// its equations
         observer: Box<SampledObserver>,
@@ -31,19 +32,77 @@ pub enum Blueprint {
 }
 
 impl Blueprint {
-    /// The estimator, at its start.
-    ///
-    /// # Errors
-    /// As [`Estimator::sampled`] and [`Estimator::filter`].
-    pub fn estimator(&self) -> Result<Estimator, Error> {
+    /// Of an observer whose signals are all there at every sample.
+    #[must_use]
+    pub fn new(system: &System, settings: EstimatorSettings) -> Self {
+        let observer = SampledObserver::of_inputs(system.clone(), settings.between);
+        Self::Sampled {
+            observer: Box::new(observer),
+            method: settings.method,
+        }
+    }
+
+    /// Names of the sensors, whose readings may be missing.
+    pub(crate) fn sensors(&self) -> Vec<String> {
         match self {
-            Self::Sampled { observer, method } => Estimator::sampled(observer, *method),
+            Self::Sampled { observer, .. } => observer.sensors.clone(),
+            Self::Filter { model, .. } => model.sensors().iter().map(|s| s.name.clone()).collect(),
+        }
+    }
+
+    /// Names of the known inputs.
+    pub(crate) fn inputs(&self) -> &[String] {
+        match self {
+            Self::Sampled { observer, .. } => observer.known_inputs(),
+            Self::Filter { model, .. } => model.inputs(),
+        }
+    }
+
+    /// Names of what is estimated, monitors last.
+    pub(crate) fn estimates(&self) -> &[String] {
+        match self {
+            Self::Sampled { observer, .. } => observer.estimates(),
+            Self::Filter { model, .. } => model.states(),
+        }
+    }
+
+    /// A number that differs for observers with other equations, settings, noises or starts.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let mut digest = Digest::default();
+        let signals = [&self.sensors()[..], self.inputs()].concat();
+        // a digest takes any text
+        let _ = write!(digest, "{signals:?} ");
+        let _ = match self {
+            Self::Sampled { observer, method } => {
+                let SampledObserver {
+                    system,
+                    predict,
+                    inputs,
+                    errors,
+                    tuned,
+                    ..
+                } = &**observer;
+                system.tell(&mut digest);
+                if let Some(errors) = errors {
+                    errors.flow().tell(&mut digest);
+                }
+                if let Some(tuned) = tuned {
+                    tuned.system.tell(&mut digest);
+                    digest.numbers(&tuned.values);
+                }
+                let noises = errors.as_ref().map(|errors| errors.noises());
+                write!(digest, "{method:?} {predict} {inputs:?} {noises:?}")
+            }
             Self::Filter {
                 model,
                 settings,
                 run,
-            } => Estimator::filter(model, settings.clone(), *run),
-        }
+            } => {
+                model.systems().for_each(|system| system.tell(&mut digest));
+                write!(digest, "{settings:?} {run:?} {}", model.numbers())
+            }
+        };
+        digest.value()
     }
 
     /// What runs between samples.

@@ -1,64 +1,35 @@
 //! Inputs, plant, sensors and observer as one system.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
-use lynkeus_expr::Tape;
+use lynkeus_expr::{Expr, Graph, Node};
 
-use crate::joint::Parts;
-use crate::noise::Sensors;
+use crate::equations::{Equations, Roots};
+use crate::filter::Limits;
+use crate::noise::{Disturbed, Sensors};
 use crate::relays::Guards;
-use crate::routine::Runner;
 use crate::{Dynamics, Error, Evaluation, Role, Simulation, Slopes, System, Trajectory};
 
-/// Where a signal of the observer comes from.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Source {
-    /// output of the plant, as measured
-    Sensor(usize),
-    /// an input
-    Input(usize),
-}
-
-/// What the signals of a system can come from.
-struct Sources<'a> {
-    sensors: &'a [String],
-    inputs: &'a [String],
-}
-
-impl Sources<'_> {
-    /// The input of a name.
-    fn input(&self, name: &str) -> Result<usize, Error> {
-        let found = places(self.inputs, name).collect::<Vec<_>>();
-        self.only("plant", name, &found)
+/// The place of a name among those that a system can read.
+fn place(
+    reader: &'static str,
+    name: &str,
+    among: &[String],
+    available: &[String],
+) -> Result<usize, Error> {
+    let mut found = (0..among.len()).filter(|&i| among[i] == name);
+    match (found.next(), found.next()) {
+        (Some(place), None) => Ok(place),
+        (None, _) => Err(Error::Unconnected {
+            reader,
+            name: name.to_owned(),
+            available: available.join(", "),
+        }),
+        (Some(_), Some(_)) => Err(Error::Ambiguous {
+            reader,
+            name: name.to_owned(),
+        }),
     }
-
-    /// The sensor or the input of a name.
-    fn any(&self, name: &str) -> Result<Source, Error> {
-        let sensors = places(self.sensors, name).map(Source::Sensor);
-        let inputs = places(self.inputs, name).map(Source::Input);
-        let found: Vec<Source> = sensors.chain(inputs).collect();
-        self.only("observer", name, &found)
-    }
-
-    fn only<T: Copy>(&self, reader: &'static str, name: &str, found: &[T]) -> Result<T, Error> {
-        match found {
-            [one] => Ok(*one),
-            [] => Err(Error::Unconnected {
-                reader,
-                name: name.to_owned(),
-                available: [self.sensors, self.inputs].concat().join(", "),
-            }),
-            _ => Err(Error::Ambiguous {
-                reader,
-                name: name.to_owned(),
-            }),
-        }
-    }
-}
-
-fn places<'a>(names: &'a [String], name: &'a str) -> impl Iterator<Item = usize> + 'a {
-    let named = names.iter().enumerate().filter(move |(_, n)| *n == name);
-    named.map(|(place, _)| place)
 }
 
 /// A table with the columns that a run records.
@@ -77,30 +48,20 @@ pub(crate) fn table(plant: &System, observer: Option<&System>, record_outputs: b
     }
 }
 
-/// The joint system; its state is the plant's, then the observer's.
-pub(crate) struct Loop {
-    inputs: Evaluation,
-    plant: Evaluation,
-    observer: Option<Evaluation>,
-    sensors: Sensors,
+/// What runs, and where the signals of each system come from.
+struct Wiring {
+    inputs: System,
+    plant: System,
+    observer: Option<System>,
     /// which input each signal of the plant is
     plant_wires: Vec<usize>,
-    observer_wires: Vec<Source>,
+    /// which sensor each signal of the observer is, or, counted on from them, which input
+    observer_wires: Vec<usize>,
     record_outputs: bool,
-    /// plant and observer are on known sides of the surfaces on which they jump
-    is_held: bool,
-    /// the derivatives of all states, as one
-    joint: Runner,
-    /// where they jump and bend
-    guards: Option<Arc<Guards>>,
-    /// time, states, what disturbs sensors and states, modes
-    arguments: Vec<f64>,
-    u: Vec<f64>,
-    y: Vec<f64>,
 }
 
-impl Loop {
-    pub(crate) fn new(simulation: &Simulation, sensors: Sensors) -> Result<Self, Error> {
+impl Wiring {
+    fn new(simulation: &Simulation) -> Result<Self, Error> {
         let Simulation {
             plant,
             inputs,
@@ -114,127 +75,289 @@ impl Loop {
                 available: "time alone".to_owned(),
             });
         }
-        let sources = Sources {
-            sensors: plant.outputs(),
-            inputs: inputs.outputs(),
+        let all = [plant.outputs(), inputs.outputs()].concat();
+        let plant_wires = plant.signals().iter();
+        let plant_wires = plant_wires.map(|name| place("plant", name, inputs.outputs(), &all));
+        let observer_wires = observer.iter().flat_map(System::signals);
+        let observer_wires = observer_wires.map(|name| place("observer", name, &all, &all));
+        Ok(Self {
+            plant_wires: plant_wires.collect::<Result<_, _>>()?,
+            observer_wires: observer_wires.collect::<Result<_, _>>()?,
+            inputs: inputs.clone(),
+            plant: plant.clone(),
+            observer: observer.clone(),
+            record_outputs: simulation.record_outputs,
+        })
+    }
+
+    fn parts(&self) -> impl Iterator<Item = &System> {
+        [&self.inputs, &self.plant]
+            .into_iter()
+            .chain(&self.observer)
+    }
+
+    /// The signals of the observer, given the inputs and what the sensors show.
+    fn observed<T: Copy>(&self, u: &[T], shown: &[T]) -> Vec<T> {
+        let all = [shown, u].concat();
+        self.observer_wires.iter().map(|&wire| all[wire]).collect()
+    }
+
+    /// One system: its states are the plant's, then the observer's, its signals what disturbs each
+    /// sensor and each moved state, its outputs the values of a row.
+    fn joined(&self, sensors: &Sensors) -> Result<System, Error> {
+        let g = Graph::new();
+        let symbols = Symbols::new(&g, self, sensors);
+        let roots = self.roots(sensors, &symbols);
+        let held = self.parts().flat_map(|part| part.equations().held.clone());
+        let switches = self
+            .parts()
+            .flat_map(|part| part.equations().switches.clone());
+        let modes = self.parts().flat_map(|part| part.equations().modes.clone());
+        let of_observer = self.observer.iter().flat_map(System::states);
+        let of_observer = of_observer.map(|name| format!("observer's {name}"));
+        let equations = Equations {
+            states: self
+                .plant
+                .states()
+                .iter()
+                .cloned()
+                .chain(of_observer)
+                .collect(),
+            signals: vec![String::new(); symbols.noise.len() + symbols.drives.len()],
+            outputs: vec![String::new(); roots.outputs.len()],
+            inputs: symbols.all(),
+            roots,
+            switches: switches.collect(),
+            modes: modes.collect(),
+            held: held.collect(),
+            graph: Mutex::new(g),
         };
-        let plant_wires = plant.signals().iter().map(|name| sources.input(name));
-        let read = observer.as_ref().map_or(&[][..], |o| o.signals());
-        let observer_wires = read.iter().map(|name| sources.any(name));
-        let plant_wires = plant_wires.collect::<Result<Vec<_>, _>>()?;
-        let observer_wires = observer_wires.collect::<Result<Vec<_>, _>>()?;
-        let parts = Parts {
+        let start = self.plant.start().iter();
+        let start = start.chain(self.observer.iter().flat_map(System::start));
+        System::compiled(equations, start.copied().collect())
+    }
+
+    fn roots(&self, sensors: &Sensors, symbols: &Symbols<'_>) -> Roots {
+        let inputs = symbols.over(&self.inputs, [&[], &[], &symbols.modes[0], &[]]);
+        let u = inputs.outputs;
+        let w: Vec<Node> = self.plant_wires.iter().map(|&wire| u[wire]).collect();
+        let mut all = symbols.over(
+            &self.plant,
+            [&symbols.plant_x, &w, &symbols.modes[1], &symbols.plant_held],
+        );
+        for derivatives in [&mut all.derivatives, &mut all.held_derivatives] {
+            for (state, &drive) in sensors.moved().zip(&symbols.drives) {
+                let g = symbols.graph;
+                derivatives[state] = (g.expr(derivatives[state]) + g.expr(drive)).node();
+            }
+        }
+        // the values of a row, and what its estimates are
+        let row = |y: &[Node]| {
+            let shown = symbols.shown(sensors, y);
+            let mut row = [&symbols.plant_x[..], &w].concat();
+            if self.record_outputs {
+                row.extend(y.iter().chain(&shown));
+            }
+            let Some(observer) = &self.observer else {
+                return (row, Roots::default());
+            };
+            let signals = self.observed(&u, &shown);
+            let held = &symbols.observer_held;
+            let made = symbols.over(
+                observer,
+                [&symbols.observer_x, &signals, &symbols.modes[2], held],
+            );
+            (row, made)
+        };
+        let estimates = |outputs: &[Node]| match outputs.is_empty() {
+            true => match &self.observer {
+                Some(_) => symbols.observer_x.clone(),
+                None => vec![],
+            },
+            false => outputs.to_vec(),
+        };
+        let (mut outputs, observer) = row(&all.outputs);
+        let (mut held_outputs, held) = match all.held_outputs == all.outputs {
+            true => (outputs.clone(), observer.clone()),
+            false => row(&all.held_outputs),
+        };
+        outputs.extend(estimates(&observer.outputs));
+        held_outputs.extend(estimates(&held.held_outputs));
+        let joined = |plant: &[Node], observer: &[Node]| [plant, observer].concat();
+        Roots {
+            derivatives: joined(&all.derivatives, &observer.derivatives),
+            held_derivatives: joined(&all.held_derivatives, &held.held_derivatives),
+            surfaces: joined(&all.surfaces, &held.surfaces),
+            bends: joined(&all.bends, &held.bends),
+            outputs,
+            held_outputs,
+        }
+    }
+}
+
+/// The inputs of the joined system.
+struct Symbols<'g> {
+    graph: &'g Graph,
+    time: Node,
+    plant_x: Vec<Node>,
+    observer_x: Vec<Node>,
+    noise: Vec<Node>,
+    drives: Vec<Node>,
+    /// of inputs, plant and observer
+    modes: [Vec<Node>; 3],
+    plant_held: Vec<Node>,
+    observer_held: Vec<Node>,
+}
+
+impl<'g> Symbols<'g> {
+    fn new(graph: &'g Graph, wiring: &Wiring, sensors: &Sensors) -> Self {
+        let Wiring {
             inputs,
             plant,
-            observer: observer.as_ref(),
-            sensors: &sensors,
-            plant_wires: &plant_wires,
-            observer_wires: &observer_wires,
+            observer,
+            ..
+        } = wiring;
+        let fresh = |count: usize| (0..count).map(|_| graph.fresh("x").node()).collect();
+        let of_observer = |count: fn(&System) -> usize| fresh(observer.as_ref().map_or(0, count));
+        Self {
+            graph,
+            time: graph.fresh("time").node(),
+            plant_x: fresh(plant.states().len()),
+            observer_x: of_observer(|o| o.states().len()),
+            noise: fresh(plant.outputs().len()),
+            drives: fresh(sensors.moved().count()),
+            modes: [
+                fresh(inputs.modes()),
+                fresh(plant.modes()),
+                of_observer(System::modes),
+            ],
+            plant_held: fresh(plant.equations().held_modes()),
+            observer_held: of_observer(|o| o.equations().held_modes()),
+        }
+    }
+
+    /// A system over its states, signals, modes and held modes.
+    fn over(&self, system: &System, arguments: [&[Node]; 4]) -> Roots {
+        let arguments = [&[self.time][..], &arguments.concat()].concat();
+        system.equations().over(self.graph, &arguments)
+    }
+
+    /// What the sensors show.
+    fn shown(&self, sensors: &Sensors, y: &[Node]) -> Vec<Node> {
+        let shown = |(i, &y): (usize, &Node)| {
+            let (y, noise) = (self.graph.expr(y), self.graph.expr(self.noise[i]));
+            let disturbed = match sensors.disturbed(i) {
+                Disturbed::Not => y,
+                Disturbed::Added => y + noise,
+                Disturbed::Multiplied => y * noise,
+            };
+            let limited = |Limits { low, high }| -> Expr<'_> {
+                let capped = disturbed.min(self.graph.constant(high));
+                capped.max(self.graph.constant(low))
+            };
+            sensors.limits(i).map_or(disturbed, limited).node()
         };
-        let (joint, guards) = (parts.joined()?, parts.guards()?);
+        y.iter().enumerate().map(shown).collect()
+    }
+
+    /// In the order of a system's inputs.
+    fn all(&self) -> Vec<Node> {
+        [
+            &[self.time],
+            &self.plant_x[..],
+            &self.observer_x,
+            &self.noise,
+            &self.drives,
+            &self.modes.concat(),
+            &self.plant_held,
+            &self.observer_held,
+        ]
+        .concat()
+    }
+}
+
+/// A closed loop under way.
+pub(crate) struct Loop {
+    joined: Evaluation,
+    sensors: Sensors,
+    wiring: Wiring,
+    /// plant and observer are on known sides of the surfaces on which they jump
+    is_held: bool,
+}
+
+/// Inputs, plant and observer by themselves, where the loop is: a message names one of them.
+struct Parts {
+    inputs: Evaluation,
+    plant: Evaluation,
+    observer: Option<Evaluation>,
+    /// inputs and outputs of the plant are finite numbers
+    inputs_are_finite: bool,
+    outputs_are_finite: bool,
+}
+
+impl Loop {
+    pub(crate) fn new(simulation: &Simulation, sensors: Sensors) -> Result<Self, Error> {
+        let wiring = Wiring::new(simulation)?;
         Ok(Self {
-            guards,
-            arguments: vec![0.0; joint.tape().inputs()],
-            joint: joint.runner(),
-            u: vec![0.0; inputs.outputs().len()],
-            y: vec![0.0; plant.outputs().len()],
-            inputs: inputs.evaluation(),
-            plant: plant.evaluation(),
-            observer: observer.as_ref().map(|o| o.evaluation()),
-            plant_wires,
-            observer_wires,
+            joined: wiring.joined(&sensors)?.evaluation(),
             sensors,
-            record_outputs: simulation.record_outputs,
+            wiring,
             is_held: false,
         })
     }
 
-    /// Start values of the joint state.
-    pub(crate) fn start(&self) -> Vec<f64> {
-        let mut x = self.plant.system().start().to_vec();
-        if let Some(observer) = &self.observer {
-            x.extend(observer.system().start());
-        }
-        x
+    /// Plant and observer as one system, whose outputs are the values of a row.
+    pub(crate) fn system(&self) -> &System {
+        self.joined.system()
     }
 
     /// A table with the recorded columns.
     pub(crate) fn table(&self) -> Trajectory {
-        let observer = self.observer.as_ref().map(Evaluation::system);
-        table(self.plant.system(), observer, self.record_outputs)
+        let Wiring {
+            plant, observer, ..
+        } = &self.wiring;
+        table(plant, observer.as_ref(), self.wiring.record_outputs)
     }
 
     /// Columns that are not estimates.
     pub(crate) fn known_columns(&self) -> usize {
-        let plant = self.plant.system();
-        let outputs = if self.record_outputs {
-            2 * self.y.len()
-        } else {
-            0
+        let plant = &self.wiring.plant;
+        let outputs = match self.wiring.record_outputs {
+            true => 2 * plant.outputs().len(),
+            false => 0,
         };
         plant.states().len() + plant.signals().len() + outputs
     }
 
     /// Names and values of the observer's states.
     pub(crate) fn estimate<'a>(&'a self, x: &'a [f64]) -> (&'a [String], &'a [f64]) {
-        let names = self
-            .observer
-            .as_ref()
-            .map_or(&[][..], |o| o.system().states());
-        (names, &x[self.plant.dimension()..])
-    }
-
-    /// The joint derivatives, as functions of time, states, what disturbs them, and modes.
-    pub(crate) fn tape(&self) -> &Tape {
-        self.joint.tape()
-    }
-
-    /// The values of a row, as functions of the same.
-    pub(crate) fn row_tape(&self) -> Result<Tape, Error> {
-        let parts = Parts {
-            inputs: self.inputs.system(),
-            plant: self.plant.system(),
-            observer: self.observer.as_ref().map(Evaluation::system),
-            sensors: &self.sensors,
-            plant_wires: &self.plant_wires,
-            observer_wires: &self.observer_wires,
-        };
-        parts.row(self.record_outputs)
-    }
-
-    /// How many values disturb sensors and states.
-    pub(crate) fn disturbances(&self) -> usize {
-        self.sensors.disturbances().count()
+        let observer = self.wiring.observer.as_ref();
+        let names = observer.map_or(&[][..], System::states);
+        (names, &x[self.wiring.plant.states().len()..])
     }
 
     /// The values of what jumps with time, since the last [`Dynamics::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
-        &self.arguments[1 + self.dimension() + self.disturbances()..]
+        self.joined.modes()
     }
 
     /// Draws the next noise sample.
     pub(crate) fn draw(&mut self) {
         self.sensors.draw();
-        self.settle();
-    }
-
-    /// An error that ended the run at `x`, by its cause where that is the observer.
-    pub(crate) fn explained(&mut self, error: Error, x: &[f64], scale: f64) -> Error {
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        if let Some(time) = error.time() {
-            self.connect(time, plant_x);
-        }
-        let scale = plant_x.iter().fold(scale, |most, x| most.max(x.abs()));
-        match &mut self.observer {
-            Some(observer) => observer.explained(error, observer_x, scale),
-            None => error,
-        }
+        self.disturb();
     }
 
     /// Draws what moves the states, between two samples.
     pub(crate) fn stir(&mut self) {
         self.sensors.stir();
-        self.settle();
+        self.disturb();
+    }
+
+    fn disturb(&mut self) {
+        let signals = self.joined.signals_mut().iter_mut();
+        for (signal, value) in signals.zip(self.sensors.disturbances()) {
+            *signal = value;
+        }
     }
 
     /// True without noise.
@@ -242,195 +365,141 @@ impl Loop {
         self.sensors.are_exact()
     }
 
+    /// An error that ended the run at `x`, by its cause where that is the observer.
+    pub(crate) fn explained(&mut self, error: Error, x: &[f64], scale: f64) -> Error {
+        let Some(time) = error.time() else {
+            return error;
+        };
+        let (plant_x, observer_x) = x.split_at(self.wiring.plant.states().len());
+        let scale = plant_x.iter().fold(scale, |most, x| most.max(x.abs()));
+        match self.parts(time, plant_x).observer {
+            Some(mut observer) => observer.explained(error, observer_x, scale),
+            None => error,
+        }
+    }
+
     /// Appends the recorded values at (t, x), in the order of [`Loop::table`].
     pub(crate) fn row(&mut self, t: f64, x: &[f64], row: &mut Vec<f64>) -> Result<(), Error> {
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        self.connect(t, plant_x);
-        row.extend_from_slice(plant_x);
-        row.extend_from_slice(self.plant.signals());
-        if self.record_outputs {
-            row.extend_from_slice(&self.y);
-            let measured = |(i, &y): (usize, &f64)| self.sensors.measured(i, y);
-            row.extend(self.y.iter().enumerate().map(measured));
-        }
-        if let Some(observer) = &mut self.observer {
-            let from = row.len();
-            row.resize(from + observer.system().estimates().len(), 0.0);
-            observer.estimates(t, observer_x, &mut row[from..]);
-        }
-        if row.iter().all(|v| v.is_finite()) {
-            return Ok(());
-        }
-        Err(self.not_finite(t, x))
-    }
-
-    /// The arguments of the joint derivatives that stay from one draw of noise, or one switch, to
-    /// the next.
-    fn settle(&mut self) {
-        let first = 1 + self.dimension();
-        let observer = self.observer.as_ref().map_or(&[][..], Evaluation::modes);
-        let modes = [self.inputs.modes(), self.plant.modes(), observer];
-        let modes = modes.into_iter().flatten().copied();
-        let values = self.sensors.disturbances().chain(modes);
-        for (argument, value) in self.arguments[first..].iter_mut().zip(values) {
-            *argument = value;
+        row.resize(self.system().outputs().len(), 0.0);
+        self.joined.outputs(t, x, row);
+        match row.iter().all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(self.not_finite(t, x)),
         }
     }
 
-    fn place(&mut self, t: f64, x: &[f64]) {
-        self.arguments[0] = t;
-        self.arguments[1..=x.len()].copy_from_slice(x);
-    }
-
-    /// Carries inputs to the plant and measurements to the observer.
-    fn connect(&mut self, t: f64, plant_x: &[f64]) {
-        self.inputs.outputs(t, &[], &mut self.u);
-        for (signal, &wire) in self.plant.signals_mut().iter_mut().zip(&self.plant_wires) {
-            *signal = self.u[wire];
-        }
-        self.plant.outputs(t, plant_x, &mut self.y);
-        let Some(observer) = &mut self.observer else {
-            return;
+    /// The parts at a time and a state of the plant.
+    fn parts(&self, t: f64, plant_x: &[f64]) -> Parts {
+        let (mut modes, mut held) = (self.joined.modes(), self.joined.held_modes());
+        let mut part = |system: &System| {
+            let mut evaluation = system.evaluation();
+            let (own, rest) = modes.split_at(system.modes());
+            let (own_held, rest_held) = held.split_at(system.equations().held_modes());
+            evaluation.enter_modes(own, self.is_held.then_some(own_held));
+            (modes, held) = (rest, rest_held);
+            evaluation
         };
-        for (signal, wire) in observer.signals_mut().iter_mut().zip(&self.observer_wires) {
-            *signal = match *wire {
-                Source::Sensor(i) => self.sensors.measured(i, self.y[i]),
-                Source::Input(i) => self.u[i],
-            };
+        let mut inputs = part(&self.wiring.inputs);
+        let mut plant = part(&self.wiring.plant);
+        let mut observer = self.wiring.observer.as_ref().map(part);
+        let mut u = vec![0.0; inputs.system().outputs().len()];
+        inputs.outputs(t, &[], &mut u);
+        let signals = plant.signals_mut().iter_mut();
+        for (signal, &wire) in signals.zip(&self.wiring.plant_wires) {
+            *signal = u[wire];
+        }
+        let mut y = vec![0.0; plant.system().outputs().len()];
+        plant.outputs(t, plant_x, &mut y);
+        let measured = |(i, &y): (usize, &f64)| self.sensors.measured(i, y);
+        let shown: Vec<f64> = y.iter().enumerate().map(measured).collect();
+        if let Some(observer) = &mut observer {
+            let signals = self.wiring.observed(&u, &shown);
+            observer.signals_mut().copy_from_slice(&signals);
+        }
+        Parts {
+            inputs,
+            plant,
+            observer,
+            inputs_are_finite: are_finite(&u),
+            outputs_are_finite: are_finite(&y),
         }
     }
 }
 
+fn are_finite(values: &[f64]) -> bool {
+    values.iter().all(|v| v.is_finite())
+}
+
 impl Dynamics for Loop {
     fn dimension(&self) -> usize {
-        self.plant.dimension() + self.observer.as_ref().map_or(0, Dynamics::dimension)
+        self.joined.dimension()
     }
 
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) {
-        if !self.is_held {
-            self.place(t, x);
-            return self.joint.eval(&self.arguments, dx);
-        }
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        let (plant_dx, observer_dx) = dx.split_at_mut(self.plant.dimension());
-        self.connect(t, plant_x);
-        self.plant.derivatives(t, plant_x, plant_dx);
-        for state in self.sensors.moved() {
-            plant_dx[state] += self.sensors.drive(state);
-        }
-        if let Some(observer) = &mut self.observer {
-            observer.derivatives(t, observer_x, observer_dx);
-        }
+        self.joined.derivatives(t, x, dx);
     }
 
+    /// What is held is looked at by differences.
     fn slopes(&mut self, t: f64, x: &[f64], slopes: &mut Slopes) -> bool {
-        if self.is_held {
-            return false;
-        }
-        self.place(t, x);
-        self.joint.slopes(&self.arguments, x.len(), slopes)
+        !self.is_held && self.joined.slopes(t, x, slopes)
     }
 
     fn step(&mut self, t: f64, h: f64, x: &[f64], next: &mut [f64]) -> bool {
-        if self.is_held {
-            return false;
-        }
-        self.place(t, x);
-        self.joint.step(&mut self.arguments, h, next)
+        self.joined.step(t, h, x, next)
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.inputs.switches(from, to, times)?;
-        self.plant.switches(from, to, times)?;
-        match &mut self.observer {
-            Some(observer) => observer.switches(from, to, times),
-            None => Ok(()),
-        }
+        self.joined.switches(from, to, times)
     }
 
     fn enter(&mut self, t: f64) {
-        self.inputs.enter(t);
-        self.plant.enter(t);
-        if let Some(observer) = &mut self.observer {
-            observer.enter(t);
-        }
-        self.settle();
+        self.joined.enter(t);
+        self.disturb();
     }
 
     fn surfaces(&self) -> usize {
-        self.plant.surfaces() + self.observer.as_ref().map_or(0, Dynamics::surfaces)
+        self.joined.surfaces()
     }
 
     fn surface_names(&self) -> Vec<String> {
-        let of_observer = self.observer.as_ref().map(Dynamics::surface_names);
-        [self.plant.surface_names(), of_observer.unwrap_or_default()].concat()
+        self.joined.surface_names()
     }
 
     fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        let (of_plant, of_observer) = values.split_at_mut(self.plant.surfaces());
-        self.connect(t, plant_x);
-        self.plant.read_surfaces(t, plant_x, of_plant);
-        if let Some(observer) = &mut self.observer {
-            observer.read_surfaces(t, observer_x, of_observer);
-        }
+        self.joined.read_surfaces(t, x, values);
     }
 
     fn hold(&mut self, sides: Option<&[f64]>) {
         self.is_held = sides.is_some();
-        let parts = sides.map(|sides| sides.split_at(self.plant.surfaces()));
-        self.plant.hold(parts.map(|(plant, _)| plant));
-        if let Some(observer) = &mut self.observer {
-            observer.hold(parts.map(|(_, observer)| observer));
-        }
+        self.joined.hold(sides);
     }
 
     fn guards(&self) -> Option<Arc<Guards>> {
-        self.guards.clone()
+        self.joined.guards()
     }
 
-    fn beside(&mut self, _t: f64, values: &mut Vec<[f64; 2]>) {
-        let first = 1 + self.dimension();
-        let observer = self
-            .observer
-            .as_ref()
-            .map_or(&[][..], Evaluation::held_modes);
-        let held = self.plant.held_modes().iter().chain(observer);
-        values.clear();
-        values.extend(
-            self.arguments[first..]
-                .iter()
-                .chain(held)
-                .map(|&v| [v, 0.0]),
-        );
+    fn beside(&mut self, t: f64, values: &mut Vec<[f64; 2]>) {
+        self.joined.beside(t, values);
     }
 
     fn names(&self) -> Vec<String> {
-        let mut names = self.plant.names();
-        if let Some(observer) = &self.observer {
-            names.extend(
-                observer
-                    .names()
-                    .iter()
-                    .map(|name| format!("observer's {name}")),
-            );
-        }
-        names
+        self.joined.names()
     }
 
     /// Blames the first part whose values are not finite.
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
-        let (plant_x, observer_x) = x.split_at(self.plant.dimension());
-        self.connect(t, plant_x);
-        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-        if !finite(&self.u) {
-            return self.inputs.not_finite(t, &[]);
+        let (plant_x, observer_x) = x.split_at(self.wiring.plant.states().len());
+        let mut parts = self.parts(t, plant_x);
+        if !parts.inputs_are_finite {
+            return parts.inputs.not_finite(t, &[]);
         }
         let mut dx = vec![0.0; plant_x.len()];
-        self.plant.derivatives(t, plant_x, &mut dx);
-        match &mut self.observer {
-            Some(observer) if finite(&dx) && finite(&self.y) => observer.not_finite(t, observer_x),
-            _ => self.plant.not_finite(t, plant_x),
+        parts.plant.derivatives(t, plant_x, &mut dx);
+        match &mut parts.observer {
+            Some(observer) if parts.outputs_are_finite && are_finite(&dx) => {
+                observer.not_finite(t, observer_x)
+            }
+            _ => parts.plant.not_finite(t, plant_x),
         }
     }
 }

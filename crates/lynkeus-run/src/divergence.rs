@@ -91,86 +91,66 @@ pub struct Margin {
 /// the run.
 const RUN_AWAY: f64 = 1e6;
 
-/// Where a run of an observer ended.
-pub(crate) struct Place<'a> {
-    /// names of the observer's states
-    pub names: &'a [String],
-    /// its state there
-    pub x: &'a [f64],
-    /// the largest number among starts and signals
-    pub scale: f64,
-    /// the margins with their values there
-    pub margins: &'a [(&'a Margin, f64)],
+/// The margin that is furthest below its limit.
+fn closest<'m>(margins: &[(&'m Margin, f64)]) -> Option<(&'m Margin, f64)> {
+    let low = margins.iter().filter(|(m, value)| *value < m.below);
+    low.min_by(|a, b| (a.1 / a.0.below).total_cmp(&(b.1 / b.0.below)))
+        .copied()
 }
 
-impl Place<'_> {
-    /// The margin that is furthest below its limit.
-    fn closest(&self) -> Option<&(&Margin, f64)> {
-        let low = self.margins.iter().filter(|(m, value)| *value < m.below);
-        low.min_by(|a, b| (a.1 / a.0.below).total_cmp(&(b.1 / b.0.below)))
-    }
-
-    /// An integration that could not go on, by its cause: an estimate on its way to infinity, or
-    /// a matrix that is singular at the estimate. Other errors stay.
-    pub fn explained(&self, error: Error) -> Error {
-        let time = match &error {
-            Error::StepBudget { time, .. }
-            | Error::StepUnderflow { time, .. }
-            | Error::TooStiff { time, .. } => *time,
-            Error::Diverged { .. } => return self.with_hint(error),
-            _ => return error,
+/// An integration that could not go on at `x`, by its cause: an estimate on its way to infinity, far
+/// beyond `scale`, the largest number among starts and signals, or a matrix that is singular at
+/// the estimate, by the margins with their values there. Other errors stay.
+pub(crate) fn explained(
+    error: Error,
+    names: &[String],
+    x: &[f64],
+    scale: f64,
+    margins: &[(&Margin, f64)],
+) -> Error {
+    let time = match &error {
+        Error::StepBudget { time, .. }
+        | Error::StepUnderflow { time, .. }
+        | Error::TooStiff { time, .. } => *time,
+        Error::Diverged { .. } => return with_hint(error, margins),
+        _ => return error,
+    };
+    let far = RUN_AWAY * scale;
+    let largest = (0..x.len()).max_by(|&i, &j| x[i].abs().total_cmp(&x[j].abs()));
+    let away = largest.filter(|&i| x[i].abs() > far);
+    if let Some(i) = away {
+        let diverged = Error::Diverged {
+            time,
+            name: names.get(i).cloned().unwrap_or_default(),
+            value: x[i],
+            hint: String::new(),
         };
-        let far = RUN_AWAY * self.scale;
-        let largest =
-            (0..self.x.len()).max_by(|&i, &j| self.x[i].abs().total_cmp(&self.x[j].abs()));
-        let away = largest.filter(|&i| self.x[i].abs() > far);
-        if let Some(i) = away {
-            let name = self.names.get(i).cloned().unwrap_or_default();
-            return self.with_hint(Error::Diverged {
-                time,
-                name,
-                value: self.x[i],
-                hint: String::new(),
-            });
-        }
-        match self.closest() {
-            None => error,
-            Some((margin, value)) => Error::Singular {
-                time,
-                matrix: margin.matrix.clone(),
-                name: margin.name.clone(),
-                value: *value,
-                below: margin.below,
-                meaning: margin.meaning.clone(),
-                state: state_text(self.names, self.x),
-            },
-        }
+        return with_hint(diverged, margins);
     }
+    match closest(margins) {
+        None => error,
+        Some((margin, value)) => Error::Singular {
+            time,
+            matrix: margin.matrix.clone(),
+            name: margin.name.clone(),
+            value,
+            below: margin.below,
+            meaning: margin.meaning.clone(),
+            state: state_text(names, x),
+        },
+    }
+}
 
-    /// A divergence beside a singular matrix says so.
-    fn with_hint(&self, error: Error) -> Error {
-        match (error, self.closest()) {
-            (
-                Error::Diverged {
-                    time,
-                    name,
-                    value,
-                    hint,
-                },
-                Some((margin, at)),
-            ) => Error::Diverged {
-                time,
-                name,
-                value,
-                hint: format!(
-                    "{hint}; {} is close to singular there ({} = {}): {}",
-                    margin.matrix,
-                    margin.name,
-                    digits(*at),
-                    margin.meaning
-                ),
-            },
-            (error, _) => error,
-        }
+/// A divergence beside a singular matrix says so.
+fn with_hint(mut error: Error, margins: &[(&Margin, f64)]) -> Error {
+    if let (Error::Diverged { hint, .. }, Some((margin, at))) = (&mut error, closest(margins)) {
+        *hint += &format!(
+            "; {} is close to singular there ({} = {}): {}",
+            margin.matrix,
+            margin.name,
+            digits(at),
+            margin.meaning
+        );
     }
+    error
 }

@@ -1,14 +1,14 @@
 //! Any observer, fed sample by sample.
 
-use std::fmt::Write;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use crate::filter::{Filter, FilterModel, FilterSettings, Health, Innovation, Smoothed};
-use crate::flow::Flow;
 use crate::runner::{Runner, Sample};
-use crate::sampled::{Sampled, SampledObserver};
-use crate::snapshot::{self, Damaged, Digest, Persist, Walk};
-use crate::{Error, EstimatorSettings, Method, SnapshotFault, StepAdvice, System};
+use crate::sampled::Sampled;
+use crate::snapshot::{self, Damaged, Persist, Walk};
+use crate::{
+    Blueprint, Error, EstimatorSettings, Method, SampledObserver, SnapshotFault, StepAdvice, System,
+};
 
 /// Any observer, one sample after the other, live or from a log.
 ///
@@ -50,93 +50,79 @@ use crate::{Error, EstimatorSettings, Method, SnapshotFault, StepAdvice, System}
 /// ```
 #[derive(Clone, Debug)]
 pub struct Estimator {
+    blueprint: Arc<Blueprint>,
+    fingerprint: OnceLock<u64>,
     intake: Intake,
     core: Core,
-    /// of what is estimated
-    names: Vec<String>,
-    program: Program,
     /// the state before the call under way
     image: Vec<u8>,
 }
 
+impl Blueprint {
+    /// The estimator, at its start.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for impossible numbers of the method; for a filter also of the gate or the
+    /// sigma points.
+    pub fn estimator(&self) -> Result<Estimator, Error> {
+        Estimator::of(self.clone())
+    }
+}
+
 impl Estimator {
+    fn of(blueprint: Blueprint) -> Result<Self, Error> {
+        let core = match &blueprint {
+            Blueprint::Sampled { observer, method } => {
+                Core::Sampled(Box::new(Sampled::new(observer, *method)?))
+            }
+            Blueprint::Filter {
+                model,
+                settings,
+                run,
+            } => Core::Filter(Box::new(Filter::new(model, settings.clone(), *run)?)),
+        };
+        let sensors = blueprint.sensors();
+        Ok(Self {
+            intake: Intake::new([&sensors[..], blueprint.inputs()].concat(), sensors.len()),
+            blueprint: Arc::new(blueprint),
+            fingerprint: OnceLock::new(),
+            core,
+            image: vec![],
+        })
+    }
+
     /// Of an observer whose signals are all there at every sample, at its start values.
     ///
     /// # Errors
-    /// [`Error::Setting`] for impossible numbers of the method.
+    /// As [`Blueprint::estimator`].
     pub fn new(observer: &System, settings: EstimatorSettings) -> Result<Self, Error> {
-        let core = Core::Flow(Box::new(Flow::new(observer, settings)?));
-        let intake = Intake::new(observer.signals().to_vec(), 0);
-        let program = Program::new(vec![observer.clone()], format!("{settings:?}"));
-        Ok(Self::of(
-            core,
-            intake,
-            observer.estimates().to_vec(),
-            program,
-        ))
+        Self::of(Blueprint::new(observer, settings))
     }
 
     /// Of an observer whose sensors report when they do, at its start values.
     ///
     /// # Errors
-    /// [`Error::Setting`] for impossible numbers of the method.
+    /// As [`Blueprint::estimator`].
     pub fn sampled(observer: &SampledObserver, method: Method) -> Result<Self, Error> {
-        let core = Core::Sampled(Box::new(Sampled::new(observer, method)?));
-        let count = observer.sensors.len();
-        let system = &observer.system;
-        let tuned = observer.tuned.as_ref();
-        let tuned = tuned.map_or(0, |tuned| tuned.system.outputs().len());
-        let known = system.signals().len().saturating_sub(count + tuned);
-        let inputs = system.signals().iter().take(known);
-        let names = observer.sensors.iter().chain(inputs).cloned().collect();
-        let told = system.outputs().len().saturating_sub(count);
-        let outputs = system.outputs().iter().take(told).cloned();
-        let mut systems = vec![system.clone()];
-        systems.extend(observer.errors.iter().map(|e| e.flow().clone()));
-        let noises = observer.errors.as_ref().map(|e| e.noises());
-        let mut settings = format!(
-            "{method:?} {} {:?} {noises:?}",
-            observer.predict, observer.inputs
-        );
-        if let Some(tuned) = &observer.tuned {
-            systems.push(tuned.system.clone());
-            settings += &format!(" {:?}", tuned.values);
-        }
-        let program = Program::new(systems, settings);
-        Ok(Self::of(
-            core,
-            Intake::new(names, count),
-            outputs.collect(),
-            program,
-        ))
+        let observer = Box::new(observer.clone());
+        Self::of(Blueprint::Sampled { observer, method })
     }
 
     /// A Kalman filter, at the plant's first estimate.
     ///
     /// # Errors
-    /// [`Error::Setting`] for impossible numbers of the method, the gate or the sigma points.
+    /// As [`Blueprint::estimator`].
     pub fn filter(
         model: &FilterModel,
         settings: FilterSettings,
         run: EstimatorSettings,
     ) -> Result<Self, Error> {
-        let sensors = model.sensors().iter().map(|s| &s.name);
-        let names = sensors.chain(model.inputs()).cloned().collect();
-        let text = format!("{settings:?} {run:?} {}", model.numbers());
-        let core = Core::Filter(Box::new(Filter::new(model, settings, run)?));
-        let program = Program::new(model.systems().cloned().collect(), text);
-        let intake = Intake::new(names, model.sensors().len());
-        Ok(Self::of(core, intake, model.states().to_vec(), program))
-    }
-
-    fn of(core: Core, intake: Intake, names: Vec<String>, program: Program) -> Self {
-        Self {
-            intake,
-            core,
-            names,
-            program,
-            image: vec![],
-        }
+        let model = Box::new(model.clone());
+        Self::of(Blueprint::Filter {
+            model,
+            settings,
+            run,
+        })
     }
 
     /// Goes to `t`, at which nothing is read: inputs stay as they were, and the estimate is
@@ -192,7 +178,7 @@ impl Estimator {
     /// Names of what is estimated, monitors last.
     #[must_use]
     pub fn names(&self) -> &[String] {
-        &self.names
+        self.blueprint.estimates()
     }
 
     /// The estimate after the last call that succeeded, in the order of [`Estimator::names`].
@@ -232,7 +218,7 @@ impl Estimator {
     #[must_use]
     pub fn advice(&self) -> Option<StepAdvice> {
         match &self.core {
-            Core::Flow(flow) => flow.advice(),
+            Core::Sampled(sampled) if self.sensors() == 0 => sampled.advice(),
             _ => None,
         }
     }
@@ -241,7 +227,6 @@ impl Estimator {
     #[must_use]
     pub fn state(&self) -> &[f64] {
         match &self.core {
-            Core::Flow(flow) => flow.state(),
             Core::Sampled(sampled) => sampled.state(),
             Core::Filter(filter) => filter.estimate(),
         }
@@ -254,14 +239,16 @@ impl Estimator {
     pub fn smoothed(&self, lag: Option<usize>, deviations: bool) -> Option<Vec<Smoothed>> {
         match &self.core {
             Core::Filter(filter) => filter.smoothed(lag, deviations),
-            _ => None,
+            Core::Sampled(_) => None,
         }
     }
 
     /// A number that differs for observers with other equations, settings, noises or starts.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
-        self.program.fingerprint(self.intake.names())
+        *self
+            .fingerprint
+            .get_or_init(|| self.blueprint.fingerprint())
     }
 
     /// Everything that the future depends on, with a version, the [fingerprint](Self::fingerprint)
@@ -342,7 +329,7 @@ impl Persist for Whole<'_> {
         self.0.walk(walk)?;
         match &mut self.0.core {
             Core::Filter(filter) => filter.walk_history(walk),
-            _ => Ok(()),
+            Core::Sampled(_) => Ok(()),
         }
     }
 }
@@ -468,7 +455,6 @@ impl Persist for Intake {
 /// An observer of any kind.
 #[derive(Clone, Debug)]
 pub(crate) enum Core {
-    Flow(Box<Flow>),
     Sampled(Box<Sampled>),
     Filter(Box<Filter>),
 }
@@ -476,7 +462,6 @@ pub(crate) enum Core {
 impl Core {
     pub fn runner(&self) -> &dyn Runner {
         match self {
-            Self::Flow(flow) => &**flow,
             Self::Sampled(sampled) => &**sampled,
             Self::Filter(filter) => &**filter,
         }
@@ -484,42 +469,8 @@ impl Core {
 
     pub fn runner_mut(&mut self) -> &mut dyn Runner {
         match self {
-            Self::Flow(flow) => &mut **flow,
             Self::Sampled(sampled) => &mut **sampled,
             Self::Filter(filter) => &mut **filter,
         }
-    }
-}
-
-/// What an estimator's numbers follow from, to tell one from another.
-#[derive(Clone, Debug)]
-pub(crate) struct Program {
-    systems: Vec<System>,
-    settings: String,
-    fingerprint: OnceLock<u64>,
-}
-
-impl Program {
-    pub fn new(systems: Vec<System>, settings: String) -> Self {
-        Self {
-            systems,
-            settings,
-            fingerprint: OnceLock::new(),
-        }
-    }
-
-    /// A number that differs for other programs; computed once.
-    pub fn fingerprint(&self, signals: &[String]) -> u64 {
-        *self.fingerprint.get_or_init(|| self.digest(signals))
-    }
-
-    fn digest(&self, signals: &[String]) -> u64 {
-        let mut digest = Digest::default();
-        // a digest takes any text
-        let _ = write!(digest, "{signals:?} {}", self.settings);
-        for system in &self.systems {
-            system.tell(&mut digest);
-        }
-        digest.value()
     }
 }

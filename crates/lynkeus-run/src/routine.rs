@@ -1,11 +1,13 @@
-//! Tapes that are interpreted at first, and run as machine code once that pays.
+//! Code of equations: tapes that are interpreted at first, and run as machine code once that pays.
 
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use lynkeus_expr::{Expr, Graph, Node, Nodes, Tape, jacobian};
+use lynkeus_expr::{Expr, Graph, MissingInput, Node, Tape, jacobian};
 use lynkeus_native::Function;
 
+use crate::equations::Equations;
 use crate::{Place, Slopes};
 
 /// What evaluates systems. All give the same values to the bit, so that it is a matter of speed.
@@ -49,9 +51,12 @@ const PATIENCE: u32 = 200;
 /// Largest tape whose step is made one function: it has four times the instructions.
 pub(crate) const LARGEST_STEP: usize = 50_000;
 
-/// A tape with the code that was made of it, shared by all that run it.
+/// Some expressions of a system as functions of its first inputs, with the code that was made of
+/// them, shared by all that run it.
 #[derive(Debug)]
 pub(crate) struct Routine {
+    equations: Arc<Equations>,
+    outputs: Vec<Node>,
     tape: Tape,
     native: OnceLock<Option<Function<1>>>,
     step: OnceLock<Option<Function<1>>>,
@@ -59,17 +64,46 @@ pub(crate) struct Routine {
 }
 
 impl Routine {
-    pub fn new(tape: Tape) -> Arc<Self> {
-        Arc::new(Self {
+    /// `outputs` as functions of so many inputs.
+    ///
+    /// # Errors
+    /// [`MissingInput`] where an output depends on another symbol.
+    pub fn new(
+        equations: &Arc<Equations>,
+        inputs: usize,
+        outputs: Vec<Node>,
+    ) -> Result<Arc<Self>, MissingInput> {
+        let tape = Tape::new(&equations.graph(), &equations.inputs[..inputs], &outputs)?;
+        Ok(Arc::new(Self {
+            equations: equations.clone(),
+            outputs,
             tape,
             native: OnceLock::new(),
             step: OnceLock::new(),
             slopes: OnceLock::new(),
-        })
+        }))
     }
 
     pub fn tape(&self) -> &Tape {
         &self.tape
+    }
+
+    /// The symbols of its inputs.
+    fn inputs(&self) -> &[Node] {
+        &self.equations.inputs[..self.tape.inputs()]
+    }
+
+    /// Names the first operation that makes a NaN or an infinity at these inputs.
+    pub fn first_nonfinite(&self, inputs: &[f64]) -> Option<String> {
+        self.tape.first_nonfinite(&self.equations.graph(), inputs)
+    }
+
+    /// For expressions x' of time, states and what is constant: one step of the classical
+    /// Runge–Kutta method in the graph of the equations, the symbols that it reads (the step's
+    /// length last) and the states at its end. None where the step is too large for one function.
+    pub fn step_in(&self, graph: &Graph) -> Option<(Vec<Node>, Vec<Node>)> {
+        let is_small = self.tape.len() <= LARGEST_STEP;
+        is_small.then(|| classical_step(graph, self.inputs(), &self.outputs))
     }
 
     fn native(&self) -> Option<&Function<1>> {
@@ -79,8 +113,11 @@ impl Routine {
 
     fn step(&self) -> Option<&Function<1>> {
         let compile = || {
-            let is_small = self.tape.len() <= LARGEST_STEP;
-            Function::compile(&is_small.then(|| classical_step(&self.tape))??)
+            let graph = self.equations.graph();
+            let (inputs, next) = self.step_in(&graph)?;
+            let tape = Tape::new(&graph, &inputs, &next).ok()?;
+            drop(graph);
+            Function::compile(&tape)
         };
         self.step.get_or_init(compile).as_ref()
     }
@@ -88,7 +125,7 @@ impl Routine {
     /// The derivatives by the states, which follow time among the inputs. They are found when
     /// they are first asked for.
     fn slopes(&self, states: usize) -> Option<&Differentiated> {
-        let find = || Differentiated::new(&self.tape, states);
+        let find = || Differentiated::new(self, states);
         self.slopes.get_or_init(find).as_ref()
     }
 
@@ -103,42 +140,36 @@ impl Routine {
     }
 }
 
-/// One step of the classical Runge–Kutta method for a tape (t, x, w) → dx: the tape
-/// (t, x, w, h) → x at t + h, operation by operation what [`Rk4`](crate::Rk4) does. What the
+/// One step of the classical Runge–Kutta method for x' = `slopes`, functions of `inputs`: time, the
+/// states and what is constant. Operation by operation it is what [`Rk4`](crate::Rk4) does; what the
 /// stages have in common is computed once.
-pub(crate) fn classical_step(tape: &Tape) -> Option<Tape> {
-    let g = Graph::new();
-    let symbols: Vec<Expr<'_>> = (0..tape.inputs()).map(|_| g.fresh("w")).collect();
+fn classical_step(g: &Graph, inputs: &[Node], slopes: &[Node]) -> (Vec<Node>, Vec<Node>) {
     let h = g.fresh("h");
-    let (t, x) = (symbols[0], &symbols[1..=tape.outputs()]);
-    let slope = |t: Expr<'_>, at: &[Node]| -> Vec<Node> {
-        let rest = symbols[1 + at.len()..].iter().map(|e| e.node());
-        let inputs: Vec<Node> = [t.node()]
-            .into_iter()
-            .chain(at.iter().copied())
-            .chain(rest)
-            .collect();
-        tape.eval_in(&Nodes(&g), &inputs)
-    };
+    let t = g.expr(inputs[0]);
+    let x: Vec<Expr<'_>> = inputs[1..=slopes.len()]
+        .iter()
+        .map(|&x| g.expr(x))
+        .collect();
     let moved = |factor: Expr<'_>, k: &[Node]| -> Vec<Node> {
         let ends = x.iter().zip(k);
-        ends.map(|(&x, &k)| (x + g.expr(factor.node()) * g.expr(k)).node())
+        ends.map(|(&x, &k)| (x + factor * g.expr(k)).node())
             .collect()
     };
+    let slope = |t: Expr<'_>, at: Vec<Node>| -> Vec<Node> {
+        let places = inputs.iter().copied().zip([t.node()].into_iter().chain(at));
+        g.substitute(slopes, &places.collect::<HashMap<_, _>>())
+    };
     let half = h * 0.5;
-    let start: Vec<Node> = x.iter().map(|x| x.node()).collect();
-    let k1 = slope(t, &start);
-    let k2 = slope(t + half, &moved(half, &k1));
-    let k3 = slope(t + half, &moved(half, &k2));
-    let k4 = slope(t + h, &moved(h, &k3));
-    let next: Vec<Node> = (0..x.len())
-        .map(|i| {
-            let [k1, k2, k3, k4] = [&k1, &k2, &k3, &k4].map(|k| g.expr(k[i]));
-            (x[i] + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)).node()
-        })
-        .collect();
-    let inputs: Vec<Node> = symbols.iter().chain([&h]).map(|e| e.node()).collect();
-    Tape::new(&g, &inputs, &next).ok()
+    let k1 = slopes;
+    let k2 = slope(t + half, moved(half, k1));
+    let k3 = slope(t + half, moved(half, &k2));
+    let k4 = slope(t + h, moved(h, &k3));
+    let next = x.iter().enumerate().map(|(i, &x)| {
+        let [k1, k2, k3, k4] = [k1, &k2, &k3, &k4].map(|k| g.expr(k[i]));
+        (x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)).node()
+    });
+    let next = next.collect();
+    ([inputs, &[h.node()]].concat(), next)
 }
 
 /// Machine code in use, or how often it would have been.
@@ -187,11 +218,6 @@ pub(crate) struct Runner {
 }
 
 impl Runner {
-    /// What is run.
-    pub fn tape(&self) -> &Tape {
-        self.routine.tape()
-    }
-
     /// Writes the outputs at `inputs`.
     #[inline]
     pub fn eval(&mut self, inputs: &[f64], outputs: &mut [f64]) {
@@ -242,23 +268,22 @@ pub(crate) struct Differentiated {
 }
 
 impl Differentiated {
-    /// Of a tape whose inputs are time, so many states, and what is constant. None where the
+    /// Of a routine whose inputs are time, so many states, and what is constant. None where the
     /// derivatives written down would be too many for what they save.
-    pub fn new(tape: &Tape, states: usize) -> Option<Self> {
-        let g = Graph::new();
-        let inputs: Vec<Node> = (0..tape.inputs()).map(|_| g.fresh("w").node()).collect();
-        let outputs = tape.eval_in(&Nodes(&g), &inputs);
-        let x = &inputs[1..=states];
-        let most = FEW.max(tape.len().saturating_mul(states) / SAVED);
-        jacobian::size(&g, &outputs, x, most)?;
-        let entries = jacobian::forward(&g, &outputs, x).entries;
-        let nodes: Vec<Node> = entries.iter().map(|&(.., node)| node).collect();
+    pub fn new(of: &Routine, states: usize) -> Option<Self> {
+        let x = &of.inputs()[1..=states];
+        let most = FEW.max(of.tape.len().saturating_mul(states) / SAVED);
+        let graph = of.equations.graph();
+        jacobian::size(&graph, &of.outputs, x, most)?;
+        let entries = jacobian::forward(&graph, &of.outputs, x).entries;
+        drop(graph);
+        let nodes = entries.iter().map(|&(.., node)| node).collect();
         let places = entries
             .iter()
             .map(|&(row, column, _)| Place { row, column });
         Some(Self {
             places: places.collect(),
-            routine: Routine::new(Tape::new(&g, &inputs, &nodes).ok()?),
+            routine: Routine::new(&of.equations, of.tape.inputs(), nodes).ok()?,
         })
     }
 }
@@ -271,7 +296,7 @@ mod tests {
     /// left to differences.
     #[test]
     fn derivatives_are_not_written_down_at_any_price() {
-        let tape = |n: usize, dense: bool| {
+        let known = |n: usize, dense: bool| {
             let g = Graph::new();
             let t = g.symbol("t").node();
             let x: Vec<_> = (0..n).map(|i| g.symbol(&format!("x{i}"))).collect();
@@ -280,12 +305,14 @@ mod tests {
             let dx: Vec<Node> = (0..n)
                 .map(|i| (x[i] * read + i as f64).exp().node())
                 .collect();
-            let inputs: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
-            Tape::new(&g, &inputs, &dx).unwrap()
+            let symbols: Vec<Node> = [t].into_iter().chain(x.iter().map(|x| x.node())).collect();
+            let equations = Arc::new(Equations::new(&g, &symbols, &dx, &[]).unwrap());
+            let dx = equations.roots.derivatives.clone();
+            let routine = Routine::new(&equations, symbols.len(), dx).unwrap();
+            Differentiated::new(&routine, n).map(|known| known.places.len())
         };
-        let sparse = Differentiated::new(&tape(400, false), 400).unwrap();
-        assert_eq!(sparse.places.len(), 799);
-        assert!(Differentiated::new(&tape(400, true), 400).is_none());
-        assert!(Differentiated::new(&tape(40, true), 40).is_some());
+        assert_eq!(known(400, false), Some(799));
+        assert!(known(400, true).is_none());
+        assert!(known(40, true).is_some());
     }
 }

@@ -81,7 +81,7 @@ impl Run {
             itinerary.hold(),
         )?;
         let system = Loop::new(simulation, sensors)?;
-        let x = system.start();
+        let x = system.system().start().to_vec();
         Ok(Self {
             itinerary: itinerary.exact(system.is_exact()),
             integrator: Integrator::new(simulation.method, x.len())?,

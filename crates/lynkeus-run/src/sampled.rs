@@ -6,7 +6,7 @@ use crate::runner::{Runner, Sample};
 use crate::snapshot::{Damaged, Persist, Walk};
 use crate::spread::{ErrorModel, Spread};
 use crate::system::Driven;
-use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
+use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, StepAdvice, System};
 
 /// An observer z' = F(t, z, u, w) whose measurements are states of their own: w jumps to a
 /// reading when the sensor reports, and in between stays (`hold`) or follows the model,
@@ -15,6 +15,7 @@ use crate::{BetweenSamples, Dynamics, Error, Integrator, Method, System};
 ///
 /// With one for each of the `sensors`, the system's last states are w; its signals are known inputs,
 /// then whether w follows the model (1) or stays (0), then what `tuned` makes; its last outputs are h(x̂).
+/// Without sensors the system's signals are known inputs and it reports [`System::estimates`].
 #[derive(Clone, Debug)]
 pub struct SampledObserver {
     /// the system
@@ -29,6 +30,38 @@ pub struct SampledObserver {
     pub errors: Option<ErrorModel>,
     /// numbers of the equations that may be changed while it runs elsewhere; here they stay
     pub tuned: Option<Tuned>,
+}
+
+impl SampledObserver {
+    /// An observer without sensors of its own: all signals of the system are known at every
+    /// sample.
+    #[must_use]
+    pub fn of_inputs(system: System, inputs: BetweenSamples) -> Self {
+        Self {
+            system,
+            sensors: vec![],
+            predict: false,
+            inputs,
+            errors: None,
+            tuned: None,
+        }
+    }
+
+    /// Names of the known inputs.
+    #[must_use]
+    pub fn known_inputs(&self) -> &[String] {
+        let tuned = self.tuned.as_ref();
+        let tuned = tuned.map_or(0, |tuned| tuned.system.outputs().len());
+        let signals = self.system.signals();
+        &signals[..signals.len().saturating_sub(self.sensors.len() + tuned)]
+    }
+
+    /// Names of what is estimated, monitors last.
+    #[must_use]
+    pub fn estimates(&self) -> &[String] {
+        let names = self.system.estimates();
+        &names[..names.len().saturating_sub(self.sensors.len())]
+    }
 }
 
 /// Numbers of an observer's equations, and what the equations make of them.
@@ -106,7 +139,7 @@ impl Sampled {
             driven: Driven::new(system, *inputs),
             integrator: Integrator::new(method, system.states().len())?,
             x: system.start().to_vec(),
-            outputs: vec![0.0; system.outputs().len()],
+            outputs: vec![0.0; system.estimates().len()],
             signals,
             sensors: count,
             predict: *predict,
@@ -122,6 +155,10 @@ impl Sampled {
 
     pub fn state(&self) -> &[f64] {
         &self.x
+    }
+
+    pub fn advice(&self) -> Option<StepAdvice> {
+        self.integrator.advice()
     }
 
     /// The signals from a sample on: a sensor's w follows the model where it did not report.
@@ -140,7 +177,7 @@ impl Sampled {
     fn evaluate(&mut self, t: f64) -> Result<(), Error> {
         let evaluation = &mut self.driven.evaluation;
         evaluation.enter(t);
-        evaluation.outputs(t, &self.x, &mut self.outputs);
+        evaluation.estimates(t, &self.x, &mut self.outputs);
         match self.outputs.iter().all(|v| v.is_finite()) {
             true => Ok(()),
             false => Err(evaluation.not_finite(t, &self.x)),
@@ -196,7 +233,9 @@ impl Runner for Sampled {
         };
         let scale = self.bound.scale();
         let evaluation = &mut self.driven.evaluation;
-        done.map_err(|error| evaluation.explained(error, &self.x, scale))
+        done.map_err(|error| evaluation.explained(error, &self.x, scale))?;
+        self.driven.arrive();
+        Ok(())
     }
 
     fn update(&mut self, sample: &Sample<'_>) -> Result<(), Error> {

@@ -1,13 +1,14 @@
 //! Systems compiled for evaluation, and at work.
 
 use std::fmt::Write;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use lynkeus_expr::{Evaluator, Graph, Node, Tape};
 
-use crate::divergence::Place;
+use crate::divergence::explained;
+use crate::equations::Equations;
 use crate::error::state_text;
-use crate::relays::{Guards, Held, Taken, Watched, bends, take};
+use crate::relays::{Guards, Watched};
 use crate::routine::{Routine, Runner};
 use crate::snapshot::{Damaged, Digest, Persist, Walk};
 use crate::switches::Switches;
@@ -17,7 +18,7 @@ use crate::{BetweenSamples, Dynamics, Error, Margin, Slopes};
 /// (without states) inputs as functions of time.
 ///
 /// The signals w are everything the right-hand side reads beside time and
-/// states. A system owns its code: it is cheap to clone, `Send` and `Sync`, and
+/// states. A system owns its equations and their code: it is cheap to clone, `Send` and `Sync`, and
 /// independent of the graph it was made from. An [`Evaluation`] evaluates it.
 #[derive(Clone, Debug)]
 pub struct System {
@@ -28,21 +29,13 @@ pub struct System {
 
 #[derive(Debug)]
 struct Code {
-    states: Vec<String>,
-    signals: Vec<String>,
-    outputs: Vec<String>,
+    equations: Arc<Equations>,
     derivatives_at: Arc<Routine>,
     outputs_at: Arc<Routine>,
-    switches: Switches,
-    modes: usize,
     /// the same with what jumps with the state held; none where nothing does
     held: Option<HeldCode>,
-    /// where it jumps and bends with the state, over the same inputs and the modes of what is held
+    /// where it jumps and bends with the state, over all inputs
     guards: Option<Arc<Guards>>,
-    /// the functions of the guards' bends, of these inputs; none where there are none
-    bends_at: Option<Tape>,
-    /// only to name an operation in an error
-    graph: Mutex<Graph>,
 }
 
 /// Code whose last inputs are the values of the operations that jump with the state.
@@ -50,21 +43,7 @@ struct Code {
 struct HeldCode {
     derivatives_at: Arc<Routine>,
     outputs_at: Arc<Routine>,
-    held: Held,
-    /// number of these operations
-    modes: usize,
-}
-
-impl HeldCode {
-    fn new(graph: &Graph, inputs: &[Node], taken: Taken, states: usize) -> Result<Self, Error> {
-        let (dx, y) = taken.roots.split_at(states);
-        Ok(Self {
-            derivatives_at: Routine::new(Tape::new(graph, inputs, dx)?),
-            outputs_at: Routine::new(Tape::new(graph, inputs, y)?),
-            held: taken.held,
-            modes: taken.modes.len(),
-        })
-    }
+    surfaces: Tape,
 }
 
 impl System {
@@ -94,60 +73,58 @@ impl System {
                 derivatives.len(),
             ));
         }
-        let own = Graph::new();
         let mut symbols = vec![time];
         symbols.extend(states.iter().map(|(_, node, _)| *node));
         symbols.extend(signals.iter().map(|(_, node)| *node));
-        let roots: Vec<Node> = derivatives
-            .iter()
-            .copied()
-            .chain(outputs.iter().map(|(_, node)| *node))
-            .collect();
-        let all: Vec<Node> = symbols.iter().chain(&roots).copied().collect();
-        let image = own.copied(graph, &all);
-        let mut inputs: Vec<Node> = symbols.iter().map(|s| image[s]).collect();
-        let roots: Vec<Node> = roots.iter().map(|r| image[r]).collect();
-        let extracted = Switches::extract(&own, image[&time], &roots)?;
-        let moving = inputs.clone();
-        inputs.extend(&extracted.modes);
-        let jumping = take(&own, &moving, &inputs, &extracted.roots, derivatives.len())?;
-        let modes = jumping.as_ref().map_or(&[][..], |taken| &taken.modes);
-        let all = [&inputs[..], modes].concat();
-        let smooth = jumping.as_ref().map_or(&extracted.roots, |t| &t.roots);
-        let bends = bends(&own, &moving[1..], &smooth[..derivatives.len()]);
-        let bends_at = match bends.is_empty() {
-            true => None,
-            false => Some(Tape::new(&own, &all, &bends)?),
-        };
-        let mut watched = Watched {
-            bends,
-            ..Watched::default()
-        };
-        if let Some(taken) = &jumping {
-            (watched.surfaces, watched.counts) =
-                (taken.surfaces.clone(), taken.held.counts.clone());
-        }
-        let guards = Guards::new(&own, &all, states.len(), &watched)?;
-        let held = |taken| HeldCode::new(&own, &all, taken, derivatives.len());
-        let held = jumping.map(held).transpose()?;
-        let (dx, y) = extracted.roots.split_at(derivatives.len());
-        let code = Code {
+        let roots: Vec<Node> = outputs.iter().map(|(_, node)| *node).collect();
+        let equations = Equations {
             states: states.iter().map(|(name, ..)| name.clone()).collect(),
             signals: signals.iter().map(|(name, _)| name.clone()).collect(),
             outputs: outputs.iter().map(|(name, _)| name.clone()).collect(),
-            derivatives_at: Routine::new(Tape::new(&own, &inputs, dx)?),
-            outputs_at: Routine::new(Tape::new(&own, &inputs, y)?),
-            modes: extracted.modes.len(),
-            switches: extracted.switches,
-            held,
-            guards,
-            bends_at,
-            graph: Mutex::new(own),
+            ..Equations::new(graph, &symbols, derivatives, &roots)?
         };
         let start = states.iter().map(|(.., value)| *value).collect();
-        let code = Arc::new(code);
+        Self::compiled(equations, start)
+    }
+
+    /// Code for equations.
+    ///
+    /// # Errors
+    /// As [`System::new`].
+    pub(crate) fn compiled(equations: Equations, start: Vec<f64>) -> Result<Self, Error> {
+        let equations = Arc::new(equations);
+        let Equations { roots, inputs, .. } = &*equations;
+        let watched = Watched {
+            surfaces: roots.surfaces.clone(),
+            counts: equations.counts(),
+            bends: roots.bends.clone(),
+        };
+        let guards = {
+            let graph = equations.graph();
+            Guards::new(&graph, inputs, equations.states.len(), &watched)?
+        };
+        let held = match equations.held.is_empty() {
+            true => None,
+            false => Some(HeldCode {
+                derivatives_at: Routine::new(
+                    &equations,
+                    inputs.len(),
+                    roots.held_derivatives.clone(),
+                )?,
+                outputs_at: Routine::new(&equations, inputs.len(), roots.held_outputs.clone())?,
+                surfaces: Tape::new(&equations.graph(), inputs, &roots.surfaces)?,
+            }),
+        };
+        let smooth = equations.smooth_inputs();
+        let code = Code {
+            derivatives_at: Routine::new(&equations, smooth, roots.derivatives.clone())?,
+            outputs_at: Routine::new(&equations, smooth, roots.outputs.clone())?,
+            held,
+            guards,
+            equations: equations.clone(),
+        };
         Self {
-            code,
+            code: Arc::new(code),
             start: vec![],
             margins: Arc::default(),
         }
@@ -185,7 +162,7 @@ impl System {
 
     /// Names of the states.
     pub fn states(&self) -> &[String] {
-        &self.code.states
+        &self.code.equations.states
     }
 
     /// Start values, in the order of the states.
@@ -195,40 +172,57 @@ impl System {
 
     /// Names of the signals w.
     pub fn signals(&self) -> &[String] {
-        &self.code.signals
+        &self.code.equations.signals
     }
 
     /// Names of the outputs.
     pub fn outputs(&self) -> &[String] {
-        &self.code.outputs
+        &self.code.equations.outputs
     }
 
     /// Names of what an observer reports: its outputs, or its states where it has
     /// no outputs.
     pub fn estimates(&self) -> &[String] {
-        if self.code.outputs.is_empty() {
-            &self.code.states
-        } else {
-            &self.code.outputs
+        match self.outputs().is_empty() {
+            true => self.states(),
+            false => self.outputs(),
         }
     }
 
     /// What the system's numbers follow from: the tapes, not the machine code made of them.
     pub(crate) fn tell(&self, digest: &mut Digest) {
         let code = &*self.code;
-        let names = (&code.states, &code.signals, &code.outputs, &code.switches);
+        let Equations {
+            states,
+            signals,
+            outputs,
+            switches,
+            held,
+            ..
+        } = &*code.equations;
         // a digest takes any text
-        let _ = write!(digest, "{names:?}");
-        for routine in [&code.derivatives_at, &code.outputs_at] {
+        let _ = write!(digest, "{:?}", (states, signals, outputs, switches, held));
+        let held = code.held.iter();
+        let held = held.flat_map(|held| [&held.derivatives_at, &held.outputs_at]);
+        for routine in [&code.derivatives_at, &code.outputs_at]
+            .into_iter()
+            .chain(held)
+        {
             let _ = write!(digest, "{:?}", routine.tape());
         }
-        if let Some(code) = &code.held {
-            for routine in [&code.derivatives_at, &code.outputs_at] {
-                let _ = write!(digest, "{:?}", routine.tape());
-            }
-            let _ = write!(digest, "{:?}", code.held);
-        }
+        let surfaces = code.held.as_ref().map(|held| &held.surfaces);
+        let _ = write!(digest, "{surfaces:?}");
         digest.numbers(&self.start);
+    }
+
+    /// The equations that it is compiled from.
+    pub(crate) fn equations(&self) -> &Equations {
+        &self.code.equations
+    }
+
+    /// The code of x'.
+    pub(crate) fn derivatives_at(&self) -> &Routine {
+        &self.code.derivatives_at
     }
 
     /// (t, x, w, [modes](System::modes)) → x'.
@@ -241,38 +235,17 @@ impl System {
         self.code.outputs_at.tape()
     }
 
-    /// (t, x, w, modes, held modes) → y on the sides of the surfaces that are held: the plain ones where nothing jumps with the state.
-    pub(crate) fn held_outputs_tape(&self) -> &Tape {
-        let held = self.code.held.as_ref();
-        held.map_or(self.output_tape(), |held| held.outputs_at.tape())
-    }
-
-    /// What vanishes on the surfaces, of the same inputs, and which of them belong to a `floor`.
-    pub(crate) fn surfaces(&self) -> Option<(&Tape, &[bool])> {
-        let held = &self.code.held.as_ref()?.held;
-        Some((&held.surfaces, &held.counts))
-    }
-
-    /// What vanishes where x' bends with the state, of the same inputs.
-    pub(crate) fn bends(&self) -> Option<&Tape> {
-        self.code.bends_at.as_ref()
-    }
-
-    /// How many operations jump with the state.
-    pub(crate) fn held_modes(&self) -> usize {
-        self.code.held.as_ref().map_or(0, |held| held.modes)
-    }
-
     /// How many values the switches in time have: what jumps with time alone is an input of the
     /// tapes.
     pub fn modes(&self) -> usize {
-        self.code.modes
+        self.code.equations.modes.iter().sum()
     }
 
     /// Whether it jumps or bends (as max does) with time alone, at instants that are found and at
     /// which an integration stops.
     pub fn has_instants(&self) -> bool {
-        !self.code.switches.is_empty()
+        let mut switches = self.code.equations.switches.iter();
+        switches.any(|switches| !switches.is_empty())
     }
 
     /// An evaluator with its own working memory, signals at zero.
@@ -307,7 +280,8 @@ pub struct Evaluation {
     system: System,
     derivatives: Runner,
     outputs: Runner,
-    switches: Switches,
+    /// of each part of the system
+    switches: Vec<Switches>,
     /// t, x, w, modes
     inputs: Vec<f64>,
     held: Option<HeldEvaluation>,
@@ -316,17 +290,16 @@ pub struct Evaluation {
 impl Evaluation {
     fn new(system: &System) -> Self {
         let code = &system.code;
-        let fixed = 1 + code.states.len() + code.signals.len();
         Self {
             derivatives: code.derivatives_at.runner(),
             outputs: code.outputs_at.runner(),
-            switches: code.switches.clone(),
-            inputs: vec![0.0; fixed + code.modes],
+            switches: code.equations.switches.clone(),
+            inputs: vec![0.0; code.equations.smooth_inputs()],
             held: code.held.as_ref().map(|held| HeldEvaluation {
                 derivatives: held.derivatives_at.runner(),
                 outputs: held.outputs_at.runner(),
-                surfaces: held.held.surfaces.evaluator(),
-                modes: vec![0.0; held.modes],
+                surfaces: held.surfaces.evaluator(),
+                modes: vec![0.0; code.equations.held_modes()],
                 inputs: vec![],
                 is_held: false,
             }),
@@ -402,23 +375,29 @@ impl Evaluation {
         let value = |margin: &Margin| values.get(margin.output).copied();
         let margins = system.margins.iter();
         let margins: Vec<(&Margin, f64)> = margins.filter_map(|m| Some((m, value(m)?))).collect();
-        Place {
-            names: system.states(),
-            x,
-            scale,
-            margins: &margins,
-        }
-        .explained(error)
+        explained(error, system.states(), x, scale, &margins)
     }
 
     /// Values of the switches at the last [`Dynamics::enter`].
     pub(crate) fn modes(&self) -> &[f64] {
-        &self.inputs[self.inputs.len() - self.system.code.modes..]
+        &self.inputs[self.inputs.len() - self.system.modes()..]
     }
 
     /// Values of the operations that jump with the state, on the sides that are held.
     pub(crate) fn held_modes(&self) -> &[f64] {
         self.held.as_ref().map_or(&[], |held| &held.modes)
+    }
+
+    /// Goes to these values of the switches, and to these of what is held.
+    pub(crate) fn enter_modes(&mut self, modes: &[f64], held_modes: Option<&[f64]>) {
+        let first = self.inputs.len() - modes.len();
+        self.inputs[first..].copy_from_slice(modes);
+        if let Some(held) = &mut self.held {
+            held.is_held = held_modes.is_some();
+            if let Some(modes) = held_modes {
+                held.modes.copy_from_slice(modes);
+            }
+        }
     }
 
     fn place(&mut self, t: f64, x: &[f64]) {
@@ -430,7 +409,7 @@ impl Evaluation {
 impl Persist for Evaluation {
     fn walk(&mut self, walk: &mut Walk<'_>) -> Result<(), Damaged> {
         walk.numbers(self.signals_mut())?;
-        self.switches.walk(walk)
+        self.switches.iter_mut().try_for_each(|s| s.walk(walk))
     }
 }
 
@@ -462,13 +441,12 @@ impl Dynamics for Evaluation {
     }
 
     fn surfaces(&self) -> usize {
-        let held = self.system.code.held.as_ref();
-        held.map_or(0, |held| held.held.names.len())
+        self.system.code.equations.roots.surfaces.len()
     }
 
     fn surface_names(&self) -> Vec<String> {
-        let held = self.system.code.held.as_ref();
-        held.map_or_else(Vec::new, |held| held.held.names.clone())
+        let held = self.system.code.equations.held.iter();
+        held.flat_map(|held| held.names.clone()).collect()
     }
 
     fn read_surfaces(&mut self, t: f64, x: &[f64], values: &mut [f64]) {
@@ -480,12 +458,18 @@ impl Dynamics for Evaluation {
     }
 
     fn hold(&mut self, sides: Option<&[f64]>) {
-        let (Some(evaluation), Some(code)) = (&mut self.held, &self.system.code.held) else {
+        let Some(evaluation) = &mut self.held else {
             return;
         };
         evaluation.is_held = sides.is_some();
-        if let Some(sides) = sides {
-            code.held.modes(sides, &mut evaluation.modes);
+        let Some(mut sides) = sides else {
+            return;
+        };
+        let mut modes = &mut evaluation.modes[..];
+        for held in &self.system.code.equations.held {
+            let (own, rest) = sides.split_at(held.names.len());
+            modes = held.modes(own, modes);
+            sides = rest;
         }
     }
 
@@ -509,12 +493,22 @@ impl Dynamics for Evaluation {
     }
 
     fn switches(&mut self, from: f64, to: f64, times: &mut Vec<f64>) -> Result<(), Error> {
-        self.switches.between(from, to, times)
+        let mut switches = self.switches.iter_mut();
+        switches.try_for_each(|switches| switches.between(from, to, times))
     }
 
     fn enter(&mut self, t: f64) {
-        let first = self.inputs.len() - self.system.code.modes;
-        self.switches.modes_at(t, &mut self.inputs[first..]);
+        let first = self.inputs.len() - self.system.modes();
+        let mut modes = &mut self.inputs[first..];
+        for (switches, &count) in self
+            .switches
+            .iter_mut()
+            .zip(&self.system.code.equations.modes)
+        {
+            let (own, rest) = modes.split_at_mut(count);
+            switches.modes_at(t, own);
+            modes = rest;
+        }
     }
 
     fn names(&self) -> Vec<String> {
@@ -524,12 +518,10 @@ impl Dynamics for Evaluation {
     fn not_finite(&mut self, t: f64, x: &[f64]) -> Error {
         self.place(t, x);
         let code = &self.system.code;
-        let graph = code.graph.lock().unwrap_or_else(|e| e.into_inner());
         let named = code
             .derivatives_at
-            .tape()
-            .first_nonfinite(&graph, &self.inputs)
-            .or_else(|| code.outputs_at.tape().first_nonfinite(&graph, &self.inputs));
+            .first_nonfinite(&self.inputs)
+            .or_else(|| code.outputs_at.first_nonfinite(&self.inputs));
         Error::NotFinite {
             time: t,
             operation: named.unwrap_or_else(|| "a value overflows".to_owned()),

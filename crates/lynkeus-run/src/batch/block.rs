@@ -4,8 +4,7 @@ use std::ops::ControlFlow;
 
 use lynkeus_native::Buffer;
 
-use super::code::{LANES, Lane, Runner};
-use super::plan::{Event, Program};
+use super::plan::{Event, LANES, Lane, Leg, Program, Runner};
 use crate::Error;
 use crate::divergence::Bound;
 use crate::error::state_text;
@@ -98,7 +97,7 @@ impl<'p> Desk<'p> {
     }
 
     /// What the steps from `first` on share; how many steps.
-    fn share(&mut self, leg: &Leg<'_>, first: usize) -> usize {
+    fn share(&mut self, leg: &Leg, first: usize) -> usize {
         let count = AHEAD.min(leg.steps - first);
         let size = self.program.step.shared();
         for (k, table) in (0..count).step_by(LANES).zip(
@@ -133,14 +132,6 @@ impl<'p> Desk<'p> {
         self.row.sweep(groups, &table[..size], x, rows);
         &rows[..groups * self.program.columns]
     }
-}
-
-/// Equal steps.
-struct Leg<'e> {
-    from: f64,
-    to: f64,
-    steps: usize,
-    modes: &'e [f64],
 }
 
 /// One trajectory.
@@ -213,20 +204,7 @@ impl Block {
             match event {
                 Event::Draw => self.draw(desk.program, Sensors::draw),
                 Event::Stir => self.draw(desk.program, Sensors::stir),
-                Event::Leg {
-                    from,
-                    to,
-                    steps,
-                    modes,
-                } => {
-                    let leg = Leg {
-                        from: *from,
-                        to: *to,
-                        steps: *steps,
-                        modes,
-                    };
-                    self.advance(desk, &leg)?;
-                }
+                Event::Leg(leg) => self.advance(desk, leg)?,
                 Event::Row { time, modes } => self.record(desk, *time, modes, columns),
             }
         }
@@ -249,7 +227,7 @@ impl Block {
         }
     }
 
-    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg<'_>) -> ControlFlow<()> {
+    fn advance(&mut self, desk: &mut Desk<'_>, leg: &Leg) -> ControlFlow<()> {
         let size = desk.program.step.shared();
         let mut done = 0;
         while done < leg.steps {
@@ -275,7 +253,7 @@ impl Block {
             let x = &self.now.values()[k * own..][..program.states];
             let extent = Extent::new(program, row, x);
             for (lane, run) in runs.iter_mut().enumerate().filter(|(_, run)| !run.is_over) {
-                let Err(error) = run.judge(program, time, extent.of(lane), (x, lane)) else {
+                let Err(error) = run.judge(program, time, &extent, x, lane) else {
                     continue;
                 };
                 run.is_over = true;
@@ -301,13 +279,6 @@ struct Extent {
     estimates: Lane,
 }
 
-/// [`Extent`] of one run.
-struct Size {
-    is_finite: bool,
-    known: f64,
-    estimates: f64,
-}
-
 impl Extent {
     fn new(program: &Program, row: &[Lane], x: &[Lane]) -> Self {
         let mut oddity = [0.0; LANES];
@@ -327,29 +298,21 @@ impl Extent {
             estimates: largest(&x[program.plant_states..]),
         }
     }
-
-    fn of(&self, lane: usize) -> Size {
-        Size {
-            is_finite: self.oddity[lane] == 0.0,
-            known: self.known[lane],
-            estimates: self.estimates[lane],
-        }
-    }
 }
 
 impl Run {
-    /// Whether the run goes on; `states` are those of its group, with its lane.
+    /// Whether the run goes on, which is at a lane of its group with states `x`.
     fn judge(
         &mut self,
         program: &Program,
         time: f64,
-        size: Size,
-        states: (&[Lane], usize),
+        extent: &Extent,
+        x: &[Lane],
+        lane: usize,
     ) -> Result<(), Error> {
-        let (x, lane) = states;
         let x = || x.iter().map(|x| x[lane]).collect::<Vec<f64>>();
-        self.bound.see(&[size.known]);
-        if !size.is_finite {
+        self.bound.see(&[extent.known[lane]]);
+        if extent.oddity[lane] != 0.0 {
             return Err(Error::NotFinite {
                 time,
                 operation: "a value is not finite".to_owned(),
@@ -358,7 +321,7 @@ impl Run {
         }
         let names = &program.observer_names;
         self.bound
-            .check(time, &[], &[size.estimates], String::new)
+            .check(time, &[], &[extent.estimates[lane]], String::new)
             .or_else(|_| {
                 let x = x();
                 self.bound

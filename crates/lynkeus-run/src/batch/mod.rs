@@ -8,7 +8,6 @@
 //! [`Simulation::run`] to the bit ([`Batch::is_exact`]).
 
 mod block;
-mod code;
 mod plan;
 
 use std::num::NonZero;
@@ -21,8 +20,7 @@ use crate::{Column, Error, Simulation};
 pub use block::Ended;
 
 use block::{Block, Desk, IsOver, groups};
-use code::LANES;
-use plan::{Event, Plan, Program};
+use plan::{Event, LANES, Plan, Program};
 
 /// What one run of a batch has of its own.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use lynkeus_expr::{Binary, Graph, MissingInput, Node, Op, Tape, Unary};
+use lynkeus_expr::{Binary, Graph, Node, Op, Unary};
 
 use super::{Held, Kind, Relay};
 
@@ -18,15 +18,8 @@ pub(crate) struct Taken {
 
 /// Takes every `sign`, `<` and `≤` that depends on one of `inputs` out of the roots, and every `floor`
 /// that one of the first `moving` roots reads; none where there is none. Several that change on one
-/// surface change together. The surfaces are functions of `arguments`, which hold the inputs and what
-/// else the roots read.
-pub(crate) fn take(
-    graph: &Graph,
-    inputs: &[Node],
-    arguments: &[Node],
-    roots: &[Node],
-    moving: usize,
-) -> Result<Option<Taken>, MissingInput> {
+/// surface change together.
+pub(crate) fn take(graph: &Graph, inputs: &[Node], roots: &[Node], moving: usize) -> Option<Taken> {
     let mut replaced: HashMap<Node, Node> = HashMap::new();
     let (mut relays, mut modes) = (vec![], vec![]);
     let mut surfaces = Surfaces::default();
@@ -58,7 +51,7 @@ pub(crate) fn take(
         replaced.insert(node, mode);
     }
     if relays.is_empty() {
-        return Ok(None);
+        return None;
     }
     // a kink on a surface that is located is smooth on each side, and no step is rejected for it
     for node in graph.reachable(roots) {
@@ -81,23 +74,21 @@ pub(crate) fn take(
         let branches = graph.substitute(&[kink.above, kink.below], &replaced);
         replaced.insert(node, graph.select(mode, branches[0], branches[1]));
     }
-    let all: Vec<Node> = arguments.iter().chain(&modes).copied().collect();
     let names = surfaces.nodes.iter().zip(&surfaces.counts);
     let name = |(&q, &counts): (&Node, &bool)| match counts {
         true => format!("{} = a whole number", graph.render(q, 60)),
         false => format!("{} = 0", graph.render(q, 60)),
     };
-    Ok(Some(Taken {
+    Some(Taken {
         roots: graph.substitute(roots, &replaced),
         modes,
         held: Held {
             relays,
-            surfaces: Tape::new(graph, &all, &surfaces.nodes)?,
             names: names.map(name).collect(),
             counts: surfaces.counts,
         },
         surfaces: surfaces.nodes,
-    }))
+    })
 }
 
 /// What vanishes where one of the roots bends with one of `inputs`, each once.

@@ -25,11 +25,9 @@ mod slide;
 
 use std::sync::Arc;
 
-use lynkeus_expr::Tape;
-
 pub(crate) use ahead::{Ahead, Glance, Span};
 pub use extract::first_jump;
-pub(crate) use extract::{Taken, bends, take};
+pub(crate) use extract::{bends, take};
 pub use guard::Guards;
 pub(crate) use guard::Watched;
 pub(crate) use path::{COEFFICIENTS, Poly};
@@ -69,8 +67,6 @@ enum Kind {
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     relays: Vec<Relay>,
-    /// functions that vanish on the surfaces, of the inputs of the system and the modes
-    pub surfaces: Tape,
     /// how the surfaces read
     pub names: Vec<String>,
     /// the surfaces that are one of two of a `floor`, even ones first
@@ -79,9 +75,10 @@ pub(crate) struct Held {
 
 impl Held {
     /// Writes the values of the operations on the given sides of the surfaces; of a `floor` its value
-    /// stands for the side.
-    pub fn modes(&self, sides: &[f64], modes: &mut [f64]) {
-        for (mode, relay) in modes.iter_mut().zip(&self.relays) {
+    /// stands for the side. Returns the modes that are not theirs.
+    pub fn modes<'m>(&self, sides: &[f64], modes: &'m mut [f64]) -> &'m mut [f64] {
+        let (own, others) = modes.split_at_mut(self.relays.len());
+        for (mode, relay) in own.iter_mut().zip(&self.relays) {
             let side = match relay.is_reversed {
                 true => -sides[relay.surface],
                 false => sides[relay.surface],
@@ -93,6 +90,7 @@ impl Held {
                 Kind::Truth => f64::from(u8::from(side > 0.0)),
             };
         }
+        others
     }
 }
 
