@@ -313,18 +313,10 @@ fn too_many_coupled(pairs: &[(&FlatEquation, &Unknown)], left: usize) -> Problem
 
 /// One equation of a linear loop follows from the others, or contradicts them.
 fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) -> Problem {
-    let names: Vec<String> = pairs
-        .iter()
-        .take(8)
-        .map(|(_, unknown)| unknown.quoted())
-        .collect();
-    let more = if pairs.len() > 8 { ", …" } else { "" };
+    let names = listed(pairs.iter().map(|(_, unknown)| *unknown));
     let spans = pairs.iter().map(|(equation, _)| equation.span);
     let lines = lines(source, spans);
-    let message = format!(
-        "these equations do not determine {}{more}",
-        names.join(", ")
-    );
+    let message = format!("these equations do not determine {names}");
     Problem::new(pairs[place].0.span, message)
         .label(format!("this one repeats or contradicts others on {lines}"))
         .hint(
@@ -335,13 +327,9 @@ fn dependent(source: &str, pairs: &[(&FlatEquation, &Unknown)], place: usize) ->
 }
 
 fn undetermined(equation: &FlatEquation, unknown: &Unknown) -> Problem {
-    let element = equation
-        .element
-        .as_deref()
-        .map(|element| format!(" (element {element})"));
     let message = format!(
         "this equation{} cannot be solved for {}: its terms in it cancel",
-        element.unwrap_or_default(),
+        equation.which_element(),
         unknown.quoted()
     );
     Problem::new(equation.span, message).hint(format!("write it as {} = …", unknown.quoted()))

@@ -83,11 +83,7 @@ impl Balance<'_> {
         lacking: Option<(usize, &Unknown)>,
         inputs: &[Node],
     ) -> Problem {
-        let element = equation
-            .element
-            .as_deref()
-            .map(|element| format!(" (element {element})"));
-        let message = format!("one equation too many{}", element.unwrap_or_default());
+        let message = format!("one equation too many{}", equation.which_element());
         let problem = Problem::new(equation.span, message).label(self.count());
         let mut hint = self.surplus_hint(place, equation, inputs);
         if let Some((_, unknown)) = lacking {

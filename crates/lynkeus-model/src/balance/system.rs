@@ -16,6 +16,14 @@ pub(crate) struct FlatEquation {
     pub element: Option<String>,
 }
 
+impl FlatEquation {
+    /// "(element [2])", with a blank before it, of an array equation, else nothing.
+    pub(super) fn which_element(&self) -> String {
+        let element = self.element.as_deref();
+        element.map_or_else(String::new, |element| format!(" (element {element})"))
+    }
+}
+
 /// Something that the equations must determine.
 #[derive(Clone, Debug)]
 pub(crate) struct Unknown {

@@ -16,87 +16,8 @@ use crate::names::{did_you_mean, listed};
 use crate::syntax::ast::{Causality, Declaration, ExprId, Kind, TypeName, Variability};
 use crate::syntax::plain;
 
-/// Budgets of what declarations are written out to.
-struct Sizes {
-    scalars: Budget,
-    text: Budget,
-}
-
-impl Sizes {
-    fn new() -> Self {
-        Self {
-            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
-            text: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
-        }
-    }
-
-    fn charge(
-        &self,
-        context: &Context<'_>,
-        dims: &[usize],
-        declaration: &Declaration,
-    ) -> Result<()> {
-        // A size beside a size of zero counts as well: slices walk along it.
-        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
-        let count = element_count(&walked).unwrap_or(u64::MAX);
-        self.scalars.charge(count, declaration.name)?;
-        let description = declaration.description.as_ref().map_or(0, String::len);
-        let is_text = |id| matches!(context.ast.expression(id).kind, Kind::Text);
-        let texts = declaration
-            .attributes
-            .iter()
-            .filter_map(|attribute| attribute.value);
-        let texts = texts
-            .filter(|&id| is_text(id))
-            .map(|id| context.ast.expression(id).span);
-        let length: u64 = texts
-            .chain([declaration.name])
-            .map(|span| u64::from(span.end.saturating_sub(span.start)))
-            .sum();
-        let each = length.saturating_add(description as u64);
-        self.text
-            .charge(count.saturating_mul(each), declaration.name)
-    }
-}
-
-fn index_names<'a>(
-    source: &'a str,
-    declarations: &'a [Declaration],
-) -> Result<HashMap<&'a str, usize>> {
-    let reserved: HashSet<&str> = ["time"].into();
-    let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
-    for (place, declaration) in declarations.iter().enumerate() {
-        let name = declaration.label.as_str();
-        if reserved.contains(name) {
-            let message = format!("`{name}` is a word of the language");
-            return Err(Problem::new(declaration.name, message).hint("choose another name"));
-        }
-        if let Some(earlier) = by_name.insert(name, place) {
-            let line = declarations[earlier].name.line(source);
-            let message = format!("`{name}` is declared twice");
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("it is first declared on line {line}")));
-        }
-    }
-    for declaration in declarations {
-        // an element by itself beside the whole array would be two variables of one name
-        let base = declaration
-            .label
-            .strip_suffix(']')
-            .and_then(|name| name.rsplit_once('['));
-        if let Some((base, _)) = base
-            && let Some(&whole) = by_name.get(base)
-        {
-            let message = format!("`{}` is declared twice", declaration.label);
-            let line = declarations[whole].name.line(source);
-            return Err(Problem::new(declaration.name, message)
-                .hint(format!("`{base}` is declared as a whole on line {line}")));
-        }
-    }
-    Ok(by_name)
-}
-
 impl<'a> Symbols<'a> {
+    /// The declarations of a model, each behind those that its size or value needs.
     pub(crate) fn new(context: &Context<'a>) -> Result<Self> {
         let model = context.model;
         let by_name = index_names(context.source, &model.declarations)?;
@@ -198,6 +119,85 @@ impl<'a> Symbols<'a> {
             _ => evaluator.length(id).map(Some),
         };
         declaration.dimensions.iter().map(length).collect()
+    }
+}
+
+fn index_names<'a>(
+    source: &'a str,
+    declarations: &'a [Declaration],
+) -> Result<HashMap<&'a str, usize>> {
+    let mut by_name: HashMap<&str, usize> = HashMap::with_capacity(declarations.len());
+    for (place, declaration) in declarations.iter().enumerate() {
+        let name = declaration.label.as_str();
+        if name == "time" {
+            let message = format!("`{name}` is a word of the language");
+            return Err(Problem::new(declaration.name, message).hint("choose another name"));
+        }
+        if let Some(earlier) = by_name.insert(name, place) {
+            let line = declarations[earlier].name.line(source);
+            let message = format!("`{name}` is declared twice");
+            return Err(Problem::new(declaration.name, message)
+                .hint(format!("it is first declared on line {line}")));
+        }
+    }
+    for declaration in declarations {
+        // an element by itself beside the whole array would be two variables of one name
+        let base = declaration
+            .label
+            .strip_suffix(']')
+            .and_then(|name| name.rsplit_once('['));
+        if let Some((base, _)) = base
+            && let Some(&whole) = by_name.get(base)
+        {
+            let message = format!("`{}` is declared twice", declaration.label);
+            let line = declarations[whole].name.line(source);
+            return Err(Problem::new(declaration.name, message)
+                .hint(format!("`{base}` is declared as a whole on line {line}")));
+        }
+    }
+    Ok(by_name)
+}
+
+/// Budgets of what declarations are written out to.
+struct Sizes {
+    scalars: Budget,
+    text: Budget,
+}
+
+impl Sizes {
+    fn new() -> Self {
+        Self {
+            scalars: Budget::new(MAX_SCALARS, "scalar variables and parameters"),
+            text: Budget::new(MAX_TEXT, "bytes of names, units and descriptions"),
+        }
+    }
+
+    fn charge(
+        &self,
+        context: &Context<'_>,
+        dims: &[usize],
+        declaration: &Declaration,
+    ) -> Result<()> {
+        // A size beside a size of zero counts as well: slices walk along it.
+        let walked: Vec<usize> = dims.iter().map(|&dim| dim.max(1)).collect();
+        let count = element_count(&walked).unwrap_or(u64::MAX);
+        self.scalars.charge(count, declaration.name)?;
+        let description = declaration.description.as_ref().map_or(0, String::len);
+        let is_text = |id| matches!(context.ast.expression(id).kind, Kind::Text);
+        let texts = declaration
+            .attributes
+            .iter()
+            .filter_map(|attribute| attribute.value);
+        let texts = texts
+            .filter(|&id| is_text(id))
+            .map(|id| context.ast.expression(id).span);
+        let length: u64 = texts
+            .chain([declaration.name])
+            .map(|span| u64::from(span.end.saturating_sub(span.start)))
+            .sum();
+        let each = length.saturating_add(description as u64);
+        self.text
+            .charge(count.saturating_mul(each), declaration.name)
     }
 }
 
