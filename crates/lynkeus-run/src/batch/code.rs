@@ -2,7 +2,7 @@
 
 use lynkeus_expr::lanes::Lanes;
 use lynkeus_expr::{Evaluator, Tape};
-use lynkeus_native::{Function, Sweep, Sweeper};
+use lynkeus_native::Function;
 
 use super::split::Divided;
 use super::{LANES, Lane};
@@ -17,7 +17,7 @@ const LARGEST: usize = 200_000;
 pub(crate) struct Code {
     tapes: Divided,
     common: Option<Function<LANES>>,
-    own: Option<Sweep<LANES>>,
+    own: Option<Function<LANES>>,
     /// from the outputs of one group of lanes to those of the next
     spacing: usize,
 }
@@ -27,7 +27,7 @@ impl Code {
         let is_wanted = |tape: &Tape| Backend::compiles_at_once() && tape.len() <= LARGEST;
         let compiled = is_wanted(&tapes.common).then(|| Function::compile(&tapes.common));
         let shared = tapes.common.outputs();
-        let sweep = is_wanted(&tapes.own).then(|| Sweep::compile(&tapes.own, shared, spacing));
+        let sweep = is_wanted(&tapes.own).then(|| Function::sweeping(&tapes.own, shared, spacing));
         Self {
             common: compiled.flatten(),
             own: sweep.flatten(),
@@ -47,20 +47,17 @@ impl Code {
     }
 
     pub fn runner(&self) -> Runner {
-        let engine = |tape: &Tape| Box::new(tape.evaluator_in(Lanes));
+        let engine = |tape: &Tape, compiled: &Option<Function<LANES>>| match compiled {
+            Some(function) => Engine::Native(function.evaluator()),
+            None => Engine::Interpreted(Box::new(tape.evaluator_in(Lanes))),
+        };
         Runner {
             spacing: self.spacing,
             own_inputs: self.tapes.own.inputs() - self.shared(),
             outputs: self.tapes.own.outputs(),
             scratch: vec![[0.0; LANES]; self.tapes.own.inputs()],
-            common: match &self.common {
-                Some(function) => Common::Native(function.evaluator()),
-                None => Common::Interpreted(engine(&self.tapes.common)),
-            },
-            own: match &self.own {
-                Some(sweep) => Own::Native(sweep.evaluator()),
-                None => Own::Interpreted(engine(&self.tapes.own)),
-            },
+            common: engine(&self.tapes.common, &self.common),
+            own: engine(&self.tapes.own, &self.own),
         }
     }
 }
@@ -68,8 +65,8 @@ impl Code {
 /// Runs one [`Code`] again and again, without allocating.
 #[derive(Debug)]
 pub(crate) struct Runner {
-    common: Common,
-    own: Own,
+    common: Engine,
+    own: Engine,
     spacing: usize,
     own_inputs: usize,
     outputs: usize,
@@ -77,14 +74,8 @@ pub(crate) struct Runner {
 }
 
 #[derive(Debug)]
-enum Common {
+enum Engine {
     Native(lynkeus_native::Evaluator<LANES>),
-    Interpreted(Box<Evaluator<Lanes<LANES>>>),
-}
-
-#[derive(Debug)]
-enum Own {
-    Native(Sweeper<LANES>),
     Interpreted(Box<Evaluator<Lanes<LANES>>>),
 }
 
@@ -95,8 +86,8 @@ impl Runner {
         let count = table.len() / LANES;
         let values = &mut self.scratch[..count];
         match &mut self.common {
-            Common::Native(native) => native.eval(inputs, values),
-            Common::Interpreted(tape) => tape.eval(inputs, values),
+            Engine::Native(native) => native.eval(inputs, values),
+            Engine::Interpreted(tape) => tape.eval(inputs, values),
         }
         for (instant, places) in table.chunks_exact_mut(count.max(1)).enumerate() {
             for (place, value) in places.iter_mut().zip(values.iter()) {
@@ -108,8 +99,8 @@ impl Runner {
     /// The outputs of every group of lanes, from what is shared and what is its own.
     pub fn sweep(&mut self, groups: usize, shared: &[Lane], inputs: &[Lane], outputs: &mut [Lane]) {
         match &mut self.own {
-            Own::Native(native) => native.eval(groups, shared, inputs, outputs),
-            Own::Interpreted(tape) => {
+            Engine::Native(native) => native.sweep(groups, shared, inputs, outputs),
+            Engine::Interpreted(tape) => {
                 let arguments = &mut self.scratch[..shared.len() + self.own_inputs];
                 arguments[..shared.len()].copy_from_slice(shared);
                 for group in 0..groups {
